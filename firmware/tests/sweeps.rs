@@ -5,8 +5,8 @@ use mock_board::sweep::{
 };
 
 /// Runs `case` for so many seeds; returns what each gives.
-fn sweep<T>(seeds: u64, case: impl Fn(u64, bool) -> Result<T, String>) -> Vec<T> {
-    let case = |seed| case(seed, false).unwrap_or_else(|why| panic!("seed {seed}: {why}"));
+fn sweep<T>(seeds: u64, case: impl Fn(u64) -> Result<T, String>) -> Vec<T> {
+    let case = |seed| case(seed).unwrap_or_else(|why| panic!("seed {seed}: {why}"));
     (0..seeds).map(case).collect()
 }
 
@@ -18,7 +18,7 @@ fn counts<const N: usize>(outcomes: &[usize]) -> [usize; N] {
 #[test]
 fn power_lost_in_an_upload_or_an_undo_leaves_the_old_or_the_new_model() {
     for job in [Job::Upload, Job::Undo] {
-        let cuts: u64 = sweep(48, |seed, it| cut_model(job, seed, it)).iter().sum();
+        let cuts: u64 = sweep(48, |seed| cut_model(job, seed)).iter().sum();
         assert!(cuts > 1000, "{job:?}: {cuts}");
     }
 }

@@ -80,7 +80,6 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             own("board", &["board"]),
             own("mutants", &[&["board", "--mutants"], &MUTANTS[..]].concat()),
             own("torture", &["torture", "--short"]),
-            own("self-test", &["torture", "--self-test"]),
         ],
     ]
 }

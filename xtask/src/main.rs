@@ -72,7 +72,9 @@ enum Command {
     /// Answer a question about the sensor, the paper's method or a part of Taxel: `study --help`.
     #[command(disable_help_flag = true)]
     Study(Rest),
-    /// Put every promise of reliability to the test, and print a table: `torture --help`.
+    /// Put every promise of reliability to the test, and print a table: `torture --help`. As the first option, --self-test
+    /// builds a copy of the product with planted faults instead, and fails unless each line sees those that proof/mutants
+    /// names it for.
     #[command(disable_help_flag = true)]
     Torture(Rest),
     /// Plant faults in a copy of the product, those of these names or all of proof/mutants, and tell which test and which

@@ -17,7 +17,7 @@ use std::thread;
 use crate::process::Outcome;
 use copy::{Copy, folder};
 use list::Fault;
-use programs::{Switch, Test, batches, full_name, red, trace};
+use programs::{Switch, Test, batches, full_name, lines, red, trace};
 use score::Found;
 
 /// Tests that run at the same time.
@@ -88,6 +88,67 @@ pub fn run(arguments: &[&str]) -> Outcome {
     } else {
         Err(format!("found before and not now, or found though equivalent: {}", worse.join(", ")))
     }
+}
+
+/// Lines of torture that no fault of the lists can turn red, and why.
+const WITHOUT_FAULT: [(&str, &str); 1] =
+    [("ram-flip", "its device runs in QEMU, whose image is not built with faults")];
+
+/// Runs the lines of torture that faults name, or those of these `names` alone: each without a fault, which it must
+/// stand, and with each of its faults, of which it must turn red.
+///
+/// # Errors
+/// The copy does not build, a line misses a fault, or it has none.
+pub fn self_test(names: &[&str]) -> Outcome {
+    let faults = list::load(false)?;
+    let copy = copy::build(&faults, &[copy::TORTURE], true)?;
+    let mut lines = lines(&copy)?;
+    let is_chosen =
+        |line: &str| names.is_empty() || names.iter().any(|name| line.starts_with(name));
+    for (fault, line) in
+        faults.iter().flat_map(|fault| fault.torture.iter().map(move |it| (fault, it)))
+    {
+        if !lines.iter().any(|known| known.name == *line) {
+            return Err(format!("{}: no line of torture is called `{line}`", fault.name));
+        }
+    }
+    lines.retain(|line| is_chosen(&line.name));
+    // Number 0 is no fault.
+    let mut cases = Vec::new();
+    let mut bad = Vec::new();
+    for line in &lines {
+        let own = faults.iter().enumerate().filter(|(_, fault)| fault.torture.contains(&line.name));
+        let numbers: Vec<usize> = own.map(|(index, _)| index + 1).collect();
+        if !numbers.is_empty() {
+            cases.push((line, 0));
+        } else if !WITHOUT_FAULT.iter().any(|(name, _)| *name == line.name) {
+            bad.push(format!("{} has no fault to find", line.name));
+        }
+        cases.extend(numbers.into_iter().map(|number| (line, number)));
+    }
+    let outcomes = shared(cases.len(), |place, worker| {
+        let (line, number) = cases[place];
+        let is_red = !red(&copy, &[line], &Switch::On(number), worker)?.is_empty();
+        let fault = number.checked_sub(1).map_or("no fault", |index| &faults[index].name);
+        let verdict = match (number, is_red) {
+            (0, false) => "kept",
+            (0, true) => "BROKEN",
+            (_, true) => "found",
+            (_, false) => "MISSED",
+        };
+        println!("{verdict:<8}{:<24}{fault}", line.name);
+        Ok::<_, String>((number == 0) == is_red)
+    });
+    for ((line, number), is_bad) in cases.iter().zip(outcomes) {
+        if is_bad? {
+            let fault = number.checked_sub(1).map_or("no fault", |index| &faults[index].name);
+            bad.push(format!("{} with {fault}", line.name));
+        }
+    }
+    for (line, why) in WITHOUT_FAULT.iter().filter(|(line, _)| is_chosen(line)) {
+        println!("none    {line:<24}{why}");
+    }
+    if bad.is_empty() { Ok(()) } else { Err(format!("not as it should be: {}", bad.join("; "))) }
 }
 
 /// Runs `work` for each of so many places with [`WORKERS`], and returns the results in order.

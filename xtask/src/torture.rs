@@ -4,6 +4,7 @@ use std::process::{ExitCode, ExitStatus, Stdio};
 
 use crate::emulate::qemu;
 use crate::firmware::{QEMU, build_image};
+use crate::mutants;
 use crate::process::{Outcome, PROOF, cargo, run as run_command, status, target_dir};
 use crate::toolchain::{Toolchain, elf};
 
@@ -15,7 +16,12 @@ const RUN: [&str; 6] = ["run", "--manifest-path", PROOF, "--package", "torture",
 ///
 /// Returns the exit status of the torture, which says itself what is wrong: 2 for options or names that it does not
 /// know. These are refused before the rest is built.
+///
+/// With `--self-test` it runs lines on a product with faults instead (`proof/mutants/README.md`).
 pub fn run(options: &[&str]) -> Outcome<ExitCode> {
+    if let Some(names) = options.strip_prefix(&["--self-test"]) {
+        return mutants::self_test(names).map(|()| ExitCode::SUCCESS);
+    }
     let mut torture = cargo(&RUN);
     torture.args(options);
     if options.iter().any(|option| ["--help", "-h", "--list"].contains(option)) {

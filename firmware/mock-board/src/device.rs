@@ -38,8 +38,6 @@ pub struct Device {
     pub cut_after: Option<u64>,
     /// Power that is cut: that of the slots, unless it is replaced by the key's.
     pub supply: Rc<RefCell<Supply>>,
-    /// Whether a fault is planted: what a start writes to the key's flash is lost.
-    pub loses_key_writes: bool,
     memory: Box<Memory>,
 }
 
@@ -53,7 +51,6 @@ impl Device {
             key: Flash::without_key(),
             settings: SharedSettings::default(),
             weights: vec![0; 1024],
-            loses_key_writes: false,
             memory: Box::new(Memory::new()),
         }
     }
@@ -84,9 +81,6 @@ impl Device {
         let mut board = Board::with_settings(&self.settings);
         board.key = self.key.clone();
         let mut bench = Bench::on(board, &mut self.memory, quiet());
-        if self.loses_key_writes {
-            bench.app.platform().key = self.key.clone();
-        }
         let done = work(&mut bench, &mut self.slots, &mut self.weights);
         self.key = bench.app.platform().key.clone();
         done

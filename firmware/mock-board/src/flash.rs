@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use firmware::seal::Key;
 use firmware::settings::PAGE_BYTES;
-use firmware::store::{DeviceKey, FlashError, RECORD_BYTES, Slot};
+use firmware::store::{DeviceKey, FlashError, Slot};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -154,8 +154,6 @@ pub struct Flash {
     torn: Torn,
     /// Words that have worn out.
     pub worn: Vec<Worn>,
-    /// Whether a write reads back what it wrote.
-    pub reads_back: bool,
     /// Whether all weak bits of a word read alike at every other start: the word is the old or the new one.
     pub swings: bool,
     /// Whether erases fail at their end.
@@ -184,7 +182,6 @@ impl Flash {
             supply: supply.clone(),
             torn,
             worn: Vec::new(),
-            reads_back: true,
             swings: false,
             fails_to_erase: false,
             slow: None,
@@ -267,12 +264,6 @@ impl Flash {
     /// Flips `bits` of word `place`, as an old cell does.
     pub fn decay(&mut self, place: usize, bits: u32) {
         self.cells.words[place] ^= bits;
-    }
-
-    /// Makes the first record's place look as if it was never written.
-    pub fn forget_record(&mut self) {
-        let record = self.cells.words.len() - RECORD_BYTES / 4;
-        self.cells.words[record..].fill(u32::MAX);
     }
 
     fn wait(&self, erases: u32, words: u32) {
@@ -401,7 +392,7 @@ impl Slot for Flash {
             for worn in worn {
                 *word |= worn.ones;
             }
-            if *word != wanted && self.reads_back {
+            if *word != wanted {
                 return Err(FlashError);
             }
         }

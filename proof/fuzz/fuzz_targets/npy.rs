@@ -4,5 +4,5 @@ use hostile::target;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    (target("npy").check)(bytes, false);
+    (target("npy").check)(bytes);
 });

@@ -4,5 +4,5 @@ use hostile::target;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    (target("scene").check)(bytes, false);
+    (target("scene").check)(bytes);
 });

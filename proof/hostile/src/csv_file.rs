@@ -6,17 +6,14 @@ use std::path::Path;
 use taxel_data::data_file::DataFile;
 
 /// Bytes of a file; the first byte says whether the first line is a header whatever it holds.
-pub fn check(bytes: &[u8], is_planted: bool) -> bool {
+pub fn check(bytes: &[u8]) -> bool {
     let Some((has_header, bytes)) = bytes.split_first() else { return false };
     let Ok(file) = DataFile::parse(Path::new("f.csv"), bytes, has_header % 2 == 1) else {
         return false;
     };
     let columns = file.header.len();
-    let mut lines: Vec<(u64, Vec<f64>)> =
+    let lines: Vec<(u64, Vec<f64>)> =
         (0..file.lines()).map(|line| (file.line_number(line), file.row(line).to_vec())).collect();
-    if is_planted {
-        lines[0].1[columns - 1] += 1.0;
-    }
     assert!(lines.is_sorted_by(|one, next| one.0 < next.0), "line numbers that do not rise");
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let read: Vec<&[f64]> = lines.iter().map(|(_, values)| values.as_slice()).collect();

@@ -24,9 +24,7 @@ pub struct Target {
     /// Name, which is that of its corpus.
     pub name: &'static str,
     /// Gives bytes to the subject; returns whether the subject took them for sound. Panics where a promise is broken.
-    ///
-    /// With a fault planted, something that the subject said is spoilt before it is checked.
-    pub check: fn(bytes: &[u8], is_planted: bool) -> bool,
+    pub check: fn(bytes: &[u8]) -> bool,
 }
 
 /// All targets.
@@ -50,25 +48,20 @@ pub fn target(name: &str) -> Target {
 
 #[cfg(test)]
 mod tests {
-    use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::path::Path;
 
     use super::*;
 
     #[test]
-    fn every_target_holds_on_its_corpus_and_finds_what_is_planted() {
+    fn every_target_holds_on_its_corpus_and_takes_some_of_it() {
         let corpora = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus");
         for target in TARGETS {
             let seeds: Vec<Vec<u8>> = std::fs::read_dir(corpora.join(target.name))
                 .unwrap()
                 .map(|entry| std::fs::read(entry.unwrap().path()).unwrap())
                 .collect();
-            let sound = seeds.iter().filter(|seed| (target.check)(seed, false)).count();
+            let sound = seeds.iter().filter(|seed| (target.check)(seed)).count();
             assert!(sound > 0, "{}: no seed is sound", target.name);
-            let finds = |seed: &Vec<u8>| {
-                catch_unwind(AssertUnwindSafe(|| (target.check)(seed, true))).is_err()
-            };
-            assert!(seeds.iter().any(finds), "{}: what is planted is not found", target.name);
         }
     }
 }

@@ -29,12 +29,9 @@ const CHUNK: usize = 60;
 const NUMBER: u16 = 9;
 
 /// Steps, as bytes.
-pub fn check(bytes: &[u8], is_planted: bool) -> bool {
+pub fn check(bytes: &[u8]) -> bool {
     let models = [blob(3, 4), blob(4, 3), blob(5, 6)];
     let mut slots = Flash::slots_with(&models[0]);
-    if is_planted {
-        slots[0].decay(20, 1);
-    }
     let settings = SharedSettings::default();
     let mut memory = Memory::new();
     let mut steps = Steps(bytes);

@@ -22,6 +22,32 @@ const MOST_TRAINING_FRAMES: usize = 10_000;
 /// Most frames that a limit is computed on.
 const MOST_LIMIT_FRAMES: usize = 40;
 
+/// Results at one noise level.
+pub trait AtNoise {
+    /// Noise level p, as a fraction.
+    fn noise_level(&self) -> f64;
+    fn decoders(&self) -> &[DecoderErrors];
+    fn limit(&self) -> &LimitSummary;
+}
+
+/// Makes results with these fields results at a noise level.
+macro_rules! at_noise {
+    ($level:ty) => {
+        impl crate::level::AtNoise for $level {
+            fn noise_level(&self) -> f64 {
+                self.noise_level
+            }
+            fn decoders(&self) -> &[DecoderErrors] {
+                &self.decoders
+            }
+            fn limit(&self) -> &LimitSummary {
+                &self.limit
+            }
+        }
+    };
+}
+pub(crate) use at_noise;
+
 /// A scene at one noise level, with its test frames.
 pub(super) struct NoiseLevel {
     /// Scene at this level, whose networks decode and are trained as the paper's: K-means, then output weights.

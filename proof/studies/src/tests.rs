@@ -38,7 +38,11 @@ fn two_per_cent_of_drift_cost_readings_a_factor_and_relative_inputs_nothing() {
     scene.world.read_rows = vec![3];
     (scene.training.frames, scene.training.test_frames) = (8000, 8000);
     let result = drift::measure(&scene, 0.02, &Silent).unwrap();
-    let line = |decoder, relative, with_drift| result.line(decoder, relative, with_drift).unwrap();
+    let line = |decoder: &str, relative: bool, with_drift: bool| {
+        let inputs = |it: &Line| (it.relative_inputs, it.trained_with_drift);
+        let mut lines = result.lines.iter().filter(|it| it.decoder == decoder);
+        lines.find(|it| inputs(it) == (relative, with_drift)).unwrap()
+    };
     let ratio = |line: &Line| z(&line.drifted) / z(&line.undrifted);
     for decoder in [NETWORK, linear::NAME] {
         let (readings, relative) = (line(decoder, false, false), line(decoder, true, false));

@@ -1,4 +1,4 @@
-//! How much a test does: from which seed on, for how long, and whether with a planted fault.
+//! How much a test does: from which seed on, and for how long.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -14,7 +14,6 @@ use crate::found::Found;
 pub struct Effort {
     seed: u64,
     end: Instant,
-    planted: bool,
 }
 
 /// The worst case so far.
@@ -23,22 +22,18 @@ struct Worst {
     value: f64,
     seed: u64,
     note: String,
+    refused: u64,
 }
 
 impl Effort {
     /// Effort from `seed` on, for `time` from now.
-    pub fn new(seed: u64, time: Duration, planted: bool) -> Self {
-        Self { seed, end: Instant::now() + time, planted }
+    pub fn new(seed: u64, time: Duration) -> Self {
+        Self { seed, end: Instant::now() + time }
     }
 
     /// Seed of the first case.
     pub fn seed(&self) -> u64 {
         self.seed
-    }
-
-    /// Whether the test must plant a fault, and find it.
-    pub fn is_planted(&self) -> bool {
-        self.planted
     }
 
     /// Whether the time for further cases is over.
@@ -53,12 +48,22 @@ impl Effort {
     /// The caller compares the worst value with `bound`, both in `unit`.
     pub fn worst(
         &self,
-        (least, most): (u64, u64),
-        (bound, unit): (f64, &'static str),
+        cases: (u64, u64),
+        bound: (f64, &'static str),
         case: impl Fn(u64) -> Result<f64, String> + Sync,
     ) -> Found {
+        self.worst_of_accepted(cases, bound, |seed| case(seed).map(Some))
+    }
+
+    /// As [`Self::worst`], for cases that the product may refuse, which have no value.
+    pub fn worst_of_accepted(
+        &self,
+        (least, most): (u64, u64),
+        (bound, unit): (f64, &'static str),
+        case: impl Fn(u64) -> Result<Option<f64>, String> + Sync,
+    ) -> Found {
         let _quiet = Quiet::begin();
-        let mut worst = Worst { value: f64::NEG_INFINITY, seed: self.seed, note: String::new() };
+        let mut worst = Worst { seed: self.seed, ..Worst::none() };
         let mut cases = 0;
         while cases < least || (cases < most && !self.is_over()) {
             let several =
@@ -66,15 +71,26 @@ impl Effort {
             let first = self.seed.wrapping_add(cases);
             let seeds = (0..several).into_par_iter().map(|offset| first.wrapping_add(offset));
             let tested = seeds.map(|seed| tested(seed, &case));
-            worst = tested.reduce(|| worst.clone(), worse);
+            worst = worse(worst, tested.reduce(Worst::none, worse));
             cases += several;
         }
-        let Worst { value, seed, note } = worst;
-        Found { cases, worst: value, bound, unit, seed, note }
+        let Worst { value, seed, note, refused } = worst;
+        Found { cases, refused, worst: value, bound, unit, seed, note }
     }
 }
 
-fn tested(seed: u64, case: impl Fn(u64) -> Result<f64, String>) -> Worst {
+impl Worst {
+    /// The worst of no case.
+    fn none() -> Self {
+        Self::new(f64::NEG_INFINITY, u64::MAX, String::new())
+    }
+
+    fn new(value: f64, seed: u64, note: String) -> Self {
+        Self { value, seed, note, refused: 0 }
+    }
+}
+
+fn tested(seed: u64, case: impl Fn(u64) -> Result<Option<f64>, String>) -> Worst {
     let outcome = panic::catch_unwind(AssertUnwindSafe(|| case(seed)));
     let told = |cause: Box<dyn Any + Send>| {
         let place = PLACE.take();
@@ -83,16 +99,18 @@ fn tested(seed: u64, case: impl Fn(u64) -> Result<f64, String>) -> Worst {
     };
     match outcome.unwrap_or_else(told) {
         // NaN is worse than any number.
-        Ok(value) if value.is_nan() => Worst { value: f64::INFINITY, seed, note: "NaN".to_owned() },
-        Ok(value) => Worst { value, seed, note: String::new() },
-        Err(note) => Worst { value: f64::INFINITY, seed, note },
+        Ok(Some(value)) if value.is_nan() => Worst::new(f64::INFINITY, seed, "NaN".to_owned()),
+        Ok(Some(value)) => Worst::new(value, seed, String::new()),
+        Ok(None) => Worst { refused: 1, ..Worst::none() },
+        Err(note) => Worst::new(f64::INFINITY, seed, note),
     }
 }
 
 /// The worse of two cases; of equals that of the lower seed, so that the number of cores does not matter.
 fn worse(one: Worst, other: Worst) -> Worst {
     let is_other = other.value > one.value || (other.value == one.value && other.seed < one.seed);
-    if is_other { other } else { one }
+    let refused = one.refused + other.refused;
+    Worst { refused, ..if is_other { other } else { one } }
 }
 
 fn said(cause: &(dyn Any + Send)) -> &str {
@@ -143,7 +161,7 @@ mod tests {
         panic::set_hook(Box::new(|_| {
             PRINTED.fetch_add(1, Ordering::Relaxed);
         }));
-        let effort = Effort::new(1, Duration::ZERO, false);
+        let effort = Effort::new(1, Duration::ZERO);
         let found = effort.worst((3, 3), (0.0, "broken"), |seed| {
             assert_ne!(seed, 2, "the second case breaks");
             Ok(0.0)

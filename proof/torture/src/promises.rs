@@ -20,21 +20,16 @@ mod emulated;
 mod authenticity;
 mod load;
 
-mod size_bombs;
 mod hostile_bytes;
-mod files;
-mod interruptions;
 
 use crate::promise::Promise;
 
-/// Every promise: numbers, sensor, device, hostile input, files.
+/// Every promise: numbers, sensor, device, hostile input.
 pub const PROMISES: &[Promise] = &[
     exponentials::POLYNOMIAL,
     exponentials::LIBM,
     exponentials::MICROMATH,
     exponentials::EXP2,
-    exponentials::MONOTONE,
-    exponentials::ANY_NUMBER,
     inference::F32,
     inference::FIXED16,
     training::EXTREMES,
@@ -44,9 +39,7 @@ pub const PROMISES: &[Promise] = &[
     rls::WITHOUT_FORGETTING,
     forward::TOUCHING,
     sensor::NAMED,
-    sensor::NOTICED,
     sensor::SILENT,
-    sensor::FILLED,
     flips::ONE,
     flips::TWO,
     power::UPLOAD,
@@ -61,9 +54,6 @@ pub const PROMISES: &[Promise] = &[
     load::FRAMES,
     load::LINK,
     load::WATCHDOG,
-    size_bombs::SIZE_BOMBS,
     hostile_bytes::HOSTILE_BYTES,
     hostile_bytes::RESIGNED_BLOBS,
-    files::FAULTS,
-    interruptions::JOBS,
 ];

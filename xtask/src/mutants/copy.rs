@@ -25,7 +25,7 @@ pub struct Copy {
 }
 
 /// Package of the lines of torture.
-const TORTURE: &str = "torture";
+pub const TORTURE: &str = "torture";
 
 /// Folder of everything that this command writes.
 pub fn folder() -> PathBuf {

@@ -35,6 +35,9 @@ pub struct Fault {
     pub why: String,
     /// Reason why nobody can observe it.
     pub equivalent: Option<String>,
+    /// Lines of torture that must see it, each by itself.
+    #[serde(default)]
+    pub torture: Vec<String>,
     /// The list's name.
     #[serde(skip)]
     pub list: String,

@@ -43,23 +43,26 @@ pub enum Switch<'a> {
 /// All tests of the copy, not yet traced.
 pub fn all(copy: &Copy) -> Outcome<Vec<Test>> {
     let mut tests = Vec::new();
-    let test = |program, name: &str| Test {
-        program,
-        name: name.to_owned(),
-        ms: 0,
-        reaches: BTreeSet::new(),
-    };
     for (place, (_, program)) in copy.programs.iter().enumerate() {
         for line in said(Command::new(program).args(["--list", "--format=terse"]))?.lines() {
             tests.extend(line.strip_suffix(": test").map(|name| test(Some(place), name)));
         }
     }
     if copy.has_torture {
-        for line in said(Command::new(&copy.torture).arg("--list"))?.lines() {
-            tests.extend(line.split_whitespace().next().map(|name| test(None, name)));
-        }
+        tests.extend(lines(copy)?);
     }
     Ok(tests)
+}
+
+/// All lines of torture, not yet traced.
+pub fn lines(copy: &Copy) -> Outcome<Vec<Test>> {
+    let listed = said(Command::new(&copy.torture).arg("--list"))?;
+    let names = listed.lines().filter_map(|line| line.split_whitespace().next());
+    Ok(names.map(|name| test(None, name)).collect())
+}
+
+fn test(program: Option<usize>, name: &str) -> Test {
+    Test { program, name: name.to_owned(), ms: 0, reaches: BTreeSet::new() }
 }
 
 fn said(command: &mut Command) -> Outcome<String> {

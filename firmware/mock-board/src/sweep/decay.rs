@@ -98,12 +98,9 @@ impl Case {
 ///
 /// # Errors
 /// What is wrong.
-pub fn abort_and_decay(seed: u64, planted: bool) -> Result<usize, String> {
+pub fn abort_and_decay(seed: u64) -> Result<usize, String> {
     let mut case = Case::new(seed)?;
     let how = case.end_upload();
-    if planted {
-        case.device.slots[0].forget_record(); // so that nothing tells that an upload has begun
-    }
     let (old, new) = (crc_of(&case.old), crc_of(&case.new));
     let before = case.device.restart();
     let in_force = if before == Some(new) { case.new.clone() } else { case.old.clone() };
@@ -136,7 +133,7 @@ pub fn abort_and_decay(seed: u64, planted: bool) -> Result<usize, String> {
 ///
 /// # Errors
 /// What is wrong.
-pub fn upload_to_worn(seed: u64, planted: bool) -> Result<usize, String> {
+pub fn upload_to_worn(seed: u64) -> Result<usize, String> {
     let mut case = Case::new(seed)?;
     let spare = 1 - case.slot_of(&case.old)?;
     // A bit or several that no erase sets, or that no programming clears; most where the upload writes.
@@ -151,7 +148,6 @@ pub fn upload_to_worn(seed: u64, planted: bool) -> Result<usize, String> {
         let worn = Worn { place: place as usize, zeros, ones };
         case.device.slots[spare].worn.push(worn);
     }
-    case.device.slots[spare].reads_back = !planted;
     let cut = (case.below(4) == 0).then(|| case.below(60));
     let new = case.new.clone();
     case.device.cut_after = cut;

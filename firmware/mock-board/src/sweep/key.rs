@@ -18,8 +18,8 @@ const OTHER: Key = [0xC7; KEY_BYTES];
 ///
 /// # Errors
 /// What is wrong, and where.
-pub fn cut_key(seed: u64, planted: bool) -> Result<u64, String> {
-    let mut case = Case::new(seed, planted);
+pub fn cut_key(seed: u64) -> Result<u64, String> {
+    let mut case = Case::new(seed);
     case.run()?;
     Ok(case.cuts)
 }
@@ -32,7 +32,7 @@ struct Case {
 }
 
 impl Case {
-    fn new(seed: u64, planted: bool) -> Self {
+    fn new(seed: u64) -> Self {
         let supply = Supply::new(seed);
         let mut flash = Flash::erased(Flash::KEY_BYTES / 4, &supply, Torn::new(seed));
         flash.swings = true;
@@ -46,7 +46,7 @@ impl Case {
             flash.flash(0, bytemuck::cast_slice(&code.collect::<Vec<u32>>()));
         }
         let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
-        (device.key, device.supply, device.loses_key_writes) = (flash, supply, planted);
+        (device.key, device.supply) = (flash, supply);
         Self { seed, device, cuts: 0 }
     }
 

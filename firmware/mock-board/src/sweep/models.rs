@@ -23,8 +23,8 @@ const STARTS: usize = 3;
 ///
 /// # Errors
 /// What is wrong, and where.
-pub fn cut_model(job: Job, seed: u64, planted: bool) -> Result<u64, String> {
-    let mut case = Case::new(job, seed, planted);
+pub fn cut_model(job: Job, seed: u64) -> Result<u64, String> {
+    let mut case = Case::new(job, seed);
     case.run()?;
     Ok(case.cuts)
 }
@@ -35,18 +35,16 @@ struct Case {
     seed: u64,
     torn: Torn,
     device: Device,
-    /// Whether a fault is planted at each cut.
-    planted: bool,
     new: AlignedBytes,
     next: AlignedBytes,
     cuts: u64,
 }
 
 impl Case {
-    fn new(job: Job, seed: u64, planted: bool) -> Self {
+    fn new(job: Job, seed: u64) -> Self {
         let torn = Torn::new(seed);
         let device = device(seed, torn);
-        Self { job, seed, torn, device, planted, new: blob(2, 2), next: blob(7, 1), cuts: 0 }
+        Self { job, seed, torn, device, new: blob(2, 2), next: blob(7, 1), cuts: 0 }
     }
 
     fn run(&mut self) -> Result<(), String> {
@@ -61,7 +59,6 @@ impl Case {
         let first = (self.seed / (4 * Torn::COUNT as u64)).wrapping_mul(17) % operations;
         self.device.restore(&before);
         let _ = self.attempt(Some(first));
-        self.slip();
         self.cuts += 1;
         let place = format!("operation {first} of {operations}, {}", self.torn.name());
         let allowed = [Some(old), Some(new)];
@@ -82,7 +79,6 @@ impl Case {
             if !self.device.is_cut() {
                 break;
             }
-            self.slip();
             self.cuts += 1;
             let place = format!("{place}, then operation {second}");
             self.expect(&[in_force, Some(wanted)], &place)?;
@@ -102,7 +98,6 @@ impl Case {
             if !self.device.is_cut() {
                 break;
             }
-            self.slip();
             self.cuts += 1;
             self.expect(allowed, &format!("{place}, then operation {operation} of the start"))?;
         }
@@ -167,12 +162,5 @@ impl Case {
             return Err(format!("{place}: the next upload is {outcome:?}"));
         }
         self.expect(&[Some(crc_of(&mend))], &format!("{place}, mended")).map(drop)
-    }
-
-    /// If a fault is to be planted: the processor runs on while the voltage falls, and writes a wild word to each slot.
-    fn slip(&mut self) {
-        if self.planted {
-            self.device.slots.iter_mut().for_each(|slot| slot.decay(6, 1));
-        }
     }
 }

@@ -81,11 +81,11 @@ fn attack(seed: u64, key: &Key) -> Attack {
 }
 
 /// Attacks a device by a model that its key's owner has not sealed: it must be refused, and a genuine one must come into
-/// force then. With a planted fault the attacker has the key.
+/// force then.
 ///
 /// # Errors
 /// What is wrong.
-pub fn forge(seed: u64, planted: bool) -> Result<f64, String> {
+pub fn forge(seed: u64) -> Result<f64, String> {
     let key: Key = std::array::from_fn(|i| (seed.wrapping_mul(31) >> (i % 8)) as u8 ^ i as u8);
     let mut device = Device::new(Flash::slots());
     device.key = Flash::with_key(&key);
@@ -95,10 +95,7 @@ pub fn forge(seed: u64, planted: bool) -> Result<f64, String> {
         if taken == confirmed(blob) { Ok(()) } else { Err(format!("a genuine model: {taken:?}")) }
     };
     genuine(&mut device, VERSION, &first)?;
-    let mut attack = attack(seed, &key);
-    if planted {
-        attack.seal = Some(Seal::new(&key, VERSION + 1, &attack.blob));
-    }
+    let attack = attack(seed, &key);
     let mut steps = confirmed_steps(&attack.blob, attack.seal);
     let chunks = steps.len() - 2;
     steps.drain(chunks - attack.lost..chunks);

@@ -22,8 +22,8 @@ const STRIDE: u64 = 16;
 ///
 /// # Errors
 /// What is wrong, and where.
-pub fn cut_settings(seed: u64, planted: bool) -> Result<u64, String> {
-    let mut case = Case::new(seed, planted)?;
+pub fn cut_settings(seed: u64) -> Result<u64, String> {
+    let mut case = Case::new(seed)?;
     case.run()?;
     Ok(case.cuts)
 }
@@ -38,19 +38,18 @@ struct Case {
     /// What is kept before the cut.
     old: Contents,
     cuts: u64,
-    planted: bool,
 }
 
 impl Case {
     /// Pages after some settings were kept, up to several exchanges of the pages. In half of the cases the next one leads
     /// to an exchange.
-    fn new(seed: u64, planted: bool) -> Result<Self, String> {
+    fn new(seed: u64) -> Result<Self, String> {
         let supply = Supply::new(seed);
         let torn = Torn::new(seed);
         let page = || Flash::erased(PAGE_BYTES / 4, &supply, torn);
         let settings = SharedSettings::in_pages([page(), page()]);
         let random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut case = Self { random, supply, settings, old: [None, None, None], cuts: 0, planted };
+        let mut case = Self { random, supply, settings, old: [None, None, None], cuts: 0 };
         let times = case.below(60);
         case.keep_some(times)?;
         if seed / Torn::COUNT as u64 % 2 == 1 {
@@ -158,10 +157,6 @@ impl Case {
         let kept = self.settings.keep_bytes(setting, bytes);
         let gone = self.supply.borrow().gone;
         assert!(kept.is_ok() || gone, "{setting:?}: {kept:?}");
-        if self.planted && gone {
-            // The processor runs on while the voltage falls, and writes a wild word to each page.
-            self.settings.0.borrow_mut().pages().iter_mut().for_each(|page| page.decay(1, 0xFFFF));
-        }
         gone
     }
 

@@ -1,4 +1,5 @@
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
 use std::fs::{self, Permissions};
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -93,6 +94,39 @@ fn whichever_step_fails_files_are_whole_and_no_temporary_stays() {
         };
         assert_eq!(text, [metrics, model, "notes old", "table old"], "{step}");
     }
+}
+
+#[test]
+fn whenever_the_program_is_killed_or_the_power_goes_files_are_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = |text: &'static [u8]| [("model", text), ("metrics", text), ("table", text)];
+    SET.write(folder.path(), &all(b"old")).unwrap();
+    // A disk forgets what was written and not made safe.
+    let (path, mut forgotten) = (folder.path().to_path_buf(), BTreeSet::new());
+    let steps = Rc::new(Cell::new(0));
+    let seen = steps.clone();
+    let watcher = move |step: Step<'_>| {
+        for name in ["model", "metrics", "table"] {
+            let found = fs::read(path.join(name)).ok();
+            let is_missing = found.is_none() && name == "table" && matches!(step, Step::Sync(_));
+            let is_whole = found.is_some_and(|it| it == b"old" || it == b"new");
+            assert!(is_whole || is_missing, "{name} before {step:?}");
+            assert!(!forgotten.contains(&path.join(name)), "{name} is not safe before {step:?}");
+        }
+        match step {
+            Step::Write(file) => drop(forgotten.insert(file.to_path_buf())),
+            Step::Sync(file) => drop(forgotten.remove(file)),
+            Step::Rename(from, to) if forgotten.remove(from) => {
+                forgotten.insert(to.to_path_buf());
+            }
+            _ => {}
+        }
+        seen.set(seen.get() + 1);
+        Ok(())
+    };
+    watched(watcher, || SET.write(folder.path(), &all(b"new")[..2])).unwrap();
+    assert_eq!(contents(&folder).len(), 2);
+    assert!(steps.get() > 6, "{} steps", steps.get());
 }
 
 #[test]

@@ -123,7 +123,7 @@ fn group(name: &str, columns: &[usize], truth: &Table, estimate: &Table) -> Grou
         percentile_95: at(0.95),
         largest: at(1.0),
         histogram: Histogram::new(&errors, at(0.95)),
-        density: Density::of(&all),
+        density: Density::new(&all),
     }
 }
 

@@ -49,56 +49,55 @@ struct Summary {
     detections: Vec<Detection>,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
-    scene.require_inverse("confidence")?;
-    arguments.noise.apply(&mut scene)?;
-    scene.world.check_frames("--frames", arguments.frames)?;
-    scene.training.confidence = true;
-    let blob = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;
-    let model = blob.prepare(Exponential::default());
-    let own = f64::from(model.model().metadata().noise_level);
-    if (own - scene.world.noise.level).abs() > 1e-3 * scene.world.noise.level {
-        eprintln!(
-            "note: the model was trained for noise of {:.2} %, and is judged at the scene's {:.2} %; see --noise",
-            100.0 * own,
-            100.0 * scene.world.noise.level
-        );
+impl super::Study for Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        let mut scene = self.scene.load(common)?;
+        scene.require_inverse("confidence")?;
+        self.noise.apply(&mut scene)?;
+        scene.world.check_frames("--frames", self.frames)?;
+        scene.training.confidence = true;
+        let blob = scene_argument::model(self.model.as_deref(), &scene, &Terminal::new())?;
+        let model = blob.prepare(Exponential::default());
+        let own = f64::from(model.model().metadata().noise_level);
+        if (own - scene.world.noise.level).abs() > 1e-3 * scene.world.noise.level {
+            eprintln!(
+                "note: the model was trained for noise of {:.2} %, and is judged at the scene's {:.2} %; see --noise",
+                100.0 * own,
+                100.0 * scene.world.noise.level
+            );
+        }
+        scene.training.relative_inputs = model.model().metadata().relative_inputs;
+        let test = scene.dataset(&Synthesis::new(&scene.world), Stream::Test, self.frames);
+        let of_inputs = model.clone().of_inputs();
+        let Some((deviations, _)) = of_inputs.assess(&test.inputs.values) else {
+            let path = self.model.clone().unwrap_or_default();
+            let message = "this model has no confidence: train it with --confidence".into();
+            return Err(Error::Unfit { path, message });
+        };
+        let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
+        let estimates = of_inputs.decode_lines(&test.inputs.values);
+        let summary = Summary {
+            subject: scene.name.clone(),
+            seed: scene.world.seed,
+            model_crc: format!("{:08x}", model.model().crc()),
+            frames: self.frames,
+            coverage: coverage(&test.outputs, &estimates, &deviations, ratios_95),
+            detections: detections(&scene, &model, self.frames),
+        };
+        super::show(common, &summary, page_of)
     }
-    scene.training.relative_inputs = model.model().metadata().relative_inputs;
-    let test = scene.dataset(&Synthesis::new(&scene.world), Stream::Test, arguments.frames);
-    let of_inputs = model.clone().of_inputs();
-    let Some((deviations, _)) = of_inputs.assess(&test.inputs.values) else {
-        let path = arguments.model.clone().unwrap_or_default();
-        let message = "this model has no confidence: train it with --confidence".into();
-        return Err(Error::Unfit { path, message });
-    };
-    let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
-    let estimates = of_inputs.decode_lines(&test.inputs.values);
-    let summary = Summary {
-        subject: scene.name.clone(),
-        seed: scene.world.seed,
-        model_crc: format!("{:08x}", model.model().crc()),
-        frames: arguments.frames,
-        coverage: coverage(&test.outputs, &estimates, &deviations, ratios_95),
-        detections: detections(&scene, &model, arguments.frames),
-    };
-    if common.json {
-        return print::json(&summary);
-    }
+}
+
+fn page_of(summary: &Summary) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{} test frames of scene {}; intervals should cover 68.3 % and 95 % of the errors",
         summary.frames, summary.subject
     ));
     coverage_page::add(&mut page, &summary.coverage);
-    page.line("");
-    page.line(format_args!("{:<58} {:>7} {:>9}", "frames with", "frames", "novel"));
-    for found in &summary.detections {
-        page.line(format_args!(
-            "{:<58} {:>7} {:>7.2} %",
-            found.anomaly, found.frames, found.percent_novel
-        ));
+    page.line(format_args!("\n{:<58} {:>7} {:>9}", "frames with", "frames", "novel"));
+    for Detection { anomaly, frames, percent_novel } in &summary.detections {
+        page.line(format_args!("{anomaly:<58} {frames:>7} {percent_novel:>7.2} %"));
     }
-    page.print()
+    page
 }

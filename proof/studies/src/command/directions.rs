@@ -1,7 +1,5 @@
 //! Study `directions`: networks from deformations to readings, inverted, beside those that decode.
 
-use std::path::PathBuf;
-
 use crate::picture;
 use crate::question::directions::{
     self, DirectionsResult, FRAMES, INVERTED, INVERTED_DAMPED, Level,
@@ -9,12 +7,13 @@ use crate::question::directions::{
 use clap::Args;
 use host_sim::Result;
 use host_sim::metrics::{self, NETWORK};
-use taxel_data::output;
 use taxel_learn::decoders::{linear, mean};
 
 use host_sim::commands::progress::Terminal;
 use host_sim::commands::scene_argument::SceneArgument;
 use host_sim::commands::{Common, print};
+
+use super::Picture;
 
 /// Compare both directions of the paper's network: deformations to readings, inverted, and readings to deformations.
 ///
@@ -32,21 +31,18 @@ pub struct Arguments {
     /// Test frames.
     #[arg(short = 'n', long, value_name = "N", default_value_t = FRAMES)]
     frames: usize,
-    /// Picture to write: RMSE of z against the noise.
-    #[arg(short, long, value_name = "FILE.svg")]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    picture: Picture,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    if let Some(path) = &arguments.output {
-        print::check_output(path, &[arguments.scene.path()])?;
+impl super::Study for Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        self.picture.check(self.scene.path())?;
+        let scene = self.scene.load(common)?;
+        let result = directions::study(&scene, self.frames, &Terminal::new())?;
+        self.picture.write(|| picture::decoding_svg(&result))?;
+        super::show(common, &result, page_of)
     }
-    let scene = arguments.scene.load(common)?;
-    let result = directions::study(&scene, arguments.frames, &Terminal::new())?;
-    if let Some(path) = &arguments.output {
-        output::write_bytes(path, picture::decoding_svg(&result).as_bytes())?;
-    }
-    if common.json { print::json(&result) } else { page_of(&result).print() }
 }
 
 fn page_of(result: &DirectionsResult) -> print::Page {
@@ -60,7 +56,7 @@ fn page_of(result: &DirectionsResult) -> print::Page {
         result.centres,
         result.training_frames
     ));
-    let columns = super::noise_columns(result.levels.iter().map(|level| level.noise_level));
+    let columns = super::noise_columns(&result.levels);
     let line = |name: &str, of: &dyn Fn(&Level) -> Option<f64>| {
         super::line(name, result.levels.iter().map(of))
     };
@@ -73,18 +69,8 @@ fn page_of(result: &DirectionsResult) -> print::Page {
         page.line(line(decoder, &rmse));
     }
     page.line(line("network, to ideal", &|level| Some(level.ideal_rmse_ohm)));
-    let groups = result.levels.first().map_or(&[][..], |level| &level.decoders[0].errors);
-    for (place, group) in groups.iter().enumerate() {
-        let heading = format!("RMSE of {}, {}", group.group, group.unit);
-        page.line(format_args!("\n{heading:<18}{columns}"));
-        for decoder in [INVERTED, INVERTED_DAMPED, NETWORK, linear::NAME, mean::NAME] {
-            let rmse = |level: &Level| {
-                metrics::of_decoder(&level.decoders, decoder).get(place).map(|errors| errors.rmse)
-            };
-            page.line(line(decoder, &rmse));
-        }
-        page.line(line("limit", &|level| super::limit_of(&level.limit, place)));
-    }
+    let decoders = [INVERTED, INVERTED_DAMPED, NETWORK, linear::NAME, mean::NAME];
+    super::errors_by_noise(&mut page, &result.levels, &decoders);
     for (place, name) in [INVERTED, INVERTED_DAMPED].into_iter().enumerate() {
         let inversion = |level: &Level| level.inversions[place].clone();
         page.line(format_args!("\n{name:<18}{columns}"));
@@ -98,6 +84,6 @@ fn page_of(result: &DirectionsResult) -> print::Page {
          to ideal: against readings without noise. The time is that of all cores of this machine.\n\
          damped: within noise and the network's own error, which the training frames tell.",
     );
-    super::refusals(&mut page, result.levels.iter().map(|it| (it.noise_level, &it.limit)));
+    super::refusals(&mut page, &result.levels);
     page
 }

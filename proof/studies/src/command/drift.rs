@@ -29,15 +29,17 @@ pub struct Arguments {
     gain: Option<f64>,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
-    scene.require_inverse("drift")?;
-    arguments.noise.apply(&mut scene)?;
-    let of_scene = scene.world.drift.map_or(TYPICAL_GAIN, |drift| drift.gain);
-    let gain = arguments.gain.unwrap_or(of_scene);
-    check_gain("gain", gain).map_err(|bad| of_option(bad, &[("gain", "--gain")]))?;
-    let result = drift::measure(&scene, gain, &Terminal::new())?;
-    if common.json { print::json(&result) } else { page_of(&result).print() }
+impl super::Study for Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        let mut scene = self.scene.load(common)?;
+        scene.require_inverse("drift")?;
+        self.noise.apply(&mut scene)?;
+        let of_scene = scene.world.drift.map_or(TYPICAL_GAIN, |drift| drift.gain);
+        let gain = self.gain.unwrap_or(of_scene);
+        check_gain("gain", gain).map_err(|bad| of_option(bad, &[("gain", "--gain")]))?;
+        let result = drift::measure(&scene, gain, &Terminal::new())?;
+        super::show(common, &result, page_of)
+    }
 }
 
 fn page_of(result: &DriftResult) -> print::Page {

@@ -1,19 +1,18 @@
 //! Study `equations`: the sensor's equations as a decoder.
 
-use std::path::PathBuf;
-
 use crate::equations::{DAMPED, EXACT};
 use crate::picture;
-use crate::question::equations::{self, EquationsResult, Level, Plan, RowWire};
+use crate::question::equations::{self, EquationsResult, Plan, RowWire};
 use clap::Args;
 use host_sim::Result;
-use host_sim::metrics::{self, NETWORK};
-use taxel_data::output;
+use host_sim::metrics::NETWORK;
 use taxel_learn::decoders::{linear, mean};
 
 use host_sim::commands::progress::Terminal;
 use host_sim::commands::scene_argument::SceneArgument;
 use host_sim::commands::{Common, print};
+
+use super::Picture;
 
 /// Solve the sensor's equations for each row's deformation, without training, by noise.
 ///
@@ -31,23 +30,20 @@ pub struct Arguments {
     /// Test frames [default: 60].
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
-    /// Picture to write: RMSE of z against the noise.
-    #[arg(short, long, value_name = "FILE.svg")]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    picture: Picture,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    if let Some(path) = &arguments.output {
-        print::check_output(path, &[arguments.scene.path()])?;
+impl super::Study for Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        self.picture.check(self.scene.path())?;
+        let scene = self.scene.load(common)?;
+        let default = Plan::default();
+        let plan = Plan { frames: self.frames.unwrap_or(default.frames), ..default };
+        let result = equations::study(&scene, plan, &Terminal::new())?;
+        self.picture.write(|| picture::equations_svg(&result))?;
+        super::show(common, &result, page_of)
     }
-    let scene = arguments.scene.load(common)?;
-    let default = Plan::default();
-    let plan = Plan { frames: arguments.frames.unwrap_or(default.frames), ..default };
-    let result = equations::study(&scene, plan, &Terminal::new())?;
-    if let Some(path) = &arguments.output {
-        output::write_bytes(path, picture::equations_svg(&result).as_bytes())?;
-    }
-    if common.json { print::json(&result) } else { page_of(&result).print() }
 }
 
 fn page_of(result: &EquationsResult) -> print::Page {
@@ -56,21 +52,12 @@ fn page_of(result: &EquationsResult) -> print::Page {
         "{}: {} rows of {} test frames, seed {}; networks by K-means on {} frames",
         result.subject, result.rows, result.frames, result.seed, result.training_frames
     ));
-    let groups = result.levels.first().map_or(&[][..], |level| &level.decoders[0].errors);
-    for (place, group) in groups.iter().enumerate() {
-        let heading = format!("RMSE of {}, {}", group.group, group.unit);
-        page.line(format_args!("\n{heading:<18}{}", columns(&result.levels)));
-        for decoder in [EXACT, DAMPED, NETWORK, linear::NAME, mean::NAME] {
-            let rmse = |level: &Level| metrics::of_decoder(&level.decoders, decoder)[place].rmse;
-            page.line(super::line(decoder, result.levels.iter().map(|level| Some(rmse(level)))));
-        }
-        let limit = |level: &Level| super::limit_of(&level.limit, place);
-        page.line(super::line("limit", result.levels.iter().map(limit)));
-    }
+    let decoders = [EXACT, DAMPED, NETWORK, linear::NAME, mean::NAME];
+    super::errors_by_noise(&mut page, &result.levels, &decoders);
     let solved = result.levels.iter().map(|level| format!("{:>10.1}", level.percent_solved));
     page.line(format_args!("\n{:<18}{}", "solved exactly, %", solved.collect::<String>()));
     page.line("All rows count: one without a solution has the last place of the search, in the box of 20 % of H.");
-    super::refusals(&mut page, result.levels.iter().map(|it| (it.noise_level, &it.limit)));
+    super::refusals(&mut page, &result.levels);
     page.line(format_args!(
         "\nWithout noise, % of the rows, by row-wire ({} more searches a row for deformations that read alike)",
         result.searches
@@ -101,10 +88,6 @@ fn page_of(result: &EquationsResult) -> print::Page {
          turned: the determinant of ∂ln R/∂Δ has not the sign that it has at rest.",
     );
     page
-}
-
-fn columns(levels: &[Level]) -> String {
-    super::noise_columns(levels.iter().map(|level| level.noise_level))
 }
 
 fn line_of(name: &str, row: &RowWire) -> String {

@@ -1,18 +1,17 @@
 //! Study `map`: error by centres, spread and number of samples, and the paper's claims on them.
 
-use std::path::{Path, PathBuf};
-
 use crate::picture;
 use crate::question::map::{self, Claim, Map, MapStudy, Plan};
 use clap::Args;
 use host_sim::Result;
-use taxel_data::output;
 use taxel_simulate::sensor::Precision;
 
 use host_sim::commands::arguments::{of_option, precision};
 use host_sim::commands::progress::Terminal;
 use host_sim::commands::scene_argument::{SceneArgument, group_of_scene, read_one_row};
 use host_sim::commands::{Common, print};
+
+use super::Picture;
 
 /// Options that set the fields of a plan.
 const OPTIONS: [(&str, &str); 6] = [
@@ -40,63 +39,33 @@ pub struct Arguments {
     /// Row-wire (from 1) that is read.
     #[arg(long, value_name = "ROW", default_value_t = 4)]
     row: usize,
-    /// Numbers of samples N.
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = Plan::default().samples)]
-    samples: Vec<usize>,
-    /// Centres K; those below N, and N itself up to 1000.
-    #[arg(long, value_name = "K,…", value_delimiter = ',', default_values_t = Plan::default().centres)]
-    centres: Vec<usize>,
-    /// Spreads.
-    #[arg(long, value_name = "S,…", value_delimiter = ',', default_values_t = Plan::default().spreads, allow_negative_numbers = true)]
-    spread: Vec<f64>,
-    /// Noise levels as fractions (0.01 is 1 %).
-    #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', default_values_t = Plan::default().noise_levels, allow_negative_numbers = true)]
-    noise: Vec<f64>,
-    /// Test frames.
-    #[arg(long, value_name = "N", default_value_t = Plan::default().test_frames)]
-    test_frames: usize,
-    /// Initial covariance δ: output weights have a penalty of 1/δ on their squares.
-    #[arg(long, value_name = "DELTA", default_value_t = Plan::default().initial_covariance, allow_negative_numbers = true)]
-    initial_covariance: f64,
+    #[command(flatten)]
+    plan: Plan,
     /// Outputs whose error is mapped, such as dz_mm or dx_mm.
     #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
     group: String,
     /// Print every cell, not only the best ones (JSON has all of them).
     #[arg(long)]
     all: bool,
-    /// Picture to write (SVG).
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    picture: Picture,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let scene = SceneArgument::new(&arguments.scene, arguments.precision);
-    if let Some(path) = &arguments.output {
-        print::check_output(path, &[scene.path()])?;
+impl super::Study for Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        let scene = SceneArgument::new(&self.scene, self.precision);
+        self.picture.check(scene.path())?;
+        let mut scene = scene.load_world(common)?;
+        read_one_row(&mut scene, self.row)?;
+        group_of_scene(&scene, &self.group)?;
+        self.plan.check().map_err(|bad| of_option(bad, &OPTIONS))?;
+        let study = map::compute(&scene, &self.group, &self.plan, &Terminal::new())?;
+        self.picture.write(|| picture::study_map_svg(&study))?;
+        super::show(common, &study, |study| page_of(study, self))
     }
-    let mut scene = scene.load_world(common)?;
-    read_one_row(&mut scene, arguments.row)?;
-    group_of_scene(&scene, &arguments.group)?;
-    let plan = Plan {
-        samples: arguments.samples.clone(),
-        centres: arguments.centres.clone(),
-        spreads: arguments.spread.clone(),
-        noise_levels: arguments.noise.clone(),
-        test_frames: arguments.test_frames,
-        initial_covariance: arguments.initial_covariance,
-    };
-    plan.check().map_err(|bad| of_option(bad, &OPTIONS))?;
-    let study = map::compute(&scene, &arguments.group, &plan, &Terminal::new())?;
-    if let Some(path) = &arguments.output {
-        output::write_bytes(path, picture::study_map_svg(&study).as_bytes())?;
-    }
-    if common.json {
-        return print::json(&study);
-    }
-    page_of(&study, arguments.all, arguments.output.as_deref()).print()
 }
 
-fn page_of(study: &MapStudy, all: bool, picture: Option<&Path>) -> print::Page {
+fn page_of(study: &MapStudy, options: &Arguments) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{}: row {}, seed {}, {} test frames, δ = {:e}; RMSE of {} in {}\n",
@@ -108,7 +77,7 @@ fn page_of(study: &MapStudy, all: bool, picture: Option<&Path>) -> print::Page {
         study.group,
         study.unit
     ));
-    if all {
+    if options.all {
         study.maps.iter().for_each(|map| cells(&mut page, map, study));
     }
     page.line(format_args!(
@@ -123,7 +92,7 @@ fn page_of(study: &MapStudy, all: bool, picture: Option<&Path>) -> print::Page {
     for claim in &study.claims {
         claim_lines(&mut page, claim);
     }
-    if let Some(path) = picture {
+    if let Some(path) = &options.picture.output {
         page.line(format_args!("\nwritten to {}", path.display()));
     }
     page

@@ -32,15 +32,16 @@ pub struct Arguments {
     model: Option<PathBuf>,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let scene = arguments.scene.load(common)?;
-    scene.require_inverse("readout")?;
-    scene.world.check_frames("--frames", arguments.frames)?;
-    VirtualBoard::new(&scene.world)?;
-    let model = scene_argument::model(arguments.model.as_deref(), &scene, &Terminal::new())?;
-    let result =
-        readout::measure(&scene, &model.prepare(Exponential::default()), arguments.frames)?;
-    if common.json { print::json(&result) } else { page_of(&result).print() }
+impl super::Study for Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        let scene = self.scene.load(common)?;
+        scene.require_inverse("readout")?;
+        scene.world.check_frames("--frames", self.frames)?;
+        VirtualBoard::new(&scene.world)?;
+        let model = scene_argument::model(self.model.as_deref(), &scene, &Terminal::new())?;
+        let result = readout::measure(&scene, &model.prepare(Exponential::default()), self.frames)?;
+        super::show(common, &result, page_of)
+    }
 }
 
 fn page_of(result: &ReadoutResult) -> print::Page {

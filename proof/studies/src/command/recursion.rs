@@ -1,19 +1,18 @@
 //! Study `recursion`: where recursive least squares diverges.
 
-use std::path::PathBuf;
-
 use crate::picture;
 use crate::question::recursion::{
     self, DIVERGED, FORGETTING_FACTORS, Form, INITIAL_COVARIANCES, KINDS, Outcome, Plan, Study,
 };
 use clap::Args;
 use host_sim::Result;
-use taxel_data::output;
 
 use host_sim::commands::arguments::of_option;
 use host_sim::commands::progress::Terminal;
 use host_sim::commands::scene_argument::{SceneArgument, read_one_row};
 use host_sim::commands::{Common, print};
+
+use super::Picture;
 
 /// Study where recursive least squares diverges: by form, precision, λ, δ and condition.
 ///
@@ -28,35 +27,25 @@ pub struct Arguments {
     /// Row-wire (from 1) whose readings are the inputs.
     #[arg(long, value_name = "ROW", default_value_t = 4)]
     row: usize,
-    /// Centres K.
-    #[arg(long, value_name = "K", default_value_t = 48)]
-    centres: usize,
-    /// Updates of each recursion.
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 10_000)]
-    updates: usize,
-    /// SVG file of the picture.
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    plan: Plan,
+    #[command(flatten)]
+    picture: Picture,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let argument = SceneArgument::new(&arguments.scene, None);
-    let mut scene = argument.load_world(common)?;
-    read_one_row(&mut scene, arguments.row)?;
-    let plan = Plan { centres: arguments.centres, updates: arguments.updates };
-    plan.check()
-        .map_err(|bad| of_option(bad, &[("centres", "--centres"), ("updates", "--updates")]))?;
-    if let Some(path) = &arguments.output {
-        print::check_output(path, &[argument.path()])?;
+impl super::Study for Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        let argument = SceneArgument::new(&self.scene, None);
+        let mut scene = argument.load_world(common)?;
+        read_one_row(&mut scene, self.row)?;
+        self.plan
+            .check()
+            .map_err(|bad| of_option(bad, &[("centres", "--centres"), ("updates", "--updates")]))?;
+        self.picture.check(argument.path())?;
+        let study = recursion::compute(&scene, &self.plan, &Terminal::new())?;
+        self.picture.write(|| picture::recursion_svg(&study))?;
+        super::show(common, &study, page_of)
     }
-    let study = recursion::compute(&scene, &plan, &Terminal::new())?;
-    if let Some(path) = &arguments.output {
-        output::write_bytes(path, picture::recursion_svg(&study).as_bytes())?;
-    }
-    if common.json {
-        return print::json(&study);
-    }
-    page_of(&study).print()
 }
 
 fn page_of(study: &Study) -> print::Page {

@@ -26,32 +26,31 @@ pub struct Arguments {
     /// Row-wire (from 1) that is read.
     #[arg(long, value_name = "ROW", default_value_t = 4)]
     row: usize,
-    /// Centres K to try.
-    #[arg(long, value_name = "K,…", value_delimiter = ',', default_values_t = Plan::default().centres)]
-    centres: Vec<usize>,
-    /// Spreads to choose among.
-    #[arg(long, value_name = "S,…", value_delimiter = ',', default_values_t = Plan::default().spreads, allow_negative_numbers = true)]
-    spread: Vec<f64>,
+    #[command(flatten)]
+    plan: Plan,
     /// Outputs whose error is shown, such as dz_mm.
     #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
     group: String,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut scene = arguments.scene.load(common)?;
-    arguments.noise.apply(&mut scene)?;
-    read_one_row(&mut scene, arguments.row)?;
-    group_of_scene(&scene, &arguments.group)?;
-    let plan = Plan { centres: arguments.centres.clone(), spreads: arguments.spread.clone() };
-    let study = widths::compute(&scene, &arguments.group, &plan, &Terminal::new());
-    let study = study.map_err(|error| match error {
-        Error::Setting(bad) => of_option(bad, &[("spreads", "--spread"), ("centres", "--centres")]),
-        Error::Data(taxel_data::Error::Setting(bad)) => {
-            of_option(bad, &[("spread", "--spread"), ("centres", "--centres")])
-        }
-        other => other,
-    })?;
-    if common.json { print::json(&study) } else { page_of(&study).print() }
+impl super::Study for Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        let mut scene = self.scene.load(common)?;
+        self.noise.apply(&mut scene)?;
+        read_one_row(&mut scene, self.row)?;
+        group_of_scene(&scene, &self.group)?;
+        let study = widths::compute(&scene, &self.group, &self.plan, &Terminal::new());
+        let study = study.map_err(|error| match error {
+            Error::Setting(bad) => {
+                of_option(bad, &[("spreads", "--spread"), ("centres", "--centres")])
+            }
+            Error::Data(taxel_data::Error::Setting(bad)) => {
+                of_option(bad, &[("spread", "--spread"), ("centres", "--centres")])
+            }
+            other => other,
+        })?;
+        super::show(common, &study, page_of)
+    }
 }
 
 fn page_of(study: &WidthsStudy) -> print::Page {

@@ -1,9 +1,10 @@
 //! Pictures of studies: the error of decoders against the noise.
 
 use crate::equations::{DAMPED, EXACT};
+use crate::level::AtNoise;
 use crate::question::directions::{DirectionsResult, INVERTED, INVERTED_DAMPED};
 use crate::question::equations::EquationsResult;
-use taxel_evaluate::metrics::{DecoderErrors, LimitSummary, NETWORK, of_decoder};
+use taxel_evaluate::metrics::{NETWORK, of_decoder};
 use taxel_learn::decoders::{linear, mean};
 
 use host_sim::report::axes::Axis;
@@ -17,24 +18,17 @@ const GROUP: &str = "dz_mm";
 /// Size of a picture.
 const SIZE: [f64; 2] = [920.0, 420.0];
 
-/// Results at one noise level.
-struct AtNoise<'l> {
-    level: f64,
-    decoders: &'l [DecoderErrors],
-    limit: &'l LimitSummary,
-}
-
 /// Decoder that is drawn: its name in results and in the picture, and how its line looks.
 type Line = (&'static str, &'static str, &'static str, Mark);
 
 /// Picture of the RMSE of z against the noise. A level without noise has no place on its axis.
-fn by_noise(title: &str, levels: &[AtNoise<'_>], lines: &[Line]) -> String {
-    let points = |of: &dyn Fn(&AtNoise<'_>) -> Option<f64>| -> Vec<[f64; 2]> {
-        let noisy = levels.iter().filter(|level| level.level > 0.0);
-        noisy.map(|level| [level.level, of(level).unwrap_or(f64::NAN)]).collect()
+fn by_noise<L: AtNoise>(title: &str, levels: &[L], lines: &[Line]) -> String {
+    let points = |of: &dyn Fn(&L) -> Option<f64>| -> Vec<[f64; 2]> {
+        let noisy = levels.iter().filter(|level| level.noise_level() > 0.0);
+        noisy.map(|level| [level.noise_level(), of(level).unwrap_or(f64::NAN)]).collect()
     };
-    let rmse = |level: &AtNoise<'_>, decoder: &str| {
-        let errors = of_decoder(level.decoders, decoder);
+    let rmse = |level: &L, decoder: &str| {
+        let errors = of_decoder(level.decoders(), decoder);
         errors.iter().find(|errors| errors.group == GROUP).map(|errors| errors.rmse)
     };
     let mut series: Vec<Series> = Vec::new();
@@ -42,8 +36,8 @@ fn by_noise(title: &str, levels: &[AtNoise<'_>], lines: &[Line]) -> String {
         let points = points(&|level| rmse(level, decoder));
         series.push(Series::new(name, class, mark.clone(), points));
     }
-    let limit = |level: &AtNoise<'_>| {
-        level.limit.groups.iter().find(|it| it.group == GROUP).map(|group| group.limit)
+    let limit = |level: &L| {
+        level.limit().groups.iter().find(|it| it.group == GROUP).map(|group| group.limit)
     };
     series.push(Series::new("limit", "c3", Mark::LineAnd(Shape::Triangle), points(&limit)));
     let all = |axis: usize| {
@@ -66,14 +60,9 @@ fn by_noise(title: &str, levels: &[AtNoise<'_>], lines: &[Line]) -> String {
 
 /// Picture of the sensor's equations as a decoder.
 pub fn equations_svg(result: &EquationsResult) -> String {
-    let levels: Vec<AtNoise<'_>> = result
-        .levels
-        .iter()
-        .map(|it| AtNoise { level: it.noise_level, decoders: &it.decoders, limit: &it.limit })
-        .collect();
     by_noise(
         "Error of the sensor's equations as a decoder, against the noise",
-        &levels,
+        &result.levels,
         &[
             (EXACT, "equations, exact", "c2", Mark::LineAnd(Shape::Square)),
             (DAMPED, "equations, damped", "c2", Mark::Dashed),
@@ -86,14 +75,9 @@ pub fn equations_svg(result: &EquationsResult) -> String {
 
 /// Picture of decoding in both directions.
 pub fn decoding_svg(result: &DirectionsResult) -> String {
-    let levels: Vec<AtNoise<'_>> = result
-        .levels
-        .iter()
-        .map(|it| AtNoise { level: it.noise_level, decoders: &it.decoders, limit: &it.limit })
-        .collect();
     by_noise(
         "Error of decoding in both directions, against the noise",
-        &levels,
+        &result.levels,
         &[
             (INVERTED, "inverted", "c2", Mark::LineAnd(Shape::Square)),
             (INVERTED_DAMPED, "inverted, damped", "c2", Mark::Dashed),

@@ -11,9 +11,7 @@ use taxel_simulate::synth::BASELINE_FRAMES;
 /// Share of some frames that a model finds novel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Detection {
-    /// What is wrong with the frames.
     pub anomaly: String,
-    /// Number of frames.
     pub frames: usize,
     /// Share of them that are novel.
     pub percent_novel: f64,

@@ -15,34 +15,26 @@ use taxel_learn::Exponential;
 use taxel_learn::decoders::BASELINES;
 use taxel_simulate::Synthesis;
 
-use crate::level::{NoiseLevel, Solved, check, train};
+use crate::level::{NoiseLevel, Solved, at_noise, check, train};
 use taxel_evaluate::error::Result;
 use taxel_evaluate::experiment::{Direction, Experiment};
 use taxel_evaluate::metrics::{self, DecoderErrors, LimitSummary};
 
 /// Noise levels of the study, the largest first.
 pub const NOISE_LEVELS: [f64; 5] = [0.1, 0.05, 0.01, 0.005, 0.0];
-/// Test frames unless a user says otherwise.
 pub const FRAMES: usize = 60;
-/// Name of the network's exact inversion.
 pub const INVERTED: &str = "inverted";
 /// Name of its inversion that is damped by noise and scene.
 pub const INVERTED_DAMPED: &str = "inverted, damped";
 
-/// Results of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DirectionsResult {
-    /// Name of the scene.
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
-    /// Number of test frames.
     pub frames: usize,
     /// Number of rows that were inverted at each level.
     pub rows: usize,
-    /// Number of frames that networks were trained on.
     pub training_frames: usize,
-    /// Number of centres of each network.
     pub centres: usize,
     /// Results by noise, without noise first.
     pub levels: Vec<Level>,
@@ -63,14 +55,14 @@ pub struct Level {
     pub inversions: Vec<Inversion>,
     /// Errors of decoding: of the inversions, the network that decodes directly, and the baselines.
     pub decoders: Vec<DecoderErrors>,
-    /// Least possible errors of decoding.
     pub limit: LimitSummary,
 }
+
+at_noise!(Level);
 
 /// Effort of inverting the network.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inversion {
-    /// Name of the decoder.
     pub decoder: String,
     /// Share of the rows that converged: to an exact solution in the box, or where it is damped to a minimum.
     pub percent_converged: f64,

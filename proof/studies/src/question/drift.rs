@@ -25,9 +25,7 @@ pub struct Line {
     pub relative_inputs: bool,
     /// Whether it was trained on sessions that drift as much.
     pub trained_with_drift: bool,
-    /// Errors without drift, by group.
     pub undrifted: Vec<Errors>,
-    /// Errors with drift, by group.
     pub drifted: Vec<Errors>,
 }
 
@@ -35,7 +33,6 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriftResult {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     /// Largest relative change of the gain.
     pub gain: f64,
@@ -44,23 +41,6 @@ pub struct DriftResult {
     /// Errors by decoder: all that take readings, those trained with drift, those with relative inputs. The mean
     /// stands once.
     pub lines: Vec<Line>,
-}
-
-#[cfg(test)]
-impl DriftResult {
-    /// Line of `decoder` with such inputs and such training.
-    pub fn line(
-        &self,
-        decoder: &str,
-        relative_inputs: bool,
-        trained_with_drift: bool,
-    ) -> Option<&Line> {
-        let is_it = |line: &&Line| {
-            (line.decoder.as_str(), line.relative_inputs, line.trained_with_drift)
-                == (decoder, relative_inputs, trained_with_drift)
-        };
-        self.lines.iter().find(is_it)
-    }
 }
 
 /// Trains the scene's decoders on readings, on readings of sessions that drift, and on relative inputs. Judges each

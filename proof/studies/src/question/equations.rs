@@ -8,7 +8,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 use taxel_limit::solve::Solution;
 use taxel_simulate::Synthesis;
 
-use crate::level::{NoiseLevel, Solved, check};
+use crate::level::{NoiseLevel, Solved, at_noise, check};
 use taxel_evaluate::error::Result;
 use taxel_evaluate::experiment::Experiment;
 use taxel_evaluate::metrics::{DecoderErrors, LimitSummary};
@@ -34,11 +34,9 @@ impl Default for Plan {
     }
 }
 
-/// Results of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EquationsResult {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     pub frames: usize,
     /// Number of rows that were solved at each level: those of all test frames.
@@ -61,9 +59,10 @@ pub struct Level {
     pub percent_solved: f64,
     /// Errors on the test frames. All rows count: one that is not solved has the last place of the search.
     pub decoders: Vec<DecoderErrors>,
-    /// Least possible errors.
     pub limit: LimitSummary,
 }
+
+at_noise!(Level);
 
 /// What solving the equations of one row-wire gives without noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]

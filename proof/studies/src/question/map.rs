@@ -3,6 +3,7 @@
 //! Networks are the paper's: Gaussians of one width and a bias, without affine tail, in f64. Centres are those of K-means,
 //! or all samples (K = N), which interpolates.
 
+use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::dataset::{Dataset, RowTable};
@@ -30,18 +31,25 @@ const SAMPLES_IN_ALL: usize = 1000;
 /// Most training sets of a map.
 const MOST_SETS: usize = 10;
 
-/// Settings of the study.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct Plan {
-    /// Numbers of samples N, ascending.
+    /// Numbers of samples N.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = Self::default().samples)]
     pub samples: Vec<usize>,
-    /// Numbers of centres K, ascending. Those below N are tried, and N itself up to [`MOST_INTERPOLATED`].
+    /// Centres K; those below N, and N itself up to 1000.
+    #[arg(long, value_name = "K,…", value_delimiter = ',', default_values_t = Self::default().centres)]
     pub centres: Vec<usize>,
+    /// Spreads.
+    #[arg(long = "spread", value_name = "S,…", value_delimiter = ',', default_values_t = Self::default().spreads, allow_negative_numbers = true)]
     pub spreads: Vec<f64>,
-    /// Noise levels as fractions, ascending.
+    /// Noise levels as fractions (0.01 is 1 %).
+    #[arg(long = "noise", value_name = "LEVEL,…", value_delimiter = ',', default_values_t = Self::default().noise_levels, allow_negative_numbers = true)]
     pub noise_levels: Vec<f64>,
+    /// Test frames.
+    #[arg(long, value_name = "N", default_value_t = Self::default().test_frames)]
     pub test_frames: usize,
-    /// Initial covariance δ: the penalty on squared weights is 1/δ for all samples together.
+    /// Initial covariance δ: output weights have a penalty of 1/δ on their squares.
+    #[arg(long, value_name = "DELTA", default_value_t = Self::default().initial_covariance, allow_negative_numbers = true)]
     pub initial_covariance: f64,
 }
 
@@ -59,7 +67,6 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// Checks every setting.
     pub fn check(&self) -> std::result::Result<(), BadValue> {
         let lists = [
             ("samples", self.samples.len(), self.samples.is_sorted_by(|a, b| a < b)),
@@ -98,18 +105,15 @@ impl Plan {
     }
 }
 
-/// Results of the study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MapStudy {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     /// Row-wire that is read, from 1.
     pub row_wire: usize,
     pub group: String,
     pub unit: String,
     pub test_frames: usize,
-    /// Initial covariance δ.
     pub initial_covariance: f64,
     /// Numbers of centres K that were tried; besides these N itself.
     pub centres: Vec<usize>,

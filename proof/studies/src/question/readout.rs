@@ -33,7 +33,6 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// All stages in order.
     pub const ALL: [Self; 6] = [
         Self::Quantised,
         Self::CrossTalk,
@@ -98,7 +97,6 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadoutResult {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     /// Number of frames that were scanned, without the scene's noise.
     pub frames: usize,
@@ -116,7 +114,6 @@ impl ReadoutResult {
         metrics::of_decoder(&self.decoders, NETWORK)
     }
 
-    /// Errors of always predicting the mean.
     pub fn mean_errors(&self) -> &[Errors] {
         metrics::of_decoder(&self.decoders, mean::NAME)
     }

@@ -5,6 +5,7 @@
 //! by QR decomposition in f64. So rounding is told from covariance wind-up: with λ < 1 and no leakage, the exact solution
 //! itself forgets what is not excited, and is wild when that is excited again.
 
+use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::error::require;
@@ -59,15 +60,17 @@ pub const KINDS: [(Form, &str); 4] = [
     (Form::SquareRoot, "f64"),
 ];
 
-/// What is studied.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Args)]
 pub struct Plan {
+    /// Centres K.
+    #[arg(long, value_name = "K", default_value_t = 48)]
     pub centres: usize,
+    /// Updates of each recursion.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 10_000)]
     pub updates: usize,
 }
 
 impl Plan {
-    /// Checks the plan.
     pub fn check(&self) -> std::result::Result<(), BadValue> {
         require((1..=128).contains(&self.centres), "centres", self.centres, || {
             "give from 1 to 128".into()
@@ -93,7 +96,6 @@ pub struct Outcome {
     pub width: f64,
     /// Forgetting factor λ.
     pub forgetting_factor: f64,
-    /// Initial covariance δ.
     pub initial_covariance: f64,
     /// Number of updates after which it had diverged: a number was not finite, or the next sample's prediction off by
     /// [`DIVERGED`] standard deviations, after more than ten updates for each weight. `None` if it did not.
@@ -115,16 +117,13 @@ pub struct Width {
     pub condition: f64,
 }
 
-/// Result of the study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Study {
     /// Scene whose readings are the inputs.
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     /// Row-wire (from 1) whose readings are the inputs.
     pub row_wire: usize,
-    /// What was studied.
     #[serde(flatten)]
     pub plan: Plan,
     pub output: String,
@@ -134,7 +133,6 @@ pub struct Study {
 }
 
 impl Study {
-    /// Outcome of one recursion.
     pub fn outcome(
         &self,
         (form, precision): (Form, &str),

@@ -1,5 +1,6 @@
 //! What a width for each centre gains over one for all, at the same K and at the same cost.
 
+use clap::Args;
 use model_core::rbf::{Format, Network};
 use serde::Serialize;
 use taxel_data::dataset::Dataset;
@@ -25,11 +26,13 @@ const VARIANTS: [(Widths, Format); 3] = [
     (Widths::Neighbours, Format::F32Direct),
 ];
 
-/// Settings of the study.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct Plan {
+    /// Centres K to try.
+    #[arg(long, value_name = "K,…", value_delimiter = ',', default_values_t = Self::default().centres)]
     pub centres: Vec<usize>,
-    /// Spreads to choose among, by other frames than those that models are judged on.
+    /// Spreads to choose among.
+    #[arg(long = "spread", value_name = "S,…", value_delimiter = ',', default_values_t = Self::default().spreads, allow_negative_numbers = true)]
     pub spreads: Vec<f64>,
 }
 
@@ -49,11 +52,9 @@ impl Plan {
     }
 }
 
-/// Results of the study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WidthsStudy {
     pub subject: String,
-    /// Seed of every random draw.
     pub seed: u64,
     /// Noise level, as a fraction.
     pub noise_level: f64,
@@ -62,11 +63,9 @@ pub struct WidthsStudy {
     pub group: String,
     pub unit: String,
     pub training_frames: usize,
-    /// Number of frames that models are judged on.
     pub test_frames: usize,
     /// RMSE of always predicting the mean.
     pub mean_rmse: f64,
-    /// Least possible errors.
     pub limit: LimitSummary,
     /// Models, by K; first those by K-means alone, then the refined ones.
     pub models: Vec<Model>,

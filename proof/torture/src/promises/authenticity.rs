@@ -9,8 +9,7 @@ pub const FORGED: Promise = Promise {
     text: "no forged, replayed, older or cut model is confirmed",
     share: 1,
     check: |effort, _| {
-        let planted = effort.is_planted();
         let cases = (8 * KINDS * 256, 10_000_000);
-        Ok(effort.worst(cases, (0.0, "taken"), |seed| forge(seed, planted)))
+        Ok(effort.worst(cases, (0.0, "taken"), |seed| forge(seed)))
     },
 };

@@ -9,170 +9,173 @@ use crate::tools::Tools;
 
 pub const POLYNOMIAL: Promise = Promise {
     name: "exp-polynomial",
-    text: "e^x within 2 ulp from -87 to 0, 0 below, no subnormal",
+    text: "e^x within 2 ulp, 0 below -87, falls, no NaN",
     share: 1,
-    check: polynomial,
+    check: |effort, _| {
+        let range = Range { exp: Polynomial::exp, end: -87.0, below: 0.0, step: ULP };
+        range.sweep(effort, (2.0, "ulp"), |truth, y| {
+            if y.is_normal() { error_ulp(truth, y) } else { f64::INFINITY }
+        })
+    },
 };
 
 pub const LIBM: Promise = Promise {
     name: "exp-libm",
-    text: "e^x within 1 ulp from -87 to 0, tiny below",
+    text: "e^x within 1 ulp, tiny below -87, falls, no NaN",
     share: 1,
-    check: libm,
+    check: |effort, _| {
+        let range = Range { exp: Libm::exp, end: -87.0, below: 1.7e-38, step: 0.0 };
+        range.sweep(effort, (1.0, "ulp"), error_ulp)
+    },
 };
 
 pub const MICROMATH: Promise = Promise {
     name: "exp-micromath",
-    text: "e^x within 0.24 % from -80 to 0, 0 below",
+    text: "e^x within 0.24 %, 0 below -80, falls, no NaN",
     share: 1,
-    check: micromath,
+    check: |effort, _| {
+        let range = Range { exp: Micromath::exp, end: -80.0, below: 0.0, step: 3e-5 };
+        range.sweep(effort, (0.24, "%"), |truth, y| 100.0 * (f64::from(y) / truth - 1.0).abs())
+    },
 };
 
 pub const EXP2: Promise = Promise {
     name: "exp-exp2",
-    text: "2^x within 2 ulp from -126 to 1",
-    share: 1,
+    text: "2^x within 2 ulp from -126 to 1, rises",
+    share: 0,
     check: base_two,
-};
-
-pub const MONOTONE: Promise = Promise {
-    name: "exp-monotone",
-    text: "a larger x gives no smaller e^x, but for rounding",
-    share: 1,
-    check: monotone,
-};
-
-pub const ANY_NUMBER: Promise = Promise {
-    name: "exp-any-number",
-    text: "no f32 makes e^x panic; up to 0 none gives NaN",
-    share: 1,
-    check: any_number,
 };
 
 /// Consecutive f32 that one case tests.
 const BLOCK: u32 = 1 << 16;
 /// Number of blocks that hold all f32.
 const ALL: u64 = 1 << 16;
-/// One of so many blocks is tested at least.
-const FEW: u64 = 64;
-/// One of so many, where every number takes several exponentials.
-const FEWER: u64 = 256;
+/// One of so many other blocks is tested at least.
+const FEW: u64 = 128;
+
+/// Blocks from −¼ to −4, which hold every way to reduce an argument, with the most digits: always tested.
+const NEAR: [u64; 2] = [0xBE80, 0xC080];
 
 /// Bits of −0.0, and of the first NaN behind −∞.
 const NEGATIVE: [u32; 2] = [0x8000_0000, 0xFF80_0001];
-/// Bits of 0, and of the next number after 1.
-const UP_TO_ONE: [u32; 2] = [0, 0x3F80_0001];
 
-fn polynomial(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let slip = if effort.is_planted() { 1.000_001 } else { 1.0 };
-    Ok(sweep(effort, FEW, (2.0, "ulp"), &[NEGATIVE], |x| {
-        let y = Polynomial::exp(x) * slip;
-        if x < -87.0 {
-            return require(y == 0.0, x, y);
-        }
-        require(y.is_normal(), x, y)?;
-        Ok(error_ulp(f64::from(x).exp(), y))
-    }))
+const ULP: f64 = f32::EPSILON as f64;
+
+/// An exponential, and where it is good.
+struct Range {
+    exp: fn(f32) -> f32,
+    /// From here to 0 it has an error.
+    end: f32,
+    /// Largest result below.
+    below: f32,
+    /// Largest relative rise where it should fall: of rounding.
+    step: f64,
 }
 
-fn libm(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let slip = if effort.is_planted() { 1.000_000_3 } else { 1.0 };
-    Ok(sweep(effort, FEW, (1.0, "ulp"), &[NEGATIVE], |x| {
-        let y = Libm::exp(x) * slip;
-        if x < -87.0 {
-            return require((0.0..1.7e-38).contains(&y), x, y);
+impl Range {
+    /// Tests numbers that are next to one another, block after block, and those at which the result's exponent or the
+    /// way to it changes. The first case is of the latter.
+    fn sweep(
+        &self,
+        effort: &Effort,
+        bound: (f64, &'static str),
+        error: impl Fn(f64, f32) -> f64 + Sync,
+    ) -> Result<Found, String> {
+        let near = NEAR[1] - NEAR[0];
+        Ok(effort.worst((near + ALL / FEW, near + ALL), bound, |seed| {
+            let number = seed.wrapping_sub(effort.seed());
+            if number == 0 {
+                let around = |x: f32| (x.to_bits().max(8) - 8)..=(x.to_bits() + 8);
+                let halves = (-260..=0).map(|n| n as f32 * 0.5 * std::f32::consts::LN_2);
+                let places = halves.chain([self.end, -104.0, -f32::MIN_POSITIVE, f32::MIN]);
+                return places
+                    .map(|x| self.worst(around(x), &error))
+                    .try_fold(0.0, |worst: f64, found| Ok(worst.max(found?)));
+            }
+            let near = NEAR[0] + number - 1;
+            // An odd step visits every block once.
+            let block = if near < NEAR[1] { near } else { seed.wrapping_mul(20_011) % ALL };
+            let first = block as u32 * BLOCK;
+            self.worst(first..=first + (BLOCK - 1), &error)
+        }))
+    }
+
+    /// Largest error at numbers of these bits. Those of larger bits are farther from 0.
+    fn worst(
+        &self,
+        bits: impl Iterator<Item = u32>,
+        error: impl Fn(f64, f32) -> f64,
+    ) -> Result<f64, String> {
+        let (mut worst, mut before) = (0.0_f64, f64::INFINITY);
+        for bits in bits {
+            let x = f32::from_bits(bits);
+            if !(NEGATIVE[0]..NEGATIVE[1]).contains(&bits) {
+                // micromath asserts, in debug builds, that its argument is no larger than it is for.
+                std::hint::black_box((self.exp)(if x > 80.0 { 80.0 } else { x }));
+                continue;
+            }
+            let y = (self.exp)(x);
+            let wide = f64::from(y);
+            let most = if x < self.end { self.below } else { 1.0 };
+            let is_higher = wide > before * (1.0 + self.step);
+            if !(0.0..=most).contains(&y) || is_higher {
+                return Err(format!("at {x:e} the result is {y:e}, after {before:e}"));
+            }
+            if x >= self.end {
+                worst = worst.max(error(f64::from(x).exp(), y));
+            }
+            before = wide;
         }
-        Ok(error_ulp(f64::from(x).exp(), y))
-    }))
+        Ok(worst)
+    }
 }
 
-fn micromath(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let slip = if effort.is_planted() { 1.0 / 128.0 } else { 0.0 };
-    Ok(sweep(effort, FEW, (0.24, "%"), &[NEGATIVE], |x| {
-        // Planted: the argument loses its last bits.
-        let y = Micromath::exp(x + slip);
-        if x < -80.0 {
-            return require(y == 0.0 || slip > 0.0, x, y);
-        }
-        Ok(100.0 * (f64::from(y) / f64::from(x).exp() - 1.0).abs())
-    }))
-}
+/// Bits of 2⁻²⁶, nearer to 0 than which every number gives 1, and of ½.
+const FRACTIONS: [u32; 2] = [0x3280_0000, 0x3F00_0000];
+const FRACTIONS_AT_ONCE: u32 = 1 << 20;
 
+/// 2^(n + f) is 2^f times a power of two, for n from −126 to 0 and f from −½ to ½: so every f is tested once, and with
+/// every n some.
 fn base_two(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    // Planted: a wrong bit in the result.
-    let wrong = if effort.is_planted() { 4 } else { 0 };
-    Ok(sweep(
-        effort,
-        FEW,
-        (2.0, "ulp"),
-        &[[NEGATIVE[0], (-126.0_f32).to_bits() + 1], UP_TO_ONE],
-        |x| Ok(error_ulp(f64::from(x).exp2(), f32::from_bits(exp2(x).to_bits() ^ wrong))),
-    ))
-}
-
-/// Steps against monotony, as shares of what each exponential may make.
-fn monotone(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    const ULP: f64 = f32::EPSILON as f64;
-    let planted = effort.is_planted();
-    Ok(sweep(effort, FEWER, (1.0, "bounds"), &[NEGATIVE], |x| {
-        let next = x.next_down();
-        // Planted: a table with one bad entry.
-        let polynomial = |x: f32| {
-            let bad = planted && x.to_bits().trailing_zeros() >= 12 && x > -80.0;
-            Polynomial::exp(x) * if bad { 0.999 } else { 1.0 }
-        };
-        let rise = |exp: fn(f32) -> f32| {
-            let (here, below) = (f64::from(exp(x)), f64::from(exp(next)));
-            if here > 0.0 { below / here - 1.0 } else { below }
-        };
-        let of_polynomial = match f64::from(polynomial(x)) {
-            0.0 => f64::from(polynomial(next)),
-            here => f64::from(polynomial(next)) / here - 1.0,
-        };
-        let of_two = if next >= -126.0 { rise(exp2) / ULP } else { 0.0 };
-        let worst = (of_polynomial / ULP).max(of_two).max(rise(Micromath::exp) / 3e-5);
-        let of_libm = rise(Libm::exp);
-        // Subnormal numbers are an ulp of theirs apart.
-        require(of_libm <= 0.0, x, Libm::exp(x))?;
-        Ok(worst.max(0.0))
-    }))
-}
-
-fn any_number(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let planted = effort.is_planted();
-    Ok(sweep(effort, FEWER, (0.0, "faults"), &[[0, u32::MAX]], |x| {
-        // Planted: a product that is 0·∞ for large numbers.
-        let polynomial = Polynomial::exp(x) + if planted { x * x * 0.0 } else { 0.0 };
-        // micromath asserts, in debug builds, that its argument is no larger than it is for.
-        let results = [polynomial, Libm::exp(x), Micromath::exp(x.min(0.0))];
-        std::hint::black_box(exp2(x));
-        if x <= 0.0 {
-            let bad = results.into_iter().find(|y| !(0.0..=1.0).contains(y));
-            require(bad.is_none(), x, bad.unwrap_or(0.0))?;
+    let blocks = u64::from((FRACTIONS[1] - FRACTIONS[0]) / FRACTIONS_AT_ONCE);
+    let cases = 2 * blocks + 2;
+    Ok(effort.worst((cases, cases), (2.0, "ulp"), |seed| {
+        let case = seed % cases;
+        let bad = |u: f32| Err(format!("2^{u:e} is {:e}", exp2(u)));
+        if case == 0 {
+            // Anything else gives no panic, and what is next to 0 gives 1.
+            for bits in 0..1 << 24 {
+                std::hint::black_box(exp2(f32::from_bits(bits << 8)));
+            }
+            let tiny = [0.0, 1e-45, 1e-30, 1.4e-8].into_iter().flat_map(|f: f32| [f, -f]);
+            return tiny.into_iter().find(|f| exp2(*f) != 1.0).map_or(Ok(0.0), bad);
         }
-        Ok(0.0)
+        if case == 1 {
+            for (n, k) in (-126..=1).flat_map(|n| (-32_768..=32_768).map(move |k| (n, k))) {
+                let f = k as f32 / 65_536.0;
+                let u = n as f32 + f;
+                let is_right = || f64::from(exp2(u)) == f64::from(exp2(f)) * 2_f64.powi(n);
+                if (-126.0..=1.0).contains(&u) && f.abs() < 0.5 && !is_right() {
+                    return bad(u);
+                }
+            }
+            return Ok(0.0);
+        }
+        let sign = if case.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let first = FRACTIONS[0] + (case / 2 - 1) as u32 * FRACTIONS_AT_ONCE;
+        let (mut worst, mut before) = (0.0_f64, 1.0);
+        for bits in first..=first + FRACTIONS_AT_ONCE {
+            let f = sign * f32::from_bits(bits);
+            let y = exp2(f);
+            let rise = f64::from(sign) * (f64::from(y) / f64::from(before) - 1.0);
+            if bits > first && rise < -ULP {
+                return bad(f);
+            }
+            worst = worst.max(error_ulp(f64::from(f).exp2(), y));
+            before = y;
+        }
+        Ok(worst)
     }))
-}
-
-/// Tests all numbers whose bits are in `ranges`, block after block; at least one block of so many.
-fn sweep(
-    effort: &Effort,
-    one_in: u64,
-    bound: (f64, &'static str),
-    ranges: &[[u32; 2]],
-    test: impl Fn(f32) -> Result<f64, String> + Sync,
-) -> Found {
-    let is_tested = |bits: u32| ranges.iter().any(|[first, end]| (*first..*end).contains(&bits));
-    effort.worst((ALL / one_in, ALL), bound, |seed| {
-        // An odd step visits every block once.
-        let first = (seed.wrapping_mul(20_011) % ALL) as u32 * BLOCK;
-        let bits = (first..=first + (BLOCK - 1)).filter(|bits| is_tested(*bits));
-        bits.map(f32::from_bits).try_fold(0.0, |worst: f64, x| Ok(worst.max(test(x)?)))
-    })
-}
-
-fn require(holds: bool, x: f32, y: f32) -> Result<f64, String> {
-    if holds { Ok(0.0) } else { Err(format!("at {x:e} the result is {y:e}")) }
 }
 
 /// Error of `y` for `truth`, in units in the last place of the true value.

@@ -6,7 +6,6 @@
 use mock_board::{blob, blob_of_components, blob_with_confidence};
 use model_core::AlignedBytes;
 use model_core::blob::Model;
-use model_core::checksum::CRC_32;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -59,17 +58,10 @@ fn subjects() -> Result<Vec<AlignedBytes>, String> {
 }
 
 /// Flips `bits`, looks whether the blob is refused, and flips them back.
-fn refused(blob: &mut AlignedBytes, bits: &[usize], planted: bool) -> Result<(), String> {
+fn refused(blob: &mut AlignedBytes, bits: &[usize]) -> Result<(), String> {
     let flip = |blob: &mut AlignedBytes| bits.iter().for_each(|b| blob[b / 8] ^= 1 << (b % 8));
     flip(blob);
-    let end = blob.len() - 4;
-    let crc = *blob.last_chunk::<4>().unwrap_or(&[0; 4]);
-    if planted {
-        let signed = CRC_32.checksum(&blob[..end]).to_le_bytes(); // as if it were not looked at
-        blob[end..].copy_from_slice(&signed);
-    }
     let is_refused = Model::decode(blob).is_err();
-    blob[end..].copy_from_slice(&crc);
     flip(blob);
     if is_refused {
         return Ok(());
@@ -96,7 +88,7 @@ fn one(effort: &Effort, _: &Tools) -> Result<Found, String> {
             if place != subject {
                 (subject, copy) = (place, subjects[place].clone());
             }
-            refused(&mut copy, &[bit as usize], effort.is_planted())?;
+            refused(&mut copy, &[bit as usize])?;
         }
         Ok(0.0)
     });
@@ -111,15 +103,13 @@ fn two(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let subjects = subjects()?;
     let smallest = &subjects[0];
     let bits = smallest.len() * 8;
-    let planted = effort.is_planted();
-    let least = if planted { 32 } else { PAIRS };
-    let found = effort.worst((least, 1 << 40), (0.0, "accepted"), |seed| {
+    let found = effort.worst((PAIRS, 1 << 40), (0.0, "accepted"), |seed| {
         // All partners of one bit of the smallest blob.
         let mut copy = smallest.clone();
         let first = (seed % bits as u64) as usize;
         let is_first_round = seed.wrapping_sub(effort.seed()) < bits as u64;
         for second in (first + 1..bits).filter(|_| is_first_round) {
-            refused(&mut copy, &[first, second], planted)?;
+            refused(&mut copy, &[first, second])?;
         }
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut below = |end: usize| (random.next_u64() % end as u64) as usize;
@@ -127,7 +117,7 @@ fn two(effort: &Effort, _: &Tools) -> Result<Found, String> {
             let mut copy = subjects[below(subjects.len())].clone();
             let first = below(copy.len() * 8);
             let second = (first + 1 + below(copy.len() * 8 - 1)) % (copy.len() * 8);
-            refused(&mut copy, &[first, second], planted)?;
+            refused(&mut copy, &[first, second])?;
         }
         Ok(0.0)
     });

@@ -10,14 +10,14 @@ use crate::tools::Tools;
 
 pub const FORGETTING: Promise = Promise {
     name: "rls-forgetting",
-    text: "λ < 1: f32 as f64 for ever; at rest: where it rests",
+    text: "λ < 1: f32 as f64 for ever; at rest: there",
     share: 4,
     check: forgetting,
 };
 
 pub const WITHOUT_FORGETTING: Promise = Promise {
     name: "rls-lambda-1",
-    text: "λ = 1: f32 within 2 σ of f64, for up to 1e7 updates",
+    text: "λ = 1: f32 as f64, for up to 1e7 updates",
     share: 1,
     check: without_forgetting,
 };
@@ -54,24 +54,21 @@ const LIVES: [Life; 5] = [Life::Rich, Life::Rest, Life::Burst, Life::Missing, Li
 const FACTORS: [f64; 4] = [0.9, 0.99, 0.999, 0.9999];
 
 fn forgetting(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let planted = effort.is_planted();
     let (least, updates) = ((LIVES.len() * FACTORS.len()) as u64, updates(effort));
     Ok(effort.worst((least, 10 * least), (1.0, "noise"), |seed| {
         let life = LIVES[(seed % 5) as usize];
         let factor = FACTORS[(seed / 5 % 4) as usize];
-        let worst = compare(life, factor, seed, updates, planted);
+        let worst = compare(life, factor, seed, updates);
         worst.map_err(|why| format!("{life:?}, λ = {factor}: {why}"))
     }))
 }
 
 fn without_forgetting(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let planted = effort.is_planted();
     let lives = [Life::Rich, Life::Missing, Life::Huge];
     let updates = updates(effort);
     Ok(effort.worst((3, 30), (2.0, "noise"), |seed| {
         let life = lives[(seed % 3) as usize];
-        // Planted: samples are not refused.
-        compare(life, 1.0, seed, updates, planted).map_err(|why| format!("{life:?}: {why}"))
+        compare(life, 1.0, seed, updates).map_err(|why| format!("{life:?}: {why}"))
     }))
 }
 
@@ -81,9 +78,9 @@ fn updates(effort: &Effort) -> u64 {
 }
 
 /// Root mean square difference of what f32 and f64 predict, in units of the noise, at its worst over time.
-fn compare(life: Life, factor: f64, seed: u64, updates: u64, planted: bool) -> Result<f64, String> {
-    let single = over_time::<f32>(life, factor, seed, updates, planted)?;
-    let double = over_time::<f64>(life, factor, seed, updates, false)?;
+fn compare(life: Life, factor: f64, seed: u64, updates: u64) -> Result<f64, String> {
+    let single = over_time::<f32>(life, factor, seed, updates)?;
+    let double = over_time::<f64>(life, factor, seed, updates)?;
     // A sensor that rests for good forgets all other places, and f32 need not forget as f64 does.
     let places: &[f64] = if life == Life::Rest { &[0.5] } else { &PLACES };
     let off = single.iter().zip(&double);
@@ -115,20 +112,14 @@ impl Number for f64 {
     }
 }
 
-/// Weights at [`LOOKS`] moments. With the planted fault the recursion is a plain one: without leakage, and taking
-/// every sample.
+/// Weights at [`LOOKS`] moments.
 pub fn over_time<T: Number>(
     life: Life,
     factor: f64,
     seed: u64,
     updates: u64,
-    planted: bool,
 ) -> Result<Vec<Vec<f64>>, String> {
     let mut memory = [T::ZERO; Rls::<f64>::values(REGRESSORS, 1)];
-    let mut plain = [T::ZERO; Rls::<f64>::values(REGRESSORS, 1)];
-    let (triangle, rest) = plain.split_at_mut(rls::triangle_values(REGRESSORS));
-    let projection = &mut rest[..REGRESSORS];
-    rls::start(triangle, REGRESSORS, T::of(1e-3));
     let started = Rls::try_new(&mut memory, [REGRESSORS, 1], T::of(1e6), T::of(factor));
     let mut recursion = started.map_err(|refusal| refusal.to_string())?;
     let mut random = Random::new(seed, Stream::Test, Purpose::Noise, 0, 0);
@@ -138,10 +129,7 @@ pub fn over_time<T: Number>(
         // What f32 refuses is kept from f64, too, which could take it.
         let is_usable = rls::is_usable(&h.map(|h| h as f32)) && rls::is_usable(&[y as f32]);
         let (mut h, mut y) = (h.map(T::of), [T::of(y)]);
-        if planted {
-            rls::forget(triangle, projection, T::of(factor.sqrt()));
-            rls::rotate(triangle, projection, &mut h, &mut y);
-        } else if size_of::<T>() == 4 || is_usable {
+        if size_of::<T>() == 4 || is_usable {
             let refused = recursion.update(&mut h, &mut y).is_err();
             if refused == is_usable {
                 return Err(format!("update {update}: is refused: {refused}, usable: {is_usable}"));
@@ -149,11 +137,7 @@ pub fn over_time<T: Number>(
         }
         if update.is_multiple_of((updates / LOOKS).max(1)) {
             let mut weights = [T::ZERO; REGRESSORS];
-            if planted {
-                rls::solve_triangle(triangle, projection, REGRESSORS, &mut weights);
-            } else {
-                recursion.weights(&mut weights);
-            }
+            recursion.weights(&mut weights);
             let weights = weights.map(T::value);
             if let Some(weight) = weights.iter().find(|w| w.is_nan() || w.abs() > MOST_WEIGHT) {
                 return Err(format!("a weight is {weight:e} after {update} updates"));

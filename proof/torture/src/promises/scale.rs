@@ -4,6 +4,7 @@ use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -13,12 +14,11 @@ use taxel_data::random::{Purpose, Random, Stream};
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
-use crate::tally::Tally;
 use crate::tools::Tools;
 
 pub const SCALE: Promise = Promise {
     name: "scale-sweep",
-    text: "1e-300 to 1e300: R² as at scale 1, or refused by name",
+    text: "1e-300 to 1e300: R² as at scale 1, or refused",
     share: 2,
     check: sweep,
 };
@@ -26,6 +26,8 @@ pub const SCALE: Promise = Promise {
 /// Time after which a command hangs.
 const PATIENCE: Duration = Duration::from_mins(1);
 const LINES: usize = 150;
+/// First cases, which are not drawn.
+const LOST: u64 = 14;
 /// Factors by which a column must be accepted: its range is about 1 before.
 const ACCEPTED_FACTORS: RangeInclusive<f64> = 1e-27..=1e29;
 /// The largest offset with which a column must be accepted. Far larger ones leave a format too few digits.
@@ -33,19 +35,19 @@ const ACCEPTED_OFFSET: f64 = 100.0;
 
 /// What becomes of a column: its values times a factor, plus an offset.
 #[derive(Debug, Clone, Copy)]
-pub struct Change {
+struct Change {
     factor: f64,
     offset: f64,
 }
 
 impl Change {
-    pub const NONE: Self = Self { factor: 1.0, offset: 0.0 };
+    const NONE: Self = Self { factor: 1.0, offset: 0.0 };
 
-    pub fn times(factor: f64) -> Self {
+    fn times(factor: f64) -> Self {
         Self { factor, ..Self::NONE }
     }
 
-    pub fn plus(offset: f64) -> Self {
+    fn plus(offset: f64) -> Self {
         Self { offset, ..Self::NONE }
     }
 
@@ -61,7 +63,7 @@ impl Change {
 
 /// How a command ended.
 #[derive(Debug, Clone, Copy)]
-pub enum Outcome {
+enum Outcome {
     /// R² of the model on its training lines.
     Accepted(f64),
     /// The message named the column.
@@ -73,19 +75,18 @@ pub enum Outcome {
 fn sweep(effort: &Effort, tools: &Tools) -> Result<Found, String> {
     let program = &path_of(tools)?;
     let folder = folder(effort.seed())?;
-    let planted = effort.is_planted();
     let base: Result<Vec<f64>, String> = FORMATS
         .iter()
-        .map(|format| match run(program, &folder.join(format), format, [Change::NONE; 2], false)? {
+        .map(|format| match run(program, &folder.join(format), format, [Change::NONE; 2])? {
             Outcome::Accepted(r_squared) => Ok(r_squared),
             _ => Err("the moderate case is refused".into()),
         })
         .collect();
     let base = base?;
-    let outcomes = Tally::new(["accepted", "refused", "noted"]);
-    let mut found = effort.worst((48, 20_000), (0.02, "of R²"), |seed| {
+    let noted = AtomicU64::new(0);
+    let found = effort.worst_of_accepted((64, 20_000), (0.02, "of R²"), |seed| {
         let mut random = Random::new(seed, Stream::Test, Purpose::Noise, 0, 0);
-        let format = random.below(FORMATS.len());
+        let mut format = random.below(FORMATS.len());
         let size = 10_f64.powf(random.between([-300.0, 300.0]));
         // Offsets that matter are from 1 to 1e18.
         let most = [18.0, 300.0][random.below(2)];
@@ -94,64 +95,63 @@ fn sweep(effort: &Effort, tools: &Tools) -> Result<Found, String> {
             0 | 1 => Change::times([size, size.powf(0.1)][random.below(2)]),
             _ => Change::plus(offset),
         };
-        let changes =
+        let mut changes =
             if seed.is_multiple_of(2) { [change, Change::NONE] } else { [Change::NONE, change] };
+        let number = seed.wrapping_sub(effort.seed());
+        if number < LOST {
+            // Outputs of which fixed16 loses more and more: up to those that it must refuse.
+            format = 2;
+            changes = [Change::NONE, Change::plus(100.0 * 2_f64.powi(number as i32))];
+        }
         let case = folder.join(seed.to_string());
-        let outcome = run(program, &case, FORMATS[format], changes, planted);
+        let outcome = run(program, &case, FORMATS[format], changes);
         let _ = fs::remove_dir_all(&case);
         let lost = outcome.and_then(|outcome| {
-            let index = match outcome {
-                Outcome::Accepted(_) => 0,
-                Outcome::Refused => 1,
-                Outcome::Noted => 2,
-            };
-            outcomes.add(index, 1);
-            lost(change, outcome, base[format])
+            noted.fetch_add(u64::from(matches!(outcome, Outcome::Noted)), Ordering::Relaxed);
+            lost(changes, outcome, base[format])
         });
         lost.map_err(|why| format!("{}, {changes:?}: {why}", FORMATS[format]))
     });
     let _ = fs::remove_dir_all(&folder);
-    if found.note.is_empty() {
-        found.note = outcomes.text();
-    }
-    Ok(found)
+    Ok(found.noted(|| format!("{} more are said not to change", noted.into_inner())))
 }
 
 /// R² that a changed column costs, of `base`. What is moderate must not be refused.
-fn lost(change: Change, outcome: Outcome, base: f64) -> Result<f64, String> {
+fn lost(changes: [Change; 2], outcome: Outcome, base: f64) -> Result<Option<f64>, String> {
+    let is_moderate = changes.into_iter().all(Change::is_moderate);
     match outcome {
-        Outcome::Accepted(r_squared) => Ok(base - r_squared),
-        Outcome::Refused if change.is_moderate() => Err("refused, but moderate".into()),
-        Outcome::Noted if change.is_moderate() => Err("is said not to change".into()),
-        Outcome::Refused | Outcome::Noted => Ok(0.0),
+        Outcome::Accepted(r_squared) => Ok(Some(base - r_squared)),
+        Outcome::Refused if is_moderate => Err("refused, but moderate".into()),
+        Outcome::Noted if is_moderate => Err("is said not to change".into()),
+        Outcome::Refused => Ok(None),
+        Outcome::Noted => Ok(Some(0.0)),
     }
 }
 
-pub const FORMATS: [&str; 3] = ["f32", "f32-direct", "fixed16"];
+const FORMATS: [&str; 3] = ["f32", "f32-direct", "fixed16"];
 
 /// Path of the program from any folder.
-pub fn path_of(tools: &Tools) -> Result<PathBuf, String> {
+fn path_of(tools: &Tools) -> Result<PathBuf, String> {
     let program = tools.program()?;
     program.canonicalize().map_err(|cause| format!("{}: {cause}", program.display()))
 }
 
 /// Empty folder for the files of a test.
-pub fn folder(seed: u64) -> Result<PathBuf, String> {
+fn folder(seed: u64) -> Result<PathBuf, String> {
     let path = std::env::temp_dir().join(format!("taxel-scale-{}-{seed}", std::process::id()));
     fs::create_dir_all(&path).map_err(|cause| format!("{}: {cause}", path.display()))?;
     Ok(path)
 }
 
 /// Trains on lines whose first input and whose output are changed, decodes and evaluates them.
-pub fn run(
+fn run(
     program: &Path,
     folder: &Path,
     format: &str,
     changes: [Change; 2],
-    planted: bool,
 ) -> Result<Outcome, String> {
     fs::create_dir_all(folder).map_err(|cause| cause.to_string())?;
-    fs::write(folder.join("d.csv"), csv(changes, planted)).map_err(|cause| cause.to_string())?;
+    fs::write(folder.join("d.csv"), csv(changes)).map_err(|cause| cause.to_string())?;
     let train = ["train", "d.csv", "--inputs", "a,b", "--outputs", "y", "--centres", "14"];
     let train = [&train[..], &["--no-refine", "--format", format, "-o", "m.bin"]].concat();
     let trained = command(program, folder, &train)?;
@@ -185,14 +185,13 @@ pub fn run(
     }
 }
 
-/// Lines of two inputs and an output. Planted: values are rounded to f32 before anybody looks at them.
-fn csv(changes: [Change; 2], planted: bool) -> String {
-    let round = |value: f64| if planted { f64::from(value as f32) } else { value };
+/// Lines of two inputs and an output.
+fn csv(changes: [Change; 2]) -> String {
     let mut random = Random::new(1, Stream::Training, Purpose::Noise, 0, 0);
     let line = |_| {
         let (a, b) = (random.unit(), random.unit());
         let y = (3.0 * a).sin() * (2.0 * b).cos() + 0.5 * b * b;
-        format!("{:e},{b:e},{:e}\n", round(changes[0].of(a)), round(changes[1].of(y)))
+        format!("{:e},{b:e},{:e}\n", changes[0].of(a), changes[1].of(y))
     };
     format!("a,b,y\n{}", (0..LINES).map(line).collect::<String>())
 }
@@ -226,15 +225,14 @@ mod tests {
     #[test]
     fn only_what_is_extreme_may_be_refused() {
         let moderate = [1e-27, 1e-9, 1.0, 1e29].map(Change::times);
-        let moderate = [&moderate[..], &[Change::plus(1.0), Change::plus(100.0)]].concat();
-        for change in moderate {
+        for change in moderate.into_iter().chain([Change::plus(1.0), Change::plus(100.0)]) {
             for outcome in [Outcome::Refused, Outcome::Noted] {
-                assert!(lost(change, outcome, 1.0).is_err(), "{change:?}, {outcome:?}");
+                assert!(lost([change; 2], outcome, 1.0).is_err(), "{change:?}, {outcome:?}");
             }
-            assert_eq!(lost(change, Outcome::Accepted(0.75), 1.0), Ok(0.25));
+            assert_eq!(lost([change; 2], Outcome::Accepted(0.75), 1.0), Ok(Some(0.25)));
         }
         for change in [1e-29, 1e31].map(Change::times).into_iter().chain([Change::plus(1e9)]) {
-            assert_eq!(lost(change, Outcome::Refused, 1.0), Ok(0.0), "{change:?}");
+            assert_eq!(lost([change, Change::NONE], Outcome::Refused, 1.0), Ok(None), "{change:?}");
         }
     }
 }

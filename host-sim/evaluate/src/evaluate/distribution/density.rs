@@ -57,12 +57,12 @@ mod tests {
     #[test]
     fn pairs_lie_in_their_bins() {
         let pairs = [[0.0, 0.0], [30.0, 29.5], [15.0, 80.0], [15.0, -0.5]];
-        let density = Density::of(&pairs);
+        let density = Density::new(&pairs);
         assert_eq!((density.low, density.high), (-1.0, 31.0));
         assert_eq!(density.outside, 1);
         assert_eq!(density.counts[32 + 1], 1, "0 is in the second bin of both");
         assert_eq!(density.counts[30 * 32 + 31], 1);
         assert_eq!(density.counts[16], 1, "below the least truth");
-        assert_eq!(Density::of(&[[3.0, 3.0]]).counts[16 * 32 + 16], 1);
+        assert_eq!(Density::new(&[[3.0, 3.0]]).counts[16 * 32 + 16], 1);
     }
 }

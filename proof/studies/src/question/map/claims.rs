@@ -22,7 +22,6 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Verdict for people.
     pub fn words(self) -> &'static str {
         match self {
             Self::Holds => "holds",
@@ -47,18 +46,15 @@ pub struct Compared {
 /// Claim of the paper, judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Claim {
-    /// What the paper says.
     pub claim: &'static str,
     /// Noise level that it is judged at, as a fraction; `None` for a claim on noise.
     pub noise_level: Option<f64>,
     pub samples: usize,
     pub quantity: &'static str,
     pub compared: Vec<Compared>,
-    /// Whether it is borne out.
     pub verdict: Verdict,
 }
 
-/// Judges all claims.
 pub(super) fn judge(plan: &Plan, maps: &[Map]) -> Vec<Claim> {
     let (Some(&narrow), Some(&wide)) = (plan.spreads.first(), plan.spreads.last()) else {
         return Vec::new();

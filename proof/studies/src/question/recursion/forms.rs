@@ -219,9 +219,7 @@ impl<'t> Regressed<'t> {
 
 /// Precision that a recursion works in.
 trait Number: Real {
-    /// Nearest number of this precision.
     fn of(value: f64) -> Self;
-    /// The number in f64.
     fn f64(self) -> f64;
 }
 

@@ -11,7 +11,7 @@ use crate::tools::{Tools, tested_model};
 
 pub const RAM: Promise = Promise {
     name: "ram-flip",
-    text: "a flipped bit of RAM: 99 % seen, and all of the model",
+    text: "flipped RAM bits: 99 % seen, all of the model",
     share: 12,
     check,
 };
@@ -19,8 +19,6 @@ pub const RAM: Promise = Promise {
 /// Flips of the short form, and the most.
 const LEAST: u64 = 24;
 const MOST: u64 = 20_000;
-/// Flips of a device with a planted fault.
-const PLANTED: u64 = 2;
 /// Most flips in per cent that no check sees.
 const MOST_UNSEEN_PERCENT: f64 = 1.0;
 
@@ -42,8 +40,7 @@ fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
     let mut counts = [0_u64; Harm::ALL.len()];
     let mut flips = 0;
     let mut first_of_model = None;
-    let least = if effort.is_planted() { PLANTED } else { LEAST };
-    while flips < least || (flips < MOST && !effort.is_over()) {
+    while flips < LEAST || (flips < MOST && !effort.is_over()) {
         let seed = effort.seed().wrapping_add(flips);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut offset = random.next_u32() % bytes;
@@ -53,7 +50,7 @@ fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
             region += 1;
         }
         let address = regions[region].1.0 + offset;
-        let harm = victim.flip(address, random.next_u32() % 8, &mut random, effort.is_planted())?;
+        let harm = victim.flip(address, random.next_u32() % 8, &mut random)?;
         counts[harm as usize] += 1;
         flips += 1;
         if harm == Harm::Silent && regions[region].1.0 == COPY {
@@ -79,7 +76,15 @@ fn check(effort: &Effort, tools: &Tools) -> Result<Found, String> {
     // A few flips tell no share: it is too large if the whole interval of 95 % is beyond the bound.
     let worst = if first_of_model.is_some() { 100.0 } else { low };
     let (seed, note) = first_of_model.unwrap_or((effort.seed(), note));
-    Ok(Found { cases: flips, worst, bound: MOST_UNSEEN_PERCENT, unit: "% unseen", seed, note })
+    Ok(Found {
+        cases: flips,
+        refused: 0,
+        worst,
+        bound: MOST_UNSEEN_PERCENT,
+        unit: "% unseen",
+        seed,
+        note,
+    })
 }
 
 /// Share in per cent, with Wilson's interval of 95 %.

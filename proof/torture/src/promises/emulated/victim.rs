@@ -52,9 +52,8 @@ const FRAMES: usize = 24;
 const ANSWER: Duration = Duration::from_millis(200);
 /// Longest time that the check in the background takes for two passes.
 const TWO_PASSES: Duration = Duration::from_secs(2);
-/// Registers of the watchdog: its count, which falls until it is fed, and what feeds it.
+/// The watchdog's count, which falls until it is fed.
 const WATCHDOG_COUNT: u32 = 0x4000_8004;
-const WATCHDOG_CLEAR: u32 = 0x4000_800C;
 
 /// Address of the copy of the model in the emulator's image.
 pub const COPY: u32 = 0x2000_8000;
@@ -90,15 +89,7 @@ impl Victim {
     }
 
     /// Flips a bit while the device decodes, and looks what becomes of it. The device is as new before.
-    ///
-    /// With `planted`, the processor runs away behind it: it feeds the watchdog for ever, and does nothing else.
-    pub fn flip(
-        &mut self,
-        address: u32,
-        bit: u32,
-        random: &mut impl Rng,
-        planted: bool,
-    ) -> Result<Harm, String> {
+    pub fn flip(&mut self, address: u32, bit: u32, random: &mut impl Rng) -> Result<Harm, String> {
         let mut running = self.renewed()?;
         let case = &self.cases[0];
         let request = Request::Decode { frame: 0, readings_ohm: Floats::new(&case.readings_ohm) };
@@ -108,9 +99,6 @@ impl Victim {
         while start.elapsed() < wait {}
         running.gdb.stop().map_err(|cause| failed(&cause))?;
         running.gdb.flip(address, bit).map_err(|cause| failed(&cause))?;
-        if planted {
-            run_away(&mut running.gdb).map_err(|cause| failed(&cause))?;
-        }
         running.gdb.run().map_err(|cause| failed(&cause))?;
         let harm = self.look(&mut running);
         if matches!(harm, Harm::None | Harm::Mended | Harm::Silent | Harm::Told) {
@@ -183,14 +171,6 @@ impl Victim {
         }
         self.cases.iter().all(|case| decoded(&mut running.device, case) == Ok(Harm::None))
     }
-}
-
-/// Lets the processor go on in a loop that feeds the watchdog. It takes the place of the model's copy, which is needed
-/// no more.
-fn run_away(gdb: &mut Gdb) -> std::io::Result<()> {
-    gdb.write(COPY, 0xE7FD_6001)?; // str r1, [r0]; and a jump back to it
-    let registers = [(0, WATCHDOG_CLEAR), (1, 1), (15, COPY)];
-    registers.into_iter().try_for_each(|(number, value)| gdb.set_register(number, value))
 }
 
 /// Whether the watchdog is fed within a second, in which its count would fall otherwise.

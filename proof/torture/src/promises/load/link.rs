@@ -20,7 +20,7 @@ use crate::tools::Tools;
 
 pub const LINK: Promise = Promise {
     name: "load-link",
-    text: "a saturated line: each report arrives, or is counted",
+    text: "a slow line: each report arrives, or is counted",
     share: 4,
     check,
 };
@@ -30,24 +30,20 @@ const LEAST: u64 = 64;
 const TURNS: u64 = 3000;
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let planted = effort.is_planted();
     let counts = Tally::new(["produced", "arrived", "counted as lost", "of them both"]);
     let mut found = effort.worst((LEAST, 1 << 40), (0.0, "reports"), |seed| {
-        let [produced, arrived, lost] = run(seed, planted)?;
+        let [produced, arrived, lost] = run(seed)?;
         let both = (arrived + lost).saturating_sub(produced);
         [produced, arrived, lost, both].iter().enumerate().for_each(|(i, n)| counts.add(i, *n));
         // A report that was given up before its very last byte arrives after all, with the byte that ends it.
         Ok(produced.saturating_sub(arrived + lost) as f64)
     });
-    if found.note.is_empty() {
-        found.note = format!("reports: {}", counts.text());
-    }
     found.cases = counts.count(0);
-    Ok(found)
+    Ok(found.noted(|| format!("reports: {}", counts.text())))
 }
 
 /// Numbers of reports that were produced, that arrived, and that were counted as lost.
-fn run(seed: u64, planted: bool) -> Result<[u64; 3], String> {
+fn run(seed: u64) -> Result<[u64; 3], String> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut below = |end: u32| random.next_u32() % end;
     let models = [blob(1, 2), blob_with_confidence(false)];
@@ -99,9 +95,6 @@ fn run(seed: u64, planted: bool) -> Result<[u64; 3], String> {
     let s = statistics(&mut session, &board);
     let per_frame = 1 + u64::from(scanning.send_readings) + u64::from(has_health);
     let produced = u64::from(s.frames_scanned) * per_frame + requests + 1;
-    if planted && let Some(end) = bytes.iter().position(|byte| *byte == 0) {
-        bytes.drain(..=end); // a report is lost without being counted
-    }
     Ok([produced, arrived(&bytes)?, u64::from(s.lost_reports)])
 }
 

@@ -51,8 +51,7 @@ const BUSY: Configuration = Configuration {
 };
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let planted = effort.is_planted();
-    Ok(effort.worst((LEAST, 1 << 40), (FASTEST_S, "s"), |seed| Ok(longest_unfed_s(seed, planted))))
+    Ok(effort.worst((LEAST, 1 << 40), (FASTEST_S, "s"), |seed| Ok(longest_unfed_s(seed))))
 }
 
 /// Settings in these pages, one of which is full: they are exchanged at the next write. From then on the pages may be worn.
@@ -67,7 +66,7 @@ fn nearly_full(pages: [Flash; 2], is_worn: bool) -> SharedSettings {
 }
 
 /// Longest time in s between feeds of the watchdog.
-fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
+fn longest_unfed_s(seed: u64) -> f64 {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let gaps_us = [0, 1_000, 10_000, 49_000, 1_000_000, 5];
     let (gap_us, is_bursts) = (gaps_us[(seed % 6) as usize], seed % 6 == 5);
@@ -121,12 +120,7 @@ fn longest_unfed_s(seed: u64, planted: bool) -> f64 {
             board.pins.borrow_mut().room = Some((random.next_u32() % 300) as usize);
         }
         session.step();
-        let mut pins = board.pins.borrow_mut();
-        if planted {
-            // A port that waits for two seconds more before it gives a turn up.
-            pins.now_us = pins.now_us.wrapping_add(2_000_000);
-        }
-        pins.to_host.clear();
+        board.pins.borrow_mut().to_host.clear();
     }
     f64::from(board.pins.borrow().longest_unfed_us) / 1e6
 }

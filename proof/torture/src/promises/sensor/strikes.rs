@@ -24,10 +24,6 @@ pub enum Strike {
 }
 
 impl Strike {
-    pub fn noisy(row: usize, column: usize) -> Self {
-        Self::Noisy { row, column }
-    }
-
     /// Faults of the board.
     pub fn faults(&self) -> &[BoardFault] {
         match self {
@@ -41,7 +37,7 @@ impl Strike {
         if matches!(self, Self::Loose(..)) { LOOSE_ONE_IN } else { 1 }
     }
 
-    /// Names that the diagnosis should give.
+    /// Names that the diagnosis should give; none where any will do.
     pub fn names(&self) -> Vec<String> {
         match self {
             Self::Board(_, names) => names.clone(),
@@ -101,6 +97,11 @@ pub fn all() -> Vec<Strike> {
                 .push(Strike::Board([BoardFault::Stuck { first, last, is_high }], names.collect()));
         }
     }
-    strikes.extend((0..ROWS * COLUMNS).map(|at| Strike::noisy(at / COLUMNS, at % COLUMNS)));
+    // A wire at the supply saturates all columns: which one it is, readings do not tell.
+    let rows = (0..ROWS).map(BoardFault::RowAtSupply);
+    let at_supply = rows.chain((0..COLUMNS).map(BoardFault::ColumnAtSupply));
+    strikes.extend(at_supply.map(|fault| Strike::Board([fault], vec![])));
+    let noisy = |at| Strike::Noisy { row: at / COLUMNS, column: at % COLUMNS };
+    strikes.extend((0..ROWS * COLUMNS).map(noisy));
     strikes
 }
