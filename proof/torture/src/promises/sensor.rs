@@ -43,25 +43,22 @@ pub const SILENT: Promise = Promise {
 const ROWS: usize = 8;
 const COLUMNS: usize = 18;
 
-/// Frames for the model.
-const TRAINING_FRAMES: usize = 2000;
+/// Numbers of training frames of the fills that sensors are judged by: the least that is accepted, and more.
+const FILLS: [usize; 3] = [ROWS * COLUMNS * 10, 2000, 6000];
 
-/// A model of the whole array that fills missing readings.
-fn model() -> Result<&'static ModelBlob, String> {
-    static MODEL: OnceLock<Result<ModelBlob, String>> = OnceLock::new();
-    MODEL.get_or_init(|| fitted(TRAINING_FRAMES, 24)).as_ref().map_err(Clone::clone)
-}
-
-/// A model with so many centres that fills missing readings, trained on so many `frames`.
-fn fitted(frames: usize, centres: usize) -> Result<ModelBlob, String> {
-    let fitted = || {
+/// Models whose fills were fitted to so many frames each.
+fn models() -> Result<&'static [ModelBlob], String> {
+    static MODELS: OnceLock<Result<Vec<ModelBlob>, String>> = OnceLock::new();
+    let fitted = |frames: usize| {
         let frames = synthesise(&World::press(), Stream::Training, frames);
-        let options = Options { centres, spread: 0.4, whole_array: true, ..Options::default() };
+        let options = Options { centres: 8, whole_array: true, ..Options::default() };
         let trained = train(&frames, &options, &Silent)?;
         let blob = pack(&trained, &frames, &Origin::of_data("press", 0, 1, &frames))?;
         fill::add(&blob, &frames.inputs)
     };
-    fitted().map_err(|error: taxel_learn::Error| error.to_string())
+    let all = || FILLS.into_iter().map(fitted).collect::<Result<_, taxel_learn::Error>>();
+    let models = MODELS.get_or_init(|| all().map_err(|error| error.to_string()));
+    models.as_deref().map_err(Clone::clone)
 }
 
 /// Readings of `frames` with this noise, drawn with `seed`.
@@ -94,12 +91,12 @@ fn scanned(seed: u64, readings: &Table, faults: &[BoardFault]) -> Result<Table, 
 
 /// Scans `readings` on a board that a fault strikes, in every frame or now and then.
 fn struck(seed: u64, readings: &Table, strike: &Strike) -> Result<Table, String> {
-    let mut faulty = scanned(seed, readings, strike.faults())?;
-    if strike.one_in() > 1 {
+    let mut faulty = scanned(seed, readings, strike.fault.as_slice())?;
+    if strike.one_in > 1 {
         let sound = scanned(seed, readings, &[])?;
         let width = readings.names.len();
         let frames = faulty.values.chunks_exact_mut(width).zip(sound.lines()).enumerate();
-        let are_sound = frames.filter(|(frame, _)| frame % strike.one_in() != 0);
+        let are_sound = frames.filter(|(frame, _)| frame % strike.one_in != 0);
         are_sound.for_each(|(_, (faulty, sound))| faulty.copy_from_slice(sound));
     }
     Ok(faulty)
@@ -128,7 +125,7 @@ fn share(
 }
 
 fn named(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let model = model()?;
+    let model = &models()?[1];
     let strikes = strikes::all();
     let count = strikes.len() as u64;
     Ok(share(effort, (60, count * 40), 1.0, |seed| {
@@ -137,7 +134,7 @@ fn named(effort: &Effort, _: &Tools) -> Result<Found, String> {
         let mut frames = readings(seed, 0.005, WINDOW);
         strike.add_noise(seed, &mut frames);
         let mut found = named_by(model.parse().fill(), &struck(seed, &frames, strike)?);
-        let mut expected = strike.names();
+        let mut expected = strike.names.clone();
         found.sort();
         expected.sort();
         let is_right = if expected.is_empty() { !found.is_empty() } else { found == expected };
@@ -145,20 +142,10 @@ fn named(effort: &Effort, _: &Tools) -> Result<Found, String> {
     }))
 }
 
-/// Numbers of training frames of the fills that sound sensors are judged by: the least that is accepted, and more.
-const FILLS: [usize; 3] = [ROWS * COLUMNS * 10, TRAINING_FRAMES, 6000];
-
-/// Models whose fills were fitted to so many frames each.
-fn fills() -> Result<&'static [ModelBlob], String> {
-    static MODELS: OnceLock<Result<Vec<ModelBlob>, String>> = OnceLock::new();
-    let all = || FILLS.into_iter().map(|frames| fitted(frames, 8)).collect();
-    MODELS.get_or_init(all).as_deref().map_err(Clone::clone)
-}
-
 /// A case is one window of a sound sensor, as one alarm is an alarm in all frames of its window. Windows of fewer frames
 /// than tell noise are tested, but do not count.
 fn silent(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let models = fills()?;
+    let models = models()?;
     let [windows, frames] = [AtomicU64::new(0), AtomicU64::new(0)];
     let found = share(effort, (60, 40_000), 0.01, |seed| {
         let mut draw = Random::new(seed, Stream::Test, Purpose::Damage, 0, 0);
@@ -186,9 +173,4 @@ fn silent(effort: &Effort, _: &Tools) -> Result<Found, String> {
         )
     });
     Ok(Found { cases: windows, ..found })
-}
-
-/// Draws for what a strike adds to readings.
-fn draws(seed: u64) -> Random {
-    Random::new(seed, Stream::Test, Purpose::AdcNoise, 0, 0)
 }

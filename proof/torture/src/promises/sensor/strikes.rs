@@ -1,9 +1,10 @@
 //! What strikes a sensor, and how it should be named.
 
+use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::table::Table;
 use taxel_simulate::virtual_board::BoardFault;
 
-use super::{COLUMNS, ROWS, draws};
+use super::{COLUMNS, ROWS};
 
 /// Noise of a struck reading: a hundred times the usual one.
 const NOISE: f64 = 0.5;
@@ -14,42 +15,27 @@ const CHANNELS: usize = 8;
 
 /// A fault of the sensor.
 #[derive(Debug, Clone)]
-pub enum Strike {
-    /// One of the board's wires or converters.
-    Board([BoardFault; 1], Vec<String>),
-    /// A lead of the board that is open in every fifth frame.
-    Loose([BoardFault; 1], String),
-    /// A reading with a hundred times the noise; wires count from 0.
-    Noisy { row: usize, column: usize },
+pub struct Strike {
+    /// What strikes the board, if anything does.
+    pub fault: Option<BoardFault>,
+    /// Number of frames of which one is struck.
+    pub one_in: usize,
+    /// Row and column, from 0, of a reading with a hundred times the noise.
+    noisy: Option<(usize, usize)>,
+    /// Names that the diagnosis should give; none where any will do.
+    pub names: Vec<String>,
 }
 
 impl Strike {
-    /// Faults of the board.
-    pub fn faults(&self) -> &[BoardFault] {
-        match self {
-            Self::Board(fault, _) | Self::Loose(fault, _) => fault,
-            Self::Noisy { .. } => &[],
-        }
-    }
-
-    /// Number of frames of which one is struck.
-    pub fn one_in(&self) -> usize {
-        if matches!(self, Self::Loose(..)) { LOOSE_ONE_IN } else { 1 }
-    }
-
-    /// Names that the diagnosis should give; none where any will do.
-    pub fn names(&self) -> Vec<String> {
-        match self {
-            Self::Board(_, names) => names.clone(),
-            Self::Loose(_, name) => vec![name.clone()],
-            Self::Noisy { row, column } => vec![format!("r{}c{} noisy", row + 1, column + 1)],
-        }
+    /// One of the board's wires or converters.
+    fn new(fault: BoardFault, names: Vec<String>) -> Self {
+        Self { fault: Some(fault), one_in: 1, noisy: None, names }
     }
 
     /// Adds the noise to `readings` in Ω, if that is the fault. No resistance is negative.
     pub fn add_noise(&self, seed: u64, readings: &mut Table) {
-        let Self::Noisy { row, column } = self else { return };
-        let mut noise = draws(seed);
+        let Some((row, column)) = self.noisy else { return };
+        let mut noise = Random::new(seed, Stream::Test, Purpose::AdcNoise, 0, 0);
         for frame in readings.values.chunks_exact_mut(ROWS * COLUMNS) {
             let reading = &mut frame[row * COLUMNS + column];
             *reading = (*reading * (1.0 + NOISE * noise.normal())).max(0.0);
@@ -59,9 +45,10 @@ impl Strike {
 
 /// Every fault of one wire, two neighbours, one converter or one reading that readings can tell.
 pub fn all() -> Vec<Strike> {
-    let one = |fault, name: String| Strike::Board([fault], vec![name]);
+    let one = |fault, name: String| Strike::new(fault, vec![name]);
     let loose = |fault, wire: &str, number| {
-        Strike::Loose([fault], format!("{wire} {number} intermittently open"))
+        let strike = one(fault, format!("{wire} {number} intermittently open"));
+        Strike { one_in: LOOSE_ONE_IN, ..strike }
     };
     let mut strikes = Vec::new();
     for row in 0..ROWS {
@@ -93,15 +80,19 @@ pub fn all() -> Vec<Strike> {
     for (first, last) in inputs.chain(all) {
         for (is_high, what) in [(true, "shorted"), (false, "open")] {
             let names = (first..=last).map(|column| format!("column-wire {} {what}", column + 1));
-            strikes
-                .push(Strike::Board([BoardFault::Stuck { first, last, is_high }], names.collect()));
+            let fault = BoardFault::Stuck { first, last, is_high };
+            strikes.push(Strike::new(fault, names.collect()));
         }
     }
     // A wire at the supply saturates all columns: which one it is, readings do not tell.
     let rows = (0..ROWS).map(BoardFault::RowAtSupply);
     let at_supply = rows.chain((0..COLUMNS).map(BoardFault::ColumnAtSupply));
-    strikes.extend(at_supply.map(|fault| Strike::Board([fault], vec![])));
-    let noisy = |at| Strike::Noisy { row: at / COLUMNS, column: at % COLUMNS };
+    strikes.extend(at_supply.map(|fault| Strike::new(fault, vec![])));
+    let noisy = |at: usize| {
+        let (row, column) = (at / COLUMNS, at % COLUMNS);
+        let names = vec![format!("r{}c{} noisy", row + 1, column + 1)];
+        Strike { fault: None, one_in: 1, noisy: Some((row, column)), names }
+    };
     strikes.extend((0..ROWS * COLUMNS).map(noisy));
     strikes
 }
