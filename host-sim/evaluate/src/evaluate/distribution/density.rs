@@ -21,7 +21,7 @@ pub struct Density {
 
 impl Density {
     /// Density of `pairs` of truth and estimate; the bins cover all truths.
-    pub(super) fn of(pairs: &[[f64; 2]]) -> Self {
+    pub(super) fn new(pairs: &[[f64; 2]]) -> Self {
         let truths = pairs.iter().map(|[truth, _]| *truth);
         let (low, high) = truths.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), truth| {
             (low.min(truth), high.max(truth))
