@@ -28,7 +28,7 @@ const DESK: &[&str] = &[
 pub fn run() -> Outcome {
     let (product, proof) = (metadata("Cargo.toml")?, metadata(PROOF)?);
     let mut broken = broken(&product);
-    let packages = [&product, &proof].into_iter().flat_map(|it| it["packages"].as_array());
+    let packages = [&product, &proof].into_iter().filter_map(|it| it["packages"].as_array());
     broken.extend(packages.flatten().flat_map(unused));
     if broken.is_empty() { Ok(()) } else { Err(broken.join("\n")) }
 }

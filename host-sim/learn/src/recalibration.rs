@@ -9,9 +9,9 @@
 //! inputs have no slope. For each press p, inputs xₚ and true outputs yₚ are known.
 //!
 //! 1. **Guess.** Centres are inputs whose outputs the network tells. A linear regression of the centres on their
-//!    outputs, with a [`RIDGE`], says which inputs g(yₚ) the stated outputs should have had. The guess s₀ is the median
+//!    outputs, with a `RIDGE`, says which inputs g(yₚ) the stated outputs should have had. The guess s₀ is the median
 //!    of xₚ − g(yₚ) over all presses.
-//! 2. **Fit.** The shift minimises Σₚ (m/3)·ln(1 + 3eₚ²) + [`PRIOR`]²·‖s − s₀‖², with eₚ² the mean squared error of
+//! 2. **Fit.** The shift minimises Σₚ (m/3)·ln(1 + 3eₚ²) + `PRIOR`²·‖s − s₀‖², with eₚ² the mean squared error of
 //!    f(xₚ − s) in its m outputs. The logarithm belongs to errors with Cauchy's distribution: a press that is far from
 //!    explained, or whose outputs were misstated, says little. Gauss–Newton steps find the minimum; each weighs the
 //!    presses by 1/(1 + 3eₚ²), solves by orthogonal rotations ([`rls`]), and is halved until the sum falls.

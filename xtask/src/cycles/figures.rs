@@ -19,8 +19,11 @@ const LOOP: [u64; 2] = [2001, 3999];
 const SAME_COMPILER_PERCENT: [u64; 3] = [0, 1, 1];
 
 /// Most per cent by which they may exceed those accepted for another compiler, which makes other code. Less is no fault.
-/// Cycles from flash also depend on where code stands: moved by 2 to 14 bytes, the accepted code takes up to 13.5 % more.
+/// Cycles from flash also depend on where code stands. Loops in assembly are the same in any compiler's image; those of
+/// [`COMPILED`] are not, and standing elsewhere alone takes them from 17 % less to 13.5 % more.
 const OTHER_COMPILER_PERCENT: [u64; 3] = [u64::MAX / 2, 2, 16];
+const COMPILED_FROM_FLASH_PERCENT: u64 = 30;
+const COMPILED: &str = "f32-direct";
 
 /// Budgets for any compiler: kernel, K, scope, and the most cycles of a model without an affine tail.
 const BUDGETS: [(&str, u64, &str, u64); 7] = [
@@ -188,6 +191,10 @@ impl Accepted {
             let Some(then) = self.figures.iter().find(|then| then.key() == now.key()) else {
                 return Some(format!("{}: not accepted yet", now.name()));
             };
+            let mut percent = percent;
+            if !is_own && now.kernel.starts_with(COMPILED) {
+                percent[2] = COMPILED_FROM_FLASH_PERCENT;
+            }
             let whats = ["instructions", "cycles", "cycles from flash"];
             let counts = now.count.all().into_iter().zip(then.count.all()).zip(percent).zip(whats);
             let is_off = |&(((now, then), percent), _): &(((u64, u64), u64), &str)| {

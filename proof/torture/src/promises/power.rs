@@ -11,7 +11,7 @@ use crate::tally::{Tally, outcomes};
 
 pub const UPLOAD: Promise = Promise {
     name: "cut-upload",
-    text: "power cut in an upload: the old or the new model",
+    text: "power cut in an upload: old or new model",
     share: 12,
     check: |effort, _| Ok(sweep(effort, 600, |seed| cut_model(Job::Upload, seed))),
 };
@@ -25,21 +25,21 @@ pub const UNDO: Promise = Promise {
 
 pub const SETTINGS: Promise = Promise {
     name: "cut-settings",
-    text: "power cut while a setting is kept: the old or the new",
+    text: "power cut while a setting is kept: old or new",
     share: 8,
     check: |effort, _| Ok(sweep(effort, 160, cut_settings)),
 };
 
 pub const PROVISION: Promise = Promise {
     name: "cut-provision",
-    text: "power cut while a key is set: no key or that one",
+    text: "power cut while a key is set: none or that one",
     share: 2,
     check: |effort, _| Ok(sweep(effort, 600, cut_key)),
 };
 
 pub const DECAY: Promise = Promise {
     name: "abort-decay",
-    text: "the slot in force decays: no aborted upload takes over",
+    text: "slot in force decays: no aborted upload is taken",
     share: 2,
     check: |effort, _| {
         let names = ["the same model", "the one before it", "none"];

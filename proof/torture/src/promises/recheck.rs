@@ -8,7 +8,7 @@ use crate::tally::outcomes;
 
 pub const RECHECK: Promise = Promise {
     name: "model-recheck",
-    text: "flipped bits of the model in force: found and mended",
+    text: "flipped bits of the model: found and mended",
     share: 2,
     check: |effort, _| {
         let names = ["copied again", "noted", "the other slot's", "none is sound"];
