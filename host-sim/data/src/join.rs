@@ -52,7 +52,7 @@ impl Join {
     pub fn join(&self, first: &DataFile, second: &DataFile) -> Result<Joined> {
         let on = [(first, first.column(&self.on[0])?), (second, second.column(&self.on[1])?)];
         let is_large = |(file, column): &(&DataFile, usize)| {
-            file.rows().any(|row| row[*column].abs() > MOST_EXACT)
+            file.rows().any(|row| row[*column].abs() >= MOST_EXACT)
         };
         let stamps = if on.iter().any(is_large) {
             let [times, others] = on.map(|(file, column)| whole_numbers(file, column));
@@ -119,7 +119,8 @@ fn whole_numbers(file: &DataFile, column: usize) -> Result<Vec<Option<i128>>> {
             return Ok(None);
         }
         // An array has no text: digits of its numbers are lost already.
-        let number = text.parse().ok().filter(|_| file.text.is_some());
+        // Differences of i64 always fit i128.
+        let number = text.parse::<i64>().ok().map(i128::from).filter(|_| file.text.is_some());
         number.map(Some).ok_or_else(|| {
             let (line, column) = (file.line_number(line), file.header[column].clone());
             Error::file(&file.path, Problem::InexactTime { line, column, value: text })

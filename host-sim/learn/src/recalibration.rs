@@ -172,7 +172,10 @@ pub fn recalibrate(
         presses: (0..outputs.len()).filter(used).count(),
         networks: networks.len(),
         error_before: root_mean(|fit| fit.square_before),
-        error_after: root_mean(|fit| fit.square_after),
+        error_after: root_mean(|fit| {
+            // A network that gets no better keeps its inputs.
+            if fit.is_better { fit.square_after } else { fit.square_before }
+        }),
     })
 }
 

@@ -58,7 +58,8 @@ pub fn execute<W: Wire>(
     common: &Common,
 ) -> Result<()> {
     if let Some(path) = &arguments.output {
-        print::check_output(path, &[&arguments.model, &arguments.presses])?;
+        let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.presses);
+        print::check_output(path, &[&arguments.model, &arguments.presses, baseline])?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let (fields, limits) = (FieldArguments::default(), Some(Limits::USUAL));
@@ -155,7 +156,7 @@ fn conclude(found: &Recalibrated, given: usize, common: &Common) -> Result<()> {
     }
     let mut page = print::Page::default();
     page.line(format_args!(
-        "The model is mended: {model_crc} is active, also after a restart. `undo` returns to the previous one."
+        "The model is mended: {model_crc} is active, also after a restart. `undo` returns to the previous one, unless the device has a key."
     ));
     page.line(format_args!(
         "{:<17} {} used, {} unusable (a reading missing, or far out of range)",
