@@ -39,7 +39,7 @@ pub const PROVISION: Promise = Promise {
 
 pub const DECAY: Promise = Promise {
     name: "abort-decay",
-    text: "slot in force decays: no aborted upload is taken",
+    text: "slot in force decays: aborted uploads stay out",
     share: 2,
     check: |effort, _| {
         let names = ["the same model", "the one before it", "none"];
