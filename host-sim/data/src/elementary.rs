@@ -206,14 +206,14 @@ mod tests {
     }
 
     #[test]
-    fn exponentials_are_within_an_ulp_and_end_at_zero() {
+    fn exponentials_are_those_of_libm_and_end_at_zero() {
         let small = (0..60).map(|power| -(2.0_f64.powi(-power)));
         let edges = [0x3e30_0000_u64, 0x3fd6_2e42, 0x3ff0_a2b1, 0x3ff0_a2b2];
         let edges = edges.into_iter().flat_map(|u| around(f64::from_bits((u + 1) << 32)));
         let edges = edges.map(|x| -x);
         let drawn = units().map(|u| -3.0 * u).chain(units().map(|u| -708.0 * u * u));
         for x in drawn.chain(small).chain(edges).chain([0.0, -0.0, -708.0]) {
-            assert!(is_close(exp(x), libm::exp(x)), "exp {x:e}");
+            assert_eq!(exp(x).to_bits(), libm::exp(x).to_bits(), "exp {x:e}");
         }
         for x in [-708.000_001, -745.0, -1e300, f64::NEG_INFINITY] {
             assert_eq!(exp(x), 0.0);

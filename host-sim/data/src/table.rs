@@ -111,7 +111,7 @@ impl Table {
     #[must_use]
     pub fn columns(&self, from: usize, count: usize) -> Self {
         let names = self.names[from..from + count].to_vec();
-        let values = self.lines().flat_map(|line| line[from..from + count].to_vec()).collect();
+        let values = self.lines().flat_map(|line| &line[from..from + count]).copied().collect();
         Self { names, values }
     }
 }

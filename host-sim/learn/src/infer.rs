@@ -1,4 +1,8 @@
-//! Inference over whole tables, by the same code that runs on the device.
+//! Inference over whole tables, to the bit as on the device.
+
+#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
+
+mod side_by_side;
 
 use model_core::confidence::{Confidence, Sizes};
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
@@ -92,24 +96,40 @@ fn infer_lines<E: ExpKernel>(networks: &[Network<'_>], readings: &[f64], values:
     let Shape { inputs, outputs, .. } = networks[0].shape();
     let (mut line, mut scaled) = (vec![0.0; inputs], vec![0.0; inputs]);
     let mut inferred = vec![0.0; outputs];
+    let lines = values.len() / outputs;
     widest(
         #[inline(always)]
         || {
-            let lines = readings.chunks_exact(inputs).zip(values.chunks_exact_mut(outputs));
-            for ((readings, values), network) in lines.zip(networks.iter().cycle()) {
-                line.iter_mut().zip(readings).for_each(|(place, r)| *place = *r as f32);
-                if line.iter().all(|reading| reading.is_finite()) {
+            for (first, network) in networks.iter().enumerate() {
+                let numbers = (first..lines).step_by(networks.len());
+                if let Network::F32(network) = network {
+                    side_by_side::infer_lines(*network, numbers, readings, values);
+                    continue;
+                }
+                for number in numbers {
+                    let is_whole = read(&readings[number * inputs..], &mut line);
                     let done = network.infer_with::<E>(&line, &mut scaled, &mut inferred);
                     done.expect("lengths of the network");
-                } else {
-                    inferred.fill(f32::NAN);
+                    write(inferred.iter().copied(), is_whole, &mut values[number * outputs..]);
                 }
-                let sound = inferred.iter().all(|value| value.is_finite());
-                let value = |value: &f32| if sound { f64::from(*value) } else { f64::NAN };
-                values.iter_mut().zip(&inferred).for_each(|(place, y)| *place = value(y));
             }
         },
     );
+}
+
+/// Copies the first `readings` to `line`, and returns whether none is missing.
+#[inline(always)]
+fn read(readings: &[f64], line: &mut [f32]) -> bool {
+    line.iter_mut().zip(readings).for_each(|(place, reading)| *place = *reading as f32);
+    line.iter().all(|reading| reading.is_finite())
+}
+
+/// Copies the outputs of a line to the first `values`: all NaN if they overflow, or a reading was missing.
+#[inline(always)]
+fn write(inferred: impl Iterator<Item = f32> + Clone, is_whole: bool, values: &mut [f64]) {
+    let is_sound = is_whole && inferred.clone().all(f32::is_finite);
+    let value = |y| if is_sound { f64::from(y) } else { f64::NAN };
+    values.iter_mut().zip(inferred).for_each(|(place, y)| *place = value(y));
 }
 
 /// Deviations (`lines × outputs`) and novelty of every line of `inputs`, as a device computes them.
@@ -133,7 +153,8 @@ pub(crate) fn assess_lines(confidence: Confidence<'_>, inputs: &[f64]) -> (Vec<f
 
 #[cfg(test)]
 mod tests {
-    use model_core::rbf::direct;
+    use model_core::rbf::{direct, expanded};
+    use model_core::scale::UNITS;
 
     use super::*;
 
@@ -150,46 +171,89 @@ mod tests {
         }
     }
 
-    #[test]
-    fn lines_of_networks_in_turn_are_those_of_each_network_bit_for_bit() {
-        let shape = Shape { inputs: 2, centres: 3, outputs: 2 };
-        let networks: Vec<Network<'_>> = [&[0.5, 1.0], &[1.5, -2.0], &[3.0, 4.0]]
-            .map(|bias| direct::Network::try_new(shape, parameters(bias)).unwrap().into())
-            .into();
+    /// Asserts that lines of the networks in turn are those of each network, and returns how many lines miss a reading,
+    /// and how many others overflow.
+    fn assert_in_turn(networks: &[Network<'_>], exponential: Exponential) -> [usize; 2] {
+        let Shape { inputs, outputs, .. } = networks[0].shape();
         let reading = |i: usize| match i % 101 {
             0 => f64::NAN,
             1 => 1e300, // beyond f32
             2 => -3e38,
             _ => 35.0 + (i * 37 % 1009) as f64 * 0.07,
         };
-        let readings: Vec<f64> = (0..3 * LINES_AT_ONCE * 6 + 6).map(reading).collect();
-        for exponential in Exponential::ALL {
-            let values = infer_in_turn(&networks, exponential, &readings);
-            assert_eq!(values.len(), readings.len());
-            let (mut missing, mut overflowing) = (0, 0);
-            for (i, (x, y)) in readings.chunks_exact(2).zip(values.chunks_exact(2)).enumerate() {
-                let (x, mut scaled, mut own) = ([x[0] as f32, x[1] as f32], [0.0; 2], [0.0; 2]);
-                let (network, scaled) = (&networks[i % 3], &mut scaled);
-                match exponential {
-                    Exponential::Polynomial => {
-                        network.infer_with::<Polynomial>(&x, scaled, &mut own)
-                    }
-                    Exponential::Libm => network.infer_with::<Libm>(&x, scaled, &mut own),
-                    Exponential::Micromath => network.infer_with::<Micromath>(&x, scaled, &mut own),
-                }
-                .unwrap();
-                let is_missing = x.iter().any(|x| !x.is_finite());
-                let overflows = own.iter().any(|y| !y.is_finite());
-                missing += usize::from(is_missing);
-                overflowing += usize::from(overflows && !is_missing);
-                let expected = own.map(f64::from).map(f64::to_bits);
-                if is_missing || overflows {
-                    assert!(y.iter().all(|y| y.is_nan()), "{x:?} gives {y:?}");
-                } else {
-                    assert_eq!([y[0].to_bits(), y[1].to_bits()], expected, "{x:?}");
-                }
+        let lines = networks.len() * (2 * LINES_AT_ONCE + 1);
+        let readings: Vec<f64> = (0..lines * inputs).map(reading).collect();
+        let values = infer_in_turn(networks, exponential, &readings);
+        assert_eq!(values.len(), lines * outputs);
+        let (mut missing, mut overflowing) = (0, 0);
+        let lines = readings.chunks_exact(inputs).zip(values.chunks_exact(outputs));
+        for (i, (x, y)) in lines.enumerate() {
+            let x: Vec<f32> = x.iter().map(|x| *x as f32).collect();
+            let (mut scaled, mut own) = (vec![0.0; inputs], vec![0.0; outputs]);
+            let (network, scaled, own) = (&networks[i % networks.len()], &mut scaled, &mut own);
+            match exponential {
+                Exponential::Polynomial => network.infer_with::<Polynomial>(&x, scaled, own),
+                Exponential::Libm => network.infer_with::<Libm>(&x, scaled, own),
+                Exponential::Micromath => network.infer_with::<Micromath>(&x, scaled, own),
             }
+            .unwrap();
+            let is_missing = x.iter().any(|x| !x.is_finite());
+            let overflows = own.iter().any(|y| !y.is_finite());
+            missing += usize::from(is_missing);
+            overflowing += usize::from(overflows && !is_missing);
+            if is_missing || overflows {
+                assert!(y.iter().all(|y| y.is_nan()), "{x:?} gives {y:?}");
+            } else {
+                let bits = |values: &[f64]| values.iter().map(|y| y.to_bits()).collect::<Vec<_>>();
+                let own: Vec<f64> = own.iter().map(|y| f64::from(*y)).collect();
+                assert_eq!(bits(y), bits(&own), "{x:?}");
+            }
+        }
+        [missing, overflowing]
+    }
+
+    #[test]
+    fn lines_of_networks_in_turn_are_those_of_each_network_bit_for_bit() {
+        let shape = Shape { inputs: 2, centres: 3, outputs: 2 };
+        let networks: Vec<Network<'_>> = [&[0.5, 1.0], &[1.5, -2.0], &[3.0, 4.0]]
+            .map(|bias| direct::Network::try_new(shape, parameters(bias)).unwrap().into())
+            .into();
+        for exponential in Exponential::ALL {
+            let [missing, overflowing] = assert_in_turn(&networks, exponential);
             assert!(missing > 10 && overflowing > 10, "{missing} and {overflowing}");
+        }
+    }
+
+    #[test]
+    fn lines_side_by_side_are_those_of_the_network_bit_for_bit() {
+        // Six inputs fill the four partial sums unevenly.
+        let shape = Shape { inputs: 6, centres: 5, outputs: 3 };
+        let numbers = |count: usize, scale: f32| -> Vec<f32> {
+            (0..count).map(|i| scale * ((i * 29 % 23) as f32 - 11.0)).collect()
+        };
+        // One b below 0 in front of the a of every centre.
+        let rows = numbers(8 * 7, 0.02 / UNITS);
+        let of_row = |row: &[f32]| [&[-2.0 + 1e9 * row[0]], &row[1..]].concat();
+        let exponents: Vec<f32> = rows.chunks(7).flat_map(of_row).collect();
+        let words = |bias: &[f32; 3], affine: &[f32]| -> Vec<u32> {
+            let parameters = expanded::Parameters {
+                input_midpoint: &[60.0; 6],
+                input_per_unit: &[UNITS / 40.0; 6],
+                decay: 1.0 / (UNITS * UNITS),
+                bias,
+                affine,
+                exponents: &exponents,
+                output_weights: &numbers(8 * 3, 0.1),
+            };
+            parameters.words().collect()
+        };
+        let blocks = [words(&[0.5, 1.0, -3.0], &[]), words(&[1.5, -2.0, 0.0], &[])];
+        let with_tail = [words(&[0.5, 1.0, -3.0], &numbers(18, 0.01 / UNITS))];
+        for (affine, blocks) in [(false, &blocks[..]), (true, &with_tail[..])] {
+            let network = |block| expanded::Network::try_new(shape, affine, block).unwrap().into();
+            let networks: Vec<Network<'_>> = blocks.iter().map(|block| network(block)).collect();
+            let [missing, _] = assert_in_turn(&networks, Exponential::Polynomial);
+            assert!(missing > 10, "{missing}");
         }
     }
 }

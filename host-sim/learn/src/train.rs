@@ -216,15 +216,12 @@ impl InputScale {
 
     /// Scales `readings` (`samples × inputs`) to [0, 1], and clamps them like the device does.
     pub fn apply(&self, readings: &[f64]) -> Vec<f64> {
-        let ranges = || self.minimum.iter().zip(&self.per_span);
+        let ranges = self.minimum.iter().zip(&self.per_span).cycle();
         let [low, high] = CLAMP.map(f64::from);
-        let scaled = |line: &[f64]| -> Vec<f64> {
-            let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
-                ((f64::from(*value as f32) - minimum) * per_span).clamp(low, high)
-            };
-            line.iter().zip(ranges()).map(scale).collect()
+        let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
+            ((f64::from(*value as f32) - minimum) * per_span).clamp(low, high)
         };
-        readings.chunks_exact(self.minimum.len().max(1)).flat_map(scaled).collect()
+        readings.iter().zip(ranges).map(scale).collect()
     }
 }
 

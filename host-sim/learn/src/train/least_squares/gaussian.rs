@@ -33,16 +33,24 @@ impl<'c> Regressors<'c> {
         self.centres.len() / self.inputs + if self.affine_tail { self.inputs } else { 0 } + 1
     }
 
-    /// Writes the regressors of one sample's `scaled` inputs into `values`.
+    /// Writes the regressors of one sample's `scaled` inputs into `values`, as far as there is room.
     pub fn evaluate(&self, scaled: &[f64], values: &mut [f64]) {
-        let activations = self
-            .centres
-            .chunks_exact(self.inputs)
-            .zip(self.decays.iter().cycle())
-            .map(|(centre, decay)| libm::exp(-decay * squared_distance(scaled, centre)));
+        let centres = self.centres.len() / self.inputs;
+        let (activations, rest) = values.split_at_mut(centres);
+        widest(
+            #[inline(always)]
+            || {
+                let gaussians =
+                    self.centres.chunks_exact(self.inputs).zip(self.decays.iter().cycle());
+                for (place, (centre, decay)) in activations.iter_mut().zip(gaussians) {
+                    *place = -decay * squared_distance(scaled, centre);
+                }
+                activations.iter_mut().for_each(|x| *x = taxel_data::exp(*x));
+            },
+        );
         let tail = if self.affine_tail { scaled } else { &[] };
-        let all = activations.chain(tail.iter().copied()).chain([1.0]);
-        values.iter_mut().zip(all).for_each(|(place, value)| *place = value);
+        let values = tail.iter().copied().chain([1.0]);
+        rest.iter_mut().zip(values).for_each(|(place, value)| *place = value);
     }
 
     /// Regressors of many samples, with `scaled` inputs (`samples × inputs`).

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use taxel_data::simd::widest;
 
-use super::products::{Line, SIDE, add_combinations, add_products, transposed};
+use super::products::{Line, SIDE, add_combinations, add_products};
 use crate::train::least_squares::exponentiate_non_positive;
 
 /// Sizes of a network that is refined.
@@ -227,13 +227,11 @@ impl Piece {
 }
 
 fn side_by_side(values: &[f64], width: usize) -> Vec<Line> {
-    let columns = transposed(values, width);
-    let line = |column: &[f64]| {
-        let mut line = [0.0; SIDE];
-        line[..column.len()].copy_from_slice(column);
-        line
-    };
-    columns.chunks_exact(values.len() / width).map(line).collect()
+    let mut lines = vec![[0.0; SIDE]; width];
+    for (s, sample) in values.chunks_exact(width).enumerate() {
+        lines.iter_mut().zip(sample).for_each(|(line, value)| line[s] = *value);
+    }
+    lines
 }
 
 /// Regressors of the samples in a piece, and what the way back needs.

@@ -35,20 +35,35 @@ pub(super) fn add_squares(a: &[Line], sums: &mut [f64]) {
 /// Adds the products of lines a_i and b_j, block by block of j. Of a block that ends before j = e those with
 /// i < `needed(e)` are needed.
 fn add_blocks(a: &[Line], b: &[Line], needed: impl Fn(usize) -> usize, sums: &mut [f64]) {
-    let (width, height) = (b.len(), a.len());
     let factors = by_samples(a);
     for (number, lines) in b.chunks(BLOCK).enumerate() {
         let first = number * BLOCK;
-        let mut block: Vec<[f64; BLOCK]> = vec![[0.0; BLOCK]; SIDE];
-        for (j, line) in lines.iter().enumerate() {
-            block.iter_mut().zip(line).for_each(|(sample, value)| sample[j] = *value);
+        let rows = needed(first + lines.len()).min(a.len());
+        if lines.len() > REGISTER {
+            add_block::<BLOCK>(&factors, a.len(), lines, &mut sums[first..], (b.len(), rows));
+        } else {
+            add_block::<REGISTER>(&factors, a.len(), lines, &mut sums[first..], (b.len(), rows));
         }
-        let mut products = vec![[0.0; BLOCK]; needed(first + lines.len()).min(height)];
-        combine_all(&factors, height, &block, &mut products);
-        for (sums, products) in sums.chunks_exact_mut(width).zip(&products) {
-            let places = &mut sums[first..first + lines.len()];
-            places.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
-        }
+    }
+}
+
+/// Adds the products of the first `rows` lines a_i, whose samples are `factors`, and at most `L` lines b_j to `sums`,
+/// whose rows are `width` apart.
+fn add_block<const L: usize>(
+    factors: &[f64],
+    height: usize,
+    b: &[Line],
+    sums: &mut [f64],
+    (width, rows): (usize, usize),
+) {
+    let mut block: Vec<[f64; L]> = vec![[0.0; L]; SIDE];
+    for (j, line) in b.iter().enumerate() {
+        block.iter_mut().zip(line).for_each(|(sample, value)| sample[j] = *value);
+    }
+    let mut products = vec![[0.0; L]; rows];
+    combine_all(factors, height, &block, &mut products);
+    for (sums, products) in sums.chunks_mut(width).zip(&products) {
+        sums.iter_mut().zip(&products[..b.len()]).for_each(|(sum, product)| *sum += product);
     }
 }
 

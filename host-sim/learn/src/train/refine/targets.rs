@@ -37,11 +37,8 @@ impl Targets {
         let count = self.means.len() / self.networks;
         let own = network * count..(network + 1) * count;
         let (means, weights) = (&self.means[own.clone()], &self.weights[own.clone()]);
-        let weighed = |line: &[f64]| -> Vec<f64> {
-            let scales = means.iter().zip(weights);
-            let values = line[own.clone()].iter().zip(scales);
-            values.map(|(value, (mean, weight))| (value - mean) * weight).collect()
-        };
-        (outputs.lines().flat_map(weighed).collect(), count)
+        let scales = means.iter().zip(weights).cycle();
+        let values = outputs.lines().flat_map(|line| &line[own.clone()]).zip(scales);
+        (values.map(|(value, (mean, weight))| (value - mean) * weight).collect(), count)
     }
 }
