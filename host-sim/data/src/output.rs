@@ -97,9 +97,9 @@ impl FileSet {
     /// [`Error::Write`] if a file cannot be written, or [`Error::WrittenOverInput`] if it is an input.
     pub fn check(&self, folder: &Path, inputs: &[&Path]) -> Result<()> {
         // A folder that is not there is made at the end: what is stopped before then leaves none.
-        let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
-        if there != folder {
-            return check_writable(&there.join("new"), &[]).map_err(|error| match error {
+        let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
+        if let Some(first_to_make) = folder.ancestors().take_while(is_missing).last() {
+            return check_writable(first_to_make, &[]).map_err(|error| match error {
                 Error::Write { cause, .. } => Error::write(folder, cause),
                 other => other,
             });

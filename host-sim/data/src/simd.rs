@@ -1,6 +1,9 @@
 //! Vector instructions: the widest that this machine has, chosen when the program runs.
 
-use pulp::NullaryFnOnce;
+#![cfg_attr(
+    target_arch = "x86_64",
+    expect(unsafe_code, reason = "a call for machines that have AVX2")
+)]
 
 /// Frames computed side by side: enough to hide the cost of a loop, few enough for the first cache.
 pub const LANES: usize = 64;
@@ -20,20 +23,19 @@ pub type Lanes<T = f64> = [T; LANES];
 /// assert_eq!(sum, 5.0);
 /// ```
 #[inline]
-pub fn widest<R>(work: impl FnMut() -> R) -> R {
-    pulp::Arch::new().dispatch(Closure(work))
+pub fn widest<R>(mut work: impl FnMut() -> R) -> R {
+    #[cfg(target_arch = "x86_64")]
+    if std::is_x86_feature_detected!("avx2") {
+        // SAFETY: this machine has AVX2.
+        return unsafe { with_avx2(work) };
+    }
+    work()
 }
 
-/// Closure that is called through `FnMut`. pulp would call `FnOnce::call_once`, a function of its own
-/// around the closure, compiled for the oldest machine unless the compiler happens to inline it.
-struct Closure<F>(F);
-
-impl<R, F: FnMut() -> R> NullaryFnOnce for Closure<F> {
-    type Output = R;
-
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "what pulp dispatches must be inlined into it")]
-    fn call(mut self) -> R {
-        (self.0)()
-    }
+/// Runs `work` with AVX2. It is called through `FnMut`: `FnOnce::call_once` would be a function of its own around the
+/// closure, compiled for the oldest machine unless the compiler happens to inline it.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn with_avx2<R>(mut work: impl FnMut() -> R) -> R {
+    work()
 }

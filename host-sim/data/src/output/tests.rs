@@ -130,6 +130,17 @@ fn whenever_the_program_is_killed_or_the_power_goes_files_are_whole() {
 }
 
 #[test]
+fn what_stands_beside_a_folder_to_be_made_is_no_hindrance() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["new", "b"] {
+        fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    SET.check(&folder.path().join("a/b"), &[]).unwrap();
+    fs::write(folder.path().join("a"), "a file").unwrap();
+    SET.check(&folder.path().join("a/b"), &[]).unwrap_err();
+}
+
+#[test]
 fn a_check_leaves_no_folder_and_no_file() {
     let folder = tempfile::tempdir().unwrap();
     SET.check(&folder.path().join("a/b"), &[]).unwrap();

@@ -6,16 +6,16 @@
 //! few samples pass through a few rows at a time, in vector lanes: the divisions and roots of one row hide behind those
 //! of the next.
 
-#![expect(clippy::inline_always, reason = "what pulp dispatches must be inlined into it")]
+#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
 
 use std::ops::Range;
 
-use pulp::{Simd, WithSimd};
+use taxel_data::simd::widest;
 
 use super::super::Recursive;
 use super::{Design, FILLED, Factor};
 
-/// Numbers of the widest vectors: rows are of whole vectors, and rotated from one on.
+/// Numbers that are rotated together: rows are of whole such groups, and rotated from one on.
 const LANES: usize = 8;
 /// Rows that are rotated by turns, each with a sample of its own.
 const ROWS_BY_TURNS: usize = 4;
@@ -27,7 +27,7 @@ const SAMPLES_AT_ONCE: usize = 16;
 pub struct Recursion {
     regressors: usize,
     outputs: usize,
-    /// Numbers in a row: its regressors, its outputs, and zeros up to whole vectors.
+    /// Numbers in a row: its regressors, its outputs, and zeros up to whole groups.
     width: usize,
     /// Rows of [R | z].
     rows: Vec<f64>,
@@ -107,7 +107,10 @@ impl Recursion {
         let (width, forgets) = (self.width, self.share > 0.0);
         let forgotten = forgets.then_some(self.root_forgetting);
         let (rows, samples) = (self.rows.as_mut_slice(), self.samples.as_mut_slice());
-        pulp::Arch::new().dispatch(Pass { width, rows, samples, forgotten });
+        widest(
+            #[inline(always)]
+            || pass(width, rows, samples, forgotten),
+        );
     }
 
     /// Factor of all samples so far.
@@ -123,32 +126,20 @@ impl Recursion {
     }
 }
 
-/// Passage of all samples through all rows.
-struct Pass<'r> {
-    width: usize,
-    rows: &'r mut [f64],
-    samples: &'r mut [f64],
-    forgotten: Option<f64>,
-}
-
-impl WithSimd for Pass<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self { width, rows, samples, forgotten } = self;
-        let count = samples.len() / width;
-        for (group, rows) in rows.chunks_mut(ROWS_BY_TURNS * width).enumerate() {
-            for step in 0..count + ROWS_BY_TURNS - 1 {
-                for (turn, row) in rows.chunks_exact_mut(width).enumerate() {
-                    // Row i is as many samples behind the first as rows lie between.
-                    let sample = step.wrapping_sub(turn);
-                    if sample < count {
-                        // With forgetting, every other sample gives back what is forgotten.
-                        let forgotten = forgotten.filter(|_| sample % 2 == 0);
-                        let sample = &mut samples[sample * width..][..width];
-                        rotate_row(simd, row, sample, group * ROWS_BY_TURNS + turn, forgotten);
-                    }
+/// Passes all samples through all rows.
+#[inline(always)]
+fn pass(width: usize, rows: &mut [f64], samples: &mut [f64], forgotten: Option<f64>) {
+    let count = samples.len() / width;
+    for (group, rows) in rows.chunks_mut(ROWS_BY_TURNS * width).enumerate() {
+        for step in 0..count + ROWS_BY_TURNS - 1 {
+            for (turn, row) in rows.chunks_exact_mut(width).enumerate() {
+                // Row i is as many samples behind the first as rows lie between.
+                let sample = step.wrapping_sub(turn);
+                if sample < count {
+                    // With forgetting, every other sample gives back what is forgotten.
+                    let forgotten = forgotten.filter(|_| sample % 2 == 0);
+                    let sample = &mut samples[sample * width..][..width];
+                    rotate_row(row, sample, group * ROWS_BY_TURNS + turn, forgotten);
                 }
             }
         }
@@ -158,13 +149,7 @@ impl WithSimd for Pass<'_> {
 /// Rotates row number `i` of [R | z] with a sample, so that the sample's entry `i` becomes 0. Before that, the row is
 /// multiplied by what is left of it, if something is `forgotten`.
 #[inline(always)]
-fn rotate_row<S: Simd>(
-    simd: S,
-    row: &mut [f64],
-    sample: &mut [f64],
-    i: usize,
-    forgotten: Option<f64>,
-) {
+fn rotate_row(row: &mut [f64], sample: &mut [f64], i: usize, forgotten: Option<f64>) {
     let start = i / LANES * LANES;
     let (row, sample) = (&mut row[start..], &mut sample[start..]);
     if let Some(root) = forgotten {
@@ -175,13 +160,13 @@ fn rotate_row<S: Simd>(
     if entry == 0.0 || length <= 0.0 {
         return;
     }
-    let (cosine, sine) = (simd.splat_f64s(pivot / length), simd.splat_f64s(entry / length));
-    let (vectors, _) = S::as_mut_simd_f64s(row);
-    let (samples, _) = S::as_mut_simd_f64s(sample);
-    for (row, sample) in vectors.iter_mut().zip(samples) {
+    let (cosine, sine) = (pivot / length, entry / length);
+    let (groups, _) = row.as_chunks_mut::<LANES>();
+    let (samples, _) = sample.as_chunks_mut::<LANES>();
+    for (row, sample) in groups.iter_mut().zip(samples) {
         let (r, h) = (*row, *sample);
-        *row = simd.add_f64s(simd.mul_f64s(cosine, r), simd.mul_f64s(sine, h));
-        *sample = simd.sub_f64s(simd.mul_f64s(cosine, h), simd.mul_f64s(sine, r));
+        *row = std::array::from_fn(|l| cosine * r[l] + sine * h[l]);
+        *sample = std::array::from_fn(|l| cosine * h[l] - sine * r[l]);
     }
     sample[i - start] = 0.0;
 }
