@@ -75,9 +75,8 @@ impl Outline {
         for index in 0..archive.len() {
             let entry =
                 archive.by_index(index).map_err(|cause| unusable(path, cause.to_string()))?;
-            let name =
-                entry.name().map_err(|cause| unusable(path, cause.to_string()))?.into_owned();
-            let name = name.strip_suffix(".npy").unwrap_or(&name).to_owned();
+            let name = entry.name();
+            let name = name.strip_suffix(".npy").unwrap_or(name).to_owned();
             if !(1..=MOST_NAME_BYTES).contains(&name.len()) || name.contains(char::is_control) {
                 let rule = format!("give a name of 1 to {MOST_NAME_BYTES} plain characters");
                 return Err(unusable(path, format!("array {}: {rule}", quoted(&name))));
