@@ -19,9 +19,8 @@ const RUN: [&str; 6] = ["run", "--manifest-path", PROOF, "--package", "torture",
 ///
 /// With `--self-test` it runs lines on a product with faults instead (`proof/mutants/README.md`).
 pub fn run(options: &[&str]) -> Outcome<ExitCode> {
-    if let Some(names) = options.strip_prefix(&["--self-test"]) {
-        return mutants::self_test(names).map(|()| ExitCode::SUCCESS);
-    }
+    let self_test = options.strip_prefix(&["--self-test"]);
+    let options = self_test.unwrap_or(options);
     let mut torture = cargo(&RUN);
     torture.args(options);
     if options.iter().any(|option| ["--help", "-h", "--list"].contains(option)) {
@@ -30,6 +29,9 @@ pub fn run(options: &[&str]) -> Outcome<ExitCode> {
     let checked = status(cargo(&RUN).arg("--list").args(options).stdout(Stdio::null()))?;
     if !checked.success() {
         return Ok(code(checked));
+    }
+    if let Some(names) = self_test {
+        return mutants::self_test(names).map(|()| ExitCode::SUCCESS);
     }
     run_command(&mut cargo(&["build", "--package", "host-sim"]))?;
     torture.arg("--program").arg(target_dir().join("debug/host-sim"));

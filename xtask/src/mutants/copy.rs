@@ -41,11 +41,11 @@ fn source() -> PathBuf {
 ///
 /// # Errors
 /// A fault does not compile.
-pub fn build(faults: &[Fault], crates: &[&str], has_torture: bool) -> Outcome<Copy> {
+pub fn build(faults: &[Fault], crates: &[String], has_torture: bool) -> Outcome<Copy> {
     let (digest, has_all_units) = (make(faults)?, crates.is_empty());
-    let has_torture = has_torture && has_all_units || crates.contains(&TORTURE);
+    let has_torture = has_torture && has_all_units || crates.iter().any(|name| name == TORTURE);
     let mut programs = Vec::new();
-    let packages = crates.iter().filter(|name| **name != TORTURE);
+    let packages = crates.iter().filter(|name| *name != TORTURE);
     let packages: Vec<&str> = packages.flat_map(|name| ["--package", name]).collect();
     let built = if has_all_units || !packages.is_empty() {
         messages(&[&["test", "--no-run"], &packages[..]].concat())?
