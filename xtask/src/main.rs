@@ -4,6 +4,8 @@ mod process;
 mod structure;
 mod lines;
 mod toolchain;
+mod queue;
+mod copy;
 
 mod firmware;
 mod cores;

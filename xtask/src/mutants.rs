@@ -12,17 +12,12 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Write;
 use std::sync::Mutex;
 
-use rayon::ThreadPoolBuilder;
-use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
-
 use crate::process::Outcome;
+use crate::queue;
 use copy::{Copy, folder};
 use list::Fault;
 use programs::{Switch, Test, batches, full_name, lines, red, trace};
 use score::Found;
-
-/// Tests that run at the same time.
-const WORKERS: usize = 2;
 
 /// Which faults to plant, and which tests to run.
 // One flag of the command line each.
@@ -172,7 +167,7 @@ pub fn self_test(names: &[&str]) -> Outcome {
         }
         cases.extend(numbers.into_iter().map(|number| (line, number)));
     }
-    let outcomes = shared(&cases, |&(line, number), worker| {
+    let outcomes = queue::results(&cases, |&(line, number), worker| {
         let is_red = !red(&copy, &[line], &Switch::On(number), worker)?.is_empty();
         let fault = number.checked_sub(1).map_or("no fault", |index| &faults[index].name);
         let verdict = match (number, is_red) {
@@ -194,18 +189,6 @@ pub fn self_test(names: &[&str]) -> Outcome {
         println!("none    {line:<24}{why}");
     }
     if bad.is_empty() { Ok(()) } else { Err(format!("not as it should be: {}", bad.join("; "))) }
-}
-
-/// Runs `work` for each item with [`WORKERS`], and returns the results in order.
-fn shared<I: Sync, T: Send>(items: &[I], work: impl Fn(&I, usize) -> T + Sync) -> Vec<T> {
-    let each = || {
-        let numbered = |item| work(item, rayon::current_thread_index().unwrap_or(0));
-        items.par_iter().with_max_len(1).map(numbered).collect()
-    };
-    match ThreadPoolBuilder::new().num_threads(WORKERS).build() {
-        Ok(pool) => pool.install(each),
-        Err(_) => items.iter().map(|item| work(item, 0)).collect(),
-    }
 }
 
 /// A file that keeps what was found out, so that a stopped run goes on: a key and its values on each line.
@@ -254,7 +237,7 @@ fn traced(copy: &Copy, faults: &[Fault], tests: &[Test]) -> Outcome<Vec<Test>> {
     let log = Log::open(&format!("trace-{:016x}.tsv", state.finish()))?;
     let is_new = |test: &&Test| !log.known.contains_key(&full_name(copy, test));
     eprintln!("tracing {} of {} tests", tests.iter().filter(is_new).count(), tests.len());
-    let outcomes = shared(tests, |test, worker| {
+    let outcomes = queue::results(tests, |test, worker| {
         let find = || {
             // Twice, as one that fails with a fault.
             let traced = trace(copy, test, worker).or_else(|_| trace(copy, test, worker))?;
@@ -289,7 +272,7 @@ fn measure(
     log: Option<(&Log, bool)>,
     is_wanted: impl Fn(&Fault, &Test) -> bool + Sync,
 ) -> Outcome<BTreeMap<usize, Found>> {
-    let outcomes = shared(numbers, |&number, worker| {
+    let outcomes = queue::results(numbers, |&number, worker| {
         let fault = &faults[number - 1];
         let reaching: Vec<&Test> = tests
             .iter()
