@@ -148,7 +148,7 @@ impl Case {
             }
         }
         if self.job != Job::Undo && self.seed / 5 % 2 == 1 {
-            self.device.slots[usize::from(uploads % 2 == 0)].decay(20, 4); // the other slot is bad
+            self.device.slots[usize::from(uploads.is_multiple_of(2))].decay(20, 4); // the other slot is bad
         }
         let in_force = (uploads > 0 || !self.is_sealed).then(|| crc_of(&old));
         self.expect(&[in_force], "before the cut")

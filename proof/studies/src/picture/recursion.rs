@@ -1,7 +1,7 @@
 //! Picture of where recursive least squares diverges: maps of λ and of the condition against δ.
 
 use crate::question::recursion::{
-    FORGETTING_FACTORS, Form, INITIAL_COVARIANCES, KINDS, Outcome, SPOILT, Study,
+    FORGETTING_FACTORS, INITIAL_COVARIANCES, KINDS, Outcome, SPOILT, Study,
 };
 
 use host_sim::report::format::fixed;
@@ -70,12 +70,8 @@ pub fn svg(study: &Study) -> String {
         }
         for (place, kind) in KINDS.into_iter().enumerate() {
             let left = LEFT + place as f64 * (panel + GAP);
-            let name = match kind.0 {
-                Form::Covariance => "covariance form",
-                Form::SquareRoot => "square-root form",
-            };
             let middle = left + panel / 2.0;
-            let heading = format!("{name}, {}", kind.1);
+            let heading = format!("{}, {}", kind.0.name(), kind.1);
             svg.text(middle, first - 8.0, Anchor::Middle, "label", &heading);
             let bottom = first + CELL[1] * lines.len() as f64;
             for (column, delta) in INITIAL_COVARIANCES.into_iter().enumerate() {

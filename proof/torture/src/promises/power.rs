@@ -2,7 +2,9 @@
 //! model is in force.
 
 use mock_board::Torn;
-use mock_board::sweep::{Cuts, Job, abort_and_decay, cut_key, cut_model, cut_settings, upload_to_worn};
+use mock_board::sweep::{
+    Cuts, Job, abort_and_decay, cut_key, cut_model, cut_settings, upload_to_worn,
+};
 
 use crate::effort::Effort;
 use crate::found::Found;
