@@ -1,7 +1,7 @@
 //! Host and emulator give the same results to the last bit. `cargo xtask emulate` compares the logs of the
 //! emulator's programs with the files beside them; here the host's results are compared with the same files.
 
-use std::fmt::Arguments;
+use std::fmt::{Arguments, Write};
 use std::fs;
 
 use model_core::AlignedBytes;
@@ -24,7 +24,7 @@ fn model(name: &str) -> &'static [u8] {
 /// Compares the lines that `work` says with the log of a program in the emulator, which says them too.
 fn expect(program: &str, work: impl FnOnce(checks::Say<'_>) -> Option<()>) {
     let mut log = String::new();
-    work(&mut |line: Arguments<'_>| log += &format!("INFO {line}\n")).expect("models that load");
+    work(&mut |line: Arguments<'_>| _ = writeln!(log, "INFO {line}")).expect("models that load");
     let path = format!("{}/qemu/src/bin/{program}.out", env!("CARGO_MANIFEST_DIR"));
     let of_target = fs::read_to_string(&path).unwrap_or_else(|cause| panic!("{path}: {cause}"));
     assert_eq!(log + "exit status 0\n", of_target);

@@ -150,6 +150,7 @@ fn one_of_extremes<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame
 }
 
 /// CRC-32 of all bits that the model in `blob` decodes so many `frames` to, and of whether an input was clamped.
+#[inline(never)] // as all that follows, so that the stack holds one decoder at a time
 fn decoding_all<E: ExpKernel, const R: usize>(
     blob: &[u8],
     frames: usize,
@@ -174,6 +175,7 @@ fn decoding_all<E: ExpKernel, const R: usize>(
 /// Number of frames with one reading within four steps of f32 of an end of the clamp, how many of them are said to be
 /// clamped, and how many otherwise than by portable arithmetic. `None` if the blob does not load, or its number format
 /// clamps before it infers.
+#[inline(never)]
 fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let model = Model::decode(blob).ok()?;
@@ -265,6 +267,7 @@ impl Assessed {
 }
 
 /// What [`MANY`] frames are by the confidence of the model in `blob`. `None` if the blob does not load, or has none.
+#[inline(never)]
 fn assessing_many(blob: &[u8]) -> Option<Assessed> {
     let decoder = Decoder::<ARRAY_ROWS>::load(blob).ok()?;
     let crc = QUICK_CRC;
@@ -292,6 +295,7 @@ const fn few_outputs(directions: usize) -> Sizes {
 }
 
 /// What frames of one row are by confidences of 1 to 12 directions. `None` if one is unsound.
+#[inline(never)]
 fn assessing_sizes() -> Option<Assessed> {
     let crc = QUICK_CRC;
     let (mut digest, mut assessed) = (crc.digest(), Assessed::NONE);
@@ -340,6 +344,7 @@ fn nearly_at_rest(
 
 /// Number of rows in [`MANY`] frames near the baseline, how many of them are at rest, and how many the gate treats
 /// wrongly: otherwise than [`is_at_rest`] says, or with other outputs. `None` if the blob does not load.
+#[inline(never)]
 fn gating(blob: &[u8]) -> Option<[usize; 3]> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let mut numbers = Numbers::new(5);
@@ -434,7 +439,6 @@ pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()>
     Some(())
 }
 
-#[inline(never)] // so that the stack holds one decoder at a time
 fn decode_many<E: ExpKernel>(format: Format, blob: &[u8], say: Say<'_>) -> Option<()> {
     let crc = decoding_all::<E, ROWS>(blob, MANY, one_of_many)?;
     say(format_args!("{}, {}: {crc:08x}", format.name(), E::NAME));

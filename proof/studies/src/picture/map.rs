@@ -166,10 +166,8 @@ fn head(svg: &mut Svg, study: &MapStudy) {
         svg.text(left + step / 2.0, top + 27.0, Anchor::Middle, "tick", &text);
     }
     let left = LEFT + KEY.len() as f64 * step + 28.0;
-    svg.path(&format!("M{left} {}v14", top - 1.0), "contour");
-    svg.text(left + 10.0, top + 11.0, Anchor::Start, "tick", "as good as the mean");
-    svg.rect([left + 160.0, top], [18.0, 12.0], "best", "");
-    svg.text(left + 186.0, top + 11.0, Anchor::Start, "tick", "least test error");
+    svg.rect([left, top], [18.0, 12.0], "best", "");
+    svg.text(left + 26.0, top + 11.0, Anchor::Start, "tick", "least test error");
 }
 
 /// Draws one map at the origin.
@@ -196,43 +194,11 @@ fn draw(svg: &mut Svg, grid: &Grid<'_>, map: &Map, kind: Kind) {
         svg.hovered_rect([x, y], CELL, class, &hover);
         svg.close();
     }
-    let path = contour(grid, map, ratio);
-    if !path.is_empty() {
-        svg.path(&path, "contour");
-    }
     if let Some(best) = map.best(|_| true)
         && let (Some(x), Some(y)) = (grid.x(best.centres, map.samples), grid.y(best.spread))
     {
         svg.rect([x, y], CELL, "best", "");
     }
-}
-
-/// Path along the edges between cells below and above a ratio of 1.
-fn contour(grid: &Grid<'_>, map: &Map, ratio: impl Fn(&Cell) -> f64) -> String {
-    use std::fmt::Write as _;
-    let spreads = grid.study.spreads.len();
-    let lines: Vec<&[Cell]> = map.cells.chunks_exact(spreads).collect();
-    let mut path = String::new();
-    let below = |cell: &Cell| ratio(cell) < 1.0;
-    for (column, cells) in lines.iter().enumerate() {
-        for (place, cell) in cells.iter().enumerate() {
-            let (Some(x), Some(y)) = (grid.x(cell.centres, map.samples), grid.y(cell.spread))
-            else {
-                continue;
-            };
-            // Writing to a string cannot fail.
-            if cells.get(place + 1).is_some_and(|wider| below(wider) != below(cell)) {
-                let _ = write!(path, "M{x} {y}h{}", CELL[0]);
-            }
-            // There is a gap before the column K = N.
-            let next = lines.get(column + 1).map(|cells| &cells[place]);
-            let next = next.filter(|more| more.centres < map.samples);
-            if next.is_some_and(|more| below(more) != below(cell)) {
-                let _ = write!(path, "M{} {y}v{}", x + CELL[0], CELL[1]);
-            }
-        }
-    }
-    path
 }
 
 /// Numbers of centres below a column of maps, whose bottom left corner is given.
@@ -246,50 +212,4 @@ fn centres_axis(svg: &mut Svg, grid: &Grid<'_>, [left, bottom]: [f64; 2]) {
     svg.text(x, bottom + 17.0, Anchor::Middle, "tick", "N");
     let middle = left + grid.size()[0] / 2.0;
     svg.text(middle, bottom + 38.0, Anchor::Middle, "label", "centres K");
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_contour_runs_between_cells_better_and_worse_than_the_mean() {
-        let cell =
-            |centres, spread, test_rmse| Cell { centres, spread, training_rmse: 0.1, test_rmse };
-        let map = Map {
-            noise_level: 0.01,
-            samples: 30,
-            training_sets: 1,
-            mean_rmse: 1.0,
-            mean_training_rmse: 1.0,
-            cells: vec![
-                cell(4, 0.1, 0.9),
-                cell(4, 0.2, 0.8),
-                cell(8, 0.1, 2.0),
-                cell(8, 0.2, 0.5),
-                cell(30, 0.1, 0.5),
-                cell(30, 0.2, 0.4),
-            ],
-        };
-        let study = MapStudy {
-            subject: "paper".into(),
-            seed: 1,
-            row_wire: 4,
-            group: "dz_mm".into(),
-            unit: "mm".into(),
-            test_frames: 10,
-            initial_covariance: 1e6,
-            centres: vec![4, 8],
-            spreads: vec![0.1, 0.2],
-            maps: vec![map],
-            claims: vec![],
-        };
-        let grid = Grid { study: &study };
-        // Right of the narrow cell with K = 4, and above that with K = 8.
-        let path = contour(&grid, &study.maps[0], |cell| cell.test_rmse);
-        assert_eq!(path, "M28 13v13M28 13h28");
-        let picture = svg(&study);
-        assert!(picture.contains("N = 30") && !picture.contains("NaN"));
-        assert_eq!(picture.matches("class=\"best\"").count(), 3);
-    }
 }
