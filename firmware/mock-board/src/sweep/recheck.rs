@@ -4,7 +4,7 @@
 use std::fmt::Debug;
 
 use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{Configuration, EstimateReport, Report, Request, Statistics};
+use firmware::link::message::{Configuration, EstimateReport, Report, Request};
 use firmware::store::Slot;
 use model_core::blob::Floats;
 use model_core::{AlignedBytes, Decoder};
@@ -15,7 +15,7 @@ use crate::bench::{Bench, Memory, Running};
 use crate::board::Board;
 use crate::decay::flip_bit;
 use crate::flash::Flash;
-use crate::host::{ask, install, model_crc};
+use crate::host::{ask, install, model_crc, statistics};
 use crate::models::{blob, crc_of};
 use crate::pages::SharedSettings;
 use crate::shape::{COLS, ROWS};
@@ -101,7 +101,7 @@ fn run(case: Case, seed: u64) -> Result<Outcome, String> {
 
     let is_decoded_from = case.hits[0] || case.is_in_flash;
     expect(end, is_decoded_from.then_some(SessionEnd::Damaged), "within two passes")?;
-    let counts = statistics(&mut session, &board)?;
+    let counts = statistics(&mut session, &board);
     expect(counts.model_damages, u32::from(is_decoded_from), "damages of the model")?;
     if end.is_none() {
         expect(counts.slot_damages, 1, "damages of the slot")?;
@@ -119,7 +119,7 @@ fn run(case: Case, seed: u64) -> Result<Outcome, String> {
         Some(_) if end.is_none() => Outcome::Noted,
         Some(_) => Outcome::OtherSlot,
     };
-    let counts = statistics(&mut session, &board)?;
+    let counts = statistics(&mut session, &board);
     expect(counts.model_checks > 0 || in_force.is_none(), true, "whole checks are counted")?;
     let _ = session;
     let next = install(&mut bench, &mut slots, &mut weights, (&new, 200));
@@ -130,14 +130,6 @@ fn run(case: Case, seed: u64) -> Result<Outcome, String> {
 /// Runs so many turns of the loop, or until the session ends.
 fn turns(session: &mut Running<'_, '_>, count: usize) -> Option<SessionEnd> {
     (0..count).find_map(|_| session.step())
-}
-
-fn statistics(session: &mut Running<'_, '_>, board: &Board) -> Result<Statistics, String> {
-    let read = |report: Report<'_>| match report {
-        Report::Statistics(statistics) => Ok(statistics),
-        other => Err(format!("{other:?}")),
-    };
-    ask(session, board, &Request::Statistics, read).0
 }
 
 /// Whether the device has the model `in_force`, and decodes with it as the host does.
