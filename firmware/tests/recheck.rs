@@ -58,7 +58,7 @@ fn a_model_that_decays_in_its_slot_while_on_trial_is_not_confirmed() {
     let mut session = Session::start(&mut bench.app, slots, weights);
     flip_bit(slot, 3);
     assert_eq!(run(&mut session), None);
-    assert_eq!(crate::app::requests::statistics(&mut session, &board).slot_damages, 1);
+    assert_eq!(statistics(&mut session, &board).slot_damages, 1);
     board.pins.borrow_mut().to_host.clear();
     let confirm = request_bytes(7, &Request::Upload(UploadStep::Confirm));
     board.pins.borrow_mut().to_device.extend(confirm);

@@ -3,13 +3,7 @@
 numpy's side expands distances into a matrix product, exponentiates in place and multiplies by the weights, in
 batches that stay in the processor's cache; in f64, which is numpy's own choice, and in f32, which is Taxel's.
 Scaling, clamp, affine tail and bias are in both.
-
-Printed besides: how much of the core's f32 peaks the decoding reaches. Counted are the multiplications and
-additions of the network, with those of its exponential, and none of scaling, checks and copies; for fixed16,
-whose instructions are others, those that the same network takes in f32. The fastest runs of both are compared.
 """
-
-import sys
 
 import numpy as np
 from threadpoolctl import threadpool_limits  # scikit-learn brings it
@@ -61,40 +55,20 @@ class Network:
         return outputs
 
 
-def operations(form: str, centres: int) -> int:
-    """Multiplications and additions of a line."""
-    affine_and_bias = 2 * CHANNELS * CHANNELS + CHANNELS
-    if form in ["f32", "fixed16"]:
-        # A product and a sum an input, 3 sums; 3 + 2·5 in the exponential; then the outputs. ‖x‖² once.
-        each = 2 * CHANNELS + 3 + 13 + 2 * CHANNELS
-        return centres * each + 2 * CHANNELS + 4 + affine_and_bias
-    # A difference more an input, the width; 7 + 2·6 + 1 in the exponential.
-    return centres * (3 * CHANNELS + 3 + 1 + 20 + 2 * CHANNELS) + affine_and_bias
-
-
 @threadpool_limits.wrap(limits=1)
 def rows() -> list[Row]:
     """All forms of networks, against numpy in both types."""
     bench("decode")
     readings = left_by_the_bench("readings", CHANNELS)
-    peak = {
-        how: left_by_the_bench(how, 1)[0, 0] / by_criterion(f"peak/{how}").fastest * 1e-9
-        for how in ["separate", "contracted"]
-    }
-    table, shares = [], []
+    table = []
     for centres in CENTRES:
         expected = Network(centres, np.float64).infer(readings, 1000)
         taxel = {
             form: by_criterion(f"decode/{form}/{centres}").over(len(readings)) for form in MOST_ERROR
         }
-        for form, seconds in taxel.items():
+        for form in taxel:
             error = np.abs(left_by_the_bench(f"{form}-{centres}", CHANNELS) - expected).max()
             assert error < MOST_ERROR[form], f"{form} with {centres} centres differs by {error}"
-            gflops = operations(form, centres) / seconds.fastest * 1e-9
-            shares.append(
-                f"{form} with {centres} centres: {gflops:.1f} Gflop/s, {gflops / peak['separate']:.0%} and"
-                f" {gflops / peak['contracted']:.0%} of these"
-            )
         for kind in [np.float64, np.float32]:
             network, own = Network(centres, kind), readings.astype(kind)
             taken = {
@@ -105,12 +79,4 @@ def rows() -> list[Row]:
             for form, seconds in taxel.items():
                 reference = f"numpy, {np.dtype(kind).name}, batches of {batch}"
                 table.append(Row(f"a line, {form}, {centres} centres", reference, fastest, seconds))
-    # To stderr, as all that is not the table.
-    print(
-        f"f32 peak of one core: {peak['separate']:.1f} Gflop/s multiplying and adding,"
-        f" {peak['contracted']:.1f} with both contracted into one instruction",
-        *shares,
-        sep="\n",
-        file=sys.stderr,
-    )
     return table

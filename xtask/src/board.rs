@@ -34,6 +34,14 @@ pub struct Options {
     names: Vec<String>,
 }
 
+impl Options {
+    /// A name that no mutant has, if mutants are to run. A list that is wrong is for [`run`] to tell.
+    pub fn unknown(&self) -> Option<&String> {
+        let mutants = self.mutants.then(|| mutants::load(&[]).ok()).flatten()?;
+        self.names.iter().find(|name| !mutants.iter().any(|mutant| mutant.name == **name))
+    }
+}
+
 /// Name of the image.
 const IMAGE: &str = "nucleo-f446re";
 

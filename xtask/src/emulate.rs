@@ -4,13 +4,13 @@
 mod application;
 mod expected;
 pub mod qemu;
-mod queue;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::firmware::{QEMU, build_image};
 use crate::process::{Outcome, Said, root};
+use crate::queue;
 use crate::toolchain::{Toolchain, elf};
 
 /// Name of the application among the programs.
@@ -51,7 +51,7 @@ pub fn run(options: &Options) -> Outcome {
         }
     }
     jobs.extend(chosen.into_iter().map(Job::Program));
-    let work = |job: &Job| match job {
+    let work = |job: &Job, _| match job {
         Job::Program(program) => run_program(program, options.accept, !names.is_empty()),
         Job::Application(check) => check.run(),
     };

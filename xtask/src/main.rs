@@ -4,6 +4,8 @@ mod process;
 mod structure;
 mod lines;
 mod toolchain;
+mod queue;
+mod copy;
 
 mod firmware;
 mod cores;
@@ -21,9 +23,12 @@ mod mutants;
 
 mod ci;
 
+use std::env::args_os;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 use process::{Outcome, PROOF, cargo, status};
 
 /// Everything that people and CI run. `bash firmware/setup.sh` installs on Debian what the commands need.
@@ -78,13 +83,9 @@ enum Command {
     #[command(disable_help_flag = true)]
     Torture(Rest),
     /// Plant faults in a copy of the product, those of these names or all of proof/mutants, and tell which test and which
-    /// line of torture sees each. An hour; what was found is kept in target/mutants.
-    ///
-    /// Options: --accept writes proof/mutants/score.csv instead of comparing; --second runs the second list; --all tells
-    /// every unit test that fails, not the first one only; --package=NAME runs only the unit tests of this crate, or with
-    /// `torture` the lines of torture; --no-torture runs only unit tests; --check-list checks only that each fault's text
-    /// stands once in its file, and shows the accepted score.
-    Mutants(Rest),
+    /// line of torture sees each. Fails if none sees a fault that was seen before. The tests that proof/mutants/score.csv
+    /// names come first.
+    Mutants(mutants::Options),
 }
 
 /// Arguments that are passed on.
@@ -100,9 +101,25 @@ impl Rest {
     }
 }
 
+/// The arguments, with names that exist.
+fn parsed(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, clap::Error> {
+    let arguments = Arguments::try_parse_from(arguments)?;
+    let unknown = match &arguments.command {
+        Command::Board(options) => options.unknown(),
+        Command::Mutants(options) => options.unknown(),
+        _ => None,
+    };
+    unknown.map_or(Ok(()), |name| {
+        let cause = format!("nothing to plant is called `{name}`\n");
+        Err(Arguments::command().error(ErrorKind::InvalidValue, cause))
+    })?;
+    Ok(arguments)
+}
+
 fn main() -> ExitCode {
     let success = |()| ExitCode::SUCCESS;
-    let outcome = match Arguments::parse().command {
+    let arguments = parsed(args_os()).unwrap_or_else(|error| error.exit());
+    let outcome = match arguments.command {
         Command::Ci => ci::run().map(success),
         Command::Structure => structure::run().map(success),
         Command::Lines => lines::run().map(success),
@@ -115,7 +132,7 @@ fn main() -> ExitCode {
         Command::Cycles(options) => cycles::run(&options).map(success),
         Command::Study(rest) => study(&rest.all()),
         Command::Torture(rest) => torture::run(&rest.all()),
-        Command::Mutants(rest) => mutants::run(&rest.all()).map(success),
+        Command::Mutants(options) => mutants::run(&options).map(success),
     };
     outcome.unwrap_or_else(|cause| {
         eprintln!("error: {cause}");
@@ -127,4 +144,26 @@ fn main() -> ExitCode {
 fn study(options: &[&str]) -> Outcome<ExitCode> {
     let run = ["run", "--release", "--manifest-path", PROOF, "--package", "studies", "--"];
     status(cargo(&run).args(options)).map(torture::code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_or_mutant_that_does_not_exist_is_wrong_usage() {
+        let exit = |line: &str| {
+            let arguments = ["cargo-xtask"].into_iter().chain(line.split(' ')).map(OsString::from);
+            parsed(arguments).map_or_else(|error| error.exit_code(), |_| 0)
+        };
+        for (line, code) in [
+            ("mutants no-feed-before-erase", 0),
+            ("mutants no-feed-before-eras", 2),
+            ("mutants --second no-feed-before-erase", 2),
+            ("board --mutants sck-slow", 0),
+            ("board --mutants sck-slo", 2),
+        ] {
+            assert_eq!(exit(line), code, "{line}");
+        }
+    }
 }

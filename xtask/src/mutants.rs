@@ -7,60 +7,102 @@ mod programs;
 mod score;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
+use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Write;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use crate::process::Outcome;
+use crate::queue;
 use copy::{Copy, folder};
 use list::Fault;
 use programs::{Switch, Test, batches, full_name, lines, red, trace};
 use score::Found;
 
-/// Tests that run at the same time.
-const WORKERS: usize = 2;
+/// Which faults to plant, and which tests to run.
+// One flag of the command line each.
+#[allow(clippy::struct_excessive_bools)]
+#[derive(clap::Args)]
+pub struct Options {
+    /// Run all tests that reach a fault, and write proof/mutants/score.csv instead of comparing. An hour; what was found
+    /// is kept in target/mutants
+    #[arg(long, conflicts_with_all = ["names", "all"])]
+    accept: bool,
+    /// Run all tests that reach a fault, and tell every one that fails
+    #[arg(long)]
+    all: bool,
+    /// Plant the faults of the second list
+    #[arg(long)]
+    second: bool,
+    /// Run only the unit tests of this crate, or with `torture` the lines of torture
+    #[arg(long = "package", value_name = "NAME")]
+    packages: Vec<String>,
+    /// Run no line of torture
+    #[arg(long)]
+    no_torture: bool,
+    /// Check only that each fault's text stands once in its file, and show the accepted score
+    #[arg(long)]
+    check_list: bool,
+    /// Faults to plant; all if there are none
+    #[arg(value_name = "FAULT")]
+    names: Vec<String>,
+}
 
-/// Runs `mutants` with these arguments.
+impl Options {
+    /// A name that no fault has, if there is one. A list that is wrong is for [`run`] to tell.
+    pub fn unknown(&self) -> Option<&String> {
+        let faults = list::load(self.second).ok()?;
+        self.names.iter().find(|name| !faults.iter().any(|fault| fault.name == **name))
+    }
+}
+
+/// Plants faults. Without `--accept` and `--all`, the tests that the accepted score names come first. The others run only
+/// for faults that were found and are not found by these, and for new ones.
 ///
 /// # Errors
 /// The lists are wrong, the copy does not build, or a fault is missed that was found before.
-pub fn run(arguments: &[&str]) -> Outcome {
-    let is_second = arguments.contains(&"--second");
-    let faults = list::load(is_second)?;
-    let accepted = score::accepted(is_second);
-    let (options, names): (Vec<&str>, Vec<&str>) =
-        arguments.iter().partition(|argument| argument.starts_with("--"));
-    let with_torture = !options.contains(&"--no-torture");
-    let (crates, options): (Vec<&str>, Vec<&str>) = options
-        .into_iter()
-        .filter(|option| !["--no-torture", "--second"].contains(option))
-        .partition(|option| option.starts_with("--package="));
-    let crates: Vec<&str> = crates.iter().filter_map(|it| it.strip_prefix("--package=")).collect();
-    if let Some(unknown) = names.iter().find(|name| !faults.iter().any(|it| it.name == **name)) {
-        return Err(format!("mutants: no fault is called `{unknown}`"));
+pub fn run(options: &Options) -> Outcome {
+    let faults = list::load(options.second)?;
+    let accepted = score::accepted(options.second);
+    if options.check_list {
+        println!("{} faults", faults.len());
+        let verdict = |fault: &Fault| accepted.get(&fault.name).map_or("", |it| &it.verdict);
+        print!("{}", score::by_crate(faults.iter().map(|fault| (fault, verdict(fault)))));
+        return Ok(());
     }
-    match options[..] {
-        ["--check-list"] => {
-            println!("{} faults", faults.len());
-            let verdict = |fault: &Fault| accepted.get(&fault.name).map_or("", String::as_str);
-            print!("{}", score::by_crate(faults.iter().map(|fault| (fault, verdict(fault)))));
-            return Ok(());
-        }
-        [] | ["--accept" | "--all"] => {}
-        _ => return Err(format!("mutants: unknown options {options:?}")),
-    }
-    if options == ["--accept"] && !names.is_empty() {
-        return Err("mutants: --accept writes the score of all faults".to_owned());
-    }
-    let copy = copy::build(&faults, &crates, with_torture)?;
-    let tests = traced(&copy, &faults)?;
     let numbers: Vec<usize> = (1..=faults.len())
-        .filter(|number| names.is_empty() || names.contains(&&*faults[number - 1].name))
+        .filter(|number| {
+            options.names.is_empty() || options.names.contains(&faults[number - 1].name)
+        })
         .collect();
-    let scored = measure(&copy, &faults, &numbers, &tests, options == ["--all"])?;
+    let copy = copy::build(&faults, &options.packages, !options.no_torture)?;
+    let tests = programs::all(&copy)?;
+    let mut found = BTreeMap::new();
+    if !options.accept && !options.all {
+        let is_named = |fault: &Fault, test: &Test| {
+            accepted.get(&fault.name).is_some_and(|it| it.tests.contains(&full_name(&copy, test)))
+        };
+        let chosen = |test: &&Test| numbers.iter().any(|it| is_named(&faults[it - 1], test));
+        let named: Vec<Test> = tests.iter().filter(chosen).cloned().collect();
+        let named = traced(&copy, &faults, &named)?;
+        found = measure(&copy, &faults, &numbers, &named, None, is_named)?;
+        found.retain(|number, found| {
+            let before = accepted.get(&faults[number - 1].name).map(|it| &*it.verdict);
+            !found.is_nothing() || before.is_some_and(|verdict| verdict != "found")
+        });
+    }
+    let open: Vec<usize> = numbers.iter().copied().filter(|it| !found.contains_key(it)).collect();
+    if !open.is_empty() {
+        let tests = traced(&copy, &faults, &tests)?;
+        let name =
+            format!("found-{:016x}{}.tsv", copy.digest, if options.all { "-all" } else { "" });
+        let log = Log::open(&name)?;
+        found.extend(measure(&copy, &faults, &open, &tests, Some((&log, options.all)), |_, _| {
+            true
+        })?);
+    }
+    let scored: Vec<(&Fault, Found)> =
+        found.into_iter().map(|(number, found)| (&faults[number - 1], found)).collect();
     for (fault, found) in &scored {
         println!("{:<24}{}", found.verdict(fault), fault.name);
         println!("{:<24}unit: {}", "", found.unit.join("; "));
@@ -73,14 +115,13 @@ pub fn run(arguments: &[&str]) -> Outcome {
         "{}",
         score::by_crate(scored.iter().map(|(fault, found)| (*fault, found.verdict(fault))))
     );
-    if options == ["--accept"] {
-        return score::accept(&scored, is_second);
+    if options.accept {
+        return score::accept(&scored, options.second);
     }
     let worse = |(fault, found): &&(&Fault, Found)| {
-        let before = accepted.get(&fault.name).map(String::as_str);
-        before.is_some_and(|before| {
-            before == "found" && !["found", "open"].contains(&found.verdict(fault))
-        }) || found.verdict(fault).starts_with("found though")
+        let before = accepted.get(&fault.name).is_some_and(|before| before.verdict == "found");
+        before && !["found", "open"].contains(&found.verdict(fault))
+            || found.verdict(fault).starts_with("found though")
     };
     let worse: Vec<&str> = scored.iter().filter(worse).map(|(fault, _)| &*fault.name).collect();
     if worse.is_empty() {
@@ -90,10 +131,6 @@ pub fn run(arguments: &[&str]) -> Outcome {
     }
 }
 
-/// Lines of torture that no fault of the lists can turn red, and why.
-const WITHOUT_FAULT: [(&str, &str); 1] =
-    [("ram-flip", "its device runs in QEMU, whose image is not built with faults")];
-
 /// Runs the lines of torture that faults name, or those of these `names` alone: each without a fault, which it must
 /// stand, and with each of its faults, of which it must turn red.
 ///
@@ -101,7 +138,7 @@ const WITHOUT_FAULT: [(&str, &str); 1] =
 /// The copy does not build, a line misses a fault, or it has none.
 pub fn self_test(names: &[&str]) -> Outcome {
     let faults = list::load(false)?;
-    let copy = copy::build(&faults, &[copy::TORTURE], true)?;
+    let copy = copy::build(&faults, &[copy::TORTURE.to_owned()], true)?;
     let mut lines = lines(&copy)?;
     let is_chosen =
         |line: &str| names.is_empty() || names.iter().any(|name| line.starts_with(name));
@@ -119,15 +156,14 @@ pub fn self_test(names: &[&str]) -> Outcome {
     for line in &lines {
         let own = faults.iter().enumerate().filter(|(_, fault)| fault.torture.contains(&line.name));
         let numbers: Vec<usize> = own.map(|(index, _)| index + 1).collect();
-        if !numbers.is_empty() {
-            cases.push((line, 0));
-        } else if !WITHOUT_FAULT.iter().any(|(name, _)| *name == line.name) {
+        if numbers.is_empty() {
             bad.push(format!("{} has no fault to find", line.name));
+        } else {
+            cases.push((line, 0));
         }
         cases.extend(numbers.into_iter().map(|number| (line, number)));
     }
-    let outcomes = shared(cases.len(), |place, worker| {
-        let (line, number) = cases[place];
+    let outcomes = queue::results(&cases, |&(line, number), worker| {
         let is_red = !red(&copy, &[line], &Switch::On(number), worker)?.is_empty();
         let fault = number.checked_sub(1).map_or("no fault", |index| &faults[index].name);
         let verdict = match (number, is_red) {
@@ -145,75 +181,73 @@ pub fn self_test(names: &[&str]) -> Outcome {
             bad.push(format!("{} with {fault}", line.name));
         }
     }
-    for (line, why) in WITHOUT_FAULT.iter().filter(|(line, _)| is_chosen(line)) {
-        println!("none    {line:<24}{why}");
-    }
     if bad.is_empty() { Ok(()) } else { Err(format!("not as it should be: {}", bad.join("; "))) }
 }
 
-/// Runs `work` for each of so many places with [`WORKERS`], and returns the results in order.
-fn shared<T: Send>(count: usize, work: impl Fn(usize, usize) -> T + Sync) -> Vec<T> {
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(BTreeMap::new());
-    thread::scope(|scope| {
-        for worker in 0..WORKERS {
-            let (next, done, work) = (&next, &done, &work);
-            scope.spawn(move || {
-                loop {
-                    let place = next.fetch_add(1, Ordering::Relaxed);
-                    if place >= count {
-                        break;
-                    }
-                    let result = work(place, worker);
-                    if let Ok(mut done) = done.lock() {
-                        done.insert(place, result);
-                    }
-                }
-            });
-        }
-    });
-    done.into_inner().unwrap_or_default().into_values().collect()
+/// A file that keeps what was found out, so that a stopped run goes on: a key and its values on each line.
+struct Log {
+    known: BTreeMap<String, Vec<String>>,
+    file: Mutex<File>,
 }
 
-/// All tests that pass without a fault, with the faults that each reaches. A file keeps them, until the copy differs.
-fn traced(copy: &Copy, faults: &[Fault]) -> Outcome<Vec<Test>> {
+impl Log {
+    fn open(name: &str) -> Outcome<Self> {
+        let path = folder().join(name);
+        let text = fs::read_to_string(&path).unwrap_or_default();
+        let fields = |line: &str| {
+            let mut fields = line.split('\t').map(str::to_owned);
+            Some((fields.next()?, fields.collect()))
+        };
+        let file = File::options().append(true).create(true).open(&path);
+        let file = file.map_err(|cause| format!("{}: {cause}", path.display()))?;
+        Ok(Self { known: text.lines().filter_map(fields).collect(), file: Mutex::new(file) })
+    }
+
+    /// What is kept under `key`; if nothing is, what `find` finds, which is kept unless it is not the `whole` truth.
+    fn get(
+        &self,
+        key: String,
+        find: impl FnOnce() -> Outcome<Vec<String>>,
+        whole: impl FnOnce(&[String]) -> bool,
+    ) -> Outcome<(Vec<String>, bool)> {
+        if let Some(values) = self.known.get(&key) {
+            return Ok((values.clone(), true));
+        }
+        let values = find()?;
+        let is_whole = whole(&values);
+        if is_whole && let Ok(mut file) = self.file.lock() {
+            let line = [&[key], &values[..]].concat().join("\t");
+            writeln!(file, "{line}").map_err(|cause| cause.to_string())?;
+        }
+        Ok((values, is_whole))
+    }
+}
+
+/// Those of `tests` that pass without a fault, with the faults that each reaches.
+fn traced(copy: &Copy, faults: &[Fault], tests: &[Test]) -> Outcome<Vec<Test>> {
     let mut state = DefaultHasher::new();
     (copy.digest, faults.iter().map(Fault::key).collect::<Vec<_>>()).hash(&mut state);
-    let file = folder().join(format!("trace-{:016x}.csv", state.finish()));
-    let tests = programs::all(copy)?;
-    let known = fs::read_to_string(&file).unwrap_or_default();
-    let known: BTreeMap<String, (u64, BTreeSet<usize>)> = known
-        .lines()
-        .filter_map(|line| {
-            let mut fields = line.split(',');
-            let (name, ms) = (fields.next()?.to_owned(), fields.next()?.parse().ok()?);
-            Some((name, (ms, fields.filter_map(|number| number.parse().ok()).collect())))
-        })
-        .collect();
-    let failed = |cause: std::io::Error| format!("{}: {cause}", file.display());
-    let log = fs::File::options().append(true).create(true).open(&file).map_err(failed)?;
-    let log = Mutex::new(log);
-    let is_new = |test: &&Test| !known.contains_key(&full_name(copy, test));
+    let log = Log::open(&format!("trace-{:016x}.tsv", state.finish()))?;
+    let is_new = |test: &&Test| !log.known.contains_key(&full_name(copy, test));
     eprintln!("tracing {} of {} tests", tests.iter().filter(is_new).count(), tests.len());
-    let outcomes = shared(tests.len(), |place, worker| {
-        let (test, name) = (&tests[place], full_name(copy, &tests[place]));
-        if let Some((ms, reaches)) = known.get(&name) {
-            return Ok::<_, String>(Test { ms: *ms, reaches: reaches.clone(), ..test.clone() });
-        }
-        // Twice, as one that fails with a fault.
-        let traced = trace(copy, test, worker).or_else(|_| trace(copy, test, worker));
-        let traced = traced.map_err(|cause| format!("left out: {cause}"))?;
-        let numbers: Vec<String> = traced.reaches.iter().map(usize::to_string).collect();
-        if let Ok(mut log) = log.lock() {
-            writeln!(log, "{name},{},{}", traced.ms, numbers.join(",")).map_err(failed)?;
-        }
-        Ok(traced)
+    let outcomes = queue::results(tests, |test, worker| {
+        let find = || {
+            // Twice, as one that fails with a fault.
+            let traced = trace(copy, test, worker).or_else(|_| trace(copy, test, worker))?;
+            let numbers = traced.reaches.iter().map(usize::to_string);
+            Ok([traced.ms.to_string()].into_iter().chain(numbers).collect())
+        };
+        let (fields, _) = log.get(full_name(copy, test), find, |_| true)?;
+        let mut fields = fields.iter().filter_map(|field| field.parse().ok());
+        let ms = fields.next().unwrap_or_default();
+        let reaches: BTreeSet<usize> = fields.map(|number| number as usize).collect();
+        Ok::<_, String>(Test { ms, reaches, ..test.clone() })
     });
     let mut passing = Vec::new();
     for outcome in outcomes {
         match outcome {
             Ok(test) => passing.push(test),
-            Err(cause) => eprintln!("{cause}"),
+            Err(cause) => eprintln!("left out: {cause}"),
         }
     }
     let seconds: u64 = passing.iter().map(|test| test.ms).sum::<u64>() / 1000;
@@ -221,66 +255,44 @@ fn traced(copy: &Copy, faults: &[Fault]) -> Outcome<Vec<Test>> {
     Ok(passing)
 }
 
-/// What was found before, by the fault's key and the kind of test.
-type Known<'k> = BTreeMap<(&'k str, &'k str), Vec<String>>;
-
-/// Runs the faults of these numbers with the tests that reach them. A file keeps what was found, until the product
-/// or its tests differ.
-fn measure<'f>(
+/// Runs the faults of these numbers with those of the `tests` that reach them and are wanted. A `log` keeps what was
+/// found, until the product or its tests differ; with it comes whether to tell all unit tests that fail.
+fn measure(
     copy: &Copy,
-    faults: &'f [Fault],
+    faults: &[Fault],
     numbers: &[usize],
     tests: &[Test],
-    all: bool,
-) -> Outcome<Vec<(&'f Fault, Found)>> {
-    let name = format!("found-{:016x}{}.tsv", copy.digest, if all { "-all" } else { "" });
-    let file = folder().join(name);
-    let text = fs::read_to_string(&file).unwrap_or_default();
-    let known: Known = text
-        .lines()
-        .filter_map(|line| {
-            let mut fields = line.split('\t');
-            let (key, kind) = (fields.next()?, fields.next()?);
-            Some(((key, kind), fields.map(str::to_owned).collect()))
-        })
-        .collect();
-    let failed = |cause: std::io::Error| format!("{}: {cause}", file.display());
-    let log = fs::File::options().append(true).create(true).open(&file).map_err(failed)?;
-    let log = Mutex::new(log);
-    let outcomes = shared(numbers.len(), |place, worker| {
-        let (number, fault) = (numbers[place], &faults[numbers[place] - 1]);
-        let reaching: Vec<&Test> =
-            tests.iter().filter(|test| test.reaches.contains(&number)).collect();
+    log: Option<(&Log, bool)>,
+    is_wanted: impl Fn(&Fault, &Test) -> bool + Sync,
+) -> Outcome<BTreeMap<usize, Found>> {
+    let outcomes = queue::results(numbers, |&number, worker| {
+        let fault = &faults[number - 1];
+        let reaching: Vec<&Test> = tests
+            .iter()
+            .filter(|test| test.reaches.contains(&number) && is_wanted(fault, test))
+            .collect();
         let mut found = Found { is_reached: !reaching.is_empty(), ..Found::default() };
-        let key = fault.key().replace(['\n', '\t'], " ");
-        for kind in ["unit", "torture"] {
-            let is_unit = kind == "unit";
-            let (names, is_whole) = if let Some(names) = known.get(&(&*key, kind)) {
-                (names.clone(), true)
-            } else {
-                let of_kind: Vec<&Test> = reaching
-                    .iter()
-                    .copied()
-                    .filter(|test| test.program.is_some() == is_unit)
-                    .collect();
-                let names = look(copy, (fault, number), &of_kind, all || !is_unit, worker)?;
-                // Tests of some crates only say nothing if none of them fails.
-                let is_whole = if is_unit {
-                    copy.has_all_units || !names.is_empty()
-                } else {
-                    copy.has_torture
-                };
-                if let (true, Ok(mut log)) = (is_whole, log.lock()) {
-                    let names = [&[key.clone(), kind.to_owned()], &names[..]].concat().join("\t");
-                    writeln!(log, "{names}").map_err(failed)?;
-                }
-                eprintln!("{}: {kind}: {}", fault.name, names.join("; "));
-                (names, is_whole)
+        for is_unit in [true, false] {
+            let of_kind = |test: &&&Test| test.program.is_some() == is_unit;
+            let of_kind: Vec<&Test> = reaching.iter().filter(of_kind).copied().collect();
+            let all = !is_unit || log.is_some_and(|(_, all)| all);
+            let find = || look(copy, (fault, number), &of_kind, all, worker);
+            // Tests of some crates only say nothing if none of them fails.
+            let whole = |names: &[String]| {
+                if is_unit { copy.has_all_units || !names.is_empty() } else { copy.has_torture }
             };
+            let kind = if is_unit { "unit" } else { "torture" };
+            let (names, is_whole) = if let Some((log, _)) = log {
+                let key = format!("{kind} {}", fault.key().replace(['\n', '\t'], " "));
+                log.get(key, find, whole)?
+            } else {
+                find().map(|names| (names, false))?
+            };
+            eprintln!("{}: {kind}: {}", fault.name, names.join("; "));
             found.is_open |= !is_whole;
             *(if is_unit { &mut found.unit } else { &mut found.torture }) = names;
         }
-        Ok((fault, found))
+        Ok((number, found))
     });
     outcomes.into_iter().collect()
 }

@@ -40,8 +40,8 @@ fn metadata(manifest: &str) -> Outcome<Value> {
     serde_json::from_str(&said.out).map_err(|cause| cause.to_string())
 }
 
-/// Dependencies of a package whose names stand in none of its sources. (cargo-machete tells as much, and takes longer to
-/// install than everything here to build.)
+/// Dependencies of a package that none of its sources uses. (cargo-machete tells as much, and takes longer to install than
+/// everything here to build.)
 fn unused(package: &Value) -> Vec<String> {
     let manifest = Path::new(package["manifest_path"].as_str().unwrap_or_default());
     let text = sources(manifest.parent().unwrap_or(manifest));
@@ -50,23 +50,37 @@ fn unused(package: &Value) -> Vec<String> {
     let named = dependencies.filter_map(|it| it["rename"].as_str().or(it["name"].as_str()));
     named
         .filter(|name| ignored.is_none_or(|ignored| !ignored.iter().any(|it| it == name)))
-        .filter(|name| {
-            let path = name.replace('-', "_");
-            let uses = [format!("{path}::"), format!("use {path};"), format!("use {path} as")];
-            !uses.iter().any(|used| text.contains(used))
-        })
+        .filter(|name| !uses(&text, &name.replace('-', "_")))
         .map(|name| format!("{} does not use {name:?}", package["name"]))
         .collect()
 }
 
-/// All Rust code of the crate in a `folder`, without that of crates within.
+/// Whether code without comments uses the crate `name`: at the beginning of a path. A module of that name hides it.
+fn uses(code: &str, name: &str) -> bool {
+    let is_hidden = [";", " {"].iter().any(|end| code.contains(&format!("mod {name}{end}")));
+    code.match_indices(name).any(|(place, _)| {
+        let (before, after) = (&code[..place], &code[place + name.len()..]);
+        let begins = match before.strip_suffix("::") {
+            Some(before) => !before.ends_with(|it: char| it.is_alphanumeric() || "_>".contains(it)),
+            None => !is_hidden && !before.ends_with(|it: char| it.is_alphanumeric() || it == '_'),
+        };
+        let is_import =
+            before.ends_with("use ") && [";", " as "].iter().any(|it| after.starts_with(it));
+        begins && (after.starts_with("::") || is_import)
+    })
+}
+
+/// All Rust code of the crate in a `folder`, without comments and without that of crates within.
 fn sources(folder: &Path) -> String {
     let mut text = String::new();
     for path in fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
         if path.is_dir() && !path.join("Cargo.toml").exists() && !path.ends_with("target") {
             text += &sources(&path);
         } else if path.extension().is_some_and(|end| end == "rs") {
-            text += &fs::read_to_string(path).unwrap_or_default();
+            let code = fs::read_to_string(path).unwrap_or_default();
+            text.extend(
+                code.lines().filter_map(|line| line.split("//").next()).flat_map(|it| [it, "\n"]),
+            );
         }
     }
     text
@@ -108,6 +122,39 @@ fn broken(metadata: &Value) -> Vec<String> {
 mod tests {
     use super::*;
     use serde_json::json;
+
+    #[test]
+    fn a_dependency_that_only_a_module_or_a_comment_is_named_after_is_not_used() {
+        let folder = std::env::temp_dir().join(format!("taxel-structure-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let unused = |code: &str| {
+            fs::write(folder.join("lib.rs"), code).unwrap();
+            let package = json!({
+                "name": "a", "manifest_path": folder.join("Cargo.toml"),
+                "dependencies": [{"name": "blue-sky"}],
+            });
+            unused(&package)
+        };
+        for code in [
+            "use blue_sky::Cloud;",
+            "fn f() { blue_sky::rain() }",
+            "use blue_sky as _;",
+            "mod blue_sky; use ::blue_sky::Cloud;",
+        ] {
+            assert!(unused(code).is_empty(), "{code}");
+        }
+        for code in [
+            "// as blue_sky::Cloud",
+            "//! `blue_sky::rain`",
+            "mod blue_sky;\nfn f() { blue_sky::rain() }",
+            "use crate::blue_sky::Cloud;",
+            "use very_blue_sky::Cloud;",
+            "let blue_sky = 1;",
+        ] {
+            assert_eq!(unused(code), ["\"a\" does not use \"blue-sky\""], "{code}");
+        }
+        fs::remove_dir_all(folder).unwrap();
+    }
 
     #[test]
     fn a_crate_depends_on_what_stands_below_it() {

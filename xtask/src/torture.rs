@@ -2,26 +2,21 @@
 
 use std::process::{ExitCode, ExitStatus, Stdio};
 
-use crate::emulate::qemu;
-use crate::firmware::{QEMU, build_image};
 use crate::mutants;
 use crate::process::{Outcome, PROOF, cargo, run as run_command, status, target_dir};
-use crate::toolchain::{Toolchain, elf};
 
 /// Cargo's arguments before those of the torture.
 const RUN: [&str; 6] = ["run", "--manifest-path", PROOF, "--package", "torture", "--"];
 
-/// Builds host-sim, the emulator's images and the torture, and runs the torture with `options`. Without an emulator,
-/// what needs one is not tested.
+/// Builds host-sim and the torture, and runs the torture with `options`.
 ///
 /// Returns the exit status of the torture, which says itself what is wrong: 2 for options or names that it does not
 /// know. These are refused before the rest is built.
 ///
 /// With `--self-test` it runs lines on a product with faults instead (`proof/mutants/README.md`).
 pub fn run(options: &[&str]) -> Outcome<ExitCode> {
-    if let Some(names) = options.strip_prefix(&["--self-test"]) {
-        return mutants::self_test(names).map(|()| ExitCode::SUCCESS);
-    }
+    let self_test = options.strip_prefix(&["--self-test"]);
+    let options = self_test.unwrap_or(options);
     let mut torture = cargo(&RUN);
     torture.args(options);
     if options.iter().any(|option| ["--help", "-h", "--list"].contains(option)) {
@@ -31,12 +26,11 @@ pub fn run(options: &[&str]) -> Outcome<ExitCode> {
     if !checked.success() {
         return Ok(code(checked));
     }
+    if let Some(names) = self_test {
+        return mutants::self_test(names).map(|()| ExitCode::SUCCESS);
+    }
     run_command(&mut cargo(&["build", "--package", "host-sim"]))?;
     torture.arg("--program").arg(target_dir().join("debug/host-sim"));
-    match qemu::present().and_then(|()| build_image(&Toolchain::find()?, QEMU)) {
-        Ok(()) => drop(torture.arg("--images").arg(elf(""))),
-        Err(cause) => eprintln!("note: promises of a device in QEMU stay untested: {cause}"),
-    }
     status(&mut torture).map(code)
 }
 

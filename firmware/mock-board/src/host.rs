@@ -1,7 +1,9 @@
 //! The host's side of the link.
 
 use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{Configuration, Refusal, Report, Request, UploadState, UploadStep};
+use firmware::link::message::{
+    Configuration, Refusal, Report, Request, Statistics, UploadState, UploadStep,
+};
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use model_core::blob::Model;
@@ -28,6 +30,20 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
         true
     }));
     bytes
+}
+
+/// Passes each report in a device's bytes to `read`, with its number; returns what it first makes of one. What is no whole
+/// report is passed over.
+pub fn find_report<T>(
+    bytes: &[u8],
+    mut read: impl FnMut(u16, Report<'_>) -> Option<T>,
+) -> Option<T> {
+    let mut receiver = Receiver::new([0; 1024]);
+    bytes.iter().find_map(|byte| {
+        let Some(Received::Frame(bytes)) = receiver.push(*byte) else { return None };
+        let packet = packet::decode::<Report<'_>>(bytes).ok()?;
+        read(packet.number, packet.body)
+    })
 }
 
 /// Reports that the host finds in a device's bytes: the number and debug text of each.
@@ -68,16 +84,22 @@ pub fn ask<T>(
     board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, request));
     let end = settle(session, board);
     let answer = std::mem::take(&mut board.pins.borrow_mut().to_host);
-    let mut receiver = Receiver::new([0; 1024]);
-    for byte in &answer {
-        if let Some(Received::Frame(bytes)) = receiver.push(*byte) {
-            let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");
-            if packet.number == ASKED {
-                return (read(packet.body), end);
-            }
-        }
-    }
-    panic!("no answer to {request:?} in {:?}", reports(&answer));
+    let mut read = Some(read);
+    let found = find_report(&answer, |number, report| {
+        if number == ASKED { read.take().map(|read| read(report)) } else { None }
+    });
+    let found =
+        found.unwrap_or_else(|| panic!("no answer to {request:?} in {:?}", reports(&answer)));
+    (found, end)
+}
+
+/// The device's counters.
+pub fn statistics(session: &mut Running<'_, '_>, board: &Board) -> Statistics {
+    let read = |report: Report<'_>| match report {
+        Report::Statistics(statistics) => statistics,
+        other => panic!("{other:?}"),
+    };
+    ask(session, board, &Request::Statistics, read).0
 }
 
 /// The CRC-32 of the model in force.
@@ -145,17 +167,12 @@ pub fn upload(
 /// The answer to a step of an upload, among all that the device has sent.
 fn answer(board: &Board) -> Result<UploadState, Refusal> {
     let bytes = std::mem::take(&mut board.pins.borrow_mut().to_host);
-    let mut receiver = Receiver::new([0; 1024]);
-    for byte in &bytes {
-        let Some(Received::Frame(bytes)) = receiver.push(*byte) else { continue };
-        let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");
-        match packet.body {
-            Report::Upload(state) if packet.number == ASKED => return Ok(state),
-            Report::Refused(refusal) if packet.number == ASKED => return Err(refusal),
-            _ => {}
-        }
-    }
-    panic!("no answer in {:?}", reports(&bytes));
+    let found = find_report(&bytes, |number, report| match report {
+        Report::Upload(state) if number == ASKED => Some(Ok(state)),
+        Report::Refused(refusal) if number == ASKED => Some(Err(refusal)),
+        _ => None,
+    });
+    found.unwrap_or_else(|| panic!("no answer in {:?}", reports(&bytes)))
 }
 
 /// Uploads `blob` in chunks of `chunk` bytes and confirms it.

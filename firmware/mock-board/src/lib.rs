@@ -39,7 +39,8 @@ pub use device::{
 };
 pub use flash::{Cells, Flash, Supply, Torn, Worn};
 pub use host::{
-    ask, begin, configure, install, model_crc, reports, request_bytes, settle, upload, upload_steps,
+    ask, begin, configure, find_report, install, model_crc, reports, request_bytes, settle,
+    statistics, upload, upload_steps,
 };
 pub use models::{
     blob, blob_of, blob_of_components, blob_of_length, blob_with_confidence, crc_of, parts,

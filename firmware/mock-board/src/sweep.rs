@@ -1,6 +1,9 @@
 //! What a device goes through when its power is cut at every operation of its flash, and again while it recovers, when its
 //! flash decays, or when it is attacked: one case for each seed. Tests take a few seeds, torture takes many.
 
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
 use crate::device::Device;
 use crate::flash::{Flash, Supply, Torn};
 
@@ -19,6 +22,20 @@ pub use models::{Job, cut_model};
 pub use recheck::flip_model;
 pub use seal::{KINDS, forge};
 pub use settings::cut_settings;
+
+/// Cuts of one case.
+#[derive(Debug, Clone, Copy)]
+pub struct Cuts {
+    pub count: u64,
+    /// Where in the work the power is cut first: 0 in its first quarter, 3 in its last one.
+    pub quarter: usize,
+}
+
+/// Draws the operation, of so many, in which the power is cut first; and its quarter.
+fn first_cut(seed: u64, operations: u64) -> (u64, usize) {
+    let first = Xoshiro256PlusPlus::seed_from_u64(seed).next_u64() % operations;
+    (first, (4 * first / operations) as usize)
+}
 
 /// Words of a slot.
 const SLOT_WORDS: usize = 192;

@@ -1,12 +1,14 @@
-//! Computations whose results must be the same on host and target, to the last bit.
-//! `firmware/tests/bit_for_bit.rs` compiles this file for the host, and compares.
+//! Computations whose results must be the same on host and target, to the last bit, as lines of a log.
+//! `firmware/tests/bit_for_bit.rs` compiles this file for the host, and compares its lines with those of the target.
+
+use core::fmt::Arguments;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use model_core::blob::Model;
 use model_core::confidence::{Confidence, Sizes};
-use model_core::exp::{ExpKernel, Polynomial};
+use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::gate::{Rest, is_at_rest};
-use model_core::rbf::Network;
+use model_core::rbf::{Format, Network};
 use model_core::rls::Rls;
 use model_core::scale::{CLAMP, saturates};
 use model_core::{Decoder, Estimate, Gate, RowStatus};
@@ -111,7 +113,7 @@ pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
 }
 
 /// Number of frames that every number format decodes.
-pub const MANY: usize = 10_000;
+const MANY: usize = 10_000;
 
 /// CRC-32 with a table, for many bytes.
 pub const QUICK_CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
@@ -133,12 +135,6 @@ pub fn one_of_many<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame
     frame
 }
 
-/// CRC-32 of all bits that the model in `blob` decodes [`MANY`] frames to, and of whether an input was clamped. `None`
-/// if the blob does not load.
-pub fn decoding_many<E: ExpKernel, const R: usize>(blob: &[u8]) -> Option<u32> {
-    decoding_all::<E, R>(blob, MANY, one_of_many)
-}
-
 /// Readings that no sensor gives: the ends of f32, subnormal numbers, and zeros.
 const EXTREMES: [f32; 10] =
     [f32::MAX, f32::MIN, 1e30, -1e30, f32::MIN_POSITIVE, 1e-39, -1e-39, 1e-45, 0.0, -0.0];
@@ -153,12 +149,8 @@ fn one_of_extremes<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame
     frame
 }
 
-/// CRC-32 as of [`decoding_many`], of a tenth as many frames with readings that no sensor gives.
-pub fn decoding_extremes<const R: usize>(blob: &[u8]) -> Option<u32> {
-    decoding_all::<Polynomial, R>(blob, MANY / 10, one_of_extremes)
-}
-
 /// CRC-32 of all bits that the model in `blob` decodes so many `frames` to, and of whether an input was clamped.
+#[inline(never)] // as all that follows, so that the stack holds one decoder at a time
 fn decoding_all<E: ExpKernel, const R: usize>(
     blob: &[u8],
     frames: usize,
@@ -183,7 +175,8 @@ fn decoding_all<E: ExpKernel, const R: usize>(
 /// Number of frames with one reading within four steps of f32 of an end of the clamp, how many of them are said to be
 /// clamped, and how many otherwise than by portable arithmetic. `None` if the blob does not load, or its number format
 /// clamps before it infers.
-pub fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
+#[inline(never)]
+fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let model = Model::decode(blob).ok()?;
     let network_of = |row| model.networks().nth(model.network_of_row(row)?);
@@ -255,16 +248,11 @@ pub fn write_confidence(sizes: Sizes, block: &mut [f32], numbers: &mut Numbers) 
 
 /// CRC-32 of all bits of the novelty and the deviations of frames, and how many frames are novel, how many of these too
 /// far off to tell, and how many have no novelty.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Assessed {
-    /// CRC-32.
-    pub crc: u32,
-    /// Frames that are novel.
-    pub novel: usize,
-    /// Novel frames that are too far off to tell how novel.
-    pub far: usize,
-    /// Frames with a missing reading.
-    pub missing: usize,
+struct Assessed {
+    crc: u32,
+    novel: usize,
+    far: usize,
+    missing: usize,
 }
 
 impl Assessed {
@@ -279,7 +267,8 @@ impl Assessed {
 }
 
 /// What [`MANY`] frames are by the confidence of the model in `blob`. `None` if the blob does not load, or has none.
-pub fn assessing_many(blob: &[u8]) -> Option<Assessed> {
+#[inline(never)]
+fn assessing_many(blob: &[u8]) -> Option<Assessed> {
     let decoder = Decoder::<ARRAY_ROWS>::load(blob).ok()?;
     let crc = QUICK_CRC;
     let (mut digest, mut assessed) = (crc.digest(), Assessed::NONE);
@@ -306,7 +295,8 @@ const fn few_outputs(directions: usize) -> Sizes {
 }
 
 /// What frames of one row are by confidences of 1 to 12 directions. `None` if one is unsound.
-pub fn assessing_sizes() -> Option<Assessed> {
+#[inline(never)]
+fn assessing_sizes() -> Option<Assessed> {
     let crc = QUICK_CRC;
     let (mut digest, mut assessed) = (crc.digest(), Assessed::NONE);
     let mut numbers = Numbers::new(7);
@@ -354,7 +344,8 @@ fn nearly_at_rest(
 
 /// Number of rows in [`MANY`] frames near the baseline, how many of them are at rest, and how many the gate treats
 /// wrongly: otherwise than [`is_at_rest`] says, or with other outputs. `None` if the blob does not load.
-pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
+#[inline(never)]
+fn gating(blob: &[u8]) -> Option<[usize; 3]> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let mut numbers = Numbers::new(5);
     let mut baseline: Frame<ROWS> = [[f32::NAN; COLS]; ROWS];
@@ -391,6 +382,77 @@ pub fn gating(blob: &[u8]) -> Option<[usize; 3]> {
         }
     }
     Some([MANY * ROWS, at_rest, otherwise])
+}
+
+/// Where lines of a log go.
+pub type Say<'s> = &'s mut dyn FnMut(Arguments<'_>);
+
+/// The models of the paper's shape, by format.
+const KERNELS: [(Format, &str); 3] = [
+    (Format::F32, "kernels-f32.bin"),
+    (Format::Fixed16, "kernels-fixed16.bin"),
+    (Format::F32Direct, "kernels-f32-direct.bin"),
+];
+
+/// The models of one network for all rows, behind a projection.
+const ARRAYS: [(&str, &str); 8] = [
+    ("f32", "array-f32.bin"),
+    ("f32 without tail", "array-f32-no-tail.bin"),
+    ("fixed16", "array-fixed16.bin"),
+    ("fixed16 without tail", "array-fixed16-no-tail.bin"),
+    ("f32-direct", "array-f32-direct.bin"),
+    ("f32 of components", "array-f32-components.bin"),
+    ("fixed16 of components", "array-fixed16-components.bin"),
+    ("f32-direct of components", "array-f32-direct-components.bin"),
+];
+
+/// Says what every number format and exponential decodes of [`MANY`] frames, what a gate and a clamp find, and what frames
+/// are by a confidence. `None` if one of the models in testdata, which `model` gives by name, does not load.
+pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()> {
+    for (format, file) in KERNELS {
+        decode_many::<Polynomial>(format, model(file), say)?;
+    }
+    let direct = model("kernels-f32-direct.bin");
+    decode_many::<Libm>(Format::F32Direct, direct, say)?;
+    decode_many::<Micromath>(Format::F32Direct, direct, say)?;
+    for (format, file) in KERNELS.into_iter().take(2) {
+        let ([frames, clamped, otherwise], name) = (clamping(model(file))?, format.name());
+        say(format_args!(
+            "clamp, {name}: {clamped} of {frames} frames clamped, {otherwise} otherwise than the twin's"
+        ));
+    }
+    let [rows, at_rest, otherwise] = gating(model("kernels-fixed16.bin"))?;
+    say(format_args!(
+        "gate: {at_rest} of {rows} rows at rest, {otherwise} otherwise than the twin's"
+    ));
+    for (name, file) in ARRAYS {
+        let crc = decoding_all::<Polynomial, ARRAY_ROWS>(model(file), MANY, one_of_many)?;
+        say(format_args!("array, {name}: {crc:08x}"));
+    }
+    let many = assessing_many(model("array-fixed16-confidence.bin"))?;
+    for (what, assessed) in [("assess_into", many), ("1 to 12 directions", assessing_sizes()?)] {
+        let Assessed { crc, novel, far, missing } = assessed;
+        say(format_args!(
+            "confidence, {what}: {crc:08x}, {novel} frames novel, {far} of them far, {missing} missing"
+        ));
+    }
+    Some(())
+}
+
+fn decode_many<E: ExpKernel>(format: Format, blob: &[u8], say: Say<'_>) -> Option<()> {
+    let crc = decoding_all::<E, ROWS>(blob, MANY, one_of_many)?;
+    say(format_args!("{}, {}: {crc:08x}", format.name(), E::NAME));
+    Some(())
+}
+
+/// Says what every number format decodes of readings that no sensor gives, while subnormals are treated as `mode` says.
+pub fn extremes<'m>(mode: &str, model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()> {
+    say(format_args!("subnormals {mode}"));
+    for (format, file) in KERNELS {
+        let crc = decoding_all::<Polynomial, ROWS>(model(file), MANY / 10, one_of_extremes)?;
+        say(format_args!("{}: {crc:08x}", format.name()));
+    }
+    Some(())
 }
 
 /// CRC-32 of all bits of the weights that recursive least squares has after each of 200 samples.

@@ -2,13 +2,11 @@
 
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, EstimateReport, Report, Request};
-use firmware::link::packet;
-use firmware::link::receive::{Received, Receiver};
 use model_core::blob::Floats;
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Frame};
 
-use super::requests::{bits, statistics};
+use super::requests::bits;
 use mock_board::*;
 
 /// What an estimate has of a confidence, as bits, and whether it is flagged as novel.
@@ -62,17 +60,15 @@ fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceS
     while board.pins.borrow().now_us < until_us {
         assert_eq!(session.step(), None);
     }
-    let mut receiver = Receiver::new([0; 1024]);
     let mut found = Vec::new();
-    for byte in std::mem::take(&mut board.pins.borrow_mut().to_host) {
-        if let Some(Received::Frame(bytes)) = receiver.push(byte) {
-            match packet::decode::<Report<'_>>(bytes).expect("a whole report").body {
-                Report::Estimate(estimate) => found.push(Sent::new(&estimate)),
-                Report::Health(_) => {}
-                other => panic!("{other:?}"),
-            }
+    find_report(&std::mem::take(&mut board.pins.borrow_mut().to_host), |_, report| {
+        match report {
+            Report::Estimate(estimate) => found.push(Sent::new(&estimate)),
+            Report::Health(_) => {}
+            other => panic!("{other:?}"),
         }
-    }
+        None::<()>
+    });
     ask(session, board, &configure(quiet()), |_| ());
     assert!(found.len() >= 2, "{found:?}");
     found

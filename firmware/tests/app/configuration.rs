@@ -3,7 +3,7 @@
 use firmware::app::Session;
 use firmware::link::message::{Configuration, ConfigurationField, Refusal, Report, Request};
 
-use super::requests::{decode, statistics};
+use super::requests::decode;
 use mock_board::*;
 
 #[test]

@@ -6,7 +6,7 @@ use model_core::Decoder;
 use model_core::blob::{Floats, Model, ModelParts, encode_to_vec};
 use model_core::fill::Fill;
 
-use super::requests::{bits, capture, decode, expected, statistics};
+use super::requests::{bits, capture, decode, expected};
 use mock_board::*;
 
 #[test]

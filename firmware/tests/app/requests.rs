@@ -1,18 +1,10 @@
 //! Requests that many tests make, and what their answers must be.
 
-use firmware::link::message::{Configuration, Report, Request, Statistics};
+use firmware::link::message::{Configuration, Report, Request};
 use model_core::blob::Floats;
 use model_core::{Aligned, Decoder};
 
 use mock_board::*;
-
-pub fn statistics(session: &mut TestSession<'_>, board: &Board) -> Statistics {
-    ask(session, board, &Request::Statistics, |report| match report {
-        Report::Statistics(statistics) => statistics,
-        other => panic!("{other:?}"),
-    })
-    .0
-}
 
 /// Outputs of model-core itself.
 pub fn expected(blob: &[u8], frame: &TestFrame) -> [[f32; OUTPUTS]; ROWS] {

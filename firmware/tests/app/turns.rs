@@ -5,7 +5,6 @@ use firmware::link::message::{Configuration, EstimateReport, Report, Request};
 use firmware::link::packet;
 use firmware::link::receive::{Received, Receiver};
 
-use super::requests::statistics;
 use mock_board::*;
 
 #[test]

@@ -42,12 +42,6 @@ pub const FILES: [(&str, Maker); 13] = [
     ("array-f32-direct-components.bin", || of_array(Format::F32Direct, 6, true, COMPONENTS)),
 ];
 
-/// Calls `work` with the blob of the file of this name.
-pub fn with_blob<T>(name: &str, work: impl FnOnce(&[u8]) -> T) -> T {
-    let (_, blob) = FILES.iter().find(|(file, _)| *file == name).unwrap();
-    work(&blob())
-}
-
 fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32> {
     (0..count).map(|_| middle + reach * numbers.draw()).collect()
 }

@@ -1,4 +1,4 @@
-//! Decoding of whole tables on one thread, beside the processor's peak of additions and multiplications.
+//! Decoding of whole tables on one thread.
 //!
 //! Readings and estimates are written to cargo's folder for temporary files, for `compare/decode.py`.
 
@@ -182,86 +182,5 @@ fn decode(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Peak rate of f32 multiplications and additions: registers alone, without any waiting.
-mod peak {
-    use pulp::{Simd, WithSimd};
-
-    /// Chains of operations that do not wait for each other.
-    const CHAINS: usize = 12;
-    const ROUNDS: usize = 20_000;
-
-    /// Number of operations in a run; contracted, each instruction makes two.
-    pub fn operations(contracted: bool) -> u64 {
-        let lanes = pulp::Arch::new().dispatch(Lanes);
-        (ROUNDS * CHAINS * lanes * if contracted { 2 } else { 1 }) as u64
-    }
-
-    /// The machine's lanes of f32.
-    struct Lanes;
-
-    impl WithSimd for Lanes {
-        type Output = usize;
-
-        fn with_simd<S: Simd>(self, _: S) -> usize {
-            S::F32_LANES
-        }
-    }
-
-    /// Equal numbers of multiplications and additions, one instruction each; contracted, one instruction
-    /// for both.
-    pub struct Peak {
-        pub contracted: bool,
-        pub by: f32,
-    }
-
-    impl WithSimd for Peak {
-        type Output = f32;
-
-        #[inline(always)]
-        #[expect(clippy::inline_always, reason = "what pulp dispatches must be inlined into it")]
-        fn with_simd<S: Simd>(self, simd: S) -> f32 {
-            let by = simd.splat_f32s(self.by);
-            let (mut a, mut b) = ([by; CHAINS / 2], [by; CHAINS / 2]);
-            if self.contracted {
-                for _ in 0..ROUNDS {
-                    for (a, b) in a.iter_mut().zip(&mut b) {
-                        *a = simd.mul_add_f32s(*a, by, by);
-                        *b = simd.mul_add_f32s(*b, by, by);
-                    }
-                }
-            } else {
-                for _ in 0..ROUNDS {
-                    for (a, b) in a.iter_mut().zip(&mut b) {
-                        *a = simd.mul_f32s(*a, by);
-                        *b = simd.add_f32s(*b, by);
-                    }
-                }
-            }
-            let mut sum = 0.0;
-            for (a, b) in a.into_iter().zip(b) {
-                sum += simd.reduce_sum_f32s(simd.add_f32s(a, b));
-            }
-            sum
-        }
-    }
-}
-
-fn peaks(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("peak");
-    for (name, contracted) in [("separate", false), ("contracted", true)] {
-        let operations = peak::operations(contracted);
-        // `compare/decode.py` divides this by the time.
-        leave(name, &[operations as f64]);
-        group.throughput(Throughput::Elements(operations));
-        group.bench_function(name, |bencher| {
-            bencher.iter(|| {
-                // The factor 1 keeps numbers normal for ever.
-                pulp::Arch::new().dispatch(peak::Peak { contracted, by: black_box(1.0) })
-            });
-        });
-    }
-    group.finish();
-}
-
-criterion_group!(benches, decode, peaks);
+criterion_group!(benches, decode);
 criterion_main!(benches);

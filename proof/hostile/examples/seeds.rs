@@ -1,4 +1,5 @@
-//! Writes the seeds of all corpora: `cargo run -p hostile --example seeds` from the root of the repository.
+//! Writes the seeds of the corpora whose format is Taxel's own: `cargo run -p hostile --example seeds` in the folder
+//! `proof`. Those of CSV files, arrays and scenes are files that were written by hand.
 
 use std::error::Error;
 use std::fs;
@@ -17,7 +18,6 @@ use model_core::blob::Floats;
 use model_core::rbf::Format;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
-use taxel_evaluate::experiment::EMBEDDED;
 use taxel_learn::train::train;
 use taxel_learn::{Options, Origin, fill, pack, relative};
 use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
@@ -27,34 +27,16 @@ use taxel_simulate::{World, synthesise};
 type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
 fn main() -> Outcome {
-    for (index, blob) in blobs()?.iter().enumerate() {
-        write("blob", index, seal::body(blob))?;
-    }
-    for (index, bytes) in packets().iter().enumerate() {
-        write("packet", index, bytes)?;
-    }
-    for (index, bytes) in settings().iter().enumerate() {
-        write("settings", index, bytes)?;
-    }
-    for (index, bytes) in links().iter().enumerate() {
-        write("link", index, bytes)?;
-    }
-    for (index, text) in csv_files().iter().enumerate() {
-        write("csv", index, &[&[(index % 2) as u8], text.as_bytes()].concat())?;
-    }
-    for (index, bytes) in arrays().iter().enumerate() {
-        write("npy", index, bytes)?;
-    }
-    for (index, text) in scenes().iter().enumerate() {
-        write("scene", index, text.as_bytes())?;
+    let blobs: Vec<Vec<u8>> = blobs()?.iter().map(|blob| seal::body(blob).to_vec()).collect();
+    let all = [("blob", blobs), ("packet", packets()), ("settings", settings()), ("link", links())];
+    for (target, seeds) in all {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
+        fs::create_dir_all(&folder)?;
+        for (index, seed) in seeds.iter().enumerate() {
+            fs::write(folder.join(format!("seed-{index:02}")), seed)?;
+        }
     }
     Ok(())
-}
-
-fn write(target: &str, index: usize, bytes: &[u8]) -> Outcome {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
-    fs::create_dir_all(&folder)?;
-    Ok(fs::write(folder.join(format!("seed-{index:02}")), bytes)?)
 }
 
 /// Models of every format and with every section.
@@ -188,79 +170,4 @@ fn links() -> Vec<Vec<u8>> {
         }
     });
     seeds
-}
-
-fn csv_files() -> Vec<String> {
-    [
-        "a,b\n1,2\n3,4\n",
-        "a,b\r\n1,2\r\n3,4\r\n",
-        "a,b\r1,2\r3,4\r",
-        "\n\na,b\n1,2\n",
-        "\r\ra,b\n1,2\n",
-        "\"a\",b\n-1e-3,+2.5E7\n.5,7.\n",
-        "a,b\n,\nNaN,\nnan,-nan\n",
-        "a,b\n 1 ,\t2\n  ,3\n",
-        "a\n1\n2\n",
-        "a,b\n4.9406564584124654e-324,1.7976931348623157e308\n",
-        "a,b\n\"1\",2\n\n3,4\n",
-        "\u{feff}a,b\n1,2\n",
-        "1,2\n3,4\n",
-        "a,b\n123456789012345678901234567890,0.1000000000000000055511151231257827\n",
-        "r1c1_ohm,r1e1_dz_mm\n60.25,0.5\n61.5,\n",
-        "a;b\n1;2\n",
-        "a,b\n\u{a0}1,2\n",
-        "a,a\n1,2\n",
-        "a,b\n1,2,3\n",
-    ]
-    .map(str::to_owned)
-    .to_vec()
-}
-
-/// Arrays with the header that numpy writes.
-fn arrays() -> Vec<Vec<u8>> {
-    let array = |version: u8, descr: &str, order: &str, shape: &str, data: &[u8]| {
-        let text =
-            format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}\n");
-        let length = (text.len() as u32).to_le_bytes();
-        let length = if version == 1 { &length[..2] } else { &length[..] };
-        [&[0], &b"\x93NUMPY"[..], &[version, 0], length, text.as_bytes(), data].concat()
-    };
-    let data: Vec<u8> = (1..=6).flat_map(|number| f64::from(number).to_le_bytes()).collect();
-    let mut seeds = vec![
-        array(1, "<f8", "False", "(3, 2)", &data),
-        array(1, "<f8", "True", "(3, 2)", &data),
-        array(2, ">f4", "False", "(12,)", &data),
-        array(3, "|u1", "False", "(48,)", &data),
-        array(1, "<i8", "False", "(2, 3)", &data),
-        array(1, "<i2", "False", "(2, 12)", &data),
-        array(1, "|b1", "False", "(4,)", &data[..4]),
-        array(1, "<f8", "False", "(9223372036854775807, 2)", &data),
-        array(1, "<f8", "False", "()", &data),
-    ];
-    seeds.push([&[1][..], include_bytes!("archive.npz")].concat());
-    seeds
-}
-
-/// The scenes that are part of the program, without their comments, and some of their fields changed.
-fn scenes() -> Vec<String> {
-    let is_kept = |line: &&str| !line.starts_with('#') && !line.is_empty();
-    let plain = |text: &str| text.lines().filter(is_kept).collect::<Vec<_>>().join("\n");
-    let mut texts: Vec<String> = EMBEDDED.iter().map(|(_, text)| plain(text)).collect();
-    let small = texts[1]
-        .replace("row_wires = 8", "row_wires = 1")
-        .replace("column_wires = 18", "column_wires = 1")
-        .replace("electrodes_per_row_wire = 6", "electrodes_per_row_wire = 1")
-        .replace("electrodes_per_column_wire = 3", "electrodes_per_column_wire = 1");
-    texts.push(small.clone());
-    texts.push(
-        small.replace(
-            "electrodes_per_row_wire = 1",
-            "electrodes_per_row_wire = 6666666666666666662",
-        ),
-    );
-    texts.push(
-        small.replace("[deformation]", "lower_electrodes_mm = [[1.0, 2.0, 0.0]]\n[deformation]"),
-    );
-    texts.push(small.replace("[outputs]", "[drift]\ngain = 0.02\n[outputs]"));
-    texts
 }

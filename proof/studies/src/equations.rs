@@ -232,48 +232,6 @@ mod tests {
     }
 
     #[test]
-    fn electrodes_above_a_plane_of_symmetry_read_alike_on_both_sides_of_it() {
-        // The middle one of three rows lies above the middle one of three lower electrodes, at y = 9 mm.
-        let mut world = World::paper();
-        let sensor = &mut world.sensor;
-        sensor.row_wires = 3;
-        sensor.upper_electrodes_mm =
-            taxel_simulate::sensor::default_upper_electrodes_mm(3, 6, sensor.size_mm);
-        world.read_rows = vec![1];
-        let truth: Vec<f64> = (0..18).map(|i| 0.1 + 0.03 * f64::from((5 * i) % 13)).collect();
-        let mut mirrored = truth.clone();
-        mirrored[4] = -mirrored[4]; // Δy of one electrode alone
-        let readings_ohm = readings(&world, 0, &truth);
-        for (a, b) in readings_ohm.iter().zip(readings(&world, 0, &mirrored)) {
-            assert!((a / b - 1.0).abs() < 1e-14);
-        }
-        let equations = Equations::exact(&world);
-        for near in [&truth, &mirrored] {
-            let start: Vec<f64> = near.iter().map(|mm| mm + 0.01).collect();
-            let found = equations.solve_row(0, &readings_ohm, &start);
-            let off = found.place.iter().zip(near).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(found.converged && off < 1e-6, "{off} mm");
-        }
-        // At rest all derivatives by Δy vanish.
-        assert!(equations.determinant(0, &[0.0; 18]).unwrap().abs() < 1e-100);
-    }
-
-    #[test]
-    fn deformations_of_the_paper_fold_over_others_that_read_alike() {
-        // Row 3 lies 0.375 mm from the middle between two lower electrodes.
-        let world = World { read_rows: vec![2], ..World::paper() };
-        let equations = Equations::exact(&world);
-        let frames = Synthesis::new(&world).ideal().frames(Stream::Test, 200);
-        let rest = equations.determinant(0, &[0.0; 18]).unwrap();
-        let turned = frames
-            .outputs
-            .lines()
-            .filter(|moved| equations.determinant(0, moved).unwrap().signum() != rest.signum());
-        let turned = turned.count();
-        assert!((60..140).contains(&turned), "{turned} of 200");
-    }
-
-    #[test]
     fn noise_ruins_the_exact_solution_and_not_the_damped_one() {
         let world = World { read_rows: vec![3], ..World::press() };
         let frames = Synthesis::new(&world).frames(Stream::Test, 60);

@@ -26,6 +26,3 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     commands::run_to_end(cli.question.name(), || cli.question.answer(&cli.common))
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,5 +1,6 @@
 //! Pictures of the studies, each as a file of its own: light or dark like the viewer.
 
+mod heat;
 mod by_noise;
 mod map;
 mod recursion;

@@ -56,9 +56,6 @@ struct Arguments {
     /// Program of host-sim
     #[arg(long, value_name = "FILE", hide = true)]
     program: Option<PathBuf>,
-    /// Folder of the emulator's images
-    #[arg(long, value_name = "FOLDER", hide = true)]
-    images: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -83,7 +80,7 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
         chosen.iter().for_each(|promise| println!("{:<24}{}", promise.name, promise.text));
         return Ok(true);
     }
-    let tools = Tools { program: arguments.program.clone(), images: arguments.images.clone() };
+    let tools = Tools { program: arguments.program.clone() };
     if arguments.accept {
         let measured = chosen.into_iter().filter(|promise| bounds::is_measured(promise.name));
         accept(arguments, &measured.collect::<Vec<_>>(), &tools)?;

@@ -16,7 +16,6 @@ mod sensor;
 mod flips;
 mod power;
 mod recheck;
-mod emulated;
 mod authenticity;
 mod load;
 
@@ -49,7 +48,6 @@ pub const PROMISES: &[Promise] = &[
     power::DECAY,
     power::WORN,
     recheck::RECHECK,
-    emulated::RAM,
     authenticity::FORGED,
     load::FRAMES,
     load::LINK,

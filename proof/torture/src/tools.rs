@@ -9,20 +9,13 @@ use model_core::AlignedBytes;
 pub struct Tools {
     /// Program of host-sim.
     pub program: Option<PathBuf>,
-    /// Folder of the emulator's images.
-    pub images: Option<PathBuf>,
 }
 
 impl Tools {
     /// The program of host-sim.
     pub fn program(&self) -> Result<&Path, String> {
-        self.program.as_deref().ok_or_else(|| missing("host-sim"))
-    }
-
-    /// The emulator's image of this name.
-    pub fn image(&self, name: &str) -> Result<PathBuf, String> {
-        let images = self.images.as_ref().ok_or_else(|| missing(name))?;
-        Ok(images.join(name))
+        let missing = || "host-sim is not built; run this by `cargo xtask torture`".to_owned();
+        self.program.as_deref().ok_or_else(missing)
     }
 }
 
@@ -31,8 +24,4 @@ pub fn tested_model(name: &str) -> Result<AlignedBytes, String> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata").join(name);
     let blob = std::fs::read(&path).map_err(|cause| format!("{}: {cause}", path.display()))?;
     Ok(AlignedBytes::copy_of(&blob))
-}
-
-fn missing(name: &str) -> String {
-    format!("{name} is not built; run this by `cargo xtask torture`")
 }

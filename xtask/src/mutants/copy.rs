@@ -2,12 +2,13 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::{fs, hash::DefaultHasher, hash::Hasher};
 
 use serde_json::Value;
 
 use super::list::{FOLDER, Fault, splice};
+use crate::copy::{update, write_if_new};
 use crate::process::{Outcome, PROOF, cargo, root, target_dir};
 
 /// What the copy's build made.
@@ -41,11 +42,11 @@ fn source() -> PathBuf {
 ///
 /// # Errors
 /// A fault does not compile.
-pub fn build(faults: &[Fault], crates: &[&str], has_torture: bool) -> Outcome<Copy> {
+pub fn build(faults: &[Fault], crates: &[String], has_torture: bool) -> Outcome<Copy> {
     let (digest, has_all_units) = (make(faults)?, crates.is_empty());
-    let has_torture = has_torture && has_all_units || crates.contains(&TORTURE);
+    let has_torture = has_torture && has_all_units || crates.iter().any(|name| name == TORTURE);
     let mut programs = Vec::new();
-    let packages = crates.iter().filter(|name| **name != TORTURE);
+    let packages = crates.iter().filter(|name| *name != TORTURE);
     let packages: Vec<&str> = packages.flat_map(|name| ["--package", name]).collect();
     let built = if has_all_units || !packages.is_empty() {
         messages(&[&["test", "--no-run"], &packages[..]].concat())?
@@ -82,35 +83,29 @@ pub fn build(faults: &[Fault], crates: &[&str], has_torture: bool) -> Outcome<Co
 
 /// Writes the copy, and returns the digest of all tracked files but pages, and those of this command.
 fn make(faults: &[Fault]) -> Outcome<u64> {
-    let listed = Command::new("git").args(["ls-files", "-z"]).current_dir(root()).output();
-    let listed = listed.map_err(|cause| format!("git: {cause}"))?;
     let spliced = splice(faults)?;
     let crates: BTreeSet<&str> = faults.iter().map(|fault| fault.crate_folder.as_str()).collect();
+    let switch = folder().join("fault-switch");
     let mut digest = DefaultHasher::new();
-    let text = String::from_utf8_lossy(&listed.stdout);
-    for file in text.split('\0').filter(|file| !file.is_empty()) {
-        let Ok(bytes) = fs::read(root().join(file)) else { continue };
+    update(&source(), |file, content| {
         if !file.starts_with(FOLDER)
             && !file.starts_with("xtask")
             && Path::new(file).extension().is_none_or(|it| it != "md")
         {
             digest.write(file.as_bytes());
-            digest.write(&bytes);
+            digest.write(&content);
         }
-        let manifest = file.strip_suffix("/Cargo.toml");
         if let Some(switched) = spliced.get(file) {
-            write_if_new(&source().join(file), switched.as_bytes())?;
-        } else if manifest.is_some_and(|folder| crates.contains(folder)) {
-            let switch = folder().join("fault-switch");
-            let dependency =
-                format!("[dependencies]\nfault-switch = {{ path = '{}' }}", switch.display());
-            let text = String::from_utf8_lossy(&bytes).replacen("[dependencies]", &dependency, 1);
-            write_if_new(&source().join(file), text.as_bytes())?;
-        } else {
-            write_if_new(&source().join(file), &bytes)?;
+            return Ok(switched.clone().into_bytes());
         }
-    }
-    let switch = folder().join("fault-switch");
+        if !file.strip_suffix("/Cargo.toml").is_some_and(|folder| crates.contains(folder)) {
+            return Ok(content);
+        }
+        let dependency =
+            format!("[dependencies]\nfault-switch = {{ path = '{}' }}", switch.display());
+        let text = String::from_utf8_lossy(&content).replacen("[dependencies]", &dependency, 1);
+        Ok(text.into_bytes())
+    })?;
     let manifest = "[package]\nname = \"fault-switch\"\nedition = \"2024\"\n\n[workspace]\n";
     write_if_new(&switch.join("Cargo.toml"), manifest.as_bytes())?;
     let code = root().join(FOLDER).join("fault_switch.rs");
@@ -135,14 +130,4 @@ fn messages(arguments: &[&str]) -> Outcome<Vec<Value>> {
     }
     let text = String::from_utf8_lossy(&output.stdout);
     Ok(text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect())
-}
-
-/// Writes `bytes` unless the file holds them already, so that little is built again.
-fn write_if_new(file: &Path, bytes: &[u8]) -> Outcome {
-    if fs::read(file).is_ok_and(|old| old == bytes) {
-        return Ok(());
-    }
-    let made = file.parent().map_or(Ok(()), fs::create_dir_all);
-    made.and_then(|()| fs::write(file, bytes))
-        .map_err(|cause| format!("{}: {cause}", file.display()))
 }

@@ -23,8 +23,13 @@ pub struct Found {
 }
 
 impl Found {
+    /// Whether no test fails.
+    pub fn is_nothing(&self) -> bool {
+        self.unit.is_empty() && self.torture.is_empty()
+    }
+
     pub fn verdict(&self, fault: &Fault) -> &'static str {
-        match (self.unit.is_empty() && self.torture.is_empty(), &fault.equivalent) {
+        match (self.is_nothing(), &fault.equivalent) {
             (false, None) => "found",
             (false, Some(_)) => "found though equivalent",
             (true, None) if self.is_open => "open",
@@ -52,12 +57,21 @@ fn file(is_second: bool) -> PathBuf {
     root().join(FOLDER).join(if is_second { "score-second.csv" } else { "score.csv" })
 }
 
-/// Reads the accepted score: verdict of each fault.
-pub fn accepted(is_second: bool) -> BTreeMap<String, String> {
+/// The accepted score of a fault.
+pub struct Accepted {
+    pub verdict: String,
+    /// The unit test and the lines of torture that see it.
+    pub tests: Vec<String>,
+}
+
+/// Reads the accepted score of each fault.
+pub fn accepted(is_second: bool) -> BTreeMap<String, Accepted> {
     let text = fs::read_to_string(file(is_second)).unwrap_or_default();
     let fields = |line: &str| {
-        let mut fields = line.split(',');
-        Some((fields.next()?.to_owned(), fields.nth(2)?.to_owned()))
+        let [name, _, _, verdict, unit, torture] =
+            line.split(',').collect::<Vec<_>>().try_into().ok()?;
+        let tests = unit.split("; ").chain(torture.split(' ')).map(str::to_owned).collect();
+        Some((name.to_owned(), Accepted { verdict: verdict.to_owned(), tests }))
     };
     text.lines().skip(1).filter_map(fields).collect()
 }

@@ -3,6 +3,7 @@
 use firmware::link::message::{KeyState, Refusal, SealFault};
 use firmware::seal::{KEY_BYTES, Key};
 
+use super::{Cuts, first_cut};
 use crate::device::Device;
 use crate::flash::{Flash, Supply, Torn};
 use crate::models::blob;
@@ -14,14 +15,14 @@ const KEY: Key = [0x42; KEY_BYTES];
 const OTHER: Key = [0xC7; KEY_BYTES];
 
 /// Cuts the power at one word while a key is set, and at each word of the start and of the next key behind it. No key or
-/// that one must be set, the same at each start. Returns the number of cuts.
+/// that one must be set, the same at each start.
 ///
 /// # Errors
 /// What is wrong, and where.
-pub fn cut_key(seed: u64) -> Result<u64, String> {
+pub fn cut_key(seed: u64) -> Result<Cuts, String> {
     let mut case = Case::new(seed);
-    case.run()?;
-    Ok(case.cuts)
+    let quarter = case.run()?;
+    Ok(Cuts { count: case.cuts, quarter })
 }
 
 /// A device without a key, with a model that has no seal.
@@ -50,14 +51,15 @@ impl Case {
         Self { seed, device, cuts: 0 }
     }
 
-    fn run(&mut self) -> Result<(), String> {
+    /// Makes all cuts; returns the quarter of the work that the first one is in.
+    fn run(&mut self) -> Result<usize, String> {
         let before = self.device.key.clone();
         let whole = self.device.provision(KEY);
         let operations = self.device.supply.borrow().operations;
         if whole.is_err() || self.expect(&[Some(KEY)], "without a cut")? != Some(KEY) {
             return Err(format!("without a cut: {whole:?}"));
         }
-        let first = self.seed / (3 * Torn::COUNT as u64) % operations;
+        let (first, quarter) = first_cut(self.seed, operations);
         self.device.key = before;
         let _ = self.device.cut(first).provision(KEY);
         self.cuts += 1;
@@ -89,7 +91,7 @@ impl Case {
             let found = self.expect(&[found, Some(next)], &place)?;
             self.mend(found, &place)?;
         }
-        Ok(())
+        Ok(quarter)
     }
 
     /// The key that the next host sets: the one that was found; without one, half the hosts set another.

@@ -4,7 +4,7 @@
 use std::fmt::Debug;
 
 use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{Configuration, EstimateReport, Report, Request, Statistics};
+use firmware::link::message::{Configuration, EstimateReport, Report, Request};
 use firmware::store::Slot;
 use model_core::blob::Floats;
 use model_core::{AlignedBytes, Decoder};
@@ -15,7 +15,7 @@ use crate::bench::{Bench, Memory, Running};
 use crate::board::Board;
 use crate::decay::flip_bit;
 use crate::flash::Flash;
-use crate::host::{ask, install, model_crc};
+use crate::host::{ask, install, model_crc, statistics};
 use crate::models::{blob, crc_of};
 use crate::pages::SharedSettings;
 use crate::shape::{COLS, ROWS};
@@ -27,21 +27,35 @@ const COPY_WORDS: usize = 512;
 /// Frames that are compared with the host's.
 const FRAMES: usize = 4;
 
+/// What a device does about flipped bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    CopiedAgain,
+    Noted,
+    OtherSlot,
+    NoModel,
+}
+
 /// Where a bit is flipped: in the copy in RAM, the slot in force, the other slot.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     hits: [bool; 3],
     /// Whether the model is decoded from its slot, without a copy.
     is_in_flash: bool,
+    right: Outcome,
+}
+
+const fn case(hits: [bool; 3], is_in_flash: bool, right: Outcome) -> Case {
+    Case { hits, is_in_flash, right }
 }
 
 const CASES: [Case; 6] = [
-    Case { hits: [true, false, false], is_in_flash: false },
-    Case { hits: [false, true, false], is_in_flash: false },
-    Case { hits: [true, true, false], is_in_flash: false },
-    Case { hits: [true, true, true], is_in_flash: false },
-    Case { hits: [false, true, false], is_in_flash: true },
-    Case { hits: [false, true, true], is_in_flash: true },
+    case([true, false, false], false, Outcome::CopiedAgain),
+    case([false, true, false], false, Outcome::Noted),
+    case([true, true, false], false, Outcome::OtherSlot),
+    case([true, true, true], false, Outcome::NoModel),
+    case([false, true, false], true, Outcome::OtherSlot),
+    case([false, true, true], true, Outcome::NoModel),
 ];
 
 /// Lets bits flip while a device works, and judges what it does about it. Returns whether the model is copied again (0),
@@ -51,10 +65,15 @@ const CASES: [Case; 6] = [
 /// What is wrong, and in which case.
 pub fn flip_model(seed: u64) -> Result<usize, String> {
     let case = CASES[(seed % CASES.len() as u64) as usize];
-    run(case, seed).map_err(|why| format!("{case:?}: {why}"))
+    let outcome = run(case, seed).and_then(|outcome| {
+        expect(outcome, case.right, "what the device does")?;
+        Ok(outcome as usize)
+    });
+    outcome.map_err(|why| format!("{case:?}: {why}"))
 }
 
-fn run(case: Case, seed: u64) -> Result<usize, String> {
+/// Lets the bits flip; returns what the device shows that it did.
+fn run(case: Case, seed: u64) -> Result<Outcome, String> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut below = |end: usize| (random.next_u64() % end as u64) as usize;
     let [old, new] = [1, 2].map(|one| blob(one, 1 + below(60)));
@@ -82,25 +101,26 @@ fn run(case: Case, seed: u64) -> Result<usize, String> {
 
     let is_decoded_from = case.hits[0] || case.is_in_flash;
     expect(end, is_decoded_from.then_some(SessionEnd::Damaged), "within two passes")?;
-    let counts = statistics(&mut session, &board)?;
+    let counts = statistics(&mut session, &board);
     expect(counts.model_damages, u32::from(is_decoded_from), "damages of the model")?;
-    let (outcome, in_force) = match case.hits {
-        [_, false, _] => (0, Some(&new)),
-        _ if !is_decoded_from => (1, Some(&new)),
-        [_, _, false] => (2, Some(&old)),
-        _ => (3, None),
-    };
-    if outcome == 1 {
+    if end.is_none() {
         expect(counts.slot_damages, 1, "damages of the slot")?;
-        judge(&mut session, &board, in_force)?;
+        judge(&mut session, &board, Some(&new))?;
     }
     let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
     expect(turns(&mut session, 2 * pass), None, "afterwards")?;
-    let found = if outcome == 1 { Some(&old) } else { in_force };
-    judge(&mut session, &board, found)?;
-    let counts = statistics(&mut session, &board)?;
-    expect(counts.model_checks > 0 || found.is_none(), true, "whole checks are counted")?;
+    let crc_32 = model_crc(&mut session, &board);
+    let in_force = [&new, &old].into_iter().find(|blob| crc_32 == Some(crc_of(blob)));
+    judge(&mut session, &board, in_force)?;
+    let outcome = match in_force {
+        None => Outcome::NoModel,
+        Some(blob) if blob == &new => Outcome::CopiedAgain,
+        Some(_) if end.is_none() => Outcome::Noted,
+        Some(_) => Outcome::OtherSlot,
+    };
+    let counts = statistics(&mut session, &board);
+    expect(counts.model_checks > 0 || in_force.is_none(), true, "whole checks are counted")?;
     let _ = session;
     let next = install(&mut bench, &mut slots, &mut weights, (&new, 200));
     expect(next.is_ok(), true, "the next upload")?;
@@ -110,14 +130,6 @@ fn run(case: Case, seed: u64) -> Result<usize, String> {
 /// Runs so many turns of the loop, or until the session ends.
 fn turns(session: &mut Running<'_, '_>, count: usize) -> Option<SessionEnd> {
     (0..count).find_map(|_| session.step())
-}
-
-fn statistics(session: &mut Running<'_, '_>, board: &Board) -> Result<Statistics, String> {
-    let read = |report: Report<'_>| match report {
-        Report::Statistics(statistics) => Ok(statistics),
-        other => Err(format!("{other:?}")),
-    };
-    ask(session, board, &Request::Statistics, read).0
 }
 
 /// Whether the device has the model `in_force`, and decodes with it as the host does.

@@ -8,6 +8,7 @@ use firmware::settings::{Keeper, PAGE_BYTES};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::Cuts;
 use crate::flash::{Cells, Flash, Supply, Torn};
 use crate::pages::SharedSettings;
 
@@ -18,14 +19,14 @@ const LATER: u64 = 64;
 const STRIDE: u64 = 16;
 
 /// Cuts the power at one operation while a setting is kept, and at some of the operations behind it. The setting must be
-/// the old or the new one, the same at each start, and the others as they were. Returns the number of cuts.
+/// the old or the new one, the same at each start, and the others as they were.
 ///
 /// # Errors
 /// What is wrong, and where.
-pub fn cut_settings(seed: u64) -> Result<u64, String> {
+pub fn cut_settings(seed: u64) -> Result<Cuts, String> {
     let mut case = Case::new(seed)?;
-    case.run()?;
-    Ok(case.cuts)
+    let quarter = case.run()?;
+    Ok(Cuts { count: case.cuts, quarter })
 }
 
 /// What each setting holds.
@@ -102,7 +103,8 @@ impl Case {
         bytes
     }
 
-    fn run(&mut self) -> Result<(), String> {
+    /// Makes all cuts; returns the quarter of the work that the first one is in.
+    fn run(&mut self) -> Result<usize, String> {
         let setting = self.setting();
         let old = self.old[setting as usize].clone();
         let new = self.content(setting, 200);
@@ -127,7 +129,7 @@ impl Case {
         loop {
             self.restore(&after);
             if !self.keep(setting, &next, Some(second)) {
-                return Ok(());
+                return Ok((4 * first / operations) as usize);
             }
             self.cuts += 1;
             let mut place = format!("{place}, then operation {second}");

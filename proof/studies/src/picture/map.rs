@@ -1,295 +1,84 @@
 //! Picture of the study of centres, spread and samples: a map for each number of samples, noise level and kind of error.
 
+use std::collections::BTreeSet;
+
 use crate::question::map::{Cell, Map, MapStudy};
 
 use host_sim::report::format::{fixed, percent, significant, symbol};
-use host_sim::report::svg::{Anchor, Svg, TEXT_PX, standalone};
 
-/// Size of a cell.
-const CELL: [f64; 2] = [28.0, 13.0];
-/// Space left of all maps, between them, before the column K = N, and above.
-const LEFT: f64 = 104.0;
-const BETWEEN: f64 = 22.0;
-const BEFORE_N: f64 = 5.0;
-const TOP: f64 = 116.0;
-/// Space between two rows of maps.
-const BETWEEN_ROWS: f64 = 18.0;
+use super::heat::{self, Picture, Square};
+
 /// Ratio to the mean's error from which on colours are full.
 const FULL: f64 = 3.0;
 /// Ratios to the mean's error that the key shows.
-const KEY: [f64; 9] = [0.0, 0.25, 0.5, 0.75, 0.9, 1.05, 1.25, 2.0, 3.0];
+const KEY: [f64; 9] = [0.0, 0.25, 0.5, 0.75, 0.9, 1.05, 1.25, 2.0, FULL];
 
-/// Kind of error that a column of maps shows.
-#[derive(Clone, Copy)]
-enum Kind {
-    Training,
-    Test,
-}
-
-impl Kind {
-    const ALL: [Self; 2] = [Self::Training, Self::Test];
-
-    fn heading(self) -> &'static str {
-        match self {
-            Self::Training => "on the samples",
-            Self::Test => "on test frames",
-        }
-    }
-
-    fn of(self, cell: &Cell) -> f64 {
-        match self {
-            Self::Training => cell.training_rmse,
-            Self::Test => cell.test_rmse,
-        }
-    }
-}
-
-/// Colour class and opacity of an error, as a ratio to the mean's.
-fn colour(ratio: f64) -> (&'static str, f64) {
+/// Square of an error, as a ratio to the mean's.
+fn square(ratio: f64, hover: String, is_framed: bool) -> Square {
     // Roots: small differences near 1 are what is looked for.
-    if ratio < 1.0 {
+    let (class, opacity) = if ratio < 1.0 {
         ("above", (1.0 - ratio).sqrt())
     } else {
         ("below", (ratio.min(FULL).ln() / FULL.ln()).sqrt())
-    }
+    };
+    Square { class, opacity, text: String::new(), hover, is_framed }
 }
 
-/// Places of cells in a map, which are the same in all maps.
-struct Grid<'s> {
-    study: &'s MapStudy,
-}
+/// A kind of error: its heading, those of a cell, and that of the mean.
+type Kind = (&'static str, fn(&Cell) -> f64, fn(&Map) -> f64);
 
-impl Grid<'_> {
-    fn size(&self) -> [f64; 2] {
-        let columns = self.study.centres.len() + 1;
-        [columns as f64 * CELL[0] + BEFORE_N, self.study.spreads.len() as f64 * CELL[1]]
-    }
-
-    /// Left edge of the column for so many `centres` of a map, if it has one.
-    fn x(&self, centres: usize, samples: usize) -> Option<f64> {
-        let all = &self.study.centres;
-        if centres == samples {
-            return Some(all.len() as f64 * CELL[0] + BEFORE_N);
-        }
-        all.iter().position(|k| *k == centres).map(|place| place as f64 * CELL[0])
-    }
-
-    /// Top edge of the line for a spread: the widest is at the top.
-    fn y(&self, spread: f64) -> Option<f64> {
-        let spreads = &self.study.spreads;
-        let place = spreads.iter().position(|s| *s == spread)?;
-        Some((spreads.len() - 1 - place) as f64 * CELL[1])
-    }
-}
+const KINDS: [Kind; 2] = [
+    ("on the samples", |cell| cell.training_rmse, |map| map.mean_training_rmse),
+    ("on test frames", |cell| cell.test_rmse, |map| map.mean_rmse),
+];
 
 pub fn svg(study: &MapStudy) -> String {
-    let grid = Grid { study };
-    let [width, height] = grid.size();
-    let mut levels: Vec<f64> = study.maps.iter().map(|map| map.noise_level).collect();
-    levels.dedup();
-    let mut samples: Vec<usize> = study.maps.iter().map(|map| map.samples).collect();
-    samples.sort_unstable();
-    samples.dedup();
-    let columns = (levels.len() * Kind::ALL.len()) as f64;
-    let size = [
-        LEFT + columns * (width + BETWEEN),
-        TOP + samples.len() as f64 * (height + BETWEEN_ROWS) + 66.0,
-    ];
-    let name = symbol(&study.group);
-    let title = format!("Error of {name} by centres K, spread and samples N");
-    let mut svg = Svg::new(size[0], size[1], &title);
-    head(&mut svg, study);
-    for (place, level) in levels.iter().enumerate() {
-        let left = LEFT + (2 * place) as f64 * (width + BETWEEN);
-        let heading = format!("{} noise", percent(*level));
-        svg.text(left, TOP - 32.0, Anchor::Start, "label strong", &heading);
-        for (side, kind) in Kind::ALL.into_iter().enumerate() {
-            let left = left + side as f64 * (width + BETWEEN);
-            svg.text(left, TOP - 12.0, Anchor::Start, "label", kind.heading());
-            for (row, samples) in samples.iter().enumerate() {
-                let top = TOP + row as f64 * (height + BETWEEN_ROWS);
-                let wanted = |map: &&Map| map.noise_level == *level && map.samples == *samples;
-                if let Some(map) = study.maps.iter().find(wanted) {
-                    svg.open(&format!(r#" transform="translate({left} {top})""#));
-                    draw(&mut svg, &grid, map, kind);
-                    svg.close();
-                }
-            }
-            let bottom = TOP + samples.len() as f64 * (height + BETWEEN_ROWS) - BETWEEN_ROWS;
-            centres_axis(&mut svg, &grid, [left, bottom]);
-        }
-    }
-    for (row, samples) in samples.iter().enumerate() {
-        let top = TOP + row as f64 * (height + BETWEEN_ROWS);
-        let middle = top + height / 2.0;
-        svg.text(
-            4.0,
-            middle + TEXT_PX * 0.35,
-            Anchor::Start,
-            "label strong",
-            &format!("N = {samples}"),
-        );
-        for spread in &study.spreads {
-            let Some(y) = grid.y(*spread) else { continue };
-            let shown = [study.spreads.first(), study.spreads.last()].contains(&Some(spread))
-                || *spread == 0.5;
-            if shown {
-                let y = top + y + CELL[1] / 2.0 + TEXT_PX * 0.35;
-                svg.text(LEFT - 6.0, y, Anchor::End, "tick", &fixed(*spread, 1));
-            }
-        }
-    }
-    svg.text(LEFT - 6.0, TOP - 12.0, Anchor::End, "tick", "spread");
-    let sets = study.maps.iter().map(|map| map.training_sets).max().unwrap_or(1);
-    let note = format!(
-        "K = N: every sample is a centre. Few samples: root mean square over up to {sets} training sets."
-    );
-    svg.text(LEFT, size[1] - 8.0, Anchor::Start, "tick", &note);
-    standalone(&svg.finish(), size)
-}
-
-/// Title, key of the colours, and what the marks mean.
-fn head(svg: &mut Svg, study: &MapStudy) {
-    let name = symbol(&study.group);
-    let heading = format!(
-        "RMSE of {name} over that of always predicting the mean (scene {}, row {})",
-        study.subject, study.row_wire
-    );
-    svg.text(4.0, 20.0, Anchor::Start, "label strong", &heading);
-    let (top, step) = (34.0, 46.0);
-    for (place, ratio) in KEY.into_iter().enumerate() {
-        let left = LEFT + place as f64 * step;
-        let (class, opacity) = colour(ratio);
-        svg.rect([left, top], [step, 12.0], class, &format!(r#" fill-opacity="{opacity:.3}""#));
-        let most = if ratio >= FULL { "≥ " } else { "" };
-        let text = format!("{most}{ratio}");
-        svg.text(left + step / 2.0, top + 27.0, Anchor::Middle, "tick", &text);
-    }
-    let left = LEFT + KEY.len() as f64 * step + 28.0;
-    svg.path(&format!("M{left} {}v14", top - 1.0), "contour");
-    svg.text(left + 10.0, top + 11.0, Anchor::Start, "tick", "as good as the mean");
-    svg.rect([left + 160.0, top], [18.0, 12.0], "best", "");
-    svg.text(left + 186.0, top + 11.0, Anchor::Start, "tick", "least test error");
-}
-
-/// Draws one map at the origin.
-fn draw(svg: &mut Svg, grid: &Grid<'_>, map: &Map, kind: Kind) {
-    let mean = match kind {
-        Kind::Training => map.mean_training_rmse,
-        Kind::Test => map.mean_rmse,
+    let heat_map = |map: &Map, (heading, of, of_mean): Kind| {
+        let best = map.best(|_| true);
+        let one = |spread: f64, centres: usize| {
+            let cell = map.cells.iter().find(|it| it.spread == spread && it.centres == centres)?;
+            let ratio = of(cell) / of_mean(map);
+            let hover = format!(
+                "K = {centres}, spread {spread}: {} {}, {} of the mean's",
+                significant(of(cell), 3),
+                study.unit,
+                significant(ratio, 3)
+            );
+            Some(square(ratio, hover, best == Some(cell)))
+        };
+        let line = |spread: &f64| {
+            let below = study.centres.iter().filter(|centres| **centres != map.samples);
+            let mut squares: Vec<_> = below.map(|centres| one(*spread, *centres)).collect();
+            squares.resize(study.centres.len(), None);
+            squares.push(one(*spread, map.samples));
+            (format!("spread {}", fixed(*spread, 1)), squares)
+        };
+        let heading = format!("{} noise, {heading}", percent(map.noise_level));
+        heat::Map { heading, lines: study.spreads.iter().rev().map(line).collect() }
     };
-    let ratio = |cell: &Cell| kind.of(cell) / mean;
-    for cell in &map.cells {
-        let (Some(x), Some(y)) = (grid.x(cell.centres, map.samples), grid.y(cell.spread)) else {
-            continue;
-        };
-        let (class, opacity) = colour(ratio(cell));
-        let hover = format!(
-            "K = {}, spread {}: {} {}, {} of the mean's",
-            cell.centres,
-            cell.spread,
-            significant(kind.of(cell), 3),
-            grid.study.unit,
-            significant(ratio(cell), 3)
-        );
-        svg.open(&format!(r#" fill-opacity="{opacity:.3}""#));
-        svg.hovered_rect([x, y], CELL, class, &hover);
-        svg.close();
-    }
-    let path = contour(grid, map, ratio);
-    if !path.is_empty() {
-        svg.path(&path, "contour");
-    }
-    if let Some(best) = map.best(|_| true)
-        && let (Some(x), Some(y)) = (grid.x(best.centres, map.samples), grid.y(best.spread))
-    {
-        svg.rect([x, y], CELL, "best", "");
-    }
-}
-
-/// Path along the edges between cells below and above a ratio of 1.
-fn contour(grid: &Grid<'_>, map: &Map, ratio: impl Fn(&Cell) -> f64) -> String {
-    use std::fmt::Write as _;
-    let spreads = grid.study.spreads.len();
-    let lines: Vec<&[Cell]> = map.cells.chunks_exact(spreads).collect();
-    let mut path = String::new();
-    let below = |cell: &Cell| ratio(cell) < 1.0;
-    for (column, cells) in lines.iter().enumerate() {
-        for (place, cell) in cells.iter().enumerate() {
-            let (Some(x), Some(y)) = (grid.x(cell.centres, map.samples), grid.y(cell.spread))
-            else {
-                continue;
-            };
-            // Writing to a string cannot fail.
-            if cells.get(place + 1).is_some_and(|wider| below(wider) != below(cell)) {
-                let _ = write!(path, "M{x} {y}h{}", CELL[0]);
-            }
-            // There is a gap before the column K = N.
-            let next = lines.get(column + 1).map(|cells| &cells[place]);
-            let next = next.filter(|more| more.centres < map.samples);
-            if next.is_some_and(|more| below(more) != below(cell)) {
-                let _ = write!(path, "M{} {y}v{}", x + CELL[0], CELL[1]);
-            }
-        }
-    }
-    path
-}
-
-/// Numbers of centres below a column of maps, whose bottom left corner is given.
-fn centres_axis(svg: &mut Svg, grid: &Grid<'_>, [left, bottom]: [f64; 2]) {
-    let study = grid.study;
-    for (place, centres) in study.centres.iter().enumerate() {
-        let x = left + (place as f64 + 0.5) * CELL[0];
-        svg.text(x, bottom + 17.0, Anchor::Middle, "tick", &centres.to_string());
-    }
-    let x = left + (study.centres.len() as f64 + 0.5) * CELL[0] + BEFORE_N;
-    svg.text(x, bottom + 17.0, Anchor::Middle, "tick", "N");
-    let middle = left + grid.size()[0] / 2.0;
-    svg.text(middle, bottom + 38.0, Anchor::Middle, "label", "centres K");
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_contour_runs_between_cells_better_and_worse_than_the_mean() {
-        let cell =
-            |centres, spread, test_rmse| Cell { centres, spread, training_rmse: 0.1, test_rmse };
-        let map = Map {
-            noise_level: 0.01,
-            samples: 30,
-            training_sets: 1,
-            mean_rmse: 1.0,
-            mean_training_rmse: 1.0,
-            cells: vec![
-                cell(4, 0.1, 0.9),
-                cell(4, 0.2, 0.8),
-                cell(8, 0.1, 2.0),
-                cell(8, 0.2, 0.5),
-                cell(30, 0.1, 0.5),
-                cell(30, 0.2, 0.4),
-            ],
-        };
-        let study = MapStudy {
-            subject: "paper".into(),
-            seed: 1,
-            row_wire: 4,
-            group: "dz_mm".into(),
-            unit: "mm".into(),
-            test_frames: 10,
-            initial_covariance: 1e6,
-            centres: vec![4, 8],
-            spreads: vec![0.1, 0.2],
-            maps: vec![map],
-            claims: vec![],
-        };
-        let grid = Grid { study: &study };
-        // Right of the narrow cell with K = 4, and above that with K = 8.
-        let path = contour(&grid, &study.maps[0], |cell| cell.test_rmse);
-        assert_eq!(path, "M28 13v13M28 13h28");
-        let picture = svg(&study);
-        assert!(picture.contains("N = 30") && !picture.contains("NaN"));
-        assert_eq!(picture.matches("class=\"best\"").count(), 3);
-    }
+    let samples: BTreeSet<usize> = study.maps.iter().map(|map| map.samples).collect();
+    let row = |samples: usize| {
+        let maps = study.maps.iter().filter(|map| map.samples == samples);
+        let both = maps.flat_map(|map| KINDS.map(|kind| heat_map(map, kind)));
+        (format!("N = {samples} samples"), both.collect())
+    };
+    let words = |ratio: f64| format!("{}{ratio}", if ratio >= FULL { "≥ " } else { "" });
+    let mut key: Vec<_> =
+        KEY.iter().map(|ratio| (square(*ratio, String::new(), false), words(*ratio))).collect();
+    key.push((square(1.0, String::new(), true), "least test error".into()));
+    let centres = study.centres.iter().map(usize::to_string);
+    let picture = Picture {
+        title: format!(
+            "RMSE of {} over that of always predicting the mean (scene {}, row {})",
+            symbol(&study.group),
+            study.subject,
+            study.row_wire
+        ),
+        key,
+        cell: [28.0, 13.0],
+        columns: centres.chain(["N".to_owned()]).collect(),
+        across: "across: centres K; K = N: every sample is a centre. Few samples: over several training sets",
+        rows: samples.into_iter().map(row).collect(),
+    };
+    picture.svg()
 }

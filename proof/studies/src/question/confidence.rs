@@ -1,12 +1,52 @@
-//! Which frames a model finds novel: those with broken or touching wires, or with two contacts.
+//! How many errors a model's intervals cover, and which frames it finds novel: those with broken or touching wires, or
+//! with two contacts.
 
 use crate::anomaly::{self, Anomaly};
 use serde::Serialize;
 use taxel_data::random::Stream;
+use taxel_evaluate::evaluate::confidence::{Coverage, coverage};
 use taxel_evaluate::experiment::Experiment;
-use taxel_learn::PreparedModel;
+use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 use taxel_simulate::Synthesis;
 use taxel_simulate::synth::BASELINE_FRAMES;
+
+/// What a model's confidence is worth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Confidence {
+    pub subject: String,
+    pub seed: u64,
+    pub model_crc: String,
+    pub frames: usize,
+    pub coverage: Vec<Coverage>,
+    pub detections: Vec<Detection>,
+}
+
+/// Judges the model in `blob` on so many test `frames`, and as many of every anomaly; `None` if it has no confidence.
+pub fn judge(mut scene: Experiment, blob: &ModelBlob, frames: usize) -> Option<Confidence> {
+    let model = blob.prepare(Exponential::default());
+    let (own, level) = (f64::from(model.model().metadata().noise_level), scene.world.noise.level);
+    if (own - level).abs() > 1e-3 * level {
+        eprintln!(
+            "note: the model was trained for noise of {:.2} %, and is judged at the scene's {:.2} %; see --noise",
+            100.0 * own,
+            100.0 * level
+        );
+    }
+    scene.training.relative_inputs = model.model().metadata().relative_inputs;
+    let test = scene.dataset(&Synthesis::new(&scene.world), Stream::Test, frames);
+    let of_inputs = model.clone().of_inputs();
+    let (deviations, _) = of_inputs.assess(&test.inputs.values)?;
+    let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
+    let estimates = of_inputs.decode_lines(&test.inputs.values);
+    Some(Confidence {
+        subject: scene.name.clone(),
+        seed: scene.world.seed,
+        model_crc: format!("{:08x}", model.model().crc()),
+        frames,
+        coverage: coverage(&test.outputs, &estimates, &deviations, ratios_95),
+        detections: detections(&scene, &model, frames),
+    })
+}
 
 /// Share of some frames that a model finds novel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,7 +63,7 @@ const CONDITIONS: [[f64; 2]; 5] = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.4], [0.2, 0.5
 /// Judges which of the scene's frames `model` finds novel: usual ones, and so many `frames` of every anomaly.
 ///
 /// A `model` without a confidence finds none.
-pub fn detections(scene: &Experiment, model: &PreparedModel<'_>, frames: usize) -> Vec<Detection> {
+fn detections(scene: &Experiment, model: &PreparedModel<'_>, frames: usize) -> Vec<Detection> {
     let world = &scene.world;
     let rest =
         Synthesis::new(world).drift(None).untouched().frames(Stream::Anomaly, BASELINE_FRAMES);

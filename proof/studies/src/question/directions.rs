@@ -22,7 +22,6 @@ use taxel_evaluate::metrics::{self, DecoderErrors, LimitSummary};
 
 /// Noise levels of the study, the largest first.
 pub const NOISE_LEVELS: [f64; 5] = [0.1, 0.05, 0.01, 0.005, 0.0];
-pub const FRAMES: usize = 60;
 pub const INVERTED: &str = "inverted";
 /// Name of its inversion that is damped by noise and scene.
 pub const INVERTED_DAMPED: &str = "inverted, damped";

@@ -20,19 +20,8 @@ const SAME_MM: f64 = 1e-3;
 /// Largest error of z in mm that counts as none.
 const NONE_MM: f64 = 1e-6;
 
-/// Frames and searches of the study.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan {
-    pub frames: usize,
-    /// Number of searches for other deformations that read alike, for each row of a frame.
-    pub searches: usize,
-}
-
-impl Default for Plan {
-    fn default() -> Self {
-        Self { frames: 60, searches: 24 }
-    }
-}
+/// Number of searches for other deformations that read alike, for each row of a frame.
+const SEARCHES: usize = 24;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EquationsResult {
@@ -119,14 +108,14 @@ impl EquationsResult {
 /// Solves the equations of the scene's test frames at every level of noise, and judges that beside trained decoders.
 pub fn study(
     experiment: &Experiment,
-    plan: Plan,
+    frames: usize,
     progress: &dyn Progress,
 ) -> Result<EquationsResult> {
-    check(experiment, plan.frames)?;
+    check(experiment, frames)?;
     let (mut levels, mut no_limit, mut without_noise) = (Vec::new(), None, Vec::new());
     let mut training_frames = 0;
     for noise_level in NOISE_LEVELS {
-        let level = NoiseLevel::new(experiment, noise_level, plan.frames, &mut no_limit, progress);
+        let level = NoiseLevel::new(experiment, noise_level, frames, &mut no_limit, progress);
         let (world, readings) = (&level.scene.world, &level.test.inputs.values);
         progress.stage(&format!("equations, noise {noise_level}"), 1);
         let exact = Equations::exact(world);
@@ -138,7 +127,7 @@ pub fn study(
         ];
         progress.step();
         if noise_level == 0.0 {
-            without_noise = by_row_wire(&level, &exact, &solved, plan.searches, progress);
+            without_noise = by_row_wire(&level, &exact, &solved, progress);
         }
         decoders.extend(level.trained(progress)?);
         training_frames = level.scene.training.frames;
@@ -153,12 +142,12 @@ pub fn study(
     Ok(EquationsResult {
         subject: experiment.name.clone(),
         seed: experiment.world.seed,
-        frames: plan.frames,
-        rows: plan.frames * experiment.world.read_rows.len(),
+        frames,
+        rows: frames * experiment.world.read_rows.len(),
         training_frames,
         levels,
         without_noise,
-        searches: plan.searches,
+        searches: SEARCHES,
     })
 }
 
@@ -193,7 +182,6 @@ fn by_row_wire(
     level: &NoiseLevel,
     equations: &Equations<'_>,
     solved: &[Solution],
-    searches: usize,
     progress: &dyn Progress,
 ) -> Vec<RowWire> {
     let world = &level.scene.world;
@@ -210,7 +198,7 @@ fn by_row_wire(
         let mut alike = vec![truth.to_vec()];
         let mut random =
             Random::new(world.seed, Stream::Test, Purpose::Posterior, n as u64, place as u64);
-        let others = (0..searches).map(|_| {
+        let others = (0..SEARCHES).map(|_| {
             let start = ranges.iter().map(|range| random.between(*range));
             equations.solve_row(place, readings, &start.collect::<Vec<_>>())
         });

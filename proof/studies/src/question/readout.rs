@@ -117,11 +117,6 @@ impl ReadoutResult {
     pub fn mean_errors(&self) -> &[Errors] {
         metrics::of_decoder(&self.decoders, mean::NAME)
     }
-
-    /// Result of a circuit at a stage.
-    pub fn line(&self, circuit: Circuit, stage: Stage) -> Option<&Line> {
-        self.lines.iter().find(|line| line.circuit == circuit && line.stage == stage)
-    }
 }
 
 /// Scans `frames` of the scene with every circuit and stage and decodes them with `model`.

@@ -52,6 +52,15 @@ pub enum Form {
     SquareRoot,
 }
 
+impl Form {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Covariance => "covariance form",
+            Self::SquareRoot => "square-root form",
+        }
+    }
+}
+
 /// Forms and precisions, in the order of the tables.
 pub const KINDS: [(Form, &str); 4] = [
     (Form::Covariance, "f32"),

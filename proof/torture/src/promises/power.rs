@@ -2,7 +2,9 @@
 //! model is in force.
 
 use mock_board::Torn;
-use mock_board::sweep::{Job, abort_and_decay, cut_key, cut_model, cut_settings, upload_to_worn};
+use mock_board::sweep::{
+    Cuts, Job, abort_and_decay, cut_key, cut_model, cut_settings, upload_to_worn,
+};
 
 use crate::effort::Effort;
 use crate::found::Found;
@@ -61,10 +63,10 @@ pub const WORN: Promise = Promise {
 const MOST: u64 = 1 << 40;
 
 /// Sweeps over at least so many cases.
-fn sweep(effort: &Effort, least: u64, case: fn(u64) -> Result<u64, String>) -> Found {
+fn sweep(effort: &Effort, least: u64, case: fn(u64) -> Result<Cuts, String>) -> Found {
     let cuts = Tally::new(Torn::ALL.map(Torn::name));
     let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
-        cuts.add(Torn::new(seed) as usize, case(seed)?);
+        cuts.add(Torn::new(seed) as usize, case(seed)?.count);
         Ok(0.0)
     });
     found.cases = cuts.sum();

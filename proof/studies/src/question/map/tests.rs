@@ -52,16 +52,3 @@ fn more_centres_and_less_noise_fit_the_samples_better() {
     let claim = study.claims.last().unwrap();
     assert_eq!((claim.claim, claim.verdict), ("the error grows with noise", Verdict::Holds));
 }
-
-#[test]
-fn plans_that_cannot_be_used_are_refused_by_field() {
-    let field = |plan: Plan| plan.check().unwrap_err().field;
-    let usual = Plan::default;
-    assert_eq!(field(Plan { samples: vec![100, 30], ..usual() }), "samples");
-    assert_eq!(field(Plan { samples: vec![2], ..usual() }), "samples");
-    assert_eq!(field(Plan { centres: vec![], ..usual() }), "centres");
-    assert_eq!(field(Plan { spreads: vec![0.0, 1.0], ..usual() }), "spreads");
-    assert_eq!(field(Plan { noise_levels: vec![2.0], ..usual() }), "noise_levels");
-    assert_eq!(field(Plan { initial_covariance: f64::NAN, ..usual() }), "initial_covariance");
-    assert!(usual().check().is_ok());
-}

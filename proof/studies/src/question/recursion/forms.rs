@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use model_core::rls::{Real, Rls};
+use nalgebra::DMatrix;
 use taxel_learn::train::least_squares::{Design, Factor, predict};
 
 use super::{DIVERGED, Form, KINDS, LOOK_EVERY, MOST_COMPARED, Outcome, SETTLED};
@@ -40,37 +41,13 @@ impl<'t> Regressed<'t> {
         Self { regressors, rows, targets }
     }
 
-    /// Largest over smallest singular value, by one-sided Jacobi rotations of R (Golub & Van Loan, *Matrix
-    /// Computations*, §8.6.3).
+    /// Largest over smallest singular value: those of R.
     pub(super) fn condition(&self) -> f64 {
         let n = self.regressors;
         let design = Rows { regressors: n, rows: &self.rows };
         let root = Factor::new(&design, self.targets, 1, 1e200).root;
-        let mut columns: Vec<Vec<f64>> =
-            (0..n).map(|j| root.iter().skip(j).step_by(n).copied().collect()).collect();
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        for _sweep in 0..30 {
-            for p in 0..n {
-                for q in p + 1..n {
-                    let (head, tail) = columns.split_at_mut(q);
-                    let (a, b) = (&mut head[p], &mut tail[0]);
-                    let (aa, bb, ab) = (product(a, a), product(b, b), product(a, b));
-                    if ab.abs() <= 1e-16 * (aa * bb).sqrt() {
-                        continue;
-                    }
-                    let zeta = (bb - aa) / (2.0 * ab);
-                    let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
-                    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
-                    let sine = cosine * tangent;
-                    for (a, b) in a.iter_mut().zip(b.iter_mut()) {
-                        (*a, *b) = (cosine * *a - sine * *b, sine * *a + cosine * *b);
-                    }
-                }
-            }
-        }
-        let lengths = columns.iter().map(|column| product(column, column).sqrt());
-        let (low, high) = lengths.fold((f64::INFINITY, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
-        high / low
+        let values = DMatrix::from_row_slice(n, n, &root).singular_values();
+        values.max() / values.min()
     }
 
     /// Outcomes of all forms and precisions.

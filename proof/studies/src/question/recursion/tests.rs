@@ -1,8 +1,5 @@
 use super::*;
 use taxel_data::progress::Silent;
-use taxel_simulate::World;
-use taxel_simulate::motion::Press;
-use taxel_simulate::outputs::{ContactOutput, Outputs};
 
 fn study() -> Study {
     let mut experiment = Experiment::load("paper").unwrap();
@@ -32,26 +29,4 @@ fn the_covariance_form_diverges_where_the_square_root_form_does_not() {
     let conditions: Vec<f64> = study.widths.iter().map(|it| it.condition).collect();
     // At 0.1, some Gaussians are hardly ever excited.
     assert!(conditions[1..].is_sorted() && conditions[6] > 1e3 * conditions[1], "{conditions:?}");
-}
-
-#[test]
-fn a_scene_with_one_output_is_studied() {
-    let mut experiment = Experiment::load("press").unwrap();
-    experiment.world.read_rows = vec![3];
-    experiment.world.outputs = Outputs::Contact(vec![ContactOutput::Depth]);
-    let study = compute(&experiment, &Plan { centres: 1, updates: 40 }, &Silent).unwrap();
-    assert_eq!((study.row_wire, study.output.as_str()), (4, "contact_depth_mm"));
-}
-
-#[test]
-fn an_output_that_does_not_move_is_refused_by_name() {
-    let mut experiment = Experiment::load("press").unwrap();
-    let still =
-        Press { dent_radius_mm: [2.0, 5.0], dent_depth_mm: [0.0; 2], shear_ratio: [0.0; 2] };
-    experiment.world = World { read_rows: vec![3], ..World::of_motion(still) };
-    let refused = compute(&experiment, &Plan { centres: 1, updates: 40 }, &Silent).unwrap_err();
-    assert!(
-        refused.to_string().starts_with("output = r4e3_dz_mm: it does not move, or"),
-        "{refused}"
-    );
 }

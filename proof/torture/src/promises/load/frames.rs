@@ -3,14 +3,10 @@
 use std::cell::RefCell;
 
 use firmware::app::Session;
-use firmware::link::message::{
-    ConfidenceSent, Configuration, EstimateReport, Report, Request, Statistics,
-};
-use firmware::link::packet;
-use firmware::link::receive::{Received, Receiver};
+use firmware::link::message::{ConfidenceSent, Configuration, EstimateReport, Report, Request};
 use mock_board::{
     Bench, Board, Flash, Memory, Running, SharedSettings, ask, blob, blob_of_components,
-    blob_with_confidence, frame_at_rest, quiet,
+    blob_with_confidence, find_report, frame_at_rest, quiet, statistics,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -169,23 +165,9 @@ fn next_frame(session: &mut Running<'_, '_>, board: &Board, period_us: u32) -> u
 
 /// Number and time of the estimate among these bytes.
 fn estimate(bytes: &[u8]) -> Result<(u32, u64), String> {
-    let mut receiver = Receiver::new([0; 1024]);
-    for byte in bytes {
-        let Some(Received::Frame(bytes)) = receiver.push(*byte) else { continue };
-        if let Ok(packet) = packet::decode::<Report<'_>>(bytes)
-            && let Report::Estimate(EstimateReport { frame, start_us, .. }) = packet.body
-        {
-            return Ok((frame, start_us));
-        }
-    }
-    Err(format!("no estimate in {} bytes", bytes.len()))
-}
-
-/// The device's counters.
-pub fn statistics(session: &mut Running<'_, '_>, board: &Board) -> Statistics {
-    ask(session, board, &Request::Statistics, |report| match report {
-        Report::Statistics(statistics) => statistics,
-        other => panic!("{other:?}"),
-    })
-    .0
+    let found = find_report(bytes, |_, report| match report {
+        Report::Estimate(EstimateReport { frame, start_us, .. }) => Some((frame, start_us)),
+        _ => None,
+    });
+    found.ok_or_else(|| format!("no estimate in {} bytes", bytes.len()))
 }

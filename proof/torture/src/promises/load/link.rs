@@ -2,16 +2,13 @@
 
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, Report, Request};
-use firmware::link::packet;
-use firmware::link::receive::{Received, Receiver};
 use mock_board::{
-    Bench, Flash, Memory, SharedSettings, blob, blob_with_confidence, configure, quiet,
-    request_bytes, settle,
+    Bench, Flash, Memory, SharedSettings, blob, blob_with_confidence, configure, find_report,
+    quiet, request_bytes, settle, statistics,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::frames::statistics;
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
@@ -100,23 +97,17 @@ fn run(seed: u64) -> Result<[u64; 3], String> {
 
 /// Number of whole reports. Each is of a later frame than the one of its kind before it.
 fn arrived(bytes: &[u8]) -> Result<u64, String> {
-    let mut receiver = Receiver::new([0; 1024]);
-    let mut last = [0; 3];
-    let mut whole = 0;
-    for byte in bytes {
-        let Some(Received::Frame(bytes)) = receiver.push(*byte) else { continue };
-        let Ok(packet) = packet::decode::<Report<'_>>(bytes) else { continue };
+    let (mut last, mut whole) = ([0; 3], 0);
+    let late = find_report(bytes, |_, report| {
         whole += 1;
-        let (kind, frame) = match packet.body {
+        let (kind, frame) = match report {
             Report::Readings { frame, .. } => (0, frame),
             Report::Health(health) => (1, health.frame),
             Report::Estimate(estimate) => (2, estimate.frame),
-            _ => continue,
+            _ => return None,
         };
-        if frame <= last[kind] {
-            return Err(format!("frame {frame} arrives after frame {}", last[kind]));
-        }
-        last[kind] = frame;
-    }
-    Ok(whole)
+        let before = std::mem::replace(&mut last[kind], frame);
+        (frame <= before).then(|| format!("frame {frame} arrives after frame {before}"))
+    });
+    late.map_or(Ok(whole), Err)
 }
