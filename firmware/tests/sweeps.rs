@@ -66,3 +66,11 @@ fn flipped_bits_of_the_model_in_force_are_found_and_mended() {
 fn whatever_is_changed_in_seal_or_blob_it_is_refused() {
     sweep(9 * 64, forge);
 }
+
+/// An erase that was cut may leave bits that only look erased.
+#[test]
+fn a_key_outlasts_what_an_erase_that_was_cut_has_left() {
+    for seed in [1085, 1643, 8627] {
+        cut_key(seed).unwrap();
+    }
+}

@@ -99,10 +99,8 @@ impl DeviceKey {
     /// # Errors
     /// [`FlashError`] if the flash could not be written. [`DeviceKey::find`] tells whether the key is set.
     pub fn set<S: Slot>(area: &mut S, key: &Key) -> Result<(), FlashError> {
-        let free = places(area.bytes()).iter().filter(|place| is_free(place)).count();
-        if free < COPIES {
-            area.erase()?; // it holds something else
-        }
+        // Even an area that looks erased: power may have gone amid the erase, and left bits that change by themselves.
+        area.erase()?;
         complete(area, key).map(|_| ())
     }
 }
