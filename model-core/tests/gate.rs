@@ -30,15 +30,8 @@ fn with_decoder(check: impl FnOnce(&TestDecoder<'_>)) {
     let network = Network::try_new(shape, parameters).unwrap().into();
     let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
     let metadata = Metadata::unnamed(shape);
-    let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks: &[network],
-        row_network: &[0; ROWS],
-        metadata,
-    };
+    let networks = &[network];
+    let parts = ModelParts::new(networks, &[0; ROWS], metadata);
     let mut buffer = Aligned([0; 512]);
     check(&TestDecoder::load(encode(&parts, &mut buffer.0).unwrap()).unwrap());
 }

@@ -38,6 +38,14 @@ pub struct ModelParts<'a> {
     pub metadata: Metadata<'a>,
 }
 
+impl<'a> ModelParts<'a> {
+    /// Networks that decode rows from their readings, and nothing else. Each row has an index into `networks`.
+    pub fn new(networks: &'a [Network<'a>], row_network: &'a [u8], metadata: Metadata<'a>) -> Self {
+        let (projection, expansion, confidence, fill) = (None, None, None, None);
+        Self { projection, expansion, confidence, fill, networks, row_network, metadata }
+    }
+}
+
 /// Bytes that a buffer needs at most to hold the blob of `parts`.
 pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     // Fixed fields, and the longest varint of every field that is one.
