@@ -183,7 +183,7 @@ impl<'d> Judge<'d> {
         options: &Options,
     ) -> Result<Vec<Vec<f64>>> {
         let (training, test) = split(self.dataset, self.fold_of, fold);
-        let start = Layers::start(&training, options)?;
+        let mut layers = Layers::start(&training, options)?;
         let squares = |networks: &Vec<FittedNetwork>| -> Vec<f64> {
             let networks = networks.iter().enumerate();
             let of_row = |(row, network): (usize, &FittedNetwork)| {
@@ -196,10 +196,9 @@ impl<'d> Judge<'d> {
         };
         let mut all = Vec::new();
         for spread in spreads {
-            let mut layers = start.clone();
             layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
             let Some(settings) = self.refinement else {
-                let models = train::fit_each(&training, &layers, options, penalties, &Silent)?;
+                let models = train::fit_each(&layers, options, penalties, &Silent)?;
                 all.extend(models.iter().map(squares));
                 continue;
             };
@@ -211,7 +210,7 @@ impl<'d> Judge<'d> {
                 let layers =
                     refine::refine(&training, &layers, &options, settings, examples, &Silent)?;
                 let options = settings.options(&options);
-                all.push(squares(&train::fit(&training, layers, &options, &Silent)?.networks));
+                all.push(squares(&train::fit(&layers, &options, &Silent)?.networks));
             }
         }
         Ok(all)

@@ -199,4 +199,4 @@ pub fn fit(
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+mod tests;

@@ -74,15 +74,6 @@ pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
     about_means(&parts, &means)
 }
 
-/// Number of features that the readings of `dataset` are projected to, unless there are fewer products of outputs.
-pub(super) fn features_of(dataset: &Dataset, features: Option<usize>) -> usize {
-    let usual = match dataset.rows {
-        1 => USUAL_FEATURES,
-        rows => dataset.inputs.names.len() / rows,
-    };
-    features.unwrap_or(usual)
-}
-
 /// Parameters of the projection with these `parts` (`readings × features`), whose features are 0 at the `means`
 /// of the readings.
 ///
@@ -103,6 +94,28 @@ pub(super) fn about_means(parts: &[f64], means: &[f64]) -> Result<Vec<f32>> {
         Ok(parameters)
     } else {
         Err(Error::failed("the projection of these readings is beyond f32"))
+    }
+}
+
+/// Projection of `dataset`'s readings with the given `parameters`.
+///
+/// # Panics
+/// If `parameters` are not as many as [`fit`] makes for this data set.
+pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
+    let readings = dataset.inputs.names.len();
+    Projection::new(readings, parameters.len() / (readings + 1), parameters)
+        .expect("a projection of these readings")
+}
+
+/// What networks are given of the frames of `dataset`: these themselves, or what a projection of these `parameters`
+/// [makes](apply) of them.
+///
+/// # Panics
+/// If the projection is one of other readings.
+pub fn seen<'d>(parameters: Option<&[f32]>, dataset: &'d Dataset) -> Cow<'d, Dataset> {
+    match parameters {
+        Some(parameters) => Cow::Owned(apply(view(parameters, dataset), dataset)),
+        None => Cow::Borrowed(dataset),
     }
 }
 

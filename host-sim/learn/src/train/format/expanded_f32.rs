@@ -8,7 +8,8 @@ use taxel_data::dataset::RowTable;
 use taxel_data::table::Table;
 
 use super::super::least_squares::{Design, Factor, Regressors};
-use super::super::{CentredScale, Options, Samples};
+use super::super::samples::CentredScale;
+use super::super::{Options, Samples};
 use super::{FittedNetwork, Held, Targets, Weights};
 use crate::error::Result;
 use crate::infer::{Exponential, infer};

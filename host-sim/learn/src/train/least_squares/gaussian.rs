@@ -1,7 +1,5 @@
 //! Regressors of the network: Gaussian activations, affine tail, bias.
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use std::borrow::Cow;
 use std::ops::Range;
 

@@ -6,7 +6,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 
 /// Oracle by batch: ridge regression with penalty 1/δ through nalgebra's QR decomposition of all samples
 /// at once.
-pub(in super::super) fn fit_batch(
+fn fit_batch(
     regressors: &Regressors<'_>,
     scaled: &[f64],
     outputs: &Table,
