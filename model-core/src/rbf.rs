@@ -200,18 +200,8 @@ impl<'a> Network<'a> {
         Ok(each!(self, inner => inner.scale(reading, scaled)))
     }
 
-    /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of [`infer`](Self::infer).
-    /// `scaled` is overwritten.
-    ///
-    /// # Errors
-    /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
-    #[inline(always)]
-    pub fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) -> Result<(), NetworkError> {
-        self.infer_scaled_with::<Polynomial>(scaled, output)
-    }
-
-    /// Infers as [`infer_scaled`](Self::infer_scaled) does, with the [exponential](crate::exp) `E` for
-    /// [`Format::F32Direct`].
+    /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of
+    /// [`infer_with`](Self::infer_with). `scaled` is overwritten.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.

@@ -155,10 +155,10 @@ fn inference_from_scaled_inputs_is_the_rest_of_inference_bit_for_bit() {
     let reading = [50.0, 52.5, 55.0, 57.5, 60.0];
     let (mut scaled, mut output) = ([0.0; 5], [0.0; 2]);
     network.scale(&reading, &mut scaled).unwrap();
-    network.infer_scaled(&mut scaled, &mut output).unwrap();
+    network.infer_scaled_with::<Polynomial>(&mut scaled, &mut output).unwrap();
     assert_eq!(output, infer::<Polynomial>(&network, &reading));
     let error = NetworkError::Length { what: "scaled", expected: 5, found: 4 };
-    assert_eq!(network.infer_scaled(&mut [0.0; 4], &mut output), Err(error));
+    assert_eq!(network.infer_scaled_with::<Polynomial>(&mut [0.0; 4], &mut output), Err(error));
 }
 
 proptest! {
