@@ -1,6 +1,5 @@
 //! Selection of K, spread and ridge penalty by k-fold cross-validation.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
@@ -9,6 +8,7 @@ use taxel_data::progress::{Progress, Silent};
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
 use crate::infer::{Exponential, infer};
+use crate::parallel;
 use crate::train::{
     self, Examples, FittedNetwork, Layers, Options, Refinement,
     refine::{self, LEAST_FOLDS},
@@ -146,15 +146,14 @@ impl<'d> Judge<'d> {
         let of_k = |k: &usize| (0..self.folds).map(|fold| (*k, fold)).collect::<Vec<_>>();
         let tasks: Vec<(usize, usize)> = centres.iter().flat_map(of_k).collect();
         progress.stage("cross-validate", tasks.len());
-        let squares: Vec<Vec<Vec<f64>>> = tasks
-            .into_par_iter()
-            .map(|(centres, fold)| {
-                let options = Options { centres, ..*self.options };
-                let squares = self.held_out_squares(fold, spreads, penalties, &options);
-                progress.step();
-                squares
-            })
-            .collect::<Result<_>>()?;
+        let squares = parallel::map(tasks.len(), &|task| {
+            let (centres, fold) = tasks[task];
+            let options = Options { centres, ..*self.options };
+            let squares = self.held_out_squares(fold, spreads, penalties, &options);
+            progress.step();
+            squares
+        });
+        let squares: Vec<Vec<Vec<f64>>> = squares.into_iter().collect::<Result<_>>()?;
         let deviations = self.dataset.outputs.deviations();
         let mut scored = Vec::new();
         for (k, of_folds) in centres.iter().zip(squares.chunks_exact(self.folds)) {
@@ -219,10 +218,9 @@ impl<'d> Judge<'d> {
     /// Baselines on the same folds.
     fn baselines(&self) -> Vec<BaselineScore> {
         let score = |baseline: &Baseline| {
-            let squares: Vec<Vec<f64>> = (0..self.folds)
-                .into_par_iter()
-                .map(|fold| baseline_squares(baseline, self.dataset, self.fold_of, fold))
-                .collect();
+            let squares = parallel::map(self.folds, &|fold| {
+                baseline_squares(baseline, self.dataset, self.fold_of, fold)
+            });
             let rmse =
                 |output: usize| self.root_mean(squares.iter().map(|fold| fold[output]).sum());
             let outputs = self.dataset.outputs.names.len();

@@ -5,13 +5,13 @@
 //! once, to the numbers of its format, as a [`FittedNetwork`].
 
 use model_core::rbf::Format;
-use rayon::prelude::*;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
 
 use crate::error::Result;
+use crate::parallel;
 
 pub mod resolution;
 mod solver;
@@ -291,14 +291,14 @@ pub(crate) fn fit_each(
 ) -> Result<Vec<Vec<FittedNetwork>>> {
     // One list of networks a row-wire, one network a penalty.
     let fit_rows = |options: &Options, penalties: &[Option<f64>]| {
-        let rows = layers.hidden.par_iter().enumerate();
-        let fitted = rows.map(|(row, layer)| {
+        let fitted = parallel::map(layers.hidden.len(), &|row| {
+            let layer = &layers.hidden[row];
             let table = layers.seen.row_table(row);
             let fitted = Samples::new(&table).fit_each(layer, options, penalties);
             progress.step();
             fitted
         });
-        fitted.collect::<Result<Vec<Vec<FittedNetwork>>>>()
+        fitted.into_iter().collect::<Result<Vec<Vec<FittedNetwork>>>>()
     };
     progress.stage("fit weights", layers.hidden.len());
     let mut rows: Vec<_> = fit_rows(options, penalties)?.into_iter().map(Vec::into_iter).collect();

@@ -2,12 +2,12 @@
 
 use std::borrow::Cow;
 
-use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 
 use super::hidden_layer::HiddenLayer;
 use super::{Options, Samples, memory, projection};
 use crate::error::Result;
+use crate::parallel;
 
 /// All that stands before the output weights, and what it makes of the frames that it was found on.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +43,7 @@ impl<'d> Layers<'d> {
             let samples = Samples::new(&table);
             samples.layer(samples.centres(options, row), options)
         };
-        let hidden = (0..seen.rows).into_par_iter().map(of_row).collect();
+        let hidden = parallel::map(seen.rows, &of_row);
         Self { projection, seen, hidden }
     }
 }

@@ -101,7 +101,7 @@ fn fit(
     let covariance = options.initial_covariance(frames.count.unwrap_or(first.frames()));
     let parameters = layers.projection.as_deref();
     let test = frames.test.map(|test| projection::seen(parameters, test));
-    let rows = layers.hidden.par_iter().enumerate().map(|(row, layer)| {
+    let rows = layers.hidden.iter().enumerate().map(|(row, layer)| {
         let test = test.as_ref().map(|test| test.row_table(row));
         Row::new(&layers.seen.row_table(row), test, layer, options, format, covariance)
     });
