@@ -45,7 +45,6 @@ impl Form {
 impl<'a> Block<'a> {
     /// Makes a block of these counts. A batch of the format's routine has `batch` centres.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "where counts are known, little is left of it")]
     pub fn new(counts: [usize; 3], affine: bool, words: &'a [u32], batch: usize) -> Self {
         let [inputs, centres, outputs] = counts;
         let sizes = if inputs != INPUTS || outputs > OUTPUTS {

@@ -65,8 +65,8 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 /// # )
 /// # .unwrap();
 /// # let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
-/// # let metadata = Metadata::unnamed(shape);
-/// # let parts = ModelParts { projection: None, expansion: None, confidence: None, fill: None, networks: &[network.into()], row_network: &[0], metadata };
+/// # let (metadata, networks) = (Metadata::unnamed(shape), [network.into()]);
+/// # let parts = ModelParts::new(&networks, &[0], metadata);
 /// # let mut buffer = Aligned([0; 512]);
 /// # let blob: &[u8] = encode(&parts, &mut buffer.0).unwrap();
 /// // `blob` holds a model of one row with two readings (Ω) and one output (mm), called `y`.
@@ -266,11 +266,7 @@ fn assess(
 /// Neither generic nor inlined on a device: it is thus compiled with this crate, for speed, while the rest of an
 /// image is compiled for size.
 #[cfg_attr(cortex_m4f, inline(never))]
-#[cfg_attr(
-    not(cortex_m4f),
-    inline(always),
-    expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
-)]
+#[cfg_attr(not(cortex_m4f), inline(always))]
 fn decode(
     model: &Model<'_>,
     networks: &[RowNetwork<'_>],
@@ -340,11 +336,7 @@ impl Rows<'_, '_> {
     /// inputs, and for readings relative to the baseline if the networks take them (`RELATIVE`). Returns whether an
     /// input was clamped.
     #[cfg_attr(cortex_m4f, inline(never))]
-    #[cfg_attr(
-        not(cortex_m4f),
-        inline(always),
-        expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
-    )]
+    #[cfg_attr(not(cortex_m4f), inline(always))]
     fn decode<const RELATIVE: bool>(
         &self,
         frame: Frame<'_>,
@@ -488,7 +480,6 @@ impl Array<'_, '_> {
 /// Infers the outputs of a row, or of all rows at once, and writes their `status`; outputs are NaN if they could not be
 /// decoded. Returns whether they were, and an input was clamped.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "so that the compiler knows lengths and the exponential")]
 fn decode_inputs(
     network: &RowNetwork<'_>,
     exp: fn(f32) -> f32,
@@ -510,11 +501,7 @@ fn decode_inputs(
 
 /// Infers the outputs of a network in `f32-direct`, which has no assembly routine, as [`decode_inputs`] does.
 #[cfg_attr(cortex_m4f, inline(never))]
-#[cfg_attr(
-    not(cortex_m4f),
-    inline(always),
-    expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
-)]
+#[cfg_attr(not(cortex_m4f), inline(always))]
 fn decode_direct(
     section: &NetworkSection<'_>,
     exp: fn(f32) -> f32,

@@ -142,7 +142,6 @@ impl<'a> Network<'a> {
     /// # Ok::<(), model_core::rbf::NetworkError>(())
     /// ```
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     pub fn infer(
         &self,
         reading: &[f32],
@@ -158,7 +157,6 @@ impl<'a> Network<'a> {
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     pub fn infer_with<E: ExpKernel>(
         &self,
         reading: &[f32],
@@ -202,24 +200,12 @@ impl<'a> Network<'a> {
         Ok(each!(self, inner => inner.scale(reading, scaled)))
     }
 
-    /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of [`infer`](Self::infer).
-    /// `scaled` is overwritten.
+    /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of
+    /// [`infer_with`](Self::infer_with). `scaled` is overwritten.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
-    pub fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) -> Result<(), NetworkError> {
-        self.infer_scaled_with::<Polynomial>(scaled, output)
-    }
-
-    /// Infers as [`infer_scaled`](Self::infer_scaled) does, with the [exponential](crate::exp) `E` for
-    /// [`Format::F32Direct`].
-    ///
-    /// # Errors
-    /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     pub fn infer_scaled_with<E: ExpKernel>(
         &self,
         scaled: &mut [f32],
@@ -235,7 +221,6 @@ impl<'a> Network<'a> {
     }
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     fn check_buffers(&self, scaled: &[f32], output: &[f32]) -> Result<(), NetworkError> {
         let shape = self.shape();
         check_length("scaled", scaled, shape.inputs)?;

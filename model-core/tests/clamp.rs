@@ -81,16 +81,7 @@ fn blob(format: Format, (from, by): &Scaling, relative_inputs: bool) -> AlignedB
     let shape = ModelShape { rows: ROWS, inputs: INPUTS, outputs: 1 };
     let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
     let networks = &[network];
-    encode_to_vec(&ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks,
-        row_network: &[0; ROWS],
-        metadata,
-    })
-    .unwrap()
+    encode_to_vec(&ModelParts::new(networks, &[0; ROWS], metadata)).unwrap()
 }
 
 /// What `decoder` says of a frame.

@@ -62,16 +62,8 @@ fn blob(seed: usize, rows: usize) -> AlignedBytes {
     let shape = ModelShape { rows, inputs: COLS, outputs: OUTPUTS };
     let metadata = Metadata { name: "hand-made", ..Metadata::unnamed(shape) };
     let row_network: Vec<u8> = (0..rows).map(|row| (row % 2) as u8).collect();
-    let parts = ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks: &[even.network(), odd.network()],
-        row_network: &row_network,
-        metadata,
-    };
-    encode_to_vec(&parts).unwrap()
+    let networks = &[even.network(), odd.network()];
+    encode_to_vec(&ModelParts::new(networks, &row_network, metadata)).unwrap()
 }
 
 fn frame() -> Vec<f32> {
@@ -198,16 +190,8 @@ fn each_row_is_divided_by_its_own_baseline() {
     let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
     let blob = |relative_inputs: bool| {
         let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
-        let parts = ModelParts {
-            projection: None,
-            expansion: None,
-            confidence: None,
-            fill: None,
-            networks: &[network.network()],
-            row_network: &[0; ROWS],
-            metadata,
-        };
-        encode_to_vec(&parts).unwrap()
+        let networks = &[network.network()];
+        encode_to_vec(&ModelParts::new(networks, &[0; ROWS], metadata)).unwrap()
     };
     let [plain, relative] = [false, true].map(blob);
     let [plain, relative] = [&plain, &relative].map(|blob| PaperDecoder::load(blob).unwrap());

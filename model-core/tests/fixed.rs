@@ -46,16 +46,8 @@ fn network(numbers: &mut Numbers) -> Small {
 fn different(fixed: &Small, parameters: Parameters<'_>, numbers: &mut Numbers) -> usize {
     let network = Network::try_new(SHAPE, parameters).unwrap();
     let shape = ModelShape { rows: 1, inputs: 7, outputs: 3 };
-    let blob = encode_to_vec(&ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks: &[network.into()],
-        row_network: &[0],
-        metadata: Metadata::unnamed(shape),
-    })
-    .unwrap();
+    let blob =
+        encode_to_vec(&ModelParts::new(&[network.into()], &[0], Metadata::unnamed(shape))).unwrap();
     let decoder = Decoder::<1>::load(&blob).unwrap();
     let odd =
         [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, -0.0, 1e-45];

@@ -11,3 +11,4 @@ mod fill;
 mod fixed;
 mod gate;
 mod projection;
+mod sections;

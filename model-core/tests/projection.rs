@@ -1,32 +1,13 @@
 //! One network for the whole array, behind a projection: its blob, and how a decoder decodes with it.
 
+use crate::common::{NEAR_CENTRE, PROJECTION, network};
 use model_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
-use model_core::checksum::CRC_32;
 use model_core::gate::Rest;
 use model_core::projection::Projection;
-use model_core::rbf::direct::{self, Parameters};
-use model_core::rbf::{Network, Shape};
+use model_core::rbf::Network;
 use model_core::{Aligned, Decoder, Estimate, Frame, Gate, OwnedEstimate, RowStatus};
-
-/// A projection block: the first feature is the mean of the four readings, the second the difference of the rows.
-const BLOCK: [f32; 10] = [0.0, 10.0, 0.25, 0.25, 0.25, 0.25, 0.25, -0.25, 0.25, -0.25];
-/// A frame at the network's centre in the first feature, and a quarter of the span from it in the second.
-const NEAR_CENTRE: [f32; 4] = [48.0, 50.0, 60.0, 58.0];
-
-fn network(outputs: usize) -> Network<'static> {
-    let parameters = Parameters {
-        input_minimum: &[50.0, 5.0],
-        input_per_span: &[0.125, 0.1],
-        centres: &[0.5, 0.25],
-        decay: &[2.0],
-        output_weights: &[1.5, 3.0, 4.5][..outputs],
-        bias: &[-0.5, -1.0, 0.0][..outputs],
-        affine: &[],
-    };
-    direct::Network::try_new(Shape { inputs: 2, centres: 1, outputs }, parameters).unwrap().into()
-}
 
 fn encoded<'b>(
     block: &[f32],
@@ -36,21 +17,13 @@ fn encoded<'b>(
 ) -> Result<&'b [u8], EncodeError> {
     let projection = Projection::new(4, 2, block).ok();
     let metadata = Metadata::unnamed(ModelShape { rows: 2, inputs: 2, outputs: 1 });
-    let parts = ModelParts {
-        projection,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks,
-        row_network,
-        metadata,
-    };
+    let parts = ModelParts { projection, ..ModelParts::new(networks, row_network, metadata) };
     assert!(encoded_length_bound(&parts) <= buffer.len());
     encode(&parts, buffer)
 }
 
 fn array(buffer: &mut [u8]) -> &[u8] {
-    encoded(&BLOCK, &[network(2)], &[0, 0], buffer).unwrap()
+    encoded(&PROJECTION, &[network(&[1.5, 3.0])], &[0, 0], buffer).unwrap()
 }
 
 #[test]
@@ -105,8 +78,8 @@ fn one_missing_reading_leaves_no_row_to_decode() {
 #[test]
 fn features_that_overflow_are_told_from_missing_readings() {
     let mut buffer = Aligned([0; 1024]);
-    let block = BLOCK.map(|part| 2.0 * part);
-    let blob = encoded(&block, &[network(2)], &[0, 0], &mut buffer.0).unwrap();
+    let block = PROJECTION.map(|part| 2.0 * part);
+    let blob = encoded(&block, &[network(&[1.5, 3.0])], &[0, 0], &mut buffer.0).unwrap();
     let decoder = Decoder::<2>::load(blob).unwrap();
     let frame = [f32::MAX, f32::MAX, -f32::MAX, -f32::MAX];
     let estimate = decoder.decode(&frame[..]).unwrap();
@@ -137,19 +110,11 @@ fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
 }
 
 /// A model of one row: four readings, two features, three outputs.
-fn of_one_row(buffer: &mut [u8]) -> &[u8] {
-    let projection = Projection::new(4, 2, &BLOCK).ok();
+pub fn of_one_row(buffer: &mut [u8]) -> &[u8] {
+    let projection = Projection::new(4, 2, &PROJECTION).ok();
     let metadata = Metadata::unnamed(ModelShape { rows: 1, inputs: 4, outputs: 3 });
-    let networks = &[network(3)];
-    let parts = ModelParts {
-        projection,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks,
-        row_network: &[0],
-        metadata,
-    };
+    let networks = &[network(&[1.5, 3.0, 4.5])];
+    let parts = ModelParts { projection, ..ModelParts::new(networks, &[0], metadata) };
     encode(&parts, buffer).unwrap()
 }
 
@@ -170,53 +135,13 @@ fn a_projection_may_have_another_number_of_features_than_a_row_has_readings() {
 }
 
 #[test]
-fn the_number_of_features_stands_in_the_blob_and_is_checked() {
-    let mut buffer = Aligned([0; 1024]);
-    let length = of_one_row(&mut buffer.0).len();
-    let floats: Vec<u8> = BLOCK.iter().flat_map(|value| value.to_le_bytes()).collect();
-    let blob = &buffer.0[..length];
-    let start = blob.windows(floats.len()).position(|window| window == floats).unwrap();
-    // Before the floats stand the tag, the number of features, the padding and the floats' length.
-    let tag = blob[..start].iter().rposition(|byte| *byte == 8).unwrap();
-    assert_eq!(&blob[tag..tag + 2], [8, 2]);
-    for (features, what) in [(1, "bytes of projection"), (3, "bytes of projection")] {
-        let mut damaged = buffer;
-        damaged.0[tag + 1] = features;
-        let crc = CRC_32.checksum(&damaged.0[..length - 4]);
-        damaged.0[length - 4..length].copy_from_slice(&crc.to_le_bytes());
-        let refused = Model::decode(&damaged.0[..length]);
-        let expected = usize::from(features) * 5 * 4;
-        assert_eq!(refused, Err(DecodeError::CountMismatch { what, expected, found: 40 }));
-    }
-}
-
-#[test]
 fn what_cannot_stand_behind_a_projection_is_refused() {
     let mut buffer = Aligned([0; 1024]);
-    let twice = encoded(&BLOCK, &[network(2), network(2)], &[0, 1], &mut buffer.0);
+    let twice =
+        encoded(&PROJECTION, &[network(&[1.5, 3.0]), network(&[1.5, 3.0])], &[0, 1], &mut buffer.0);
     let expected =
         DecodeError::CountMismatch { what: "networks behind a projection", expected: 1, found: 2 };
     assert_eq!(twice, Err(EncodeError::Refused(expected)));
-    let uneven = encoded(&BLOCK, &[network(3)], &[0, 0], &mut buffer.0);
+    let uneven = encoded(&PROJECTION, &[network(&[1.5, 3.0, 4.5])], &[0, 0], &mut buffer.0);
     assert_eq!(uneven, Err(EncodeError::UnevenRows { outputs: 3, rows: 2 }));
-}
-
-#[test]
-fn every_changed_word_of_a_projection_is_told() {
-    let mut buffer = Aligned([0; 1024]);
-    let length = array(&mut buffer.0).len();
-    let bytes: Vec<u8> = BLOCK.iter().flat_map(|value| value.to_le_bytes()).collect();
-    let start = buffer.0.windows(bytes.len()).position(|window| window == bytes).unwrap();
-    assert!(start.is_multiple_of(4));
-    for word in 0..BLOCK.len() {
-        let mut damaged = buffer;
-        let place = start + 4 * word;
-        damaged.0[place..place + 4].copy_from_slice(&f32::NAN.to_le_bytes());
-        assert!(matches!(Model::decode(&damaged.0[..length]), Err(DecodeError::Corrupt { .. })));
-        // The CRC fits the damaged bytes.
-        let crc = CRC_32.checksum(&damaged.0[..length - 4]);
-        damaged.0[length - 4..length].copy_from_slice(&crc.to_le_bytes());
-        let refused = Model::decode(&damaged.0[..length]);
-        assert!(matches!(refused, Err(DecodeError::Projection { .. })), "{refused:?}");
-    }
 }

@@ -7,6 +7,7 @@ use core::{ptr, slice};
 
 use cortex_m::peripheral::MPU;
 
+use model_core::exp::Polynomial;
 use model_core::gate::{Rest, is_at_rest};
 use model_core::projection::Projection;
 use model_core::rbf::{Format, Network, Shape, expanded, fixed16};
@@ -202,7 +203,9 @@ fn is_as_its_twin(
                 network.infer(readings, scaled.first(inputs), found.first(outputs)).ok()?;
             } else {
                 network.scale(readings, scaled.first(inputs)).ok()?;
-                network.infer_scaled(scaled.first(inputs), found.first(outputs)).ok()?;
+                network
+                    .infer_scaled_with::<Polynomial>(scaled.first(inputs), found.first(outputs))
+                    .ok()?;
             }
             same &= same_bits(found.first(outputs), expected.first(outputs));
             same &= scaled.is_untouched_from(inputs) && found.is_untouched_from(outputs);

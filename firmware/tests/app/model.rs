@@ -76,23 +76,27 @@ fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
     encode_to_vec(&parts(networks, &[0], metadata)).unwrap()
 }
 
+/// Reports on the first scan with the model in `blob`: readings, and then the estimate.
+fn reports_on_a_scan(blob: &[u8]) -> Vec<(u16, String)> {
+    let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
+    let (mut slots, mut bench) = (Flash::slots_with(blob), Bench::new(scanning));
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    while bench.board.pins.borrow().now_us < 1500 {
+        assert_eq!(session.step(), None);
+    }
+    reports(&bench.board.pins.borrow().to_host)
+}
+
 #[test]
 fn the_model_says_what_is_scanned_and_decoded() {
     let rest = frame_at_rest();
     // A column and an output less; one network for all six readings; one output of one row.
     for (inputs, outputs, wires) in [(2, 1, 2), (6, 4, 6), (3, 2, 3), (1, 1, 1)] {
         let blob = blob_of_one_row(inputs, outputs);
-        let mut slots = Flash::slots_with(&blob);
-        let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
-        let mut bench = Bench::new(scanning);
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        while bench.board.pins.borrow().now_us < 1500 {
-            assert_eq!(session.step(), None);
-        }
         let readings = &rest.as_flattened()[..wires];
         let decoder = Decoder::<1>::load(&blob).unwrap();
         let outputs = decoder.decode(readings).unwrap().outputs;
-        let all = reports(&bench.board.pins.borrow().to_host);
+        let all = reports_on_a_scan(&blob);
         let found = |debug: String| all.iter().any(|(_, text)| text.contains(&debug));
         assert!(found(format!("readings_ohm: {:?}", Floats::new(readings))), "{all:?}");
         let row = format!("row_status: [0], outputs: {:?}", Floats::new(&outputs));
@@ -103,34 +107,20 @@ fn the_model_says_what_is_scanned_and_decoded() {
 #[test]
 fn the_names_of_readings_say_which_rows_are_scanned() {
     let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
-    for (names, row) in [("r1c1_ohm\nr1c2_ohm", 0), ("r2c1_ohm\nr2c2_ohm", 1), ("a\nb", 0)] {
+    let [first, second] = frame_at_rest();
+    for (names, readings) in [
+        ("r1c1_ohm\nr1c2_ohm", first[..2].to_vec()),
+        ("r2c1_ohm\nr2c2_ohm", second[..2].to_vec()),
+        ("a\nb", first[..2].to_vec()),
+        // One row of the model with the readings of both row-wires, in the other order.
+        ("r2c1_ohm\nr2c2_ohm\nr2c3_ohm\nr1c1_ohm\nr1c2_ohm\nr1c3_ohm", [second, first].concat()),
+    ] {
+        let shape = ModelShape { inputs: readings.len(), ..shape };
         let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
-        let mut slots = Flash::slots_with(&blob_with(shape, metadata));
-        let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
-        let mut bench = Bench::new(scanning);
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        while bench.board.pins.borrow().now_us < 1500 {
-            assert_eq!(session.step(), None);
-        }
-        let all = reports(&bench.board.pins.borrow().to_host);
-        let expected = format!("readings_ohm: {:?}", Floats::new(&frame_at_rest()[row][..2]));
+        let all = reports_on_a_scan(&blob_with(shape, metadata));
+        let expected = format!("readings_ohm: {:?}", Floats::new(&readings));
         assert!(all[0].1.contains(&expected), "{names}: {all:?}");
     }
-    // One row of the model with the readings of both row-wires, in the other order.
-    let names = "r2c1_ohm\nr2c2_ohm\nr2c3_ohm\nr1c1_ohm\nr1c2_ohm\nr1c3_ohm";
-    let both = ModelShape { rows: 1, inputs: 6, outputs: 1 };
-    let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(both) };
-    let mut slots = Flash::slots_with(&blob_with(both, metadata));
-    let mut bench =
-        Bench::new(Configuration { frame_period_us: 1000, send_readings: true, ..quiet() });
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    while bench.board.pins.borrow().now_us < 1500 {
-        assert_eq!(session.step(), None);
-    }
-    let [first, second] = frame_at_rest();
-    let expected = format!("readings_ohm: {:?}", Floats::new(&[second, first].concat()));
-    let all = reports(&bench.board.pins.borrow().to_host);
-    assert!(all[0].1.contains(&expected), "{all:?}");
     let metadata =
         Metadata { input_names: Columns("r3c1_ohm\nr3c2_ohm"), ..Metadata::unnamed(shape) };
     let mut slots = Flash::slots_with(&blob_with(shape, metadata));

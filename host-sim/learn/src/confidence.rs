@@ -4,13 +4,13 @@
 //! frames that training did not see.
 
 use model_core::confidence::{Confidence, Sizes};
-use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::require;
 
 use crate::error::{Result, no_regression};
 use crate::infer::{Exponential, assess_lines};
 use crate::packing::ModelBlob;
+use crate::parallel;
 
 mod features;
 mod mixture;
@@ -90,7 +90,7 @@ impl Density {
     fn surprises(&self, inputs: &[f64]) -> Vec<f64> {
         let points = self.features.apply(inputs);
         let of_point = |point: &[f64]| -self.mixture.probabilities(&point.to_vec().into()).1;
-        points.par_chunks_exact(self.features.count()).map(of_point).collect()
+        parallel::pieces(&points, self.features.count(), &of_point)
     }
 }
 
@@ -165,10 +165,10 @@ fn variances(
 ) -> Vec<f64> {
     let points = features.apply(&held_out.inputs);
     let components = mixture.components.len();
-    let of_pieces: Vec<(Vec<f64>, Vec<f64>)> = points
-        .par_chunks(512 * features.count())
-        .zip(held_out.errors.par_chunks(512 * outputs))
-        .map(|(points, errors)| {
+    let of_pieces: Vec<(Vec<f64>, Vec<f64>)> =
+        parallel::map(held_out.errors.len().div_ceil(512 * outputs), &|index| {
+            let points = parallel::piece(&points, 512 * features.count(), index);
+            let errors = parallel::piece(&held_out.errors, 512 * outputs, index);
             let (mut weights, mut squares) =
                 (vec![0.0; components], vec![0.0; components * outputs]);
             for (point, errors) in
@@ -184,8 +184,7 @@ fn variances(
                 }
             }
             (weights, squares)
-        })
-        .collect();
+        });
     // Every component counts one mean frame besides its own, so that it has a variance.
     let frames = (held_out.errors.len() / outputs) as f64;
     let mut mean = vec![0.0; outputs];
@@ -210,7 +209,7 @@ fn ratios(deviations: &[f32], errors: &[f64], outputs: usize) -> Vec<[f64; 2]> {
         let found = SHARES.map(|share| quantile(&mut ratios, share));
         if found[0] > 0.0 { found } else { [1.0; 2] }
     };
-    (0..outputs).into_par_iter().map(of_output).collect()
+    parallel::map(outputs, &of_output)
 }
 
 /// Quantile of `values`, which are sorted: the least that this share does not exceed; 0 of none.

@@ -4,7 +4,7 @@
 //! between the frames of a trajectory), like in idsp's `SplitProcess`. A new kind of decoder implements
 //! [`FrameDecoder`]; every [`FrameDecoder`] is a [`Decoder`], of which programs hold lists.
 
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Estimates of a number of frames, frame after frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -74,10 +74,9 @@ impl<D: FrameDecoder> Decoder for D {
         if size_of::<D::State>() == 0 {
             return self.decode(&mut D::State::default(), readings);
         }
-        let trajectories = readings.par_chunks(steps.max(1) * self.inputs().max(1));
-        let decoded: Vec<Estimates> =
-            trajectories.map(|readings| self.decode(&mut D::State::default(), readings)).collect();
-        let mut decoded = decoded.into_iter();
+        let decode = |readings: &[f64]| self.decode(&mut D::State::default(), readings);
+        let trajectory = steps.max(1) * self.inputs().max(1);
+        let mut decoded = parallel::pieces(readings, trajectory, &decode).into_iter();
         let mut all = decoded.next().unwrap_or_default();
         decoded.for_each(|next| all.append(next));
         all

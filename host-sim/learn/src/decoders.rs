@@ -1,10 +1,10 @@
 //! Decoders besides the packed network, and their common parts.
 
-use rayon::prelude::*;
 use taxel_data::dataset::{Dataset, RowTable};
 
 use crate::decoder::{Decoder, Estimates, FrameDecoder};
 use crate::infer::{Exponential, infer};
+use crate::parallel;
 use crate::train::FittedNetwork;
 
 pub mod linear;
@@ -60,8 +60,7 @@ impl<D: RowDecoder + Send> Rows<D> {
         training: &Dataset,
         fit: impl Fn(&RowTable) -> D + Sync,
     ) -> Self {
-        let rows = (0..training.rows).into_par_iter();
-        let decoders = rows.map(|row| fit(&training.row_table(row))).collect();
+        let decoders = parallel::map(training.rows, &|row| fit(&training.row_table(row)));
         Self::new(name, training, decoders)
     }
 
@@ -84,13 +83,13 @@ impl<D: RowDecoder + Send> FrameDecoder for Rows<D> {
 
     fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
         let frames = readings.chunks_exact(FrameDecoder::inputs(self).max(1));
-        let of_row = |(row, decoder): (usize, &D)| {
+        let of_row = |row: usize| {
             let places = row * self.inputs..(row + 1) * self.inputs;
             let readings: Vec<f64> =
                 frames.clone().flat_map(|frame| &frame[places.clone()]).copied().collect();
-            decoder.predict(&readings)
+            self.decoders[row].predict(&readings)
         };
-        let parts: Vec<Vec<f64>> = self.decoders.par_iter().enumerate().map(of_row).collect();
+        let parts = parallel::map(self.decoders.len(), &of_row);
         Estimates::of_values(side_by_side(&parts, frames.len()))
     }
 }

@@ -83,11 +83,16 @@ fn header(model: &Model<'_>) -> String {
     let [inputs, outputs] =
         [shape.inputs, shape.outputs].map(|count| format!("[[f32; {count}]; {}]", shape.rows));
     let columns = |names: Columns<'_>, units: Columns<'_>| {
-        let pair = |(name, unit): (&str, &str)| match unit {
-            "" => format!("//     {}\n", name.escape_debug()),
-            unit => format!("//     {}, {}\n", name.escape_debug(), unit.escape_debug()),
+        let pairs: Vec<(&str, &str)> = names.iter().zip(units.iter()).collect();
+        let line = |alike: &[(&str, &str)]| {
+            let (name, unit) = alike[0];
+            let unit =
+                if unit.is_empty() { String::new() } else { format!(", {}", unit.escape_debug()) };
+            let times =
+                if alike.len() > 1 { format!(" ({} times)", alike.len()) } else { String::new() };
+            format!("//     {}{unit}{times}\n", name.escape_debug())
         };
-        names.iter().zip(units.iter()).map(pair).collect::<Vec<_>>().concat()
+        pairs.chunk_by(|a, b| a == b).map(line).collect::<String>()
     };
     format!(
         "// Model {:?} in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: {:08x}.\n\

@@ -13,9 +13,10 @@ use std::ops::Range;
 
 use model_core::fill::{Fill, MOST_MISSING};
 use model_core::health::Limits;
-use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::table::Table;
+
+use crate::parallel;
 
 mod wire_fault;
 mod grid;
@@ -49,13 +50,12 @@ pub fn diagnose(readings: &Table, limits: Limits, fill: Option<Fill<'_>>) -> Vec
     let Some(grid) = Grid::new(&readings.names) else { return vec![] };
     let count = readings.names.len();
     let expected = fill.filter(|fill| fill.readings() == count).map(Expected::new);
-    let found: Vec<(usize, Vec<WireFault>)> = windows(readings.len())
-        .into_par_iter()
-        .map(|window| {
-            let values = &readings.values[window.start * count..window.end * count];
-            (window.len(), of_window(&grid, count, values, limits, expected.as_ref()))
-        })
-        .collect();
+    let windows = windows(readings.len());
+    let found = parallel::map(windows.len(), &|window| {
+        let window = windows[window].clone();
+        let values = &readings.values[window.start * count..window.end * count];
+        (window.len(), of_window(&grid, count, values, limits, expected.as_ref()))
+    });
     let all: BTreeSet<WireFault> = found.iter().flat_map(|(_, faults)| faults).copied().collect();
     let of_windows = |fault: WireFault| {
         let windows = found.iter().filter(|(_, faults)| faults.contains(&fault));

@@ -6,13 +6,14 @@
 
 use model_core::fill::Fill;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 use taxel_data::table::Table;
 
 use crate::error::{Error, Result};
 use crate::packing::ModelBlob;
+use crate::parallel;
 use crate::train::principal;
+use crate::train::projection;
 
 /// Number of factors, where there are enough readings.
 const FACTORS: usize = 16;
@@ -141,26 +142,15 @@ fn loadings(
 /// whatever the number of threads.
 fn products(readings: &Table, means: &[f64]) -> Vec<f64> {
     let count = means.len();
-    let pieces = readings.values.par_chunks(FRAMES_AT_ONCE * count);
-    let sums: Vec<Vec<f64>> = pieces
-        .map(|lines| {
-            let mut sums = vec![0.0; count * count];
-            for line in lines.chunks_exact(count) {
-                let z: Vec<f64> =
-                    line.iter().zip(means).map(|(value, mean)| value - mean).collect();
-                for (i, sums) in sums.chunks_exact_mut(count).enumerate() {
-                    let factor = z[i];
-                    sums[i..].iter_mut().zip(&z[i..]).for_each(|(sum, z)| *sum += factor * z);
-                }
-            }
-            sums
-        })
-        .collect();
-    let mut total = vec![0.0; count * count];
-    for sums in &sums {
-        total.iter_mut().zip(sums).for_each(|(total, sum)| *total += sum);
-    }
-    total
+    let of_piece = |lines: &[f64]| {
+        let mut sums = vec![0.0; count * count];
+        for line in lines.chunks_exact(count) {
+            let z: Vec<f64> = line.iter().zip(means).map(|(value, mean)| value - mean).collect();
+            projection::add_products(&z, count, &mut sums);
+        }
+        sums
+    };
+    projection::sum(&parallel::pieces(&readings.values, FRAMES_AT_ONCE * count, &of_piece))
 }
 
 #[cfg(test)]

@@ -1,15 +1,14 @@
 //! Inference over whole tables, to the bit as on the device.
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 mod side_by_side;
 
 use model_core::confidence::{Confidence, Sizes};
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::{Network, Shape};
-use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::simd::widest;
+
+use crate::parallel;
 
 /// Lines that one thread takes at a time.
 const LINES_AT_ONCE: usize = 256;
@@ -72,17 +71,16 @@ pub(crate) fn infer_in_turn(
     let Some(Shape { inputs, outputs, .. }) = networks.first().map(Network::shape) else {
         return Vec::new();
     };
-    let [of_lines, to_lines] =
-        [inputs, outputs].map(|count| LINES_AT_ONCE * networks.len() * count);
-    let mut values = vec![0.0; readings.len() / inputs * outputs];
-    values.par_chunks_mut(to_lines).zip(readings.par_chunks(of_lines)).for_each(
-        |(values, readings)| match exponential {
-            Exponential::Polynomial => infer_lines::<Polynomial>(networks, readings, values),
-            Exponential::Libm => infer_lines::<Libm>(networks, readings, values),
-            Exponential::Micromath => infer_lines::<Micromath>(networks, readings, values),
-        },
-    );
-    values
+    let of_piece = |readings: &[f64]| {
+        let mut values = vec![0.0; readings.len() / inputs * outputs];
+        match exponential {
+            Exponential::Polynomial => infer_lines::<Polynomial>(networks, readings, &mut values),
+            Exponential::Libm => infer_lines::<Libm>(networks, readings, &mut values),
+            Exponential::Micromath => infer_lines::<Micromath>(networks, readings, &mut values),
+        }
+        values
+    };
+    parallel::pieces(readings, LINES_AT_ONCE * networks.len() * inputs, &of_piece).concat()
 }
 
 /// Whether the device would take `reading` for missing: NaN, or beyond f32.
@@ -135,20 +133,21 @@ fn write(inferred: impl Iterator<Item = f32> + Clone, is_whole: bool, values: &m
 /// Deviations (`lines × outputs`) and novelty of every line of `inputs`, as a device computes them.
 pub(crate) fn assess_lines(confidence: Confidence<'_>, inputs: &[f64]) -> (Vec<f32>, Vec<f64>) {
     let Sizes { readings, outputs, .. } = confidence.sizes();
-    let mut deviations = vec![0.0; inputs.len() / readings * outputs];
-    let novelty = inputs
-        .par_chunks_exact(readings)
-        .zip(deviations.par_chunks_exact_mut(outputs))
-        .map_init(
-            || vec![0.0; confidence.sizes().scratch_floats()],
-            |scratch, (line, deviation)| {
-                let line = line.iter().map(|reading| *reading as f32);
-                let novelty = confidence.assess(line, scratch, deviation);
-                f64::from(novelty.expect("lengths of the confidence"))
-            },
-        )
-        .collect();
-    (deviations, novelty)
+    let of_piece = |lines: &[f64]| {
+        let mut scratch = vec![0.0; confidence.sizes().scratch_floats()];
+        let mut deviations = vec![0.0; lines.len() / readings * outputs];
+        let lines = lines.chunks_exact(readings).zip(deviations.chunks_exact_mut(outputs));
+        let assess = |(line, deviation): (&[f64], &mut [f32])| {
+            let line = line.iter().map(|reading| *reading as f32);
+            let novelty = confidence.assess(line, &mut scratch, deviation);
+            f64::from(novelty.expect("lengths of the confidence"))
+        };
+        let novelty: Vec<f64> = lines.map(assess).collect();
+        (deviations, novelty)
+    };
+    let (deviations, novelty): (Vec<_>, Vec<_>) =
+        parallel::pieces(inputs, LINES_AT_ONCE * readings, &of_piece).into_iter().unzip();
+    (deviations.concat(), novelty.concat())
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@
 //! ```
 
 pub mod error;
+mod parallel;
 pub mod decoder;
 pub mod infer;
 pub mod health;

@@ -59,7 +59,8 @@ impl Origin {
 /// [`Error`] for a model beyond what the format holds.
 pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<ModelBlob> {
     let views: Vec<Network<'_>> = trained.networks.iter().map(FittedNetwork::network).collect();
-    let projection = trained.projection.as_ref().map(|parameters| train::view(parameters, dataset));
+    let projection =
+        trained.projection.as_ref().map(|parameters| train::projection::view(parameters, dataset));
     let row_network: Vec<u8> = match projection {
         Some(_) => vec![0; dataset.rows],
         None => (0..dataset.rows).map(|row| row as u8).collect(),

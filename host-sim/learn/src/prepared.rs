@@ -6,14 +6,17 @@ use std::sync::Arc;
 use model_core::blob::Model;
 use model_core::rbf::Network;
 use model_core::scale::CLAMP;
-use rayon::prelude::*;
 use taxel_data::table::Table;
 
 use crate::decoder::{Estimates, FrameDecoder};
 use crate::infer::{Exponential, assess_lines, infer_in_turn, is_missing};
 use crate::packing::ModelBlob;
+use crate::parallel;
 use crate::relative::{ratios, reciprocals};
 use crate::train::{output_rank, projection};
+
+/// Frames that a thread fills at a time.
+const FRAMES_AT_ONCE: usize = 64;
 
 /// Model that was parsed and laid out, ready to decode. Clones share what was laid out.
 ///
@@ -151,24 +154,26 @@ impl<'b> PreparedModel<'b> {
     /// each frame; `None` if the model has no [fill](model_core::fill).
     pub fn filled(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
         let fill = self.model.fill()?;
-        let mut values = readings.to_vec();
-        let counts = values
-            .par_chunks_exact_mut(self.inputs())
-            .map_init(
-                || vec![0.0; fill.scratch_floats()],
-                |scratch, frame| {
-                    if !frame.iter().any(|reading| is_missing(*reading)) {
-                        return 0;
-                    }
-                    let mut ohm: Vec<f32> = frame.iter().map(|reading| *reading as f32).collect();
-                    let count = fill.fill(&mut ohm, scratch);
-                    let missing = frame.iter_mut().zip(ohm).filter(|(it, _)| is_missing(**it));
-                    missing.for_each(|(reading, ohm)| *reading = f64::from(ohm));
-                    count
-                },
-            )
-            .collect();
-        Some((values, counts))
+        let of_piece = |frames: &[f64]| {
+            let (mut values, mut scratch) = (frames.to_vec(), vec![0.0; fill.scratch_floats()]);
+            let filled = |frame: &mut [f64]| {
+                if !frame.iter().any(|reading| is_missing(*reading)) {
+                    return 0;
+                }
+                let mut ohm: Vec<f32> = frame.iter().map(|reading| *reading as f32).collect();
+                let count = fill.fill(&mut ohm, &mut scratch);
+                let missing = frame.iter_mut().zip(ohm).filter(|(it, _)| is_missing(**it));
+                missing.for_each(|(reading, ohm)| *reading = f64::from(ohm));
+                count
+            };
+            let counts: Vec<usize> = values.chunks_exact_mut(self.inputs()).map(filled).collect();
+            (values, counts)
+        };
+        let (values, counts): (Vec<_>, Vec<_>) =
+            parallel::pieces(readings, FRAMES_AT_ONCE * self.inputs(), &of_piece)
+                .into_iter()
+                .unzip();
+        Some((values.concat(), counts.concat()))
     }
 
     /// Whether decoding clamps an input, in each frame of `readings` (`frames × inputs`). Rows that cannot be decoded do
@@ -180,17 +185,14 @@ impl<'b> PreparedModel<'b> {
         let inputs = self.networks[0].shape().inputs;
         let of_networks = self.inputs_of_networks(readings);
         let step = inputs * self.networks.len();
-        let frames = of_networks.par_chunks_exact(step.max(1));
-        frames
-            .map(|frame| {
-                let rows = self.networks.iter().zip(frame.chunks_exact(inputs));
-                rows.into_iter().any(|(network, row)| {
-                    let row: Vec<f32> = row.iter().map(|input| *input as f32).collect();
-                    let decoded = row.iter().all(|input| input.is_finite());
-                    decoded && network.clamps(&row, &mut vec![0.0; inputs]) == Ok(true)
-                })
+        parallel::pieces(&of_networks, step.max(1), &|frame| {
+            let mut rows = self.networks.iter().zip(frame.chunks_exact(inputs));
+            rows.any(|(network, row)| {
+                let row: Vec<f32> = row.iter().map(|input| *input as f32).collect();
+                let decoded = row.iter().all(|input| input.is_finite());
+                decoded && network.clamps(&row, &mut vec![0.0; inputs]) == Ok(true)
             })
-            .collect()
+        })
     }
 
     /// Share of the inputs for `readings`, or of their features behind a projection, that inference clamps: those

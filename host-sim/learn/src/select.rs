@@ -1,6 +1,5 @@
 //! Selection of K, spread and ridge penalty by k-fold cross-validation.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
@@ -9,6 +8,7 @@ use taxel_data::progress::{Progress, Silent};
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
 use crate::infer::{Exponential, infer};
+use crate::parallel;
 use crate::train::{
     self, Examples, FittedNetwork, Layers, Options, Refinement,
     refine::{self, LEAST_FOLDS},
@@ -146,15 +146,14 @@ impl<'d> Judge<'d> {
         let of_k = |k: &usize| (0..self.folds).map(|fold| (*k, fold)).collect::<Vec<_>>();
         let tasks: Vec<(usize, usize)> = centres.iter().flat_map(of_k).collect();
         progress.stage("cross-validate", tasks.len());
-        let squares: Vec<Vec<Vec<f64>>> = tasks
-            .into_par_iter()
-            .map(|(centres, fold)| {
-                let options = Options { centres, ..*self.options };
-                let squares = self.held_out_squares(fold, spreads, penalties, &options);
-                progress.step();
-                squares
-            })
-            .collect::<Result<_>>()?;
+        let squares = parallel::map(tasks.len(), &|task| {
+            let (centres, fold) = tasks[task];
+            let options = Options { centres, ..*self.options };
+            let squares = self.held_out_squares(fold, spreads, penalties, &options);
+            progress.step();
+            squares
+        });
+        let squares: Vec<Vec<Vec<f64>>> = squares.into_iter().collect::<Result<_>>()?;
         let deviations = self.dataset.outputs.deviations();
         let mut scored = Vec::new();
         for (k, of_folds) in centres.iter().zip(squares.chunks_exact(self.folds)) {
@@ -183,7 +182,7 @@ impl<'d> Judge<'d> {
         options: &Options,
     ) -> Result<Vec<Vec<f64>>> {
         let (training, test) = split(self.dataset, self.fold_of, fold);
-        let start = Layers::start(&training, options)?;
+        let mut layers = Layers::start(&training, options)?;
         let squares = |networks: &Vec<FittedNetwork>| -> Vec<f64> {
             let networks = networks.iter().enumerate();
             let of_row = |(row, network): (usize, &FittedNetwork)| {
@@ -196,10 +195,9 @@ impl<'d> Judge<'d> {
         };
         let mut all = Vec::new();
         for spread in spreads {
-            let mut layers = start.clone();
             layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
             let Some(settings) = self.refinement else {
-                let models = train::fit_each(&training, &layers, options, penalties, &Silent)?;
+                let models = train::fit_each(&layers, options, penalties, &Silent)?;
                 all.extend(models.iter().map(squares));
                 continue;
             };
@@ -211,7 +209,7 @@ impl<'d> Judge<'d> {
                 let layers =
                     refine::refine(&training, &layers, &options, settings, examples, &Silent)?;
                 let options = settings.options(&options);
-                all.push(squares(&train::fit(&training, layers, &options, &Silent)?.networks));
+                all.push(squares(&train::fit(&layers, &options, &Silent)?.networks));
             }
         }
         Ok(all)
@@ -220,10 +218,9 @@ impl<'d> Judge<'d> {
     /// Baselines on the same folds.
     fn baselines(&self) -> Vec<BaselineScore> {
         let score = |baseline: &Baseline| {
-            let squares: Vec<Vec<f64>> = (0..self.folds)
-                .into_par_iter()
-                .map(|fold| baseline_squares(baseline, self.dataset, self.fold_of, fold))
-                .collect();
+            let squares = parallel::map(self.folds, &|fold| {
+                baseline_squares(baseline, self.dataset, self.fold_of, fold)
+            });
             let rmse =
                 |output: usize| self.root_mean(squares.iter().map(|fold| fold[output]).sum());
             let outputs = self.dataset.outputs.names.len();

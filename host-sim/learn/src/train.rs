@@ -4,22 +4,20 @@
 //! alone decides how work is cut into pieces, whose results are merged in order. The network is rounded
 //! once, to the numbers of its format, as a [`FittedNetwork`].
 
-use model_core::projection::Projection;
 use model_core::rbf::Format;
-use model_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
-use rayon::prelude::*;
 use taxel_data::BadValue;
-use taxel_data::dataset::{Dataset, RowTable};
+use taxel_data::dataset::Dataset;
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
-use taxel_data::random::{Purpose, Random, Stream};
 
 use crate::error::Result;
+use crate::parallel;
 
 pub mod resolution;
 mod solver;
 pub mod kmeans;
 pub mod hidden_layer;
+mod samples;
 pub mod least_squares;
 pub(crate) mod principal;
 pub mod format;
@@ -31,20 +29,16 @@ pub mod refine;
 pub mod stream;
 
 pub use format::FittedNetwork;
-use format::Ridge;
 pub use hidden_layer::{HiddenLayer, Widths};
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
+use samples::Ridge;
+pub use samples::{InputScale, Samples};
 pub use solver::{Recursive, Solver};
 
 /// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
 /// 1/δ for all frames together, too small to be felt.
 pub const INITIAL_COVARIANCE: f64 = 1e6;
-
-/// Frames for each regressor below which they are few.
-const FEW_FRAMES: usize = 50;
-/// Least error of a reading over its range, whatever few frames say.
-const LEAST_ERROR: f64 = 1e-3;
 
 /// Factor on the spread for networks of a whole array, relative to those of a row.
 ///
@@ -185,127 +179,7 @@ pub fn check_spread(field: &str, spread: f64) -> std::result::Result<(), BadValu
     Err(BadValue::new(field, format!("{spread:?}"), rule))
 }
 
-/// Minimum and span of every input, by which readings are scaled to [0, 1].
-#[derive(Debug, Clone, PartialEq)]
-pub struct InputScale {
-    minimum: Vec<f64>,
-    /// One over each input's span; 0 for an input that never changes.
-    per_span: Vec<f64>,
-}
-
-impl InputScale {
-    /// Scale of a table's inputs, rounded to the numbers that the blob holds.
-    pub fn new(table: &RowTable) -> Self {
-        // Ranges of the readings in f32, as the device has them.
-        let ranges: Vec<[f32; 2]> =
-            table.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
-        let per_span = |[low, high]: &[f32; 2]| {
-            let per_span = 1.0 / (high - low);
-            if per_span.is_finite() { f64::from(per_span) } else { 0.0 }
-        };
-        Self {
-            minimum: ranges.iter().map(|[low, _]| f64::from(*low)).collect(),
-            per_span: ranges.iter().map(per_span).collect(),
-        }
-    }
-
-    /// Whether each input never changes; it is scaled to 0.
-    fn never_changes(&self) -> impl Iterator<Item = bool> {
-        self.per_span.iter().map(|per_span| *per_span == 0.0)
-    }
-
-    /// Scales `readings` (`samples × inputs`) to [0, 1], and clamps them like the device does.
-    pub fn apply(&self, readings: &[f64]) -> Vec<f64> {
-        let ranges = self.minimum.iter().zip(&self.per_span).cycle();
-        let [low, high] = CLAMP.map(f64::from);
-        let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
-            ((f64::from(*value as f32) - minimum) * per_span).clamp(low, high)
-        };
-        readings.iter().zip(ranges).map(scale).collect()
-    }
-}
-
-/// Middle of every input's range, and scale about it: the scaling of the formats with expanded
-/// distances.
-#[derive(Debug, Clone, PartialEq)]
-struct CentredScale {
-    midpoint: Vec<f32>,
-    /// Number of [`UNITS`] in one unit of the reading; 0 for an input that never changes.
-    per_unit: Vec<f32>,
-}
-
-impl CentredScale {
-    fn new(table: &RowTable) -> Self {
-        let range = |range: [f64; 2]| range.map(|v| f64::from(v as f32));
-        let ranges = || table.input_ranges().into_iter().map(range);
-        let per_unit = |[low, high]: [f64; 2]| {
-            let per_unit = (f64::from(UNITS) / (f64::from(HALF_RANGE) * (high - low))) as f32;
-            if per_unit.is_finite() { per_unit } else { 0.0 }
-        };
-        Self {
-            midpoint: ranges().map(|[low, high]| (0.5 * (low + high)) as f32).collect(),
-            per_unit: ranges().map(per_unit).collect(),
-        }
-    }
-
-    fn never_changes(&self) -> impl Iterator<Item = bool> {
-        self.per_unit.iter().map(|per_unit| *per_unit == 0.0)
-    }
-
-    /// Scales all inputs of `table` like the device does before its clamp, line after line.
-    fn units<'a>(&'a self, table: &'a RowTable) -> impl Iterator<Item = f32> + 'a {
-        table.inputs.lines().flat_map(|line| {
-            let ranges = self.midpoint.iter().zip(&self.per_unit);
-            line.iter().zip(ranges).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
-        })
-    }
-
-    /// Scales all inputs of `table` to [0, 1] and clamps them, line after line.
-    fn apply(&self, table: &RowTable) -> Vec<f64> {
-        let spans = f64::from(HALF_RANGE) / f64::from(UNITS);
-        self.units(table).map(|x| 0.5 + f64::from(clamp_units(x)) * spans).collect()
-    }
-}
-
-/// Samples of one network, with their inputs scaled to [0, 1].
-#[derive(Debug, Clone)]
-pub struct Samples<'b> {
-    pub(crate) scale: InputScale,
-    /// Scaled inputs, `samples × inputs`.
-    pub(crate) scaled: Vec<f64>,
-    pub(crate) table: &'b RowTable,
-}
-
-impl<'b> Samples<'b> {
-    /// Scales the inputs of `table` to [0, 1].
-    pub fn new(table: &'b RowTable) -> Self {
-        let scale = InputScale::new(table);
-        Self { scaled: scale.apply(&table.inputs.values), scale, table }
-    }
-
-    pub(crate) fn inputs(&self) -> usize {
-        self.table.inputs.names.len()
-    }
-
-    /// K-means centres of these samples (`centres × inputs`), rounded to the numbers that the blob
-    /// holds.
-    ///
-    /// `part` numbers the network, so that each draws its own starting points.
-    pub fn centres(&self, options: &Options, part: usize) -> Vec<f64> {
-        let mut random =
-            Random::new(options.seed, Stream::Training, Purpose::Centres, 0, part as u64);
-        let found =
-            kmeans::fit(&self.scaled, self.inputs(), options.centres, &options.search, &mut random);
-        found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
-    }
-
-    /// Hidden layer of Gaussians at `centres` (`centres × inputs`, on scaled inputs), with the widths that `options` ask
-    /// for.
-    pub fn layer(&self, centres: Vec<f64>, options: &Options) -> HiddenLayer {
-        let relative_widths = options.widths.relative(&centres, self.inputs());
-        HiddenLayer { centres, spread: options.spread, relative_widths }
-    }
-
+impl Samples<'_> {
     /// Fits output weights to the samples for given `centres` (`centres × inputs`, on scaled inputs), by
     /// least squares, with the widths, in the format and of the rank that `options` ask for.
     ///
@@ -343,23 +217,6 @@ impl<'b> Samples<'b> {
         let ridges: Vec<Ridge> = penalties.iter().map(ridge).collect();
         format::fit(self, layer, options, &ridges)
     }
-
-    /// Penalties on squared weights that `options` ask for.
-    ///
-    /// Where none is chosen and frames are few, the affine tail is fitted as if every reading had an error of a
-    /// [thousandth of its range](LEAST_ERROR). Readings of neighbouring wires hardly differ in some directions; a few
-    /// frames without noise are fitted best by large weights there, which ruin all others. With many frames, or noise,
-    /// it makes no difference.
-    fn ridge(&self, layer: &HiddenLayer, options: &Options) -> Ridge {
-        let (frames, inputs) = (self.table.inputs.len(), self.inputs());
-        let regressors = layer.centres.len() / inputs + inputs + 1;
-        let is_few = frames < FEW_FRAMES * regressors;
-        let is_usual = options.affine_tail && options.penalty.is_none();
-        Ridge {
-            initial_covariance: options.initial_covariance(frames),
-            of_tail: if is_few && is_usual { frames as f64 * LEAST_ERROR.powi(2) } else { 0.0 },
-        }
-    }
 }
 
 /// Result of training on a data set.
@@ -384,7 +241,7 @@ pub struct Trained {
 /// [`Error`](crate::Error)s for data that does not fit the format.
 pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
     check(dataset, options)?;
-    fit(dataset, Layers::start(dataset, options)?, options, progress)
+    fit(&Layers::start(dataset, options)?, options, progress)
 }
 
 /// Trains as [`train`] does, and refines centres, widths and the projection before the weights are fitted.
@@ -401,7 +258,7 @@ pub fn train_refined(
     check(dataset, options)?;
     let start = Layers::start(dataset, options)?;
     let layers = refine::refine(dataset, &start, options, settings, examples, progress)?;
-    fit(dataset, layers, &settings.options(options), progress)
+    fit(&layers, &settings.options(options), progress)
 }
 
 /// Checks the options against the data, and the data against f32.
@@ -411,54 +268,37 @@ fn check(dataset: &Dataset, options: &Options) -> Result<()> {
     resolution::check(dataset)
 }
 
-/// Projection of `dataset`'s readings with the given `parameters`.
-///
-/// # Panics
-/// If `parameters` are not as many as [`projection::fit`] makes for this data set.
-pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
-    let readings = dataset.inputs.names.len();
-    Projection::new(readings, parameters.len() / (readings + 1), parameters)
-        .expect("a projection of these readings")
-}
-
-/// Fits the output weights of networks with these `layers` to `dataset`.
+/// Fits the output weights of networks with these `layers` to the frames that they were found on.
 ///
 /// # Errors
 /// [`Error`](crate::Error) for data or layers that the format does not hold.
 ///
 /// # Panics
 /// Never: one penalty gives one model.
-pub fn fit(
-    dataset: &Dataset,
-    layers: Layers,
-    options: &Options,
-    progress: &dyn Progress,
-) -> Result<Trained> {
-    let mut models = fit_each(dataset, &layers, options, &[options.penalty], progress)?;
+pub fn fit(layers: &Layers<'_>, options: &Options, progress: &dyn Progress) -> Result<Trained> {
+    let mut models = fit_each(layers, options, &[options.penalty], progress)?;
     let networks = models.pop().expect("one model a penalty");
-    Ok(Trained { projection: layers.projection, networks, frames: dataset.frames() })
+    Ok(Trained { projection: layers.projection.clone(), networks, frames: layers.seen.frames() })
 }
 
 /// Fits output weights as [`fit`] does, with each of `penalties` instead of the options' own: the networks of one model
 /// for each. They share the decomposition of the samples.
 pub(crate) fn fit_each(
-    dataset: &Dataset,
-    layers: &Layers,
+    layers: &Layers<'_>,
     options: &Options,
     penalties: &[Option<f64>],
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<FittedNetwork>>> {
-    let seen = layers.seen(dataset);
     // One list of networks a row-wire, one network a penalty.
     let fit_rows = |options: &Options, penalties: &[Option<f64>]| {
-        let rows = layers.hidden.par_iter().enumerate();
-        let fitted = rows.map(|(row, layer)| {
-            let table = seen.row_table(row);
+        let fitted = parallel::map(layers.hidden.len(), &|row| {
+            let layer = &layers.hidden[row];
+            let table = layers.seen.row_table(row);
             let fitted = Samples::new(&table).fit_each(layer, options, penalties);
             progress.step();
             fitted
         });
-        fitted.collect::<Result<Vec<Vec<FittedNetwork>>>>()
+        fitted.into_iter().collect::<Result<Vec<Vec<FittedNetwork>>>>()
     };
     progress.stage("fit weights", layers.hidden.len());
     let mut rows: Vec<_> = fit_rows(options, penalties)?.into_iter().map(Vec::into_iter).collect();
@@ -478,7 +318,6 @@ pub(crate) fn fit_each(
 
 /// Squared distance ‖a − b‖².
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "`simd::widest` runs it")]
 pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut sum = [0.0; 4];

@@ -38,6 +38,14 @@ pub struct ModelParts<'a> {
     pub metadata: Metadata<'a>,
 }
 
+impl<'a> ModelParts<'a> {
+    /// Networks that decode rows from their readings, and nothing else. Each row has an index into `networks`.
+    pub fn new(networks: &'a [Network<'a>], row_network: &'a [u8], metadata: Metadata<'a>) -> Self {
+        let (projection, expansion, confidence, fill) = (None, None, None, None);
+        Self { projection, expansion, confidence, fill, networks, row_network, metadata }
+    }
+}
+
 /// Bytes that a buffer needs at most to hold the blob of `parts`.
 pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     // Fixed fields, and the longest varint of every field that is one.
@@ -51,11 +59,14 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
         + m.output_units.0.len();
     let numbers = m.training_rmse.0.len() + m.full_scale.0.len() + parts.row_network.len();
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
-    let projection = parts.projection.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
-    let expansion = parts.expansion.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
-    let confidence = parts.confidence.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
-    let fill = parts.fill.map_or(0, |it| SECTION_FIELDS + it.block().len() * 4);
-    FIXED_FIELDS + text + numbers + projection + expansion + confidence + fill + weights
+    let blocks = [
+        parts.projection.map(|it| it.block()),
+        parts.expansion.map(|it| it.block()),
+        parts.confidence.map(|it| it.block()),
+        parts.fill.map(|it| it.block()),
+    ];
+    let blocks: usize = blocks.iter().flatten().map(|it| SECTION_FIELDS + it.len() * 4).sum();
+    FIXED_FIELDS + text + numbers + blocks + weights
 }
 
 fn block_bytes(network: &Network<'_>) -> usize {

@@ -45,6 +45,20 @@ pub(super) fn take_block<'a>(
     take::<&[u8]>(rest, section)
 }
 
+/// Cuts padding, length and a block of so many `floats` from the front of `bytes`. `what` names its bytes.
+fn take_floats<'a>(
+    bytes: &'a [u8],
+    section: &'static str,
+    what: &'static str,
+    floats: usize,
+) -> Result<(&'a [f32], &'a [u8]), DecodeError> {
+    let (block, rest) = take_block(bytes, section)?;
+    check_count(what, floats.saturating_mul(4), block.len())?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    Ok((block, rest))
+}
+
 /// Cuts the section of relative inputs from the front of `bytes`; returns whether there is one.
 pub(super) fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
     match bytes.split_first() {
@@ -67,12 +81,9 @@ pub(super) fn take_projection(
         }
         _ => return Ok((None, bytes)),
     };
-    let (block, rest) = take_block(rest, SECTION)?;
     let readings = shape.rows * shape.inputs;
     let floats = projection::block_floats(readings, features);
-    check_count("bytes of projection", floats.saturating_mul(4), block.len())?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let (block, rest) = take_floats(rest, SECTION, "bytes of projection", floats)?;
     let projection = Projection::new(readings, features, block)
         .map_err(|cause| DecodeError::Projection { cause })?;
     Ok((Some(projection), rest))
@@ -88,12 +99,9 @@ pub(super) fn take_expansion(
         return Ok((None, bytes));
     }
     let (header, rest) = take::<ExpansionHeader>(bytes, SECTION)?;
-    let (block, rest) = take_block(rest, SECTION)?;
     let (components, outputs) = (header.components.into(), shape.rows * shape.outputs);
     let floats = projection::block_floats(components, outputs);
-    check_count("bytes of expansion", floats.saturating_mul(4), block.len())?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let (block, rest) = take_floats(rest, SECTION, "bytes of expansion", floats)?;
     let expansion = Expansion::new(components, outputs, block)
         .map_err(|cause| DecodeError::Expansion { cause })?;
     Ok((Some(expansion), rest))
@@ -109,16 +117,14 @@ pub(super) fn take_confidence(
         return Ok((None, bytes));
     }
     let (header, rest) = take::<ConfidenceHeader>(bytes, SECTION)?;
-    let (block, rest) = take_block(rest, SECTION)?;
     let sizes = Sizes {
         readings: shape.rows * shape.inputs,
         directions: header.directions.into(),
         components: header.components.into(),
         outputs: shape.rows * shape.outputs,
     };
-    check_count("bytes of confidence", sizes.block_floats().saturating_mul(4), block.len())?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let floats = sizes.block_floats();
+    let (block, rest) = take_floats(rest, SECTION, "bytes of confidence", floats)?;
     let confidence =
         Confidence::new(sizes, block).map_err(|cause| DecodeError::Confidence { cause })?;
     Ok((Some(confidence), rest))
@@ -134,11 +140,8 @@ pub(super) fn cut_fill(
         return Ok((None, bytes));
     }
     let (header, rest) = take::<FillHeader>(bytes, SECTION)?;
-    let (block, rest) = take_block(rest, SECTION)?;
     let (readings, factors) = (shape.rows.saturating_mul(shape.inputs), header.factors.into());
     let floats = fill::block_floats(readings, factors);
-    check_count("bytes of fill", floats.saturating_mul(4), block.len())?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let (block, rest) = take_floats(rest, SECTION, "bytes of fill", floats)?;
     Ok((Some(Fill::of_checked(readings, factors, block)), rest))
 }

@@ -98,7 +98,6 @@ fn has_clamped(fpscr: u32) -> bool {
 /// The caller must check that `block` has no count of 0 and all words of such a network, and that there are as many
 /// inputs, words of space, and outputs as it says.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "a call")]
 pub(crate) unsafe fn expanded(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
     debug_assert!(inputs.are(block.inputs) && output.len() == block.outputs);
     let (inputs, space) = inputs.addresses();
@@ -112,7 +111,6 @@ pub(crate) unsafe fn expanded(block: &Block<'_>, inputs: Inputs<'_>, output: &mu
 /// # Safety
 /// As for [`expanded`].
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "a call")]
 pub(crate) unsafe fn fixed16(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
     debug_assert!(inputs.are(block.inputs) && output.len() == block.outputs);
     let (inputs, space) = inputs.addresses();
@@ -142,7 +140,6 @@ pub(crate) unsafe fn project(block: &[f32], readings: &[f32], features: &mut [f3
 /// # Safety
 /// The caller must check that there are features, and that `component` has 1 + n + n · (n + 1) / 2 numbers for n features.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "a call")]
 pub(crate) unsafe fn density(component: &[f32], features: &[f32], floor: f32) -> f32 {
     let count = features.len();
     debug_assert!(count > 0 && component.len() == 1 + count + count * (count + 1) / 2);
@@ -157,7 +154,6 @@ pub(crate) unsafe fn density(component: &[f32], features: &[f32], floor: f32) ->
 /// The caller must check that there is at least one row, with as many `inputs` and `outputs` (both at least 1) as
 /// `sizes` says, in readings, baseline, outputs at rest, estimate, and the status of each.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "a call")]
 pub(crate) unsafe fn give_rest(
     readings: &[f32],
     (baseline, rest, status): (&[f32], &[f32], &[RowStatus]),
@@ -197,7 +193,6 @@ const _: () = {
 
 /// Square root of a number that is not negative, rounded correctly.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "one instruction, and moves to its register and back")]
 pub(crate) fn sqrt(value: f32) -> f32 {
     let mut bits = value.to_bits();
     // SAFETY: the instructions read and write these two registers alone. The compiler offers no floating-point register

@@ -74,7 +74,6 @@ impl<'a> Network<'a> {
 
     /// Makes a network after checking the lengths alone, for parameters whose values were checked before.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn with_lengths_checked(
         shape: Shape,
         parameters: Parameters<'a>,
@@ -149,7 +148,6 @@ impl<'a> Network<'a> {
 
     /// Makes a network of the arrays that follow each other in `block`; its values are not checked.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn from_block(
         shape: Shape,
         common_width: bool,
@@ -196,7 +194,6 @@ impl<'a> Network<'a> {
 
     /// Scales readings to [0, 1], and clamps them. Returns whether one was clamped, NaN or infinite.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> bool {
         let p = &self.parameters;
         let limits = p.input_minimum.iter().zip(p.input_per_span);
@@ -213,11 +210,7 @@ impl<'a> Network<'a> {
     /// formats need not save the registers it uses. Not generic, so that it is compiled with this crate, for
     /// speed.
     #[cfg_attr(cortex_m4f, inline(never))]
-    #[cfg_attr(
-        not(cortex_m4f),
-        inline(always),
-        expect(clippy::inline_always, reason = "so that the compiler knows the exponential")
-    )]
+    #[cfg_attr(not(cortex_m4f), inline(always))]
     pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
         let usual: (Result<&[f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
             (scaled.try_into(), (&mut *output).try_into());
@@ -229,7 +222,6 @@ impl<'a> Network<'a> {
     }
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
     fn add_up(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
         let p = &self.parameters;
         output.fill(0.0);
@@ -254,7 +246,6 @@ impl<'a> Network<'a> {
 
 /// ‖a − b‖² by direct differences; the expanded form ‖a‖² − 2a·b + ‖b‖² cancels (400 % error at offset 100).
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
     let (a4, a_rest) = a.as_chunks::<4>();
     let (b4, b_rest) = b.as_chunks::<4>();

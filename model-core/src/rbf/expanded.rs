@@ -155,7 +155,6 @@ impl Layout for Expanded {
     }
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
     fn infer_scaled_in_rust(network: &Network<'_>, scaled: &mut [f32], output: &mut [f32]) {
         scaled.iter_mut().for_each(|x| *x = clamp_units(*x));
         output.fill(0.0);
@@ -180,7 +179,6 @@ impl Layout for Expanded {
 
     #[cfg(cortex_m4f)]
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
     unsafe fn routine(network: &Network<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
         // SAFETY: the caller has compared the lengths with the shape. When the network was made, its block was found
         // to be as long as its shape asks for, and no dimension to be 0.
@@ -201,7 +199,6 @@ impl Network<'_> {
 
 /// Sum of `opened` and the products of `a` and `b`, in four partial sums that are added pairwise.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn sum_of_products(opened: [f32; 4], a: &[f32], b: &[f32]) -> f32 {
     let mut sum = opened;
     let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());

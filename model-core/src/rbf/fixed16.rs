@@ -105,7 +105,6 @@ impl Layout for Fixed16 {
     }
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "one comparison")]
     fn check_shape(shape: Shape) -> Result<(), NetworkError> {
         if shape.inputs > MOST_INPUTS {
             return Err(NetworkError::TooManyInputs { most: MOST_INPUTS, found: shape.inputs });
@@ -190,7 +189,6 @@ impl Layout for Fixed16 {
     }
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
     fn infer_scaled_in_rust(network: &Network<'_>, scaled: &mut [f32], output: &mut [f32]) {
         let p = network.parameters();
         // The caller's buffers also hold the integers: no others have the right length.
@@ -215,7 +213,6 @@ impl Layout for Fixed16 {
 
     #[cfg(cortex_m4f)]
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
     unsafe fn routine(network: &Network<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
         // SAFETY: the caller has compared the lengths with the shape. When the network was made, its block was found
         // to be as long as its shape asks for, and no dimension to be 0.
@@ -263,7 +260,6 @@ fn halves(pair: u32) -> [i32; 2] {
 
 /// `sum` plus the products of the `i16` in `pairs` with the `values` in the same places.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn add_products(sum: i32, pairs: &[u32], values: &[i32]) -> i32 {
     let (twos, rest) = values.as_chunks::<2>();
     let mut sum = sum;
@@ -288,7 +284,6 @@ pub fn square_shift(inputs: usize) -> u32 {
 
 /// The term g‖x‖² of the exponent, which all centres share.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn shared_term(decay: u32, x: &[i32]) -> u32 {
     let square: u64 = x.iter().map(|&x| u64::from(x.unsigned_abs()).pow(2)).sum();
     let shift = square_shift(x.len());
@@ -297,7 +292,6 @@ fn shared_term(decay: u32, x: &[i32]) -> u32 {
 
 /// The activation 2^−v in Q15.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn power(v: u32) -> i32 {
     let fraction = i64::from(v & ((1 << EXPONENT_FRACTION_BITS) - 1));
     let [c3, c2, c1, c0] = CUBIC;
@@ -309,7 +303,6 @@ fn power(v: u32) -> i32 {
 }
 
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 fn activations_of(exponents: &[u32], shared: u32, x: &[i32]) -> [i32; CENTRES_AT_ONCE] {
     let mut activations = [0; CENTRES_AT_ONCE];
     let lines = exponents.chunks_exact(1 + x.len().div_ceil(2));

@@ -32,7 +32,6 @@ pub trait Layout: Copy + Debug + PartialEq {
     /// # Errors
     /// [`NetworkError::TooManyInputs`], or whatever the format rejects.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "no code")]
     fn check_shape(_: Shape) -> Result<(), NetworkError> {
         Ok(())
     }
@@ -94,7 +93,6 @@ impl<'a, L: Layout> Network<'a, L> {
 
     /// Makes a network after checking the length alone, for a block whose values were checked before.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a network is large to hand over")]
     pub(crate) fn with_length_checked(
         shape: Shape,
         affine: bool,
@@ -135,7 +133,6 @@ impl<'a, L: Layout> Network<'a, L> {
     /// The words with their counts, as the routines take them.
     #[cfg(cortex_m4f)]
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a reference")]
     pub(super) fn counted(&self) -> &Block<'a> {
         &self.block
     }
@@ -163,7 +160,6 @@ impl<'a, L: Layout> Network<'a, L> {
     }
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call")]
     pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> bool {
         L::scale(self, reading, scaled)
     }
@@ -171,7 +167,6 @@ impl<'a, L: Layout> Network<'a, L> {
     /// Infers `output` from one row of readings; `scaled` is working space. All must have the lengths of the shape.
     /// Returns whether a reading was clamped, NaN or infinite.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
     pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> bool {
         #[cfg(cortex_m4f)]
         if reading.len() == self.block.inputs && self.fit(scaled, output) {
@@ -190,7 +185,6 @@ impl<'a, L: Layout> Network<'a, L> {
 
     /// Infers `output` from `scaled` inputs, which are overwritten. Both must have the lengths of the shape.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "callers rely on it for constant lengths")]
     pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
         #[cfg(cortex_m4f)]
         if self.fit(scaled, output) {
@@ -204,14 +198,12 @@ impl<'a, L: Layout> Network<'a, L> {
     /// Whether buffers have the lengths of the shape.
     #[cfg(cortex_m4f)]
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "where lengths are known, nothing is left of it")]
     fn fit(&self, scaled: &[f32], output: &[f32]) -> bool {
         scaled.len() == self.block.inputs && output.len() == self.block.outputs
     }
 
     /// Infers `output` from `scaled` inputs by the compiled twin, with separate code for the usual sizes.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "for callers that are not inlined themselves")]
     pub(super) fn infer_scaled_by_twin(&self, scaled: &mut [f32], output: &mut [f32]) {
         let usual: (Result<&mut [f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
             ((&mut *scaled).try_into(), (&mut *output).try_into());

@@ -143,7 +143,6 @@ pub(super) fn check_spans(per_span: &[f32]) -> Result<(), NetworkError> {
 }
 
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "callers rely on it for unrolling")]
 pub(super) fn accumulate(output: &mut [f32], factor: f32, weights: &[f32]) {
     for (y, &w) in output.iter_mut().zip(weights) {
         *y += factor * w;

@@ -135,8 +135,12 @@ fn unusable_values_are_named() {
         ((|s| s.decay[1] = 0.0) as fn(&mut Sample), NetworkError::InvalidWidth { centre: 1 }),
         (|s| s.decay[2] = f32::INFINITY, NetworkError::InvalidWidth { centre: 2 }),
         (|s| s.decay[0] = f32::NAN, NetworkError::InvalidWidth { centre: 0 }),
+        (|s| s.input_minimum[1] = f32::NAN, NetworkError::NotFinite { what: "input_minimum" }),
+        (|s| s.input_per_span[2] = f32::NAN, NetworkError::NotFinite { what: "input_per_span" }),
         (|s| s.centres[4] = f32::NAN, NetworkError::NotFinite { what: "centres" }),
+        (|s| s.output_weights[5] = f32::NAN, NetworkError::NotFinite { what: "output_weights" }),
         (|s| s.bias[0] = f32::INFINITY, NetworkError::NotFinite { what: "bias" }),
+        (|s| s.affine[9] = f32::NEG_INFINITY, NetworkError::NotFinite { what: "affine" }),
         (|s| s.input_per_span[3] = -1.0, NetworkError::NegativeSpan { input: 3 }),
     ] {
         assert_eq!(network(change), Err(error));
@@ -151,24 +155,13 @@ fn inference_from_scaled_inputs_is_the_rest_of_inference_bit_for_bit() {
     let reading = [50.0, 52.5, 55.0, 57.5, 60.0];
     let (mut scaled, mut output) = ([0.0; 5], [0.0; 2]);
     network.scale(&reading, &mut scaled).unwrap();
-    network.infer_scaled(&mut scaled, &mut output).unwrap();
+    network.infer_scaled_with::<Polynomial>(&mut scaled, &mut output).unwrap();
     assert_eq!(output, infer::<Polynomial>(&network, &reading));
     let error = NetworkError::Length { what: "scaled", expected: 5, found: 4 };
-    assert_eq!(network.infer_scaled(&mut [0.0; 4], &mut output), Err(error));
+    assert_eq!(network.infer_scaled_with::<Polynomial>(&mut [0.0; 4], &mut output), Err(error));
 }
 
 proptest! {
-    /// Inference gives the same bits with sizes known at run time and at compile time.
-    #[test]
-    fn both_entries_agree_bit_for_bit(reading in prop::array::uniform5(-1e3_f32..1e3)) {
-        let sample = Sample::new();
-        let network = Network::from(direct::Network::try_new(SHAPE, sample.parameters()).unwrap());
-        let mut dynamic = [0.0; 2];
-        network.infer(&reading, &mut [0.0; 5], &mut dynamic).unwrap();
-        let fixed = infer::<Polynomial>(&network, &reading);
-        prop_assert_eq!(dynamic.map(f32::to_bits), fixed.map(f32::to_bits));
-    }
-
     /// The clamp keeps the outputs of any finite reading within a bound from the weights.
     #[test]
     fn output_is_bounded_for_any_finite_reading(

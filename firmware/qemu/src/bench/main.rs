@@ -134,5 +134,5 @@ fn measure_inference(network: &Network<'_>, arena: &mut Arena) {
 
 #[inline(never)]
 fn infer(network: &Network<'_>, scaled: &mut [f32], outputs: &mut [f32]) {
-    let _ = network.infer_scaled(scaled, outputs);
+    let _ = network.infer_scaled_with::<Polynomial>(scaled, outputs);
 }

@@ -2,9 +2,9 @@
 
 use model_core::confidence::project;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 use taxel_data::table::Table;
 
+use crate::parallel;
 use crate::train::principal;
 
 /// Frames whose products are summed before the sum is added to those of others.
@@ -62,8 +62,7 @@ impl Features {
             let z = DMatrix::from_iterator(size, frames.len() / size, lines);
             &z * z.transpose()
         };
-        let pieces = readings.values.par_chunks(FRAMES_AT_ONCE * size);
-        let sums: Vec<DMatrix<f64>> = pieces.map(products).collect();
+        let sums = parallel::pieces(&readings.values, FRAMES_AT_ONCE * size, &products);
         let sum = sums.into_iter().fold(DMatrix::zeros(size, size), |sum, piece| sum + piece);
         sum / readings.len() as f64
     }
@@ -79,6 +78,8 @@ impl Features {
             project(frame, [&self.mean, &self.scale], &projection, &mut z, &mut features);
             features.into_iter().map(f64::from)
         };
-        readings.par_chunks_exact(size).flat_map_iter(of_frame).collect()
+        let of_piece =
+            |frames: &[f64]| -> Vec<f64> { frames.chunks_exact(size).flat_map(of_frame).collect() };
+        parallel::pieces(readings, FRAMES_AT_ONCE * size, &of_piece).concat()
     }
 }

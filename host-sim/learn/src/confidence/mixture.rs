@@ -2,9 +2,9 @@
 //! B 39, 1977) from K-means centres.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use rayon::prelude::*;
 use taxel_data::random::{Purpose, Random, Stream};
 
+use crate::parallel;
 use crate::train::kmeans::{self, Search};
 
 /// Points that a thread takes at a time.
@@ -196,7 +196,7 @@ fn sums(
         }
         (sums, likelihood)
     };
-    let pieces: Vec<_> = points.par_chunks(POINTS_AT_ONCE * size).map(of_piece).collect();
+    let pieces = parallel::pieces(points, POINTS_AT_ONCE * size, &of_piece);
     let mut all = (vec![Sums::zero(size); components], 0.0);
     for (sums, likelihood) in &pieces {
         all.0.iter_mut().zip(sums).for_each(|(all, sums)| all.merge(sums));

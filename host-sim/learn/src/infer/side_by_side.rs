@@ -1,8 +1,6 @@
 //! Inference of networks in f32 with expanded distances, several lines side by side: the bits of
 //! [`model_core::rbf::expanded`], several times as fast.
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use model_core::exp::exp2;
 use model_core::rbf::expanded::{self, Parameters};
 use model_core::rbf::{Network, Shape};

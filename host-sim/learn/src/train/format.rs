@@ -14,7 +14,8 @@ use taxel_data::table::Table;
 
 use super::hidden_layer::{HiddenLayer, not_held};
 use super::least_squares::{Decomposed, Design, Factor, Recursion, predict};
-use super::{Options, Recursive, Samples, Solver};
+use super::samples::{Ridge, Samples};
+use super::{Options, Recursive, Solver};
 use crate::error::{Error, Result, parameter_not_held};
 use crate::infer::{Exponential, infer};
 
@@ -222,15 +223,6 @@ pub(super) fn held(
             Box::new(direct_f32::Direct::new(samples, layer, options))
         }
     })
-}
-
-/// Penalties on the squared weights of a network.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Ridge {
-    /// One over the penalty on every weight: the initial covariance δ of a recursion.
-    pub initial_covariance: f64,
-    /// What is added to the penalty on the weights of the affine tail. A recursion has none.
-    pub of_tail: f64,
 }
 
 /// Samples of a table that weights are fitted to.

@@ -2,11 +2,11 @@
 //! neighbours.
 
 use model_core::rbf::Format;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use taxel_data::BadValue;
 
 use super::squared_distance;
+use crate::parallel;
 
 /// Neighbours of a centre whose distances give its width, P.
 pub const NEIGHBOURS: usize = 2;
@@ -54,10 +54,7 @@ impl Widths {
         if self == Self::Common || count < 2 {
             return Vec::new();
         }
-        let distances: Vec<f64> = (0..count)
-            .into_par_iter()
-            .map(|k| distance_to_neighbours(centres, inputs, k))
-            .collect();
+        let distances = parallel::map(count, &|k| distance_to_neighbours(centres, inputs, k));
         let mean = distances.iter().sum::<f64>() / count as f64;
         distances
             .into_iter()

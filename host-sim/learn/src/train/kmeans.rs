@@ -4,8 +4,6 @@
 //! features; among equals, to the first. `screen` avoids computing most distances in f64, which changes nothing in
 //! the result.
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use std::borrow::Cow;
 
 use taxel_data::random::Random;

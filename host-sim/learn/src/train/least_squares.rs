@@ -7,9 +7,10 @@
 use std::ops::Range;
 
 use model_core::rls;
-use rayon::prelude::*;
 
 use taxel_data::table::Table;
+
+use crate::parallel;
 
 mod exp;
 mod gaussian;
@@ -17,6 +18,7 @@ mod triangle;
 mod recursion;
 
 pub(crate) use exp::exponentiate_non_positive;
+pub(crate) use gaussian::squared_distances;
 pub use gaussian::{Gaussians, Regressors};
 pub use recursion::Recursion;
 use triangle::{NewRows, ROWS_AT_ONCE, Triangle};
@@ -67,11 +69,10 @@ impl Decomposed {
         let regressors = design.regressors();
         let samples = targets.len() / outputs;
         let piece = piece(samples, regressors);
-        let starts: Vec<usize> = (0..samples).step_by(piece).collect();
-        let pieces = starts
-            .into_par_iter()
-            .map(|start| decompose(design, targets, outputs, start..samples.min(start + piece)))
-            .collect();
+        let pieces = parallel::map(samples.div_ceil(piece), &|index| {
+            let start = index * piece;
+            decompose(design, targets, outputs, start..samples.min(start + piece))
+        });
         Self { pieces, regressors, outputs }
     }
 
@@ -199,4 +200,4 @@ pub fn fit(
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+mod tests;

@@ -5,7 +5,8 @@ use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{in_words, require};
 
-use super::{Options, projection};
+use super::Options;
+use super::projection::USUAL_FEATURES;
 
 /// Copies of the samples that are held at once: as read, by row-wire, scaled, and as features.
 const COPIES: f64 = 4.0;
@@ -23,9 +24,10 @@ pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -
     let [frames, readings, all_outputs, rows] =
         [dataset.frames(), dataset.inputs.names.len(), dataset.outputs.names.len(), dataset.rows]
             .map(|count| count as f64);
-    let features = || projection::features_of(dataset, options.features) as f64;
+    let usual = if dataset.rows == 1 { USUAL_FEATURES as f64 } else { readings / rows };
+    let features = options.features.map_or(usual, |features| features as f64);
     let (networks, inputs) =
-        if options.whole_array { (1.0, features()) } else { (rows, readings / rows) };
+        if options.whole_array { (1.0, features) } else { (rows, readings / rows) };
     let outputs = all_outputs / networks;
     let weights = options.centres as f64 + 1.0 + if options.affine_tail { inputs } else { 0.0 };
     let at_once = networks.min(rayon::current_num_threads() as f64);

@@ -12,7 +12,6 @@
 
 use model_core::expansion::Expansion;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 use taxel_data::BadValue;
 use taxel_data::dataset::RowTable;
 use taxel_data::table::Table;
@@ -23,6 +22,7 @@ use super::least_squares::{Factor, Regressors};
 use super::principal;
 use super::{Options, Samples};
 use crate::error::Result;
+use crate::parallel;
 
 /// Lines that one thread expands at a time.
 const LINES_AT_ONCE: usize = 256;
@@ -117,9 +117,8 @@ pub fn expand(expansion: Expansion<'_>, components: &[f64]) -> Vec<f64> {
     if width == 0 || outputs == 0 {
         return Vec::new();
     }
-    let mut values = vec![f64::NAN; components.len() / width * outputs];
-    let pieces = values.par_chunks_mut(LINES_AT_ONCE * outputs);
-    pieces.zip(components.par_chunks(LINES_AT_ONCE * width)).for_each(|(values, components)| {
+    let of_piece = |components: &[f64]| {
+        let mut values = vec![f64::NAN; components.len() / width * outputs];
         let (mut given, mut expanded) = (vec![0.0; width], vec![0.0; outputs]);
         for (values, line) in values.chunks_exact_mut(outputs).zip(components.chunks_exact(width)) {
             if line.iter().all(|component| component.is_finite()) {
@@ -128,8 +127,9 @@ pub fn expand(expansion: Expansion<'_>, components: &[f64]) -> Vec<f64> {
                 values.iter_mut().zip(&expanded).for_each(|(place, y)| *place = f64::from(*y));
             }
         }
-    });
-    values
+        values
+    };
+    parallel::pieces(components, LINES_AT_ONCE * width, &of_piece).concat()
 }
 
 #[cfg(test)]

@@ -15,7 +15,6 @@ use std::borrow::Cow;
 
 use model_core::projection::Projection;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::require;
 use taxel_data::simd;
@@ -23,6 +22,7 @@ use taxel_data::table::Table;
 
 use super::principal;
 use crate::error::{Error, Result, no_regression};
+use crate::parallel;
 
 /// Frames whose products are summed before the sum is added to those of others.
 const FRAMES_AT_ONCE: usize = 1024;
@@ -74,15 +74,6 @@ pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
     about_means(&parts, &means)
 }
 
-/// Number of features that the readings of `dataset` are projected to, unless there are fewer products of outputs.
-pub(super) fn features_of(dataset: &Dataset, features: Option<usize>) -> usize {
-    let usual = match dataset.rows {
-        1 => USUAL_FEATURES,
-        rows => dataset.inputs.names.len() / rows,
-    };
-    features.unwrap_or(usual)
-}
-
 /// Parameters of the projection with these `parts` (`readings × features`), whose features are 0 at the `means`
 /// of the readings.
 ///
@@ -103,6 +94,28 @@ pub(super) fn about_means(parts: &[f64], means: &[f64]) -> Result<Vec<f32>> {
         Ok(parameters)
     } else {
         Err(Error::failed("the projection of these readings is beyond f32"))
+    }
+}
+
+/// Projection of `dataset`'s readings with the given `parameters`.
+///
+/// # Panics
+/// If `parameters` are not as many as [`fit`] makes for this data set.
+pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
+    let readings = dataset.inputs.names.len();
+    Projection::new(readings, parameters.len() / (readings + 1), parameters)
+        .expect("a projection of these readings")
+}
+
+/// What networks are given of the frames of `dataset`: these themselves, or what a projection of these `parameters`
+/// [makes](apply) of them.
+///
+/// # Panics
+/// If the projection is one of other readings.
+pub fn seen<'d>(parameters: Option<&[f32]>, dataset: &'d Dataset) -> Cow<'d, Dataset> {
+    match parameters {
+        Some(parameters) => Cow::Owned(apply(view(parameters, dataset), dataset)),
+        None => Cow::Borrowed(dataset),
     }
 }
 
@@ -136,10 +149,9 @@ pub fn features(
         projection.project(&line, &mut features);
         features.into_iter().map(f64::from)
     };
-    let pieces = readings.par_chunks(FRAMES_AT_ONCE * width);
-    let values: Vec<Vec<f64>> =
-        pieces.map(|lines| lines.chunks_exact(width).flat_map(of_line).collect()).collect();
-    values.concat()
+    let of_piece =
+        |lines: &[f64]| -> Vec<f64> { lines.chunks_exact(width).flat_map(of_line).collect() };
+    parallel::pieces(readings, FRAMES_AT_ONCE * width, &of_piece).concat()
 }
 
 /// What the projection has to tell: the `outputs`, and where these are fewer than `features`, their products of two
@@ -221,35 +233,38 @@ fn products(readings: &Table, targets: &Table, means: &[f64]) -> Vec<f64> {
     let means = [means, &targets.means()].concat();
     let width = means.len();
     let (inputs, outputs) = (readings.names.len(), targets.names.len());
-    let pieces = readings.values.par_chunks(FRAMES_AT_ONCE * inputs);
-    let pieces = pieces.zip(targets.values.par_chunks(FRAMES_AT_ONCE * outputs));
-    let sums: Vec<Vec<f64>> = pieces
-        .map(|(inputs_of_piece, outputs_of_piece)| {
-            let mut sums = vec![0.0; width * width];
-            let lines = inputs_of_piece.chunks_exact(inputs);
-            for (readings, outputs) in lines.zip(outputs_of_piece.chunks_exact(outputs)) {
-                // Readings in f32, as the device has them.
-                let readings = readings.iter().map(|reading| f64::from(*reading as f32));
-                let values = readings.chain(outputs.iter().copied());
-                let z: Vec<f64> = values.zip(&means).map(|(value, mean)| value - mean).collect();
-                simd::widest(
-                    #[inline(always)]
-                    || add_products(&z, inputs, &mut sums),
-                );
-            }
-            sums
-        })
-        .collect();
-    let mut total = vec![0.0; width * width];
-    for sums in &sums {
-        total.iter_mut().zip(sums).for_each(|(total, sum)| *total += sum);
+    let of_piece = |piece| {
+        let mut sums = vec![0.0; width * width];
+        let readings = parallel::piece(&readings.values, FRAMES_AT_ONCE * inputs, piece);
+        let targets = parallel::piece(&targets.values, FRAMES_AT_ONCE * outputs, piece);
+        for (readings, targets) in readings.chunks_exact(inputs).zip(targets.chunks_exact(outputs))
+        {
+            // Readings in f32, as the device has them.
+            let readings = readings.iter().map(|reading| f64::from(*reading as f32));
+            let values = readings.chain(targets.iter().copied());
+            let z: Vec<f64> = values.zip(&means).map(|(value, mean)| value - mean).collect();
+            simd::widest(
+                #[inline(always)]
+                || add_products(&z, inputs, &mut sums),
+            );
+        }
+        sums
+    };
+    sum(&parallel::map(readings.len().div_ceil(FRAMES_AT_ONCE), &of_piece))
+}
+
+/// Sums of lists of the same length, added in their order.
+pub(crate) fn sum(lists: &[Vec<f64>]) -> Vec<f64> {
+    let mut total = vec![0.0; lists.first().map_or(0, Vec::len)];
+    for list in lists {
+        total.iter_mut().zip(list).for_each(|(total, value)| *total += value);
     }
     total
 }
 
 /// Adds the products zᵢ·zⱼ to the sums, for i among the inputs and j ≥ i.
 #[inline(always)]
-fn add_products(z: &[f64], inputs: usize, sums: &mut [f64]) {
+pub(crate) fn add_products(z: &[f64], inputs: usize, sums: &mut [f64]) {
     for (i, sums) in sums.chunks_exact_mut(z.len()).take(inputs).enumerate() {
         let factor = z[i];
         sums[i..].iter_mut().zip(&z[i..]).for_each(|(sum, z)| *sum += factor * z);

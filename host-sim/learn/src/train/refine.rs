@@ -7,7 +7,6 @@
 
 use std::collections::BTreeSet;
 
-use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
@@ -24,8 +23,8 @@ mod loss;
 mod adam;
 mod turn;
 mod targets;
-mod sources;
 mod width;
+mod sources;
 mod descent;
 mod folds;
 
@@ -123,7 +122,7 @@ impl Refinement {
     }
 }
 
-/// Refines the `layers` that training on `dataset` starts from.
+/// Refines the `layers` that training on `dataset` starts from, to those that it ends with.
 ///
 /// The refined layers are the same on any number of threads.
 ///
@@ -133,19 +132,19 @@ impl Refinement {
 ///
 /// # Panics
 /// If folds are not given for every frame, or fresh frames have other columns than the data set.
-pub fn refine(
-    dataset: &Dataset,
-    layers: &Layers,
+pub fn refine<'d>(
+    dataset: &'d Dataset,
+    layers: &Layers<'_>,
     options: &Options,
     settings: &Refinement,
     examples: Examples<'_>,
     progress: &dyn Progress,
-) -> Result<Layers> {
+) -> Result<Layers<'d>> {
     settings.check(examples, dataset.frames())?;
     let pieces = settings.pieces(dataset.frames(), options.centres, examples);
     memory::check(dataset, options, Some(pieces))?;
     let sources = Sources::new(dataset, layers);
-    let start = |layer| Descent::new(&sources, layer, options, settings);
+    let start = |layer| Descent::new(sources.start(layer), options, settings);
     let mut descents: Vec<Descent> = layers.hidden.iter().enumerate().map(start).collect();
     match examples {
         Examples::Fresh(fresh) => {
@@ -172,25 +171,8 @@ pub fn refine(
             })?;
         }
     }
-    let mut refined = match (sources.projected(), descents.as_slice()) {
-        (Some(projected), [descent]) => {
-            let (layer, mix) = descent.layer();
-            projected.layers(dataset, mix, &layer)?
-        }
-        _ => Layers {
-            projection: None,
-            hidden: descents.iter().map(|descent| descent.layer().0).collect(),
-        },
-    };
-    for (network, layer) in refined.hidden.iter_mut().enumerate() {
-        // As the blob holds them.
-        layer.centres.iter_mut().for_each(|c| *c = f64::from(*c as f32));
-        if options.format == Format::Fixed16 {
-            let ranges = sources.ranges(network);
-            layer.spread = layer.spread.max(width::least(options.format, &layer.centres, &ranges));
-        }
-    }
-    Ok(refined)
+    let found: Vec<_> = descents.iter().map(Descent::layer).collect();
+    sources.layers(dataset, &found, options.format)
 }
 
 /// Most steps of progress that refinement of so many `networks` takes on folds. Descents that end sooner take fewer.

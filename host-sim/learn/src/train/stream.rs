@@ -20,7 +20,7 @@ use super::format::{self, FittedNetwork, Held, Targets, expanded_f32};
 use super::least_squares::{Recursion, predict};
 use super::{
     Examples, HiddenLayer, Layers, Options, Recursive, Refinement, Samples, Solver, Trained,
-    output_rank, refine,
+    output_rank, projection, refine,
 };
 use crate::error::Result;
 
@@ -83,34 +83,34 @@ pub fn train(
             (layers, settings.options(options))
         }
     };
-    fit(frames, layers, &options, progress)
+    fit(frames, &layers, &options, progress)
 }
 
 /// Fits the output weights of networks with these `layers` to all `frames`.
 fn fit(
     mut frames: Frames<'_>,
-    layers: Layers,
+    layers: &Layers<'_>,
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<(Trained, Vec<Learned>)> {
     let first = frames.first;
     // What a format does to weights of the first frames decides on it: there is no second look at the others.
     let by_qr = Options { solver: Solver::Qr, ..*options };
-    let chosen = super::fit(first, layers.clone(), &by_qr, progress)?;
+    let chosen = super::fit(layers, &by_qr, progress)?;
     let format = chosen.networks.first().map_or(options.format, FittedNetwork::format);
     let covariance = options.initial_covariance(frames.count.unwrap_or(first.frames()));
-    let seen = layers.seen(first);
-    let test = frames.test.map(|test| layers.seen(test));
-    let rows = layers.hidden.par_iter().enumerate().map(|(row, layer)| {
+    let parameters = layers.projection.as_deref();
+    let test = frames.test.map(|test| projection::seen(parameters, test));
+    let rows = layers.hidden.iter().enumerate().map(|(row, layer)| {
         let test = test.as_ref().map(|test| test.row_table(row));
-        Row::new(&seen.row_table(row), test, layer, options, format, covariance)
+        Row::new(&layers.seen.row_table(row), test, layer, options, format, covariance)
     });
     let mut rows: Vec<Row> = rows.collect::<Result<_>>()?;
     progress.stage("fit weights by recursion", frames.count.unwrap_or(0).div_ceil(first.frames()));
     let (mut piece, mut count) = (Some(Cow::Borrowed(first)), 0);
     while let Some(current) = piece {
         let absorb = || {
-            let seen = layers.seen(&current);
+            let seen = projection::seen(parameters, &current);
             let of_row = |(row, it): (usize, &mut Row)| it.absorb(&seen.row_table(row), count);
             rows.par_iter_mut().enumerate().for_each(of_row);
         };
@@ -124,7 +124,7 @@ fn fit(
     let curve = curve(&rows);
     let networks = rows.into_par_iter().map(|row| row.network(format));
     let networks = networks.collect::<Result<_>>()?;
-    Ok((Trained { projection: layers.projection, networks, frames: count }, curve))
+    Ok((Trained { projection: layers.projection.clone(), networks, frames: count }, curve))
 }
 
 /// Checks that the frames of `next` have the columns of the `first` ones.

@@ -1,12 +1,12 @@
-use super::least_squares::tests::fit_batch;
-use super::least_squares::{Regressors, fit};
+use taxel_data::dataset::RowTable;
+use taxel_data::progress::Silent;
+use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::table::Table;
 
 use super::*;
 use crate::decoders::RowDecoder;
 use crate::decoders::standard::StandardNetwork;
 use crate::infer::{Exponential, infer};
-use taxel_data::progress::Silent;
 
 /// Table of `frames` of a smooth function of two inputs, with a little noise.
 fn table(frames: usize, noise: f64) -> RowTable {
@@ -29,68 +29,6 @@ fn table(frames: usize, noise: f64) -> RowTable {
 fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
     norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
-}
-
-fn predictions(regressors: &Regressors<'_>, scaled: &[f64], weights: &[f64]) -> Vec<f64> {
-    let mut h = vec![0.0; regressors.count()];
-    let outputs = weights.len() / h.len();
-    let mut all = Vec::new();
-    for line in scaled.chunks_exact(regressors.inputs) {
-        regressors.evaluate(line, &mut h);
-        for output in 0..outputs {
-            let w = weights.iter().skip(output).step_by(outputs);
-            all.push(h.iter().zip(w).map(|(h, w)| h * w).sum());
-        }
-    }
-    all
-}
-
-#[test]
-fn weights_equal_batch_ridge_on_a_well_conditioned_set() {
-    let table = table(5000, 0.1); // several pieces are merged
-    let samples = Samples::new(&table);
-    let centres: Vec<f64> =
-        (0..9).flat_map(|i| [f64::from(i % 3), f64::from(i / 3)]).map(|c| c / 2.0).collect();
-    let regressors =
-        Regressors { centres: &centres, inputs: 2, decays: &[20.0], affine_tail: false };
-    for initial_covariance in [1.0, 1e3, 1e6] {
-        let in_groups = fit(&regressors, &samples.scaled, &table.outputs, initial_covariance);
-        let batch = fit_batch(&regressors, &samples.scaled, &table.outputs, initial_covariance);
-        let relative = relative_difference(&in_groups, &batch);
-        println!("well-conditioned, δ = {initial_covariance:e}: weights differ by {relative:.1e}");
-        assert!(relative <= 1e-8, "δ = {initial_covariance}: {relative:e}");
-    }
-}
-
-#[test]
-fn predictions_equal_batch_ridge_on_an_ill_conditioned_set() {
-    let table = table(3000, 0.01);
-    let samples = Samples::new(&table);
-    let centres: Vec<f64> = (0..32).map(|i| f64::from(i * 7 % 32) / 32.0).collect();
-    // Wide Gaussians all look alike, and the affine tail repeats their information.
-    let regressors =
-        Regressors { centres: &centres, inputs: 2, decays: &[0.02], affine_tail: true };
-    let n = regressors.count();
-    let mut h = nalgebra::DMatrix::zeros(table.inputs.len(), n);
-    let mut row = vec![0.0; n];
-    for (i, line) in samples.scaled.chunks_exact(2).enumerate() {
-        regressors.evaluate(line, &mut row);
-        row.iter().enumerate().for_each(|(j, v)| h[(i, j)] = *v);
-    }
-    let singular = h.singular_values();
-    assert!(singular.max() / singular.min() > 1e12, "the set must be hard");
-    for initial_covariance in [1e3, 1e6, 1e9] {
-        let in_groups = fit(&regressors, &samples.scaled, &table.outputs, initial_covariance);
-        let batch = fit_batch(&regressors, &samples.scaled, &table.outputs, initial_covariance);
-        let relative = relative_difference(
-            &predictions(&regressors, &samples.scaled, &in_groups),
-            &predictions(&regressors, &samples.scaled, &batch),
-        );
-        println!(
-            "ill-conditioned, δ = {initial_covariance:e}: predictions differ by {relative:.1e}"
-        );
-        assert!(relative <= 1e-6, "δ = {initial_covariance}: {relative:e}");
-    }
 }
 
 #[test]

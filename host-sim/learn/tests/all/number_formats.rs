@@ -1,7 +1,6 @@
 //! Loss of accuracy by number formats: the same centres fitted and evaluated in f64, in f32 and in 16-bit
 //! fixed point, on both reference scenes, by axis. Figures: `cargo test -p taxel-learn --test all number_formats -- --nocapture`.
 
-use model_core::Decoder;
 use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::columns;
@@ -146,40 +145,4 @@ fn sixteen_bits_cost_no_more_than_a_hundredth_on_press() {
 #[test]
 fn sixteen_bits_cost_no_more_than_a_hundredth_on_paper() {
     check("paper");
-}
-
-#[test]
-fn an_eighth_of_the_training_range_beyond_it_inputs_are_clamped_in_every_format() {
-    let frames = synthesise(&world("press", 0.005), Stream::Training, 300);
-    for format in Format::ALL {
-        let options = Options { centres: 4, format, ..Options::default() };
-        let trained = train(&frames, &options, &Silent).unwrap();
-        let blob = pack(&trained, &frames, &Origin::of_data("press", 0, 1, &frames)).unwrap();
-        let model = blob.parse();
-        let decoder = Decoder::<8>::load(blob.bytes()).unwrap();
-        let inputs = model.shape().inputs;
-        let ranges: Vec<[f32; 2]> = (0..model.shape().rows)
-            .flat_map(|row| {
-                let network = model.networks().nth(model.network_of_row(row).unwrap()).unwrap();
-                (0..inputs).map(move |input| network.training_range(input))
-            })
-            .collect();
-        let middle: Vec<f32> = ranges.iter().map(|[low, high]| (low + high) / 2.0).collect();
-        let mut estimate = decoder.decode(&middle[..]).unwrap();
-        let mut scratch = vec![0.0; decoder.scratch_floats()];
-        let mut clamps = |readings: &[f32]| {
-            let mut estimate = estimate.borrowed();
-            decoder.decode_into(readings.into(), &mut scratch, &mut estimate).unwrap()
-        };
-        assert!(!clamps(&middle));
-        for (place, [low, high]) in ranges.iter().enumerate() {
-            for (share, clamped) in [(0.12, false), (0.13, true), (1e6, true)] {
-                for reading in [low - share * (high - low), high + share * (high - low)] {
-                    let mut readings = middle.clone();
-                    readings[place] = reading;
-                    assert_eq!(clamps(&readings), clamped, "{format:?} {place} {share}");
-                }
-            }
-        }
-    }
 }

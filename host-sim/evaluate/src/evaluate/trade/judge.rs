@@ -67,7 +67,7 @@ impl<'s> Judge<'s> {
         // Layers are shared by all formats and by networks with and without a tail.
         let (layers, options) = layers(frames, inputs, &options, &refining)?;
         refining.finish();
-        let fitted = fit(frames, &layers, &options, &variants, &fitting);
+        let fitted = fit(&layers, &options, &variants, &fitting);
         fitting.finish();
         for (variant, &(format, affine, rank)) in variants.iter().enumerate() {
             let of_rows = fitted.iter().map(|row| row[variant].as_ref().cloned());
@@ -192,33 +192,30 @@ fn weight(centres: usize) -> usize {
 }
 
 /// Layers of networks trained with `options`, and the options for fitting their weights.
-fn layers(
-    frames: &Frames<'_>,
+fn layers<'f>(
+    frames: &'f Frames<'_>,
     inputs: &Inputs,
     options: &Options,
     progress: &dyn Progress,
-) -> Result<(Layers, Options)> {
-    let start = Layers { projection: inputs.projection.clone(), hidden: vec![] };
-    let start = start.with_centres(frames.training(), options);
+) -> Result<(Layers<'f>, Options)> {
+    let dataset = frames.training();
+    let start = Layers::behind(inputs.projection.clone(), dataset, options);
     let settings = Refinement::default();
     let Some(examples) = frames.set.examples() else { return Ok((start, *options)) };
-    let dataset = frames.training();
     let layers = refine::refine(dataset, &start, options, &settings, examples, progress)?;
     Ok((layers, settings.options(options)))
 }
 
 /// Networks of every variant on the same layers, for every row.
 fn fit(
-    frames: &Frames<'_>,
-    layers: &Layers,
+    layers: &Layers<'_>,
     options: &Options,
     variants: &[Variant],
     progress: &dyn Progress,
 ) -> Vec<Vec<taxel_learn::Result<FittedNetwork>>> {
-    let seen = layers.seen(frames.training());
     let rows = layers.hidden.par_iter().enumerate();
     rows.map(|(row, layer)| {
-        let table = seen.row_table(row);
+        let table = layers.seen.row_table(row);
         let samples = Samples::new(&table);
         let fit = |&(format, affine_tail, output_rank): &Variant| {
             let options = Options { affine_tail, format, output_rank, ..*options };

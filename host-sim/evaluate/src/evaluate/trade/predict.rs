@@ -7,7 +7,7 @@ use model_core::rbf::Format;
 use taxel_data::dataset::Dataset;
 use taxel_learn::Exponential;
 use taxel_learn::cost::{Cost, Design, Prices};
-use taxel_learn::train::Layers;
+use taxel_learn::train::projection;
 
 use super::choice::Offer;
 use super::device::Wires;
@@ -31,8 +31,7 @@ pub(super) fn ranks(
 
 /// Number of distinct samples of each network's inputs, counted up to `most`: networks have no more centres.
 fn distinct_samples(dataset: &Dataset, inputs: &Inputs, most: usize) -> Vec<usize> {
-    let layers = Layers { projection: inputs.projection.clone(), hidden: vec![] };
-    let seen = layers.seen(dataset);
+    let seen = projection::seen(inputs.projection.as_deref(), dataset);
     let of_row = seen.inputs.names.len() / seen.rows;
     let distinct = |row: usize| {
         let mut found: HashSet<Vec<u32>> = HashSet::new();

@@ -8,7 +8,8 @@ use taxel_data::dataset::RowTable;
 use taxel_data::table::Table;
 
 use super::super::least_squares::{Design, Factor, Regressors};
-use super::super::{CentredScale, Options, Samples};
+use super::super::samples::CentredScale;
+use super::super::{Options, Samples};
 use super::{FittedNetwork, Held, Targets, Weights};
 use crate::error::Result;
 use crate::infer::{Exponential, infer};
@@ -194,6 +195,7 @@ fn activation_bound(decay: f64, centre: f64, opened: f64, chain: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use model_core::exp::Polynomial;
     use taxel_data::dataset::Dataset;
     use taxel_data::progress::Silent;
     use taxel_data::random::Stream;
@@ -231,7 +233,7 @@ mod tests {
             network.scale(&reading, &mut scaled).unwrap();
             let x: Vec<f64> =
                 scaled.iter().map(|x| f64::from(model_core::scale::clamp_units(*x))).collect();
-            network.infer_scaled(&mut scaled, &mut output).unwrap();
+            network.infer_scaled_with::<Polynomial>(&mut scaled, &mut output).unwrap();
             // The same sum without rounding of the exponents; rounding in the outputs' sum stays, and is
             // small.
             let mut exact: Vec<f64> = p.bias.iter().map(|b| f64::from(*b)).collect();

@@ -18,7 +18,8 @@ use taxel_data::BadValue;
 use taxel_data::dataset::RowTable;
 
 use super::super::least_squares::{Design, Factor};
-use super::super::{CentredScale, Options, Samples, squared_distance};
+use super::super::samples::CentredScale;
+use super::super::{Options, Samples, squared_distance};
 use super::{FittedNetwork, Held, Targets};
 use crate::error::{Error, Result, parameter_not_held};
 

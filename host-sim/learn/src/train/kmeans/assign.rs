@@ -5,8 +5,6 @@
 //!
 //! [`Screen`]: super::screen::Screen
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use rayon::prelude::*;
 use taxel_data::simd::widest;
 

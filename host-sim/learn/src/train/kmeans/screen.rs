@@ -6,8 +6,6 @@
 //!
 //! [`squared_distance`]: crate::train::squared_distance
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 /// Centres that are looked at side by side.
 const LANES: usize = 16;
 

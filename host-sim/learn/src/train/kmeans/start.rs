@@ -1,8 +1,6 @@
 //! Starting centres for Lloyd's iterations, by k-means++ (Arthur & Vassilvitskii, "k-means++: the
 //! advantages of careful seeding", SODA 2007).
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use rayon::prelude::*;
 
 use taxel_data::random::Random;

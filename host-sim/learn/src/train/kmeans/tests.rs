@@ -35,13 +35,6 @@ fn duplicates_end_with_one_centre_a_distinct_point() {
 }
 
 #[test]
-fn as_many_centres_as_points_reach_them_all() {
-    let points = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0];
-    let found = fit(&points, 2, 4, &Search::default(), &mut random(3));
-    assert_eq!((found.centres.len(), found.inertia), (8, 0.0));
-}
-
-#[test]
 fn an_empty_cluster_takes_the_farthest_point() {
     // The third centre is nearest to no point.
     let points = [0.0, 1.0, 10.0, 11.0, 30.0];

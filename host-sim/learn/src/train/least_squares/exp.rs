@@ -1,8 +1,6 @@
 //! Exponentials e^x of many x ≤ 0 at once, in plain f64 operations that compilers turn into vector
 //! instructions. They give the same result on every machine.
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use std::f64::consts::LOG2_E;
 
 /// First part of ln 2, with 21 zero bits at its end, so that k times it is exact.

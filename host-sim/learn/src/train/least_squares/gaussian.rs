@@ -1,7 +1,5 @@
 //! Regressors of the network: Gaussian activations, affine tail, bias.
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -118,11 +116,18 @@ impl Design for Gaussians<'_> {
 /// Exponents −decay·‖x − c‖² of a group of centres.
 #[inline(always)]
 fn exponents(x: &[f64], group: &[[f64; LANES]], decays: &[f64; LANES]) -> [f64; LANES] {
-    let mut sum = [0.0; LANES];
-    for (x, c) in x.iter().zip(group) {
-        for l in 0..LANES {
-            sum[l] += (x - c[l]) * (x - c[l]);
+    let squares = squared_distances(x, group);
+    std::array::from_fn(|l| -decays[l] * squares[l])
+}
+
+/// Squared distances of a point from those that lie side by side in lanes, coordinate after coordinate.
+#[inline(always)]
+pub(crate) fn squared_distances<const L: usize>(x: &[f64], lanes: &[[f64; L]]) -> [f64; L] {
+    let mut sums = [0.0; L];
+    for (x, c) in x.iter().zip(lanes) {
+        for l in 0..L {
+            sums[l] += (x - c[l]) * (x - c[l]);
         }
     }
-    std::array::from_fn(|l| -decays[l] * sum[l])
+    sums
 }

@@ -6,8 +6,6 @@
 //! few samples pass through a few rows at a time, in vector lanes: the divisions and roots of one row hide behind those
 //! of the next.
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use std::ops::Range;
 
 use taxel_data::simd::widest;

@@ -13,8 +13,6 @@
 //!
 //! The order of operations is fixed by the shapes alone, and nothing is contracted: the result is the
 //! same on every machine.
-
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
 #![expect(clippy::needless_range_loop, reason = "loops over lanes read as the formulas do")]
 
 use taxel_data::simd::widest;

@@ -23,7 +23,7 @@ fn known(frames: usize, noise: f64) -> Dataset {
 }
 
 fn projection<'b>(dataset: &Dataset, parameters: &'b [f32]) -> Projection<'b> {
-    crate::train::view(parameters, dataset)
+    view(parameters, dataset)
 }
 
 #[test]
@@ -44,19 +44,6 @@ fn features_carry_all_that_outputs_take_from_readings() {
     // The reading that never changes has no part.
     let parts = &parameters[3..];
     assert_eq!(parts[5 * 3..], [0.0; 3]);
-}
-
-#[test]
-fn the_projection_does_not_depend_on_the_number_of_threads() {
-    let data = synthesise(&World::press(), Stream::Training, 3000);
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| fit(&data, None).unwrap())
-    };
-    let parameters = with(1);
-    assert_eq!(parameters, with(3));
-    assert_eq!(parameters.len(), 18 * 145);
-    assert!(parameters.iter().all(|value| value.is_finite()));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::Refinement;
 use super::adam::Adam;
 use super::loss::{self, Loss};
 use super::movable::{Movable, Piece, Sizes};
-use super::sources::Sources;
+use super::sources::Start;
 use super::width;
 use crate::error::Result;
 use crate::train::Options;
@@ -28,18 +28,9 @@ pub(super) struct Descent {
 }
 
 impl Descent {
-    /// Descent of one network, which starts from `layer`.
-    pub(super) fn new(
-        sources: &Sources,
-        (network, layer): (usize, &HiddenLayer),
-        options: &Options,
-        settings: &Refinement,
-    ) -> Self {
-        let (layer, mix) = match sources.projected() {
-            Some(projected) => (projected.among_features(layer), projected.start()),
-            None => (layer.clone(), vec![]),
-        };
-        let ranges = sources.ranges(network);
+    /// Descent of one network from its `start`.
+    pub(super) fn new(start: Start, options: &Options, settings: &Refinement) -> Self {
+        let Start { layer, mix, ranges } = start;
         let inputs = ranges.len();
         let sizes = Sizes {
             inputs,

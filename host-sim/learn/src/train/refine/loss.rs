@@ -5,11 +5,11 @@
 //! large and cancel.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
-use rayon::prelude::*;
 
 use super::movable::{Activated, Movable, Piece};
 use super::products::{Line, SIDE, add_combinations, add_products, add_squares, transposed};
 use crate::error::{Result, no_regression};
+use crate::parallel;
 
 /// Mean squared error of one set of samples, and its gradient by what moves.
 #[derive(Debug, Clone)]
@@ -32,16 +32,13 @@ impl Solved {
     /// squared weights.
     fn new(movable: &Movable, pieces: &[&Piece], ridge: f64) -> Result<Self> {
         let (n, outputs) = (movable.sizes.regressors(), pieces[0].targets.len());
-        let parts: Vec<(Activated, Vec<f64>, Vec<f64>)> = pieces
-            .par_iter()
-            .map(|piece| {
-                let activated = movable.activate(piece);
-                let (mut squares, mut products) = (vec![0.0; n * n], vec![0.0; n * outputs]);
-                add_squares(&activated.regressors, &mut squares);
-                add_products(&activated.regressors, &piece.targets, &mut products);
-                (activated, squares, products)
-            })
-            .collect();
+        let parts = parallel::map(pieces.len(), &|index| {
+            let activated = movable.activate(pieces[index]);
+            let (mut squares, mut products) = (vec![0.0; n * n], vec![0.0; n * outputs]);
+            add_squares(&activated.regressors, &mut squares);
+            add_products(&activated.regressors, &pieces[index].targets, &mut products);
+            (activated, squares, products)
+        });
         let (mut squares, mut products) = (vec![0.0; n * n], vec![0.0; n * outputs]);
         let mut activated = Vec::with_capacity(parts.len());
         for (of_piece, s, p) in parts {
@@ -65,12 +62,11 @@ impl Solved {
 pub(super) fn on_same(movable: &Movable, pieces: &[&Piece], ridge: f64) -> Result<Loss> {
     let solved = Solved::new(movable, pieces, ridge)?;
     let back = transposed(&solved.weights, pieces[0].targets.len());
-    let of_piece = |(piece, activated): (&&Piece, &Activated)| {
+    let parts = parallel::map(pieces.len(), &|index| {
+        let (piece, activated) = (pieces[index], &solved.activated[index]);
         let (errors, square) = errors(&solved.weights, activated, piece);
         (square, through(movable, piece, activated, &back, &errors))
-    };
-    let parts: Vec<(f64, Vec<f64>)> =
-        pieces.par_iter().zip(&solved.activated).map(of_piece).collect();
+    });
     let squares = parts.iter().map(|(square, _)| *square);
     Ok(mean(movable, pieces, squares, parts.iter().map(|(_, gradient)| gradient)))
 }
@@ -88,35 +84,30 @@ pub(super) fn on_held_out(
     let solved = Solved::new(movable, rest, ridge)?;
     let (n, outputs) = (movable.sizes.regressors(), held_out[0].targets.len());
     let back = transposed(&solved.weights, outputs);
-    let parts: Vec<(f64, Vec<f64>, Vec<f64>)> = held_out
-        .par_iter()
-        .map(|piece| {
-            let activated = movable.activate(piece);
-            let (errors, square) = errors(&solved.weights, &activated, piece);
-            let mut by_weights = vec![0.0; n * outputs];
-            add_products(&activated.regressors, &errors, &mut by_weights);
-            let gradient = through(movable, piece, &activated, &back, &errors);
-            (square, gradient, by_weights)
-        })
-        .collect();
+    let parts = parallel::map(held_out.len(), &|index| {
+        let piece = held_out[index];
+        let activated = movable.activate(piece);
+        let (errors, square) = errors(&solved.weights, &activated, piece);
+        let mut by_weights = vec![0.0; n * outputs];
+        add_products(&activated.regressors, &errors, &mut by_weights);
+        let gradient = through(movable, piece, &activated, &back, &errors);
+        (square, gradient, by_weights)
+    });
     let mut by_weights = vec![0.0; n * outputs];
     parts.iter().for_each(|(_, _, part)| add(&mut by_weights, part));
     let adjoint = solve(&solved.normal, &by_weights, outputs);
     let adjoint_back = transposed(&adjoint, outputs);
     let minus_back: Vec<f64> = back.iter().map(|w| -w).collect();
-    let through_rest: Vec<Vec<f64>> = rest
-        .par_iter()
-        .zip(&solved.activated)
-        .map(|(piece, activated)| {
-            let (errors, _) = errors(&solved.weights, activated, piece);
-            let left: Vec<Line> = errors.into_iter().map(|line| line.map(|e| -e)).collect();
-            let mut of_adjoint = vec![[0.0; SIDE]; outputs];
-            add_combinations(&adjoint, &activated.regressors, &mut of_adjoint);
-            let mut gradient = through(movable, piece, activated, &adjoint_back, &left);
-            add(&mut gradient, &through(movable, piece, activated, &minus_back, &of_adjoint));
-            gradient
-        })
-        .collect();
+    let through_rest = parallel::map(rest.len(), &|index| {
+        let (piece, activated) = (rest[index], &solved.activated[index]);
+        let (errors, _) = errors(&solved.weights, activated, piece);
+        let left: Vec<Line> = errors.into_iter().map(|line| line.map(|e| -e)).collect();
+        let mut of_adjoint = vec![[0.0; SIDE]; outputs];
+        add_combinations(&adjoint, &activated.regressors, &mut of_adjoint);
+        let mut gradient = through(movable, piece, activated, &adjoint_back, &left);
+        add(&mut gradient, &through(movable, piece, activated, &minus_back, &of_adjoint));
+        gradient
+    });
     let squares = parts.iter().map(|(square, ..)| *square);
     let gradients = parts.iter().map(|(_, gradient, _)| gradient).chain(&through_rest);
     Ok(mean(movable, held_out, squares, gradients))
@@ -130,12 +121,13 @@ pub(super) fn held_out_errors(
     ridge: f64,
 ) -> Result<Vec<f64>> {
     let solved = Solved::new(movable, rest, ridge)?;
-    let of_piece = |piece: &&Piece| -> Vec<f64> {
+    let of_piece = |index: usize| -> Vec<f64> {
+        let piece = held_out[index];
         let (errors, _) = errors(&solved.weights, &movable.activate(piece), piece);
         let of_sample = |s: usize| errors.iter().map(|line| line[s] * line[s]).sum();
         (0..piece.samples).map(of_sample).collect()
     };
-    Ok(held_out.par_iter().map(of_piece).collect::<Vec<_>>().concat())
+    Ok(parallel::map(held_out.len(), &of_piece).concat())
 }
 
 /// Gradient by what moves, where the derivative by the regressors is Σ_outputs factor·line.

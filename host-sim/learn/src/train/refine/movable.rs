@@ -6,7 +6,7 @@ use std::ops::Range;
 use taxel_data::simd::widest;
 
 use super::products::{Line, SIDE, add_combinations, add_products};
-use crate::train::least_squares::exponentiate_non_positive;
+use crate::train::least_squares::{exponentiate_non_positive, squared_distances};
 
 /// Sizes of a network that is refined.
 #[derive(Debug, Clone, Copy)]
@@ -186,19 +186,14 @@ impl Movable {
 
 /// Exponents −decay·‖x − c‖² of one centre, for all samples.
 fn exponents_of(inputs: &[Line], centre: &[f64], decay: f64) -> Line {
-    let mut sums = [0.0; SIDE];
     widest(
         #[inline(always)]
         || {
-            for (x, c) in inputs.iter().zip(centre) {
-                for s in 0..SIDE {
-                    sums[s] += (x[s] - c) * (x[s] - c);
-                }
-            }
-            sums.iter_mut().for_each(|sum| *sum *= -decay);
+            let mut exponents = squared_distances(centre, inputs);
+            exponents.iter_mut().for_each(|square| *square *= -decay);
+            exponents
         },
-    );
-    sums
+    )
 }
 
 /// Samples side by side; lines beyond the last sample are 0.

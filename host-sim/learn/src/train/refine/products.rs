@@ -3,8 +3,6 @@
 //! Own code: a library that fuses operations where the machine can would make trained models depend on the
 //! machine. All sums are taken in an order that depends on the shapes alone.
 
-#![expect(clippy::inline_always, reason = "what `simd::widest` runs must be inlined into it")]
-
 use taxel_data::simd::widest;
 
 /// Samples that lie side by side; every line is so long.

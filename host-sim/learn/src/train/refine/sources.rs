@@ -3,15 +3,18 @@
 //! Without a projection these are a row's readings, scaled. With one they are the features that it starts with,
 //! and then all readings: inputs are a mix of both. Features then change as a whole as easily as single parts do.
 
+use std::borrow::Cow;
+
+use model_core::rbf::Format;
 use taxel_data::dataset::Dataset;
 
 use super::movable::Piece;
 use super::targets::Targets;
-use super::turn;
+use super::{turn, width};
 use crate::error::Result;
 use crate::train::hidden_layer::HiddenLayer;
 use crate::train::layers::Layers;
-use crate::train::{InputScale, projection, view};
+use crate::train::{InputScale, projection};
 
 /// Size of a reading as a source: so many times a typical part of the projection, for a reading of one standard
 /// deviation. The larger, the faster single parts move.
@@ -22,7 +25,17 @@ pub(super) struct Sources {
     inputs: Inputs,
     targets: Targets,
     /// Networks: one a row, or one in all.
-    pub(super) networks: usize,
+    networks: usize,
+}
+
+/// Where the descent of a network starts.
+pub(super) struct Start {
+    /// Gaussians among the inputs.
+    pub(super) layer: HiddenLayer,
+    /// What each source adds to each input, `sources × inputs`; empty where sources are the inputs.
+    pub(super) mix: Vec<f64>,
+    /// Ranges that inputs are scaled by.
+    pub(super) ranges: Vec<[f64; 2]>,
 }
 
 enum Inputs {
@@ -33,10 +46,10 @@ enum Inputs {
 }
 
 /// What the refinement of a projection starts from.
-pub(super) struct Projected {
+struct Projected {
     /// f₀ of every feature, then each reading's part in every feature.
     parameters: Vec<f32>,
-    pub(super) features: usize,
+    features: usize,
     /// Low end of each feature's range, and the common span, by which centres are scaled.
     lows: Vec<f64>,
     span: f64,
@@ -47,9 +60,9 @@ pub(super) struct Projected {
 }
 
 impl Sources {
-    pub(super) fn new(dataset: &Dataset, layers: &Layers) -> Self {
+    pub(super) fn new(dataset: &Dataset, layers: &Layers<'_>) -> Self {
         let inputs = if let Some(parameters) = &layers.projection {
-            Inputs::Projected(Projected::new(dataset, parameters, &layers.seen(dataset)))
+            Inputs::Projected(Projected::new(dataset, parameters, &layers.seen))
         } else {
             let scale = |row| InputScale::new(&dataset.row_table(row));
             Inputs::Rows((0..dataset.rows).map(scale).collect())
@@ -58,23 +71,56 @@ impl Sources {
         Self { inputs, targets: Targets::new(dataset, networks), networks }
     }
 
-    /// What the projection's refinement starts from, if there is one.
-    pub(super) fn projected(&self) -> Option<&Projected> {
-        match &self.inputs {
-            Inputs::Projected(projected) => Some(projected),
-            Inputs::Rows(_) => None,
-        }
+    /// Start of the descent of network number `network` with this `layer`.
+    pub(super) fn start(&self, (network, layer): (usize, &HiddenLayer)) -> Start {
+        let (layer, mix) = match &self.inputs {
+            Inputs::Projected(projected) => (projected.among_features(layer), projected.start()),
+            Inputs::Rows(_) => (layer.clone(), vec![]),
+        };
+        Start { layer, mix, ranges: self.ranges(network) }
     }
 
     /// Ranges of the inputs that layers are scaled by.
     ///
     /// The format puts the centres of an input that never changes, which are 0, into its middle.
-    pub(super) fn ranges(&self, network: usize) -> Vec<[f64; 2]> {
+    fn ranges(&self, network: usize) -> Vec<[f64; 2]> {
         let range = |still: bool| if still { [-0.5, 0.5] } else { [0.0, 1.0] };
         match &self.inputs {
             Inputs::Rows(scales) => scales[network].never_changes().map(range).collect(),
             Inputs::Projected(projected) => vec![[0.0, 1.0]; projected.features],
         }
+    }
+
+    /// Layers that the descents on `dataset` have come to: the hidden layer among mixed inputs, and the mix, of each
+    /// network. They are rounded and widened as the `format` asks for.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for a projection beyond f32.
+    pub(super) fn layers<'d>(
+        &self,
+        dataset: &'d Dataset,
+        found: &[(HiddenLayer, &[f64])],
+        format: Format,
+    ) -> Result<Layers<'d>> {
+        let mut layers = match (&self.inputs, found) {
+            (Inputs::Projected(projected), [(layer, mix)]) => {
+                projected.layers(dataset, mix, layer)?
+            }
+            _ => Layers {
+                projection: None,
+                seen: Cow::Borrowed(dataset),
+                hidden: found.iter().map(|(layer, _)| layer.clone()).collect(),
+            },
+        };
+        for (network, layer) in layers.hidden.iter_mut().enumerate() {
+            // As the blob holds them.
+            layer.centres.iter_mut().for_each(|c| *c = f64::from(*c as f32));
+            if format == Format::Fixed16 {
+                let least = width::least(format, &layer.centres, &self.ranges(network));
+                layer.spread = layer.spread.max(least);
+            }
+        }
+        Ok(layers)
     }
 
     /// Samples of network number `network`, side by side.
@@ -119,14 +165,14 @@ impl Projected {
     }
 
     /// Mix that a descent starts with, `sources × features`: the features rotated, and nothing of single readings.
-    pub(super) fn start(&self) -> Vec<f64> {
+    fn start(&self) -> Vec<f64> {
         let mut mix = self.turn.clone();
         mix.resize((self.features + self.readings.len()) * self.features, 0.0);
         mix
     }
 
     /// Centres and widths of `layer` among the features of the mix at the start.
-    pub(super) fn among_features(&self, layer: &HiddenLayer) -> HiddenLayer {
+    fn among_features(&self, layer: &HiddenLayer) -> HiddenLayer {
         let scaled = layer.centres.chunks_exact(self.features);
         let centres = scaled.flat_map(|centre| {
             let feature = |(c, low): (&f64, &f64)| c + low / self.span;
@@ -139,7 +185,7 @@ impl Projected {
     /// Sources of all frames, line after line.
     fn sources(&self, frames: &Dataset) -> Vec<f64> {
         let count = self.readings.len();
-        let view = view(&self.parameters, frames);
+        let view = projection::view(&self.parameters, frames);
         let features = projection::features(view, self.features, count, &frames.inputs.values);
         let lines = features.chunks_exact(self.features).zip(frames.inputs.lines());
         let of_line = |(features, readings): (&[f64], &[f64])| -> Vec<f64> {
@@ -155,12 +201,12 @@ impl Projected {
     ///
     /// # Errors
     /// [`Error`](crate::Error) for a projection beyond f32.
-    pub(super) fn layers(
+    fn layers<'d>(
         &self,
-        dataset: &Dataset,
+        dataset: &'d Dataset,
         mix: &[f64],
         layer: &HiddenLayer,
-    ) -> Result<Layers> {
+    ) -> Result<Layers<'d>> {
         let n = self.features;
         let parts = self.parameters[n..].chunks_exact(n).zip(&self.readings);
         let mixed =
@@ -175,21 +221,19 @@ impl Projected {
         let parts: Vec<f64> = mixed.collect();
         let means: Vec<f64> = self.readings.iter().map(|(mean, _)| *mean).collect();
         let parameters = projection::about_means(&parts, &means)?;
-        let turn = turn::evening(&apply(&parameters, dataset).inputs.values, n);
+        let seen = projection::seen(Some(&parameters), dataset);
+        let turn = turn::evening(&seen.inputs.values, n);
         let parameters = projection::about_means(&turn::turned(&parts, &turn, n), &means)?;
-        let (lows, span) = scale_of(&apply(&parameters, dataset));
+        let seen = projection::seen(Some(&parameters), dataset);
+        let (lows, span) = scale_of(&seen);
         let centres = turn::turned(&layer.centres, &turn, n);
         let scaled = centres
             .chunks_exact(n)
             .flat_map(|centre| centre.iter().zip(&lows).map(|(c, low)| (c - low) / span));
         let (centres, spread) = (scaled.collect(), layer.spread / span);
         let layer = HiddenLayer { centres, spread, ..layer.clone() };
-        Ok(Layers { projection: Some(parameters), hidden: vec![layer] })
+        Ok(Layers { projection: Some(parameters), seen, hidden: vec![layer] })
     }
-}
-
-fn apply(parameters: &[f32], dataset: &Dataset) -> Dataset {
-    projection::apply(view(parameters, dataset), dataset)
 }
 
 /// Low end of every feature's range, and their common span.

@@ -103,9 +103,8 @@ fn a_width_for_each_centre_moves_by_itself() {
         .collect();
     let (least, most) = ratios.iter().fold((f64::MAX, 0.0_f64), |(l, m), r| (l.min(*r), m.max(*r)));
     assert!(most > 1.2 * least, "{ratios:?}");
-    let [before, after] = [start, refined].map(|layers| {
-        rmse(&crate::train::fit(&training, layers, &options, &Silent).unwrap(), &test)
-    });
+    let [before, after] = [start, refined]
+        .map(|layers| rmse(&crate::train::fit(&layers, &options, &Silent).unwrap(), &test));
     assert!(after < 0.98 * before, "{after} and {before}");
 }
 
@@ -138,8 +137,7 @@ fn quick() -> Refinement {
 
 /// Root mean square of the errors in z of a model of one network on `test`.
 fn rmse(trained: &crate::train::Trained, test: &Dataset) -> f64 {
-    let layers = Layers { projection: trained.projection.clone(), hidden: vec![] };
-    let seen = layers.seen(test);
+    let seen = crate::train::projection::seen(trained.projection.as_deref(), test);
     let network = trained.networks[0].network();
     let estimate = infer(&network, Exponential::default(), &seen.inputs.values);
     let squares: f64 = test.outputs.squared_errors(&estimate).iter().skip(2).step_by(3).sum();
@@ -227,7 +225,7 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let layers = Layers::start(&training, &options).unwrap();
         let layers = refine(&training, &layers, &options, &quick(), examples, &taken).unwrap();
         let refined = quick().options(&options);
-        let refined = crate::train::fit(&training, layers, &refined, &Silent).unwrap();
+        let refined = crate::train::fit(&layers, &refined, &Silent).unwrap();
         let start = train(&training, &options, &Silent).unwrap();
         let ratio = rmse(&refined, &test) / rmse(&start, &test);
         assert!(ratio < most, "{noise}: {ratio}");
@@ -235,21 +233,6 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let steps = taken.0.into_inner() - quick().steps;
         assert!(steps.is_multiple_of(20) && (steps > 0) == (ratio < 0.99), "{steps}");
     }
-}
-
-#[test]
-fn the_least_width_is_just_held_by_fixed16() {
-    let world = World { read_rows: vec![3], ..World::press() };
-    let training = Synthesis::new(&world).frames(Stream::Training, 500);
-    let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
-    let start = Layers::start(&training, &options).unwrap();
-    let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 18]);
-    let held = |spread: f64| {
-        let mut layers = start.clone();
-        layers.hidden[0].spread = spread;
-        crate::train::fit(&training, layers, &options, &Silent).is_ok()
-    };
-    assert!(held(least) && !held(0.999 * least), "{least}");
 }
 
 /// Few inputs are near each other: there the decay's 32 bits are what ends.
@@ -267,7 +250,7 @@ fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
     let held = |spread: f64| {
         let mut layers = start.clone();
         layers.hidden[0].spread = spread;
-        crate::train::fit(&data, layers, &options, &Silent).is_ok()
+        crate::train::fit(&layers, &options, &Silent).is_ok()
     };
     assert!(held(least) && !held(0.999 * least), "{least}");
 }

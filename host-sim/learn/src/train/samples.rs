@@ -1,0 +1,160 @@
+//! Samples of one network, scaled as the device scales them, and what is fitted to them.
+
+use model_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
+use taxel_data::dataset::RowTable;
+use taxel_data::random::{Purpose, Random, Stream};
+
+use super::{HiddenLayer, Options, kmeans};
+
+/// Frames for each regressor below which they are few.
+const FEW_FRAMES: usize = 50;
+/// Least error of a reading over its range, whatever few frames say.
+const LEAST_ERROR: f64 = 1e-3;
+
+/// Minimum and span of every input, by which readings are scaled to [0, 1].
+#[derive(Debug, Clone, PartialEq)]
+pub struct InputScale {
+    pub(super) minimum: Vec<f64>,
+    /// One over each input's span; 0 for an input that never changes.
+    pub(super) per_span: Vec<f64>,
+}
+
+impl InputScale {
+    /// Scale of a table's inputs, rounded to the numbers that the blob holds.
+    pub fn new(table: &RowTable) -> Self {
+        // Ranges of the readings in f32, as the device has them.
+        let ranges: Vec<[f32; 2]> =
+            table.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
+        let per_span = |[low, high]: &[f32; 2]| {
+            let per_span = 1.0 / (high - low);
+            if per_span.is_finite() { f64::from(per_span) } else { 0.0 }
+        };
+        Self {
+            minimum: ranges.iter().map(|[low, _]| f64::from(*low)).collect(),
+            per_span: ranges.iter().map(per_span).collect(),
+        }
+    }
+
+    /// Whether each input never changes; it is scaled to 0.
+    pub(super) fn never_changes(&self) -> impl Iterator<Item = bool> {
+        self.per_span.iter().map(|per_span| *per_span == 0.0)
+    }
+
+    /// Scales `readings` (`samples × inputs`) to [0, 1], and clamps them like the device does.
+    pub fn apply(&self, readings: &[f64]) -> Vec<f64> {
+        let ranges = self.minimum.iter().zip(&self.per_span).cycle();
+        let [low, high] = CLAMP.map(f64::from);
+        let scale = |(value, (minimum, per_span)): (&f64, (&f64, &f64))| {
+            ((f64::from(*value as f32) - minimum) * per_span).clamp(low, high)
+        };
+        readings.iter().zip(ranges).map(scale).collect()
+    }
+}
+
+/// Middle of every input's range, and scale about it: the scaling of the formats with expanded
+/// distances.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CentredScale {
+    pub midpoint: Vec<f32>,
+    /// Number of [`UNITS`] in one unit of the reading; 0 for an input that never changes.
+    pub per_unit: Vec<f32>,
+}
+
+impl CentredScale {
+    pub fn new(table: &RowTable) -> Self {
+        let range = |range: [f64; 2]| range.map(|v| f64::from(v as f32));
+        let ranges = || table.input_ranges().into_iter().map(range);
+        let per_unit = |[low, high]: [f64; 2]| {
+            let per_unit = (f64::from(UNITS) / (f64::from(HALF_RANGE) * (high - low))) as f32;
+            if per_unit.is_finite() { per_unit } else { 0.0 }
+        };
+        Self {
+            midpoint: ranges().map(|[low, high]| (0.5 * (low + high)) as f32).collect(),
+            per_unit: ranges().map(per_unit).collect(),
+        }
+    }
+
+    pub(super) fn never_changes(&self) -> impl Iterator<Item = bool> {
+        self.per_unit.iter().map(|per_unit| *per_unit == 0.0)
+    }
+
+    /// Scales all inputs of `table` like the device does before its clamp, line after line.
+    pub fn units<'a>(&'a self, table: &'a RowTable) -> impl Iterator<Item = f32> + 'a {
+        table.inputs.lines().flat_map(|line| {
+            let ranges = self.midpoint.iter().zip(&self.per_unit);
+            line.iter().zip(ranges).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
+        })
+    }
+
+    /// Scales all inputs of `table` to [0, 1] and clamps them, line after line.
+    pub fn apply(&self, table: &RowTable) -> Vec<f64> {
+        let spans = f64::from(HALF_RANGE) / f64::from(UNITS);
+        self.units(table).map(|x| 0.5 + f64::from(clamp_units(x)) * spans).collect()
+    }
+}
+
+/// Penalties on the squared weights of a network.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Ridge {
+    /// One over the penalty on every weight: the initial covariance δ of a recursion.
+    pub initial_covariance: f64,
+    /// What is added to the penalty on the weights of the affine tail. A recursion has none.
+    pub of_tail: f64,
+}
+
+/// Samples of one network, with their inputs scaled to [0, 1].
+#[derive(Debug, Clone)]
+pub struct Samples<'b> {
+    pub(crate) scale: InputScale,
+    /// Scaled inputs, `samples × inputs`.
+    pub(crate) scaled: Vec<f64>,
+    pub(crate) table: &'b RowTable,
+}
+
+impl<'b> Samples<'b> {
+    /// Scales the inputs of `table` to [0, 1].
+    pub fn new(table: &'b RowTable) -> Self {
+        let scale = InputScale::new(table);
+        Self { scaled: scale.apply(&table.inputs.values), scale, table }
+    }
+
+    pub(crate) fn inputs(&self) -> usize {
+        self.table.inputs.names.len()
+    }
+
+    /// K-means centres of these samples (`centres × inputs`), rounded to the numbers that the blob
+    /// holds.
+    ///
+    /// `part` numbers the network, so that each draws its own starting points.
+    pub fn centres(&self, options: &Options, part: usize) -> Vec<f64> {
+        let mut random =
+            Random::new(options.seed, Stream::Training, Purpose::Centres, 0, part as u64);
+        let found =
+            kmeans::fit(&self.scaled, self.inputs(), options.centres, &options.search, &mut random);
+        found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
+    }
+
+    /// Hidden layer of Gaussians at `centres` (`centres × inputs`, on scaled inputs), with the widths that `options` ask
+    /// for.
+    pub fn layer(&self, centres: Vec<f64>, options: &Options) -> HiddenLayer {
+        let relative_widths = options.widths.relative(&centres, self.inputs());
+        HiddenLayer { centres, spread: options.spread, relative_widths }
+    }
+
+    /// Penalties on squared weights that `options` ask for.
+    ///
+    /// Where none is chosen and frames are few, the affine tail is fitted as if every reading had an error of a
+    /// [thousandth of its range](LEAST_ERROR). Readings of neighbouring wires hardly differ in some directions; a few
+    /// frames without noise are fitted best by large weights there, which ruin all others. With many frames, or noise,
+    /// it makes no difference.
+    pub(super) fn ridge(&self, layer: &HiddenLayer, options: &Options) -> Ridge {
+        let (frames, inputs) = (self.table.inputs.len(), self.inputs());
+        let regressors = layer.centres.len() / inputs + inputs + 1;
+        let is_few = frames < FEW_FRAMES * regressors;
+        let is_usual = options.affine_tail && options.penalty.is_none();
+        Ridge {
+            initial_covariance: options.initial_covariance(frames),
+            of_tail: if is_few && is_usual { frames as f64 * LEAST_ERROR.powi(2) } else { 0.0 },
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Sections of the blob that a model may have besides its networks: their bytes, and what damage of them is called.
+
+use crate::common::{PROJECTION, seal, worked_bytes};
+use crate::{blob_format, confidence, expansion, fill, projection};
+use model_core::blob::{DecodeError, Model};
+use model_core::rbf::{Network, NetworkError};
+use model_core::{Aligned, AlignedBytes, Decoder, Frame, RowStatus};
+use proptest::prelude::*;
+
+/// A blob with such a section: where it starts, and where its numbers do.
+struct Sample {
+    blob: AlignedBytes,
+    start: usize,
+    floats: usize,
+    count: usize,
+}
+
+/// A blob whose section has this `header`, padding, and the numbers of `block`.
+fn sample(blob: &[u8], header: &[u8], block: &[f32]) -> Sample {
+    let bytes: Vec<u8> = block.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let floats = blob.windows(bytes.len()).position(|window| window == bytes).unwrap();
+    assert!(floats.is_multiple_of(4));
+    let start = blob[..floats].windows(header.len()).rposition(|it| it == header).unwrap();
+    Sample { blob: AlignedBytes::copy_of(blob), start, floats, count: block.len() }
+}
+
+/// A projection, an expansion, a confidence and a fill.
+fn samples() -> [Sample; 4] {
+    let mut buffer = Aligned([0; 1024]);
+    let of_projection = sample(projection::of_one_row(&mut buffer.0), &[8, 2], &PROJECTION);
+    let of_expansion = sample(expansion::small(&mut buffer.0), &[6, 1], &expansion::EXPANSION);
+    let (blob, length) = confidence::small(false);
+    let of_confidence = sample(&blob.0[..length], &[7, 1, 1], &confidence::BLOCK);
+    let blob = fill::blob(Some(fill::fill()), false).unwrap();
+    let of_fill = sample(&blob, &[9, 1], fill::BLOCK.as_flattened());
+    [of_projection, of_expansion, of_confidence, of_fill]
+}
+
+impl Sample {
+    /// Error for other `bytes` at a `place`, under a CRC that fits them. Under the former CRC they are corrupt.
+    fn damaged(&self, place: usize, bytes: &[u8]) -> DecodeError {
+        let mut blob = self.blob.clone();
+        blob[place..place + bytes.len()].copy_from_slice(bytes);
+        assert!(matches!(Model::decode(&blob), Err(DecodeError::Corrupt { .. })));
+        seal(&mut blob);
+        Model::decode(&blob).map(drop).unwrap_err()
+    }
+
+    /// Error for another value of number `number`.
+    fn with(&self, number: usize, value: f32) -> DecodeError {
+        self.damaged(self.floats + 4 * number, &value.to_le_bytes())
+    }
+}
+
+#[test]
+fn sections_have_the_specifications_worked_bytes() {
+    let [_, expansion, confidence, _] = samples();
+    for (sample, mark) in [(expansion, "worked expansion"), (confidence, "worked confidence")] {
+        let bytes = worked_bytes(mark);
+        assert_eq!(sample.blob[sample.start..][..bytes.len()], bytes, "{mark}");
+    }
+}
+
+#[test]
+fn every_damage_of_a_section_has_its_own_error() {
+    let [projection, expansion, confidence, fill] = samples();
+    let count = |what, expected, found| DecodeError::CountMismatch { what, expected, found };
+    let malformed = |section| DecodeError::Malformed { section };
+    for (sample, place, byte, error) in [
+        (&projection, 1, 1, count("bytes of projection", 20, 40)),
+        (&projection, 1, 3, count("bytes of projection", 60, 40)),
+        // 0 components need the means alone, 2 another eight bytes.
+        (&expansion, 1, 0, count("bytes of expansion", 8, 16)),
+        (&expansion, 1, 2, count("bytes of expansion", 24, 16)),
+        (
+            &expansion,
+            expansion.floats - expansion.start - 1,
+            15,
+            count("bytes of expansion", 16, 15),
+        ),
+        (&expansion, 2, 4, malformed("padding")),
+        // Two directions take 4·(1 + 2 + 1 + 3) bytes more; two components 4·(1 + 2 + 3 + 1).
+        (&confidence, 1, 2, count("bytes of confidence", 92, 64)),
+        (&confidence, 2, 2, count("bytes of confidence", 92, 64)),
+        (&confidence, 2, 0, count("bytes of confidence", 36, 64)),
+        (&confidence, 4, 1, malformed("padding")),
+        (&fill, 1, 2, count("bytes of fill", 64, 48)),
+    ] {
+        assert_eq!(sample.damaged(sample.start + place, &[byte]), error, "{place} {byte}");
+    }
+    // With any other tag these are no fields of a network, whose section must follow.
+    for tag in [0, 1, 3, 4, 5, 8, 0xff] {
+        assert_eq!(expansion.damaged(expansion.start, &[tag]), malformed("network section"));
+    }
+    assert_eq!(confidence.damaged(confidence.start, &[200]), malformed("network section"));
+}
+
+#[test]
+fn every_number_that_cannot_be_is_refused_by_its_section() {
+    let [projection, expansion, confidence, fill] = samples();
+    let not_finite = |what| NetworkError::NotFinite { what };
+    let not_positive = |what| NetworkError::NotPositive { what };
+    for (sample, error) in [
+        (&projection, DecodeError::Projection { cause: not_finite("projection") }),
+        (&expansion, DecodeError::Expansion { cause: not_finite("expansion") }),
+        (&confidence, DecodeError::Confidence { cause: not_finite("confidence") }),
+        (&fill, DecodeError::Fill { cause: not_finite("fill") }),
+    ] {
+        for (number, value) in (0..sample.count).zip([f32::NAN, f32::NEG_INFINITY].iter().cycle()) {
+            assert_eq!(sample.with(number, *value), error, "number {number}");
+        }
+    }
+    // 3e38 is a number, but outputs would leave f32.
+    let cause = not_finite("the largest output");
+    assert_eq!(expansion.with(2, 3e38), DecodeError::Expansion { cause });
+    let cause = not_finite("confidence");
+    assert_eq!(confidence.with(13, 2e38), DecodeError::Confidence { cause });
+    let cause = not_positive("confidence");
+    assert_eq!(confidence.with(12, 0.0), DecodeError::Confidence { cause });
+    assert_eq!(fill.with(8, 1.5), DecodeError::Fill { cause: not_positive("fill") });
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60_000))]
+    /// Parsing, decoding and assessing end for any bytes under a valid CRC. What an accepted model decodes is finite, or
+    /// marked; where readings are numbers, so is the novelty.
+    #[test]
+    fn hostile_bytes_under_a_valid_crc_never_panic(
+        which in 0..5_usize,
+        changes in prop::collection::vec((9_usize..500, any::<u8>()), 1..6),
+        frame in prop::array::uniform4(any::<f32>()),
+    ) {
+        let mut plain = Aligned([0; 512]);
+        let samples = samples();
+        let blob = samples.get(which).map(|sample| &sample.blob[..]);
+        let mut blob =
+            AlignedBytes::copy_of(blob.unwrap_or_else(|| blob_format::small_model(&mut plain.0)));
+        let length = blob.len();
+        for (offset, byte) in changes {
+            blob[9 + offset % (length - 4 - 9)] = byte;
+        }
+        seal(&mut blob);
+        let Ok(decoder) = Decoder::<2>::load(&blob) else { return Ok(()) };
+        let model = decoder.model();
+        prop_assert_eq!(model.networks().count(), model.network_count());
+        for network in model.networks() {
+            let Network::F32Direct(network) = network else { continue };
+            prop_assert!(network.parameters().centres.iter().all(|c| c.is_finite()));
+        }
+        let shape = decoder.shape();
+        let Some(readings) = frame.get(..shape.rows * shape.inputs) else { return Ok(()) };
+        if let Ok(estimate) = decoder.decode(readings) {
+            for (row, status) in estimate.status.iter().enumerate() {
+                let outputs = &estimate.outputs[row * shape.outputs..][..shape.outputs];
+                let finite = outputs.iter().all(|output| output.is_finite());
+                prop_assert_eq!(finite, *status == RowStatus::Decoded);
+            }
+        }
+        let mut deviation = vec![0.0; shape.rows * shape.outputs];
+        let mut scratch = vec![0.0; decoder.scratch_floats()];
+        let assessed = decoder.assess_into(Frame::from(readings), &mut scratch, &mut deviation);
+        if let Ok(Some(novelty)) = assessed {
+            prop_assert!(!novelty.is_infinite());
+            prop_assert!(deviation.iter().all(|d| !d.is_infinite()));
+        }
+    }
+}
