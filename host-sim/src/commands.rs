@@ -78,12 +78,16 @@ fn advice(error: &Error) -> &'static str {
         _ => "",
     };
     match error {
-        Error::Setting(bad) | Error::Data(Data::Setting(bad)) => of_field(&bad.field),
-        Error::Data(Data::Unfit { field, .. }) => of_field(field),
-        Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
-        Error::Data(Data::File { problem, .. }) => match problem {
-            Problem::NoPartner { .. } => " (--tolerance, --lag, --on)",
-            Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. } => " (--on)",
+        Error::Setting(bad) => of_field(&bad.field),
+        Error::Rig(Rig::Data(error)) | Error::Data(error) => match error {
+            Data::Setting(bad) => of_field(&bad.field),
+            Data::Unfit { field, .. } => of_field(field),
+            Data::Write { .. } | Data::WrittenOverInput { .. } => " (-o)",
+            Data::File { problem: Problem::NoPartner { .. }, .. } => " (--tolerance, --lag, --on)",
+            Data::File {
+                problem: Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. },
+                ..
+            } => " (--on)",
             _ => "",
         },
         Error::Rig(Rig::NoQemu { .. } | Rig::NoStart { .. }) => " (--qemu)",
@@ -111,5 +115,25 @@ fn exit_status(error: &Error) -> u8 {
         ) => 2,
         Error::Rig(_) => 1,
         _ => 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_names_the_option_that_mends_it_whichever_crate_found_it() {
+        let errors = || {
+            [
+                taxel_data::BadValue::new("memory", 1, "give more").into(),
+                taxel_data::Error::unfit_for("memory", "too little"),
+            ]
+        };
+        let of_rig = errors().map(|error| Error::Rig(error.into()));
+        for error in of_rig.into_iter().chain(errors().map(Error::Data)) {
+            assert_eq!(advice(&error), " (--centres, --no-affine, --most-memory)", "{error}");
+            assert_eq!(exit_status(&error), 2, "{error}");
+        }
     }
 }

@@ -514,6 +514,10 @@ pub mod serial_port {
         let alike = folder.run(&["link", &port, "recalibrate", "old.bin", "alike.csv"]);
         let said = String::from_utf8_lossy(&alike.stderr).into_owned();
         assert!(alike.status.code() == Some(1) && said.contains("too alike"), "{said}");
+        folder.write("device.key", "ab".repeat(32));
+        let key = ["old.bin", "presses.csv", "--key", "device.key", "-o", "./device.key"];
+        let said = folder.fail(&[&["link", &port, "recalibrate"], &key[..]].concat(), 2);
+        assert!(said.contains("would be written over"), "{said}");
         folder.write("missing.csv", b"r1e1_dx_mm\n0\n");
         let missing = folder.run(&["link", &port, "recalibrate", "old.bin", "missing.csv"]);
         assert_eq!(missing.status.code(), Some(2));
