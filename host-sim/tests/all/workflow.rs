@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use crate::common::{Folder, small_scene, small_scene_with_table1, untimed};
-use crate::json_schema;
 
 fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap()
@@ -356,21 +355,6 @@ fn table1_shows_the_papers_cells_beside_its_own() {
     assert!(cells[3].as_f64().unwrap() < 1.0, "{cells}");
     assert_eq!(result["test_frames"], 60);
     assert_eq!(result["solver"], "qr");
-}
-
-#[test]
-fn a_search_for_the_papers_set_up_goes_on_from_where_it_was_ended() {
-    let folder = Folder::new("reconstruct");
-    let search = ["table1", "--reconstruct", "--setups", "1", "--saved", "s.json"];
-    json_schema::checked(&folder, &json_schema::schema(), &search);
-    let saved = std::fs::read(folder.path("s.json")).unwrap();
-    let page = folder.succeed(&search);
-    assert!(page.contains("nearest 1") && page.contains("a constant"), "{page}");
-    assert!(std::fs::read(folder.path("s.json")).unwrap() == saved);
-    let refused = folder.fail(&[&search[..], &["--seed", "2"]].concat(), 2);
-    assert!(refused.contains("s.json") && refused.contains("--seed 1"), "{refused}");
-    folder.write("s.json", "{}");
-    assert!(folder.fail(&search, 2).contains("it is no saved search"));
 }
 
 #[test]

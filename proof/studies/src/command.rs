@@ -11,6 +11,7 @@ use serde::Serialize;
 use taxel_data::output;
 
 use crate::level::AtNoise;
+use crate::reconstruct;
 
 mod directions;
 mod equations;
@@ -32,12 +33,19 @@ pub enum Question {
     Drift(drift::Arguments),
     Readout(readout::Arguments),
     Confidence(confidence::Arguments),
+    Reconstruct(reconstruct::Arguments),
 }
 
 /// Options of a study, and what it does with them.
 trait Study {
     /// Computes and prints the answer.
     fn answer(&self, common: &Common) -> Result<()>;
+}
+
+impl Study for reconstruct::Arguments {
+    fn answer(&self, common: &Common) -> Result<()> {
+        reconstruct::answer(self, common)
+    }
 }
 
 impl Question {
@@ -52,6 +60,7 @@ impl Question {
             Self::Drift(study) => ("drift", study),
             Self::Readout(study) => ("readout", study),
             Self::Confidence(study) => ("confidence", study),
+            Self::Reconstruct(study) => ("study reconstruct", study),
         }
     }
 
