@@ -6,9 +6,12 @@ use crate::{Error, Result};
 use clap::Args;
 use taxel_data::data_file::{DataFile, Reading};
 
+/// Heading of options for data files.
+pub const DATA_FILES: &str = "Data files (CSV, .npy, .npz)";
+
 /// How data files are read: CSV files (with or without a header), numpy's .npy and .npz.
 #[derive(Args, Default)]
-#[command(next_help_heading = "Data files (CSV, .npy, .npz)")]
+#[command(next_help_heading = DATA_FILES)]
 pub struct DataFileArguments {
     #[command(flatten)]
     fields: FieldArguments,

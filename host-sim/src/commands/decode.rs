@@ -39,8 +39,6 @@ pub struct Arguments {
     model: PathBuf,
     /// CSV file, .npy or .npz with the model's reading columns, in any order, among others.
     readings: PathBuf,
-    #[command(flatten)]
-    file: DataFileArguments,
     /// CSV file to write, with the model's output columns.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -58,6 +56,8 @@ pub struct Arguments {
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
+    #[command(flatten)]
+    file: DataFileArguments,
 }
 
 #[derive(Serialize)]

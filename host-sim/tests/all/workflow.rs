@@ -318,6 +318,14 @@ fn every_command_has_help_with_an_example() {
         assert!(help.contains(&format!("host-sim {command} ")), "{help}");
         assert!(help.contains("--json"), "{help}");
     }
+    let help = folder.succeed(&["trade", "-h"]);
+    let options = |section: &str| section.lines().filter(|line| line.contains("--")).count();
+    let (_, help) = help.split_once("\nOptions:\n").unwrap();
+    let (own, rest) = help.split_once("\nData files (CSV, .npy, .npz):\n").unwrap();
+    let (of_files, _) = rest.split_once("\nExamples:").unwrap();
+    assert!((20..=25).contains(&options(own)) && own.contains("--seed"), "{own}");
+    assert!(options(of_files) >= 10 && of_files.contains("--test"), "{of_files}");
+    assert!(!of_files.contains("--max-error"), "{of_files}");
 }
 
 #[test]
