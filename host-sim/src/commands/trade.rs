@@ -130,11 +130,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     files::FILES.check(&folder, &arguments.subject.paths())?;
     let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
     let mut trade = computed.map_err(|error| match error {
-        Error::Setting(bad) => of_option(bad, &OPTIONS),
         Error::Data(taxel_data::Error::Setting(bad)) if bad.field == "memory" => {
             let fix = "give fewer --centres or --inputs";
             Error::Usage(format!("training takes {}, more than 8 GB: {fix}", bad.value))
         }
+        Error::Data(taxel_data::Error::Setting(bad)) => of_option(bad, &OPTIONS),
         Error::NoPoint(cause) => Error::Usage(cause.text(option)),
         other => other,
     })?;

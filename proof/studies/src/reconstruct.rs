@@ -71,7 +71,7 @@ pub fn answer(arguments: &Arguments, common: &Common) -> Result<()> {
     let save = |tried: &[Tried]| -> Result<()> {
         let saved = Saved { seed, axes: axes(), tried: tried.to_vec() };
         let text = serde_json::to_string(&saved)
-            .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
+            .map_err(|cause| Error::failed(format!("cannot write JSON: {cause}")))?;
         Ok(output::write_bytes(saved_to, text.as_bytes())?)
     };
     let found = search::search(seed, setups, tried, save, &Terminal::new())?;

@@ -237,7 +237,7 @@ pub fn compute(
     }
     let Judged { mut points, left_out, blobs, distinct } = judged;
     if let (true, Some(cause)) = (points.is_empty(), left_out.first()) {
-        return Err(Error::Failed(format!("no way to decode can be trained: {cause}")));
+        return Err(Error::failed(format!("no way to decode can be trained: {cause}")));
     }
     compare(&mut points, group);
     let first = frames.first().zip(measures.first());

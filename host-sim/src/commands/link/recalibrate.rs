@@ -185,6 +185,6 @@ fn ask_for_press(number: usize, outputs: &Table) -> Result<()> {
     let mut text = String::new();
     match std::io::stdin().lock().read_line(&mut text) {
         Ok(1..) => Ok(()),
-        _ => Err(Error::Failed("stdin ended before all presses were made".into())),
+        _ => Err(Error::failed("stdin ended before all presses were made")),
     }
 }

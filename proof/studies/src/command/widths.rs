@@ -41,11 +41,9 @@ impl super::Study for Arguments {
         group_of_scene(&scene, &self.group)?;
         let study = widths::compute(&scene, &self.group, &self.plan, &Terminal::new());
         let study = study.map_err(|error| match error {
-            Error::Setting(bad) => {
-                of_option(bad, &[("spreads", "--spread"), ("centres", "--centres")])
-            }
             Error::Data(taxel_data::Error::Setting(bad)) => {
-                of_option(bad, &[("spread", "--spread"), ("centres", "--centres")])
+                let options = ["spreads", "spread"].map(|field| (field, "--spread"));
+                of_option(bad, &[&options[..], &[("centres", "--centres")]].concat())
             }
             other => other,
         })?;
