@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn shares_that_make_the_whole_have_each_line_once() {
         for count in [7, 10, 11, 13, 25, 50, 101, 150] {
-            let text: String = (0..count).map(|line| format!("{line}\n")).collect();
+            let text = (0..count).map(|line| line.to_string()).collect::<Vec<_>>().join("\n");
             let file = DataFile::parse(Path::new("d.csv"), text.as_bytes(), false).unwrap();
             let lines = |first_share, last_share| {
                 let cut = DataFileArguments { first_share, last_share, ..Default::default() };

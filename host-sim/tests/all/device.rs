@@ -229,23 +229,6 @@ fn the_image_answers_alike_on_both_lines() {
 }
 
 #[test]
-fn a_device_behind_a_mailbox_passes_every_check() {
-    let model = model(16);
-    let (host, end) = crate::virtual_device::mailbox::pair();
-    crate::virtual_device::run(end, SOUND, model.bytes(), frames());
-    let mut device = Device::new(host).unwrap();
-    let plan = Plan {
-        seed: 1,
-        damaged_uploads: 14,
-        interruptions: true,
-        garbage_bytes: 50_000,
-        window: 4,
-    };
-    let findings = check(&mut device, &frames_of(100), &model, &plan, &Silent).unwrap();
-    assert!(findings.all_good(), "{findings:#?}");
-}
-
-#[test]
 fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
     let mut device = device(SOUND, &model(3));
     let wanted = model(5);
