@@ -55,7 +55,7 @@ pub struct Common {
 pub fn run_to_end(name: &str, work: impl FnOnce() -> Result<()>) -> ExitCode {
     print::begin(name);
     let outcome = interruption::watch()
-        .map_err(|cause| Error::Failed(format!("cannot watch for Ctrl-C: {cause}")))
+        .map_err(|cause| Error::failed(format!("cannot watch for Ctrl-C: {cause}")))
         .and_then(|()| work());
     let Err(error) = outcome else { return ExitCode::SUCCESS };
     eprintln!("error: {error}{}", advice(&error));
@@ -69,47 +69,53 @@ pub fn run_to_end(name: &str, work: impl FnOnce() -> Result<()>) -> ExitCode {
 fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
     use taxel_data::error::Problem;
-    use taxel_rig::Error as Rig;
     let of_field = |field: &str| match field {
         "whole_array" => " (--whole-array)",
         "fill" => " (leave --fill or training.fill out)",
         "folds" => " (--folds or --fold-column, --no-refine)",
         "memory" => " (--centres, --no-affine, --most-memory)",
+        "qemu" => " (--qemu)",
+        "image" => " (--image)",
+        "port" => " (PORT)",
         _ => "",
     };
+    let Error::Data(error) = error else { return "" };
     match error {
-        Error::Setting(bad) | Error::Data(Data::Setting(bad)) => of_field(&bad.field),
-        Error::Data(Data::Unfit { field, .. }) => of_field(field),
-        Error::Data(Data::Write { .. } | Data::WrittenOverInput { .. }) => " (-o)",
-        Error::Data(Data::File { problem, .. }) => match problem {
-            Problem::NoPartner { .. } => " (--tolerance, --lag, --on)",
-            Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. } => " (--on)",
-            _ => "",
-        },
-        Error::Rig(Rig::NoQemu { .. } | Rig::NoStart { .. }) => " (--qemu)",
-        Error::Rig(Rig::NoImage { .. } | Rig::NotElf { .. }) => " (--image)",
-        Error::Rig(Rig::Port { .. }) => " (PORT)",
+        Data::Setting(bad) => of_field(&bad.field),
+        Data::Unfit { field, .. } => of_field(field),
+        Data::Write { .. } | Data::WrittenOverInput { .. } => " (-o)",
+        Data::File { problem: Problem::NoPartner { .. }, .. } => " (--tolerance, --lag, --on)",
+        Data::File {
+            problem: Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. }, ..
+        } => " (--on)",
         _ => "",
     }
 }
 
 /// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
 fn exit_status(error: &Error) -> u8 {
-    use taxel_data::Error as Data;
-    use taxel_rig::Error as Rig;
     match error {
-        Error::Failed(_)
-        | Error::Data(Data::Failed(_))
-        | Error::Rig(Rig::Data(Data::Failed(_))) => 1,
-        Error::Rig(
-            Rig::Port { .. }
-            | Rig::NoRoom { .. }
-            | Rig::NoQemu { .. }
-            | Rig::NoImage { .. }
-            | Rig::NotElf { .. }
-            | Rig::Data(_),
-        ) => 2,
-        Error::Rig(_) => 1,
+        Error::Rig(_) | Error::Data(taxel_data::Error::Failed(_)) => 1,
         _ => 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_names_the_option_that_mends_it_whichever_crate_found_it() {
+        let errors = || {
+            [
+                taxel_data::BadValue::new("memory", 1, "give more").into(),
+                taxel_data::Error::unfit_for("memory", "too little"),
+            ]
+        };
+        let of_rig = errors().map(|error| Error::from(taxel_rig::Error::from(error)));
+        for error in of_rig.into_iter().chain(errors().map(Error::Data)) {
+            assert_eq!(advice(&error), " (--centres, --no-affine, --most-memory)", "{error}");
+            assert_eq!(exit_status(&error), 2, "{error}");
+        }
     }
 }

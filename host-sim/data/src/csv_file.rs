@@ -7,6 +7,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use crate::data_file::FieldTexts;
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -15,19 +16,19 @@ const PIECE: usize = 16 * 1024;
 const PIECES: usize = 64;
 
 /// Column of a CSV file that is written: its name, and what its fields are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Column<'n> {
     name: &'n str,
     fields: Fields<'n>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 enum Fields<'n> {
     /// Numbers that a line has.
     F64,
     F32,
-    /// The fields of all lines.
-    Texts(&'n [String]),
+    /// Fields of another file, of these lines or of all.
+    Texts(FieldTexts<'n>, Option<&'n [usize]>),
 }
 
 impl<'n> Column<'n> {
@@ -41,9 +42,10 @@ impl<'n> Column<'n> {
         Self { name, fields: Fields::F32 }
     }
 
-    /// Column called `name` of these `texts`, one a line, which are written as they are and need no quotes.
-    pub fn texts(name: &'n str, texts: &'n [String]) -> Self {
-        Self { name, fields: Fields::Texts(texts) }
+    /// Column called `name` of these `texts`, which are written as they are and need no quotes: those of these `lines`, or
+    /// all in turn.
+    pub fn texts(name: &'n str, texts: FieldTexts<'n>, lines: Option<&'n [usize]>) -> Self {
+        Self { name, fields: Fields::Texts(texts, lines) }
     }
 }
 
@@ -137,7 +139,10 @@ impl Piece {
                 match column.fields {
                     Fields::F64 => write_number(&mut self.text, value()),
                     Fields::F32 => write_f32(&mut self.text, value()),
-                    Fields::Texts(texts) => self.text.extend_from_slice(texts[line].as_bytes()),
+                    Fields::Texts(texts, lines) => {
+                        let line = lines.map_or(line, |lines| lines[line]);
+                        self.text.extend_from_slice(texts.at(line).as_bytes());
+                    }
                 }
             }
             if self.text.len() == start {

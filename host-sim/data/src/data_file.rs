@@ -1,5 +1,7 @@
 //! Data files, read whole: CSV, `.npy` and `.npz`.
 
+use std::borrow::Cow;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::columns;
@@ -9,6 +11,9 @@ use crate::input;
 mod csv;
 mod npy;
 pub mod pieces;
+
+/// Largest magnitude up to which f64 holds every whole number: 2^53.
+pub(crate) const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// Data file that was read whole: named columns of numbers, one frame a line.
 ///
@@ -27,8 +32,43 @@ pub struct DataFile {
     pub(crate) values: Vec<f64>,
     /// Line number in the file (from 1) of each line of data.
     pub(crate) line_numbers: Vec<u64>,
-    /// Bytes of a CSV file whose fields are wanted as they are written.
-    pub(crate) text: Option<Vec<u8>>,
+    /// Fields of a CSV file, if they are wanted as they are written.
+    pub(crate) texts: Option<Texts>,
+    /// Columns of integer arrays with numbers from 2^53 on, of which f64 does not hold every digit.
+    pub(crate) rounded: Vec<usize>,
+}
+
+/// Fields as they are written, line after line, without spaces around.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Texts {
+    text: String,
+    /// Where the first field begins in the text, and where each ends.
+    places: Vec<usize>,
+}
+
+/// One column's fields, as text.
+#[derive(Debug, Clone, Copy)]
+pub struct FieldTexts<'f> {
+    file: &'f DataFile,
+    column: usize,
+}
+
+impl<'f> FieldTexts<'f> {
+    /// Field at `line` (from 0, header not counted); "" if the value is missing.
+    ///
+    /// # Panics
+    /// If the file has no such line.
+    pub fn at(&self, line: usize) -> Cow<'f, str> {
+        let value = self.file.value(line, self.column);
+        match &self.file.texts {
+            _ if value.is_nan() => Cow::Borrowed(""),
+            Some(Texts { text, places }) => {
+                let field = line * self.file.header.len() + self.column;
+                Cow::Borrowed(&text[places[field]..places[field + 1]])
+            }
+            None => Cow::Owned(value.to_string()),
+        }
+    }
 }
 
 /// How a data file is read.
@@ -36,7 +76,8 @@ pub struct DataFile {
 pub struct Reading {
     /// Whether the first line of a CSV file is a header even if it holds numbers alone.
     pub has_header: bool,
-    /// Whether [`DataFile::texts`] gives the fields of a CSV file as they are written. This takes the memory of the file.
+    /// Whether [`DataFile::texts`] gives the fields of a CSV file as they are written. This takes the memory of the file,
+    /// and 8 bytes a field.
     pub keeps_text: bool,
 }
 
@@ -60,7 +101,9 @@ impl DataFile {
         let bytes = input::read(path, input::MOST_DATA_BYTES)?;
         let mut file = Self::parse(path, &bytes, reading.has_header)?;
         let is_array = ["npy", "npz"].into_iter().any(|kind| has_extension(path, kind));
-        file.text = Some(bytes).filter(|_| reading.keeps_text && !is_array);
+        if reading.keeps_text && !is_array {
+            file.texts = Some(csv::texts(&file, &bytes));
+        }
         Ok(file)
     }
 
@@ -90,9 +133,13 @@ impl DataFile {
     ///
     /// # Panics
     /// If there are no such lines.
-    pub fn keep_lines(&mut self, range: std::ops::Range<usize>) {
+    pub fn keep_lines(&mut self, range: Range<usize>) {
         let columns = self.header.len();
-        self.values = self.values[range.start * columns..range.end * columns].to_vec();
+        let fields = range.start * columns..range.end * columns;
+        if let Some(texts) = &mut self.texts {
+            texts.places = texts.places[fields.start..=fields.end].to_vec();
+        }
+        self.values = self.values[fields].to_vec();
         self.line_numbers = self.line_numbers[range].to_vec();
     }
 
@@ -123,24 +170,17 @@ impl DataFile {
         self.values[line * self.header.len() + column]
     }
 
-    /// Fields of these `columns` (from 0), each column's line after line: as they are written, without spaces around, in a
-    /// CSV file that was read with its text; otherwise the shortest digits of their numbers. A missing value is "".
-    pub fn texts(&self, columns: &[usize]) -> Vec<Vec<String>> {
-        let mut texts = vec![Vec::with_capacity(self.lines()); columns.len()];
-        let mut put = |line: usize, field: &dyn Fn(usize) -> String| {
-            for (texts, &column) in texts.iter_mut().zip(columns) {
-                let is_missing = self.value(line, column).is_nan();
-                texts.push(if is_missing { String::new() } else { field(column) });
-            }
-        };
-        match &self.text {
-            Some(text) => csv::for_each_record(self, text, |line, record| {
-                put(line, &|column| record.get(column).unwrap_or_default().trim().to_owned());
-            }),
-            None => (0..self.lines())
-                .for_each(|line| put(line, &|column| self.value(line, column).to_string())),
+    /// Fields of this `column` (from 0): as they are written, without spaces around, in a CSV file that was read with its
+    /// text; otherwise the shortest digits of their numbers.
+    ///
+    /// # Errors
+    /// [`Error::File`] for whole numbers of an array that are too large for f64: it lost some of their digits.
+    pub fn texts(&self, column: usize) -> Result<FieldTexts<'_>> {
+        if self.rounded.contains(&column) {
+            let column = self.header[column].clone();
+            return Err(Error::file(&self.path, Problem::RoundedIntegers { column }));
         }
-        texts
+        Ok(FieldTexts { file: self, column })
     }
 
     /// Number in the file (from 1, header included) of the line of data `line` (from 0), for messages.

@@ -286,12 +286,19 @@ pub enum Problem {
     },
     /// Time stamps of which f64 does not hold every digit, and which are no whole numbers in text either.
     #[error(
-        "line {line}, column {}: the time stamp {} has more digits than numbers hold (above 2^53 = 9007199254740992); \
-         give whole numbers in a CSV file, or a smaller unit's count from a later start",
+        "line {line}, column {}: the time stamp {} has more digits than numbers hold, beside time stamps or a lag above \
+         2^53 = 9007199254740992; give whole numbers in a CSV file, or a smaller unit's count from a later start",
         quoted(column),
         cut(value)
     )]
     InexactTime { line: u64, column: String, value: String },
+    /// Column of an array of 64-bit integers that are too large to be written with every digit.
+    #[error(
+        "column {}: it has whole numbers beyond 2^53 = 9007199254740992, of which digits are lost; save them in a CSV \
+         file, or count from a later start",
+        quoted(column)
+    )]
+    RoundedIntegers { column: String },
     /// Log of which no line has a partner in another one.
     #[error(
         "no time stamp is within tolerance = {} of one in {other}: the nearest are {} apart; raise the tolerance, set \

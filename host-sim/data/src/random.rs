@@ -141,6 +141,16 @@ mod tests {
     }
 
     #[test]
+    fn whole_numbers_below_an_end_are_all_drawn_equally_often() {
+        let mut random = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
+        let mut counts = [0_i32; 5];
+        (0..50_000).for_each(|_| counts[random.below(5)] += 1);
+        // Six standard deviations.
+        assert!(counts.iter().all(|count| (count - 10_000).abs() < 540), "{counts:?}");
+        assert_eq!((random.below(1), random.below(0)), (0, 0));
+    }
+
+    #[test]
     fn normal_draws_have_the_moments_of_a_normal() {
         let n = 400_000;
         let mut moments = [0.0; 4];

@@ -171,29 +171,12 @@ impl NoPoint {
 /// right.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Scene file that cannot be parsed.
-    #[error("scene {scene}: {message}")]
-    Syntax {
-        scene: String,
-        /// Place in the file, and what was expected there.
-        message: String,
-    },
-    /// Scene with a setting that cannot be used.
-    #[error("scene {scene}: {cause}")]
-    Scene {
-        scene: String,
-        /// Setting, and which values can be used.
-        cause: BadValue,
-    },
-    /// Setting that cannot be used.
-    #[error(transparent)]
-    Setting(#[from] BadValue),
     /// Refusal or failure of the crates that compute.
     #[error(transparent)]
     Data(#[from] taxel_data::Error),
-    /// Device or emulator that failed.
+    /// Device that failed, other than by a refusal or failure of [`Data`](Self::Data).
     #[error(transparent)]
-    Rig(#[from] taxel_rig::Error),
+    Rig(taxel_rig::Error),
     /// Trade without a point within its bounds.
     #[error(transparent)]
     NoPoint(#[from] NoPoint),
@@ -207,7 +190,31 @@ pub enum Error {
     /// Options that cannot be used, or not together.
     #[error("{0}")]
     Usage(String),
-    /// Work that failed.
-    #[error("{0}")]
-    Failed(String),
+}
+
+impl Error {
+    /// Error for work that failed, and the `reason`.
+    pub fn failed(reason: impl Into<String>) -> Self {
+        taxel_data::Error::failed(reason).into()
+    }
+
+    /// Error for a scene with this name or path, and what is wrong with it.
+    pub fn of_scene(scene: &str, cause: impl fmt::Display) -> Self {
+        taxel_data::Error::unfit(format!("scene {scene}: {cause}")).into()
+    }
+}
+
+impl From<BadValue> for Error {
+    fn from(bad: BadValue) -> Self {
+        Self::Data(bad.into())
+    }
+}
+
+impl From<taxel_rig::Error> for Error {
+    fn from(error: taxel_rig::Error) -> Self {
+        match error {
+            taxel_rig::Error::Data(error) => Self::Data(error),
+            error => Self::Rig(error),
+        }
+    }
 }

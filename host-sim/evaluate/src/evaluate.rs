@@ -8,6 +8,5 @@ pub mod learning_curve;
 pub mod limit;
 pub mod confidence;
 pub mod printed;
-pub mod reconstruct;
 pub mod table1;
 pub mod trade;

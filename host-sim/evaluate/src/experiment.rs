@@ -164,11 +164,11 @@ impl Experiment {
     /// Reads a scene: the name of an embedded one, or a path.
     ///
     /// # Errors
-    /// [`Error::Data`] for a file that cannot be read, [`Error::Syntax`] or [`Error::Scene`] for its
+    /// [`Error::Data`] for a file that cannot be read, and for its
     /// content.
     pub fn load(name_or_path: &str) -> Result<Self> {
         let scene = Self::load_open(name_or_path)?;
-        scene.check_sizes().map_err(|cause| Error::Scene { scene: name_or_path.into(), cause })?;
+        scene.check_sizes().map_err(|cause| Error::of_scene(name_or_path, cause))?;
         Ok(scene)
     }
 
@@ -194,23 +194,21 @@ impl Experiment {
     /// Reads a scene from its text; `origin` names it in messages.
     ///
     /// # Errors
-    /// [`Error::Syntax`] for text that is no scene, [`Error::Scene`] for a setting that cannot be used.
+    /// [`Error::Data`] for text that is no scene, and for a setting that cannot be used.
     pub fn parse(origin: &str, text: &str) -> Result<Self> {
         let scene = Self::parse_open(origin, text)?;
-        scene.check_sizes().map_err(|cause| Error::Scene { scene: origin.into(), cause })?;
+        scene.check_sizes().map_err(|cause| Error::of_scene(origin, cause))?;
         Ok(scene)
     }
 
     /// Reads a scene from its text, but does not check its sizes.
     fn parse_open(origin: &str, text: &str) -> Result<Self> {
-        let file: file::SceneFile = toml::from_str(text).map_err(|cause| Error::Syntax {
-            scene: origin.into(),
-            message: shortened(cause.to_string().trim_end()),
-        })?;
+        let file: file::SceneFile = toml::from_str(text)
+            .map_err(|cause| Error::of_scene(origin, shortened(cause.to_string().trim_end())))?;
         let experiment = file.into_experiment(digest(text.as_bytes()));
         experiment
             .and_then(|experiment| experiment.check().map(|()| experiment))
-            .map_err(|cause| Error::Scene { scene: origin.into(), cause })
+            .map_err(|cause| Error::of_scene(origin, cause))
     }
 
     /// Options for training the scene's model.

@@ -143,10 +143,8 @@ pub fn run(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<(RunResult, ModelBlob)> {
-    progress.stage("read or synthesise", 2);
-    let training = subject.training_set(1);
-    progress.step();
-    let test = subject.test_set(1);
+    progress.stage("read or synthesise", 1);
+    let (training, test) = subject.sets(1);
     progress.step();
 
     let blob = training.blob(options, progress)?;

@@ -95,14 +95,6 @@ impl Subject {
         }
     }
 
-    /// Number of row tables, each with a network of its own unless one serves the whole array.
-    pub fn rows(&self) -> usize {
-        match self {
-            Self::Scene(scene) => scene.world.outputs.row_tables(scene.world.read_rows.len()),
-            Self::Measured(data) => data.training.rows,
-        }
-    }
-
     /// Row-wire (from 1) of each row table, where outputs belong to row-wires.
     pub fn row_wires(&self) -> Vec<usize> {
         match self {
@@ -142,16 +134,18 @@ impl Subject {
         }
     }
 
-    /// Frames to judge by, whose readings are means of so many samples. Measurements are as they are.
-    pub fn test_set(&self, samples_averaged: usize) -> Cow<'_, Dataset> {
-        match self {
+    /// Frames to train on, and those to judge by, whose readings are means of so many samples. Measurements are as they
+    /// are.
+    pub fn sets(&self, samples_averaged: usize) -> (TrainingSet<'_>, Cow<'_, Dataset>) {
+        let test = match self {
             Self::Scene(scene) => {
                 let synthesis = Self::synthesis(scene, samples_averaged);
                 let frames = scene.training.test_frames;
                 Cow::Owned(scene.dataset(&synthesis, Stream::Test, frames))
             }
             Self::Measured(data) => Cow::Borrowed(&data.test),
-        }
+        };
+        (self.training_set(samples_averaged), test)
     }
 
     /// Measure for errors on the test frames, with the limit at so many samples a reading where it is known, and a

@@ -15,8 +15,9 @@
 //!    f(xₚ − s) in its m outputs. The logarithm belongs to errors with Cauchy's distribution: a press that is far from
 //!    explained, or whose outputs were misstated, says little. Gauss–Newton steps find the minimum; each weighs the
 //!    presses by 1/(1 + 3eₚ²), solves by orthogonal rotations ([`rls`]), and is halved until the sum falls.
-//! 3. **Judge.** The fit is repeated without a fifth of the presses, five times, and tells the error on presses that it
-//!    has not seen. A network whose Σ ln(1 + 3eₚ²) falls by less than a tenth keeps its inputs.
+//! 3. **Judge.** Guess and fit are repeated without a fifth of the presses, five times, and tell the error on presses
+//!    that they have not seen. Errors before and after are judged as a device decodes, with the clamp. A network whose
+//!    Σ ln(1 + 3eₚ²) falls by less than a tenth keeps its inputs.
 //!
 //! docs/recalibration.md has what it reaches, and what was tried besides.
 
@@ -127,14 +128,14 @@ pub fn recalibrate(
     outputs: &Table,
 ) -> Result<Recalibrated> {
     check(model.model())?;
-    let decoded = model.decode_table(readings);
-    assert_eq!(outputs.names.len(), decoded.names.len(), "the model's outputs");
+    let width = model.model().metadata().output_names.iter().count();
+    assert_eq!(outputs.names.len(), width, "the model's outputs");
     assert_eq!(readings.len(), outputs.len(), "outputs for each press");
     let inputs = model.inputs_of_networks(&readings.values);
     let networks = model.networks();
     let units: Vec<Unit> = (0..networks.len())
         .into_par_iter()
-        .map(|index| Unit::new(index, model, &inputs, outputs, &decoded.values))
+        .map(|index| Unit::new(index, model, &inputs, outputs))
         .collect();
     if let Some(network) = units.iter().position(|unit| !unit.is_excited()) {
         let row = (networks.len() > 1).then_some(network + 1);
@@ -199,8 +200,6 @@ struct Unit {
     inputs: Vec<Vec<f64>>,
     /// True outputs of each press, in training errors.
     stated: Vec<Vec<f64>>,
-    /// Mean squared error of the model before, of each press.
-    squares_before: Vec<f64>,
 }
 
 /// What the presses say of one network.
@@ -212,13 +211,7 @@ struct Fit {
 }
 
 impl Unit {
-    fn new(
-        index: usize,
-        model: &PreparedModel<'_>,
-        inputs: &[f64],
-        outputs: &Table,
-        decoded: &[f64],
-    ) -> Self {
+    fn new(index: usize, model: &PreparedModel<'_>, inputs: &[f64], outputs: &Table) -> Self {
         let networks = model.networks();
         let network = Smooth::new(&networks[index]);
         let (width, count) = (network.shape.inputs, network.shape.outputs);
@@ -228,27 +221,19 @@ impl Unit {
         };
         let errors = own(&training_errors(model.model()), 0, count).into_iter().enumerate();
         let errors = errors.filter(|(_, error)| *error > 0.0).collect();
-        let mut unit = Self {
-            network,
-            errors,
-            numbers: vec![],
-            inputs: vec![],
-            stated: vec![],
-            squares_before: vec![],
-        };
+        let mut unit = Self { network, errors, numbers: vec![], inputs: vec![], stated: vec![] };
         for press in 0..outputs.len() {
             let x = own(inputs, press, width);
             let scale = unit.network.zeros.iter().zip(&unit.network.per_unit);
             let x: Vec<f64> =
                 x.iter().zip(scale).map(|(x, (zero, per_unit))| (x - zero) * per_unit).collect();
-            let [stated, decoded] =
-                [&outputs.values, decoded].map(|values| unit.in_errors(&own(values, press, count)));
+            let stated = unit.in_errors(&own(&outputs.values, press, count));
+            let decoded = unit.in_errors(&unit.network.decode(&x));
             let near = |e: &f64| e.abs() <= MOST_ERRORS;
             let usable = x.iter().all(|x| x.abs() <= FARTHEST)
                 && stated.iter().zip(&decoded).all(|(y, decoded)| near(&(decoded - y)));
             if usable {
                 unit.numbers.push(press);
-                unit.squares_before.push(mean_square(&stated, &decoded));
                 unit.inputs.push(x);
                 unit.stated.push(stated);
             }
@@ -271,29 +256,38 @@ impl Unit {
 
     fn recalibrate(&self) -> Fit {
         let all: Vec<usize> = (0..self.inputs.len()).collect();
-        let guess = self.guess();
-        let shift = self.fit(&guess, &guess, &all);
-        let mut squares_after = vec![0.0; all.len()];
-        for part in 0..PARTS {
-            let (kept, others): (Vec<_>, Vec<_>) =
-                all.iter().partition(|press| *press % PARTS == part);
-            let fitted = self.fit(&guess, &shift, &others);
-            for press in kept {
-                squares_after[press] = self.square(&fitted, press);
-            }
-        }
+        let shift = self.fit(&all);
+        let none = vec![0.0; shift.len()];
+        let before: Vec<f64> = all.iter().map(|press| self.square_decoded(&none, *press)).collect();
+        let after = self.squares_after();
         let cost = |squares: &[f64]| squares.iter().map(|square| doubted(*square)).sum::<f64>();
         let mean = |squares: &[f64]| squares.iter().sum::<f64>() / squares.len() as f64;
         Fit {
             shift,
-            square_before: mean(&self.squares_before),
-            square_after: mean(&squares_after),
-            is_better: cost(&squares_after) < WORTH * cost(&self.squares_before),
+            square_before: mean(&before),
+            square_after: mean(&after),
+            is_better: cost(&after) < WORTH * cost(&before),
         }
     }
 
-    /// Guesses the shift: the median difference of inputs to those that the stated outputs should have had.
-    fn guess(&self) -> Vec<f64> {
+    /// Mean squared error of each press as a device decodes it, by the network that was fitted without this press and
+    /// the others of its part.
+    fn squares_after(&self) -> Vec<f64> {
+        let mut squares = vec![0.0; self.inputs.len()];
+        for part in 0..PARTS {
+            let (judged, fitted): (Vec<_>, Vec<_>) =
+                (0..squares.len()).partition(|press| press % PARTS == part);
+            let shift = self.fit(&fitted);
+            for press in judged {
+                squares[press] = self.square_decoded(&shift, press);
+            }
+        }
+        squares
+    }
+
+    /// Guesses the shift: the median difference of the inputs of these `presses` to those that the stated outputs should
+    /// have had.
+    fn guess(&self, presses: &[usize]) -> Vec<f64> {
         let (inputs, regressors) = (self.network.shape.inputs, self.errors.len());
         let centres: Vec<&[f64]> = self.network.centres.chunks_exact(inputs).collect();
         let outputs: Vec<Vec<f64>> =
@@ -309,7 +303,8 @@ impl Unit {
         let mut parts = vec![0.0; regressors * inputs];
         rls::solve_triangle(&triangle, &projection, regressors, &mut parts);
         let mut differences: Vec<Vec<f64>> = vec![vec![]; inputs];
-        for (x, stated) in self.inputs.iter().zip(&self.stated) {
+        for press in presses {
+            let (x, stated) = (&self.inputs[*press], &self.stated[*press]);
             let mut left = difference(x, &centre);
             for (y, parts) in difference(stated, &output).iter().zip(parts.chunks_exact(inputs)) {
                 left.iter_mut().zip(parts).for_each(|(left, part)| *left -= y * part);
@@ -323,15 +318,16 @@ impl Unit {
         differences.into_iter().map(median).collect()
     }
 
-    /// The shift that explains these `presses` best, near the `guess`, searched from `start` on.
-    fn fit(&self, guess: &[f64], start: &[f64], presses: &[usize]) -> Vec<f64> {
+    /// The shift that explains these `presses` best, near the guess that they give.
+    fn fit(&self, presses: &[usize]) -> Vec<f64> {
+        let guess = &self.guess(presses)[..];
         let inputs = guess.len();
         let cost = |shift: &[f64]| {
             let errors = presses.iter().map(|press| doubted(self.square(shift, *press)));
             let from_guess: f64 = difference(shift, guess).iter().map(|d| d * d).sum();
             self.errors.len() as f64 / DOUBT * errors.sum::<f64>() + PRIOR.powi(2) * from_guess
         };
-        let mut shift = start.to_vec();
+        let mut shift = guess.to_vec();
         let mut lowest = cost(&shift);
         let mut triangle = vec![0.0; rls::triangle_values(inputs)];
         let mut step = vec![0.0; inputs];
@@ -376,7 +372,13 @@ impl Unit {
         }
     }
 
-    /// Mean squared error of a press with its inputs shifted.
+    /// Mean squared error of a press with its inputs shifted, as a device decodes it.
+    fn square_decoded(&self, shift: &[f64], press: usize) -> f64 {
+        let values = self.network.decode(&difference(&self.inputs[press], shift));
+        mean_square(&self.in_errors(&values), &self.stated[press])
+    }
+
+    /// Mean squared error of a press with its inputs shifted, by the smooth network.
     fn square(&self, shift: &[f64], press: usize) -> f64 {
         let values = self.network.infer(&difference(&self.inputs[press], shift), &mut []);
         mean_square(&self.in_errors(&values), &self.stated[press])

@@ -140,7 +140,7 @@ struct Sample {
 /// voltage, the rest to the feedback resistors. Series resistances stay as they are.
 ///
 /// # Errors
-/// [`Error::Calibration`] if a reading is not that of its resistor, if the resistors do not tell all constants of
+/// [`Error::Data`] if a reading is not that of its resistor, if the resistors do not tell all constants of
 /// their wires, or if no constants explain the readings.
 pub fn fit(before: &CircuitConstants, wires: Wires, arrangements: &[Arrangement]) -> Result<Fit> {
     for (number, arrangement) in (1..).zip(arrangements) {
@@ -207,7 +207,7 @@ pub fn fit(before: &CircuitConstants, wires: Wires, arrangements: &[Arrangement]
             .flat_map(|(a, read)| a.known_s.iter().copied().zip(read)),
     );
     if after.largest > MOST_AFTER {
-        return Err(Error::Calibration(format!(
+        return Err(Error::failed(format!(
             "no constants explain these readings: the best ones leave {after}; check the values of the resistors, \
              their order, and that nothing else is connected"
         )));
@@ -244,7 +244,7 @@ fn check_places(arrangement: &Arrangement, number: usize, wires: Wires) -> Resul
         } else {
             continue;
         };
-        return Err(Error::Calibration(format!("arrangement {number}: {says}")));
+        return Err(Error::failed(format!("arrangement {number}: {says}")));
     }
     Ok(())
 }
@@ -291,7 +291,7 @@ fn check_loads(samples: &[Sample], wires: Wires) -> Result<()> {
 }
 
 fn undetermined(why: &str) -> Error {
-    Error::Calibration(format!("these resistors do not determine the constants{why}"))
+    Error::failed(format!("these resistors do not determine the constants{why}"))
 }
 
 /// Numbers of the wires, of so many, that `of` names.

@@ -302,8 +302,9 @@ impl<W: Wire> Device<W> {
 /// Bytes of a request, framed for the line.
 pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
     let mut buffer = [0; MOST_REQUEST_BYTES];
-    let packet = packet::encode(number, request, &mut buffer)
-        .ok_or(Error::RequestTooLong { most_bytes: MOST_REQUEST_BYTES })?;
+    let packet = packet::encode(number, request, &mut buffer).ok_or_else(|| {
+        Error::failed(format!("a request longer than {MOST_REQUEST_BYTES} bytes"))
+    })?;
     let mut bytes = Vec::with_capacity(packet.len() + 8);
     cobs::encode(packet, |byte| {
         bytes.push(byte);

@@ -36,19 +36,23 @@ impl Options {
     /// Checks that [`Emulator::start`] can find an image, before long work.
     ///
     /// # Errors
-    /// [`Error::NoImage`] for an image that cannot be read, [`Error::NotElf`] for a file that is no
-    /// program.
+    /// [`Error::Data`] for an image that cannot be read, or is no program.
     pub fn check(&self) -> Result<()> {
+        let image = self.image.display();
+        let unfit = |says: String| Err(Error::unfit_for("image", format!("{image}: {says}")));
+        let not_elf = || unfit("it is no ELF file; the application's is `qemu-app`".into());
         // A named pipe would be waited for.
         if self.image.exists() && !self.image.is_file() {
-            return Err(Error::NotElf { image: self.image.clone() });
+            return not_elf();
         }
         let mut magic = [0; 4];
         let opened = File::open(&self.image).and_then(|mut file| file.read_exact(&mut magic));
         match opened {
             Ok(()) if magic == *b"\x7FELF" => Ok(()),
-            Ok(()) => Err(Error::NotElf { image: self.image.clone() }),
-            Err(cause) => Err(Error::NoImage { image: self.image.clone(), cause }),
+            Ok(()) => not_elf(),
+            Err(cause) => unfit(format!(
+                "{cause}; `cargo xtask firmware` builds it, below CARGO_TARGET_DIR if that is set"
+            )),
         }
     }
 }
@@ -139,8 +143,7 @@ impl Emulator {
     /// Starts QEMU and connects to the image's link.
     ///
     /// # Errors
-    /// [`Error::NoQemu`], [`Error::NoImage`] or [`Error::NotElf`] if a file is missing or wrong,
-    /// [`Error::Mailbox`] if its file cannot be made, or [`Error::NoStart`].
+    /// [`Error::Data`] if a file is missing or wrong, if that of the mailbox cannot be made, or if QEMU does not start.
     pub fn start(options: &Options) -> Result<(Self, Link)> {
         Self::start_with(options, &[])
     }
@@ -148,7 +151,10 @@ impl Emulator {
     /// Starts QEMU with further `arguments`, and connects to the image's link.
     pub fn start_with(options: &Options, arguments: &[&str]) -> Result<(Self, Link)> {
         options.check()?;
-        let failed = |cause| Error::NoStart { qemu: options.qemu.clone(), cause };
+        let qemu = options.qemu.display();
+        let failed = |cause: std::io::Error| {
+            Error::failed(format!("{qemu}: the emulator does not start: {cause} (--qemu)"))
+        };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
         let mut command = Command::new(&options.qemu);
@@ -174,7 +180,8 @@ impl Emulator {
         );
         let child = command.spawn().map_err(|cause| {
             if cause.kind() == ErrorKind::NotFound {
-                return Error::NoQemu { qemu: options.qemu.clone() };
+                let says = "there is no such program; on Debian: apt-get install qemu-system-arm";
+                return Error::unfit_for("qemu", format!("{qemu}: {says}"));
             }
             failed(cause)
         })?;
@@ -200,7 +207,9 @@ impl Drop for Emulator {
 }
 
 fn create_mailbox(path: &Path) -> Result<Mailbox> {
-    Mailbox::create(path).map_err(|cause| Error::Mailbox { path: path.into(), cause })
+    Mailbox::create(path).map_err(|cause| {
+        Error::failed(format!("cannot make the mailbox {}: {cause}", path.display()))
+    })
 }
 
 /// Arguments that choose the machine, with its PSRAM in the file at `mailbox` if that is given.

@@ -1,6 +1,5 @@
 //! Errors of a device or an emulator, as values that a program can match.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use firmware::capacity::Capacity;
@@ -62,36 +61,9 @@ pub enum Error {
     /// Line that the other end closed.
     #[error("the device closed the line")]
     Closed,
-    /// Serial port that cannot be opened.
-    #[error("{port}: {cause}; {known} (on Linux you may have to join the group dialout)")]
-    Port {
-        port: String,
-        cause: serialport::Error,
-        /// Ports that this computer has.
-        known: String,
-    },
     /// Work that somebody ended.
     #[error("interrupted; the device returns to its own configuration")]
     Interrupted,
-    /// Device that takes models in chunks of a size that is no positive multiple of four.
-    #[error("the device offers chunks of {0} bytes; they must be a positive multiple of 4")]
-    ChunkSize(usize),
-    /// Report with another number of values than the model in force has.
-    #[error(
-        "frame {frame} has {found} values instead of {expected}; was the model exchanged meanwhile?"
-    )]
-    ReportLength {
-        frame: u32,
-        /// Number of values that it should have.
-        expected: usize,
-        found: usize,
-    },
-    /// Request longer than any device takes.
-    #[error("a request longer than {most_bytes} bytes")]
-    RequestTooLong {
-        /// Largest size of a request.
-        most_bytes: usize,
-    },
     /// Device that does not answer.
     #[error("the device does not answer ({attempts} attempts, {} ms each); {heard}", timeout.as_millis())]
     NoAnswer {
@@ -102,18 +74,12 @@ pub enum Error {
         /// What came instead.
         heard: Heard,
     },
-    /// Device that stops answering or reporting in the middle of its work.
-    #[error("{0}")]
-    Silent(String),
     /// Answer that does not belong to the request.
     #[error("the device answers {request} with {answer}")]
     Unexpected { request: String, answer: String },
     /// Request that the device refused.
     #[error("the device refused: {}", why(*.0))]
     Refused(Refusal),
-    /// Readings of known resistors from which no constants of the circuit can be found.
-    #[error("{0}")]
-    Calibration(String),
     /// Model that the device says it activated, while another one is active.
     #[error("the device accepted model {committed:08x}, but {in_force} is active")]
     NotInForce {
@@ -122,57 +88,48 @@ pub enum Error {
         /// Active model, as it reports it.
         in_force: String,
     },
-    /// Model without a seal, for a device with a key.
-    #[error("the device takes sealed models only: give its key, `upload --key FILE`")]
-    NeedsSeal,
-    /// Seal for a device without a key.
-    #[error("the device has no key, and takes any model: `provision` it first, or leave --key out")]
-    HasNoKey,
-    /// Device whose key has decayed.
-    #[error(
-        "the device's key has decayed, so it takes no model: provision the same key again, \
-         or erase its flash with a debugger"
-    )]
-    KeyDamaged,
     /// Device that does not decode with a model on trial.
     #[error("the device is back at its previous model: {0}")]
     NotDecoding(String),
-    /// Model that the device has no room for.
-    #[error(
-        "the model has {} rows of {} readings and {} outputs; the device has room for {} rows of {} readings and \
-         {} outputs: {}",
-        shape.rows, shape.inputs, shape.outputs, capacity.rows, capacity.columns, capacity.outputs,
-        image_for(*capacity, *shape)
-    )]
-    NoRoom {
-        /// What the device has room for.
-        capacity: Capacity,
-        shape: ModelShape,
-    },
-    /// Exponential of the device that the host does not know.
-    #[error("the device decodes with {0:?}, which this host does not know")]
-    UnknownExponential(String),
-    /// Emulator whose program is missing.
-    #[error("{}: there is no such program; on Debian: apt-get install qemu-system-arm", qemu.display())]
-    NoQemu { qemu: PathBuf },
-    /// Emulator that does not start.
-    #[error("{}: the emulator does not start: {cause}", qemu.display())]
-    NoStart { qemu: PathBuf, cause: std::io::Error },
-    /// File of a mailbox that cannot be made.
-    #[error("cannot make the mailbox {}: {cause}", path.display())]
-    Mailbox { path: PathBuf, cause: std::io::Error },
-    /// Image that cannot be read.
-    #[error("{}: {cause}; `cargo xtask firmware` builds it, below CARGO_TARGET_DIR if that is set", image.display())]
-    NoImage { image: PathBuf, cause: std::io::Error },
-    /// Image that is no program.
-    #[error("{}: it is no ELF file; the application's is `qemu-app`", image.display())]
-    NotElf { image: PathBuf },
     /// Refusal or failure of the crates that compute.
     #[error(transparent)]
     Data(#[from] taxel_data::Error),
 }
 
+/// Said of a device without a key, and of one whose key has decayed.
+pub(crate) const NO_KEY: &str =
+    "the device has no key, and takes any model: `provision` it first, or leave --key out";
+pub(crate) const KEY_DAMAGED: &str = "the device's key has decayed, so it takes no model: provision the same key again, or erase its flash with a debugger";
+
 impl Error {
+    /// Error for what a device or an emulator does wrong, and the `reason`.
+    pub(crate) fn failed(reason: impl Into<String>) -> Self {
+        taxel_data::Error::failed(reason).into()
+    }
+
+    /// Error for something that cannot be used for the setting `field`, and the `reason`.
+    pub(crate) fn unfit_for(field: &'static str, reason: impl Into<String>) -> Self {
+        taxel_data::Error::unfit_for(field, reason).into()
+    }
+
+    /// Error for a model of this `shape` that a device of this `capacity` has no room for.
+    pub(crate) fn no_room(capacity: Capacity, shape: ModelShape) -> Self {
+        Self::unfit_for(
+            "",
+            format!(
+                "the model has {} rows of {} readings and {} outputs; the device has room for {} rows of {} readings \
+                 and {} outputs: {}",
+                shape.rows,
+                shape.inputs,
+                shape.outputs,
+                capacity.rows,
+                capacity.columns,
+                capacity.outputs,
+                image_for(capacity, shape)
+            ),
+        )
+    }
+
     /// Whether the device goes on, and must be told to leave the model that it got.
     pub(crate) fn is_settled_by_abort(&self) -> bool {
         matches!(self, Self::Interrupted | Self::NotDecoding(_) | Self::NotInForce { .. })
@@ -230,9 +187,9 @@ fn why_not_trusted(fault: SealFault) -> String {
         SealFault::Outdated { highest } => format!(
             "it had a model of version {highest}; seal this one as a higher version (--model-version), if you mean it"
         ),
-        SealFault::NoKey => Error::HasNoKey.to_string(),
+        SealFault::NoKey => NO_KEY.into(),
         SealFault::KeyIsSet => "it has another key; a debugger can erase it".into(),
-        SealFault::KeyDamaged => Error::KeyDamaged.to_string(),
+        SealFault::KeyDamaged => KEY_DAMAGED.into(),
     }
 }
 

@@ -84,7 +84,7 @@ impl Limits {
             if taken > limit {
                 let message =
                     format!("the firmware takes {taken} bytes, more than {option} {limit}");
-                return Err(Error::Failed(message));
+                return Err(Error::failed(message));
             }
         }
         Ok(())
@@ -181,7 +181,7 @@ pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result
     if findings.all_good() {
         limits.check(&findings.device.memory)
     } else {
-        Err(Error::Failed(if findings.repeated > 0 || findings.damaged > 0 {
+        Err(Error::failed(if findings.repeated > 0 || findings.damaged > 0 {
             format!(
                 "the line is not reliable: {} requests had to be sent again, {} reports were damaged",
                 findings.repeated, findings.damaged

@@ -15,11 +15,12 @@ use taxel_learn::train::refine::LEAST_FOLDS;
 use taxel_learn::train::resolution;
 use taxel_learn::{Options, select};
 
-use super::data_file::DataFileArguments;
+use super::data_file::{DATA_FILES, DataFileArguments};
 use super::{data_notes, readings, refused_readings};
 
 /// What a CSV file's columns are.
 #[derive(Args, Default)]
+#[command(next_help_heading = DATA_FILES)]
 pub struct DataArguments {
     /// Reading columns of a data file: names with * and ?, and ranges such as c2..c16, comma-separated [default:
     /// r*c*_ohm].

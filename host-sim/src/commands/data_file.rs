@@ -6,9 +6,12 @@ use crate::{Error, Result};
 use clap::Args;
 use taxel_data::data_file::{DataFile, Reading};
 
+/// Heading of options for data files.
+pub const DATA_FILES: &str = "Data files (CSV, .npy, .npz)";
+
 /// How data files are read: CSV files (with or without a header), numpy's .npy and .npz.
 #[derive(Args, Default)]
-#[command(next_help_heading = "Data files (CSV, .npy, .npz)")]
+#[command(next_help_heading = DATA_FILES)]
 pub struct DataFileArguments {
     #[command(flatten)]
     fields: FieldArguments,
@@ -52,13 +55,12 @@ impl DataFileArguments {
         let lines = file.lines();
         let kept = match (self.first_share, self.last_share) {
             (Some(share), _) => {
-                let last = count("--first-share", share, lines, |lines| (lines + 0.5).floor())?;
-                0..last
+                0..count("--first-share", share, lines, |share| first_lines(share, lines))?
             }
             (_, Some(share)) => {
-                // Half a line goes to the first part, so that both parts make the whole.
-                let count = count("--last-share", share, lines, |lines| (lines - 0.5).ceil())?;
-                lines - count..lines
+                // What the first part leaves, so that both parts make the whole.
+                let rest = |share| lines - first_lines(WHOLE - share, lines);
+                lines - count("--last-share", share, lines, rest)?..lines
             }
             _ => 0..lines,
         };
@@ -95,13 +97,22 @@ impl DataFileArguments {
     }
 }
 
-/// Number of lines that are a `share` of all `lines`, as `rounded` makes it a whole number.
-fn count(option: &str, share: f64, lines: usize, rounded: fn(f64) -> f64) -> Result<usize> {
+/// Parts of a share of 1. Whole numbers of these do not round, so that no line is in two parts of a file.
+const WHOLE: u64 = 1_000_000_000_000;
+
+/// Number of lines that are the first `share` of all `lines`, to the nearest; half a line counts as one.
+fn first_lines(share: u64, lines: usize) -> usize {
+    let (share, lines, whole) = (u128::from(share), lines as u128, u128::from(WHOLE));
+    ((share * lines + whole / 2) / whole) as usize
+}
+
+/// Number of lines that `lines_of` makes of a `share` in parts of [`WHOLE`].
+fn count(option: &str, share: f64, lines: usize, lines_of: impl Fn(u64) -> usize) -> Result<usize> {
     if !(share > 0.0 && share <= 1.0) {
         let message = format!("{option} {share}: give a share above 0, up to 1, such as 0.8");
         return Err(Error::Usage(message));
     }
-    let count = rounded(lines as f64 * share) as usize;
+    let count = lines_of((share * WHOLE as f64).round() as u64);
     if count == 0 {
         let message = format!("{option} {share}: no line of {lines} is left; give a larger share");
         return Err(Error::Usage(message));
@@ -145,5 +156,30 @@ impl FieldArguments {
             eprintln!("note: {marked} values of {name} are {code}, and count as missing");
         }
         Ok(file)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_that_make_the_whole_have_each_line_once() {
+        for count in [7, 10, 11, 13, 25, 50, 101, 150] {
+            let text = (0..count).map(|line| line.to_string()).collect::<Vec<_>>().join("\n");
+            let file = DataFile::parse(Path::new("d.csv"), text.as_bytes(), false).unwrap();
+            let lines = |first_share, last_share| {
+                let cut = DataFileArguments { first_share, last_share, ..Default::default() };
+                cut.cut(file.clone()).map_or(vec![], |file| file.rows().map(|r| r[0]).collect())
+            };
+            for percent in 1..100 {
+                let share = |percent: i32| format!("0.{percent:02}").parse::<f64>().ok();
+                let first = lines(share(percent), None);
+                let last = lines(None, share(100 - percent));
+                let all = [first, last].concat();
+                let whole: Vec<f64> = (0..count).map(f64::from).collect();
+                assert_eq!(all, whole, "{percent} % of {count} lines");
+            }
+        }
     }
 }

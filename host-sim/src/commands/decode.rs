@@ -8,7 +8,7 @@ use clap::Args;
 use firmware::link::message::EstimateReport;
 use serde::Serialize;
 use taxel_data::csv_file::{self, Column};
-use taxel_data::data_file::DataFile;
+use taxel_data::data_file::{DataFile, FieldTexts};
 use taxel_data::table::Table;
 use taxel_learn::infer::is_missing;
 use taxel_learn::{Exponential, ModelBlob, PreparedModel};
@@ -39,8 +39,6 @@ pub struct Arguments {
     model: PathBuf,
     /// CSV file, .npy or .npz with the model's reading columns, in any order, among others.
     readings: PathBuf,
-    #[command(flatten)]
-    file: DataFileArguments,
     /// CSV file to write, with the model's output columns.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -58,6 +56,8 @@ pub struct Arguments {
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
+    #[command(flatten)]
+    file: DataFileArguments,
 }
 
 #[derive(Serialize)]
@@ -92,7 +92,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let health = arguments.health.apply(&model, &mut readings)?;
     remark_on_range(&model, &readings);
     let estimate = model.decode_table(&readings);
-    let keep = kept(&arguments.keep, &file, &estimate)?;
+    let keep = kept(arguments, &file, &estimate)?;
     let assessed = arguments.confidence.then(|| model.assess(&readings.values));
     let assessed = match assessed {
         Some(None) => {
@@ -136,6 +136,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     page.print()
 }
+
+/// Column of novelty, and what follows an output's name in the name of its deviation.
+const NOVELTY: &str = "novelty_nats";
+const DEVIATION: &str = "_deviation";
 
 /// Whether a row's outputs are no numbers though no reading is missing.
 fn overflows(inputs: &[f64], outputs: &[f64]) -> bool {
@@ -190,7 +194,7 @@ fn status_name(names: &[&str]) -> String {
 /// frame), and each frame's `flags`.
 fn write(
     path: &Path,
-    keep: &[(&str, Vec<String>)],
+    keep: &[(&str, FieldTexts<'_>)],
     estimate: &Table,
     assessed: Option<&(Vec<f64>, Vec<f64>)>,
     flags: &[u8],
@@ -199,7 +203,7 @@ fn write(
     let names = estimate.names.iter().map(String::as_str).chain(keep.iter().map(|(name, _)| *name));
     let status = status_name(&names.collect::<Vec<_>>());
     let flags = flags.iter().map(|flags| f64::from(*flags));
-    let kept = keep.iter().map(|(name, texts)| Column::texts(name, texts));
+    let kept = keep.iter().map(|(name, texts)| Column::texts(name, *texts, None));
     let estimated = estimate.names.iter().map(|name| Column::f32(name));
     let lines = estimate.lines();
     let Some((deviations, novelty)) = assessed else {
@@ -209,9 +213,9 @@ fn write(
         return Ok(csv_file::write_columns(path, columns, lines)?);
     };
     let names: Vec<String> =
-        estimate.names.iter().map(|name| format!("{name}_deviation")).collect();
+        estimate.names.iter().map(|name| format!("{name}{DEVIATION}")).collect();
     let columns = kept.chain(estimated).chain(names.iter().map(|name| Column::f32(name)));
-    let columns = columns.chain([Column::f64("novelty_nats"), Column::f64(&status)]);
+    let columns = columns.chain([Column::f64(NOVELTY), Column::f64(&status)]);
     let lines = lines.zip(deviations.chunks_exact(outputs)).zip(novelty.iter().zip(flags));
     let lines = lines.map(|((values, deviations), (novelty, flags))| {
         let values = values.iter().chain(deviations).copied();
@@ -222,27 +226,33 @@ fn write(
 
 /// Columns of `file` to write in front of the `outputs`: names, and fields as they are written.
 fn kept<'k>(
-    keep: &'k [String],
-    file: &DataFile,
+    Arguments { keep, confidence, .. }: &'k Arguments,
+    file: &'k DataFile,
     outputs: &Table,
-) -> Result<Vec<(&'k str, Vec<String>)>> {
+) -> Result<Vec<(&'k str, FieldTexts<'k>)>> {
     let names = || keep.iter().map(|name| name.trim());
-    if let Some(name) = names().find(|name| outputs.names.iter().any(|output| output == name)) {
-        let message =
-            format!("--keep {name}: the model has an output of that name; rename the column");
+    let is_written = |name: &str| {
+        let is_output = |name: &str| outputs.names.iter().any(|output| output == name);
+        let of_confidence = name == NOVELTY || name.strip_suffix(DEVIATION).is_some_and(is_output);
+        is_output(name) || *confidence && of_confidence
+    };
+    if let Some(name) = names().find(|name| is_written(name)) {
+        let message = format!(
+            "--keep {name}: a column of that name is written for the model already; rename this one"
+        );
         return Err(Error::Usage(message));
     }
     let repeated = |place: usize| names().take(place).any(|name| name == keep[place].trim());
     if let Some(place) = (0..keep.len()).find(|place| repeated(*place)) {
         return Err(Error::Usage(format!("--keep {}: name each column once", keep[place])));
     }
-    match file.columns(names()) {
-        Ok(columns) => Ok(names().zip(file.texts(&columns)).collect()),
-        Err(taxel_data::Error::File { path, problem }) => {
-            Err(Error::Unfit { path, message: format!("{problem} (--keep)") })
+    let column = |name| Ok((name, file.texts(file.column(name)?)?));
+    names().map(column).collect::<taxel_data::Result<_>>().map_err(|error| match error {
+        taxel_data::Error::File { path, problem } => {
+            Error::Unfit { path, message: format!("{problem} (--keep)") }
         }
-        Err(other) => Err(other.into()),
-    }
+        other => other.into(),
+    })
 }
 
 /// Remarks on stderr if many readings lie outside the range that the model was trained on.

@@ -39,8 +39,6 @@ pub struct Arguments {
     /// CSV file, .npy or .npz with the model's reading and output columns.
     data: PathBuf,
     #[command(flatten)]
-    file: DataFileArguments,
-    #[command(flatten)]
     baseline: BaselineArgument,
     #[command(flatten)]
     health: HealthArguments,
@@ -50,6 +48,8 @@ pub struct Arguments {
     /// Write a page with the same figures as run's.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    #[command(flatten)]
+    file: DataFileArguments,
 }
 
 #[derive(Serialize)]

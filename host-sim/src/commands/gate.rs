@@ -30,8 +30,6 @@ use super::{Common, print};
   host-sim gate press --k 3,3.5,4 --noise 0.01
   host-sim gate measured.csv --inputs 'ch*' --outputs 'f?_n' --baseline rest.csv")]
 pub struct Arguments {
-    #[command(flatten)]
-    subject: SubjectArgument,
     /// Frames of a scene, and as many of the untouched sensor [default: 4000].
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
@@ -54,6 +52,8 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     cycles: Vec<u64>,
+    #[command(flatten)]
+    subject: SubjectArgument,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {

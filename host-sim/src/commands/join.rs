@@ -8,7 +8,7 @@ use serde::Serialize;
 use taxel_data::columns;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::DataFile;
-use taxel_data::join::{Join, Joined};
+use taxel_data::join::{Join, Joined, Time};
 
 use super::arguments::of_option;
 use super::data_file::FieldArguments;
@@ -46,10 +46,10 @@ struct JoinArguments {
     on: String,
     /// Largest distance of two time stamps that belong together, in their unit. Lines without a partner are left out.
     #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
-    tolerance: f64,
+    tolerance: Time,
     /// Time to add to the second file's time stamps.
-    #[arg(long, value_name = "TIME", default_value_t = 0.0, allow_negative_numbers = true)]
-    lag: f64,
+    #[arg(long, value_name = "TIME", default_value = "0", allow_negative_numbers = true)]
+    lag: Time,
 }
 
 #[derive(Serialize)]
@@ -89,14 +89,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// Writes the lines of both logs that belong together, with their fields as they are written.
 fn write(path: &Path, joined: &Joined, logs: [&DataFile; 2]) -> Result<()> {
-    let texts: Vec<Vec<String>> = (0..2)
-        .flat_map(|log| {
-            let all: Vec<usize> = (0..logs[log].header.len()).collect();
-            logs[log].texts(&all).into_iter().map(move |column| (log, column))
-        })
-        .map(|(log, column)| joined.pairs.iter().map(|pair| column[pair[log]].clone()).collect())
-        .collect();
-    let columns = joined.header.iter().zip(&texts).map(|(name, texts)| Column::texts(name, texts));
+    let lines = [0, 1].map(|log| joined.pairs.iter().map(|pair| pair[log]).collect::<Vec<_>>());
+    let mut names = joined.header.iter();
+    let mut columns = vec![];
+    for (log, lines) in logs.iter().zip(&lines) {
+        for (column, name) in (0..log.header.len()).zip(&mut names) {
+            columns.push(Column::texts(name, log.texts(column)?, Some(lines)));
+        }
+    }
     let no_numbers = joined.pairs.iter().map(|_| []);
     Ok(csv_file::write_columns(path, columns, no_numbers)?)
 }

@@ -103,7 +103,7 @@ fn refusal(result: &LimitResult) -> Result<()> {
     let first = all.clone().find_map(|figures| figures.refused.as_ref());
     match first {
         Some(refused) if all.all(|figures| figures.refused.is_some()) => {
-            Err(Error::Failed(format!("no limit can be given: {refused}")))
+            Err(Error::failed(format!("no limit can be given: {refused}")))
         }
         _ => Ok(()),
     }

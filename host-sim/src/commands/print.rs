@@ -58,7 +58,7 @@ fn show(text: &str) -> Result<()> {
     };
     match written {
         Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
-            Err(Error::Failed(format!("cannot write to {place}: {cause}")))
+            Err(Error::failed(format!("cannot write to {place}: {cause}")))
         }
         _ => Ok(()),
     }
@@ -99,7 +99,7 @@ fn document(result: &impl Serialize, timed: bool) -> Result<String> {
         result,
     };
     let text = serde_json::to_string_pretty(&document);
-    Ok(text.map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))? + "\n")
+    Ok(text.map_err(|cause| Error::failed(format!("cannot write JSON: {cause}")))? + "\n")
 }
 
 /// Prints the result of the command as JSON.

@@ -31,8 +31,6 @@ const FILES: FileSet =
   host-sim run press --noise 0.01 -o out/noise-1
   host-sim run measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column fold")]
 pub struct Arguments {
-    #[command(flatten)]
-    subject: SubjectArgument,
     /// Centres K of each network [default: the scene's, or 64].
     #[arg(long, value_name = "K")]
     centres: Option<usize>,
@@ -48,6 +46,8 @@ pub struct Arguments {
     /// Folder that receives a folder named after the scene.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
+    #[command(flatten)]
+    subject: SubjectArgument,
 }
 
 impl Default for Arguments {

@@ -108,7 +108,7 @@ impl Sizes {
         if options.iter().any(|(field, _)| *field == bad.field) {
             return Err(arguments::of_option(bad, &options));
         }
-        Err(Error::Scene { scene: source.into(), cause: bad })
+        Err(Error::of_scene(source, bad))
     }
 }
 

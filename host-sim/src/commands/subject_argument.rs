@@ -11,6 +11,7 @@ use taxel_learn::ModelBlob;
 use taxel_simulate::sensor::Precision;
 
 use super::data_argument::{DataArguments, HowToTrain, JudgedBy};
+use super::data_file::DATA_FILES;
 use super::scene_argument::{
     self, DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument, Sizes,
 };
@@ -23,7 +24,7 @@ pub struct SubjectArgument {
     source: Option<String>,
     /// CSV file with frames to judge by, in the same columns [default: the last fifth of the lines is held out, or the
     /// last fold of --fold-column].
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = DATA_FILES)]
     test: Option<PathBuf>,
     /// Precision of the scene's readings, instead of its own.
     #[arg(long, value_parser = arguments::precision())]
@@ -36,13 +37,14 @@ pub struct SubjectArgument {
 #[derive(Args, Default)]
 pub struct SubjectOptions {
     #[command(flatten)]
-    pub data: DataArguments,
-    #[command(flatten)]
     pub noise: NoiseArgument,
     #[command(flatten)]
     pub relative_inputs: RelativeInputsArgument,
     #[command(flatten)]
     pub refine: RefineArgument,
+    // Last, since options behind it would stand under its heading.
+    #[command(flatten)]
+    pub data: DataArguments,
 }
 
 /// Whether `source` is a scene, or otherwise a CSV file. A name without a file and an extension is a

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use super::progress::Terminal;
 use crate::evaluate::printed::{self, CELLS, Nearness};
-use crate::evaluate::reconstruct;
 use crate::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
 use crate::experiment;
 use crate::metrics::{Definition, Errors};
@@ -19,21 +18,16 @@ use taxel_simulate::sensor::Precision;
 use super::scene_argument::{RelativeInputsArgument, SceneArgument, group_of_scene};
 use super::{Common, arguments, print};
 
-mod comparison;
-mod search;
+pub mod comparison;
 
 /// Compute the paper's Table 1: errors by spread and noise.
 ///
 /// Every definition of error is given. The K-centre network is compared with the training mean, the best
 /// linear decoder, the paper's standard network (K = N), and the 40 cells that the paper prints.
-///
-/// `--reconstruct` searches what the paper leaves open for set-ups whose table comes near the printed one. It takes
-/// some minutes, saves what it has tried (`--saved`), and goes on from there (docs/paper.md).
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim table1 paper -o table1.csv --svg table1.svg
-  host-sim table1 paper-as-printed
-  host-sim table1 --reconstruct --svg reconstruct.svg")]
+  host-sim table1 paper-as-printed")]
 pub struct Arguments {
     /// A built-in scene (paper, press, paper-as-printed) or the path of a scene file.
     #[arg(default_value = "paper")]
@@ -49,20 +43,6 @@ pub struct Arguments {
     /// Picture to write: the table beside the printed one.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Search for set-ups that give the printed table, instead of computing that of a scene.
-    #[arg(long, conflicts_with_all = ["scene", "precision", "group", "relative_inputs", "output"])]
-    reconstruct: bool,
-    /// File that the search is saved to, and goes on from.
-    #[arg(
-        long,
-        value_name = "FILE",
-        requires = "reconstruct",
-        default_value = "out/reconstruct.json"
-    )]
-    saved: PathBuf,
-    /// Set-ups to try.
-    #[arg(long, value_name = "N", requires = "reconstruct", default_value_t = reconstruct::USUAL_SETUPS)]
-    setups: usize,
     /// Outputs to print, such as dz_mm or dx_mm.
     #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
     group: String,
@@ -77,10 +57,6 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    if arguments.reconstruct {
-        let svg = arguments.svg.as_deref();
-        return search::execute(arguments.setups, &arguments.saved, svg, common);
-    }
     let argument = SceneArgument::new(&arguments.scene, arguments.precision);
     let mut scene = argument.load(common)?;
     arguments.relative_inputs.apply(&mut scene);

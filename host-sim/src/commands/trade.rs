@@ -39,8 +39,6 @@ mod page;
   host-sim trade press --average 1,4,16 --max-latency-ms 25
   host-sim trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
-    #[command(flatten)]
-    subject: SubjectArgument,
     /// Folder that receives a folder named after the scene or the CSV file.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = "out")]
     output: PathBuf,
@@ -90,6 +88,8 @@ pub struct Arguments {
     /// Print all points, not only the front and the chosen one (files have all of them).
     #[arg(long)]
     all: bool,
+    #[command(flatten)]
+    subject: SubjectArgument,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -130,11 +130,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     files::FILES.check(&folder, &arguments.subject.paths())?;
     let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
     let mut trade = computed.map_err(|error| match error {
-        Error::Setting(bad) => of_option(bad, &OPTIONS),
         Error::Data(taxel_data::Error::Setting(bad)) if bad.field == "memory" => {
             let fix = "give fewer --centres or --inputs";
             Error::Usage(format!("training takes {}, more than 8 GB: {fix}", bad.value))
         }
+        Error::Data(taxel_data::Error::Setting(bad)) => of_option(bad, &OPTIONS),
         Error::NoPoint(cause) => Error::Usage(cause.text(option)),
         other => other,
     })?;

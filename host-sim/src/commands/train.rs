@@ -77,11 +77,11 @@ pub struct Arguments {
     /// Where more than a quarter of a frame is missing, nothing is filled.
     #[arg(long)]
     fill: bool,
-    #[command(flatten)]
-    subject: SubjectOptions,
     /// Frames to synthesise from a scene, instead of the scene's number.
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
+    #[command(flatten)]
+    subject: SubjectOptions,
     #[command(flatten)]
     recursion: recursion::RecursionArguments,
 }

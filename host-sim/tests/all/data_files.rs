@@ -154,27 +154,6 @@ fn whole_numbers_of_any_length_are_kept_and_joined_as_they_are_written() {
 }
 
 #[test]
-fn shares_of_a_file_make_the_whole() {
-    let folder = Folder::new("shares");
-    let lines = |count: u32| {
-        let line = |i: u32| format!("{i},{}", i * i);
-        (0..count).map(line).collect::<Vec<_>>().join("\n")
-    };
-    for (count, share, rest) in [(10, "0.8", "0.2"), (13, "0.5", "0.5"), (11, "0.75", "0.25")] {
-        folder.write("d.csv", lines(count));
-        let frames = |option: &str, share: &str| {
-            let columns = ["--inputs", "c1", "--outputs", "c2", "--no-refine", "--centres", "1"];
-            let train = ["train", "d.csv", option, share, "-o", "m.bin", "--json"];
-            let text = folder.succeed(&[&train[..], &columns[..]].concat());
-            let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
-            summary["training_frames"].as_u64().unwrap()
-        };
-        let first = frames("--first-share", share);
-        assert_eq!(first + frames("--last-share", rest), u64::from(count));
-    }
-}
-
-#[test]
 fn arrays_and_text_train_the_same_model() {
     let folder = Folder::new("arrays");
     let values: Vec<[f64; 3]> =
@@ -264,7 +243,11 @@ fn wrong_usage_of_data_files_is_refused() {
     assert!(std::fs::read_to_string(folder.path("sensor.csv")).unwrap().contains(','));
     let decode = ["decode", "m.bin", "sensor.csv", "-o", "e.csv", "--keep"];
     refused(&folder, &[&decode[..], &["time"]].concat(), &["\"time\" is missing", "--keep"]);
-    refused(&folder, &[&decode[..], &["c4"]].concat(), &["--keep c4", "output of that name"]);
+    refused(&folder, &[&decode[..], &["c4"]].concat(), &["--keep c4", "column of that name"]);
+    for name in ["novelty_nats", "c4_deviation"] {
+        let assessed = [&decode[..], &[name, "--confidence"]].concat();
+        refused(&folder, &assessed, &["--keep", name, "column of that name"]);
+    }
     refused(&folder, &[&decode[..], &["c2,c2"]].concat(), &["--keep c2", "once"]);
     folder.write("d.npy", "1,2\n");
     let array = ["train", "d.npy", "--inputs", "c1", "--outputs", "c2", "-o", "x.bin"];

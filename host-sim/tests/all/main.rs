@@ -2,7 +2,6 @@
 
 mod common;
 mod confidence;
-mod quantisation;
 mod virtual_device;
 
 mod accuracy;

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use crate::common::{Folder, small_scene, small_scene_with_table1, untimed};
-use crate::json_schema;
 
 fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap()
@@ -91,73 +90,6 @@ fn columns_with_any_names_train_one_network() {
 }
 
 #[test]
-fn missing_readings_leave_their_rows_outputs_empty_and_no_line_out() {
-    let folder = Folder::new("missing");
-    folder.write("scene.toml", small_scene());
-    folder.succeed(&["train", "scene.toml", "-n", "200", "-o", "m.bin"]);
-    folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "d.csv"]);
-    let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
-    let mut lines: Vec<Vec<&str>> = data.lines().map(|l| l.split(',').collect()).collect();
-    let column = lines[0].iter().position(|name| *name == "r5c7_ohm").unwrap();
-    lines[2][column] = "";
-    lines[3][column] = "NaN";
-    let holed = lines.iter().map(|l| l.join(",") + "\n").collect::<String>();
-    folder.write("holed.csv", holed);
-    let printed = folder.succeed(&["decode", "m.bin", "holed.csv", "-o", "e.csv"]);
-    assert!(printed.contains("2 of them miss a reading"), "{printed}");
-    let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
-    let empty = |line: &str| line.split(',').map(str::is_empty).collect::<Vec<_>>();
-    let lines: Vec<Vec<bool>> = estimate.lines().map(empty).collect();
-    assert_eq!(lines.len(), 4);
-    assert!(lines[1].iter().all(|empty| !empty));
-    for holed in &lines[2..] {
-        let (row_4, row_5) = (&holed[..18], &holed[18..36]); // and the status
-        assert!(row_4.iter().all(|empty| !empty) && row_5.iter().all(|empty| *empty));
-    }
-}
-
-#[test]
-fn a_network_of_few_components_takes_less_flash_and_says_so() {
-    let folder = Folder::new("components");
-    folder.write("scene.toml", small_scene());
-    let train = ["train", "scene.toml", "-n", "2000", "--whole-array", "--centres", "40"];
-    let to =
-        |model: &str, more: &[&str]| folder.succeed(&[&train[..], more, &["-o", model]].concat());
-    to("full.bin", &[]);
-    let printed = to("few.bin", &["--output-rank", "5"]);
-    assert!(printed.contains("K = 40, rank 5, "), "{printed}");
-    let printed = folder.succeed(&["inspect", "few.bin"]);
-    assert!(printed.contains("5 components → 36 outputs of all rows"), "{printed}");
-    assert!(printed.contains("components 20, "), "{printed}");
-    let bytes = |model: &str| std::fs::metadata(folder.path(model)).unwrap().len();
-    assert!(bytes("few.bin") < bytes("full.bin"));
-
-    // A scene asks for the same by its fields.
-    let fields = "affine_tail = true\nwhole_array = true\noutput_rank = 5";
-    let scene = small_scene()
-        .replace("affine_tail = true", fields)
-        .replace("spread = 0.8", "spread = 0.4")
-        .replace("centres = 12", "centres = 40");
-    assert!(scene.contains("output_rank = 5") && scene.contains("centres = 40"));
-    folder.write("few.toml", &scene);
-    folder.succeed(&["train", "few.toml", "-n", "2000", "-o", "scene.bin"]);
-    let printed = folder.succeed(&["run", "few.toml"]);
-    assert!(printed.contains("K = 40 -> 5 components -> 36 outputs, "), "{printed}");
-    folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "9", "-o", "d.csv"]);
-    for model in ["few", "scene"] {
-        folder.succeed(&[
-            "decode",
-            &format!("{model}.bin"),
-            "d.csv",
-            "-o",
-            &format!("{model}.csv"),
-        ]);
-    }
-    let decoded = |model: &str| std::fs::read(folder.path(model)).unwrap();
-    assert_eq!(decoded("few.csv"), decoded("scene.csv"));
-}
-
-#[test]
 fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     let folder = Folder::new("array");
     folder.write("scene.toml", small_scene());
@@ -177,17 +109,23 @@ fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     };
     let (of_array, of_rows) = (rmse("array.bin"), rmse("rows.bin"));
     assert!(of_array < of_rows, "{of_array} {of_rows}");
+    let printed = folder.succeed(&[&array[..6], &["few.bin", "--output-rank", "5"]].concat());
+    assert!(printed.contains("rank 5, "), "{printed}");
+    let printed = folder.succeed(&["inspect", "few.bin"]);
+    assert!(printed.contains("5 components → 36 outputs of all rows"), "{printed}");
+    let bytes = |model: &str| std::fs::metadata(folder.path(model)).unwrap().len();
+    assert!(bytes("few.bin") < bytes("array.bin"));
 
     // The scene asks for the same, but with a width of its own, of which --whole-array takes half.
     let scene = small_scene()
-        .replace("affine_tail = true", "affine_tail = true\nwhole_array = true")
+        .replace("affine_tail = true", "affine_tail = true\nwhole_array = true\noutput_rank = 5")
         .replace("spread = 0.8", "spread = 0.4");
-    assert!(scene.contains("whole_array") && scene.contains("spread = 0.4"));
+    assert!(scene.contains("output_rank") && scene.contains("spread = 0.4"));
     folder.write("array.toml", scene);
     folder.succeed(&["train", "array.toml", "-n", "2000", "-o", "scene.bin"]);
     let network =
         |model: &str| json(&folder.succeed(&["inspect", model, "--json"]))["networks"].clone();
-    assert_eq!(network("scene.bin"), network("array.bin"));
+    assert_eq!(network("scene.bin"), network("few.bin"));
 
     let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
     let mut lines: Vec<Vec<&str>> = data.lines().map(|l| l.split(',').collect()).collect();
@@ -319,6 +257,14 @@ fn every_command_has_help_with_an_example() {
         assert!(help.contains(&format!("host-sim {command} ")), "{help}");
         assert!(help.contains("--json"), "{help}");
     }
+    let help = folder.succeed(&["trade", "-h"]);
+    let options = |section: &str| section.lines().filter(|line| line.contains("--")).count();
+    let (_, help) = help.split_once("\nOptions:\n").unwrap();
+    let (own, rest) = help.split_once("\nData files (CSV, .npy, .npz):\n").unwrap();
+    let (of_files, _) = rest.split_once("\nExamples:").unwrap();
+    assert!((20..=25).contains(&options(own)) && own.contains("--seed"), "{own}");
+    assert!(options(of_files) >= 10 && of_files.contains("--test"), "{of_files}");
+    assert!(!of_files.contains("--max-error"), "{of_files}");
 }
 
 #[test]
@@ -356,21 +302,6 @@ fn table1_shows_the_papers_cells_beside_its_own() {
     assert!(cells[3].as_f64().unwrap() < 1.0, "{cells}");
     assert_eq!(result["test_frames"], 60);
     assert_eq!(result["solver"], "qr");
-}
-
-#[test]
-fn a_search_for_the_papers_set_up_goes_on_from_where_it_was_ended() {
-    let folder = Folder::new("reconstruct");
-    let search = ["table1", "--reconstruct", "--setups", "1", "--saved", "s.json"];
-    json_schema::checked(&folder, &json_schema::schema(), &search);
-    let saved = std::fs::read(folder.path("s.json")).unwrap();
-    let page = folder.succeed(&search);
-    assert!(page.contains("nearest 1") && page.contains("a constant"), "{page}");
-    assert!(std::fs::read(folder.path("s.json")).unwrap() == saved);
-    let refused = folder.fail(&[&search[..], &["--seed", "2"]].concat(), 2);
-    assert!(refused.contains("s.json") && refused.contains("--seed 1"), "{refused}");
-    folder.write("s.json", "{}");
-    assert!(folder.fail(&search, 2).contains("it is no saved search"));
 }
 
 #[test]

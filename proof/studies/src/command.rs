@@ -33,6 +33,7 @@ use crate::question::recursion::{
     self, DIVERGED, FORGETTING_FACTORS, INITIAL_COVARIANCES, KINDS, Outcome,
 };
 use crate::question::widths::{self, WidthsStudy};
+use crate::reconstruct;
 
 /// What is studied.
 #[derive(Subcommand)]
@@ -180,6 +181,7 @@ pub enum Question {
         #[arg(long, value_name = "FILE")]
         model: Option<PathBuf>,
     },
+    Reconstruct(reconstruct::Arguments),
 }
 
 /// Option of a study with a picture.
@@ -219,9 +221,7 @@ const OPTIONS: [(&str, &str); 9] = [
 /// An error of a setting, as one of the option that sets it.
 fn of_options(error: impl Into<Error>) -> Error {
     match error.into() {
-        Error::Setting(bad) | Error::Data(taxel_data::Error::Setting(bad)) => {
-            of_option(bad, &OPTIONS)
-        }
+        Error::Data(taxel_data::Error::Setting(bad)) => of_option(bad, &OPTIONS),
         other => other,
     }
 }
@@ -238,6 +238,7 @@ impl Question {
             Self::Drift { .. } => "drift",
             Self::Readout { .. } => "readout",
             Self::Confidence { .. } => "confidence",
+            Self::Reconstruct(_) => "study reconstruct",
         }
     }
 
@@ -318,6 +319,7 @@ impl Question {
                 })?;
                 show(common, &found, confidence_page)
             }
+            Self::Reconstruct(arguments) => reconstruct::answer(arguments, common),
         }
     }
 }

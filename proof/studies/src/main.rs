@@ -7,6 +7,7 @@ use host_sim::commands::{self, Common};
 
 mod anomaly;
 mod equations;
+mod reconstruct;
 mod level;
 mod question;
 mod picture;

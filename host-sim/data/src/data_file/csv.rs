@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use super::{DataFile, numbered};
+use super::{DataFile, Texts, numbered};
 use crate::error::{Error, Problem, Result};
 
 mod body;
@@ -59,7 +59,8 @@ pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool, before: u64) ->
         digest,
         values,
         line_numbers,
-        text: None,
+        texts: None,
+        rounded: vec![],
     })
 }
 
@@ -68,25 +69,20 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
-/// Passes each line of data (from 0) of `file`, which was parsed from `bytes`, to `take`, with its fields as they are
-/// written.
-pub(super) fn for_each_record(
-    file: &DataFile,
-    bytes: &[u8],
-    mut take: impl FnMut(usize, &csv::StringRecord),
-) {
-    let bytes = without_mark(bytes);
-    let mut reader = reader(bytes, file.names_columns);
-    let (mut counted, mut record) = (LineCount { bytes, at: 0, line: 1 }, csv::StringRecord::new());
-    let mut line = 0;
-    // What was parsed has no error, and lines that were left out since then are passed over.
-    while reader.read_record(&mut record).unwrap_or(false) && line < file.lines() {
-        let position = record.position().map_or(0, csv::Position::byte);
-        if counted.of_record_at(position) == file.line_number(line) {
-            take(line, &record);
-            line += 1;
+/// Fields of `file`, which was parsed from `bytes`, as they are written.
+pub(super) fn texts(file: &DataFile, bytes: &[u8]) -> Texts {
+    let mut reader = reader(without_mark(bytes), file.names_columns);
+    let (mut text, mut record) = (String::new(), csv::StringRecord::new());
+    let mut places = Vec::with_capacity(file.values.len() + 1);
+    places.push(0);
+    // What was parsed has no error.
+    while reader.read_record(&mut record).unwrap_or(false) {
+        for field in &record {
+            text += field.trim();
+            places.push(text.len());
         }
     }
+    Texts { text, places }
 }
 
 fn reader(text: &[u8], has_header: bool) -> csv::Reader<&[u8]> {

@@ -32,8 +32,9 @@ pub(super) fn parse_array(path: &Path, bytes: &[u8]) -> Result<DataFile> {
         return Err(unusable(path, cause));
     }
     let mut values = vec![0.0; count];
-    array.read_into(&mut values, columns, 0).map_err(|cause| unusable(path, cause))?;
-    data_file(path, bytes, numbered(columns), false, values)
+    let rounded =
+        array.read_into(&mut values, columns, 0).map_err(|cause| unusable(path, cause))?;
+    Ok(DataFile { rounded, ..data_file(path, bytes, numbered(columns), false, values)? })
 }
 
 /// Parses arrays of equally many lines, set side by side. The columns of `NAME` are called `NAME1`, `NAME2`, …; an
@@ -46,17 +47,17 @@ pub(super) fn parse_archive(path: &Path, bytes: &[u8]) -> Result<DataFile> {
     let outline = Outline::new(path, &mut archive, bytes.len())?;
     let width = outline.header.len();
     let mut values = vec![0.0; outline.lines * width];
-    let mut first = 0;
+    let (mut first, mut rounded) = (0, vec![]);
     for (index, name) in outline.arrays.iter().enumerate() {
         let of_array = |cause| unusable(path, format!("array {}: {cause}", quoted(name)));
         let mut entry =
             archive.by_index(index).map_err(|cause| unusable(path, cause.to_string()))?;
         let array = Array::open(&mut entry).map_err(of_array)?;
         let columns = array.columns;
-        array.read_into(&mut values, width, first).map_err(of_array)?;
+        rounded.extend(array.read_into(&mut values, width, first).map_err(of_array)?);
         first += columns;
     }
-    data_file(path, bytes, outline.header, true, values)
+    Ok(DataFile { rounded, ..data_file(path, bytes, outline.header, true, values)? })
 }
 
 /// What an archive holds, as its arrays' headers tell.
@@ -149,7 +150,8 @@ fn data_file(
         digest,
         values,
         line_numbers,
-        text: None,
+        texts: None,
+        rounded: vec![],
     })
 }
 

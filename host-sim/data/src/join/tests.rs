@@ -12,7 +12,8 @@ fn log(path: &str, header: &[&str], lines: &[&[f64]]) -> DataFile {
         digest: 1,
         values: lines.concat(),
         line_numbers: (2..).take(lines.len()).collect(),
-        text: None,
+        texts: None,
+        rounded: vec![],
     }
 }
 
@@ -24,7 +25,7 @@ fn read(text: &str) -> DataFile {
 }
 
 fn on_time(tolerance: f64, lag: f64) -> Join {
-    Join { on: ["t".into(), "t".into()], tolerance, lag }
+    Join { on: ["t".into(), "t".into()], tolerance: tolerance.into(), lag: lag.into() }
 }
 
 /// The joined lines, with the columns of both logs.
@@ -94,7 +95,7 @@ fn a_clock_that_was_set_back_is_refused() {
 fn names_that_exist_already_get_a_prefix_as_often_as_needed() {
     let first = log("a.csv", &["c1", "b.c1"], &[&[0.0, 1.0]]);
     let second = log("b.csv", &["c1", "c2"], &[&[0.0, 2.0]]);
-    let join = Join { on: ["c1".into(), "c1".into()], tolerance: 0.0, lag: 0.0 };
+    let join = Join { on: ["c1".into(), "c1".into()], tolerance: 0.0.into(), lag: 0.0.into() };
     assert_eq!(join.join(&first, &second).unwrap().header, ["c1", "b.c1", "b.b.c1", "c2"]);
 }
 
@@ -149,23 +150,57 @@ fn nanoseconds_since_1970_are_joined_to_the_last_one() {
     assert_eq!(joined.pairs, [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]);
     assert_eq!(joined.largest_distance, 3.0);
     assert!(on_time(2.0, 0.0).join(&first, &second).is_err());
-    assert_eq!(first.texts(&[0, 1])[0][1], (start + 10).to_string());
+    assert_eq!(first.texts(0).unwrap().at(1), (start + 10).to_string());
     let back = read(&format!("t\n{}\n{start}\n", start + 1));
     let refused = on_time(1.0, 0.0).join(&first, &back).unwrap_err().to_string();
     assert!(refused.contains("1743486221590758123 is earlier than"), "{refused}");
-    for inexact in [read("t\n1743486221590758123.5\n"), DataFile { text: None, ..first.clone() }] {
+    for inexact in [read("t\n1743486221590758123.5\n"), DataFile { texts: None, ..first.clone() }] {
         let refused = on_time(1.0, 0.0).join(&first, &inexact).unwrap_err().to_string();
         assert!(refused.contains("more digits than numbers hold"), "{refused}");
     }
 }
 
 #[test]
+fn whole_numbers_are_exact_however_far_apart_and_whatever_the_lag() {
+    let join = |tolerance: &str, lag: &str, [first, second]: [&str; 2]| {
+        let (tolerance, lag) = (tolerance.parse().unwrap(), lag.parse().unwrap());
+        let join = Join { tolerance, lag, ..on_time(0.0, 0.0) };
+        join.join(&read(&format!("t\n{first}\n")), &read(&format!("t\n{second}\n")))
+    };
+    // Beyond 2^53 from the first stamp, f64 steps by 2 and more.
+    let pairs = |joined: Result<Joined>| joined.unwrap().pairs;
+    let far = ["0\n9007199254740995", "9007199254740994\n9007199254740996"];
+    assert_eq!(pairs(join("1", "0", far)), [[1, 0]]);
+    assert!(join("0", "0", far).is_err());
+    let ends = ["-9223372036854775808\n9223372036854775807", "9223372036854775806"];
+    assert_eq!(pairs(join("1", "0", ends)), [[1, 0]]);
+    // Small time stamps, and a lag from another start: 1743486221590758123 is no f64.
+    let lag = "1743486221590758123";
+    let clocks = ["1743486221590758130\n1743486221590758140", "7\n17"];
+    assert_eq!(pairs(join("0", lag, clocks)), [[0, 0], [1, 1]]);
+    assert!(join("0", "1743486221590758124", clocks).is_err());
+    assert_eq!(pairs(join("0", "-1743486221590758123", [clocks[1], clocks[0]])).len(), 2);
+    assert_eq!(pairs(join("9007199254740993", "9007199254740993", ["0", "0"])).len(), 1);
+    assert!(join("9007199254740992", "9007199254740993", ["0", "0"]).is_err());
+    for lag in ["1743486221590758123.0", "0.5", "1e300"] {
+        let refused = join("1e300", lag, clocks).unwrap_err().to_string();
+        assert!(refused.starts_with("lag = ") && refused.contains("a whole number"), "{refused}");
+    }
+    let refused = join("1", lag, ["0.5", "1"]).unwrap_err().to_string();
+    assert!(refused.contains("the time stamp 0.5 has more digits"), "{refused}");
+}
+
+#[test]
 fn texts_are_those_of_the_lines_that_are_left_and_missing_ones_are_empty() {
     let mut file = read("\u{feff}a,\"b\"\r\n 1.50,-1\r\n\r\n\"2e3\",7\r\n,0010\r\n");
     file.mark_missing(-1.0);
-    assert_eq!(file.texts(&[1, 0]), [["", "7", "0010"], ["1.50", "2e3", ""]]);
+    let texts = |file: &DataFile, column| -> Vec<String> {
+        let texts = file.texts(column).unwrap();
+        (0..file.lines()).map(|line| texts.at(line).into_owned()).collect()
+    };
+    assert_eq!([1, 0].map(|column| texts(&file, column)), [["", "7", "0010"], ["1.50", "2e3", ""]]);
     file.keep_lines(1..2);
-    assert_eq!(file.texts(&[0]), [["2e3"]]);
-    file.text = None;
-    assert_eq!(file.texts(&[0]), [["2000"]]);
+    assert_eq!([0, 1].map(|column| texts(&file, column)), [["2e3"], ["7"]]);
+    file.texts = None;
+    assert_eq!(texts(&file, 0), ["2000"]);
 }

@@ -108,9 +108,9 @@ impl Column {
 /// # Errors
 /// [`Error`] for a scene without `[table1]`, or an error of [`train`](taxel_learn::train::train).
 pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table1> {
-    let settings = experiment.table1.as_ref().ok_or_else(|| Error::Syntax {
-        scene: experiment.name.clone(),
-        message: "it has no [table1]: add one, or use a scene that has (paper, press)".into(),
+    let settings = experiment.table1.as_ref().ok_or_else(|| {
+        let cause = "it has no [table1]: add one, or use a scene that has (paper, press)";
+        Error::of_scene(&experiment.name, cause)
     })?;
     let on_training = settings.open.is_some_and(|open| open.judged_on == JudgedOn::Training);
     let columns = settings.noise_levels.iter().map(|&level| {

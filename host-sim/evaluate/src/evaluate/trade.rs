@@ -12,11 +12,10 @@ use taxel_learn::cost::Prices;
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{ModelBlob, Options};
-use taxel_simulate::outputs::Outputs;
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
-use crate::metrics::{self, DecoderErrors, Errors, LimitSummary};
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 use crate::subject::Subject;
 use crate::verdict::Verdict;
 
@@ -26,15 +25,16 @@ mod choice;
 mod point;
 mod gating;
 mod frames;
-mod predict;
+mod ways;
 mod judge;
 
 pub use choice::Bounds;
 use choice::{Offer, SAME_ERROR};
 pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Times, Wires};
 use frames::Frames;
-use judge::Judge;
+use judge::Judged;
 pub use point::{Arithmetic, Point};
+use ways::Ways;
 
 pub use crate::verdict::SLOT_BYTES;
 
@@ -199,53 +199,51 @@ pub fn compute(
 ) -> Result<Trade> {
     let prices = Prices::accepted()?;
     check(subject, plan)?;
-    let wires = wires_of(subject);
-    let arrays = kinds(subject);
     progress.stage("prepare frames", plan.samples_averaged.len());
     let synthesised = plan.samples_averaged.iter().map(|&samples| {
-        let frames = Frames::new(subject, samples, arrays, plan);
+        let frames = Frames::new(subject, samples, plan);
         progress.step();
         frames
     });
-    let mut frames: Vec<Frames<'_>> = synthesised.collect::<Result<_>>()?;
+    let frames: Vec<Frames<'_>> = synthesised.collect::<Result<_>>()?;
+    let ways: Vec<Vec<Ways<'_>>> =
+        frames.iter().map(|frames| Ways::all(frames, plan).collect()).collect();
     // What nothing can meet is refused at once: costs first, then errors, since the limit takes some seconds.
     let unit = columns::unit_of(group);
-    let possible = |frames: &[Frames<'_>], least_errors: &[f64]| {
-        let mut offers = Vec::new();
-        for (frames, least_error) in frames.iter().zip(least_errors) {
-            offers.extend(predict::offers(frames, plan, wires, &prices, *least_error)?);
-        }
-        Ok::<_, Error>(bounds.check_possible(&offers, &named(unit, group))?)
-    };
-    possible(&frames, &vec![0.0; frames.len()])?;
-    let limit = |frames: &mut Frames<'_>| frames.measure_beside_limit(subject, progress);
-    let limits: Vec<LimitSummary> = frames.iter_mut().map(limit).collect();
-    let least = |limit| least_error(limit, group).map_or(0.0, |[limit, se]| limit - CERTAIN * se);
-    possible(&frames, &limits.iter().map(least).collect::<Vec<_>>())?;
-
-    let mut judge = Judge::new(subject.options(), plan, wires, &prices);
-    let settings = |frames: &Frames<'_>| -> usize {
-        let of_inputs = frames.inputs.iter().flat_map(|inputs| {
-            plan.centres.iter().map(|centres| judge::steps(frames, inputs, *centres))
-        });
-        of_inputs.sum()
-    };
-    progress.stage("train and measure", frames.iter().map(settings).sum());
-    for frames in &frames {
-        for inputs in &frames.inputs {
-            for &centres in &plan.centres {
-                judge.centres((frames, inputs), centres, progress)?;
-            }
+    let mut offers = Vec::new();
+    for (place, ways) in ways.iter().enumerate() {
+        for ways in ways {
+            let of_ways = ways.offers(&plan.device, &prices)?;
+            offers.extend(of_ways.into_iter().map(|offer| (place, offer)));
         }
     }
-    let Judge { mut points, left_out, blobs, distinct, .. } = judge;
+    let possible = |least_errors: &[f64]| {
+        let offers =
+            offers.iter().map(|&(place, offer)| Offer { rmse: least_errors[place], ..offer });
+        bounds.check_possible(&offers.collect::<Vec<_>>(), &named(unit, group))
+    };
+    possible(&vec![0.0; frames.len()])?;
+    let measures: Vec<(Measure, LimitSummary)> =
+        frames.iter().map(|frames| subject.measure(frames.samples_averaged, progress)).collect();
+    let least = |limit| least_error(limit, group).map_or(0.0, |[limit, se]| limit - CERTAIN * se);
+    possible(&measures.iter().map(|(_, limit)| least(limit)).collect::<Vec<_>>())?;
+
+    progress.stage("train and measure", ways.iter().flatten().map(judge::steps).sum());
+    let mut judged = Judged::default();
+    for (ways, (measure, _)) in ways.iter().zip(&measures) {
+        for ways in ways {
+            judged.add(ways, measure, (&plan.device, &prices), progress)?;
+        }
+    }
+    let Judged { mut points, left_out, blobs, distinct } = judged;
     if let (true, Some(cause)) = (points.is_empty(), left_out.first()) {
-        return Err(Error::Failed(format!("no way to decode can be trained: {cause}")));
+        return Err(Error::failed(format!("no way to decode can be trained: {cause}")));
     }
     compare(&mut points, group);
-    let baselines = frames.first().map_or(vec![], |frames| {
+    let first = frames.first().zip(measures.first());
+    let baselines = first.map_or(vec![], |(frames, (measure, _))| {
         let fitted = BASELINES.iter().map(|baseline| baseline.fit(frames.training()));
-        fitted.map(|it| metrics::judge(it.as_ref(), &frames.test, &frames.measure)).collect()
+        fitted.map(|it| metrics::judge(it.as_ref(), &frames.test, measure)).collect()
     });
     Ok(Trade {
         subject: subject.name().into(),
@@ -263,10 +261,10 @@ pub fn compute(
         outliers: subject.measurements().map(|data| data.outliers.clone()),
         compiler: prices.compiler,
         device: plan.device,
-        wires,
+        wires: frames.first().and_then(|frames| frames.wires),
         group: group.into(),
         unit: unit.into(),
-        limit: limits.into_iter().next(),
+        limit: measures.into_iter().next().map(|(_, limit)| limit),
         decoders: baselines,
         points,
         left_out,
@@ -317,28 +315,6 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
         Subject::Measured(data) => gate::Rest::new(data, &plan.gate_k).map(|_| ()),
     };
     gates.map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })
-}
-
-/// Networks to try: one for each row, and one for the array of several rows; that alone where outputs belong to no row.
-fn kinds(subject: &Subject) -> &'static [bool] {
-    let of_array =
-        subject.scene().is_some_and(|scene| matches!(scene.world.outputs, Outputs::Contact(_)));
-    match (of_array, subject.rows()) {
-        (true, _) => &[true],
-        (false, 1) => &[false],
-        (false, _) => &[false, true],
-    }
-}
-
-/// Wires that a scan reads: those of the scene, or those that measured columns are named after.
-fn wires_of(subject: &Subject) -> Option<Wires> {
-    match subject {
-        Subject::Scene(scene) => {
-            let (rows, columns) = (scene.world.read_rows.len(), scene.world.sensor.column_wires);
-            Some(Wires { rows, columns })
-        }
-        Subject::Measured(data) => Wires::named(&data.training.inputs.names),
-    }
 }
 
 /// Fills in the fields that compare points with each other.

@@ -49,12 +49,12 @@ impl Experiment {
     /// Refuses a scene whose models predict readings, for a `command` that is about decoding.
     ///
     /// # Errors
-    /// [`Error::Scene`] for a scene with `direction = "forward"`.
+    /// [`Error::Data`] for a scene with `direction = "forward"`.
     pub fn require_inverse(&self, command: &str) -> Result<()> {
         let rule =
             || format!("{command} is about models that decode readings: leave the field out");
         require(!self.is_forward(), "training.direction", "forward", rule)
-            .map_err(|cause| Error::Scene { scene: self.name.clone(), cause })
+            .map_err(|cause| Error::of_scene(&self.name, cause))
     }
 
     /// Checks what models that predict readings ask of the scene, whatever options have changed in it.

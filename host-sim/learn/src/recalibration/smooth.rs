@@ -6,7 +6,7 @@ use model_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, HIGHEST_ACTIVATION, words_at_once,
 };
 use model_core::rbf::{Network, Shape, direct, expanded, fixed16};
-use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
+use model_core::scale::{CLAMP, HALF_RANGE, UNITS, UNITS_PER_STEP};
 
 /// One of [`UNITS`], in spans of the training range.
 const SPANS_PER_UNIT: f64 = HALF_RANGE as f64 / UNITS as f64;
@@ -20,6 +20,8 @@ pub struct Smooth {
     pub zeros: Vec<f64>,
     /// Spans in one unit of each input; 0 for an input that never changed in training.
     pub per_unit: Vec<f64>,
+    /// Range that a device clamps inputs to, in spans from the zeros.
+    clamp: [f64; 2],
     /// Centres in spans from the zeros: `[centres × inputs]`.
     pub centres: Vec<f64>,
     /// 1/(2σ²) of each centre.
@@ -47,6 +49,7 @@ impl Smooth {
             shape,
             zeros: scaled(p.input_minimum, 1.0),
             per_unit: scaled(p.input_per_span, 1.0),
+            clamp: CLAMP.map(f64::from),
             centres: scaled(p.centres, 1.0),
             decay: decay.map(|decay| f64::from(*decay)).collect(),
             weights: scaled(p.output_weights, 1.0),
@@ -64,6 +67,7 @@ impl Smooth {
             shape,
             zeros: scaled(p.input_midpoint, 1.0),
             per_unit: scaled(p.input_per_unit, SPANS_PER_UNIT),
+            clamp: [-1.0, 1.0].map(|end| end * f64::from(HALF_RANGE)),
             centres: p.exponents.chunks(1 + inputs).take(centres).flat_map(of_centre).collect(),
             decay: vec![decay * LN_2 / SPANS_PER_UNIT.powi(2); centres],
             weights: scaled(&p.output_weights[..centres * outputs], 1.0),
@@ -84,6 +88,7 @@ impl Smooth {
             shape,
             zeros: scaled(p.input_midpoint, 1.0),
             per_unit: scaled(p.input_per_unit, SPANS_PER_UNIT),
+            clamp: [-1.0, 1.0].map(|end| end * f64::from(HALF_RANGE)),
             centres: Vec::with_capacity(centres * inputs),
             decay: vec![decay * LN_2 / SPANS_PER_STEP.powi(2); centres],
             weights: vec![0.0; centres * outputs],
@@ -109,6 +114,12 @@ impl Smooth {
             }
         }
         smooth
+    }
+
+    /// Outputs at the inputs `x` as a device decodes them: with its clamp.
+    pub fn decode(&self, x: &[f64]) -> Vec<f64> {
+        let [low, high] = self.clamp;
+        self.infer(&x.iter().map(|x| x.clamp(low, high)).collect::<Vec<_>>(), &mut [])
     }
 
     /// Outputs at the inputs `x`. Adds to `slopes` (`[outputs × inputs]`, or empty) the change of each output with each

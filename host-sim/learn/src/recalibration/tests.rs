@@ -302,6 +302,37 @@ fn a_smooth_network_has_the_outputs_of_decoding_and_the_slopes_of_its_outputs() 
 }
 
 #[test]
+fn errors_before_and_after_are_those_of_decoding_and_of_presses_that_no_fit_has_seen() {
+    for (format, tolerance) in
+        [(Format::F32, 1e-3), (Format::F32Direct, 1e-3), (Format::Fixed16, 3e-2)]
+    {
+        let (blob, frames) = small(Options { format, ..Options::default() });
+        let frames = first(&frames, 80);
+        let model = blob.prepare(Exponential::default());
+        // Far beyond the clamp.
+        let readings = drifted(&frames.inputs, &[[1.3, 0.0]; 36]);
+        let inputs = model.inputs_of_networks(&readings.values);
+        let mut unit = Unit::new(0, &model, &inputs, &frames.outputs);
+        assert_eq!(unit.numbers, (0..80).collect::<Vec<_>>());
+        let decoded = model.decode_table(&readings);
+        let none = vec![0.0; 18];
+        for press in 0..80 {
+            let errors = unit.in_errors(&decoded.line(press)[..18]);
+            let expected = mean_square(&errors, &unit.stated[press]);
+            let square = unit.square_decoded(&none, press);
+            assert!((square / expected - 1.0).abs() < tolerance, "{format:?}: {square} {expected}");
+        }
+        // What the presses of a part state changes nothing of the network that judges them.
+        let squares = unit.squares_after();
+        let part: Vec<usize> = (0..80).step_by(PARTS).collect();
+        unit.stated[0].iter_mut().for_each(|output| *output += 100.0);
+        let again = unit.squares_after();
+        assert!(again[0] > squares[0] + 1000.0);
+        assert!(part[1..].iter().all(|press| again[*press] == squares[*press]), "{format:?}");
+    }
+}
+
+#[test]
 fn zeros_of_inputs_that_have_drifted_change_and_nothing_else() {
     for format in [Format::F32, Format::F32Direct, Format::Fixed16] {
         let (blob, frames) = small(Options { format, ..Options::default() });

@@ -30,7 +30,7 @@ pub struct Reading {
 /// before it is read, and returns when it is connected.
 ///
 /// # Errors
-/// [`Error::Calibration`] if constants cannot be found; the former ones then stay active. Errors of `connect`, and
+/// [`Error::Data`] if constants cannot be found; the former ones then stay active. Errors of `connect`, and
 /// of [`ask`](Device::ask).
 pub fn calibrate<W: Wire, E: From<Error>>(
     device: &mut Device<W>,
@@ -84,10 +84,10 @@ fn read<W: Wire>(
     })?;
     match heard {
         Some(true) => Ok(sums.iter().map(|sum| sum / f64::from(frames)).collect()),
-        Some(false) => Err(Error::Silent("the device scans other wires than it said".into())),
+        Some(false) => Err(Error::failed("the device scans other wires than it said")),
         None => {
             let wanted = reading.frames;
-            Err(Error::Silent(format!("only {frames} of {wanted} frames came in time")))
+            Err(Error::failed(format!("only {frames} of {wanted} frames came in time")))
         }
     }
 }

@@ -184,7 +184,7 @@ fn check_garbage<W: Wire>(
         _ => None,
     })?;
     let requests_until_answer =
-        answered.ok_or_else(|| Error::Silent("after garbage the device answers no more".into()))?;
+        answered.ok_or_else(|| Error::failed("after garbage the device answers no more"))?;
     let identity = device.identify()?;
     progress.step();
     let (same, _) = expected.count_same(device, 1, 1, &Silent)?;

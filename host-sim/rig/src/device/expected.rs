@@ -158,10 +158,12 @@ pub(super) fn prepare<W: Wire>(
 fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<Exponential> {
     let (capacity, shape) = (identity.capacity(), model.shape());
     if capacity.wires_for(shape).is_none() {
-        return Err(Error::NoRoom { capacity, shape });
+        return Err(Error::no_room(capacity, shape));
     }
-    Exponential::by_name(&identity.exponential)
-        .ok_or_else(|| Error::UnknownExponential(identity.exponential.clone()))
+    let name = &identity.exponential;
+    Exponential::by_name(name).ok_or_else(|| {
+        Error::failed(format!("the device decodes with {name:?}, which this host does not know"))
+    })
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use model_core::blob::Model;
 use taxel_data::BadValue;
 
 use super::{Device, DeviceIdentity, Wire};
-use crate::error::{Error, Result};
+use crate::error::{Error, KEY_DAMAGED, NO_KEY, Result};
 
 /// Longest time in which a board sets a key: it may erase flash.
 const SETTING: Duration = Duration::from_secs(5);
@@ -65,13 +65,15 @@ fn of_digits(text: &[u8]) -> Option<Key> {
 /// Checks that the device of this `identity` takes models with such a `sealing`.
 ///
 /// # Errors
-/// [`Error::NeedsSeal`], [`Error::HasNoKey`] or [`Error::KeyDamaged`].
+/// [`Error::Data`] for a seal that is missing or too many, and for a key that has decayed.
 pub fn check_sealing(identity: &DeviceIdentity, sealing: Option<&Sealing>) -> Result<()> {
     match (identity.key, sealing) {
         (KeyState::None, None) | (KeyState::Set, Some(_)) => Ok(()),
-        (KeyState::Set, None) => Err(Error::NeedsSeal),
-        (KeyState::None, Some(_)) => Err(Error::HasNoKey),
-        (KeyState::Damaged, _) => Err(Error::KeyDamaged),
+        (KeyState::Set, None) => Err(Error::failed(
+            "the device takes sealed models only: give its key, `upload --key FILE`",
+        )),
+        (KeyState::None, Some(_)) => Err(Error::failed(NO_KEY)),
+        (KeyState::Damaged, _) => Err(Error::failed(KEY_DAMAGED)),
     }
 }
 

@@ -23,6 +23,7 @@ pub fn open(port: &str, baud: u32) -> Result<Box<dyn SerialPort>> {
         } else {
             format!("there are {}", names.join(", "))
         };
-        Error::Port { port: port.into(), cause, known }
+        let join = "on Linux you may have to join the group dialout";
+        Error::unfit_for("port", format!("{port}: {cause}; {known} ({join})"))
     })
 }

@@ -79,7 +79,7 @@ fn repeat_oldest<'r, W: Wire>(
     if oldest.attempts == ATTEMPTS {
         let frame = oldest.frame;
         let message = format!("frame {frame} is not answered, after {ATTEMPTS} attempts");
-        return Err(Error::Silent(message));
+        return Err(Error::failed(message));
     }
     oldest.attempts += 1;
     oldest.sent = Instant::now();

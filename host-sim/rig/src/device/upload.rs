@@ -43,7 +43,7 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
 /// Sends `blob` and puts it on trial with this `seal`, until the device refuses a step. A trial that is going on ends.
 ///
 /// # Errors
-/// [`Error::NoAnswer`] if the device stops answering, [`Error::ChunkSize`] if no chunk can be sent.
+/// [`Error::NoAnswer`] if the device stops answering, and a failure if no chunk can be sent.
 pub fn send<W: Wire>(
     device: &mut Device<W>,
     (blob, seal): (&[u8], Option<Seal>),
@@ -51,7 +51,9 @@ pub fn send<W: Wire>(
     progress: &dyn Progress,
 ) -> Result<std::result::Result<UploadState, Refusal>> {
     if chunk_bytes == 0 || !chunk_bytes.is_multiple_of(4) {
-        return Err(Error::ChunkSize(chunk_bytes));
+        return Err(Error::failed(format!(
+            "the device offers chunks of {chunk_bytes} bytes; they must be a positive multiple of 4"
+        )));
     }
     let chunks = blob.chunks(chunk_bytes);
     progress.stage("uploading the model", chunks.len());
@@ -88,7 +90,7 @@ pub fn start_trial<W: Wire>(
     if let Some((_, shape)) = Model::declared(blob)
         && capacity.wires_for(shape).is_none()
     {
-        return Err(Error::NoRoom { capacity, shape });
+        return Err(Error::no_room(capacity, shape));
     }
     let seal = seal_for(&identity, blob, sealing)?;
     or_abort(device, |device| {

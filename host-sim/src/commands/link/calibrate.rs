@@ -161,7 +161,7 @@ fn ask_to_connect(number: usize, known: &[Vec<f64>], wires: Wires) -> Result<()>
     let mut line = String::new();
     match std::io::stdin().lock().read_line(&mut line) {
         Ok(1..) => Ok(()),
-        _ => Err(Error::Failed("stdin ended before all resistors were connected".into())),
+        _ => Err(Error::failed("stdin ended before all resistors were connected")),
     }
 }
 

@@ -69,7 +69,7 @@ pub fn hear_frames<W: Wire>(
             return Some(Err(error));
         }
         if frames.last().is_some_and(|last| last.is_from_before(&frame)) {
-            return Some(Err(Error::Failed("the device has restarted meanwhile".into())));
+            return Some(Err(Error::failed("the device has restarted meanwhile")));
         }
         frames.push(frame);
         let at_rest = status.iter().filter(|status| **status == EstimateReport::ROW_AT_REST);
@@ -79,7 +79,7 @@ pub fn hear_frames<W: Wire>(
     })?;
     match enough {
         Some(outcome) => outcome.map(|()| (frames, rows_at_rest)),
-        None => Err(Error::Failed(format!("only {} of {count} frames came in time", frames.len()))),
+        None => Err(Error::failed(format!("only {} of {count} frames came in time", frames.len()))),
     }
 }
 
@@ -90,7 +90,7 @@ pub fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted
         return Ok(missing);
     }
     let what = if wanted == Wanted::Estimates { "estimate" } else { "reading" };
-    Err(Error::Failed(format!(
+    Err(Error::failed(format!(
         "the device sent not a single {what}; `identify` shows failed samples: check the wiring of \
          converters and rows (docs/board.md)"
     )))

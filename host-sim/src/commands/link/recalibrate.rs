@@ -58,8 +58,9 @@ pub fn execute<W: Wire>(
     common: &Common,
 ) -> Result<()> {
     if let Some(path) = &arguments.output {
-        let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.presses);
-        print::check_output(path, &[&arguments.model, &arguments.presses, baseline])?;
+        let others = [&arguments.baseline.baseline, &arguments.sealing.key].into_iter().flatten();
+        let read = [&arguments.model, &arguments.presses].into_iter().chain(others);
+        print::check_output(path, &read.map(PathBuf::as_path).collect::<Vec<_>>())?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let (fields, limits) = (FieldArguments::default(), Some(Limits::USUAL));
@@ -184,6 +185,6 @@ fn ask_for_press(number: usize, outputs: &Table) -> Result<()> {
     let mut text = String::new();
     match std::io::stdin().lock().read_line(&mut text) {
         Ok(1..) => Ok(()),
-        _ => Err(Error::Failed("stdin ended before all presses were made".into())),
+        _ => Err(Error::failed("stdin ended before all presses were made")),
     }
 }

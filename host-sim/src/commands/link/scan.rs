@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::Result;
+use crate::{Error, Result};
 use clap::{Args, ValueEnum, value_parser};
 use firmware::link::message::{ConfidenceSent, Configuration};
 use firmware::timing::ScanPlan;
@@ -110,5 +110,7 @@ pub fn check_length(frame: u32, values: &[f64], expected: usize) -> Result<()> {
     if found == expected {
         return Ok(());
     }
-    Err(taxel_rig::Error::ReportLength { frame, expected, found }.into())
+    Err(Error::failed(format!(
+        "frame {frame} has {found} values instead of {expected}; was the model exchanged meanwhile?"
+    )))
 }

@@ -190,7 +190,7 @@ impl Plan {
                     set.train_by_recursion(rest, Some(*count), Some(&test), options, progress)?;
                 (LearnedOn::FreshFrames, trained)
             }
-            _ => return Err(Error::Failed("frames were not loaded".into())),
+            _ => return Err(Error::failed("frames were not loaded")),
         };
         let outputs = &set.frames.outputs;
         let curve = LearningCurve::new(judged_on, &learned, &outputs.names, &outputs.deviations());

@@ -2,6 +2,7 @@
 
 use std::io::{self, BufReader, Read};
 
+use crate::data_file::MOST_EXACT;
 use crate::error::cut;
 use crate::input::MOST_VALUES;
 
@@ -126,11 +127,17 @@ impl<R: Read> Array<R> {
         self.lines * self.columns
     }
 
-    /// Reads all elements into the columns from `first` on of `values`, whose lines have so many columns, `width`.
+    /// Reads all elements into the columns from `first` on of `values`, whose lines have so many columns, `width`. Returns
+    /// the columns of integers from [`MOST_EXACT`] on, which may be rounded.
     ///
     /// # Errors
     /// What is wrong, in words: elements of a type that is not read, fewer or more of them than the shape takes.
-    pub fn read_into(self, values: &mut [f64], width: usize, first: usize) -> Result<(), String> {
+    pub fn read_into(
+        self,
+        values: &mut [f64],
+        width: usize,
+        first: usize,
+    ) -> Result<Vec<usize>, String> {
         let (lines, columns) = (self.lines, self.columns);
         let (outer, inner, of_outer, of_inner) = if self.header.is_column_major {
             (columns, lines, 1, width)
@@ -166,10 +173,16 @@ impl<R: Read> Array<R> {
         .map_err(|cause| unread(&cause))?;
         // The end of a packed array is where its sum is checked.
         match numbers.bytes.read(&mut [0]) {
-            Ok(0) => Ok(()),
-            Ok(_) => Err("it has more bytes than its shape takes".into()),
-            Err(cause) => Err(unread(&cause)),
+            Ok(0) => {}
+            Ok(_) => return Err("it has more bytes than its shape takes".into()),
+            Err(cause) => return Err(unread(&cause)),
         }
+        let is_whole = kind.ends_with("i8") || kind.ends_with("u8");
+        let mut own = (first..first + columns).filter(|_| is_whole).collect::<Vec<_>>();
+        own.retain(|&column| {
+            values[column..].iter().step_by(width).any(|value| value.abs() >= MOST_EXACT)
+        });
+        Ok(own)
     }
 }
 

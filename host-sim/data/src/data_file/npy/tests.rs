@@ -249,3 +249,23 @@ fn an_archive_is_read_to_its_end() {
     let message = parse_archive(path, &packed).unwrap_err().to_string();
     assert!(message.contains("cannot be read to its end"), "{message}");
 }
+
+#[test]
+fn texts_of_integers_that_f64_rounds_are_refused_and_others_have_every_digit() {
+    let large = (1_i64 << 53) + 1;
+    let arrays = [
+        ("time", array(&[2], Order::C, &[1_i64, large])),
+        ("count", array(&[2, 2], Order::C, &[1_i64, 2, large - 2, 4])),
+        ("real", array(&[2], Order::C, &[0.1_f64, 1e17])),
+    ];
+    let packed = archive(&arrays.map(|(name, array)| (name, array)), CompressionMethod::Stored);
+    let file = parse_archive(Path::new("log.npz"), &packed).unwrap();
+    let texts = |column: usize| file.texts(column).map(|texts| texts.at(1).into_owned());
+    let refused = texts(0).unwrap_err().to_string();
+    assert!(refused.contains("log.npz: column \"time\"") && refused.contains("2^53"), "{refused}");
+    let texts = [1, 2, 3].map(|column| texts(column).unwrap());
+    assert_eq!(texts, [&(large - 2).to_string(), "4", "100000000000000000"]);
+    let single = parse_array(Path::new("log.npy"), &array(&[1, 2], Order::C, &[2_i64, large]));
+    let single = single.unwrap();
+    assert!(single.texts(0).is_ok() && single.texts(1).is_err());
+}

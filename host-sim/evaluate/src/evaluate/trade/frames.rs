@@ -3,30 +3,32 @@
 use std::borrow::Cow;
 
 use taxel_data::dataset::Dataset;
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
+use taxel_learn::Options;
 use taxel_learn::train::projection;
-use taxel_simulate::Synthesis;
+use taxel_simulate::outputs::Outputs;
 
 use super::Plan;
+use super::device::Wires;
 use super::gating::Gates;
 use crate::error::Result;
-use crate::experiment::Experiment;
-use crate::metrics::{LimitSummary, Measure};
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 
-/// Training and test frames with one number of samples a reading.
+/// Training and test frames with one number of samples a reading, and what is trained on them.
 pub(super) struct Frames<'s> {
     pub samples_averaged: usize,
     /// Noise level of the averaged readings, as a fraction; 0 for measured ones.
     pub noise_level: f64,
+    /// Wires that a scan reads; `None` if the readings are not those of wires.
+    pub wires: Option<Wires>,
+    /// Time of a scan; `None` if it is unknown.
+    pub scan_ms: Option<f64>,
+    /// Options for training, except for the settings that the plan varies.
+    pub options: Options,
     pub set: TrainingSet<'s>,
     pub test: Cow<'s, Dataset>,
     /// Networks that see a row each, and networks that see the whole array.
     pub inputs: Vec<Inputs>,
-    /// Measure of errors, once it is [known](Self::measure_beside_limit).
-    pub measure: Measure,
 }
 
 /// What networks see of a frame.
@@ -44,65 +46,39 @@ impl Inputs {
 }
 
 impl<'s> Frames<'s> {
-    /// Frames of a subject with so many samples a reading, for networks of a row each, of the whole array, or both.
-    pub fn new(
-        subject: &'s Subject,
-        samples_averaged: usize,
-        arrays: &[bool],
-        plan: &Plan,
-    ) -> Result<Self> {
-        let set = subject.training_set(samples_averaged);
-        let test = subject.test_set(samples_averaged);
-        let level = subject.scene().map_or(0.0, |scene| scene.world.noise.level);
+    /// Frames of a subject with so many samples a reading, and the networks that a plan tries on them.
+    pub fn new(subject: &'s Subject, samples_averaged: usize, plan: &Plan) -> Result<Self> {
+        // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
+        let (level, of_array, wires) = match subject {
+            Subject::Scene(scene) => {
+                let world = &scene.world;
+                let wires = (world.read_rows.len(), world.sensor.column_wires);
+                let wires = Wires { rows: wires.0, columns: wires.1 };
+                (world.noise.level, matches!(world.outputs, Outputs::Contact(_)), Some(wires))
+            }
+            Subject::Measured(data) => (0.0, false, Wires::named(&data.training.inputs.names)),
+        };
         let noise_level = level / (samples_averaged as f64).sqrt();
-        let features = subject.options().features;
+        let (set, test) = subject.sets(samples_averaged);
+        let options = subject.options();
+        let arrays: &[bool] = match (of_array, set.frames.rows) {
+            (true, _) => &[true],
+            (false, 1) => &[false],
+            (false, _) => &[false, true],
+        };
         let inputs = |&whole_array: &bool| {
-            let projection = whole_array.then(|| projection::fit(&set.frames, features));
-            let gates = match subject {
-                _ if plan.gate_k.is_empty() => Gates::none(&test),
-                Subject::Scene(scene) => {
-                    gates(scene, noise_level, &test, (whole_array, &plan.gate_k))
-                }
-                Subject::Measured(data) => Gates::measured(data, &plan.gate_k, whole_array)?,
-            };
-            Ok(Inputs { projection: projection.transpose()?, gates })
+            let projection =
+                whole_array.then(|| projection::fit(&set.frames, options.features)).transpose()?;
+            let gates = Gates::new(subject, (&test, noise_level), &plan.gate_k, whole_array)?;
+            Ok(Inputs { projection, gates })
         };
         let inputs = arrays.iter().map(inputs).collect::<Result<_>>()?;
-        let measure = Measure { full_scale: vec![], thickness_mm: None, limit: None };
-        Ok(Self { samples_averaged, noise_level, set, test, inputs, measure })
+        let scan_ms = plan.device.scan_ms(wires, samples_averaged);
+        Ok(Self { samples_averaged, noise_level, wires, scan_ms, options, set, test, inputs })
     }
 
     /// Frames to train on.
     pub fn training(&self) -> &Dataset {
         &self.set.frames
     }
-
-    /// Finds the measure of errors, and the limit that they are measured beside.
-    pub fn measure_beside_limit(
-        &mut self,
-        subject: &Subject,
-        progress: &dyn Progress,
-    ) -> LimitSummary {
-        let (measure, summary) = subject.measure(self.samples_averaged, progress);
-        self.measure = measure;
-        summary
-    }
-}
-
-/// Gates of a scene with these tolerances, for its `test` frames.
-fn gates(
-    scene: &Experiment,
-    noise_level: f64,
-    test: &Dataset,
-    (whole_array, k): (bool, &[f64]),
-) -> Gates {
-    let synthesis = Synthesis::new(&scene.world).noise_level(noise_level);
-    let t = &scene.training;
-    // The gate compares readings in Ω.
-    let readings_ohm = if t.relative_inputs {
-        Cow::Owned(synthesis.frames(Stream::Test, t.test_frames).inputs)
-    } else {
-        Cow::Borrowed(&test.inputs)
-    };
-    Gates::new(&synthesis, noise_level, &readings_ohm, k, (whole_array, t.relative_inputs))
 }

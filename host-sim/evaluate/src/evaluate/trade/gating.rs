@@ -1,13 +1,16 @@
 //! Points behind a gate: untouched rows are not decoded but take the outputs of the baseline.
 
+use std::borrow::Cow;
+
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
+use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::relative;
 use taxel_simulate::Synthesis;
 
 use super::super::gate::{BASELINE_FRAMES, Gate, Rest, gated, has_sessions, share};
-use crate::measurements::Measurements;
+use crate::subject::Subject;
 
 /// Untouched rows of the test frames for every k. They depend on the readings alone, not on the decoder.
 pub(super) struct Gates {
@@ -26,37 +29,40 @@ pub(super) struct AtRest {
 }
 
 impl Gates {
-    /// Gates of rows, or of the whole array, for the `readings` in Ω of test frames with this noise level.
-    /// `relative_inputs` tells what models take.
+    /// Gates of rows, or of the whole array, with these tolerances `k`, for the `test` frames of a subject whose readings
+    /// have this noise level.
     pub fn new(
-        frames: &Synthesis<'_>,
-        noise_level: f64,
-        readings: &Table,
+        subject: &Subject,
+        (test, noise_level): (&Dataset, f64),
         k: &[f64],
-        (whole_array, relative_inputs): (bool, bool),
-    ) -> Self {
-        let sessions = has_sessions(frames.world(), relative_inputs).then_some(readings.len());
-        let gate = Gate::new(frames, BASELINE_FRAMES, whole_array, sessions);
-        Self::behind(gate, noise_level, readings, k, relative_inputs)
-    }
-
-    /// Gates of measured test frames with these tolerances `k`.
-    pub fn measured(data: &Measurements, k: &[f64], whole_array: bool) -> Result<Self, BadValue> {
-        let rest = Rest::new(data, k)?;
-        let gate = Gate::at(rest.baseline, data.test.rows, whole_array);
-        let relative_inputs = data.test.relative_inputs;
-        Ok(Self::behind(gate, rest.noise_level, &data.test_readings, k, relative_inputs))
-    }
-
-    fn behind(
-        gate: Gate,
-        noise_level: f64,
-        readings: &Table,
-        k: &[f64],
-        relative_inputs: bool,
-    ) -> Self {
+        whole_array: bool,
+    ) -> Result<Self, BadValue> {
+        if k.is_empty() {
+            let rest_inputs = Table { names: test.inputs.names.clone(), values: vec![] };
+            return Ok(Self { rest_inputs, gates: vec![] });
+        }
+        let relative_inputs = test.relative_inputs;
+        let (gate, noise_level, readings) = match subject {
+            Subject::Scene(scene) => {
+                let synthesis = Synthesis::new(&scene.world).noise_level(noise_level);
+                // The gate compares readings in Ω.
+                let readings = if relative_inputs {
+                    Cow::Owned(synthesis.frames(Stream::Test, test.frames()).inputs)
+                } else {
+                    Cow::Borrowed(&test.inputs)
+                };
+                let sessions = has_sessions(&scene.world, relative_inputs).then_some(test.frames());
+                let gate = Gate::new(&synthesis, BASELINE_FRAMES, whole_array, sessions);
+                (gate, noise_level, readings)
+            }
+            Subject::Measured(data) => {
+                let rest = Rest::new(data, k)?;
+                let gate = Gate::at(rest.baseline, test.rows, whole_array);
+                (gate, rest.noise_level, Cow::Borrowed(&data.test_readings))
+            }
+        };
         let at_rest = |&k: &f64| {
-            let rows = gate.at_rest(readings, k * noise_level);
+            let rows = gate.at_rest(&readings, k * noise_level);
             AtRest { k, share: share(&rows), rows }
         };
         let gates = k.iter().map(at_rest).collect();
@@ -65,13 +71,7 @@ impl Gates {
         } else {
             gate.baseline
         };
-        Self { rest_inputs, gates }
-    }
-
-    /// No gate, for frames with the columns of `test`.
-    pub fn none(test: &Dataset) -> Self {
-        let rest_inputs = Table { names: test.inputs.names.clone(), values: vec![] };
-        Self { rest_inputs, gates: vec![] }
+        Ok(Self { rest_inputs, gates })
     }
 
     /// Untouched rows for each k.

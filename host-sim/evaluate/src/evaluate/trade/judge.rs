@@ -1,6 +1,5 @@
 //! Training and judging of the points that share their training and test frames.
 
-use model_core::rbf::Format;
 use rayon::prelude::*;
 use taxel_data::progress::Progress;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
@@ -9,90 +8,58 @@ use taxel_learn::train::{
 };
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, Trained, pack};
 
-use super::device::Wires;
-use super::frames::{Frames, Inputs};
 use super::progress::Part;
-use super::{Arithmetic, Plan, Point, SLOT_BYTES, predict};
+use super::ways::{Variant, Ways};
+use super::{Arithmetic, Device, Point, SLOT_BYTES};
 use crate::error::Result;
-use crate::metrics;
+use crate::metrics::{self, Measure};
 
-/// Collector of points, and of the blobs that they decode with.
-pub(super) struct Judge<'s> {
-    options: Options,
-    plan: &'s Plan,
-    wires: Option<Wires>,
-    prices: &'s Prices,
+/// Points that were trained and judged, and the blobs that they decode with.
+#[derive(Default)]
+pub(super) struct Judged {
     pub points: Vec<Point>,
-    /// Formats that cannot hold a network of these settings, and why.
+    /// Formats that cannot hold a network of some settings, and why.
     pub left_out: Vec<String>,
     /// Index of each point's blob among the distinct ones.
     pub blobs: Vec<usize>,
     pub distinct: Vec<Vec<u8>>,
 }
 
-/// Network to fit on layers that are shared: format, affine tail, rank.
-type Variant = (Format, bool, Option<usize>);
-
-impl<'s> Judge<'s> {
-    /// Judge of networks trained with `options`, except for the settings that the plan varies. A scan reads `wires`.
-    pub fn new(options: Options, plan: &'s Plan, wires: Option<Wires>, prices: &'s Prices) -> Self {
-        let (points, left_out, blobs, distinct) = (vec![], vec![], vec![], vec![]);
-        Self { options, plan, wires, prices, points, left_out, blobs, distinct }
-    }
-
-    /// Trains and judges every format and tail with so many centres.
-    pub fn centres(
+impl Judged {
+    /// Trains networks for all `ways`, and judges them by their `measure`.
+    pub fn add(
         &mut self,
-        (frames, inputs): (&Frames<'_>, &Inputs),
-        centres: usize,
+        ways: &Ways<'_>,
+        measure: &Measure,
+        (device, prices): (&Device, &Prices),
         progress: &dyn Progress,
     ) -> Result<()> {
-        let whole_array = inputs.whole_array();
-        let ranks = predict::ranks(self.plan, frames.training(), whole_array, centres);
-        let variants: Vec<Variant> = (Format::ALL.into_iter().rev())
-            .flat_map(|format| [(format, false), (format, true)])
-            .flat_map(|(format, affine)| ranks.iter().map(move |rank| (format, affine, *rank)))
-            .collect();
-        let features = self.options.features.filter(|_| whole_array);
-        let defaults = Options { whole_array, features, output_rank: None, ..self.options };
-        let spread = match (self.options.whole_array, whole_array) {
-            (false, true) => WHOLE_ARRAY_SPREAD * defaults.spread,
-            (true, false) => defaults.spread / WHOLE_ARRAY_SPREAD,
-            _ => defaults.spread,
-        };
-        let options = Options { centres, spread, ..defaults };
-        options.check(frames.training().frames())?;
-        let [refining, fitting] =
-            parts(frames, inputs).map(|steps| Part::new(progress, steps, weight(centres)));
-        // Layers are shared by all formats and by networks with and without a tail.
-        let (layers, options) = layers(frames, inputs, &options, &refining)?;
-        refining.finish();
-        let fitted = fit(&layers, &options, &variants, &fitting);
-        fitting.finish();
-        for (variant, &(format, affine, rank)) in variants.iter().enumerate() {
-            let of_rows = fitted.iter().map(|row| row[variant].as_ref().cloned());
+        let (frames, whole_array) = (ways.frames, ways.inputs.whole_array());
+        let (projection, fitted) = fit(ways, progress)?;
+        for (index, variant) in ways.variants.iter().enumerate() {
+            let of_rows = fitted.iter().map(|row| row[index].as_ref().cloned());
             let networks = match of_rows.collect::<std::result::Result<_, _>>() {
                 Ok(networks) => networks,
                 Err(cause) => {
-                    self.leave_out((format, centres, rank), whole_array, cause);
+                    self.leave_out(*variant, ways, cause);
                     continue;
                 }
             };
-            let frames_seen = frames.training().frames();
-            let trained =
-                Trained { projection: layers.projection.clone(), networks, frames: frames_seen };
+            let seen = frames.training().frames();
+            let trained = Trained { projection: projection.clone(), networks, frames: seen };
             let origin = &frames.set.origin;
             let noise = (origin.noise.0, frames.noise_level);
             let origin = Origin { noise, ..origin.clone() };
             let blob = pack(&trained, frames.training(), &origin)?;
             // A network that fell back to direct distances is the point of that format.
-            let fell_back = trained.networks.iter().any(|network| network.format() != format);
+            let fell_back =
+                trained.networks.iter().any(|network| network.format() != variant.format);
             let fits = !whole_array || blob.bytes().len() <= SLOT_BYTES;
             if fell_back || !fits {
                 continue;
             }
-            for arithmetic in Arithmetic::all().filter(|a| a.format == format) {
-                self.points(&blob, (frames, inputs), arithmetic, (affine, rank))?;
+            for arithmetic in Arithmetic::all().filter(|a| a.format == variant.format) {
+                self.points(&blob, (ways, *variant), arithmetic, measure, (device, prices))?;
             }
             self.distinct.push(blob.bytes().to_vec());
         }
@@ -100,16 +67,12 @@ impl<'s> Judge<'s> {
     }
 
     /// Notes why a format cannot hold a network of these settings.
-    fn leave_out(
-        &mut self,
-        (format, centres, rank): (Format, usize, Option<usize>),
-        whole_array: bool,
-        cause: &taxel_learn::Error,
-    ) {
-        let of = if whole_array { " array" } else { "" };
-        let note = |rank: &str| format!("{}{of}, K = {centres}{rank}: {cause}", format.name());
+    fn leave_out(&mut self, variant: Variant, ways: &Ways<'_>, cause: &taxel_learn::Error) {
+        let of = if ways.inputs.whole_array() { " array" } else { "" };
+        let (name, centres) = (variant.format.name(), ways.centres);
+        let note = |rank: &str| format!("{name}{of}, K = {centres}{rank}: {cause}");
         // What holds for full rank need not be said again.
-        let rank = rank.filter(|_| !self.left_out.contains(&note("")));
+        let rank = variant.output_rank.filter(|_| !self.left_out.contains(&note("")));
         let note = note(&rank.map_or(String::new(), |rank| format!(", rank {rank}")));
         if !self.left_out.contains(&note) {
             self.left_out.push(note);
@@ -121,9 +84,10 @@ impl<'s> Judge<'s> {
     fn points(
         &mut self,
         blob: &ModelBlob,
-        (frames, inputs): (&Frames<'_>, &Inputs),
+        (Ways { frames, inputs, .. }, variant): (&Ways<'_>, Variant),
         arithmetic: Arithmetic,
-        (affine_tail, output_rank): (bool, Option<usize>),
+        measure: &Measure,
+        (device, prices): (&Device, &Prices),
     ) -> Result<()> {
         let test = &frames.test;
         let model = blob.prepare(arithmetic.exponential).of_inputs();
@@ -132,23 +96,22 @@ impl<'s> Judge<'s> {
         // Fewer than asked for where there are fewer distinct samples.
         let centres = design.networks.iter().map(|network| network.shape.centres).max();
         let centres = centres.unwrap_or_default();
-        let costs = self.prices.frames(&design, arithmetic.exponential)?;
+        let costs = prices.frames(&design, arithmetic.exponential)?;
         let estimate = model.decode_lines(&test.inputs.values);
-        let scan_ms = self.plan.device.scan_ms(self.wires, frames.samples_averaged);
         let mut add = |gate_k: Option<f64>, frame: Cost, estimate: &[f64]| {
             self.points.push(Point {
                 arithmetic,
                 whole_array: inputs.whole_array(),
                 centres,
-                output_rank,
+                output_rank: variant.output_rank,
                 spread: blob.spread(),
-                affine_tail,
+                affine_tail: variant.affine_tail,
                 samples_averaged: frames.samples_averaged,
                 gate_k,
-                errors: metrics::by_group(&test.outputs, estimate, &frames.measure),
+                errors: metrics::by_group(&test.outputs, estimate, measure),
                 ratio_to_best: vec![],
                 frame,
-                times: self.plan.device.times(scan_ms, &frame),
+                times: device.times(frames.scan_ms, &frame),
                 blob_bytes: blob.bytes().len(),
                 ram_bytes: if gate_k.is_some() { ram.gated_bytes() } else { ram.bytes() },
                 on_front: false,
@@ -168,13 +131,13 @@ impl<'s> Judge<'s> {
     }
 }
 
-/// Steps of progress that [`Judge::centres`] takes.
-pub(super) fn steps(frames: &Frames<'_>, inputs: &Inputs, centres: usize) -> usize {
-    weight(centres) * parts(frames, inputs).iter().sum::<usize>()
+/// Steps of progress that [`Judged::add`] takes.
+pub(super) fn steps(ways: &Ways<'_>) -> usize {
+    weight(ways.centres) * parts(ways).iter().sum::<usize>()
 }
 
 /// Steps of refinement, and of fitting weights, which take about as long each.
-fn parts(frames: &Frames<'_>, inputs: &Inputs) -> [usize; 2] {
+fn parts(Ways { frames, inputs, .. }: &Ways<'_>) -> [usize; 2] {
     let networks = if inputs.whole_array() { 1 } else { frames.training().rows };
     let steps = Refinement::default().steps;
     let refining = match frames.set.examples() {
@@ -191,39 +154,46 @@ fn weight(centres: usize) -> usize {
     8 + centres * centres / 640
 }
 
-/// Layers of networks trained with `options`, and the options for fitting their weights.
-fn layers<'f>(
-    frames: &'f Frames<'_>,
-    inputs: &Inputs,
-    options: &Options,
-    progress: &dyn Progress,
-) -> Result<(Layers<'f>, Options)> {
-    let dataset = frames.training();
-    let start = Layers::behind(inputs.projection.clone(), dataset, options);
-    let settings = Refinement::default();
-    let Some(examples) = frames.set.examples() else { return Ok((start, *options)) };
-    let layers = refine::refine(dataset, &start, options, &settings, examples, progress)?;
-    Ok((layers, settings.options(options)))
-}
+/// Networks of a row, or of the whole array: one of each variant, or why there is none.
+type OfVariants = Vec<taxel_learn::Result<FittedNetwork>>;
 
-/// Networks of every variant on the same layers, for every row.
+/// Networks of every variant on the same layers, for every row, and their projection.
 fn fit(
-    layers: &Layers<'_>,
-    options: &Options,
-    variants: &[Variant],
+    ways @ Ways { frames, inputs, centres, variants }: &Ways<'_>,
     progress: &dyn Progress,
-) -> Vec<Vec<taxel_learn::Result<FittedNetwork>>> {
+) -> Result<(Option<Vec<f32>>, Vec<OfVariants>)> {
+    let (dataset, whole_array) = (frames.training(), inputs.whole_array());
+    let features = frames.options.features.filter(|_| whole_array);
+    let spread = match (frames.options.whole_array, whole_array) {
+        (false, true) => WHOLE_ARRAY_SPREAD * frames.options.spread,
+        (true, false) => frames.options.spread / WHOLE_ARRAY_SPREAD,
+        _ => frames.options.spread,
+    };
+    let (centres, output_rank) = (*centres, None);
+    let mut options =
+        Options { whole_array, features, output_rank, centres, spread, ..frames.options };
+    options.check(dataset.frames())?;
+    let [refining, fitting] = parts(ways).map(|steps| Part::new(progress, steps, weight(centres)));
+    // Layers are shared by all formats and by networks with and without a tail.
+    let mut layers = Layers::behind(inputs.projection.clone(), dataset, &options);
+    if let Some(examples) = frames.set.examples() {
+        let settings = Refinement::default();
+        layers = refine::refine(dataset, &layers, &options, &settings, examples, &refining)?;
+        options = settings.options(&options);
+    }
+    refining.finish();
     let rows = layers.hidden.par_iter().enumerate();
-    rows.map(|(row, layer)| {
+    let fitted = rows.map(|(row, layer)| {
         let table = layers.seen.row_table(row);
         let samples = Samples::new(&table);
-        let fit = |&(format, affine_tail, output_rank): &Variant| {
-            let options = Options { affine_tail, format, output_rank, ..*options };
-            samples.fit_layer(layer, &options)
+        let fit = |&Variant { format, affine_tail, output_rank }: &Variant| {
+            samples.fit_layer(layer, &Options { affine_tail, format, output_rank, ..options })
         };
         let fitted = variants.par_iter().map(fit).collect();
-        progress.step();
+        fitting.step();
         fitted
-    })
-    .collect()
+    });
+    let fitted = fitted.collect();
+    fitting.finish();
+    Ok((layers.projection, fitted))
 }

@@ -9,13 +9,10 @@ use serde::{Deserialize, Serialize};
 use taxel_data::progress::Progress;
 use taxel_data::random::{Purpose, Random, Stream};
 
-use super::printed::{self, CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
+use taxel_evaluate::evaluate::printed::{self, CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
 
-pub mod setup;
-pub mod cells;
-
-use cells::{FORMULAS, INITIAL_COVARIANCES};
-use setup::{AXES, JUDGED, JudgedOn, Setup};
+use super::cells::{self, FORMULAS, INITIAL_COVARIANCES};
+use super::setup::{AXES, JUDGED, JudgedOn, Setup};
 
 /// Number of set-ups that are tried unless a user says otherwise.
 pub const USUAL_SETUPS: usize = 1920;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use taxel_data::dataset::RowTable;
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::table::Table;
+use taxel_evaluate::evaluate::printed::{Cells, NOISE_LEVELS, SPREADS};
 use taxel_learn::decoders::textbook::{Textbook, predict_each};
 use taxel_limit::solve::{Unknowns, solve};
 use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
@@ -12,7 +13,6 @@ use taxel_simulate::sensor::Axis;
 use taxel_simulate::{Synthesis, World};
 
 use super::setup::{JudgedOn, NoiseOf, Setup};
-use crate::evaluate::printed::{Cells, NOISE_LEVELS, SPREADS};
 
 /// Initial covariances δ of the recursion that are tried; the penalty on squared weights is 1/δ.
 pub const INITIAL_COVARIANCES: [f64; 6] = [1e6, 1e4, 1e2, 10.0, 3.0, 1.0];

@@ -1,20 +1,42 @@
-//! `table1 --reconstruct`: which set-ups come near the printed table.
+//! Study `reconstruct`: which set-ups come near the paper's printed Table 1.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::evaluate::printed::{CELLS, Nearness};
-use crate::evaluate::reconstruct::cells::{FORMULAS, INITIAL_COVARIANCES};
-use crate::evaluate::reconstruct::setup::AXES;
-use crate::evaluate::reconstruct::{self, Candidate, Reconstruction, Tried};
-use crate::report;
-use crate::{Error, Result};
+use clap::Args;
+use host_sim::commands::progress::Terminal;
+use host_sim::commands::table1::comparison;
+use host_sim::commands::{Common, print};
+use host_sim::report;
+use host_sim::{Error, Result};
 use serde::{Deserialize, Serialize};
 use taxel_data::digest::digest;
 use taxel_data::{input, output};
+use taxel_evaluate::evaluate::printed::{CELLS, Nearness};
 
-use super::super::progress::Terminal;
-use super::super::{Common, print};
-use super::comparison;
+mod setup;
+mod cells;
+mod search;
+
+use cells::{FORMULAS, INITIAL_COVARIANCES};
+use search::{Candidate, Reconstruction, Tried};
+use setup::AXES;
+
+/// Search what the paper leaves open for set-ups whose Table 1 comes near the printed one.
+///
+/// It takes some minutes, saves what it has tried (`--saved`), and goes on from there (docs/paper.md).
+#[derive(Args)]
+#[command(after_help = "Example: cargo xtask study reconstruct --svg reconstruct.svg")]
+pub struct Arguments {
+    /// Set-ups to try.
+    #[arg(long, value_name = "N", default_value_t = search::USUAL_SETUPS)]
+    setups: usize,
+    /// File that the search is saved to, and goes on from.
+    #[arg(long, value_name = "FILE", default_value = "out/reconstruct.json")]
+    saved: PathBuf,
+    /// Picture to write: the tables found beside the printed one.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+}
 
 /// Search as it is saved, to go on from.
 #[derive(Serialize, Deserialize)]
@@ -30,7 +52,10 @@ fn axes() -> String {
     format!("{:016x}", digest(format!("{AXES:?}{FORMULAS:?}{INITIAL_COVARIANCES:?}").as_bytes()))
 }
 
-pub fn execute(setups: usize, saved_to: &Path, svg: Option<&Path>, common: &Common) -> Result<()> {
+/// Searches, prints what was found, and draws it if that was asked for.
+pub fn answer(arguments: &Arguments, common: &Common) -> Result<()> {
+    let Arguments { setups, saved, svg } = arguments;
+    let (setups, saved_to, svg) = (*setups, saved.as_path(), svg.as_deref());
     if setups == 0 {
         return Err(Error::Usage("--setups 0: give at least 1".into()));
     }
@@ -46,10 +71,10 @@ pub fn execute(setups: usize, saved_to: &Path, svg: Option<&Path>, common: &Comm
     let save = |tried: &[Tried]| -> Result<()> {
         let saved = Saved { seed, axes: axes(), tried: tried.to_vec() };
         let text = serde_json::to_string(&saved)
-            .map_err(|cause| Error::Failed(format!("cannot write JSON: {cause}")))?;
+            .map_err(|cause| Error::failed(format!("cannot write JSON: {cause}")))?;
         Ok(output::write_bytes(saved_to, text.as_bytes())?)
     };
-    let found = reconstruct::search(seed, setups, tried, save, &Terminal::new())?;
+    let found = search::search(seed, setups, tried, save, &Terminal::new())?;
     if let Some(svg) = svg {
         output::write_bytes(svg, picture(&found).as_bytes())?;
     }
@@ -171,11 +196,29 @@ fn list(page: &mut print::Page, name: &str, candidates: &[Candidate]) {
 
 #[cfg(test)]
 mod tests {
-    use crate::evaluate::reconstruct::setup::Setup;
-
     use taxel_data::random::{Purpose, Random, Stream};
 
     use super::*;
+    use setup::Setup;
+
+    #[test]
+    fn a_search_goes_on_from_the_file_that_it_was_saved_to() {
+        let saved = std::env::temp_dir().join(format!("taxel-{}-s.json", std::process::id()));
+        let _ = std::fs::remove_file(&saved);
+        let search = |seed| {
+            let arguments = Arguments { setups: 1, saved: saved.clone(), svg: None };
+            answer(&arguments, &Common { seed: Some(seed), json: true })
+        };
+        search(1).unwrap();
+        let bytes = std::fs::read(&saved).unwrap();
+        search(1).unwrap();
+        assert!(std::fs::read(&saved).unwrap() == bytes);
+        let refused = search(2).unwrap_err().to_string();
+        assert!(refused.contains("s.json") && refused.contains("--seed 1"), "{refused}");
+        std::fs::write(&saved, "{}").unwrap();
+        assert!(search(1).unwrap_err().to_string().contains("it is no saved search"));
+        std::fs::remove_file(&saved).unwrap();
+    }
 
     #[test]
     fn a_saved_search_is_read_back_to_the_last_bit() {
