@@ -2,7 +2,7 @@
 
 #![cfg_attr(
     target_arch = "x86_64",
-    expect(unsafe_code, reason = "a call for machines that have AVX2")
+    expect(unsafe_code, reason = "calls for machines that have AVX")
 )]
 
 /// Frames computed side by side: enough to hide the cost of a loop, few enough for the first cache.
@@ -12,7 +12,7 @@ pub const LANES: usize = 64;
 /// no bounds check and no remainder.
 pub type Lanes<T = f64> = [T; LANES];
 
-/// Runs `work` compiled for the machine's widest vectors (AVX2 on most x86-64, NEON on AArch64).
+/// Runs `work` compiled for the machine's widest vectors (AVX-512 or AVX2 on most x86-64, NEON on AArch64).
 ///
 /// Code that is to be vectorised must be inlined into `work`: the closure and what it calls need
 /// `#[inline(always)]`. Results do not depend on the machine, since the compiler never contracts or
@@ -25,10 +25,25 @@ pub type Lanes<T = f64> = [T; LANES];
 #[inline]
 pub fn widest<R>(mut work: impl FnMut() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
+    if std::is_x86_feature_detected!("avx512f")
+        && std::is_x86_feature_detected!("avx512dq")
+        && std::is_x86_feature_detected!("avx512vl")
+    {
+        // SAFETY: this machine has these parts of AVX-512.
+        return unsafe { with_avx512(work) };
+    }
+    #[cfg(target_arch = "x86_64")]
     if std::is_x86_feature_detected!("avx2") {
         // SAFETY: this machine has AVX2.
         return unsafe { with_avx2(work) };
     }
+    work()
+}
+
+/// Runs `work` with AVX-512, as [`with_avx2`] does.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+fn with_avx512<R>(mut work: impl FnMut() -> R) -> R {
     work()
 }
 

@@ -7,7 +7,9 @@
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
 use super::movable::{Activated, Movable, Piece};
-use super::products::{Line, SIDE, add_combinations, add_products, add_squares, transposed};
+use super::products::{
+    Line, SIDE, add_combinations, add_normal_equations, add_products, transposed,
+};
 use crate::error::{Result, no_regression};
 use crate::parallel;
 
@@ -35,8 +37,8 @@ impl Solved {
         let parts = parallel::map(pieces.len(), &|index| {
             let activated = movable.activate(pieces[index]);
             let (mut squares, mut products) = (vec![0.0; n * n], vec![0.0; n * outputs]);
-            add_squares(&activated.regressors, &mut squares);
-            add_products(&activated.regressors, &pieces[index].targets, &mut products);
+            let (a, b) = (&activated.regressors, &pieces[index].targets);
+            add_normal_equations(a, b, &mut squares, &mut products);
             (activated, squares, products)
         });
         let (mut squares, mut products) = (vec![0.0; n * n], vec![0.0; n * outputs]);

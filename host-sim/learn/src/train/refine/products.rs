@@ -8,9 +8,9 @@ use taxel_data::simd::widest;
 /// Samples that lie side by side; every line is so long.
 pub(super) const SIDE: usize = 256;
 /// Numbers that a register holds.
-const REGISTER: usize = 4;
+const REGISTER: usize = 8;
 /// Lines that are added to at once: their sums stay in registers.
-const STRIP: usize = 8;
+const STRIP: usize = 4;
 /// Lines of the second matrix whose products are taken at once.
 const BLOCK: usize = 16;
 /// Lines that are combined before the next ones are added to the same sums: they stay in the first cache.
@@ -21,26 +21,37 @@ pub(super) type Line = [f64; SIDE];
 
 /// Adds the products Σ_samples a_i·b_j of all lines to `sums` (`a.len() × b.len()`, row-major).
 pub(super) fn add_products(a: &[Line], b: &[Line], sums: &mut [f64]) {
-    add_blocks(a, b, |_| a.len(), sums);
+    add_blocks((&by_samples(a), a.len()), b, |_| a.len(), sums);
 }
 
-/// Adds the products Σ_samples a_i·a_j with j ≥ i to `sums` (`a.len() × a.len()`, row-major). What stands below
-/// the diagonal has no meaning.
-pub(super) fn add_squares(a: &[Line], sums: &mut [f64]) {
-    add_blocks(a, a, |end| end, sums);
-}
-
-/// Adds the products of lines a_i and b_j, block by block of j. Of a block that ends before j = e those with
-/// i < `needed(e)` are needed.
-fn add_blocks(a: &[Line], b: &[Line], needed: impl Fn(usize) -> usize, sums: &mut [f64]) {
+/// Adds the products Σ_samples a_i·a_j with j ≥ i to `squares` (`a.len() × a.len()`, row-major), and those of
+/// [`add_products`] to `products`. What stands in `squares` below the diagonal has no meaning.
+pub(super) fn add_normal_equations(
+    a: &[Line],
+    b: &[Line],
+    squares: &mut [f64],
+    products: &mut [f64],
+) {
     let factors = by_samples(a);
+    add_blocks((&factors, a.len()), a, |end| end, squares);
+    add_blocks((&factors, a.len()), b, |_| a.len(), products);
+}
+
+/// Adds the products of so many lines a_i, whose samples are `factors`, and lines b_j, block by block of j. Of a block that
+/// ends before j = e those with i < `needed(e)` are needed.
+fn add_blocks(
+    (factors, height): (&[f64], usize),
+    b: &[Line],
+    needed: impl Fn(usize) -> usize,
+    sums: &mut [f64],
+) {
     for (number, lines) in b.chunks(BLOCK).enumerate() {
         let first = number * BLOCK;
-        let rows = needed(first + lines.len()).min(a.len());
+        let rows = needed(first + lines.len()).min(height);
         if lines.len() > REGISTER {
-            add_block::<BLOCK>(&factors, a.len(), lines, &mut sums[first..], (b.len(), rows));
+            add_block::<BLOCK>((factors, height), lines, &mut sums[first..], (b.len(), rows));
         } else {
-            add_block::<REGISTER>(&factors, a.len(), lines, &mut sums[first..], (b.len(), rows));
+            add_block::<REGISTER>((factors, height), lines, &mut sums[first..], (b.len(), rows));
         }
     }
 }
@@ -48,8 +59,7 @@ fn add_blocks(a: &[Line], b: &[Line], needed: impl Fn(usize) -> usize, sums: &mu
 /// Adds the products of the first `rows` lines a_i, whose samples are `factors`, and at most `L` lines b_j to `sums`,
 /// whose rows are `width` apart.
 fn add_block<const L: usize>(
-    factors: &[f64],
-    height: usize,
+    (factors, height): (&[f64], usize),
     b: &[Line],
     sums: &mut [f64],
     (width, rows): (usize, usize),

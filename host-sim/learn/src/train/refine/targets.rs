@@ -35,10 +35,13 @@ impl Targets {
     /// Targets of network number `network`, frame after frame, and their number in each.
     pub(super) fn of_network(&self, outputs: &Table, network: usize) -> (Vec<f64>, usize) {
         let count = self.means.len() / self.networks;
-        let own = network * count..(network + 1) * count;
-        let (means, weights) = (&self.means[own.clone()], &self.weights[own.clone()]);
-        let scales = means.iter().zip(weights).cycle();
-        let values = outputs.lines().flat_map(|line| &line[own.clone()]).zip(scales);
-        (values.map(|(value, (mean, weight))| (value - mean) * weight).collect(), count)
+        let first = network * count;
+        let scales = || self.means[first..].iter().zip(&self.weights[first..]).take(count);
+        let mut values = Vec::with_capacity(outputs.len() * count);
+        for line in outputs.lines() {
+            let scaled = line[first..].iter().zip(scales());
+            values.extend(scaled.map(|(value, (mean, weight))| (value - mean) * weight));
+        }
+        (values, count)
     }
 }

@@ -7,7 +7,7 @@ use taxel_simulate::{Synthesis, World};
 
 use super::loss::{Loss, on_held_out, on_same};
 use super::movable::{Movable, Piece, Sizes};
-use super::products::{Line, SIDE, add_combinations, add_products, add_squares};
+use super::products::{Line, SIDE, add_combinations, add_normal_equations, add_products};
 use super::*;
 use crate::infer::{Exponential, infer};
 use crate::train::{train, train_refined};
@@ -34,8 +34,9 @@ fn products_are_those_of_plain_loops() {
                 close(products[i * n + j], 1.0 + dot(a, b));
             }
         }
-        let mut squares = vec![0.0; m * m];
-        add_squares(&a, &mut squares);
+        let (mut squares, mut again) = (vec![0.0; m * m], vec![1.0; m * n]);
+        add_normal_equations(&a, &b, &mut squares, &mut again);
+        assert_eq!(again, products);
         for i in 0..m {
             (i..m).for_each(|j| close(squares[i * m + j], dot(&a[i], &a[j])));
         }
