@@ -228,7 +228,7 @@ impl<'a> Network<'a> {
         at_once.map(move |words| words.split_at_checked(exponents).unwrap_or_default())
     }
 
-    /// Infers as [`rbf::Network::infer_scaled`](super::Network::infer_scaled) does, to the bit, by the assembly's
+    /// Infers as [`rbf::Network::infer_scaled_with`](super::Network::infer_scaled_with) does, to the bit, by the assembly's
     /// compiled twin in portable Rust. It is public to measure what the assembly saves.
     ///
     /// `scaled` and `output` must have the lengths of the shape; elements beyond are ignored.

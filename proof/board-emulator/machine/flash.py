@@ -12,8 +12,8 @@ PGPERR, PGSERR, ERRORS = 1 << 6, 1 << 7, 0x1F3
 #: Offset and length of each sector.
 SECTORS = [(0x0, 0x4000), (0x4000, 0x4000), (0x8000, 0x4000), (0xC000, 0x4000), (0x10000, 0x10000),
            (0x20000, 0x20000), (0x40000, 0x20000), (0x60000, 0x20000)]
-#: Sectors below this one hold the program.
-FIRST_SLOT = 6
+#: Sectors that hold the program. The others hold settings, the key, and two models.
+PROGRAM = (0, 4, 5)
 #: Longest time in s to erase 128 KiB, by PSIZE: 8, 16 and 32 bits at once (DS10693).
 ERASE_S = (4.0, 2.6, 2.0, 2.0)
 #: Time in s to program once, whatever the width.
@@ -86,7 +86,7 @@ class Flash(Registers):
         if not value & SER or number >= len(SECTORS):
             self._rules.breach("flash-sector", f"{number}")
             return
-        if number < FIRST_SLOT:
+        if number in PROGRAM:
             self._rules.breach("flash-sector", f"{number} holds the program")
         start, length = SECTORS[number]
         self.content[start:start + length] = b"\xff" * length

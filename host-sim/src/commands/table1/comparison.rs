@@ -4,7 +4,7 @@ use crate::evaluate::printed::{CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
 
 use super::super::print::{Page, percent};
 
-/// Header of [`line`]s.
+/// Header of [`line()`]s.
 pub fn header(what: &str) -> String {
     format!(
         "{what:<22} {:>6} {:>8} {:>9} {:>12} {:>12} {:>12}",
