@@ -24,8 +24,7 @@ use score::Found;
 #[allow(clippy::struct_excessive_bools)]
 #[derive(clap::Args)]
 pub struct Options {
-    /// Run all tests that reach a fault, and write proof/mutants/score.csv instead of comparing. An hour; what was found
-    /// is kept in target/mutants
+    /// Write proof/mutants/score.csv instead of comparing
     #[arg(long, conflicts_with_all = ["names", "all"])]
     accept: bool,
     /// Run all tests that reach a fault, and tell every one that fails
@@ -56,8 +55,8 @@ impl Options {
     }
 }
 
-/// Plants faults. Without `--accept` and `--all`, the tests that the accepted score names come first. The others run only
-/// for faults that were found and are not found by these, and for new ones.
+/// Plants faults. Without `--all`, the tests that the accepted score names come first. The others run only for faults that
+/// these do not find: that were found or are new, and with `--accept` any.
 ///
 /// # Errors
 /// The lists are wrong, the copy does not build, or a fault is missed that was found before.
@@ -78,7 +77,7 @@ pub fn run(options: &Options) -> Outcome {
     let copy = copy::build(&faults, &options.packages, !options.no_torture)?;
     let tests = programs::all(&copy)?;
     let mut found = BTreeMap::new();
-    if !options.accept && !options.all {
+    if !options.all {
         let is_named = |fault: &Fault, test: &Test| {
             accepted.get(&fault.name).is_some_and(|it| it.tests.contains(&full_name(&copy, test)))
         };
@@ -88,7 +87,8 @@ pub fn run(options: &Options) -> Outcome {
         found = measure(&copy, &faults, &numbers, &named, None, is_named)?;
         found.retain(|number, found| {
             let before = accepted.get(&faults[number - 1].name).map(|it| &*it.verdict);
-            !found.is_nothing() || before.is_some_and(|verdict| verdict != "found")
+            let is_searched = options.accept || before.is_none_or(|verdict| verdict == "found");
+            !found.is_nothing() || !is_searched
         });
     }
     let open: Vec<usize> = numbers.iter().copied().filter(|it| !found.contains_key(it)).collect();
