@@ -145,11 +145,6 @@ impl Emulator {
     /// # Errors
     /// [`Error::Data`] if a file is missing or wrong, if that of the mailbox cannot be made, or if QEMU does not start.
     pub fn start(options: &Options) -> Result<(Self, Link)> {
-        Self::start_with(options, &[])
-    }
-
-    /// Starts QEMU with further `arguments`, and connects to the image's link.
-    pub fn start_with(options: &Options, arguments: &[&str]) -> Result<(Self, Link)> {
         options.check()?;
         let qemu = options.qemu.display();
         let failed = |cause: std::io::Error| {
@@ -163,7 +158,7 @@ impl Emulator {
         command.args(machine(options.mailbox.as_deref()));
         command.args(["-cpu", "cortex-m4", "-display", "none"]);
         command.args(["-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
-        command.args(["-serial", &format!("tcp:127.0.0.1:{port},nodelay=on")]).args(arguments);
+        command.args(["-serial", &format!("tcp:127.0.0.1:{port},nodelay=on")]);
         if let Some(model) = &options.model {
             let path = escaped(model);
             let place = format!("loader,file={path},addr={SLOT_ADDRESS:#x},force-raw=on");
