@@ -143,6 +143,28 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
 }
 
 #[test]
+fn a_configuration_that_is_kept_under_a_lease_outlasts_the_lease() {
+    let mut slots = Flash::slots_with(&blob(1, 3));
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let leased = Configuration { contact_threshold: 0.25, ..quiet() };
+    let requests = [
+        Request::Configure { configuration: leased, lease_ms: 500 },
+        Request::Keep(Setting::Configuration),
+    ];
+    for request in &requests {
+        ask(&mut session, &bench.board, request, |_| ());
+    }
+    bench.board.pins.borrow_mut().now_us += 501_000;
+    session.step();
+    let asked = ask(&mut session, &bench.board, &Request::Configuration, |report| match report {
+        Report::Configuration { configuration, lease_left_ms } => (configuration, lease_left_ms),
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(asked.0, (leased, 0));
+}
+
+#[test]
 fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
     let mut settings = SharedSettings::default();
     let mut slots = Flash::slots_with(&blob(1, 3));

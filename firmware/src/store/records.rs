@@ -127,3 +127,20 @@ pub fn missing_records<S: Slot>(slots: &[S; 2], in_force: usize) -> Option<u32> 
     // A model that was flashed with the firmware has no record.
     (!is_firm && generation > 0).then_some(generation)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_right_behind_its_blob_counts() {
+        for (room, expected) in [(RECORD_BYTES, Some(7)), (RECORD_BYTES - 4, None)] {
+            let mut slot = vec![0xFF; 40 + room];
+            slot[..5].copy_from_slice(b"TAXL\x01");
+            slot[5..9].copy_from_slice(&40_u32.to_le_bytes());
+            let place = slot.len() - RECORD_BYTES;
+            slot[place..].copy_from_slice(&record(7, u32::MAX));
+            assert_eq!(generation(1, &slot), expected);
+        }
+    }
+}

@@ -89,6 +89,7 @@ mod tests {
         assert_eq!(scale.colour(0.0).1, 0.0);
         assert_eq!(scale.colour(0.5), ("above", 1.0));
         assert_eq!(scale.colour(-0.1), ("below", 0.2));
+        assert_eq!(ColourScale::diverging([0.1, -0.5]).colour(-0.1), ("below", 0.2));
         let scale = ColourScale::sequential([0.04, 0.06]);
         assert_eq!(scale.colour(0.06), ("above", 1.0));
         assert!(scale.colour(0.04).1 < 0.1);

@@ -61,6 +61,21 @@ fn data_without_outliers_keeps_every_line() {
 }
 
 #[test]
+fn the_gap_of_an_outlier_is_wider_in_few_lines() {
+    // One line, at four times the range of all others.
+    let far = |lines: usize| {
+        let mut data = measured(lines, 1);
+        let (low, high) = (35.0, 60.0);
+        for (line, value) in data.inputs.values.iter_mut().step_by(6).enumerate() {
+            *value = low + (high - low) * line as f64 / lines as f64;
+        }
+        data.inputs.values[0] = high + 4.0 * (high - low);
+        outliers(&data).lines
+    };
+    assert_eq!([100, 200, 1000].map(far), [0, 0, 1]);
+}
+
+#[test]
 fn a_wild_line_is_named_and_left_out() {
     let mut data = measured(3000, 1);
     data.inputs.values[6 * 1500..6 * 1501].fill(1e6);

@@ -1,3 +1,5 @@
+use taxel_data::random::{Purpose, Random, Stream};
+
 use super::*;
 
 const WIRES: Wires = Wires { rows: 3, columns: 4 };
@@ -75,6 +77,33 @@ fn wires_without_a_resistor_keep_their_constants() {
     assert_eq!(fit.constants.row_source_ohm[2], 0.26);
     assert_eq!(fit.constants.feedback_ohm[2..], [560.0, 560.0]);
     assert!((fit.constants.row_source_ohm[1] - 0.3).abs() < 1e-5, "{fit:?}");
+}
+
+#[test]
+fn standard_errors_are_as_large_as_the_errors_of_many_calibrations() {
+    // Eight readings of two rows and three columns leave three degrees of freedom.
+    let known = [only(&[0, 1, 2, 4, 5, 6]), only(&[0]), only(&[5])];
+    let mut random = Random::new(1, Stream::Training, Purpose::Noise, 0, 0);
+    let (mut squares, mut told) = ([0.0; 2], 0.0);
+    let repeats = 2000;
+    for _ in 0..repeats {
+        let arrangements = known.each_ref().map(|known| {
+            let mut arrangement = read(&actual(), known);
+            for read in &mut arrangement.read_s {
+                *read *= 1.0 + 1e-4 * random.normal();
+            }
+            arrangement
+        });
+        let fit = fit(&typical(), WIRES, &arrangements).unwrap();
+        for (m, square) in squares.iter_mut().enumerate() {
+            let error = fit.constants.row_source_ohm[m] - actual().row_source_ohm[m];
+            *square += f64::from(error).powi(2);
+        }
+        told += fit.row_source_error_ohm.powi(2);
+    }
+    // Of the two rows, the error of the less certain one is told.
+    let ratio = (told / squares[0].max(squares[1])).sqrt();
+    assert!((0.95..1.1).contains(&ratio), "{ratio}");
 }
 
 #[test]
