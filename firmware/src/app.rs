@@ -4,14 +4,11 @@
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
 //! is allocated.
 
-use model_core::{Estimate, RowWire, Wires};
-
-use crate::capacity::Capacity;
-use crate::link::message::{Configuration, Statistics};
+use crate::link::message::Configuration;
 use crate::link::receive::Receiver;
 use crate::log::info;
 use crate::platform::Platform;
-use crate::readout::{Baseline, FrameSource};
+use crate::readout::FrameSource;
 use crate::store::{Slot, Upload};
 
 // From the ground up: a module imports only what is declared before it.
@@ -19,26 +16,30 @@ mod buffers;
 mod configuration;
 mod frame_clock;
 mod lease;
-mod line;
+mod link;
 mod session_end;
 mod model;
+mod sensor;
 mod saved_settings;
+mod work;
 mod authenticity;
-mod records;
 mod recheck;
 mod trial;
+mod models;
+mod records;
 mod undo;
 mod session;
 mod answer;
 
 use authenticity::Authenticity;
 pub use buffers::Buffers;
-use frame_clock::{FrameClock, LongClock};
-use lease::Lease;
-use line::Line;
+use link::Link;
+use models::Models;
+use sensor::Sensor;
 pub use session::Session;
 pub use session_end::SessionEnd;
 use trial::Trial;
+use work::Work;
 
 /// The application's state, except the model in force. `ROWS` is the largest number of rows.
 pub struct App<'m, P, F, const ROWS: usize> {
@@ -48,59 +49,10 @@ pub struct App<'m, P, F, const ROWS: usize> {
 
 /// The application without the receiver: a request borrows the receiver's bytes while it is answered.
 struct Core<'m, P, F, const ROWS: usize> {
-    line: Line<'m, P>,
-    source: F,
-    /// The configuration in force.
-    configuration: Configuration,
-    /// The device's own configuration, which is in force without a lease.
-    own_configuration: Configuration,
-    lease: Lease,
-    statistics: Statistics,
-    clock: FrameClock,
-    time: LongClock,
-    capacity: Capacity,
-    /// Numbers of wires that are scanned: those of the model in force, else all.
-    wires: Wires,
-    /// Which row-wires these are.
-    row_wires: [RowWire; ROWS],
-    /// Rows of the model in force, and outputs of all of them; without a model, rows that are scanned and 0.
-    rows: usize,
-    outputs: usize,
-    /// Room for the longest frame.
-    frame: &'m mut [f32],
-    /// One over each reading of the last complete baseline; NaN without one.
-    reciprocals: &'m mut [f32],
-    /// Whether at least one reading has a reciprocal, so that a model with relative inputs may decode.
-    has_reciprocals: bool,
-    /// Working space of a decoder.
-    scratch: &'m mut [f32],
-    estimate: Estimate<'m>,
-    /// The baseline, decoded by the model in force; valid once a baseline is captured.
-    rest: Estimate<'m>,
-    /// Bits of the last frame's faulty readings, a word a row.
-    faulty_columns: [u32; ROWS],
-    baseline: Baseline<'m>,
-    /// Whether the last scan gave at least one reading.
-    sensor_answers: bool,
-    capture: Option<Capture>,
-    upload: Upload,
-    trial: Trial,
-    authenticity: Authenticity,
-    /// Number of times that settings may still be written before the next restart.
-    writes_left: u16,
-    /// Standard deviations of the outputs, for a model with a confidence.
-    deviations: &'m mut [f32],
-}
-
-/// A baseline that is being captured.
-#[derive(Clone, Copy)]
-struct Capture {
-    /// Number of the request that waits for it.
-    number: u16,
-    /// Number of frames asked for.
-    frames: u16,
-    /// Number of frames still to be scanned.
-    left: u16,
+    sensor: Sensor<'m, F, ROWS>,
+    models: Models,
+    link: Link<'m, P>,
+    work: Work<'m, ROWS>,
 }
 
 impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
@@ -124,39 +76,25 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             deviations,
         } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
-        let now_us = platform.now_us();
         let authenticity = Authenticity::new(platform.key_area());
-        let mut core = Core {
-            line: Line::new(platform, message),
-            source,
-            configuration,
-            own_configuration: configuration,
-            lease: Lease::NONE,
-            statistics: Statistics::default(),
-            clock: FrameClock::starting_at(now_us),
-            time: LongClock::starting_at(now_us),
-            capacity,
-            wires: capacity.wires(),
-            row_wires: core::array::from_fn(RowWire),
+        let models =
+            Models { capacity, upload: Upload::new(), trial: Trial::default(), authenticity };
+        let now_us = platform.now_us();
+        let mut link = Link::new(platform, message);
+        let memories = [frame.as_flattened_mut(), baseline.as_flattened_mut()];
+        let mut sensor = Sensor::new(source, configuration, capacity.wires(), memories, now_us);
+        sensor.load_settings(&mut link);
+        let work = Work {
             rows: ROWS,
             outputs: 0,
-            frame: frame.as_flattened_mut(),
             reciprocals: reciprocals.as_flattened_mut(),
             has_reciprocals: false,
             scratch: scratch.as_flattened_mut().as_flattened_mut(),
             estimate: estimate.whole(),
             rest: rest.whole(),
-            faulty_columns: [0; ROWS],
-            baseline: Baseline::new(baseline.as_flattened_mut()),
-            sensor_answers: true,
-            capture: None,
-            upload: Upload::new(),
-            trial: Trial::default(),
-            authenticity,
-            writes_left: saved_settings::MOST_WRITES,
             deviations: deviations.as_flattened_mut(),
         };
-        core.load_settings();
+        let core = Core { sensor, models, link, work };
         Self { receiver: Receiver::new(received), core }
     }
 
@@ -182,6 +120,6 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
 
     /// The board's platform, for tests that inspect it.
     pub fn platform(&mut self) -> &mut P {
-        self.core.line.platform()
+        self.core.link.platform()
     }
 }

@@ -1,13 +1,11 @@
 //! Writes at every start the records that the choice of a model still needs ([`missing_records`]).
 
-use super::Core;
 use super::model::{candidates, choose};
+use super::models::Models;
 use crate::log::{info, warning};
-use crate::platform::Platform;
-use crate::readout::FrameSource;
 use crate::store::{Slot, missing_records, reinstate};
 
-impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
+impl Models {
     /// Writes them. A trial is no choice yet.
     // Apart from its caller, whose stack is deep.
     #[inline(never)]

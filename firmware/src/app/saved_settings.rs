@@ -14,7 +14,8 @@ use model_core::Wires;
 use model_core::blob::Floats;
 use model_core::checksum::CRC_32;
 
-use super::Core;
+use super::link::Link;
+use super::sensor::Sensor;
 use crate::circuit::Constants;
 use crate::link::message::{Configuration, KeepFault, Kept, KeptBaseline, Refusal, Setting};
 use crate::log::{info, warning};
@@ -31,16 +32,13 @@ const fn version(setting: Setting) -> u8 {
     }
 }
 
-/// Most writes between two restarts: flash wears, and a host may be in an endless loop.
-pub const MOST_WRITES: u16 = 100;
-
 /// Largest size of a configuration in bytes.
 const CONFIGURATION_BYTES: usize = 64;
 
-impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
+impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
     /// Puts the configuration and the constants that are kept in force.
-    pub(super) fn load_settings(&mut self) {
-        let (keeper, buffer) = self.line.settings();
+    pub(super) fn load_settings<P: Platform>(&mut self, link: &mut Link<'_, P>) {
+        let (keeper, buffer) = link.settings();
         if keeper.recover().is_err() {
             warning!("the memory of settings failed");
         }
@@ -50,7 +48,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             (self.configuration, self.own_configuration) = (configuration, configuration);
             info!("configuration as kept: a frame every {=u32} us", configuration.frame_period_us);
         }
-        let (keeper, buffer) = self.line.settings();
+        let (keeper, buffer) = link.settings();
         let kept = keeper.read(Setting::Constants, buffer).and_then(constants);
         if let Some(constants) = kept {
             if self.source.set_constants(constants).is_ok() {
@@ -63,9 +61,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
 
     /// Puts the baseline that is kept in force, if it is of the wires that are scanned, and was read with the
     /// constants in force.
-    pub(super) fn load_baseline(&mut self) {
+    pub(super) fn load_baseline<P: Platform>(&mut self, link: &mut Link<'_, P>) {
         let constants_crc = self.constants_crc();
-        let (keeper, buffer) = self.line.settings();
+        let (keeper, buffer) = link.settings();
         let kept = keeper.read(Setting::Baseline, buffer).and_then(baseline);
         match kept {
             Some(kept) if kept.wires == self.wires && kept.constants_crc == constants_crc => {
@@ -78,9 +76,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 
     /// The settings that are kept.
-    pub(super) fn kept(&mut self) -> Kept {
+    pub(super) fn kept<P: Platform>(&self, link: &mut Link<'_, P>) -> Kept {
         let writes_left = self.writes_left;
-        let (keeper, buffer) = self.line.settings();
+        let (keeper, buffer) = link.settings();
         let configuration = keeper.read(Setting::Configuration, buffer).and_then(configuration);
         let constants = keeper.read(Setting::Constants, buffer).and_then(constants).is_some();
         let baseline = keeper.read(Setting::Baseline, buffer).and_then(baseline);
@@ -93,13 +91,17 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 
     /// Keeps a setting that is in force.
-    pub(super) fn keep(&mut self, setting: Setting) -> Result<(), Refusal> {
+    pub(super) fn keep<P: Platform>(
+        &mut self,
+        setting: Setting,
+        link: &mut Link<'_, P>,
+    ) -> Result<(), Refusal> {
         const NOTHING: Refusal = Refusal::Keep(KeepFault::Nothing);
         if self.writes_left == 0 {
             return Err(Refusal::Keep(KeepFault::TooOften));
         }
         let constants_crc = self.constants_crc();
-        let keeper = self.line.platform().settings();
+        let keeper = link.platform().settings();
         let version = version(setting);
         let written = match setting {
             Setting::Configuration => {
@@ -134,7 +136,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 keeper.keep(setting, &[&head, &constants_crc.to_le_bytes(), readings])
             }
         };
-        self.count_write(written)
+        self.count_write(written, link)
     }
 
     /// CRC-32 of the constants in force; 0 if there are none.
@@ -149,17 +151,25 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 
     /// Keeps a setting no longer.
-    pub(super) fn forget(&mut self, setting: Setting) -> Result<(), Refusal> {
+    pub(super) fn forget<P: Platform>(
+        &mut self,
+        setting: Setting,
+        link: &mut Link<'_, P>,
+    ) -> Result<(), Refusal> {
         if self.writes_left == 0 {
             return Err(Refusal::Keep(KeepFault::TooOften));
         }
-        let written = self.line.platform().settings().keep(setting, &[]);
-        self.count_write(written)
+        let written = link.platform().settings().keep(setting, &[]);
+        self.count_write(written, link)
     }
 
-    fn count_write(&mut self, written: Result<bool, KeepError>) -> Result<(), Refusal> {
+    fn count_write<P: Platform>(
+        &mut self,
+        written: Result<bool, KeepError>,
+        link: &mut Link<'_, P>,
+    ) -> Result<(), Refusal> {
         if written != Ok(false) {
-            self.line.platform().feed_watchdog(); // an erase may have taken half a second
+            link.platform().feed_watchdog(); // an erase may have taken half a second
             self.writes_left = self.writes_left.saturating_sub(1);
         }
         match written {

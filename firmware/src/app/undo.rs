@@ -1,18 +1,16 @@
 //! Undo: the previous model comes into force again.
 
-use super::Core;
 use super::model::{self, InForce};
+use super::models::Models;
 use super::session_end::SessionEnd;
 use crate::link::message::Refusal;
 use crate::log::info;
-use crate::platform::Platform;
-use crate::readout::FrameSource;
 use crate::store::{Slot, blob_in_slot, generation, reinstate};
 
-impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
+impl Models {
     /// Puts the spare slot's model in force again, and leaves the one with the CRC-32 `left`; returns the CRC-32 of the
     /// one in force then.
-    pub(super) fn undo<S: Slot>(
+    pub(super) fn undo<S: Slot, const ROWS: usize>(
         &mut self,
         left: u32,
         in_force: &InForce<'_, ROWS>,

@@ -1,5 +1,7 @@
-//! Sending reports to the host.
+//! The host's side: reports to it, how long it is silent, and what is counted for it.
 
+use super::frame_clock::LongClock;
+use super::lease::Lease;
 use crate::link::message::{Report, Statistics};
 use crate::link::{cobs, packet};
 use crate::platform::{Platform, Port};
@@ -11,25 +13,30 @@ const STALL_US: u32 = 50_000;
 const TURN_US: u32 = 2_000_000;
 
 /// The board's serial line, with room for one report.
-pub struct Line<'m, P> {
+pub struct Link<'m, P> {
     platform: P,
     buffer: &'m mut [u8],
+    time: LongClock,
+    pub lease: Lease,
+    pub statistics: Statistics,
     /// Whether the last report was given up in the middle, so that its frame must still be ended.
     cut: bool,
     /// What is left of [`TURN_US`].
     left_us: u32,
 }
 
-impl<P: Platform> Line<'_, P> {
+impl<P: Platform> Link<'_, P> {
     /// The memory that keeps settings, and the room for a report, which no report needs meanwhile.
     pub fn settings(&mut self) -> (&mut P::Settings, &mut [u8]) {
         (self.platform.settings(), self.buffer)
     }
 }
 
-impl<'m, P: Port> Line<'m, P> {
-    pub fn new(platform: P, buffer: &'m mut [u8]) -> Self {
-        Self { platform, buffer, cut: false, left_us: TURN_US }
+impl<'m, P: Port> Link<'m, P> {
+    pub fn new(mut platform: P, buffer: &'m mut [u8]) -> Self {
+        let time = LongClock::starting_at(platform.now_us());
+        let (lease, statistics) = (Lease::NONE, Statistics::default());
+        Self { platform, buffer, time, lease, statistics, cut: false, left_us: TURN_US }
     }
 
     /// Begins a turn of the loop.
@@ -41,10 +48,16 @@ impl<'m, P: Port> Line<'m, P> {
         &mut self.platform
     }
 
-    /// Sends one report. If the host's side takes no more bytes, it is lost, which `statistics` count.
-    pub fn send(&mut self, number: u16, report: &Report<'_>, statistics: &mut Statistics) {
+    /// The time in µs that has passed since the start.
+    pub fn now_us(&mut self) -> u64 {
+        self.time.at(self.platform.now_us())
+    }
+
+    /// Sends one report. If the host's side takes no more bytes, it is lost, which the statistics count.
+    pub fn send(&mut self, number: u16, report: &Report<'_>) {
         if !self.try_send(number, report) {
-            statistics.lost_reports = statistics.lost_reports.saturating_add(1);
+            let lost = &mut self.statistics.lost_reports;
+            *lost = lost.saturating_add(1);
         }
     }
 

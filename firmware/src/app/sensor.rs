@@ -1,0 +1,281 @@
+//! The sensor: which wires are scanned, how, and its baseline.
+
+use model_core::blob::Floats;
+use model_core::health::{Health, Limits};
+use model_core::{RowWire, Wires};
+
+use super::frame_clock::FrameClock;
+use super::link::Link;
+use crate::circuit::{Constants, ConstantsFault};
+use crate::link::message::{Configuration, HealthReport, Refusal, Report};
+use crate::link::packet::UNASKED;
+use crate::log::info;
+use crate::platform::Platform;
+use crate::readout::{Baseline, FrameSource, Selection};
+
+/// Most writes between two restarts: flash wears, and a host may be in an endless loop.
+const MOST_WRITES: u16 = 100;
+
+/// The sensor and the settings that belong to it.
+pub struct Sensor<'m, F, const ROWS: usize> {
+    pub source: F,
+    /// The configuration in force.
+    pub configuration: Configuration,
+    /// The device's own configuration, which is in force without a lease.
+    pub own_configuration: Configuration,
+    pub clock: FrameClock,
+    /// Numbers of wires that are scanned: those of the model in force, else all.
+    pub wires: Wires,
+    /// Which row-wires these are.
+    row_wires: [RowWire; ROWS],
+    /// Room for the longest frame.
+    frame: &'m mut [f32],
+    /// Bits of the last frame's faulty readings, a word a row.
+    faulty_columns: [u32; ROWS],
+    pub baseline: Baseline<'m>,
+    pub capture: Option<Capture>,
+    /// Whether the last scan gave at least one reading.
+    pub answers: bool,
+    /// Number of times that settings may still be written before the next restart.
+    pub writes_left: u16,
+}
+
+/// A baseline that is being captured.
+#[derive(Clone, Copy)]
+pub struct Capture {
+    /// Number of the request that waits for it.
+    pub number: u16,
+    /// Number of frames asked for.
+    frames: u16,
+    /// Number of frames still to be scanned.
+    left: u16,
+}
+
+impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
+    /// Makes a sensor of which all `wires` are scanned. The memories have room for the longest frame each.
+    pub fn new(
+        source: F,
+        configuration: Configuration,
+        wires: Wires,
+        [frame, baseline]: [&'m mut [f32]; 2],
+        now_us: u32,
+    ) -> Self {
+        Self {
+            source,
+            configuration,
+            own_configuration: configuration,
+            clock: FrameClock::starting_at(now_us),
+            wires,
+            row_wires: core::array::from_fn(RowWire),
+            frame,
+            faulty_columns: [0; ROWS],
+            baseline: Baseline::new(baseline),
+            capture: None,
+            answers: true,
+            writes_left: MOST_WRITES,
+        }
+    }
+
+    /// The readings of the last frame, in Ω.
+    pub fn frame(&self) -> &[f32] {
+        self.frame.get(..self.wires.readings()).unwrap_or_default()
+    }
+
+    /// Replaces the frame with the `readings_ohm` of a request.
+    pub fn set_frame(&mut self, readings_ohm: Floats<'_>) -> Result<(), Refusal> {
+        self.check_length(readings_ohm)?;
+        let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
+        frame.iter_mut().zip(readings_ohm.iter()).for_each(|(place, reading)| *place = reading);
+        Ok(())
+    }
+
+    /// Checks that there are as many readings as are scanned.
+    fn check_length(&self, readings_ohm: Floats<'_>) -> Result<(), Refusal> {
+        let expected = self.wires.readings();
+        if readings_ohm.0.len() == 4 * expected {
+            Ok(())
+        } else {
+            Err(Refusal::FrameLength { expected: expected as u16 })
+        }
+    }
+
+    /// Looks for faulty readings. Returns the frame, in which they are NaN, and what was found.
+    pub fn judge_frame(&mut self) -> (&mut [f32], Health) {
+        let limits = Limits {
+            shorted_below_ohm: self.configuration.shorted_below_ohm,
+            open_above_ohm: self.configuration.open_above_ohm,
+        };
+        let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
+        let health = Health::new(frame, self.wires.columns, limits, &mut self.faulty_columns);
+        (frame, health)
+    }
+
+    /// Whether there is a baseline, and none is being captured.
+    pub fn has_baseline(&self) -> bool {
+        self.capture.is_none() && self.baseline.frames() > 0
+    }
+
+    /// Whether the last frame differs from the baseline as under a contact.
+    pub fn is_touched(&self) -> bool {
+        let change = self.baseline.largest_relative_deviation(self.frame);
+        let touched = change.is_some_and(|change| change > self.configuration.contact_threshold);
+        touched && self.capture.is_none()
+    }
+}
+
+impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
+    /// Scans these wires from now on. A baseline of others is given up.
+    pub fn scan_wires<P: Platform>(
+        &mut self,
+        wires: Wires,
+        row_wires: [RowWire; ROWS],
+        link: &mut Link<'_, P>,
+    ) {
+        if (self.wires, self.row_wires) != (wires, row_wires) {
+            (self.wires, self.row_wires) = (wires, row_wires);
+            self.restart_baseline(link);
+        }
+    }
+
+    /// Scans a frame, counts it and sends its readings if they are wanted. Returns its number.
+    pub fn scan<P: Platform>(&mut self, start_us: u64, link: &mut Link<'_, P>) -> u32 {
+        let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
+        let rows = self.row_wires.get(..self.wires.rows).unwrap_or_default();
+        let wires = Selection { rows, columns: self.wires.columns };
+        let report = self.source.scan(self.configuration.scan, wires, frame);
+        self.answers = frame.iter().any(|reading| !reading.is_nan());
+        let scan_us = link.now_us().wrapping_sub(start_us) as u32;
+        let s = &mut link.statistics;
+        let frame = s.number_frame();
+        s.failed_samples = s.failed_samples.saturating_add(u32::from(report.failed_samples));
+        s.longest_scan_us = s.longest_scan_us.max(scan_us);
+        if self.configuration.send_readings {
+            let readings_ohm = Floats::new(self.frame());
+            link.send(UNASKED, &Report::Readings { frame, start_us, readings_ohm });
+        }
+        frame
+    }
+
+    /// Reports the last frame's faulty readings.
+    pub fn send_health<P: Platform>(
+        &self,
+        frame: u32,
+        start_us: u64,
+        health: Health,
+        link: &mut Link<'_, P>,
+    ) {
+        let faulty = self.faulty_columns.map(u32::to_le_bytes);
+        let report = HealthReport {
+            frame,
+            start_us,
+            missing: health.missing,
+            shorted: health.shorted,
+            open: health.open,
+            faulty_columns: faulty.get(..self.wires.rows).unwrap_or_default().as_flattened(),
+        };
+        link.send(UNASKED, &Report::Health(report));
+    }
+
+    /// Puts `configuration` in force for `lease_ms`, or as the device's own without a lease.
+    pub fn configure<P: Platform>(
+        &mut self,
+        configuration: Configuration,
+        lease_ms: u32,
+        link: &mut Link<'_, P>,
+    ) -> Result<(), Refusal> {
+        configuration.check().map_err(Refusal::Configuration)?;
+        if lease_ms == 0 {
+            self.own_configuration = configuration;
+        }
+        link.lease.set(lease_ms);
+        self.put_in_force(configuration, link);
+        Ok(())
+    }
+
+    /// Ends a lease: puts the device's own configuration in force.
+    pub fn resume<P: Platform>(&mut self, link: &mut Link<'_, P>) {
+        link.lease.set(0);
+        self.put_in_force(self.own_configuration, link);
+    }
+
+    /// Scans by `configuration` from now on. Nothing changes if it is in force already.
+    fn put_in_force<P: Platform>(&mut self, configuration: Configuration, link: &mut Link<'_, P>) {
+        if configuration == self.configuration {
+            return;
+        }
+        self.configuration = configuration;
+        self.give_up_capture(link);
+        self.answers |= configuration.frame_period_us == 0; // it is not scanned any more
+        self.clock.restart(link.platform().now_us());
+        info!("configured: a frame every {=u32} us", configuration.frame_period_us);
+    }
+
+    /// Puts constants in force. A baseline that was read with others means nothing any more. Returns whether they changed.
+    pub fn set_constants<P: Platform>(
+        &mut self,
+        constants: Constants<'_>,
+        link: &mut Link<'_, P>,
+    ) -> Result<bool, ConstantsFault> {
+        let before = self.constants_crc();
+        self.source.set_constants(constants)?;
+        let changed = self.constants_crc() != before;
+        if changed {
+            self.restart_baseline(link);
+            self.load_baseline(link);
+        }
+        Ok(changed)
+    }
+
+    /// Begins to capture a baseline of so many `frames`, for request `number`.
+    pub fn begin_capture<P: Platform>(
+        &mut self,
+        number: u16,
+        frames: u16,
+        link: &mut Link<'_, P>,
+    ) -> Result<(), Refusal> {
+        if frames == 0 || self.configuration.frame_period_us == 0 {
+            return Err(Refusal::Baseline);
+        }
+        let is_repeated = |capture: Capture| (capture.number, capture.frames) == (number, frames);
+        if self.capture.is_some_and(is_repeated) {
+            return Ok(()); // the answer takes a while
+        }
+        self.restart_baseline(link);
+        self.capture = Some(Capture { number, frames, left: frames });
+        Ok(())
+    }
+
+    /// Adds the last frame to the baseline that is being captured. Returns the number of the request that waits for it
+    /// once it is complete.
+    pub fn feed_baseline(&mut self) -> Option<u16> {
+        let capture = self.capture.as_mut()?;
+        self.baseline.add(self.frame);
+        capture.left = capture.left.saturating_sub(1);
+        let (number, left) = (capture.number, capture.left);
+        if left > 0 {
+            return None;
+        }
+        self.capture = None;
+        Some(number)
+    }
+
+    /// Takes the last frame for the baseline.
+    pub fn take_baseline<P: Platform>(&mut self, link: &mut Link<'_, P>) {
+        self.restart_baseline(link);
+        self.baseline.add(self.frame);
+    }
+
+    /// Forgets the baseline, and refuses the request that waits for one.
+    fn restart_baseline<P: Platform>(&mut self, link: &mut Link<'_, P>) {
+        self.give_up_capture(link);
+        self.baseline.restart(self.wires.readings());
+    }
+
+    /// Refuses the request that waits for a baseline, if there is one: no baseline will come.
+    fn give_up_capture<P: Platform>(&mut self, link: &mut Link<'_, P>) {
+        if let Some(Capture { number, .. }) = self.capture.take() {
+            self.baseline.restart(self.wires.readings());
+            link.send(number, &Report::Refused(Refusal::Baseline));
+        }
+    }
+}
