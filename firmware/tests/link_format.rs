@@ -78,8 +78,11 @@ fn requests() -> Vec<Example> {
         ),
         ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
         ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
-        ("try", upload(UploadStep::Try { seal: None })),
-        ("try, sealed as version 300", upload(UploadStep::Try { seal: Some(SEAL) })),
+        ("try", upload(UploadStep::Try { seal: None, lease_ms: 60_000 })),
+        (
+            "try, sealed as version 300",
+            upload(UploadStep::Try { seal: Some(SEAL), lease_ms: 60_000 }),
+        ),
         ("abort", upload(UploadStep::Abort)),
         ("confirm", upload(UploadStep::Confirm)),
         ("restart", request_bytes(7, &Request::Restart)),
@@ -204,6 +207,10 @@ fn reports() -> Vec<Example> {
             "confirmed",
             report_bytes(6, &Report::Upload(UploadState::Confirmed { crc_32: 0x1234_5678 })),
         ),
+        (
+            "trial over",
+            report_bytes(0, &Report::Upload(UploadState::TrialOver { crc_32: 0x1234_5678 })),
+        ),
         ("refused: nothing to undo", refused(Refusal::NothingToUndo)),
         ("provisioned", report_bytes(7, &Report::Provisioned)),
         ("restarting", report_bytes(7, &Report::Restarting)),
@@ -251,6 +258,7 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::NothingToUndo, 14),
         (Refusal::OnTrial, 15),
         (Refusal::Seal(SealFault::Missing), 16),
+        (Refusal::TrialOver, 17),
     ];
     for (refusal, number) in refusals {
         let mut buffer = [0; 16];

@@ -1,7 +1,8 @@
 //! A new model is on trial until it is confirmed: until then every restart brings the previous one back.
 
 use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{ModelIdentity, Refusal, UploadState, UploadStep};
+use firmware::link::message::{ModelIdentity, Refusal, Report, Request, UploadState, UploadStep};
+use firmware::link::packet::UNASKED;
 use mock_board::*;
 
 const CHUNK: usize = 60;
@@ -42,7 +43,11 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
 fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let (mut slots, mut bench) = on_trial(&old, &new);
-    let confirm = [UploadStep::Try { seal: None }, UploadStep::Confirm, UploadStep::Confirm];
+    let confirm = [
+        UploadStep::Try { seal: None, lease_ms: 60_000 },
+        UploadStep::Confirm,
+        UploadStep::Confirm,
+    ];
     let state = upload(&mut bench, &mut slots, &mut [], &confirm);
     assert_eq!(state, confirmed(&new));
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -125,7 +130,7 @@ fn on_trial_nothing_overwrites_the_previous_model() {
     assert_eq!(refused, Err(Refusal::OnTrial));
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    // Silence ends no trial.
+    // A trial outlasts an upload's time of silence.
     board.pins.borrow_mut().now_us += 20_000_000;
     session.step();
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
@@ -148,4 +153,49 @@ fn a_model_that_decays_on_trial_is_left() {
         let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
         assert_eq!(refused, Err(Refusal::NoUpload));
     }
+}
+
+#[test]
+fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    let (mut slots, mut bench) = on_trial(&old, &new);
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let pass = |session: &mut Running<'_, '_>, us| {
+        board.pins.borrow_mut().now_us += us;
+        board.pins.borrow_mut().to_host.clear();
+        session.step()
+    };
+    assert_eq!(pass(&mut session, 59_000_000), None);
+    // The host may let it last longer, and asking alone does not.
+    let again = Request::Upload(UploadStep::Try { seal: None, lease_ms: 120_000 });
+    ask(&mut session, &board, &again, |_| ());
+    assert_eq!(pass(&mut session, 119_000_000), None);
+    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
+    assert_eq!(pass(&mut session, 1_000_000), Some(SessionEnd::NewModel));
+    let said = reports(&board.pins.borrow().to_host);
+    let over = UploadState::TrialOver { crc_32: crc_of(&new) };
+    assert_eq!(said, [(UNASKED, format!("{:?}", Report::Upload(over)))]);
+    let _ = session;
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&old)));
+    let _ = session;
+    let late = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+    assert_eq!(late, Err(Refusal::TrialOver));
+    let state = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
+    assert_eq!(state, confirmed(&new));
+}
+
+#[test]
+fn a_trial_lasts_half_an_hour_at_most() {
+    let (old, new) = (blob(1, 3), blob(2, 5));
+    let (mut slots, mut bench) = on_trial(&old, &new);
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let again = Request::Upload(UploadStep::Try { seal: None, lease_ms: u32::MAX });
+    ask(&mut session, &board, &again, |_| ());
+    board.pins.borrow_mut().now_us += 1_799_000_000;
+    assert_eq!(session.step(), None);
+    board.pins.borrow_mut().now_us += 1_000_000;
+    assert_eq!(session.step(), Some(SessionEnd::NewModel));
 }

@@ -313,7 +313,7 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     let mut one = |step: &UploadStep<'_>| upload(&mut session, &board, &[*step]).0;
 
     assert_eq!(one(&steps[1]), Err(Refusal::NoUpload));
-    assert_eq!(one(&UploadStep::Try { seal: None }), Err(Refusal::NoUpload));
+    assert_eq!(one(&UploadStep::Try { seal: None, lease_ms: 60_000 }), Err(Refusal::NoUpload));
     assert_eq!(one(&UploadStep::Confirm), Err(Refusal::NoUpload));
     let slot_bytes = Flash::SLOT_BYTES as u32 - 16;
     let mut too_long = new.clone();
@@ -326,7 +326,10 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     for _ in 0..2 {
         assert_eq!(one(&steps[1]), Ok(UploadState::Receiving { received })); // doubled
     }
-    assert_eq!(one(&UploadStep::Try { seal: None }), Err(Refusal::OutOfPlace { received }));
+    assert_eq!(
+        one(&UploadStep::Try { seal: None, lease_ms: 60_000 }),
+        Err(Refusal::OutOfPlace { received })
+    );
     assert_eq!(one(&UploadStep::Confirm), Err(Refusal::NoUpload));
     for bytes in [&[1; 3][..], &[1; 100]] {
         let chunk = UploadStep::Chunk { offset: received, bytes };
@@ -339,5 +342,5 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
         one(step).unwrap();
     }
     let on_trial = UploadState::OnTrial { crc_32: crc_of(&new) };
-    assert_eq!(one(&UploadStep::Try { seal: None }), Ok(on_trial)); // the answer was lost
+    assert_eq!(one(&UploadStep::Try { seal: None, lease_ms: 60_000 }), Ok(on_trial)); // the answer was lost
 }

@@ -134,7 +134,7 @@ impl Device {
 pub fn trial_steps(blob: &[u8], seal: Option<Seal>) -> Vec<UploadStep<'_>> {
     let mut steps = upload_steps(blob, CHUNK);
     steps.pop();
-    steps.push(UploadStep::Try { seal });
+    steps.push(UploadStep::Try { seal, lease_ms: 60_000 });
     steps
 }
 

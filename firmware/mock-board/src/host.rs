@@ -125,7 +125,7 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
             .enumerate()
             .map(|(i, bytes)| UploadStep::Chunk { offset: (i * chunk) as u32, bytes }),
     );
-    steps.push(UploadStep::Try { seal: None });
+    steps.push(UploadStep::Try { seal: None, lease_ms: 60_000 });
     steps
 }
 

@@ -4,7 +4,7 @@
 const UPLOAD_US: u32 = 10_000_000;
 
 /// Longest lease in ms, by far less than the clock's turn.
-const MOST_MS: u32 = 1_800_000;
+pub const MOST_LEASE_MS: u32 = 1_800_000;
 
 /// When the host was heard last, and how long the configuration in force outlasts its silence. Times are those of a
 /// clock in µs that wraps around to 0.
@@ -26,7 +26,7 @@ impl Lease {
 
     /// Starts a lease of `length_ms`, but at most half an hour; 0 ends it.
     pub fn set(&mut self, length_ms: u32) {
-        self.length_us = 1000 * length_ms.min(MOST_MS);
+        self.length_us = 1000 * length_ms.min(MOST_LEASE_MS);
     }
 
     /// Time in ms until the lease ends, rounded up; 0 without one.

@@ -7,6 +7,7 @@ use super::session_end::SessionEnd;
 use super::trial::Trial;
 use crate::capacity::Capacity;
 use crate::link::message::{KeyState, ModelFault, Refusal, Report, UploadState, UploadStep};
+use crate::link::packet::UNASKED;
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::seal::Key;
@@ -76,9 +77,10 @@ impl Models {
                 self.upload.abort();
                 Ok(())
             }
-            UploadStep::Try { seal } => {
+            UploadStep::Try { seal, lease_ms } => {
+                self.trial.lease(link.now_us(), lease_ms);
                 if self.trial.is_going_on() {
-                    return Ok(()); // the host repeats the request, because the answer was lost
+                    return Ok(()); // the answer was lost, or the trial is to last longer
                 }
                 let blob = self.upload.complete(spare)?;
                 let checked = model::check(self.capacity, blob).map_err(Refusal::BadModel);
@@ -103,6 +105,7 @@ impl Models {
             // Nothing is on trial. The answer was lost, if it was confirmed.
             UploadStep::Confirm => match self.upload.state() {
                 UploadState::Confirmed { .. } => Ok(()),
+                UploadState::TrialOver { .. } => Err(Refusal::TrialOver),
                 _ => Err(Refusal::NoUpload),
             },
         }
@@ -139,6 +142,17 @@ impl Models {
             self.trial = Trial::default();
         }
         ended
+    }
+
+    /// Ends a trial whose time is over, and says so. Another session must begin then.
+    pub fn end_late_trial<P: Platform>(&mut self, link: &mut Link<'_, P>) -> Option<SessionEnd> {
+        if !self.trial.is_over(link.now_us()) {
+            return None;
+        }
+        self.end_trial();
+        self.upload.end_late_trial();
+        link.send(UNASKED, &Report::Upload(self.upload.state()));
+        Some(SessionEnd::NewModel)
     }
 
     /// Ends the trial unless its model `is_in_force`: it was found damaged.

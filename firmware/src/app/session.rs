@@ -84,8 +84,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
     /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
     pub fn step(&mut self) -> Option<SessionEnd> {
         self.app.core.link.begin_turn();
-        let end = self.serve_link();
-        self.app.core.end_leases();
+        let end = self.serve_link().or_else(|| self.app.core.end_leases());
         self.app.core.scan_if_due(self.model.decoder.as_ref());
         self.app.core.feed_watchdog();
         end.or_else(|| self.recheck())
@@ -173,7 +172,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 
     /// Ends what a host has begun and not gone on with.
-    fn end_leases(&mut self) {
+    fn end_leases(&mut self) -> Option<SessionEnd> {
         let Self { sensor, models, link, .. } = self;
         let now_us = link.now_us() as u32;
         if link.lease.has_ended(now_us) {
@@ -183,6 +182,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if link.lease.has_upload_ended(now_us) && models.upload.is_receiving() {
             models.upload.abort();
         }
+        models.end_late_trial(link)
     }
 
     /// Feeds the watchdog, unless the last scan gave no reading at all. A sensor that stays silent thus leads to a

@@ -114,6 +114,9 @@ pub enum UploadStep<'a> {
     Try {
         /// The blob's seal, for a device with a key.
         seal: Option<Seal>,
+        /// Time in ms, at most half an hour, after which the previous model comes back unless the trial is confirmed.
+        /// The same step again lets it last so long from then on.
+        lease_ms: u32,
     },
     /// Abort the upload, and forget the bytes received. A model on trial is left for the previous one.
     Abort,
@@ -493,6 +496,11 @@ pub enum UploadState {
         /// CRC-32 of the blob.
         crc_32: u32,
     },
+    /// The blob was on trial and was not confirmed in time: the previous model is in force again. Reported unasked.
+    TrialOver {
+        /// CRC-32 of the blob.
+        crc_32: u32,
+    },
 }
 
 /// Why a request was not carried out.
@@ -545,6 +553,8 @@ pub enum Refusal {
     OnTrial,
     /// The device's key forbids it.
     Seal(SealFault),
+    /// The model was not confirmed in time: the previous one is in force again.
+    TrialOver,
 }
 
 /// What the device's key has against a request.

@@ -152,6 +152,13 @@ impl Upload {
         self.state = UploadState::OnTrial { crc_32 };
     }
 
+    /// Notes that the trial was not confirmed in time.
+    pub fn end_late_trial(&mut self) {
+        if let UploadState::OnTrial { crc_32 } = self.state {
+            self.state = UploadState::TrialOver { crc_32 };
+        }
+    }
+
     /// Commits the blob in `slot`, which must have been found sound: writes the pair of records that makes it the most
     /// recent.
     ///

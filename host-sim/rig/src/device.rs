@@ -403,7 +403,7 @@ mod tests {
             (vec![0x55; 40], "bytes come from it that are no packets: check the speed"),
             (
                 packet(&[version + 1, 0, 3]),
-                "it speaks version 8 of the link, and this program version 7",
+                "it speaks version 9 of the link, and this program version 8",
             ),
             (framed(), "it sends reports, but no answer in time"),
             (packet(&[version, 0, 120]), "messages that this program does not know"),

@@ -176,6 +176,9 @@ fn why(refusal: Refusal) -> String {
         }
         Refusal::Seal(fault) => why_not_trusted(fault),
         Refusal::OnTrial => "its model is on trial; `confirm` or `undo` it first".into(),
+        Refusal::TrialOver => {
+            "the model was not confirmed in time, and the previous one is active again; upload it once more".into()
+        }
     }
 }
 

@@ -124,9 +124,17 @@ impl Arguments {
 struct UploadArguments {
     /// Weight blob.
     model: PathBuf,
-    /// Leave the model on trial, until `confirm` or the next restart, which returns to the previous one.
-    #[arg(long)]
-    trial: bool,
+    /// Leave the model on trial, until `confirm`. Without that, the previous one comes back after so many minutes, or at
+    /// the next restart.
+    #[arg(
+        long,
+        value_name = "MINUTES",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "10",
+        value_parser = clap::value_parser!(u32).range(1..=30)
+    )]
+    trial: Option<u32>,
     #[command(flatten)]
     sealing: SealingArguments,
 }
@@ -198,8 +206,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let before = device.identify()?;
             let after = activate(&mut device, &model, sealing.as_ref())?;
             note_another_sensor(&before, &after);
-            if !action.trial {
-                upload::confirm(&mut device)?;
+            match action.trial {
+                Some(minutes) => upload::prolong_trial(&mut device, minutes)?,
+                None => drop(upload::confirm(&mut device)?),
             }
             status::show(&mut device, common)
         }

@@ -14,6 +14,9 @@ use crate::error::{Error, Result};
 /// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
 const ERASE: Duration = Duration::from_secs(6);
 
+/// Time in ms that a trial lasts unless it is confirmed: longer than [`see_frames`] takes.
+const TRIAL_MS: u32 = 60_000;
+
 /// Longest time between scans that is waited for.
 const SLOWEST_SCANS: Duration = Duration::from_secs(5);
 /// Reading in Ω that no configuration is likely to find faulty.
@@ -70,7 +73,11 @@ pub fn send<W: Wire>(
         answer = step(device, UploadStep::Chunk { offset, bytes })?;
         progress.step();
     }
-    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Try { seal }) }
+    if answer.is_err() {
+        Ok(answer)
+    } else {
+        step(device, UploadStep::Try { seal, lease_ms: TRIAL_MS })
+    }
 }
 
 /// Uploads `blob` and makes it the active model, on trial, and checks that the device decodes with it. Until
@@ -161,6 +168,15 @@ pub fn see_frames<W: Wire>(device: &mut Device<W>) -> Result<()> {
         }
         Ok(())
     })
+}
+
+/// Lets the trial that is going on last for so many `minutes` from now on.
+pub fn prolong_trial<W: Wire>(device: &mut Device<W>, minutes: u32) -> Result<()> {
+    let again = UploadStep::Try { seal: None, lease_ms: 60_000 * minutes };
+    match step(device, again)?.map_err(Error::Refused)? {
+        UploadState::OnTrial { .. } => Ok(()),
+        other => Err(unexpected("a longer trial", other)),
+    }
 }
 
 /// Confirms the model on trial, so that it stays active over restarts.
