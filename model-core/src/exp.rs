@@ -20,10 +20,11 @@ pub trait ExpKernel: Copy + Default {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Libm;
 
-/// `micromath`'s exponential: relative error up to 2.4e-3 on [−30, 0], and not even faster on a Cortex-M4F.
+/// `micromath`'s exponential, a feature of its name: relative error up to 2.4e-3 on [−30, 0], and not even faster on a Cortex-M4F.
 ///
 /// It is here so that users can compare it. Below −80 it is wrong by orders of magnitude, so such arguments
 /// give 0.
+#[cfg(feature = "micromath")]
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Micromath;
 
@@ -44,6 +45,7 @@ impl ExpKernel for Libm {
     }
 }
 
+#[cfg(feature = "micromath")]
 impl ExpKernel for Micromath {
     const NAME: &'static str = "micromath";
     #[inline]

@@ -22,6 +22,7 @@ compile_error!("the weight blob holds little-endian floats that are borrowed in 
 // From the ground up: a module imports only what is declared before it.
 
 pub mod exp;
+pub mod feature;
 pub mod scale;
 pub mod relative;
 pub mod checksum;
@@ -38,6 +39,7 @@ pub mod confidence;
 pub mod fill;
 pub mod blob;
 mod decoder;
+#[cfg(feature = "f32-direct")]
 mod fixed;
 
 pub use blob::Aligned;
@@ -47,6 +49,7 @@ pub use blob::AlignedBytes;
 pub use decoder::OwnedEstimate;
 pub use decoder::{Decoder, Frame, decoder_ram_bytes, scratch_floats};
 pub use estimate::{Estimate, RowStatus};
+#[cfg(feature = "f32-direct")]
 pub use fixed::Fixed;
 pub use frame::{ColumnWire, RowWire, Wires};
 pub use gate::Gate;

@@ -1,7 +1,9 @@
 //! Building and linting the firmware for its target, and proving that it cannot panic.
 
+use std::fs;
+
 use crate::process::{Outcome, Watched, run as run_command, watch};
-use crate::toolchain::Toolchain;
+use crate::toolchain::{Toolchain, elf};
 
 /// Function that the link check's panic handler calls, and that is defined nowhere.
 const SYMBOL: &str = "taxel_reachable_panic";
@@ -23,6 +25,13 @@ pub const BENCH: Packages =
 /// The board's image.
 pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 
+/// Features of the board's image. All are on unless it is built with others.
+pub const FEATURES: [&str; 7] =
+    ["confidence", "f32", "f32-direct", "fill", "fixed16", "micromath", "settings"];
+
+/// Name of the board's image with `fixed16` alone.
+pub const NUCLEO_FIXED16: &str = "nucleo-f446re-fixed16";
+
 /// Libraries of the images, and the link check.
 const LIBRARIES: Packages =
     &["--package", "model-core", "--package", "firmware", "--package", "link-check"];
@@ -41,6 +50,18 @@ pub fn run() -> Outcome {
 /// Builds an image.
 pub fn build_image(toolchain: &Toolchain, packages: Packages) -> Outcome {
     run_command(toolchain.build().args(PROFILE).args(packages))
+}
+
+/// Builds the board's image with these `features` alone, under a `name` of its own. The image of the usual name must be
+/// built again afterwards.
+pub fn build_variant(toolchain: &Toolchain, features: &[&str], name: &str) -> Outcome {
+    let features = features.join(",");
+    let mut command = toolchain.build();
+    command.args(PROFILE).args(NUCLEO).args(["--no-default-features", "--features", &features]);
+    run_command(&mut command)?;
+    let [built, kept] = [NUCLEO[1], name].map(elf);
+    fs::copy(&built, &kept).map_err(|cause| format!("{}: {cause}", kept.display()))?;
+    Ok(())
 }
 
 fn lint(toolchain: &Toolchain, packages: Packages) -> Outcome {

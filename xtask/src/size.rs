@@ -1,13 +1,14 @@
-//! Flash and RAM of the images, compared with a budget.
+//! Flash and RAM of the images and of their features, compared with a budget.
 
 mod budget;
 
 use std::fs;
 use std::path::Path;
 
+use budget::Budget;
 use object::{Object, ObjectSection, ObjectSymbol};
 
-use crate::firmware::{NUCLEO, QEMU, build_image};
+use crate::firmware::{FEATURES, NUCLEO, NUCLEO_FIXED16, QEMU, build_image, build_variant};
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
 
@@ -45,11 +46,16 @@ pub fn run() -> Outcome {
     let text = fs::read_to_string(&path).map_err(|cause| format!("{BUDGET}: {cause}"))?;
     let budget = budget::parse(&text).map_err(|cause| format!("{BUDGET}: {cause}"))?;
     let toolchain = Toolchain::find()?;
+    let parts = FEATURES.map(|feature| Part::new(&budget, feature)).into_iter();
+    let parts: Vec<_> = parts.collect::<Outcome<_>>()?;
     build_image(&toolchain, QEMU)?;
+    build_variant(&toolchain, &["fixed16"], NUCLEO_FIXED16)?;
+    let without = parts.iter().map(|part| part.build_without(&toolchain));
+    let without: Vec<_> = without.collect::<Outcome<_>>()?;
     build_image(&toolchain, NUCLEO)?;
 
     println!(
-        "{:14} {:>6} {:>6} {:>6} {:>5} {:>6} {:>6} {:>7} | {:>6} of {:>6} {:>6} | {:>5} of {:>5} {:>6} | {:>5}",
+        "{:21} {:>6} {:>6} {:>6} {:>5} {:>6} {:>6} {:>7} | {:>6} of {:>6} {:>6} | {:>5} of {:>5} {:>6} | {:>5}",
         "image",
         "vector",
         "text",
@@ -67,18 +73,55 @@ pub fn run() -> Outcome {
         "stack"
     );
     let mut exceeded = Vec::new();
-    for image in &budget {
+    for image in budget.iter().filter(|budget| !budget.name.starts_with(PRICE)) {
         let size = measure(&elf(image.name))?;
         print_line(image, &size);
         exceeded.extend(image.exceeded_by(size.flash(), size.ram()));
     }
+    println!(
+        "\n{:21} {:>6} of {:>6} | {:>5} of {:>5}",
+        "feature", "flash", "budget", "RAM", "bud."
+    );
+    let whole = measure(&elf(NUCLEO[1]))?;
+    for (part, without) in parts.iter().zip(&without) {
+        let [flash, ram] =
+            [Size::flash, Size::ram].map(|of| of(&whole).saturating_sub(of(without)));
+        let Budget { flash: most_flash, ram: most_ram, .. } = part.budget;
+        println!("{:21} {flash:6} of {most_flash:6} | {ram:5} of {most_ram:5}", part.feature);
+        exceeded.extend(part.budget.exceeded_by(flash, ram));
+    }
     if exceeded.is_empty() { Ok(()) } else { Err(format!("{BUDGET}: {}", exceeded.join("; "))) }
 }
 
-fn print_line(image: &budget::Budget<'_>, size: &Size) {
+/// First letters of a feature's price among the budgets.
+const PRICE: &str = "feature:";
+
+/// A feature of the board's image, whose price is what the image takes less without it.
+struct Part<'a> {
+    feature: &'static str,
+    budget: Budget<'a>,
+}
+
+impl<'a> Part<'a> {
+    fn new(budgets: &[Budget<'a>], feature: &'static str) -> Outcome<Self> {
+        let price = |budget: &&Budget<'_>| budget.name.strip_prefix(PRICE) == Some(feature);
+        let budget = *budgets.iter().find(price).ok_or(format!("no price of {feature}"))?;
+        Ok(Self { feature, budget })
+    }
+
+    fn build_without(&self, toolchain: &Toolchain) -> Outcome<Size> {
+        let others: Vec<_> =
+            FEATURES.into_iter().filter(|feature| *feature != self.feature).collect();
+        let name = format!("nucleo-f446re-without-{}", self.feature);
+        build_variant(toolchain, &others, &name)?;
+        measure(&elf(&name))
+    }
+}
+
+fn print_line(image: &Budget<'_>, size: &Size) {
     let left = |budget: u64, taken: u64| i128::from(budget) - i128::from(taken);
     println!(
-        "{:14} {:6} {:6} {:6} {:5} {:6} {:6} {:7} | {:6} of {:6} {:6} | {:5} of {:5} {:6} | {:5}",
+        "{:21} {:6} {:6} {:6} {:5} {:6} {:6} {:7} | {:6} of {:6} {:6} | {:5} of {:5} {:6} | {:5}",
         image.name,
         size.vector_table,
         size.text,

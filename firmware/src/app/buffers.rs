@@ -23,7 +23,10 @@ pub struct Buffers<
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     pub(super) rest: Outcome<ROWS, OUTPUTS>,
     /// Standard deviations of the outputs.
+    #[cfg(feature = "confidence")]
     pub(super) deviations: [[f32; OUTPUTS]; ROWS],
+    #[cfg(not(feature = "confidence"))]
+    pub(super) deviations: [[f32; OUTPUTS]; 0],
 }
 
 /// Outputs of all rows, and their status.
@@ -69,7 +72,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
             rest: Outcome::NOTHING,
-            deviations: [[0.0; OUTPUTS]; ROWS],
+            deviations: [[0.0; OUTPUTS]; _],
         }
     }
 

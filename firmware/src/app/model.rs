@@ -2,6 +2,7 @@
 
 use model_core::blob::{Columns, DecodeError, Model};
 use model_core::checksum::CRC_32;
+use model_core::rbf::NetworkError;
 use model_core::{Decoder, RowWire, scratch_floats};
 
 use crate::capacity::Capacity;
@@ -178,6 +179,11 @@ fn fault(error: &DecodeError) -> ModelFault {
         DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. } => ModelFault::Length,
         DecodeError::Corrupt { .. } => ModelFault::Corrupt,
         DecodeError::TooManyRows { .. } => ModelFault::Shape,
+        DecodeError::Network { cause: NetworkError::NotBuilt { feature }, .. }
+        | DecodeError::Confidence { cause: NetworkError::NotBuilt { feature } }
+        | DecodeError::Fill { cause: NetworkError::NotBuilt { feature } } => {
+            ModelFault::NotBuilt(*feature)
+        }
         _ => ModelFault::Invalid,
     }
 }

@@ -4,6 +4,7 @@
 //! [`PROTOCOL_VERSION`](super::packet::PROTOCOL_VERSION).
 
 use model_core::blob::Floats;
+use model_core::feature::Feature;
 use serde::{Deserialize, Serialize};
 
 use crate::circuit::{Constants, ConstantsFault};
@@ -618,6 +619,8 @@ pub enum ModelFault {
     Invalid,
     /// The device has no room for a model of this shape.
     Shape,
+    /// The device's image was built without a part that the model needs.
+    NotBuilt(Feature),
 }
 
 #[cfg(test)]

@@ -148,6 +148,11 @@ fn why(refusal: Refusal) -> String {
         Refusal::NoUpload => "no upload has begun, or no model is on trial".into(),
         Refusal::OutOfPlace { received } => format!("it has {received} bytes of the upload so far"),
         Refusal::BadModel(ModelFault::Shape) => "it has no room for a model of this shape".into(),
+        Refusal::BadModel(ModelFault::NotBuilt(feature)) => format!(
+            "its image is built without the feature `{}`, which the model needs: flash an image with it, or train \
+             without it (another --format, or no --confidence or --fill)",
+            feature.name()
+        ),
         Refusal::BadModel(fault) => {
             format!("the model is faulty ({fault:?}); `inspect` shows more")
         }

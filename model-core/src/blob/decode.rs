@@ -186,7 +186,7 @@ impl<'a> Model<'a> {
         let [directions, components] = self.confidence_sizes.map(usize::from);
         let (readings, outputs) = (rows.wrapping_mul(inputs), rows.wrapping_mul(outputs));
         let sizes = Sizes { readings, directions, components, outputs };
-        self.confidence.map(|block| Confidence::of_checked(sizes, block))
+        self.confidence.and_then(|block| Confidence::of_checked(sizes, block))
     }
 
     /// What fills missing readings from the others; `None` if a missing reading stays missing.

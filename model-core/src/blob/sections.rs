@@ -143,5 +143,6 @@ pub(super) fn cut_fill(
     let (readings, factors) = (shape.rows.saturating_mul(shape.inputs), header.factors.into());
     let floats = fill::block_floats(readings, factors);
     let (block, rest) = take_floats(rest, SECTION, "bytes of fill", floats)?;
-    Ok((Some(Fill::of_checked(readings, factors, block)), rest))
+    let fill = Fill::of_checked(readings, factors, block);
+    Ok((Some(fill.map_err(|cause| DecodeError::Fill { cause })?), rest))
 }

@@ -7,6 +7,7 @@ use super::parameters::{
     Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans, magnitudes,
 };
 use crate::cortex_m4::{INPUTS, OUTPUTS};
+use crate::feature::{F32DirectBuilt, Feature};
 use crate::scale::scale_and_tell;
 
 /// The parameters of one network, borrowed from where they lie.
@@ -43,6 +44,7 @@ impl Parameters<'_> {
 pub struct Network<'a> {
     shape: Shape,
     parameters: Parameters<'a>,
+    proof: F32DirectBuilt,
 }
 
 impl<'a> Network<'a> {
@@ -94,12 +96,14 @@ impl<'a> Network<'a> {
         if !p.affine.is_empty() {
             check_length("affine", p.affine, inputs * outputs)?;
         }
-        Ok(Self { shape, parameters })
+        let proof = NetworkError::proof(Feature::F32Direct)?;
+        Ok(Self { shape, parameters, proof })
     }
 
     /// Makes a network of parameters whose lengths their types ensure; no value is checked.
+    #[cfg(feature = "f32-direct")]
     pub(crate) const fn of_arrays(shape: Shape, parameters: Parameters<'a>) -> Self {
-        Self { shape, parameters }
+        Self { shape, parameters, proof: crate::feature::Yes }
     }
 
     pub(crate) fn check_values(&self) -> Result<(), NetworkError> {

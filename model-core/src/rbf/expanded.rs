@@ -22,6 +22,7 @@ use super::parameters::{
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::{self, Inputs};
 use crate::exp::exp2;
+use crate::feature::{F32Built, Feature};
 use crate::scale::{HALF_RANGE, UNITS, clamp_units};
 
 /// Number of centres in a group: K is rounded up to a multiple of it in the block.
@@ -71,6 +72,8 @@ pub type Network<'a> = packed::Network<'a, Expanded>;
 
 impl Layout for Expanded {
     const BATCH: usize = 128;
+    const FEATURE: Feature = Feature::F32;
+    type Proof = F32Built;
 
     type Parameters<'a> = Parameters<'a>;
 

@@ -25,6 +25,7 @@ use super::parameters::{
 };
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::{self, Inputs};
+use crate::feature::{Feature, Fixed16Built};
 use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 
 /// Number of centres in a group: K is rounded up to a multiple of it in the block.
@@ -90,6 +91,8 @@ pub type Network<'a> = packed::Network<'a, Fixed16>;
 
 impl Layout for Fixed16 {
     const BATCH: usize = 256;
+    const FEATURE: Feature = Feature::Fixed16;
+    type Proof = Fixed16Built;
 
     type Parameters<'a> = Parameters<'a>;
 

@@ -9,17 +9,22 @@
 )]
 
 use core::fmt::Debug;
-use core::marker::PhantomData;
 
 use super::parameters::{NetworkError, Shape, check_length};
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::Inputs;
 use crate::cortex_m4::{Block, INPUTS, OUTPUTS};
+use crate::feature::{Built, Feature};
 
 /// A number format whose networks are one block of words.
 pub trait Layout: Copy + Debug + PartialEq {
     /// Most centres of a batch of the assembly routine.
     const BATCH: usize;
+
+    /// The part of decoding that the format is, and the proof that it is built.
+    const FEATURE: Feature;
+    /// The proof.
+    type Proof: Built;
 
     /// Parameters of a network, cut from its block.
     type Parameters<'a>;
@@ -72,9 +77,9 @@ pub trait Layout: Copy + Debug + PartialEq {
 /// A network whose parameters are one borrowed block of words, checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)] // the shape first, so that it is at the same place in a network of any format
-pub struct Network<'a, L> {
+pub struct Network<'a, L: Layout> {
     block: Block<'a>,
-    layout: PhantomData<L>,
+    proof: L::Proof,
 }
 
 impl<'a, L: Layout> Network<'a, L> {
@@ -101,11 +106,12 @@ impl<'a, L: Layout> Network<'a, L> {
         if shape.inputs == 0 || shape.centres == 0 || shape.outputs == 0 {
             return Err(NetworkError::Empty);
         }
+        let proof = NetworkError::proof(L::FEATURE)?;
         L::check_shape(shape)?;
         check_length("block", block, Self::block_words(shape, affine))?;
         let Shape { inputs, centres, outputs } = shape;
         let block = Block::new([inputs, centres, outputs], affine, block, L::BATCH);
-        Ok(Self { block, layout: PhantomData })
+        Ok(Self { block, proof })
     }
 
     /// Number of words in the block of a network of this shape, with an affine tail or without.

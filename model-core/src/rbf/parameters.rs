@@ -1,5 +1,6 @@
 //! Parts shared by all formats: the shape of a network, its errors, and cutting arrays from a block.
 
+use crate::feature::{Built, Feature};
 use crate::scale::{HALF_RANGE, UNITS, saturates};
 
 /// Numbers of inputs, centres and outputs of one network.
@@ -67,6 +68,23 @@ pub enum NetworkError {
         /// Number of inputs found.
         found: usize,
     },
+    /// The program was built without this part of decoding.
+    #[error("this program is built without the feature `{}`", feature.name())]
+    NotBuilt {
+        /// What is missing.
+        feature: Feature,
+    },
+}
+
+impl NetworkError {
+    /// The proof that `feature` is built.
+    ///
+    /// # Errors
+    /// [`NotBuilt`](Self::NotBuilt).
+    #[inline(always)]
+    pub(crate) fn proof<B: Built>(feature: Feature) -> Result<B, Self> {
+        B::PROOF.ok_or(Self::NotBuilt { feature })
+    }
 }
 
 /// Cuts arrays of four-byte words from the front of a network's block.
