@@ -11,11 +11,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::emulate::qemu::decoded;
-use crate::firmware::{NUCLEO, build_image};
+use crate::images::{NUCLEO, build_image};
 use crate::process::{Outcome, Said};
 use crate::toolchain::{Toolchain, elf};
 use copy::Copy;
-use emulator::Emulator;
+pub use emulator::Emulator;
 
 /// What to run.
 #[derive(clap::Args)]
@@ -35,6 +35,11 @@ pub struct Options {
 }
 
 impl Options {
+    /// No names, and a small model.
+    pub fn plain() -> Self {
+        Self { mutants: false, frames: NonZeroU32::MIN, model: None, names: Vec::new() }
+    }
+
     /// A name that no mutant has, if mutants are to run. A list that is wrong is for [`run`] to tell.
     pub fn unknown(&self) -> Option<&String> {
         let mutants = self.mutants.then(|| mutants::load(&[]).ok()).flatten()?;

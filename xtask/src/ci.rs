@@ -78,6 +78,7 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
         vec![
             own("emulate", &["emulate"]),
             own("board", &["board"]),
+            own("accept", &["accept", "--emulated"]),
             own("mutants", &[&["board", "--mutants"], &MUTANTS[..]].concat()),
             own("torture", &["torture", "--short"]),
         ],

@@ -1,6 +1,6 @@
 //! Building the libraries for cores besides the images' own.
 
-use crate::firmware::PROFILE;
+use crate::images::PROFILE;
 use crate::process::{Outcome, run as run_command};
 use crate::toolchain::{TARGET, Toolchain};
 

@@ -5,7 +5,7 @@
 //! assembly) if it ends with `-portable`. `docs/cycles.md` explains all this, and has the accepted figures.
 
 mod designs;
-mod models;
+pub mod models;
 
 mod flash;
 mod instruction;
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use crate::emulate::qemu;
-use crate::firmware::{BENCH, build_image};
+use crate::images::{BENCH, build_image};
 use crate::process::{Outcome, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
 use figures::{Accepted, Figure};
@@ -118,7 +118,7 @@ pub fn run(options: &Options) -> Outcome {
 /// Measures the models whose cost is accepted: those of a `kernel`, or all. Figures come sorted by kernel, in the order
 /// of their first appearance, and then by K.
 fn measure(image: &Image, directory: &Path, kernel: Option<&str>) -> Outcome<Vec<Figure>> {
-    let models = models::train(directory)?;
+    let models = models::train(directory, |_| true)?;
     // Images are measured on all cores at once, since QEMU runs an image on one.
     let figures = models.par_iter().map(|model| {
         let measured = image.run(&model.path)?;

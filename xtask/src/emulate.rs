@@ -8,7 +8,7 @@ pub mod qemu;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::firmware::{QEMU, build_image};
+use crate::images::{QEMU, build_image};
 use crate::process::{Outcome, Said, root};
 use crate::queue;
 use crate::toolchain::{Toolchain, elf};

@@ -7,7 +7,7 @@ mod toolchain;
 mod queue;
 mod copy;
 
-mod firmware;
+mod images;
 mod cores;
 mod size;
 
@@ -16,6 +16,8 @@ mod emulate;
 mod board;
 
 mod cycles;
+
+mod accept;
 
 mod torture;
 
@@ -62,6 +64,9 @@ enum Command {
     /// Run the board's image on an emulated STM32F446 (proof/board-emulator). The name `serve` lets it run until Ctrl-C,
     /// at a serial port that it names.
     Board(board::Options),
+    /// Flash a board, let it test itself, and write what it does beside what is predicted to one JSON file. docs/board.md
+    /// tells what it takes.
+    Accept(accept::Options),
     /// Print a log that `host-sim emulate --log FILE` saved.
     Log {
         log: String,
@@ -123,10 +128,11 @@ fn main() -> ExitCode {
         Command::Ci => ci::run().map(success),
         Command::Structure => structure::run().map(success),
         Command::Lines => lines::run().map(success),
-        Command::Firmware => firmware::run().map(success),
+        Command::Firmware => images::run().map(success),
         Command::Cores => cores::run().map(success),
         Command::Emulate(options) => emulate::run(&options).map(success),
         Command::Board(options) => board::run(&options).map(success),
+        Command::Accept(options) => accept::run(&options).map(success),
         Command::Log { log, elf } => emulate::print_log(&log, elf.as_deref()).map(success),
         Command::Size => size::run().map(success),
         Command::Cycles(options) => cycles::run(&options).map(success),

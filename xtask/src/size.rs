@@ -8,7 +8,7 @@ use std::path::Path;
 use budget::Budget;
 use object::{Object, ObjectSection, ObjectSymbol};
 
-use crate::firmware::{FEATURES, NUCLEO, NUCLEO_FIXED16, QEMU, build_image, build_variant};
+use crate::images::{FEATURES, NUCLEO, NUCLEO_FIXED16, QEMU, build_image, build_variant};
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
 

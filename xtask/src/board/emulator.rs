@@ -68,7 +68,8 @@ impl Emulator {
         capture(self.command(image).arg(scenario))
     }
 
-    fn command(&self, image: &Path) -> Command {
+    /// The emulator with this `image`, before the names of scenarios.
+    pub fn command(&self, image: &Path) -> Command {
         let mut command = Command::new(&self.python);
         command.args(&self.arguments).arg("--image").arg(image).current_dir(root());
         command

@@ -33,6 +33,7 @@ const SPREAD_OF_ARRAY: f64 = 0.4;
 /// A model to be measured.
 pub struct Model {
     pub path: PathBuf,
+    pub format: Format,
     /// Number of centres K.
     pub centres: usize,
     /// Whether it has an affine tail.
@@ -40,19 +41,19 @@ pub struct Model {
 }
 
 /// Trains models of every format and size, with a network a row and with one for the whole array, with affine tail and
-/// without, and writes them into `directory`.
+/// without, as far as they are `wanted`, and writes them into `directory`.
 ///
 /// All rows get the first row's network, so that the largest model fits the image's slot. A model that does not
 /// fit is left out.
 ///
 /// # Errors
 /// Training fails, or makes another model than requested.
-pub fn train(directory: &Path) -> Outcome<Vec<Model>> {
+pub fn train(directory: &Path, wanted: impl Fn(&Options) -> bool) -> Outcome<Vec<Model>> {
     fs::create_dir_all(directory).map_err(|cause| cause.to_string())?;
     let world = World::press();
     let dataset = Synthesis::new(&world).noise_level(NOISE).frames(Stream::Training, FRAMES);
     let origin = Origin::of_data("press", 0, world.seed, &dataset);
-    let mut wanted = Vec::new();
+    let mut tried = Vec::new();
     for format in Format::ALL {
         for centres in CENTRES {
             for (whole_array, affine_tail) in
@@ -62,7 +63,7 @@ pub fn train(directory: &Path) -> Outcome<Vec<Model>> {
                 let spread = if whole_array { SPREAD_OF_ARRAY } else { usual.spread };
                 let options =
                     Options { format, centres, whole_array, affine_tail, spread, ..usual };
-                wanted.push(options);
+                tried.push(options);
             }
         }
     }
@@ -77,9 +78,11 @@ pub fn train(directory: &Path) -> Outcome<Vec<Model>> {
         }
         let path = directory.join(format!("{name}.bin"));
         fs::write(&path, blob).map_err(|cause| format!("{}: {cause}", path.display()))?;
-        Ok(Some(Model { path, centres: options.centres, affine: options.affine_tail }))
+        let Options { format, centres, affine_tail, .. } = *options;
+        Ok(Some(Model { path, format, centres, affine: affine_tail }))
     };
-    let models: Vec<Option<Model>> = wanted.par_iter().map(model).collect::<Outcome<_>>()?;
+    tried.retain(wanted);
+    let models: Vec<Option<Model>> = tried.par_iter().map(model).collect::<Outcome<_>>()?;
     Ok(models.into_iter().flatten().collect())
 }
 

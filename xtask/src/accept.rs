@@ -1,0 +1,307 @@
+//! Acceptance of a board: what it does, as it says itself over the link, beside what is predicted, in one JSON file.
+
+mod board;
+
+use std::fmt::Display;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use firmware::link::message::{Configuration, Memory, ModelIdentity, Report, Request, UploadState};
+use firmware::timing::ScanPlan;
+use model_core::Decoder;
+use serde::Serialize;
+use taxel_data::dataset::Dataset;
+use taxel_data::progress::Silent;
+use taxel_data::random::Stream;
+use taxel_learn::cost::{Design, Gating, Prices};
+use taxel_learn::{Exponential, ModelBlob};
+use taxel_rig::device::{Device, DeviceIdentity, Wire, stream, upload};
+use taxel_simulate::{Synthesis, World};
+
+use crate::cycles::models;
+use crate::process::{Outcome, first_line, root, target_dir};
+use crate::toolchain::Toolchain;
+use board::Board;
+
+/// Numbers of centres of the models that are tried, in every format.
+const CENTRES: [usize; 3] = [16, 64, 256];
+
+/// Frames that each model decodes, of other presses than it was trained with.
+const FRAMES: usize = 20;
+
+/// Time in µs between scans while flash is erased: long enough for a scan.
+const PERIOD_US: u32 = 20_000;
+
+/// Least and most time in ms to erase a slot of 128 KiB, 32 bits at once (DS10693, table 45: typical and largest).
+const ERASE_MS: [u32; 2] = [1000, 2000];
+
+/// RMS error in per cent of readings of known resistors, and what it may be: a metal film resistor's tolerance.
+const RESISTORS_PERCENT: f64 = 1.0;
+
+/// What to accept.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Serial port of the board, such as /dev/ttyACM0.
+    #[arg(required_unless_present = "emulated")]
+    port: Option<String>,
+    /// Take the emulated board (proof/board-emulator) instead.
+    #[arg(long, conflicts_with_all = ["port", "flashed"])]
+    emulated: bool,
+    /// The board has this revision's image already: do not flash it.
+    #[arg(long)]
+    flashed: bool,
+    /// CSV of the known resistors at the wires in Ω: columns r1c1_ohm, r1c2_ohm and so on, one line.
+    #[arg(long, value_name = "FILE")]
+    resistors: Option<PathBuf>,
+    /// Where to write the file. By default proof/silicon, or a build folder for the emulated board.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// A measured number beside what is predicted.
+#[derive(Serialize)]
+struct Beside<T> {
+    measured: T,
+    predicted: T,
+}
+
+/// How a model decodes.
+#[derive(Serialize)]
+struct Decoding {
+    format: &'static str,
+    centres: usize,
+    frames: usize,
+    /// Frames whose every output has the bits of the host's; all are predicted.
+    bit_identical: Beside<usize>,
+    /// Cycles of the fastest frame, its readings checked and its contact told; predicted is decoding alone, from flash.
+    cycles: Beside<u64>,
+}
+
+/// What the file holds.
+#[derive(Serialize)]
+struct Record<'a> {
+    is_emulated: bool,
+    /// Revision of the repository.
+    revision: Option<String>,
+    compiler: String,
+    board: &'a str,
+    memory: Memory,
+    decoding: Vec<Decoding>,
+    scan_us: Beside<u32>,
+    erase_ms: Beside<Vec<u32>>,
+    keeps_its_model_over_a_restart: Beside<bool>,
+    /// Error of the readings of known resistors, if there are any; predicted is the resistors' tolerance.
+    resistors_rms_percent: Option<Beside<f64>>,
+}
+
+/// Accepts a board, and writes the file.
+pub fn run(options: &Options) -> Outcome {
+    let known = options.resistors.as_deref().map(read_resistors).transpose()?;
+    let toolchain = Toolchain::find()?;
+    let mut board = if let Some(port) = &options.port {
+        Board::real(port, options.flashed, &toolchain)?
+    } else {
+        Board::emulated(&toolchain)?
+    };
+    let mut device = board.open()?;
+    let identity = device.identify().map_err(text)?;
+    println!("{}, firmware {}", identity.board, identity.firmware);
+    let decoding = decode_all(&mut device)?;
+    let (erase_ms, scan_us) = erase_and_scan(&mut device)?;
+    let restart = restart(&mut device)?;
+    let resistors = known.map(|known| compare(&mut device, &known)).transpose()?;
+    let git = ["-C", &root().to_string_lossy(), "describe", "--always", "--dirty"];
+    let record = Record {
+        is_emulated: options.emulated,
+        revision: first_line("git", &git),
+        compiler: toolchain.compiler()?,
+        board: &identity.board,
+        memory: identity.memory,
+        decoding,
+        scan_us,
+        erase_ms,
+        keeps_its_model_over_a_restart: restart,
+        resistors_rms_percent: resistors,
+    };
+    let path = options.output.clone().unwrap_or_else(|| default_file(&identity, options.emulated));
+    write(&path, &serde_json::to_string_pretty(&record).map_err(text)?)?;
+    println!("written to {}", path.display());
+    if record.is_as_predicted() {
+        Ok(())
+    } else {
+        Err("the board does something else than it should: see the file".into())
+    }
+}
+
+impl Record<'_> {
+    /// Whether everything is right that must be. Times and cycles may differ.
+    fn is_as_predicted(&self) -> bool {
+        let resistors = self.resistors_rms_percent.as_ref();
+        self.decoding.iter().all(|it| it.bit_identical.measured == it.bit_identical.predicted)
+            && resistors.is_none_or(|it| it.measured <= it.predicted)
+            && self.keeps_its_model_over_a_restart.measured
+    }
+}
+
+/// The file of a board: one for each chip.
+fn default_file(identity: &DeviceIdentity, emulated: bool) -> PathBuf {
+    let folder = if emulated { target_dir().join("accept") } else { root().join("proof/silicon") };
+    folder.join(format!("{}.json", identity.board))
+}
+
+fn write(path: &Path, text: &str) -> Outcome {
+    let failed = |cause: std::io::Error| format!("{}: {cause}", path.display());
+    let half = path.with_extension("json.part");
+    path.parent().map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
+    fs::write(&half, format!("{text}\n")).map_err(failed)?;
+    fs::rename(&half, path).map_err(failed)
+}
+
+/// Uploads a model of every format and size, and lets each decode the same frames as the host.
+fn decode_all<W: Wire>(device: &mut Device<W>) -> Outcome<Vec<Decoding>> {
+    let frames = Synthesis::new(&World::press()).frames(Stream::Test, FRAMES);
+    let wanted = |options: &taxel_learn::Options| {
+        CENTRES.contains(&options.centres) && !options.whole_array && !options.affine_tail
+    };
+    let tried = models::train(&target_dir().join("accept"), wanted)?;
+    tried.iter().map(|model| decode(device, model, &frames)).collect()
+}
+
+fn decode<W: Wire>(
+    device: &mut Device<W>,
+    model: &models::Model,
+    frames: &Dataset,
+) -> Outcome<Decoding> {
+    let blob = ModelBlob::read(&model.path).map_err(text)?;
+    device.while_paused(|device| upload::replace(device, blob.bytes(), &Silent)).map_err(text)?;
+    // So that the counters start anew.
+    device.restart().map_err(text)?;
+    let host = Decoder::<8>::load(blob.bytes()).map_err(text)?;
+    let per_frame = frames.inputs.names.len();
+    let readings: Vec<f32> = frames.inputs.values.iter().map(|value| *value as f32).collect();
+    let mut bit_identical = 0;
+    let decoded = device.while_paused(|device| {
+        stream::decode_frames(device, &readings, per_frame, 1, |frame, estimate| {
+            let start = frame as usize * per_frame;
+            let expected = host.decode(&readings[start..start + per_frame]);
+            let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            let found: Vec<f32> = estimate.outputs.iter().collect();
+            let is_same = expected.is_ok_and(|expected| bits(&expected.outputs) == bits(&found));
+            bit_identical += usize::from(is_same);
+        })
+    });
+    decoded.map_err(text)?;
+    let measured = u64::from(device.statistics().map_err(text)?.shortest_decode_cycles);
+    let prices = Prices::accepted().map_err(text)?;
+    let cost = prices.frame(&Design::new(&blob), Exponential::default(), Gating::Ungated);
+    let predicted = cost.map_err(text)?.flash_cycles;
+    let (format, centres) = (model.format.name(), model.centres);
+    println!(
+        "{format:10} K = {centres:3}: {bit_identical} of {FRAMES} frames bit-identical, {measured} cycles a frame, \
+         predicted {predicted}"
+    );
+    Ok(Decoding {
+        format,
+        centres,
+        frames: FRAMES,
+        bit_identical: Beside { measured: bit_identical, predicted: FRAMES },
+        cycles: Beside { measured, predicted },
+    })
+}
+
+/// Erases the slot that is not in force while the sensor is scanned, and lets it scan on. Returns the time in ms that the
+/// erase took, by the scans that were missed meanwhile, and that of the longest scan in µs.
+fn erase_and_scan<W: Wire>(device: &mut Device<W>) -> Outcome<(Beside<Vec<u32>>, Beside<u32>)> {
+    let own = device.configuration().map_err(text)?.configuration;
+    let scanning = Configuration { frame_period_us: PERIOD_US, send_estimates: false, ..own };
+    device.configure_until_restart(scanning).map_err(text)?;
+    let before = device.statistics().map_err(text)?;
+    let head = fs::read(root().join("target/accept/fixed16-16.bin")).map_err(text)?;
+    let begun = upload::step(device, upload::begin(&head)).map_err(text)?;
+    if !matches!(begun, Ok(UploadState::Receiving { .. })) {
+        return Err(format!("an upload begins with {begun:?}"));
+    }
+    // One more request is answered behind the next scan.
+    let missed = |device: &mut Device<W>| device.statistics().map(|it| it.frames_missed);
+    let (first, last) = (before.frames_missed, missed(device).map_err(text)?);
+    let erase_ms = last.wrapping_sub(first) * (PERIOD_US / 1000);
+    let after = device.statistics().map_err(text)?;
+    let plan = ScanPlan::of_nucleo(8, 18, scanning.scan.oversampling);
+    let (scan_us, predicted) = (after.longest_scan_us, plan.scan_us());
+    println!(
+        "erasing a slot took {erase_ms} ms; the longest scan {scan_us} µs, predicted {predicted}"
+    );
+    let erase_ms = Beside { measured: vec![erase_ms], predicted: ERASE_MS.to_vec() };
+    Ok((erase_ms, Beside { measured: scan_us, predicted }))
+}
+
+/// Restarts the board; returns whether the same model is in force afterwards.
+fn restart<W: Wire>(device: &mut Device<W>) -> Outcome<Beside<bool>> {
+    let before = device.identify().map_err(text)?.model;
+    let after = device.restart().map_err(text)?.model;
+    let crc = |model: Option<ModelIdentity>| model.map(|model| model.crc_32);
+    let measured = after.is_some() && crc(before) == crc(after);
+    println!("after a restart the same model is in force: {measured}");
+    Ok(Beside { measured, predicted: true })
+}
+
+/// RMS error in per cent of the board's readings of `known` resistances in Ω.
+fn compare<W: Wire>(device: &mut Device<W>, known: &[f32]) -> Outcome<Beside<f64>> {
+    let request = Request::CaptureBaseline { frames: 100 };
+    let patience = Duration::from_secs(10);
+    let answer = device.ask(&request, patience, |report| match report {
+        Report::Baseline { readings_ohm } => Some(readings_ohm.iter().collect::<Vec<f32>>()),
+        _ => None,
+    });
+    let read = answer.map_err(text)?.map_err(|refusal| format!("{refusal:?}"))?;
+    if read.len() != known.len() {
+        return Err(format!(
+            "--resistors has {} columns, the board reads {}",
+            known.len(),
+            read.len()
+        ));
+    }
+    let squares = read.iter().zip(known).map(|(read, known)| f64::from(read / known - 1.0).powi(2));
+    let measured = 100.0 * (squares.sum::<f64>() / known.len() as f64).sqrt();
+    println!("readings of the known resistors are {measured:.3} % off (RMS)");
+    Ok(Beside { measured, predicted: RESISTORS_PERCENT })
+}
+
+/// Resistances in Ω of a CSV file of one line under names, row after row.
+fn read_resistors(path: &Path) -> Outcome<Vec<f32>> {
+    let named = |cause: &dyn Display| format!("--resistors {}: {cause}", path.display());
+    let content = fs::read_to_string(path).map_err(|cause| named(&cause))?;
+    let line = content.lines().nth(1).ok_or(named(&"no line under the names"))?;
+    let numbers = line.split(',').map(|number| number.trim().parse::<f32>());
+    let ohm: Vec<f32> = numbers.collect::<Result<_, _>>().map_err(|cause| named(&cause))?;
+    match ohm.iter().position(|ohm| !(ohm.is_finite() && *ohm > 0.0)) {
+        Some(place) => Err(named(&format!("column {} is no resistance", place + 1))),
+        None => Ok(ohm),
+    }
+}
+
+fn text(cause: impl Display) -> String {
+    cause.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn resistors_are_one_line_of_positive_numbers_under_their_names() {
+        let path = std::env::temp_dir().join(format!("resistors-{}.csv", std::process::id()));
+        let read = |content: &str| {
+            fs::write(&path, content).unwrap();
+            read_resistors(&path)
+        };
+        assert_eq!(read("r1c1_ohm,r1c2_ohm\n56, 56.2\n"), Ok(vec![56.0, 56.2]));
+        for (content, says) in
+            [("a\n", "no line"), ("a\nx\n", "invalid"), ("a,b\n1,0\n", "column 2")]
+        {
+            assert!(read(content).unwrap_err().contains(says), "{content}");
+        }
+        fs::remove_file(&path).unwrap();
+    }
+}

@@ -1,0 +1,93 @@
+//! The board that is accepted: one at a serial port, or the emulated one.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use taxel_rig::device::{Device, Wire, serial};
+
+use crate::board::{Emulator, Options};
+use crate::images::{NUCLEO, build_image};
+use crate::process::{Outcome, run};
+use crate::toolchain::{Toolchain, elf};
+
+/// Baud rate of the boards' serial line.
+const BAUD: u32 = 921_600;
+
+/// Chip of the board, as probe-rs names it.
+const CHIP: &str = "STM32F446RETx";
+
+/// Longest time that an answer may take: the emulated board is slower than its own time.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// What the emulated board prints before the name of its port.
+const PORT: &str = "host-sim link ";
+
+pub struct Board {
+    port: String,
+    emulator: Option<Child>,
+}
+
+impl Board {
+    /// The board at this `port`. The image is built and flashed, unless it is there already.
+    pub fn real(port: &str, is_flashed: bool, toolchain: &Toolchain) -> Outcome<Self> {
+        if !is_flashed {
+            build_image(toolchain, NUCLEO)?;
+            flash(&elf(NUCLEO[1]))?;
+        }
+        Ok(Self { port: port.into(), emulator: None })
+    }
+
+    /// The emulated board, running the image.
+    pub fn emulated(toolchain: &Toolchain) -> Outcome<Self> {
+        build_image(toolchain, NUCLEO)?;
+        let mut command = Emulator::prepare(&Options::plain())?.command(&elf(NUCLEO[1]));
+        command.arg("serve").stdout(Stdio::piped());
+        let mut emulator =
+            command.spawn().map_err(|cause| format!("the emulated board: {cause}"))?;
+        let said = emulator.stdout.take().ok_or("the emulated board says nothing")?;
+        let mut lines = BufReader::new(said).lines().map_while(Result::ok);
+        let port = lines
+            .find_map(|line| line.split_once(PORT)?.1.split_whitespace().next().map(str::to_owned));
+        // What it says from now on is of no interest, but it must not be stopped by it.
+        std::thread::spawn(move || lines.for_each(drop));
+        let port = port.ok_or("the emulated board opens no port");
+        Ok(Self { port: port?, emulator: Some(emulator) })
+    }
+
+    /// Opens the line to the board.
+    pub fn open(&mut self) -> Outcome<Device<impl Wire + use<>>> {
+        let wire = serial::open(&self.port, BAUD).map_err(|cause| cause.to_string())?;
+        let mut device = Device::new(wire).map_err(|cause| cause.to_string())?;
+        device.patience = PATIENCE;
+        Ok(device)
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        if let Some(emulator) = &mut self.emulator {
+            let _ = emulator.kill();
+            let _ = emulator.wait();
+        }
+    }
+}
+
+/// Writes the image to the board at the only debug probe, and starts it.
+fn flash(image: &Path) -> Outcome {
+    for arguments in [&["download", "--verify"][..], &["reset"]] {
+        let mut command = Command::new("probe-rs");
+        command.args(arguments).args(["--chip", CHIP]);
+        if arguments.len() > 1 {
+            command.arg(image);
+        }
+        run(&mut command).map_err(|cause| {
+            format!(
+                "{cause}; flashing takes probe-rs (`cargo install probe-rs-tools --locked`), or flash the image yourself \
+                 and say --flashed"
+            )
+        })?;
+    }
+    Ok(())
+}
