@@ -20,7 +20,7 @@ use taxel_rig::device::{Device, DeviceIdentity, Wire, stream, upload};
 use taxel_simulate::{Synthesis, World};
 
 use crate::cycles::models;
-use crate::process::{Outcome, first_line, root, target_dir};
+use crate::process::{Outcome, cargo, first_line, root, run as run_command, target_dir};
 use crate::toolchain::Toolchain;
 use board::Board;
 
@@ -28,13 +28,32 @@ use board::Board;
 const CENTRES: [usize; 3] = [16, 64, 256];
 
 /// Frames that each model decodes, of other presses than it was trained with.
-const FRAMES: usize = 20;
+const FRAMES: usize = 10;
 
 /// Time in µs between scans while flash is erased: long enough for a scan.
 const PERIOD_US: u32 = 20_000;
 
 /// Least and most time in ms to erase a slot of 128 KiB, 32 bits at once (DS10693, table 45: typical and largest).
 const ERASE_MS: [u32; 2] = [1000, 2000];
+
+/// Trains a model with a confidence, and with what fills missing readings.
+const TRAIN_CONFIDENCE: [&str; 12] = [
+    "run",
+    "--quiet",
+    "--package",
+    "host-sim",
+    "--",
+    "train",
+    "press",
+    "--no-refine",
+    "--centres=16",
+    "--confidence",
+    "--fill",
+    "--output",
+];
+
+/// Most bytes that the stack may take, of the 8192 that the image has for it.
+const STACK_BYTES: u32 = 7168;
 
 /// RMS error in per cent of readings of known resistors, and what it may be: a metal film resistor's tolerance.
 const RESISTORS_PERCENT: f64 = 1.0;
@@ -69,13 +88,15 @@ struct Beside<T> {
 /// How a model decodes.
 #[derive(Serialize)]
 struct Decoding {
-    format: &'static str,
-    centres: usize,
+    /// Format and number of centres; *array* if one network decodes the whole array, *confidence* if the model has one.
+    model: String,
     frames: usize,
     /// Frames whose every output has the bits of the host's; all are predicted.
     bit_identical: Beside<usize>,
     /// Cycles of the fastest frame, its readings checked and its contact told; predicted is decoding alone, from flash.
     cycles: Beside<u64>,
+    /// What the stack has taken at most since the start with this model.
+    stack_bytes: u32,
 }
 
 /// What the file holds.
@@ -87,6 +108,8 @@ struct Record<'a> {
     compiler: String,
     board: &'a str,
     memory: Memory,
+    /// What the stack took at most.
+    stack_bytes: Beside<u32>,
     decoding: Vec<Decoding>,
     scan_us: Beside<u32>,
     erase_ms: Beside<Vec<u32>>,
@@ -109,6 +132,9 @@ pub fn run(options: &Options) -> Outcome {
     println!("{}, firmware {}", identity.board, identity.firmware);
     let decoding = decode_all(&mut device)?;
     let (erase_ms, scan_us) = erase_and_scan(&mut device)?;
+    let last = device.identify().map_err(text)?.memory.stack_high_water;
+    let stack_bytes = decoding.iter().map(|it| it.stack_bytes).fold(last, u32::max);
+    println!("the stack took {stack_bytes} of {} bytes", identity.memory.stack_reserved);
     let restart = restart(&mut device)?;
     let resistors = known.map(|known| compare(&mut device, &known)).transpose()?;
     let git = ["-C", &root().to_string_lossy(), "describe", "--always", "--dirty"];
@@ -118,6 +144,7 @@ pub fn run(options: &Options) -> Outcome {
         compiler: toolchain.compiler()?,
         board: &identity.board,
         memory: identity.memory,
+        stack_bytes: Beside { measured: stack_bytes, predicted: STACK_BYTES },
         decoding,
         scan_us,
         erase_ms,
@@ -141,6 +168,7 @@ impl Record<'_> {
         self.decoding.iter().all(|it| it.bit_identical.measured == it.bit_identical.predicted)
             && resistors.is_none_or(|it| it.measured <= it.predicted)
             && self.keeps_its_model_over_a_restart.measured
+            && self.stack_bytes.measured <= self.stack_bytes.predicted
     }
 }
 
@@ -161,19 +189,21 @@ fn write(path: &Path, text: &str) -> Outcome {
 /// Uploads a model of every format and size, and lets each decode the same frames as the host.
 fn decode_all<W: Wire>(device: &mut Device<W>) -> Outcome<Vec<Decoding>> {
     let frames = Synthesis::new(&World::press()).frames(Stream::Test, FRAMES);
-    let wanted = |options: &taxel_learn::Options| {
-        CENTRES.contains(&options.centres) && !options.whole_array && !options.affine_tail
+    let wanted = |options: &taxel_learn::Options| match (options.whole_array, options.affine_tail) {
+        (false, false) => CENTRES.contains(&options.centres),
+        (array, affine) => array && affine && options.centres == CENTRES[0],
     };
-    let tried = models::train(&target_dir().join("accept"), wanted)?;
-    tried.iter().map(|model| decode(device, model, &frames)).collect()
+    let folder = target_dir().join("accept");
+    let mut models: Vec<PathBuf> =
+        models::train(&folder, wanted)?.into_iter().map(|model| model.path).collect();
+    let assessed = folder.join("fixed16-16-confidence.bin");
+    run_command(cargo(&TRAIN_CONFIDENCE).arg(&assessed))?;
+    models.push(assessed);
+    models.iter().map(|model| decode(device, model, &frames)).collect()
 }
 
-fn decode<W: Wire>(
-    device: &mut Device<W>,
-    model: &models::Model,
-    frames: &Dataset,
-) -> Outcome<Decoding> {
-    let blob = ModelBlob::read(&model.path).map_err(text)?;
+fn decode<W: Wire>(device: &mut Device<W>, path: &Path, frames: &Dataset) -> Outcome<Decoding> {
+    let blob = ModelBlob::read(path).map_err(text)?;
     device.while_paused(|device| upload::replace(device, blob.bytes(), &Silent)).map_err(text)?;
     // So that the counters start anew.
     device.restart().map_err(text)?;
@@ -196,17 +226,16 @@ fn decode<W: Wire>(
     let prices = Prices::accepted().map_err(text)?;
     let cost = prices.frame(&Design::new(&blob), Exponential::default(), Gating::Ungated);
     let predicted = cost.map_err(text)?.flash_cycles;
-    let (format, centres) = (model.format.name(), model.centres);
+    let model = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     println!(
-        "{format:10} K = {centres:3}: {bit_identical} of {FRAMES} frames bit-identical, {measured} cycles a frame, \
-         predicted {predicted}"
+        "{model:22} {bit_identical} of {FRAMES} frames bit-identical, {measured} cycles a frame, predicted {predicted}"
     );
     Ok(Decoding {
-        format,
-        centres,
+        model,
         frames: FRAMES,
         bit_identical: Beside { measured: bit_identical, predicted: FRAMES },
         cycles: Beside { measured, predicted },
+        stack_bytes: device.identify().map_err(text)?.memory.stack_high_water,
     })
 }
 

@@ -33,7 +33,6 @@ const SPREAD_OF_ARRAY: f64 = 0.4;
 /// A model to be measured.
 pub struct Model {
     pub path: PathBuf,
-    pub format: Format,
     /// Number of centres K.
     pub centres: usize,
     /// Whether it has an affine tail.
@@ -78,8 +77,7 @@ pub fn train(directory: &Path, wanted: impl Fn(&Options) -> bool) -> Outcome<Vec
         }
         let path = directory.join(format!("{name}.bin"));
         fs::write(&path, blob).map_err(|cause| format!("{}: {cause}", path.display()))?;
-        let Options { format, centres, affine_tail, .. } = *options;
-        Ok(Some(Model { path, format, centres, affine: affine_tail }))
+        Ok(Some(Model { path, centres: options.centres, affine: options.affine_tail }))
     };
     tried.retain(wanted);
     let models: Vec<Option<Model>> = tried.par_iter().map(model).collect::<Outcome<_>>()?;
