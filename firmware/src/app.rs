@@ -6,10 +6,10 @@
 
 use crate::link::message::Configuration;
 use crate::link::receive::Receiver;
-use crate::log::info;
+use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
-use crate::store::{Slot, Upload};
+use crate::store::{ConfirmedModels, Slot, Upload};
 
 // From the ground up: a module imports only what is declared before it.
 mod buffers;
@@ -26,7 +26,6 @@ mod authenticity;
 mod recheck;
 mod trial;
 mod models;
-mod records;
 mod undo;
 mod session;
 mod answer;
@@ -76,9 +75,17 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             deviations,
         } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
-        let authenticity = Authenticity::new(platform.key_area());
-        let models =
-            Models { capacity, upload: Upload::new(), trial: Trial::default(), authenticity };
+        let journal = platform.journal();
+        if journal.recover().is_err() {
+            warning!("the journal in flash failed");
+        }
+        let models = Models {
+            capacity,
+            confirmed: ConfirmedModels::NONE,
+            upload: Upload::new(),
+            trial: Trial::default(),
+            authenticity: Authenticity::new(journal),
+        };
         let now_us = platform.now_us();
         let mut link = Link::new(platform, message);
         let memories = [frame.as_flattened_mut(), baseline.as_flattened_mut()];

@@ -1,8 +1,8 @@
 //! The program of a board, as a library that is tested on the host.
 //!
 //! [`readout`] scans frames over embedded-hal; [`circuit`] converts counts to Ω, and [`timing`] computes how long
-//! a scan takes. [`store`] keeps models in two slots of flash, [`settings`] what else survives a restart. [`link`] carries messages to and from the host.
-//! [`App`](app::App) is the loop that joins them and decodes with the model in force. A board implements
+//! a scan takes. [`store`] keeps models in two slots of flash, and in a journal what else survives a restart. [`link`] carries messages
+//! to and from the host. [`App`](app::App) is the loop that joins them and decodes with the model in force. A board implements
 //! [`platform`]; [`capacity`] says how large a sensor and a model it has room for. Nothing here allocates, panics or
 //! waits without bound.
 //!
@@ -11,6 +11,7 @@
 
 // From the ground up: a module imports only what is declared before it.
 mod log;
+#[cfg(feature = "seal")]
 pub mod seal;
 pub mod circuit;
 pub mod readout;
@@ -18,6 +19,5 @@ pub mod link;
 pub mod timing;
 pub mod capacity;
 pub mod store;
-pub mod settings;
 pub mod platform;
 pub mod app;

@@ -1,8 +1,7 @@
 //! The interface of a board to the application, besides the sensor and the slots.
 
 use crate::link::message::Memory;
-use crate::settings::Keeper;
-use crate::store::Slot;
+use crate::store::{Journal, Slot};
 
 /// A serial line, and a clock for time limits on it. No function may wait.
 pub trait Port {
@@ -19,12 +18,8 @@ pub trait Port {
 /// A board, whose port leads to the host. The port must keep at least 1000 bytes that arrive while the
 /// application scans and decodes.
 pub trait Platform: Port {
-    /// Memory that keeps settings over restarts.
-    type Settings: Keeper;
-
-    /// Flash that holds the device's key, and nothing else. It is not erased once a key is set. Zeros can be written over
-    /// whatever it holds.
-    type KeyArea: Slot;
+    /// A page of the journal.
+    type Page: Slot;
 
     /// Name of the board, as the link reports it.
     const BOARD: &'static str;
@@ -35,11 +30,19 @@ pub trait Platform: Port {
     /// Use of flash and RAM.
     fn memory(&self) -> Memory;
 
-    /// The memory that keeps settings.
-    fn settings(&mut self) -> &mut Self::Settings;
+    /// What survives a restart besides the slots.
+    fn journal(&mut self) -> &mut Journal<Self::Page>;
 
-    /// The flash that holds the key.
-    fn key_area(&mut self) -> &mut Self::KeyArea;
+    /// Number that no other board of its kind has, so that a request sealed for one device is none for another; zeros on
+    /// a board without one.
+    fn unique_id(&self) -> [u8; 12] {
+        [0; 12]
+    }
+
+    /// Whether somebody at the board lets it take its first key: by a button held at the start, or a strap.
+    fn may_provision(&self) -> bool {
+        false
+    }
 
     /// Count of the processor's cycles, which wraps around; always 0 on a board without a counter.
     fn cycles(&self) -> u32 {

@@ -1,33 +1,26 @@
-//! Model slots in flash: one holds the model in force, the other is spare.
+//! What survives a restart. Two model slots in flash: one holds the model in force, the other is spare. And a
+//! [`Journal`], which tells all else.
 //!
-//! A slot holds a blob at its start and, once the blob has been found sound, a record of 16 bytes at its end. The
-//! record's first word is written when an upload begins, and the others last and in one go: a slot whose upload was
-//! interrupted or aborted is not chosen.
-//!
-//! With a key on the device, a seal stands behind the blob ([`DeviceKey`], [`Seal`]).
-//!
-//! To put the previous model in force again, another record with a higher generation is written before those of its
-//! slot ([`reinstate`]). Every start writes the records that the choice of a model still needs ([`missing_records`]).
+//! A slot holds a blob at its start, and nothing else. Which models were confirmed, and which of them is in force,
+//! [`ConfirmedModels`] tells.
 
 use model_core::blob::Model;
 
-use crate::seal::Seal;
-
-mod key;
-mod records;
+mod journal;
+mod confirmed;
 mod upload;
 
-pub use key::DeviceKey;
-pub use records::{MOST_RECORDS, RECORD_BYTES, generation, missing_records, reinstate};
+pub use confirmed::ConfirmedModels;
+pub use journal::{Journal, KeepError, KeyFound, Kind, PAGE_BYTES};
 pub use upload::Upload;
 
 /// Error of a flash that could not be erased or written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FlashError;
 
-/// A region of flash that is erased as a whole and read in place.
+/// A region of flash that is erased as a whole and read in place: a model slot, or a page of the journal.
 ///
-/// There are two, and the borrow checker keeps them apart: a decoder borrows the slot of its model
+/// There are two slots, and the borrow checker keeps them apart: a decoder borrows the slot of its model
 /// while the other is written.
 pub trait Slot {
     /// Mean time in s between erases that the medium endures for years; 0 if it does not wear. The first
@@ -45,8 +38,8 @@ pub trait Slot {
     /// [`FlashError`]: the flash could not be erased.
     fn erase(&mut self) -> Result<(), FlashError>;
 
-    /// Writes `bytes` from `offset` on, where the slot must be erased. Offset and length must be multiples of
-    /// four.
+    /// Writes `bytes` from `offset` on, where the slot must be erased; zeros can be written over anything. Offset and
+    /// length must be multiples of four.
     ///
     /// # Errors
     /// [`FlashError`]: the flash could not be written, or holds other bytes afterwards.
@@ -74,26 +67,3 @@ pub fn blob_in_slot(slot: &[u8]) -> &[u8] {
 
 /// Number of erases after the start that need not wait for each other.
 pub const ERASES_AT_ONCE: u32 = 100;
-
-/// Length in bytes of a seal behind a blob: mark, version, tag.
-pub const SEAL_BYTES: usize = 40;
-
-/// First word of a seal.
-const SEAL_MARK: [u8; 4] = *b"SEAL";
-
-/// Largest blob that a slot holds, in bytes; with a seal, [`SEAL_BYTES`] less. The first record stands behind it.
-pub fn capacity(slot: &[u8]) -> usize {
-    slot.len().saturating_sub(RECORD_BYTES)
-}
-
-/// Place of the seal in a slot: the first word behind its blob.
-fn seal_place(slot: &[u8]) -> usize {
-    blob_in_slot(slot).len().saturating_add(3) & !3
-}
-
-/// The seal behind the blob in `slot`, right or wrong.
-pub fn seal_in_slot(slot: &[u8]) -> Option<Seal> {
-    let rest = slot.get(seal_place(slot)..)?.strip_prefix(&SEAL_MARK)?;
-    let (version, rest) = rest.split_first_chunk()?;
-    Some(Seal { version: u32::from_le_bytes(*version), tag: *rest.first_chunk()? })
-}

@@ -1,147 +1,392 @@
-//! With a key on the device, only models sealed with it come into force, and no older ones.
+//! With a key on the device, a host without it changes nothing. Each test is an attack of docs/reliability.md.
 
 use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{KeyState, Refusal, SealFault, UploadStep};
-use firmware::seal::{Key, Seal};
-use firmware::store::Slot;
+use firmware::circuit::{Circuit, ZeroPotential};
+use firmware::link::cobs;
+use firmware::link::message::{
+    Configuration, KeyState, Refusal, Report, Request, SealFault, Setting, UploadState, UploadStep,
+};
+use firmware::link::packet::PROTOCOL_VERSION;
+use firmware::store::{Kind, Slot};
 use mock_board::*;
+use model_core::blob::Floats;
+use model_core::checksum::CRC_32;
 
-const KEY: Key = [0x42; 32];
-/// Words of a copy of the key.
-const COPY: usize = 12;
+const KEY: [u8; 32] = [0x42; 32];
+const OTHER: [u8; 32] = [0x43; 32];
+/// Number of an attacker's requests.
+const NUMBER: u16 = 77;
 
-/// A device with this key, and a model of version 5 in force.
-fn with_key() -> Device {
-    let mut device = Device::new(Flash::slots());
-    device.key = Flash::with_key(&KEY);
-    install(&mut device, 5, &blob(1, 3)).unwrap();
-    device
-}
-
-/// Uploads `blob`, sealed as this version.
-fn install(device: &mut Device, version: u32, blob: &[u8]) -> Answer {
-    device.install(blob, Some(Seal::new(&KEY, version, blob)))
-}
-
-/// A model's CRC-32, and the version that it was sealed with.
-type Versioned = (u32, Option<u32>);
-
-/// The model in force, whether there is a key, and the highest version.
-fn identity(device: &mut Device) -> (Option<Versioned>, KeyState, Option<u32>) {
-    let (model, key, highest) = device.identity();
-    (model.map(|model| (model.crc_32, model.version)), key, highest)
-}
-
-fn fault(fault: SealFault) -> Answer {
+fn fault<T>(fault: SealFault) -> Result<T, Refusal> {
     Err(Refusal::Seal(fault))
 }
 
-#[test]
-fn a_sealed_model_comes_into_force_and_stays() {
-    let mut device = with_key();
-    for version in [6, 7, 4_000_000_000] {
-        let next = blob(version as usize % 10, 4);
-        assert_eq!(install(&mut device, version, &next), confirmed(&next));
-        let expected = (Some((crc_of(&next), Some(version))), KeyState::Set, Some(version));
-        assert_eq!(identity(&mut device), expected);
-    }
+/// A device with a key and the model `blob(1, 3)`, flashed.
+fn with_key() -> Device {
+    Device::with_key(Flash::slots_with(&blob(1, 3)), &KEY)
+}
+
+/// What the device says to the bytes of a request: why it refuses it, if it does.
+fn said(session: &mut Running<'_, '_>, board: &Board, bytes: Vec<u8>) -> Result<(), Refusal> {
+    let read = |report: Report<'_>| match report {
+        Report::Refused(refusal) => Err(refusal),
+        _ => Ok(()),
+    };
+    send(session, board, bytes, read).0
 }
 
 #[test]
-fn no_older_model_comes_back() {
-    let mut device = with_key();
-    let [first, second, third] = [blob(1, 3), blob(2, 4), blob(3, 4)];
-    let outdated = fault(SealFault::Outdated { highest: 6 });
-    assert_eq!(install(&mut device, 6, &second), confirmed(&second));
-    assert_eq!(install(&mut device, 5, &first), outdated, "replayed");
-    assert_eq!(install(&mut device, 6, &third), outdated, "same version");
-    // The refused uploads have erased the other slot.
-    assert_eq!(device.undo(crc_of(&second)), Err(Refusal::NothingToUndo));
-    // The same once more is no step back.
-    assert_eq!(install(&mut device, 6, &second), confirmed(&second));
-    assert_eq!(install(&mut device, 7, &third), confirmed(&third));
-    assert_eq!(device.undo(crc_of(&third)), fault(SealFault::Outdated { highest: 7 }));
-    assert_eq!(identity(&mut device).0, Some((crc_of(&third), Some(7))));
-}
-
-#[test]
-fn a_trial_that_ends_leaves_the_version_unused() {
-    let mut device = with_key();
-    let (second, third) = (blob(2, 4), blob(3, 4));
-    let mut steps = trial_steps(&second, Some(Seal::new(&KEY, 6, &second)));
-    steps.push(UploadStep::Abort);
-    device.upload(&steps).unwrap();
-    assert_eq!(identity(&mut device).2, Some(5));
-    assert_eq!(install(&mut device, 6, &third), confirmed(&third));
-}
-
-#[test]
-fn a_key_is_set_once_and_models_from_before_are_left() {
+fn whoever_comes_first_sets_no_key_unless_somebody_at_the_board_allows_it() {
     let old = blob(1, 3);
-    let mut slots = Flash::slots_with(&old);
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let feeds = || board.pins.borrow().feeds;
-    let fed = feeds();
-    assert_eq!(provision(&mut session, &board, KEY), (Ok(()), Some(SessionEnd::NewModel)));
-    assert_eq!(feeds() - fed, 2, "in its turn, and before flash is erased");
-    let _ = session;
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &board), None, "it has no seal");
-    assert_eq!(provision(&mut session, &board, KEY), (Ok(()), None), "the answer was lost");
-    let is_set = Err(Refusal::Seal(SealFault::KeyIsSet));
-    assert_eq!(provision(&mut session, &board, [1; 32]), (is_set, None));
-    let _ = session;
-    let mut device = Device::new(slots);
-    device.key = bench.app.platform().key.clone();
-    assert_eq!(install(&mut device, 0, &old), confirmed(&old));
-    assert_eq!(identity(&mut device).0, Some((crc_of(&old), Some(0))));
-    assert_eq!(device.undo(crc_of(&old)), fault(SealFault::Missing));
-}
-
-#[test]
-fn without_a_key_a_seal_is_refused_and_with_a_decayed_one_every_model() {
+    let mut device = Device::new(Flash::slots_with(&old));
+    assert_eq!(device.provision(KEY), fault(SealFault::NotAllowed));
+    assert_eq!(device.identity().1, KeyState::None);
     let next = blob(2, 4);
-    let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
-    assert_eq!(install(&mut device, 6, &next), fault(SealFault::NoKey));
-    assert_eq!(identity(&mut device).1, KeyState::None);
-
-    let mut device = with_key();
-    device.key.decay(1, 1 << 24);
-    device.key.decay(1 + COPY, 1 << 24);
-    let damaged = fault(SealFault::KeyDamaged);
-    assert_eq!((install(&mut device, 6, &next), device.install(&next, None)), (damaged, damaged));
-    assert_eq!(identity(&mut device), (None, KeyState::Damaged, None));
-    // Only whoever has the key can set it again.
-    assert_eq!(device.provision([0x43; 32]), Err(Refusal::Seal(SealFault::KeyDamaged)));
+    assert_eq!(device.install(&next), confirmed(&next), "the owner is not locked out");
+    device.is_held = true;
     assert_eq!(device.provision(KEY), Ok(()));
-    assert_eq!(identity(&mut device).1, KeyState::Set);
-    assert_eq!(install(&mut device, 6, &next), confirmed(&next));
+    device.is_held = false;
+    assert_eq!(device.provision(KEY), Ok(()), "the answer was lost");
+    let (model, key, _) = device.identity();
+    assert_eq!((model.unwrap().crc_32, key), (crc_of(&next), KeyState::Set), "the model stays");
 }
 
 #[test]
-fn a_blob_that_leaves_room_for_its_seal_alone_is_taken_and_a_longer_one_costs_no_erase() {
+fn the_watchdog_is_fed_before_flash_is_erased_for_a_key_or_a_counter() {
+    let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
+    device.is_held = true;
+    device.session(|session, board| {
+        let fed = board.pins.borrow().feeds;
+        assert_eq!(provision(session, board, KEY), (Ok(()), None));
+        assert_eq!(board.pins.borrow().feeds - fed, 2, "in its turn, and before");
+        let fed = board.pins.borrow().feeds;
+        assert_eq!(said(session, board, sealed(&KEY, 1, &Request::Resume)), Ok(()));
+        assert_eq!(board.pins.borrow().feeds - fed, 2);
+    });
+}
+
+#[test]
+fn a_key_is_replaced_by_whoever_has_it_and_by_nobody_else() {
     let mut device = with_key();
-    let most = Flash::SLOT_BYTES - 16 - 40;
-    let too_large = Err(Refusal::TooLarge { slot_bytes: most as u32 });
-    for (length, erases) in [(most + 4, 0), (most, 1)] {
-        let blob = blob_of_length(length);
-        let before = device.slots[0].erases + device.slots[1].erases;
-        let expected = if erases == 0 { too_large } else { confirmed(&blob) };
-        assert_eq!(install(&mut device, 6, &blob), expected);
-        assert_eq!(device.slots[0].erases + device.slots[1].erases, before + erases);
+    device.is_held = true;
+    device.key = None;
+    assert_eq!(device.provision(OTHER), fault(SealFault::Missing), "not even with the button");
+    device.key = Some(OTHER);
+    assert_eq!(device.provision(OTHER), fault(SealFault::Forged));
+    device.key = Some(KEY);
+    assert_eq!(device.provision(OTHER), Ok(()));
+    assert_eq!(device.undo(1), fault(SealFault::Forged), "the old one counts no more");
+    device.key = Some(OTHER);
+    assert_eq!(device.undo(1), Err(Refusal::NothingToUndo));
+}
+
+#[test]
+fn a_model_comes_into_force_by_whoever_has_the_key_alone() {
+    let (old, new) = (blob(1, 3), blob(2, 4));
+    let mut device = with_key();
+    for (key, why) in [(None, SealFault::Missing), (Some(OTHER), SealFault::Forged)] {
+        device.key = key;
+        assert_eq!(device.install(&new), fault(why));
+        assert_eq!(device.slots[1].erases, 0);
+    }
+    device.key = Some(KEY);
+    // The owner's upload, into which somebody else puts the chunks of another model of that length.
+    let forged = blob(5, 4);
+    let mut steps = trial_steps(&new);
+    let last = steps.len() - 1;
+    steps.splice(1..last, trial_steps(&forged).drain(1..last));
+    assert_eq!(device.upload(&steps), fault(SealFault::Forged));
+    // Or a host that does not say which model it means.
+    let mut steps = trial_steps(&new);
+    steps[last] = UploadStep::Try { sha_256: None, lease_ms: 60_000 };
+    assert_eq!(device.upload(&steps), fault(SealFault::Missing));
+    assert_eq!(device.restart(), Some(crc_of(&old)));
+    assert_eq!(device.install(&new), confirmed(&new));
+    assert_eq!(device.restart(), Some(crc_of(&new)));
+}
+
+#[test]
+fn an_older_model_comes_back_neither_by_a_replay_nor_by_an_undo() {
+    let (first, second) = (blob(2, 4), blob(3, 4));
+    let mut device = with_key();
+    let steps: Vec<Vec<u8>> = (1..)
+        .zip(confirmed_steps(&first))
+        .map(|(counter, step)| match step {
+            UploadStep::Chunk { .. } => request_bytes(NUMBER, &Request::Upload(step)),
+            step => sealed(&KEY, counter, &Request::Upload(step)),
+        })
+        .collect();
+    device.install(&first).unwrap();
+    device.install(&second).unwrap();
+    device.key = None;
+    assert_eq!(device.undo(crc_of(&second)), fault(SealFault::Missing));
+    let last = device.identity().2;
+    for _ in 0..2 {
+        let erases = device.slots[0].erases;
+        device.session(|session, board| {
+            let begun = said(session, board, steps[0].clone());
+            assert_eq!(begun, fault(SealFault::Counter { last }));
+            let confirmed = said(session, board, steps[steps.len() - 1].clone());
+            assert_eq!(confirmed, fault(SealFault::Counter { last }));
+        });
+        assert_eq!(device.slots[0].erases, erases);
+        assert_eq!(device.restart(), Some(crc_of(&second)));
+    }
+    // Whoever has the key may go back.
+    device.key = Some(KEY);
+    assert_eq!(device.undo(crc_of(&second)), confirmed(&first));
+}
+
+/// Calls `use_it` with each request that changes what estimates are made of.
+fn settings(mut use_it: impl FnMut(&Request<'_>)) {
+    let ohm = [70.0; 6];
+    let circuit = ZeroPotential::<ROWS, COLS> { drive_v: 0.25, ..ZeroPotential::TYPICAL };
+    let other = Configuration { contact_threshold: 0.5, ..quiet() };
+    use_it(&configure(other));
+    use_it(&Request::SetConstants(circuit.constants().unwrap()));
+    use_it(&Request::SetBaseline { readings_ohm: Floats::new(&ohm) });
+    for setting in Setting::ALL {
+        use_it(&Request::Keep(setting));
+    }
+}
+
+/// What the device shows of its settings.
+fn shown(session: &mut Running<'_, '_>, board: &Board) -> String {
+    let ohm = [60.0; 6];
+    let decode = Request::Decode { frame: 1, readings_ohm: Floats::new(&ohm) };
+    let requests = [Request::Configuration, Request::Constants, Request::Kept, decode];
+    requests.map(|request| ask(session, board, &request, |report| format!("{report:?}")).0).concat()
+}
+
+#[test]
+fn nobody_without_the_key_changes_constants_baseline_or_configuration_not_even_by_a_replay() {
+    let mut device = with_key();
+    device.session(|session, board| {
+        let original = shown(session, board);
+        board.pins.borrow_mut().key = None;
+        settings(|request| {
+            let refused = ask(session, board, request, |report| format!("{report:?}")).0;
+            assert!(refused.contains("Seal(Missing)"), "{request:?}: {refused}");
+        });
+        assert_eq!(shown(session, board), original);
+        // The owner changes them, and back again.
+        let mut recorded = Vec::new();
+        settings(|request| {
+            recorded.push(sealed(&KEY, recorded.len() as u64 + 1, request));
+        });
+        recorded.iter().for_each(|it| assert_eq!(said(session, board, it.clone()), Ok(())));
+        let changed = shown(session, board);
+        assert_ne!(changed, original);
+        let last = recorded.len() as u64;
+        let back = configure(quiet());
+        assert_eq!(said(session, board, sealed(&KEY, last + 1, &back)), Ok(()));
+        let now = shown(session, board);
+        for replayed in &recorded {
+            let refused = said(session, board, replayed.clone());
+            assert_eq!(refused, fault(SealFault::Counter { last: last + 1 }));
+        }
+        assert_eq!(shown(session, board), now);
+    });
+    // At the next start the counter is beyond all of them.
+    device.session(|session, board| {
+        let replayed = sealed(&KEY, 1, &configure(quiet()));
+        let refused = said(session, board, replayed);
+        assert_eq!(refused, fault(SealFault::Counter { last: 1001 }));
+    });
+}
+
+#[test]
+fn a_seal_for_one_device_is_none_for_another_and_none_holds_another_seal() {
+    let mut device = with_key();
+    device.session(|session, board| {
+        let mut buffer = [0; 64];
+        let request = postcard::to_slice(&Request::Restart, &mut buffer).unwrap();
+        let tag = firmware::seal::tag(&KEY, b"mock board 2", 1, request);
+        let elsewhere = Request::Sealed { counter: 1, tag, request };
+        let refused = said(session, board, request_bytes(NUMBER, &elsewhere));
+        assert_eq!(refused, fault(SealFault::Forged));
+        let mut inner = [0; 64];
+        let inner = postcard::to_slice(&elsewhere, &mut inner).unwrap();
+        let tag = firmware::seal::tag(&KEY, &Board::UNIQUE_ID, 1, inner);
+        let outer = Request::Sealed { counter: 1, tag, request: inner };
+        assert_eq!(said(session, board, request_bytes(NUMBER, &outer)), Err(Refusal::Unknown));
+        // What follows a request in its seal, or is none.
+        for bytes in [&[7, 0][..], &[250], &[]] {
+            let tag = firmware::seal::tag(&KEY, &Board::UNIQUE_ID, 2, bytes);
+            let more = Request::Sealed { counter: 2, tag, request: bytes };
+            let said = said(session, board, request_bytes(NUMBER, &more));
+            let expected = Err(Refusal::Unknown);
+            assert!(said == expected || said == fault(SealFault::Counter { last: 2 }), "{said:?}");
+        }
+    });
+}
+
+#[test]
+fn no_counter_uses_up_those_that_follow_and_a_thousand_cost_one_write() {
+    let mut device = with_key();
+    device.session(|session, board| {
+        for counter in [u64::MAX, u64::MAX - 1000, 1_000_001, 0] {
+            let refused = said(session, board, sealed(&KEY, counter, &Request::Resume));
+            assert_eq!(refused, fault(SealFault::Counter { last: 0 }), "{counter}");
+        }
+        assert_eq!(said(session, board, sealed(&KEY, 1_000_000, &Request::Resume)), Ok(()));
+    });
+    let written = |device: &mut Device| -> usize {
+        device.journal.pages().iter().map(|page| page.words_written).sum()
+    };
+    let before = written(&mut device);
+    device.session(|session, board| {
+        for counter in 1_001_001..=1_002_000 {
+            assert_eq!(said(session, board, sealed(&KEY, counter, &Request::Resume)), Ok(()));
+        }
+    });
+    assert_eq!(written(&mut device) - before, 6, "mark, head, counter, CRC-32, zeros");
+    assert_eq!(device.identity().2, 1_002_001);
+}
+
+#[test]
+fn a_counter_that_cannot_be_written_down_does_not_count() {
+    let mut device = with_key();
+    device.session(|session, board| {
+        assert_eq!(said(session, board, sealed(&KEY, 5, &Request::Resume)), Ok(()));
+    });
+    let supply = device.journal.pages()[0].supply();
+    device.session(|session, board| {
+        supply.borrow_mut().on(Some(0));
+        let next = sealed(&KEY, 2000, &configure(Configuration::DEFAULT));
+        assert_eq!(said(session, board, next.clone()), Err(Refusal::Flash));
+        supply.borrow_mut().on(None);
+        assert_eq!(said(session, board, next), Ok(()));
+    });
+}
+
+#[test]
+fn no_request_without_the_key_wears_flash_and_a_host_with_it_is_limited() {
+    let mut device = with_key();
+    let model = blob(2, 4);
+    device.slots.iter_mut().for_each(|slot| slot.erase_interval_s = 600);
+    let worn = |device: &mut Device| -> usize {
+        let flashes = device.slots.iter().chain(device.journal.pages().iter());
+        flashes.map(|flash| flash.erases + flash.words_written).sum()
+    };
+    let before = worn(&mut device);
+    device.key = None;
+    device.session(|session, board| {
+        for _ in 0..1000 {
+            for request in [
+                Request::Upload(begin(&model)),
+                Request::Keep(Setting::Configuration),
+                Request::Forget(Setting::Constants),
+                Request::Undo { crc_32: crc_of(&blob(1, 3)) },
+                Request::Provision { key: OTHER },
+            ] {
+                let bytes = request_bytes(NUMBER, &request);
+                assert_eq!(said(session, board, bytes), fault(SealFault::Missing));
+            }
+            assert!(said(session, board, sealed(&OTHER, 1, &Request::Restart)).is_err());
+        }
+    });
+    assert_eq!(worn(&mut device), before);
+    device.key = Some(KEY);
+    device.session(|session, board| {
+        let steps = trial_steps(&model);
+        let erased = (0..1000).take_while(|_| {
+            let begun = upload_step(session, board, steps[0]).0;
+            let _ = upload_step(session, board, steps[1]);
+            begun == Ok(UploadState::Receiving { received: 0 })
+        });
+        assert_eq!(erased.count(), 100);
+    });
+}
+
+#[test]
+fn requests_without_the_key_prolong_no_lease() {
+    let mut device = with_key();
+    device.session(|session, board| {
+        let leased = Configuration { contact_threshold: 0.25, ..quiet() };
+        let request = Request::Configure { configuration: leased, lease_ms: 10_000 };
+        ask(session, board, &request, |_| ());
+        let ohm = [60.0; 6];
+        let chunk = UploadStep::Chunk { offset: 0, bytes: &[0; 4] };
+        for request in [
+            Request::Decode { frame: 1, readings_ohm: Floats::new(&ohm) },
+            Request::Kept,
+            Request::Resume,
+            Request::Upload(chunk),
+        ] {
+            board.pins.borrow_mut().now_us += 3_000_000;
+            let _ = said(session, board, request_bytes(NUMBER, &request));
+        }
+        session.step();
+        let (configuration, left) =
+            ask(session, board, &Request::Configuration, |report| match report {
+                Report::Configuration { configuration, lease_left_ms } => {
+                    (configuration, lease_left_ms)
+                }
+                other => panic!("{other:?}"),
+            })
+            .0;
+        assert_eq!((configuration, left), (quiet(), 0));
+    });
+}
+
+#[test]
+fn a_key_that_decayed_lets_nothing_change_and_the_model_stays() {
+    let mut device = with_key();
+    let places: Vec<usize> = {
+        let page = device.journal.pages()[1].bytes();
+        (0..page.len()).step_by(32).filter(|at| page[*at..].starts_with(b"ITEM\x05")).collect()
+    };
+    assert_eq!(places.len(), 2);
+    for place in places {
+        device.journal.pages()[1].decay(place / 4 + 4, 1 << 9);
+    }
+    let (model, key, _) = device.identity();
+    assert_eq!((model.unwrap().crc_32, key), (crc_of(&blob(1, 3)), KeyState::Damaged));
+    for key in [None, Some(KEY)] {
+        device.key = key;
+        device.is_held = true;
+        assert_eq!(device.install(&blob(2, 4)), fault(SealFault::KeyDamaged));
+        assert_eq!(device.provision(KEY), fault(SealFault::KeyDamaged));
     }
 }
 
 #[test]
-fn a_model_whose_seal_decays_or_is_written_by_a_debugger_is_not_in_force() {
+fn only_erasing_the_flash_removes_a_key_which_needs_a_debugger() {
     let mut device = with_key();
-    let second = blob(2, 4);
-    install(&mut device, 6, &second).unwrap();
-    let seal = second.len().div_ceil(4);
-    assert_eq!(&device.slots[0].bytes()[4 * seal..4 * seal + 4], b"SEAL");
-    device.slots[0].decay(seal + 3, 1 << 9);
-    let (model, _, highest) = identity(&mut device);
-    assert_eq!((model, highest), (Some((crc_of(&blob(1, 3)), Some(5))), Some(5)));
+    device.journal.pages().iter_mut().for_each(|page| page.erase().unwrap());
+    device.key = None;
+    assert_eq!(device.identity().1, KeyState::None);
+    assert_eq!(device.install(&blob(2, 4)), confirmed(&blob(2, 4)));
+}
+
+/// The device learns from nobody's presses: a recalibrated model comes as any other.
+#[test]
+fn there_is_no_request_behind_the_last_one() {
+    let mut device = with_key();
+    device.session(|session, board| {
+        for variant in 18..=255_u8 {
+            let covered = [&[PROTOCOL_VERSION, NUMBER as u8, variant][..], &[1; 8]].concat();
+            let packet = [&covered[..], &CRC_32.checksum(&covered).to_le_bytes()].concat();
+            let mut line = Vec::new();
+            cobs::encode(&packet, |byte| {
+                line.push(byte);
+                true
+            });
+            assert_eq!(said(session, board, line), Err(Refusal::Unknown), "{variant}");
+        }
+    });
+}
+
+#[test]
+fn a_sealed_restart_restarts() {
+    let mut slots = Flash::slots_with(&blob(1, 3));
+    let mut journal = Flash::journal();
+    journal.keep(Kind::Key, &[&KEY]).unwrap();
+    let mut bench = Bench::with_journal(quiet(), journal);
+    let board = bench.board.clone();
+    board.pins.borrow_mut().key = Some(KEY);
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let ((), end) = ask(&mut session, &board, &Request::Restart, |_| ());
+    assert_eq!(end, Some(SessionEnd::Restart));
 }

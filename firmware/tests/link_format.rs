@@ -8,7 +8,7 @@ use firmware::link::message::{
     Setting, Statistics, UploadState, UploadStep,
 };
 use firmware::link::packet::{self, PROTOCOL_VERSION};
-use firmware::seal::{Key, Seal};
+use firmware::seal::{Key, tag};
 use mock_board::request_bytes;
 use model_core::blob::Floats;
 
@@ -40,12 +40,20 @@ fn report_bytes(number: u16, report: &Report<'_>) -> Vec<u8> {
 
 type Example = (&'static str, Vec<u8>);
 
-/// A key of the examples, and a seal.
+/// Key of the examples, and the device that it is for.
 const KEY: Key = [0xA5; 32];
-const SEAL: Seal = Seal { version: 300, tag: [0x5A; 32] };
+const UNIQUE_ID: [u8; 12] = *b"an STM32F446";
 
 /// Numbers of the examples: a reading, and a missing one.
 const OHM: [f32; 2] = [60.0, f32::NAN];
+
+/// A request, sealed.
+fn sealed(request: &Request<'_>) -> Vec<u8> {
+    let mut buffer = [0; 64];
+    let request = postcard::to_slice(request, &mut buffer).unwrap();
+    let (counter, tag) = (301, tag(&KEY, &UNIQUE_ID, 301, request));
+    request_bytes(7, &Request::Sealed { counter, tag, request })
+}
 
 fn requests() -> Vec<Example> {
     let readings_ohm = Floats::new(&OHM);
@@ -78,16 +86,17 @@ fn requests() -> Vec<Example> {
         ),
         ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
         ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
-        ("try", upload(UploadStep::Try { seal: None, lease_ms: 60_000 })),
+        ("try", upload(UploadStep::Try { sha_256: None, lease_ms: 60_000 })),
         (
-            "try, sealed as version 300",
-            upload(UploadStep::Try { seal: Some(SEAL), lease_ms: 60_000 }),
+            "try a blob with a digest",
+            upload(UploadStep::Try { sha_256: Some([0x5A; 32]), lease_ms: 60_000 }),
         ),
         ("abort", upload(UploadStep::Abort)),
         ("confirm", upload(UploadStep::Confirm)),
         ("restart", request_bytes(7, &Request::Restart)),
         ("undo", request_bytes(7, &Request::Undo { crc_32: 0x1234_5678 })),
         ("provision", request_bytes(7, &Request::Provision { key: KEY })),
+        ("restart, sealed as number 301", sealed(&Request::Restart)),
         ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
         ("resume", request_bytes(8, &Request::Resume)),
     ]
@@ -113,14 +122,14 @@ fn identity() -> Report<'static> {
             inputs_crc_32: 0x1234_5678,
             outputs_crc_32: 2,
             on_trial: true,
-            version: Some(300),
         }),
         model_name: "press",
         slot_bytes: 131_056,
         chunk_bytes: 512,
         memory: Memory { vector_table: 1024, stack_reserved: 300, ..Memory::default() },
         key: KeyState::Set,
-        highest_version: Some(299),
+        unique_id: UNIQUE_ID,
+        counter: 1001,
     })
 }
 
@@ -221,10 +230,7 @@ fn reports() -> Vec<Example> {
         ),
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
-        (
-            "refused: older than version 300",
-            refused(Refusal::Seal(SealFault::Outdated { highest: 300 })),
-        ),
+        ("refused: replayed", refused(Refusal::Seal(SealFault::Counter { last: 300 }))),
         ("refused: flash", refused(Refusal::Flash)),
         ("refused: erased too often", refused(Refusal::TooSoon { wait_us: 600_000_000 })),
     ]
@@ -254,11 +260,10 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::Constants(ConstantsFault::Fixed), 10),
         (Refusal::Keep(KeepFault::Nothing), 11),
         (Refusal::TooSoon { wait_us: 1 }, 12),
-        (Refusal::LastGeneration, 13),
-        (Refusal::NothingToUndo, 14),
-        (Refusal::OnTrial, 15),
-        (Refusal::Seal(SealFault::Missing), 16),
-        (Refusal::TrialOver, 17),
+        (Refusal::NothingToUndo, 13),
+        (Refusal::OnTrial, 14),
+        (Refusal::Seal(SealFault::Missing), 15),
+        (Refusal::TrialOver, 16),
     ];
     for (refusal, number) in refusals {
         let mut buffer = [0; 16];

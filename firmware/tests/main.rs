@@ -8,7 +8,7 @@ mod fixed;
 mod app;
 mod authenticity;
 mod bit_for_bit;
-mod key;
+mod journal;
 mod link_format;
 mod recheck;
 mod settings;

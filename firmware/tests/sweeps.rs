@@ -1,25 +1,11 @@
 //! A few seeds of each sweep over power cuts, decay and attacks. `cargo xtask torture` takes many.
 
-use mock_board::sweep::{
-    Cuts, Job, abort_and_decay, cut_key, cut_model, cut_settings, forge, upload_to_worn,
-};
+use mock_board::sweep::{Job, abort_and_decay, cut, forge, upload_to_worn};
 
 /// Runs `case` for so many seeds; returns what each gives.
 fn sweep<T>(seeds: u64, case: impl Fn(u64) -> Result<T, String>) -> Vec<T> {
     let case = |seed| case(seed).unwrap_or_else(|why| panic!("seed {seed}: {why}"));
     (0..seeds).map(case).collect()
-}
-
-/// Sweeps over cuts, of which many must be made, and some in every quarter of the work.
-fn cut_everywhere(seeds: u64, case: impl Fn(u64) -> Result<Cuts, String>) {
-    let cases = sweep(seeds, case);
-    let cuts: u64 = cases.iter().map(|case| case.count).sum();
-    let quarters: Vec<usize> = cases.iter().map(|case| case.quarter).collect();
-    let quarters = counts::<4>(&quarters);
-    assert!(
-        cuts > 1000 && quarters.iter().all(|cases| 16 * cases > seeds as usize),
-        "{cuts}, {quarters:?}"
-    );
 }
 
 /// How often each of the first `N` outcomes came about.
@@ -28,20 +14,14 @@ fn counts<const N: usize>(outcomes: &[usize]) -> [usize; N] {
 }
 
 #[test]
-fn power_lost_in_an_upload_or_an_undo_leaves_the_old_or_the_new_model() {
-    for job in [Job::Upload, Job::Undo] {
-        cut_everywhere(48, |seed| cut_model(job, seed));
+fn power_lost_at_any_time_leaves_a_device_as_before_or_as_after() {
+    for job in Job::ALL {
+        let cases = sweep(12, |seed| cut(job, seed));
+        let cuts: u64 = cases.iter().map(|case| case.count).sum();
+        let quarters = [0, 1, 2, 3].map(|it| cases.iter().map(|case| case.quarters[it]).sum());
+        let few = quarters.iter().any(|first_cuts: &u64| *first_cuts < 2);
+        assert!(cuts > 1000 && !few, "{job:?}: {cuts}, {quarters:?}");
     }
-}
-
-#[test]
-fn power_lost_while_a_setting_is_kept_leaves_the_old_or_the_new_one() {
-    cut_everywhere(48, cut_settings);
-}
-
-#[test]
-fn power_lost_while_a_key_is_set_leaves_no_key_or_that_one() {
-    cut_everywhere(96, cut_key);
 }
 
 #[test]
@@ -63,14 +43,6 @@ fn flipped_bits_of_the_model_in_force_are_found_and_mended() {
 }
 
 #[test]
-fn whatever_is_changed_in_seal_or_blob_it_is_refused() {
+fn whatever_is_changed_in_a_sealed_request_it_is_refused() {
     sweep(9 * 64, forge);
-}
-
-/// An erase that was cut may leave bits that only look erased.
-#[test]
-fn a_key_outlasts_what_an_erase_that_was_cut_has_left() {
-    for seed in [1085, 1643, 8627] {
-        cut_key(seed).unwrap();
-    }
 }

@@ -1,21 +1,20 @@
 //! Undo over the link: the previous model comes into force again, whole and for good.
 
-use firmware::link::message::{Refusal, UploadState};
-use firmware::store::{MOST_RECORDS, Slot};
+use firmware::app::Session;
+use firmware::link::message::{KeepFault, Refusal, UploadState};
 use mock_board::*;
-use model_core::checksum::CRC_32;
 
 /// A device with the model `first`, flashed, and the others uploaded.
 fn device(first: &[u8], others: &[&[u8]]) -> Device {
     let mut device = Device::new(Flash::slots_with(first));
     for blob in others {
-        device.install(blob, None).unwrap();
+        device.install(blob).unwrap();
     }
     device
 }
 
 #[test]
-fn the_previous_model_can_be_had_again_as_long_as_there_is_room_for_records() {
+fn the_previous_model_can_be_had_again() {
     let (old, new) = (blob(1, 3), blob(4, 3));
     let mut device = device(&old, &[&new]);
     let back_to = |crc_32| Ok(UploadState::Confirmed { crc_32 });
@@ -25,35 +24,37 @@ fn the_previous_model_can_be_had_again_as_long_as_there_is_room_for_records() {
         assert_eq!(device.undo(left), back_to(expected));
         assert_eq!(device.restart(), Some(expected));
     }
-    let nothing = Err(Refusal::NothingToUndo);
-    assert_eq!(device.undo(7), nothing);
-    // Every change takes a record; at last there is no place for one.
-    let mut in_force = [new, old];
-    let mut undos = 0;
-    while device.undo(in_force[0]) == back_to(in_force[1]) {
-        in_force.reverse();
-        undos += 1;
-    }
-    assert_eq!(undos, MOST_RECORDS - 4, "a pair for each");
-    assert_eq!(device.undo(in_force[0]), nothing);
-    assert_eq!(device.restart(), Some(in_force[0]));
-    // Uploads make room: one in each slot.
-    let [next, last] = [blob(2, 5), blob(3, 2)];
-    device.install(&next, None).unwrap();
-    device.install(&last, None).unwrap();
-    assert_eq!(device.undo(crc_of(&last)), back_to(crc_of(&next)));
+    assert_eq!(device.undo(7), Err(Refusal::NothingToUndo));
 }
 
 #[test]
-fn behind_the_largest_generation_no_undo_comes_into_force() {
-    let old = blob(1, 3);
-    let mut device = device(&old, &[&blob(2, 5), &old]);
-    // Another record of the model in force, in slot 0, with the largest generation.
-    let record = [&b"SLOT"[..], &[0xFF; 4], &crc_of(&old).to_le_bytes()].concat();
-    let record = [&record[..], &CRC_32.checksum(&record).to_le_bytes()].concat();
-    device.slots[0].write(Flash::SLOT_BYTES - 48, &record).unwrap();
-    assert_eq!(device.undo(crc_of(&old)), Err(Refusal::LastGeneration));
-    assert_eq!(device.restart(), Some(crc_of(&old)));
+fn once_an_upload_has_begun_there_is_no_way_back_even_if_it_sends_the_same_bytes() {
+    let (old, new) = (blob(1, 3), blob(4, 3));
+    let mut device = device(&old, &[&new, &old, &new]);
+    let mut steps = trial_steps(&old);
+    steps.pop();
+    device.upload(&steps).unwrap();
+    assert_eq!(device.undo(crc_of(&new)), Err(Refusal::NothingToUndo));
+    assert_eq!(device.restart(), Some(crc_of(&new)));
+}
+
+#[test]
+fn undos_wear_flash_and_are_limited_between_restarts() {
+    let (old, new) = (blob(1, 3), blob(4, 3));
+    let mut slots = Flash::slots_with(&old);
+    let mut bench = Bench::new(quiet());
+    let board = bench.board.clone();
+    install(&mut bench, &mut slots, &mut [], (&new, 60)).unwrap();
+    let mut in_force = [crc_of(&new), crc_of(&old)];
+    for undos in 0..=100 {
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let expected = match undos {
+            100 => Err(Refusal::Keep(KeepFault::TooOften)),
+            _ => Ok(UploadState::Confirmed { crc_32: in_force[1] }),
+        };
+        assert_eq!(undo(&mut session, &board, in_force[0]).0, expected, "{undos}");
+        in_force.reverse();
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Memory regions of the model slots, of settings and key, and of weights in RAM, as the linker placed them.
+//! Memory regions of the model slots, of the journal, and of weights in RAM, as the linker placed them.
 
 use core::{ptr, slice};
 
@@ -8,10 +8,8 @@ unsafe extern "C" {
     static mut _slot_a_end: u8;
     static mut _slot_b_start: u8;
     static mut _slot_b_end: u8;
-    static mut _settings_start: u8;
-    static mut _settings_end: u8;
-    static mut _key_start: u8;
-    static mut _key_end: u8;
+    static mut _journal_start: u8;
+    static mut _journal_end: u8;
     static mut _weights_start: u32;
     static mut _weights_end: u32;
 }
@@ -33,10 +31,7 @@ pub unsafe fn take_weights() -> &'static mut [u32] {
     }
 }
 
-/// Regions of the model slots, of the pages of settings, and of the key.
-pub type Regions = ([Region; 2], [Region; 2], Region);
-
-/// Memory of one model slot, one page of settings, or the key, with exclusive access.
+/// Memory of one model slot, or one page of the journal, with exclusive access.
 #[derive(Debug)]
 pub struct Region {
     start: usize,
@@ -44,11 +39,11 @@ pub struct Region {
 }
 
 impl Region {
-    /// Takes the regions of both slots, of both pages of settings, and of the key.
+    /// Takes the regions of both slots, and of both pages of the journal.
     ///
     /// # Safety
     /// The caller must ensure that this is called only once: no two values may be the same region.
-    pub unsafe fn take() -> Regions {
+    pub unsafe fn take() -> ([Self; 2], [Self; 2]) {
         let region = |start: *const u8, end: *const u8| Self {
             start: start.expose_provenance(),
             length: end.addr() - start.addr(),
@@ -57,10 +52,10 @@ impl Region {
             region(&raw const _slot_a_start, &raw const _slot_a_end),
             region(&raw const _slot_b_start, &raw const _slot_b_end),
         ];
-        let settings = region(&raw const _settings_start, &raw const _settings_end);
-        let length = settings.length / 2;
-        let pages = [0, length].map(|offset| Self { start: settings.start + offset, length });
-        (slots, pages, region(&raw const _key_start, &raw const _key_end))
+        let journal = region(&raw const _journal_start, &raw const _journal_end);
+        let length = journal.length / 2;
+        let pages = [0, length].map(|offset| Self { start: journal.start + offset, length });
+        (slots, pages)
     }
 
     /// Address of the region's first byte.

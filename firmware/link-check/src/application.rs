@@ -6,12 +6,11 @@ use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use firmware::settings::SettingPages;
-use firmware::store::{FlashError, Slot};
+use firmware::store::{FlashError, Journal, Slot};
 
 use crate::opaque::{opaque, slot};
 
-struct Board(SettingPages<Flash>, Flash);
+struct Board(Journal<Flash>);
 
 impl Port for Board {
     fn now_us(&mut self) -> u32 {
@@ -29,8 +28,7 @@ impl Port for Board {
 }
 
 impl Platform for Board {
-    type Settings = SettingPages<Flash>;
-    type KeyArea = Flash;
+    type Page = Flash;
 
     const BOARD: &'static str = "link-check";
 
@@ -42,12 +40,12 @@ impl Platform for Board {
         opaque(Memory::default())
     }
 
-    fn settings(&mut self) -> &mut SettingPages<Flash> {
+    fn journal(&mut self) -> &mut Journal<Flash> {
         &mut self.0
     }
 
-    fn key_area(&mut self) -> &mut Flash {
-        &mut self.1
+    fn may_provision(&self) -> bool {
+        opaque(true)
     }
 }
 
@@ -95,12 +93,8 @@ pub fn exercise() {
     let mut buffers = Buffers::<8, 18, 18, { Capacity::PAPER.message_bytes() }>::new();
     let configuration = opaque(Configuration::DEFAULT);
     let sensor = Sensor(opaque(ZeroPotential::TYPICAL));
-    let mut app = App::new(
-        Board(SettingPages::new([Flash, Flash]), Flash),
-        sensor,
-        configuration,
-        &mut buffers,
-    );
+    let mut app =
+        App::new(Board(Journal::new([Flash, Flash])), sensor, configuration, &mut buffers);
     let mut weights = [0; 1024];
     app.run(&mut [Flash, Flash], &mut weights);
     opaque(weights);

@@ -5,10 +5,10 @@ use std::rc::Rc;
 
 use firmware::app::{App, Buffers, Session};
 use firmware::link::message::Configuration;
+use firmware::store::Journal;
 
 use crate::board::Board;
 use crate::flash::Flash;
-use crate::pages::SharedSettings;
 use crate::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
 use crate::source::Source;
 
@@ -42,31 +42,27 @@ impl Bench<'static> {
     /// An application on a new board. Its memory, half a kilobyte, is never freed: whoever makes many uses
     /// [`Bench::within`].
     pub fn new(configuration: Configuration) -> Self {
-        Self::with_settings(configuration, &SharedSettings::default())
+        Self::with_journal(configuration, Flash::journal())
     }
 
-    /// As [`Bench::new`], on a board on which these settings are kept.
-    pub fn with_settings(configuration: Configuration, settings: &SharedSettings) -> Self {
-        Self::within(Box::leak(Box::new(Memory::new())), configuration, settings)
+    /// As [`Bench::new`], on a board with this journal.
+    pub fn with_journal(configuration: Configuration, journal: Journal<Flash>) -> Self {
+        Self::on(Board::new(journal), Box::leak(Box::new(Memory::new())), configuration)
     }
 }
 
 impl<'m> Bench<'m> {
-    /// An application in this `memory`, which is cleared, on a new board on which these settings are kept: what a
-    /// restart leaves. The memory can be used again when the bench is dropped.
-    pub fn within(
-        memory: &'m mut Memory,
-        configuration: Configuration,
-        settings: &SharedSettings,
-    ) -> Self {
-        Self::on(Board::with_settings(settings), memory, configuration)
-    }
-
-    /// As [`Bench::within`], on this board.
+    /// An application on this board in this `memory`, which is cleared: what a restart leaves. The memory can be used again
+    /// when the bench is dropped.
     pub fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
         *memory = Memory::new();
         let frame = Rc::new(RefCell::new(frame_at_rest()));
         let source = Source::new(&frame, &board);
         Self { app: App::new(board.clone(), source, configuration, memory), board, frame }
+    }
+
+    /// Its board's journal, for the next start.
+    pub fn journal(&mut self) -> Journal<Flash> {
+        self.app.platform().journal.clone()
     }
 }

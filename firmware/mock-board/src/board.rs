@@ -1,4 +1,4 @@
-//! The board: clock, serial line and watchdog, and the memory of its settings.
+//! The board: clock, serial line, watchdog and journal, and the key of the host at the other end of the line.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -6,9 +6,10 @@ use std::rc::Rc;
 
 use firmware::link::message::Memory;
 use firmware::platform::{Platform, Port};
+use firmware::seal::Key;
+use firmware::store::Journal;
 
 use crate::flash::Flash;
-use crate::pages::SharedSettings;
 
 /// State of the board, which a test can see while the application owns the board.
 #[derive(Default)]
@@ -36,22 +37,32 @@ pub struct Pins {
     /// When it took the last byte.
     taken_us: u32,
     cycles: u32,
+    /// Whether the board's button was held at the start.
+    pub is_held: bool,
+    /// Key that the host seals its requests with, if it has one.
+    pub key: Option<Key>,
+    /// Counter of its last sealed request, once it has asked for it.
+    pub counter: Option<u64>,
+    /// Counter of the last one that was not refused.
+    pub answered: u64,
 }
 
-/// A board. Clones are the same board.
+/// A board. Clones have the same pins.
 #[derive(Clone)]
 pub struct Board {
     /// Clock, serial line and watchdog.
     pub pins: Rc<RefCell<Pins>>,
-    settings: SharedSettings,
-    /// The flash of its key; that of a clone is another one.
-    pub key: Flash,
+    /// What survives a restart besides the slots; that of a clone is another one.
+    pub journal: Journal<Flash>,
 }
 
 impl Board {
-    /// A board on which these settings are kept.
-    pub fn with_settings(settings: &SharedSettings) -> Self {
-        Self { pins: Rc::default(), settings: settings.clone(), key: Flash::without_key() }
+    /// Number that no other mock has.
+    pub const UNIQUE_ID: [u8; 12] = *b"mock board 1";
+
+    /// A board with this journal.
+    pub fn new(journal: Journal<Flash>) -> Self {
+        Self { pins: Rc::default(), journal }
     }
 }
 
@@ -83,8 +94,7 @@ impl Port for Board {
 }
 
 impl Platform for Board {
-    type Settings = SharedSettings;
-    type KeyArea = Flash;
+    type Page = Flash;
 
     const BOARD: &'static str = "test";
 
@@ -107,11 +117,15 @@ impl Platform for Board {
         pins.cycles
     }
 
-    fn settings(&mut self) -> &mut SharedSettings {
-        &mut self.settings
+    fn journal(&mut self) -> &mut Journal<Flash> {
+        &mut self.journal
     }
 
-    fn key_area(&mut self) -> &mut Flash {
-        &mut self.key
+    fn unique_id(&self) -> [u8; 12] {
+        Self::UNIQUE_ID
+    }
+
+    fn may_provision(&self) -> bool {
+        self.pins.borrow().is_held
     }
 }

@@ -3,66 +3,95 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::app::{Session, SessionEnd};
+use firmware::app::Session;
 use firmware::link::message::{
     Identity, KeyState, ModelIdentity, Refusal, Report, Request, UploadState, UploadStep,
 };
-use firmware::seal::{Key, Seal};
+use firmware::seal::Key;
+use firmware::store::{Journal, KeepError, Kind};
 
 use crate::bench::{Bench, Memory, Running, quiet};
 use crate::board::Board;
 use crate::flash::{Cells, Flash, Supply};
-use crate::host::{self, ask, model_crc, upload_steps};
+use crate::host::{self, Answer, ask, model_crc, provision, undo, upload_steps};
 use crate::models::crc_of;
-use crate::pages::SharedSettings;
 
 /// Bytes of a chunk of an upload.
 const CHUNK: usize = 100;
-
-/// Answer to a step of an upload, or to an undo.
-pub type Answer = Result<UploadState, Refusal>;
 
 /// The answer to a confirmation of `blob`.
 pub fn confirmed(blob: &[u8]) -> Answer {
     Ok(UploadState::Confirmed { crc_32: crc_of(blob) })
 }
 
-/// A device that scans on request alone. Each of its functions starts it anew.
+/// A device that scans on request alone, and the host that it knows. Each of its functions starts it anew.
 pub struct Device {
     pub slots: [Flash; 2],
-    pub key: Flash,
-    pub settings: SharedSettings,
+    pub journal: Journal<Flash>,
     /// Memory for a copy of the model.
     pub weights: Vec<u32>,
     /// Operation of the flash behind which the power is cut at the next start.
     pub cut_after: Option<u64>,
-    /// Power that is cut: that of the slots, unless it is replaced by the key's.
+    /// Power that is cut: that of the slots.
     pub supply: Rc<RefCell<Supply>>,
+    /// Key that the host seals its requests with.
+    pub key: Option<Key>,
+    /// Whether somebody holds the board's button at the start.
+    pub is_held: bool,
+    /// Largest counter of a sealed request that was not refused.
+    pub answered: u64,
     memory: Box<Memory>,
+}
+
+/// What a device's flash holds, and what its host knows.
+pub struct Snapshot {
+    cells: [Cells; 4],
+    key: Option<Key>,
+    answered: u64,
 }
 
 impl Device {
     /// A device without a key, with these slots.
     pub fn new(slots: [Flash; 2]) -> Self {
         Self {
-            cut_after: None,
             supply: slots[0].supply(),
             slots,
-            key: Flash::without_key(),
-            settings: SharedSettings::default(),
+            journal: Flash::journal(),
             weights: vec![0; 1024],
+            cut_after: None,
+            key: None,
+            is_held: false,
+            answered: 0,
             memory: Box::new(Memory::new()),
         }
     }
 
-    /// What both slots hold.
-    pub fn cells(&self) -> [Cells; 2] {
-        self.slots.each_ref().map(Flash::cells)
+    /// A device with this key, as its host has it.
+    pub fn with_key(slots: [Flash; 2], key: &Key) -> Self {
+        let mut device = Self { key: Some(*key), ..Self::new(slots) };
+        device.journal.keep(Kind::Key, &[key]).expect("there is room");
+        device
     }
 
-    /// Puts back what both slots held.
-    pub fn restore(&mut self, cells: &[Cells; 2]) {
-        self.slots.iter_mut().zip(cells).for_each(|(slot, cells)| slot.restore(cells));
+    /// What its flash holds.
+    pub fn snapshot(&mut self) -> Snapshot {
+        let [one, other] = self.journal.pages();
+        let [first, second] = &self.slots;
+        let cells = [first, second, one, other].map(Flash::cells);
+        Snapshot { cells, key: self.key, answered: self.answered }
+    }
+
+    /// Puts back what its flash held, and what its host knew.
+    pub fn restore(&mut self, Snapshot { cells, key, answered }: &Snapshot) {
+        let flashes = self.slots.iter_mut().chain(self.journal.pages());
+        flashes.zip(cells).for_each(|(flash, cells)| flash.restore(cells));
+        (self.key, self.answered) = (*key, *answered);
+    }
+
+    /// Switches the power on, and lets weak bits settle.
+    pub fn power_on(&mut self) {
+        self.slots.iter_mut().chain(self.journal.pages()).for_each(Flash::settle);
+        self.supply.borrow_mut().on(self.cut_after.take());
     }
 
     /// Lets the power be cut behind so many operations after the next start.
@@ -76,13 +105,14 @@ impl Device {
         &mut self,
         work: impl FnOnce(&mut Bench<'_>, &mut [Flash; 2], &mut [u32]) -> T,
     ) -> T {
-        self.slots.iter_mut().chain([&mut self.key]).for_each(Flash::settle);
-        self.supply.borrow_mut().on(self.cut_after.take());
-        let mut board = Board::with_settings(&self.settings);
-        board.key = self.key.clone();
+        self.power_on();
+        let board = Board::new(self.journal.clone());
+        board.pins.borrow_mut().key = self.key;
+        board.pins.borrow_mut().is_held = self.is_held;
         let mut bench = Bench::on(board, &mut self.memory, quiet());
         let done = work(&mut bench, &mut self.slots, &mut self.weights);
-        self.key = bench.app.platform().key.clone();
+        self.journal = bench.journal();
+        self.answered = self.answered.max(bench.board.pins.borrow().answered);
         done
     }
 
@@ -104,8 +134,8 @@ impl Device {
         self.session(model_crc)
     }
 
-    /// The model in force, whether there is a key, and the highest version.
-    pub fn identity(&mut self) -> (Option<ModelIdentity>, KeyState, Option<u32>) {
+    /// The model in force, whether there is a key, and the counter of sealed requests.
+    pub fn identity(&mut self) -> (Option<ModelIdentity>, KeyState, u64) {
         self.session(identity)
     }
 
@@ -114,9 +144,9 @@ impl Device {
         self.start(|bench, slots, weights| host::upload(bench, slots, weights, steps))
     }
 
-    /// Uploads `blob` with this seal, and confirms it.
-    pub fn install(&mut self, blob: &[u8], seal: Option<Seal>) -> Answer {
-        self.upload(&confirmed_steps(blob, seal))
+    /// Uploads `blob`, and confirms it.
+    pub fn install(&mut self, blob: &[u8]) -> Answer {
+        self.upload(&confirmed_steps(blob))
     }
 
     /// Leaves the model with the CRC-32 `left` for the one before it.
@@ -128,72 +158,34 @@ impl Device {
     pub fn provision(&mut self, key: Key) -> Result<(), Refusal> {
         self.session(|session, board| provision(session, board, key).0)
     }
+
+    /// Keeps `bytes` in the journal, past the application.
+    pub fn keep(&mut self, kind: Kind, bytes: &[u8]) -> Result<bool, KeepError> {
+        self.power_on();
+        self.journal.keep(kind, &[bytes])
+    }
 }
 
 /// Steps of an upload in chunks of 100 bytes, until it is on trial.
-pub fn trial_steps(blob: &[u8], seal: Option<Seal>) -> Vec<UploadStep<'_>> {
-    let mut steps = upload_steps(blob, CHUNK);
-    steps.pop();
-    steps.push(UploadStep::Try { seal, lease_ms: 60_000 });
-    steps
+pub fn trial_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
+    upload_steps(blob, CHUNK)
 }
 
 /// The same, and its confirmation.
-pub fn confirmed_steps(blob: &[u8], seal: Option<Seal>) -> Vec<UploadStep<'_>> {
-    let mut steps = trial_steps(blob, seal);
+pub fn confirmed_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
+    let mut steps = trial_steps(blob);
     steps.push(UploadStep::Confirm);
     steps
 }
 
-/// The model in force, whether there is a key, and the highest version.
+/// The model in force, whether there is a key, and the counter of sealed requests.
 pub fn identity(
     session: &mut Running<'_, '_>,
     board: &Board,
-) -> (Option<ModelIdentity>, KeyState, Option<u32>) {
+) -> (Option<ModelIdentity>, KeyState, u64) {
     ask(session, board, &Request::Identify, |report| match report {
-        Report::Identity(Identity { model, key, highest_version, .. }) => {
-            (model, key, highest_version)
-        }
+        Report::Identity(Identity { model, key, counter, .. }) => (model, key, counter),
         other => panic!("{other:?}"),
     })
     .0
-}
-
-/// Carries out one step of an upload.
-pub fn upload_step(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    step: UploadStep<'_>,
-) -> (Answer, Option<SessionEnd>) {
-    ask(session, board, &Request::Upload(step), answer)
-}
-
-/// Leaves the model with the CRC-32 `left` for the one before it.
-pub fn undo(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    left: u32,
-) -> (Answer, Option<SessionEnd>) {
-    ask(session, board, &Request::Undo { crc_32: left }, answer)
-}
-
-fn answer(report: Report<'_>) -> Answer {
-    match report {
-        Report::Upload(state) => Ok(state),
-        Report::Refused(refusal) => Err(refusal),
-        other => panic!("{other:?}"),
-    }
-}
-
-/// Sets the key.
-pub fn provision(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    key: Key,
-) -> (Result<(), Refusal>, Option<SessionEnd>) {
-    ask(session, board, &Request::Provision { key }, |report| match report {
-        Report::Provisioned => Ok(()),
-        Report::Refused(refusal) => Err(refusal),
-        other => panic!("{other:?}"),
-    })
 }

@@ -4,9 +4,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::seal::Key;
-use firmware::settings::PAGE_BYTES;
-use firmware::store::{DeviceKey, FlashError, Slot};
+use firmware::store::{FlashError, Journal, PAGE_BYTES, Slot};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -145,7 +143,7 @@ pub struct Cells {
     has_weak: bool,
 }
 
-/// Flash that is erased as a whole: a model slot, a page of settings, or the key's. A clone is another chip with the same
+/// Flash that is erased as a whole: a model slot, or a page of the journal. A clone is another chip with the same
 /// content, on the same power.
 #[derive(Clone)]
 pub struct Flash {
@@ -171,8 +169,6 @@ pub struct Flash {
 impl Flash {
     /// Length in bytes of a model slot.
     pub const SLOT_BYTES: usize = 2048;
-    /// Length in bytes of the flash for a key.
-    pub const KEY_BYTES: usize = 480;
 
     /// Erased flash of so many `words`.
     pub fn erased(words: usize, supply: &Rc<RefCell<Supply>>, torn: Torn) -> Self {
@@ -209,22 +205,16 @@ impl Flash {
         slots
     }
 
-    /// A pair of erased pages of settings.
-    pub fn pages() -> [Self; 2] {
-        Self::pair(PAGE_BYTES)
+    /// An empty journal.
+    pub fn journal() -> Journal<Self> {
+        Journal::new(Self::pair(PAGE_BYTES))
     }
 
-    /// Flash for a key, as it comes from the factory.
-    pub fn without_key() -> Self {
-        let [flash, _] = Self::pair(Self::KEY_BYTES);
-        flash
-    }
-
-    /// Flash in which this key is set.
-    pub fn with_key(key: &Key) -> Self {
-        let mut flash = Self::without_key();
-        DeviceKey::set(&mut flash, key).expect("there is room");
-        flash
+    /// A journal whose pages hold these bytes.
+    pub fn journal_of(pages: [&[u8]; 2]) -> Journal<Self> {
+        let mut journal = Self::journal();
+        journal.pages().iter_mut().zip(pages).for_each(|(page, bytes)| page.flash(0, bytes));
+        journal
     }
 
     /// Its power.

@@ -6,6 +6,7 @@ use firmware::link::message::{
 };
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
+use firmware::seal::{Key, sha_256, tag};
 use model_core::blob::Model;
 
 use crate::bench::{Bench, Running};
@@ -14,6 +15,9 @@ use crate::flash::Flash;
 
 /// Number of the requests of [`ask`].
 const ASKED: u16 = 77;
+
+/// Answer to a step of an upload, or to an undo.
+pub type Answer = Result<UploadState, Refusal>;
 
 /// A request for a configuration of the device's own.
 pub fn configure(configuration: Configuration) -> Request<'static> {
@@ -73,23 +77,59 @@ pub fn settle(session: &mut Running<'_, '_>, board: &Board) -> Option<SessionEnd
     None
 }
 
-/// Sends `request` and passes the answer to `read`. All that the device has sent before is forgotten.
+/// The bytes of a request that this key seals for the mock board.
+pub fn sealed(key: &Key, counter: u64, request: &Request<'_>) -> Vec<u8> {
+    let mut buffer = [0; 1024];
+    let request = postcard::to_slice(request, &mut buffer).unwrap();
+    let tag = tag(key, &Board::UNIQUE_ID, counter, request);
+    request_bytes(ASKED, &Request::Sealed { counter, tag, request })
+}
+
+/// Sends `request` and passes the answer to `read`; what needs a seal is sealed if the host has a key. All that the device
+/// has sent before is forgotten.
 pub fn ask<T>(
     session: &mut Running<'_, '_>,
     board: &Board,
     request: &Request<'_>,
     read: impl FnOnce(Report<'_>) -> T,
 ) -> (T, Option<SessionEnd>) {
+    let key = board.pins.borrow().key.filter(|_| !request.is_free());
+    let Some(key) = key else {
+        return send(session, board, request_bytes(ASKED, request), read);
+    };
+    let known = board.pins.borrow().counter;
+    let last = known.unwrap_or_else(|| {
+        send(session, board, request_bytes(ASKED, &Request::Identify), |report| match report {
+            Report::Identity(identity) => identity.counter,
+            other => panic!("{other:?}"),
+        })
+        .0
+    });
+    board.pins.borrow_mut().counter = Some(last + 1);
+    send(session, board, sealed(&key, last + 1, request), |report| {
+        if !matches!(report, Report::Refused(_)) {
+            board.pins.borrow_mut().answered = last + 1;
+        }
+        read(report)
+    })
+}
+
+/// Sends the bytes of a request and passes the answer to `read`.
+pub fn send<T>(
+    session: &mut Running<'_, '_>,
+    board: &Board,
+    bytes: Vec<u8>,
+    read: impl FnOnce(Report<'_>) -> T,
+) -> (T, Option<SessionEnd>) {
     board.pins.borrow_mut().to_host.clear();
-    board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, request));
+    board.pins.borrow_mut().to_device.extend(bytes);
     let end = settle(session, board);
     let answer = std::mem::take(&mut board.pins.borrow_mut().to_host);
     let mut read = Some(read);
     let found = find_report(&answer, |number, report| {
         if number == ASKED { read.take().map(|read| read(report)) } else { None }
     });
-    let found =
-        found.unwrap_or_else(|| panic!("no answer to {request:?} in {:?}", reports(&answer)));
+    let found = found.unwrap_or_else(|| panic!("no answer in {:?}", reports(&answer)));
     (found, end)
 }
 
@@ -116,7 +156,7 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
 }
 
-/// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial without a seal. [`install`] goes on
+/// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial. [`install`] goes on
 /// to the confirmation.
 pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
     let mut steps = vec![begin(blob)];
@@ -125,7 +165,7 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
             .enumerate()
             .map(|(i, bytes)| UploadStep::Chunk { offset: (i * chunk) as u32, bytes }),
     );
-    steps.push(UploadStep::Try { seal: None, lease_ms: 60_000 });
+    steps.push(UploadStep::Try { sha_256: Some(sha_256(blob)), lease_ms: 60_000 });
     steps
 }
 
@@ -136,43 +176,57 @@ pub fn upload(
     slots: &mut [Flash; 2],
     weights: &mut [u32],
     steps: &[UploadStep<'_>],
-) -> Result<UploadState, Refusal> {
+) -> Answer {
     let board = bench.board.clone();
     let mut steps = steps.iter();
     let mut last = Ok(UploadState::Idle);
-    let mut left = None;
-    board.pins.borrow_mut().to_host.clear();
     loop {
         let mut session = Session::start(&mut bench.app, slots, weights);
-        if left == Some(SessionEnd::Confirm) {
-            last = answer(&board);
-        }
-        loop {
+        let mut end = None;
+        while end.is_none() {
             let Some(step) = steps.next().filter(|_| last.is_ok()) else { return last };
-            board.pins.borrow_mut().to_host.clear();
-            board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, &Request::Upload(*step)));
-            left = settle(&mut session, &board);
-            match left {
-                Some(SessionEnd::Confirm) => break,
-                None | Some(SessionEnd::NewModel) => last = answer(&board),
-                Some(other) => panic!("{step:?} leads to {other:?}"),
-            }
-            if left.is_some() {
-                break;
-            }
+            (last, end) = upload_step(&mut session, &board, *step);
         }
     }
 }
 
-/// The answer to a step of an upload, among all that the device has sent.
-fn answer(board: &Board) -> Result<UploadState, Refusal> {
-    let bytes = std::mem::take(&mut board.pins.borrow_mut().to_host);
-    let found = find_report(&bytes, |number, report| match report {
-        Report::Upload(state) if number == ASKED => Some(Ok(state)),
-        Report::Refused(refusal) if number == ASKED => Some(Err(refusal)),
-        _ => None,
-    });
-    found.unwrap_or_else(|| panic!("no answer in {:?}", reports(&bytes)))
+/// Carries out one step of an upload.
+pub fn upload_step(
+    session: &mut Running<'_, '_>,
+    board: &Board,
+    step: UploadStep<'_>,
+) -> (Answer, Option<SessionEnd>) {
+    ask(session, board, &Request::Upload(step), answer)
+}
+
+/// Leaves the model with the CRC-32 `left` for the one before it.
+pub fn undo(
+    session: &mut Running<'_, '_>,
+    board: &Board,
+    left: u32,
+) -> (Answer, Option<SessionEnd>) {
+    ask(session, board, &Request::Undo { crc_32: left }, answer)
+}
+
+fn answer(report: Report<'_>) -> Answer {
+    match report {
+        Report::Upload(state) => Ok(state),
+        Report::Refused(refusal) => Err(refusal),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Sets the key.
+pub fn provision(
+    session: &mut Running<'_, '_>,
+    board: &Board,
+    key: Key,
+) -> (Result<(), Refusal>, Option<SessionEnd>) {
+    ask(session, board, &Request::Provision { key }, |report| match report {
+        Report::Provisioned => Ok(()),
+        Report::Refused(refusal) => Err(refusal),
+        other => panic!("{other:?}"),
+    })
 }
 
 /// Uploads `blob` in chunks of `chunk` bytes and confirms it.
@@ -181,7 +235,7 @@ pub fn install(
     slots: &mut [Flash; 2],
     weights: &mut [u32],
     (blob, chunk): (&[u8], usize),
-) -> Result<UploadState, Refusal> {
+) -> Answer {
     let mut steps = upload_steps(blob, chunk);
     steps.push(UploadStep::Confirm);
     upload(bench, slots, weights, &steps)

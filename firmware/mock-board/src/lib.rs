@@ -1,4 +1,4 @@
-//! A board without hardware: sensor, serial line, clock, flash and settings as mocks, and the host at the other end
+//! A board without hardware: sensor, serial line, clock and flash as mocks, and the host at the other end
 //! of the line. All are stricter than real parts, and panic where a test asks for what cannot be.
 //!
 //! [`Bench`] puts an application together with what it is connected to:
@@ -21,7 +21,6 @@ mod shape;
 mod flash;
 #[cfg(target_os = "linux")]
 mod decay;
-mod pages;
 mod board;
 mod source;
 mod models;
@@ -34,17 +33,14 @@ pub use bench::{Bench, Memory, Running, TestApp, TestSession, quiet};
 pub use board::{Board, Pins};
 #[cfg(target_os = "linux")]
 pub use decay::flip_bit;
-pub use device::{
-    Answer, Device, confirmed, confirmed_steps, identity, provision, trial_steps, undo, upload_step,
-};
+pub use device::{Device, Snapshot, confirmed, confirmed_steps, identity, trial_steps};
 pub use flash::{Cells, Flash, Supply, Torn, Worn};
 pub use host::{
-    ask, begin, configure, find_report, install, model_crc, reports, request_bytes, settle,
-    statistics, upload, upload_steps,
+    Answer, ask, begin, configure, find_report, install, model_crc, provision, reports,
+    request_bytes, sealed, send, settle, statistics, undo, upload, upload_step, upload_steps,
 };
 pub use models::{
     blob, blob_of, blob_of_components, blob_of_length, blob_with_confidence, crc_of, parts,
 };
-pub use pages::SharedSettings;
 pub use shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
 pub use source::Source;

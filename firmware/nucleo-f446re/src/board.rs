@@ -64,10 +64,10 @@ pub struct Board {
     pub delay: SysDelay,
     /// The two model slots.
     pub slots: [Slot; 2],
-    /// The two pages of settings.
-    pub settings: [Slot; 2],
-    /// Flash for the key.
-    pub key: Slot,
+    /// The two pages of the journal.
+    pub pages: [Slot; 2],
+    /// Whether the blue button was held at the start.
+    pub is_button_held: bool,
     /// Watchdog, already running; it restarts the program if it is not fed for 8 s.
     pub watchdog: IndependentWatchdog,
 }
@@ -111,7 +111,7 @@ impl Board {
 
         let serial = Serial::start(parts.USART2, gpioa.pa2, gpioa.pa3, &mut rcc)?;
         let clock = Clock::start(parts.TIM2, &mut rcc)?;
-        let (slots, settings, key) = Slot::all(parts.FLASH);
+        let (slots, pages) = Slot::all(parts.FLASH);
         let high = PinState::High;
         let selects = [
             Some(gpiob.pb12.into_push_pull_output_in_state(high).erase()),
@@ -134,8 +134,8 @@ impl Board {
             // From the processor's own clock: from an eighth of it, the HAL's waits would be 2 % short.
             delay: Timer::syst(core.SYST, &rcc.clocks).delay(),
             slots,
-            settings,
-            key,
+            pages,
+            is_button_held: gpioc.pc13.into_input().is_low(),
             watchdog,
         })
     }

@@ -9,10 +9,11 @@ use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
-use firmware::settings::SettingPages;
+use firmware::store::Journal;
 use nucleo_f446re::{Board, Clock, Oscillator, Serial, Slot, memory, restart};
 use panic_probe as _;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
+use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 /// Constants of the circuit, until others are kept: `host-sim link PORT calibrate` measures your own.
@@ -23,8 +24,8 @@ struct Nucleo {
     clock: Clock,
     watchdog: IndependentWatchdog,
     led: ErasedPin<Output>,
-    settings: SettingPages<Slot>,
-    key: Slot,
+    journal: Journal<Slot>,
+    is_button_held: bool,
 }
 
 impl Port for Nucleo {
@@ -42,8 +43,7 @@ impl Port for Nucleo {
 }
 
 impl Platform for Nucleo {
-    type Settings = SettingPages<Slot>;
-    type KeyArea = Slot;
+    type Page = Slot;
 
     const BOARD: &'static str = "nucleo-f446re";
 
@@ -62,12 +62,24 @@ impl Platform for Nucleo {
         self.clock.cycles()
     }
 
-    fn settings(&mut self) -> &mut SettingPages<Slot> {
-        &mut self.settings
+    fn journal(&mut self) -> &mut Journal<Slot> {
+        &mut self.journal
     }
 
-    fn key_area(&mut self) -> &mut Slot {
-        &mut self.key
+    fn unique_id(&self) -> [u8; 12] {
+        let id = Uid::get();
+        let [x, y] = [id.x(), id.y()].map(u16::to_le_bytes);
+        let parts: [&[u8]; 4] = [&x, &y, &[id.waf_num()], id.lot_num().as_bytes()];
+        let mut bytes = [0; 12];
+        bytes
+            .iter_mut()
+            .zip(parts.iter().copied().flatten())
+            .for_each(|(place, byte)| *place = *byte);
+        bytes
+    }
+
+    fn may_provision(&self) -> bool {
+        self.is_button_held
     }
 }
 
@@ -95,8 +107,8 @@ fn main() -> ! {
         clock: board.clock,
         watchdog: board.watchdog,
         led: board.led,
-        settings: SettingPages::new(board.settings),
-        key: board.key,
+        journal: Journal::new(board.pages),
+        is_button_held: board.is_button_held,
     };
     let buffers = unwrap!(buffers());
     let mut app = BoardApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);

@@ -1,4 +1,4 @@
-//! Model slots in sectors 6 and 7 of the flash, pages of settings in sectors 1 and 2, and the key in sector 3.
+//! Model slots and pages of the journal, in sectors of the flash that regions.x names.
 
 use board_common::region::Region;
 use firmware::store::FlashError;
@@ -19,15 +19,15 @@ pub enum SlotError {
     Refused,
 }
 
-/// Flash for one model, one page of settings, or the key. Erasing sets all its bits to 1; writing can only set bits to 0.
+/// Flash for one model, or one page of the journal. Erasing sets all its bits to 1; writing can only set bits to 0.
 pub struct Slot(Region);
 
 impl Slot {
-    /// Takes both model slots, both pages of settings, the flash for the key, and the flash controller, which they share.
-    pub(crate) fn all(_: FLASH) -> ([Self; 2], [Self; 2], Self) {
+    /// Takes both model slots, both pages of the journal, and the flash controller, which they share.
+    pub(crate) fn all(_: FLASH) -> ([Self; 2], [Self; 2]) {
         // SAFETY: there is only one controller value, so this is called only once.
-        let (slots, pages, key) = unsafe { Region::take() };
-        (slots.map(Self), pages.map(Self), Self(key))
+        let (slots, pages) = unsafe { Region::take() };
+        (slots.map(Self), pages.map(Self))
     }
 
     /// All bytes of the slot.

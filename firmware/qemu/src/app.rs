@@ -12,7 +12,7 @@ use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use firmware::settings::SettingPages;
+use firmware::store::Journal;
 use qemu_image::clock::Clock;
 use qemu_image::mailbox::Mailbox;
 use qemu_image::psram::Psram;
@@ -69,8 +69,7 @@ struct Board {
     clock: Clock,
     watchdog: Watchdog,
     fed_us: u32,
-    settings: SettingPages<Slot>,
-    key: Slot,
+    journal: Journal<Slot>,
 }
 
 impl Port for Board {
@@ -94,8 +93,7 @@ impl Port for Board {
 }
 
 impl Platform for Board {
-    type Settings = SettingPages<Slot>;
-    type KeyArea = Slot;
+    type Page = Slot;
 
     const BOARD: &'static str = "qemu mps2-an386";
 
@@ -112,12 +110,8 @@ impl Platform for Board {
         memory::taken()
     }
 
-    fn settings(&mut self) -> &mut SettingPages<Slot> {
-        &mut self.settings
-    }
-
-    fn key_area(&mut self) -> &mut Slot {
-        &mut self.key
+    fn journal(&mut self) -> &mut Journal<Slot> {
+        &mut self.journal
     }
 }
 
@@ -128,14 +122,13 @@ fn main() -> ! {
     let carrier = Carrier::find();
     info!("link: {=str}", carrier.name());
     // SAFETY: the slots are taken here only.
-    let (mut slots, pages, key) = unsafe { Slot::take() };
+    let (mut slots, pages) = unsafe { Slot::take() };
     let board = Board {
         carrier,
         clock,
         watchdog: Watchdog::start(WATCHDOG_MS),
         fed_us: 0,
-        settings: SettingPages::new(pages),
-        key,
+        journal: Journal::new(pages),
     };
     // There is nothing to scan, unless the host asks for it.
     let configuration = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };

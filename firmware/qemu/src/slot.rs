@@ -1,4 +1,4 @@
-//! Model slots and pages of settings, which behave as flash does.
+//! Model slots and pages of the journal, which behave as flash does.
 //!
 //! They lie in code memory, which QEMU lets a program write to. `-device
 //! loader,file=model.bin,addr=0x200000,force-raw=on` on QEMU's command line puts a model into slot
@@ -16,18 +16,18 @@ pub enum SlotError {
     NotErased,
 }
 
-/// Memory for one model, one page of settings, or the key. Erasing sets all its bits to 1; writing can only set bits to 0.
+/// Memory for one model, or one page of the journal. Erasing sets all its bits to 1; writing can only set bits to 0.
 pub struct Slot(Region);
 
 impl Slot {
-    /// Takes both model slots, both pages of settings, and the flash for the key.
+    /// Takes both model slots, and both pages of the journal.
     ///
     /// # Safety
     /// The caller must ensure that this is called only once: no two values may be the same slot.
-    pub unsafe fn take() -> ([Self; 2], [Self; 2], Self) {
+    pub unsafe fn take() -> ([Self; 2], [Self; 2]) {
         // SAFETY: the caller ensures that this is called only once.
-        let (slots, pages, key) = unsafe { Region::take() };
-        (slots.map(Self), pages.map(Self), Self(key))
+        let (slots, pages) = unsafe { Region::take() };
+        (slots.map(Self), pages.map(Self))
     }
 
     /// All bytes of the slot.

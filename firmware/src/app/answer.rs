@@ -11,7 +11,8 @@ use super::session::Session;
 use super::session_end::SessionEnd;
 use crate::circuit::ConstantsFault;
 use crate::link::message::{
-    ConfidenceSent, Configuration, Identity, Refusal, Report, Request, UploadState, UploadStep,
+    ConfidenceSent, Configuration, Identity, KeyState, Refusal, Report, Request, UploadState,
+    UploadStep,
 };
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
@@ -64,12 +65,21 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         };
         let Self { sensor, models, link, work } = self;
         link.statistics.requests = link.statistics.requests.saturating_add(1);
-        if !request.only_asks() {
+        let is_sealed = matches!(request, Request::Sealed { .. });
+        let request = match models.authenticity.open(request, link.platform()) {
+            Ok(request) => request,
+            Err(refusal) => {
+                link.send(number, &Report::Refused(refusal));
+                return None;
+            }
+        };
+        let is_keyless = models.authenticity.key_state() == KeyState::None;
+        if is_sealed || models.is_chunk(request) || is_keyless && !request.only_asks() {
             let now_us = link.platform().now_us();
             link.lease.hear(now_us);
         }
         let mut end = None;
-        // Nothing is sent for `Ok(None)`: the answer takes a while, or is sent already.
+        // Nothing is sent for `Ok(None)`: the answer takes a while.
         let report = match request {
             Request::Identify => Ok(Some(Report::Identity(models.identity(model, spare, link)))),
             Request::Statistics => Ok(Some(Report::Statistics(link.statistics))),
@@ -97,16 +107,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 work.decode_baseline(&sensor.baseline, model.decoder.as_ref());
                 Some(Report::Baseline { readings_ohm: Floats::new(sensor.baseline.mean()) })
             }),
-            Request::Upload(UploadStep::Confirm) if models.trial.is_going_on() => {
-                models.trial.confirm(number);
-                end = Some(SessionEnd::Confirm);
-                Ok(None)
-            }
             Request::Upload(step) => models
                 .upload_step(step, model, spare, link, &mut end)
                 .map(|()| Some(Report::Upload(models.upload.state()))),
             Request::Undo { crc_32 } => models
-                .undo(crc_32, model, spare, &mut end)
+                .undo(crc_32, model, spare, link, &mut end)
                 .map(|crc_32| Some(Report::Upload(UploadState::Confirmed { crc_32 }))),
             Request::Restart => {
                 info!("restart asked for");
@@ -126,16 +131,18 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 }
                 Err(fault) => Err(Refusal::Constants(fault)),
             },
-            Request::Kept => Ok(Some(Report::Kept(sensor.kept(link)))),
+            Request::Kept => Ok(Some(Report::Kept(link.kept()))),
             Request::Keep(setting) => {
-                sensor.keep(setting, link).map(|()| Some(Report::Kept(sensor.kept(link))))
+                sensor.keep(setting, link).map(|()| Some(Report::Kept(link.kept())))
             }
             Request::Forget(setting) => {
-                sensor.forget(setting, link).map(|()| Some(Report::Kept(sensor.kept(link))))
+                link.forget(setting).map(|()| Some(Report::Kept(link.kept())))
             }
             Request::Provision { key } => models
-                .provision(&key, link.platform(), &mut end)
+                .authenticity
+                .provision(&key, link.platform())
                 .map(|()| Some(Report::Provisioned)),
+            Request::Sealed { .. } => Err(Refusal::Unknown), // in another one
         };
         match report {
             Ok(Some(report)) => link.send(number, &report),
@@ -161,6 +168,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
 }
 
 impl Models {
+    /// Whether a request is a chunk of the upload that is going on.
+    fn is_chunk(&self, request: Request<'_>) -> bool {
+        matches!(request, Request::Upload(UploadStep::Chunk { .. })) && self.upload.is_receiving()
+    }
+
     fn identity<'i, P: Platform, S: Slot, const ROWS: usize>(
         &self,
         model: &'i InForce<'_, ROWS>,
@@ -176,11 +188,12 @@ impl Models {
             kernel: Polynomial::NAME,
             model: model.identity,
             model_name: model.name(),
-            slot_bytes: self.authenticity.capacity(spare.bytes()) as u32,
+            slot_bytes: spare.bytes().len() as u32,
             chunk_bytes: chunk_bytes(self.capacity.message_bytes()) as u16,
             memory: link.platform().memory(),
             key: self.authenticity.key_state(),
-            highest_version: self.authenticity.highest(),
+            unique_id: link.platform().unique_id(),
+            counter: self.authenticity.counter(),
         }
     }
 }

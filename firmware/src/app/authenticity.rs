@@ -1,134 +1,180 @@
-//! Which models the device's key lets come into force.
+//! The device's key: what a host may change, and what it must seal for that.
 
-use crate::link::message::{KeyState, Refusal, SealFault};
-use crate::log::{info, warning};
-use crate::seal::{Key, Seal, is_same};
-use crate::store::{DeviceKey, SEAL_BYTES, Slot, blob_in_slot, capacity, generation, seal_in_slot};
+use crate::link::message::{KeyState, Refusal, Request, SealFault};
+use crate::platform::Platform;
 
-/// The device's key, and the seals that it has found good.
-pub struct Authenticity {
-    key: DeviceKey,
-    /// Good seals in the slots when the session began.
-    seals: [Option<Seal>; 2],
-    /// Highest version that was ever confirmed, as far as the slots tell.
-    highest: Option<u32>,
-}
+#[cfg(feature = "seal")]
+mod keyed {
+    use super::{KeyState, Platform, Refusal, Request, SealFault};
+    use crate::log::info;
+    use crate::seal::{Key, is_same, sha_256, tag};
+    use crate::store::{Journal, KeyFound, Kind, Slot};
 
-impl Authenticity {
-    /// Reads the key in this `area` of flash, and makes it last.
-    pub fn new<S: Slot>(area: &mut S) -> Self {
-        let key = DeviceKey::find(area.bytes());
-        match key.settle(area) {
-            Ok(false) => {}
-            Ok(true) => info!("key: a damaged or unfinished copy was found and made good"),
-            Err(_) => warning!("key: not two sound copies, no place or the flash failed"),
+    /// Largest distance from one counter to the next: nobody who has the key for a while can use up all of them.
+    const MOST_AHEAD: u64 = 1_000_000;
+
+    /// Number of requests between two writes of the counter to flash.
+    const RESERVED: u64 = 1000;
+
+    /// The device's key, and the counter of sealed requests.
+    pub struct Authenticity {
+        state: KeyState,
+        key: Key,
+        /// Largest counter so far, or beyond.
+        last: u64,
+        /// Number from which on counters are written down before they count.
+        reserved: u64,
+    }
+
+    impl Authenticity {
+        /// Reads key and counter in a `journal`. No request that counted before the start counts again.
+        pub fn new<S: Slot>(journal: &Journal<S>) -> Self {
+            let (state, key) = match journal.key() {
+                KeyFound::None => (KeyState::None, Key::default()),
+                KeyFound::Set(key) => (KeyState::Set, *key),
+                KeyFound::Damaged => (KeyState::Damaged, Key::default()),
+            };
+            let counter = journal.read(Kind::Counter).and_then(|bytes| bytes.first_chunk());
+            let last = counter.copied().map_or(0, u64::from_le_bytes);
+            Self { state, key, last, reserved: last }
         }
-        Self { key, seals: [None; 2], highest: None }
-    }
 
-    /// Looks at the seals in both slots.
-    pub fn read_seals<S: Slot>(&mut self, slots: &[S; 2]) {
-        let DeviceKey::Set(key) = &self.key else { return };
-        for ((index, slot), seal) in slots.iter().enumerate().zip(&mut self.seals) {
-            let bytes = slot.bytes();
-            *seal = seal_in_slot(bytes).filter(|seal| seal.fits(key, blob_in_slot(bytes)));
-            if generation(index, bytes).is_some() {
-                self.highest = self.highest.max(seal.map(|seal| seal.version));
-            }
+        /// Whether there is a key.
+        pub fn key_state(&self) -> KeyState {
+            self.state
         }
-    }
 
-    /// Whether the model in `slot` may come into force.
-    pub fn allows(&self, slot: usize) -> bool {
-        match self.key {
-            DeviceKey::None => true,
-            DeviceKey::Set(_) => self.seal_of(slot).is_some(),
-            DeviceKey::Damaged => false,
+        /// Largest counter so far, or beyond.
+        pub fn counter(&self) -> u64 {
+            self.last
         }
-    }
 
-    /// Good seal in `slot`.
-    pub fn seal_of(&self, slot: usize) -> Option<Seal> {
-        self.seals.get(slot).copied().flatten()
-    }
-
-    /// Largest blob for `slot`, in bytes.
-    pub fn capacity(&self, slot: &[u8]) -> usize {
-        let seal = if matches!(self.key, DeviceKey::None) { 0 } else { SEAL_BYTES };
-        capacity(slot).saturating_sub(seal)
-    }
-
-    /// Whether there is a key.
-    pub fn key_state(&self) -> KeyState {
-        match self.key {
-            DeviceKey::None => KeyState::None,
-            DeviceKey::Set(_) => KeyState::Set,
-            DeviceKey::Damaged => KeyState::Damaged,
-        }
-    }
-
-    /// Highest version that was confirmed.
-    pub fn highest(&self) -> Option<u32> {
-        self.highest
-    }
-
-    /// Checks whether `blob` may come into force with this `seal`. The same seal again is no step back.
-    pub fn check(&self, blob: &[u8], seal: Option<Seal>) -> Result<(), Refusal> {
-        let fault = match (&self.key, seal) {
-            (DeviceKey::None, None) => return Ok(()),
-            (DeviceKey::None, Some(_)) => SealFault::NoKey,
-            (DeviceKey::Damaged, _) => SealFault::KeyDamaged,
-            (DeviceKey::Set(_), None) => SealFault::Missing,
-            (DeviceKey::Set(key), Some(seal)) if !seal.fits(key, blob) => SealFault::Forged,
-            (DeviceKey::Set(_), Some(seal)) => return self.check_version(seal),
-        };
-        Err(Refusal::Seal(fault))
-    }
-
-    /// Checks that a good `seal` leads to no older model.
-    fn check_version(&self, seal: Seal) -> Result<(), Refusal> {
-        match self.highest {
-            Some(highest) if seal.version < highest || self.is_another_of(seal, highest) => {
-                Err(Refusal::Seal(SealFault::Outdated { highest }))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Whether `seal` has the version `highest`, and is not one that stands in a slot.
-    fn is_another_of(&self, seal: Seal, highest: u32) -> bool {
-        seal.version == highest && !self.seals.contains(&Some(seal))
-    }
-
-    /// Checks that going back to the model in `slot` is no step to a lower version.
-    pub fn check_undo(&self, slot: usize) -> Result<(), Refusal> {
-        match (&self.key, self.seal_of(slot)) {
-            (DeviceKey::None, _) => Ok(()),
-            (DeviceKey::Damaged, _) => Err(Refusal::Seal(SealFault::KeyDamaged)),
-            (DeviceKey::Set(_), None) => Err(Refusal::Seal(SealFault::Missing)),
-            (DeviceKey::Set(_), Some(seal)) => self.check_version(seal),
-        }
-    }
-
-    /// Sets the key for good. The same key again makes copies good that have decayed.
-    pub fn provision<S: Slot>(&mut self, area: &mut S, key: &Key) -> Result<(), Refusal> {
-        match &self.key {
-            DeviceKey::None => {
-                // The key may be set although the flash failed: in its second copy.
-                let _ = DeviceKey::set(area, key);
-            }
-            DeviceKey::Set(old) if is_same(old, key) => {
-                let _ = self.key.settle(area);
-                return Ok(());
-            }
-            DeviceKey::Set(_) => return Err(Refusal::Seal(SealFault::KeyIsSet)),
-            DeviceKey::Damaged => {
-                if DeviceKey::mend(area, key) == Ok(false) {
-                    return Err(Refusal::Seal(SealFault::KeyDamaged));
+        /// What a host asks for, if it may: the request in a seal, or one that needs none.
+        pub fn open<'r, P: Platform>(
+            &mut self,
+            request: Request<'r>,
+            platform: &mut P,
+        ) -> Result<Request<'r>, Refusal> {
+            let fault = match (self.state, request) {
+                (_, Request::Sealed { .. }) if self.state == KeyState::None => SealFault::NoKey,
+                (KeyState::Set, Request::Sealed { counter, tag: found, request }) => {
+                    let right = tag(&self.key, &platform.unique_id(), counter, request);
+                    if is_same(&right, &found) {
+                        self.count(counter, platform)?;
+                        return inner(request).ok_or(Refusal::Unknown);
+                    }
+                    SealFault::Forged
                 }
+                _ if request.is_free() => return Ok(request),
+                (KeyState::None, Request::Provision { .. }) if !platform.may_provision() => {
+                    SealFault::NotAllowed
+                }
+                (KeyState::None, _) => return Ok(request),
+                // The answer was lost.
+                (KeyState::Set, Request::Provision { key }) if is_same(&key, &self.key) => {
+                    return Ok(request);
+                }
+                (KeyState::Set, _) => SealFault::Missing,
+                (KeyState::Damaged, _) => SealFault::KeyDamaged,
+            };
+            Err(Refusal::Seal(fault))
+        }
+
+        /// Takes note of a `counter`: neither it nor a lower one counts again, not even after a restart.
+        fn count<P: Platform>(&mut self, counter: u64, platform: &mut P) -> Result<(), Refusal> {
+            let ahead = counter.checked_sub(self.last).filter(|ahead| *ahead > 0);
+            if ahead.is_none_or(|ahead| ahead > MOST_AHEAD) {
+                return Err(Refusal::Seal(SealFault::Counter { last: self.last }));
+            }
+            if counter > self.reserved {
+                let reserved = counter.saturating_add(RESERVED);
+                platform.feed_watchdog(); // it may erase flash
+                let kept = platform.journal().keep(Kind::Counter, &[&reserved.to_le_bytes()]);
+                kept.map_err(|_| Refusal::Flash)?;
+                self.reserved = reserved;
+            }
+            self.last = counter;
+            Ok(())
+        }
+
+        /// Checks the digest of a `blob` that is to be tried out.
+        pub fn check(&self, blob: &[u8], digest: Option<[u8; 32]>) -> Result<(), Refusal> {
+            match digest {
+                _ if self.state == KeyState::None => Ok(()),
+                None => Err(Refusal::Seal(SealFault::Missing)),
+                Some(digest) if digest == sha_256(blob) => Ok(()),
+                Some(_) => Err(Refusal::Seal(SealFault::Forged)),
             }
         }
-        self.key = DeviceKey::find(area.bytes());
-        if matches!(self.key, DeviceKey::Set(_)) { Ok(()) } else { Err(Refusal::Flash) }
+
+        /// Sets the key.
+        pub fn provision<P: Platform>(
+            &mut self,
+            key: &Key,
+            platform: &mut P,
+        ) -> Result<(), Refusal> {
+            platform.feed_watchdog(); // it erases flash
+            let kept = platform.journal().keep(Kind::Key, &[key]);
+            *self =
+                Self { last: self.last, reserved: self.reserved, ..Self::new(platform.journal()) };
+            kept.map_err(|_| Refusal::Flash)?;
+            info!("the device has a key from now on");
+            Ok(())
+        }
+    }
+
+    /// The request in a seal. It is no seal itself.
+    fn inner(bytes: &[u8]) -> Option<Request<'_>> {
+        match postcard::take_from_bytes(bytes) {
+            Ok((Request::Sealed { .. }, _)) | Err(_) => None,
+            Ok((request, rest)) => rest.is_empty().then_some(request),
+        }
     }
 }
+
+#[cfg(not(feature = "seal"))]
+mod keyless {
+    use super::{KeyState, Platform, Refusal, Request, SealFault};
+    use crate::store::{Journal, Slot};
+
+    const UNSUPPORTED: Refusal = Refusal::Seal(SealFault::Unsupported);
+
+    /// No key: any host may change anything.
+    pub struct Authenticity;
+
+    impl Authenticity {
+        pub fn new<S: Slot>(_: &Journal<S>) -> Self {
+            Self
+        }
+
+        pub fn key_state(&self) -> KeyState {
+            KeyState::None
+        }
+
+        pub fn counter(&self) -> u64 {
+            0
+        }
+
+        pub fn open<'r, P: Platform>(
+            &mut self,
+            request: Request<'r>,
+            _: &mut P,
+        ) -> Result<Request<'r>, Refusal> {
+            let is_known = !matches!(request, Request::Sealed { .. } | Request::Provision { .. });
+            if is_known { Ok(request) } else { Err(UNSUPPORTED) }
+        }
+
+        pub fn check(&self, _: &[u8], _: Option<[u8; 32]>) -> Result<(), Refusal> {
+            Ok(())
+        }
+
+        pub fn provision<P: Platform>(&mut self, _: &[u8; 32], _: &mut P) -> Result<(), Refusal> {
+            Err(UNSUPPORTED)
+        }
+    }
+}
+
+#[cfg(feature = "seal")]
+pub use keyed::Authenticity;
+#[cfg(not(feature = "seal"))]
+pub use keyless::Authenticity;

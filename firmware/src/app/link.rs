@@ -2,15 +2,19 @@
 
 use super::frame_clock::LongClock;
 use super::lease::Lease;
-use crate::link::message::{Report, Statistics};
+use crate::link::message::{KeepFault, Refusal, Report, Statistics};
 use crate::link::{cobs, packet};
 use crate::platform::{Platform, Port};
+use crate::store::KeepError;
 
 /// Longest time in µs without progress of a report; then it is given up.
 const STALL_US: u32 = 50_000;
 /// Longest time in µs that all reports of a turn of the loop may take together. With the longest scan it is less
 /// than a watchdog's period.
 const TURN_US: u32 = 2_000_000;
+
+/// Most writes between two restarts: flash wears, and a host may be in an endless loop.
+const MOST_WRITES: u16 = 100;
 
 /// The board's serial line, with room for one report.
 pub struct Link<'m, P> {
@@ -19,6 +23,8 @@ pub struct Link<'m, P> {
     time: LongClock,
     pub lease: Lease,
     pub statistics: Statistics,
+    /// Number of times that the host may still have something kept before the next restart.
+    pub writes_left: u16,
     /// Whether the last report was given up in the middle, so that its frame must still be ended.
     cut: bool,
     /// What is left of [`TURN_US`].
@@ -26,9 +32,22 @@ pub struct Link<'m, P> {
 }
 
 impl<P: Platform> Link<'_, P> {
-    /// The memory that keeps settings, and the room for a report, which no report needs meanwhile.
-    pub fn settings(&mut self) -> (&mut P::Settings, &mut [u8]) {
-        (self.platform.settings(), self.buffer)
+    /// Counts a write of `kept`, if there was one, and converts its outcome.
+    pub fn count_write(&mut self, kept: Result<bool, KeepError>) -> Result<(), Refusal> {
+        if kept != Ok(false) {
+            self.platform.feed_watchdog(); // an erase may have taken half a second
+            self.writes_left = self.writes_left.saturating_sub(1);
+        }
+        match kept {
+            Ok(_) => Ok(()),
+            Err(KeepError::TooLarge) => Err(Refusal::Keep(KeepFault::TooLarge)),
+            Err(KeepError::Failed) => Err(Refusal::Flash),
+        }
+    }
+
+    /// Checks that the host may have something kept.
+    pub fn may_write(&self) -> Result<(), Refusal> {
+        if self.writes_left > 0 { Ok(()) } else { Err(Refusal::Keep(KeepFault::TooOften)) }
     }
 }
 
@@ -36,7 +55,17 @@ impl<'m, P: Port> Link<'m, P> {
     pub fn new(mut platform: P, buffer: &'m mut [u8]) -> Self {
         let time = LongClock::starting_at(platform.now_us());
         let (lease, statistics) = (Lease::NONE, Statistics::default());
-        Self { platform, buffer, time, lease, statistics, cut: false, left_us: TURN_US }
+        let writes_left = MOST_WRITES;
+        Self {
+            platform,
+            buffer,
+            time,
+            lease,
+            statistics,
+            writes_left,
+            cut: false,
+            left_us: TURN_US,
+        }
     }
 
     /// Begins a turn of the loop.

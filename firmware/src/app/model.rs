@@ -7,7 +7,7 @@ use model_core::{Decoder, RowWire, scratch_floats};
 
 use crate::capacity::Capacity;
 use crate::link::message::{ModelFault, ModelIdentity};
-use crate::store::{Slot, blob_in_slot, generation};
+use crate::store::{ConfirmedModels, Slot, blob_in_slot};
 
 /// The model in force, if there is one.
 pub struct InForce<'a, const ROWS: usize> {
@@ -29,7 +29,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
         &mut self,
         capacity: Capacity,
         bytes: &'a [u8],
-        Candidate { slot, generation, on_trial }: Candidate,
+        Candidate { slot, on_trial }: Candidate,
         in_ram: bool,
     ) -> Option<()> {
         let blob = blob_in_slot(bytes);
@@ -39,7 +39,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
         let identity = ModelIdentity {
             crc_32: decoder.model_crc(),
             slot: slot as u8,
-            generation,
+            generation: 0,
             rows: shape.rows as u8,
             inputs: shape.inputs as u16,
             outputs: shape.outputs as u16,
@@ -48,7 +48,6 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
             inputs_crc_32: crc_of(metadata.input_names, metadata.input_units),
             outputs_crc_32: crc_of(metadata.output_names, metadata.output_units),
             on_trial,
-            version: None,
         };
         (self.identity, self.blob) = (Some(identity), blob);
         Some(())
@@ -61,9 +60,16 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
         cut.unwrap_or_default()
     }
 
-    /// Generation of the model; 0 without one.
-    pub fn generation(&self) -> u32 {
-        self.identity.map_or(0, |identity| identity.generation)
+    /// Number of the slot that is not in force: 1 without a model.
+    pub fn spare_slot(&self) -> usize {
+        self.identity.map_or(1, |model| 1 - usize::from(model.slot.min(1)))
+    }
+
+    /// CRC-32 of the model in force, if it is sound in its slot.
+    pub fn stored_crc(&self, capacity: Capacity) -> Option<u32> {
+        let is_copy = self.identity.is_some_and(|model| model.in_ram);
+        let stored = if is_copy { self.stored } else { Some(self.blob) };
+        Some(check(capacity, stored?).ok()?.crc())
     }
 }
 
@@ -125,8 +131,6 @@ fn row_of(name: &str) -> Option<RowWire> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Candidate {
     pub slot: usize,
-    /// Generation that it has, or that it gets when it is confirmed.
-    pub generation: u32,
     pub on_trial: bool,
 }
 
@@ -142,21 +146,19 @@ pub fn choose<S: Slot>(
     })
 }
 
-/// The slots that may be in force, in the order in which they are tried: the one `on_trial`, and then those with a
-/// generation, the most recent first.
-pub fn candidates<S: Slot>(slots: &[S; 2], on_trial: Option<usize>) -> [Option<Candidate>; 3] {
-    let [a, b] = slots;
-    let committed = |slot, bytes| {
-        let generation = generation(slot, bytes)?;
-        Some(Candidate { slot, generation, on_trial: false })
+/// The slots that may be in force, in the order in which they are tried: the one `on_trial`, and then those whose models
+/// were `confirmed`.
+pub fn candidates<S: Slot>(
+    slots: &[S; 2],
+    confirmed: &ConfirmedModels,
+    on_trial: Option<usize>,
+) -> [Option<Candidate>; 3] {
+    let of_slot = |slot: usize| {
+        let bytes = slots.get(slot)?.bytes();
+        confirmed.has(slot, bytes).then_some(Candidate { slot, on_trial: false })
     };
-    let (a, b) = (committed(0, a.bytes()), committed(1, b.bytes()));
-    let generation = |candidate: Option<Candidate>| candidate.map(|found| found.generation);
-    let [newest, older] = if generation(b) > generation(a) { [b, a] } else { [a, b] };
-    let next = generation(newest).unwrap_or(0).saturating_add(1);
-    let tried = on_trial.map(|slot| Candidate { slot, generation: next, on_trial: true });
-    // None first would be taken for an empty slot.
-    if tried.is_some() { [tried, newest, older] } else { [newest, older, None] }
+    let tried = on_trial.map(|slot| Candidate { slot, on_trial: true });
+    [tried, of_slot(confirmed.in_force), of_slot(1 - confirmed.in_force.min(1))]
 }
 
 /// Copies the blob at the start of `bytes` to `room`, if it fits; returns the copy.

@@ -21,7 +21,7 @@ use crate::link::message::{Configuration, KeepFault, Kept, KeptBaseline, Refusal
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
-use crate::settings::{KeepError, Keeper};
+use crate::store::Kind;
 
 /// Version of what is kept for `setting`. Whoever changes the setting's fields must raise it.
 const fn version(setting: Setting) -> u8 {
@@ -32,25 +32,24 @@ const fn version(setting: Setting) -> u8 {
     }
 }
 
+/// Whether the image keeps settings.
+const KEEPS: bool = cfg!(feature = "settings");
+
 /// Largest size of a configuration in bytes.
 const CONFIGURATION_BYTES: usize = 64;
 
 impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
     /// Puts the configuration and the constants that are kept in force.
     pub(super) fn load_settings<P: Platform>(&mut self, link: &mut Link<'_, P>) {
-        let (keeper, buffer) = link.settings();
-        if keeper.recover().is_err() {
-            warning!("the memory of settings failed");
+        if !KEEPS {
+            return;
         }
-        if let Some(configuration) =
-            keeper.read(Setting::Configuration, buffer).and_then(configuration)
-        {
+        let journal = link.platform().journal();
+        if let Some(configuration) = journal.read(Kind::Configuration).and_then(configuration) {
             (self.configuration, self.own_configuration) = (configuration, configuration);
             info!("configuration as kept: a frame every {=u32} us", configuration.frame_period_us);
         }
-        let (keeper, buffer) = link.settings();
-        let kept = keeper.read(Setting::Constants, buffer).and_then(constants);
-        if let Some(constants) = kept {
+        if let Some(constants) = journal.read(Kind::Constants).and_then(constants) {
             if self.source.set_constants(constants).is_ok() {
                 info!("constants as kept: drive voltage {=f32} V", constants.drive_v);
             } else {
@@ -62,10 +61,11 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
     /// Puts the baseline that is kept in force, if it is of the wires that are scanned, and was read with the
     /// constants in force.
     pub(super) fn load_baseline<P: Platform>(&mut self, link: &mut Link<'_, P>) {
+        if !KEEPS {
+            return;
+        }
         let constants_crc = self.constants_crc();
-        let (keeper, buffer) = link.settings();
-        let kept = keeper.read(Setting::Baseline, buffer).and_then(baseline);
-        match kept {
+        match link.platform().journal().read(Kind::Baseline).and_then(baseline) {
             Some(kept) if kept.wires == self.wires && kept.constants_crc == constants_crc => {
                 self.baseline.restore(kept.readings, kept.frames);
                 info!("baseline as kept: {=u16} frames", kept.frames);
@@ -75,21 +75,6 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         }
     }
 
-    /// The settings that are kept.
-    pub(super) fn kept<P: Platform>(&self, link: &mut Link<'_, P>) -> Kept {
-        let writes_left = self.writes_left;
-        let (keeper, buffer) = link.settings();
-        let configuration = keeper.read(Setting::Configuration, buffer).and_then(configuration);
-        let constants = keeper.read(Setting::Constants, buffer).and_then(constants).is_some();
-        let baseline = keeper.read(Setting::Baseline, buffer).and_then(baseline);
-        let baseline = baseline.map(|kept| KeptBaseline {
-            rows: kept.wires.rows as u8,
-            columns: kept.wires.columns as u8,
-            frames: kept.frames,
-        });
-        Kept { configuration, constants, baseline, writes_left }
-    }
-
     /// Keeps a setting that is in force.
     pub(super) fn keep<P: Platform>(
         &mut self,
@@ -97,11 +82,9 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         link: &mut Link<'_, P>,
     ) -> Result<(), Refusal> {
         const NOTHING: Refusal = Refusal::Keep(KeepFault::Nothing);
-        if self.writes_left == 0 {
-            return Err(Refusal::Keep(KeepFault::TooOften));
-        }
+        link.may_keep()?;
         let constants_crc = self.constants_crc();
-        let keeper = link.platform().settings();
+        let journal = link.platform().journal();
         let version = version(setting);
         let written = match setting {
             Setting::Configuration => {
@@ -110,7 +93,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
                 let mut bytes = [0; CONFIGURATION_BYTES];
                 let fields = postcard::to_slice(&self.configuration, &mut bytes);
                 let fields = fields.map_err(|_| Refusal::Keep(KeepFault::TooLarge))?;
-                keeper.keep(setting, &[&[version], fields])
+                journal.keep(setting.into(), &[&[version], fields])
             }
             Setting::Constants => {
                 let Some(c) = self.source.constants() else { return Err(NOTHING) };
@@ -123,7 +106,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
                     c.feedback_ohm.0,
                     c.series_ohm.0,
                 ];
-                keeper.keep(setting, &parts)
+                journal.keep(setting.into(), &parts)
             }
             Setting::Baseline => {
                 let frames = self.baseline.frames();
@@ -133,10 +116,10 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
                 let [low, high] = frames.to_le_bytes();
                 let head = [version, self.wires.rows as u8, self.wires.columns as u8, low, high];
                 let readings = Floats::new(self.baseline.mean()).0;
-                keeper.keep(setting, &[&head, &constants_crc.to_le_bytes(), readings])
+                journal.keep(setting.into(), &[&head, &constants_crc.to_le_bytes(), readings])
             }
         };
-        self.count_write(written, link)
+        link.count_write(written)
     }
 
     /// CRC-32 of the constants in force; 0 if there are none.
@@ -149,34 +132,37 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         resistances.iter().for_each(|bytes| digest.update(bytes));
         digest.finalize()
     }
+}
 
-    /// Keeps a setting no longer.
-    pub(super) fn forget<P: Platform>(
-        &mut self,
-        setting: Setting,
-        link: &mut Link<'_, P>,
-    ) -> Result<(), Refusal> {
-        if self.writes_left == 0 {
-            return Err(Refusal::Keep(KeepFault::TooOften));
-        }
-        let written = link.platform().settings().keep(setting, &[]);
-        self.count_write(written, link)
+impl<P: Platform> Link<'_, P> {
+    /// Checks that the host may have a setting kept, or forgotten.
+    fn may_keep(&self) -> Result<(), Refusal> {
+        if KEEPS { self.may_write() } else { Err(Refusal::Keep(KeepFault::Unsupported)) }
     }
 
-    fn count_write<P: Platform>(
-        &mut self,
-        written: Result<bool, KeepError>,
-        link: &mut Link<'_, P>,
-    ) -> Result<(), Refusal> {
-        if written != Ok(false) {
-            link.platform().feed_watchdog(); // an erase may have taken half a second
-            self.writes_left = self.writes_left.saturating_sub(1);
+    /// The settings that are kept.
+    pub(super) fn kept(&mut self) -> Kept {
+        let writes_left = self.writes_left;
+        if !KEEPS {
+            return Kept { configuration: None, constants: false, baseline: None, writes_left };
         }
-        match written {
-            Ok(_) => Ok(()),
-            Err(KeepError::TooLarge) => Err(Refusal::Keep(KeepFault::TooLarge)),
-            Err(KeepError::Failed) => Err(Refusal::Flash),
-        }
+        let journal = self.platform().journal();
+        let configuration = journal.read(Kind::Configuration).and_then(configuration);
+        let constants = journal.read(Kind::Constants).and_then(constants).is_some();
+        let baseline = journal.read(Kind::Baseline).and_then(baseline);
+        let baseline = baseline.map(|kept| KeptBaseline {
+            rows: kept.wires.rows as u8,
+            columns: kept.wires.columns as u8,
+            frames: kept.frames,
+        });
+        Kept { configuration, constants, baseline, writes_left }
+    }
+
+    /// Keeps a setting no longer.
+    pub(super) fn forget(&mut self, setting: Setting) -> Result<(), Refusal> {
+        self.may_keep()?;
+        let written = self.platform().journal().keep(setting.into(), &[]);
+        self.count_write(written)
     }
 }
 

@@ -13,9 +13,6 @@ use crate::log::info;
 use crate::platform::Platform;
 use crate::readout::{Baseline, FrameSource, Selection};
 
-/// Most writes between two restarts: flash wears, and a host may be in an endless loop.
-const MOST_WRITES: u16 = 100;
-
 /// The sensor and the settings that belong to it.
 pub struct Sensor<'m, F, const ROWS: usize> {
     pub source: F,
@@ -36,8 +33,6 @@ pub struct Sensor<'m, F, const ROWS: usize> {
     pub capture: Option<Capture>,
     /// Whether the last scan gave at least one reading.
     pub answers: bool,
-    /// Number of times that settings may still be written before the next restart.
-    pub writes_left: u16,
 }
 
 /// A baseline that is being captured.
@@ -72,7 +67,6 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
             baseline: Baseline::new(baseline),
             capture: None,
             answers: true,
-            writes_left: MOST_WRITES,
         }
     }
 

@@ -12,7 +12,7 @@ use crate::link::packet::UNASKED;
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
-use crate::store::{Slot, blob_in_slot, generation};
+use crate::store::{ConfirmedModels, Slot, blob_in_slot};
 
 /// The application with the model in force, whose memory it borrows, and with the spare slot.
 pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
@@ -34,13 +34,9 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         weights: &'a mut [u32],
     ) -> Self {
         let Core { models, link, .. } = &mut app.core;
-        models.confirm(slots, link);
-        models.authenticity.read_seals(slots);
-        models.write_missing_records(slots);
-        let capacity = models.capacity;
-        let authenticity = &models.authenticity;
-        let candidates = candidates(slots, models.trial.slot())
-            .map(|candidate| candidate.filter(|found| authenticity.allows(found.slot)));
+        models.confirmed = ConfirmedModels::read(link.platform().journal(), slots);
+        let (capacity, confirmed) = (models.capacity, models.confirmed);
+        let candidates = candidates(slots, &confirmed, models.trial.slot());
         let best = candidates.into_iter().flatten().next();
         // Only the copy is checked, so the best model is looked at once.
         let bytes = best.and_then(|best| slots.get(best.slot)).map_or(&[][..], S::bytes);
@@ -56,11 +52,8 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
             // Without a model if that fails.
             let _ = model.load(capacity, active.bytes(), chosen, false);
         }
-        if let Some(identity) = &mut model.identity {
-            let seal = models.authenticity.seal_of(identity.slot.into());
-            identity.version = seal.map(|seal| seal.version);
-        }
-        if let Some(model) = &model.identity {
+        if let Some(model) = &mut model.identity {
+            model.generation = confirmed.generation.wrapping_add(u32::from(model.on_trial));
             info!(
                 "model {=u32:08x} in force, slot {=u8}, generation {=u32}, in RAM: {=bool}",
                 model.crc_32, model.slot, model.generation, model.in_ram
@@ -70,7 +63,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         }
         // Behind an uploaded model in slot 1, the spare slot is slot 0. For a line of the log, the blob's head will do.
         if slot == Some(1)
-            && generation(0, spare.bytes()) == Some(0)
+            && confirmed.crcs[0].is_none()
             && check_head(capacity, blob_in_slot(spare.bytes())).is_ok()
         {
             info!("slot 0 holds a model that was flashed, not uploaded: it is not used");

@@ -1,4 +1,4 @@
-//! A model on trial: in force without a record, so that every restart brings the previous one back, whether the watchdog
+//! A model on trial: in force without being kept as that, so that every restart brings the previous one back, whether the watchdog
 //! or the power caused it.
 
 use super::lease::MOST_LEASE_MS;
@@ -6,17 +6,15 @@ use super::lease::MOST_LEASE_MS;
 /// Whether a model is on trial.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Trial {
-    slot: Option<u8>,
+    slot: Option<usize>,
     /// Time in µs since the start at which it ends.
     ends_us: u64,
-    /// Number of the request to confirm it.
-    confirms: Option<u16>,
 }
 
 impl Trial {
     /// Slot of the model on trial.
     pub fn slot(self) -> Option<usize> {
-        self.slot.map(usize::from)
+        self.slot
     }
 
     /// Whether there is one.
@@ -25,7 +23,7 @@ impl Trial {
     }
 
     /// Puts the model in `slot` on trial.
-    pub fn begin(&mut self, slot: u8) {
+    pub fn begin(&mut self, slot: usize) {
         self.slot = Some(slot);
     }
 
@@ -37,15 +35,5 @@ impl Trial {
     /// Whether there is one, and its time is over.
     pub fn is_over(&self, now_us: u64) -> bool {
         self.is_going_on() && now_us >= self.ends_us
-    }
-
-    /// Number of the request to confirm the model, if there was one.
-    pub fn confirms(&mut self) -> Option<u16> {
-        self.confirms.take()
-    }
-
-    /// Lets the next session confirm the model, and answer request `number`: the slot is not borrowed then.
-    pub fn confirm(&mut self, number: u16) {
-        self.confirms = Some(number);
     }
 }

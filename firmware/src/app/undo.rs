@@ -1,20 +1,23 @@
 //! Undo: the previous model comes into force again.
 
+use super::link::Link;
 use super::model::{self, InForce};
 use super::models::Models;
 use super::session_end::SessionEnd;
 use crate::link::message::Refusal;
 use crate::log::info;
-use crate::store::{Slot, blob_in_slot, generation, reinstate};
+use crate::platform::Platform;
+use crate::store::{Slot, blob_in_slot};
 
 impl Models {
     /// Puts the spare slot's model in force again, and leaves the one with the CRC-32 `left`; returns the CRC-32 of the
     /// one in force then.
-    pub(super) fn undo<S: Slot, const ROWS: usize>(
+    pub(super) fn undo<P: Platform, S: Slot, const ROWS: usize>(
         &mut self,
         left: u32,
         in_force: &InForce<'_, ROWS>,
-        spare: &mut S,
+        spare: &S,
+        link: &mut Link<'_, P>,
         end: &mut Option<SessionEnd>,
     ) -> Result<u32, Refusal> {
         const NOTHING: Refusal = Refusal::NothingToUndo;
@@ -25,23 +28,19 @@ impl Models {
             // The answer was lost, if the model that was to be left is the spare one.
             return if previous == left { Ok(identity.crc_32) } else { Err(NOTHING) };
         }
-        let slot = 1 - usize::from(identity.slot.min(1));
-        generation(slot, spare.bytes()).ok_or(NOTHING)?;
-        if self.end_trial() {
-            *end = Some(SessionEnd::NewModel);
-            return Ok(previous);
+        let slot = in_force.spare_slot();
+        if !self.confirmed.has(slot, spare.bytes()) {
+            return Err(NOTHING);
         }
-        self.authenticity.check_undo(slot)?;
-        let next = identity.generation.checked_add(1).ok_or(Refusal::LastGeneration)?;
-        match reinstate(spare, next) {
-            None => Err(NOTHING),
-            Some(Err(_)) => Err(Refusal::Flash),
-            Some(Ok(())) => {
-                info!("model {=u32:08x} in force again", previous);
-                self.upload.abort();
-                *end = Some(SessionEnd::NewModel);
-                Ok(previous)
-            }
+        if !self.end_trial() {
+            link.may_write()?;
+            let confirmed = self.confirmed.exchanged(slot, self.confirmed.crcs);
+            let kept = confirmed.keep(link.platform().journal());
+            link.count_write(kept)?;
+            info!("model {=u32:08x} in force again", previous);
+            self.upload.abort();
         }
+        *end = Some(SessionEnd::NewModel);
+        Ok(previous)
     }
 }

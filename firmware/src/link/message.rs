@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::circuit::{Constants, ConstantsFault};
 use crate::readout::ScanSettings;
-use crate::seal::{Key, Seal};
 
 /// A request of the host. The device answers each with one [`Report`] that repeats the request's number. Every
 /// request may be repeated without harm.
@@ -77,11 +76,21 @@ pub enum Request<'a> {
         /// CRC-32 of the model in force, which is left: a repeated request does not undo twice.
         crc_32: u32,
     },
-    /// Set the device's key: from now on only models with a seal made by it come into force. It can be set once.
+    /// Set the device's key: from now on a request that changes anything must be sealed by it ([`Request::Sealed`]). The
+    /// first key is taken only if somebody at the board allows it. Another one replaces it, sealed by the one before.
     /// Answered by [`Report::Provisioned`].
     Provision {
         /// The key.
-        key: Key,
+        key: [u8; 32],
+    },
+    /// Carry out another request, which comes from whoever has the key. Answered as that one, or by [`Refusal::Seal`].
+    Sealed {
+        /// Number that rises from one sealed request to the next, so that none counts twice ([`Identity::counter`]).
+        counter: u64,
+        /// HMAC-SHA256 by the key, of purpose, device, counter and request.
+        tag: [u8; 32],
+        /// The request, as postcard fields.
+        request: &'a [u8],
     },
 }
 
@@ -89,6 +98,15 @@ impl Request<'_> {
     /// Whether the request changes nothing, and so prolongs no lease.
     pub fn only_asks(&self) -> bool {
         matches!(self, Self::Identify | Self::Statistics | Self::Configuration)
+    }
+
+    /// Whether it needs no seal on a device with a key: it changes neither estimates nor flash, or is a chunk of an
+    /// upload, whose bytes the seal of the trial covers.
+    pub fn is_free(&self) -> bool {
+        let chunk = matches!(self, Self::Upload(UploadStep::Chunk { .. }));
+        chunk
+            || self.only_asks()
+            || matches!(self, Self::Decode { .. } | Self::Constants | Self::Kept)
     }
 }
 
@@ -113,8 +131,8 @@ pub enum UploadStep<'a> {
     /// Check the blob from end to end, and put it in force on trial if it is sound: until it is confirmed, a restart
     /// brings the previous model back.
     Try {
-        /// The blob's seal, for a device with a key.
-        seal: Option<Seal>,
+        /// SHA-256 of the blob, for a device with a key.
+        sha_256: Option<[u8; 32]>,
         /// Time in ms, at most half an hour, after which the previous model comes back unless the trial is confirmed.
         /// The same step again lets it last so long from then on.
         lease_ms: u32,
@@ -217,18 +235,20 @@ pub struct Identity<'a> {
     pub memory: Memory,
     /// Whether the device has a key.
     pub key: KeyState,
-    /// Highest version of a seal that was confirmed, as far as the slots tell.
-    pub highest_version: Option<u32>,
+    /// Number that no other device of this board has; zeros if the board has none.
+    pub unique_id: [u8; 12],
+    /// Largest counter of a sealed request so far, or beyond: the next one must be above it.
+    pub counter: u64,
 }
 
 /// Whether a device has a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum KeyState {
-    /// It has none, and takes any sound model.
+    /// It has none, and does what any host asks.
     None,
-    /// It has one, and takes models with a seal made by it.
+    /// It has one, and changes nothing without a seal made by it.
     Set,
-    /// It had one, which has decayed, and takes no model.
+    /// It had one, which has decayed, and changes nothing any more.
     Damaged,
 }
 
@@ -239,7 +259,7 @@ pub struct ModelIdentity {
     pub crc_32: u32,
     /// Slot of the model, 0 or 1.
     pub slot: u8,
-    /// Number of models confirmed on this device up to this one; 0 if the model was not uploaded.
+    /// Number of times that a model came into force for good on this device; 0 if this one was flashed with the firmware.
     pub generation: u32,
     /// Number of rows.
     pub rows: u8,
@@ -257,8 +277,6 @@ pub struct ModelIdentity {
     pub outputs_crc_32: u32,
     /// Whether the model is on trial: not confirmed, and gone with the next restart.
     pub on_trial: bool,
-    /// Version of its seal, if it has one and the device has a key.
-    pub version: Option<u32>,
 }
 
 /// Use of a device's memory, in bytes.
@@ -539,16 +557,14 @@ pub enum Refusal {
     Flash,
     /// The circuit has no constants, or cannot take these.
     Constants(ConstantsFault),
-    /// The setting cannot be kept.
+    /// The setting, or another model, cannot be kept.
     Keep(KeepFault),
     /// The flash was erased too often ([`erase_interval_s`](crate::store::Slot::erase_interval_s)).
     TooSoon {
         /// Time in µs until it may be erased again.
         wait_us: u64,
     },
-    /// The model in force has the largest generation, so no other can be more recent.
-    LastGeneration,
-    /// There is no model in force, the spare slot holds no previous one, or it has no room for another record.
+    /// There is no model in force, or the spare slot holds no previous one.
     NothingToUndo,
     /// A model is on trial: it must be confirmed or aborted first.
     OnTrial,
@@ -561,21 +577,23 @@ pub enum Refusal {
 /// What the device's key has against a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SealFault {
-    /// The model has no seal, and the device has a key.
+    /// The request has no seal, or a trial no digest, and the device has a key.
     Missing,
-    /// The seal was not made of this blob, with this version and this key.
+    /// The seal was not made of this request by this key for this device, or the digest not of the blob that was uploaded.
     Forged,
-    /// The version is lower than one that was confirmed, or the same for another blob.
-    Outdated {
-        /// Highest version that was confirmed.
-        highest: u32,
+    /// The counter is not above the largest so far, or far above it.
+    Counter {
+        /// Largest counter so far, or beyond.
+        last: u64,
     },
-    /// The model has a seal, and the device has no key.
+    /// The request has a seal, and the device has no key.
     NoKey,
-    /// The device has another key.
-    KeyIsSet,
+    /// Nobody at the board allowed it to take a key: hold its button while it starts.
+    NotAllowed,
     /// The device's key has decayed.
     KeyDamaged,
+    /// The image knows no keys: it was built without the feature `seal`.
+    Unsupported,
 }
 
 /// Why a setting cannot be kept.
@@ -585,8 +603,10 @@ pub enum KeepFault {
     Nothing,
     /// It is too large for the device's memory.
     TooLarge,
-    /// Settings were written too often since the start; a restart allows more.
+    /// Settings and undos were written too often since the start; a restart allows more.
     TooOften,
+    /// The image keeps no settings: it was built without the feature `settings`.
+    Unsupported,
 }
 
 /// A field of [`Configuration`] that can be out of range.

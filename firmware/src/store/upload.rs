@@ -1,9 +1,7 @@
 //! Upload of a blob in chunks.
 
-use super::records::{RECORD_MAGIC, record, record_pairs};
-use super::{ERASES_AT_ONCE, FlashError, SEAL_BYTES, SEAL_MARK, Slot, capacity, seal_place};
+use super::{ERASES_AT_ONCE, FlashError, Slot};
 use crate::link::message::{Refusal, UploadState};
-use crate::seal::Seal;
 
 /// State of an upload, whose bytes are in the spare slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,31 +37,29 @@ impl Upload {
         matches!(self.state, UploadState::Receiving { .. })
     }
 
-    /// Prepares `spare` for a blob of `length` bytes at the time `now_us` since the start. The slot is erased, and
-    /// marked as one with an upload, unless it still is from the last begin.
+    /// Prepares `spare` for a blob of `length` bytes at the time `now_us` since the start. The slot is erased unless it
+    /// still is from the last begin.
     ///
-    /// Calls `feed` just before and after an erase: it must feed the watchdog, since the processor may stand still.
+    /// Calls `prepare` just before an erase. It must write down that no model of the slot counts any more.
     ///
     /// # Errors
     /// [`Refusal::TooLarge`] if the blob does not fit, [`Refusal::TooSoon`] after too many erases,
-    /// [`Refusal::Flash`] if erasing fails.
+    /// [`Refusal::Flash`] if erasing or preparing fails.
     pub fn begin<S: Slot>(
         &mut self,
         spare: &mut S,
         length: usize,
         now_us: u64,
-        mut feed: impl FnMut(),
+        prepare: impl FnOnce() -> Result<(), FlashError>,
     ) -> Result<(), Refusal> {
-        let capacity = capacity(spare.bytes());
-        if length > capacity {
-            return Err(Refusal::TooLarge { slot_bytes: capacity as u32 });
+        let slot_bytes = spare.bytes().len();
+        if length > slot_bytes {
+            return Err(Refusal::TooLarge { slot_bytes: slot_bytes as u32 });
         }
         if !self.is_empty {
             self.wear(now_us, spare.erase_interval_s())?;
-            feed();
-            let marked = spare.erase().and_then(|()| spare.write(capacity, &RECORD_MAGIC));
-            feed();
-            self.flash(marked)?;
+            let erased = prepare().and_then(|()| spare.erase());
+            self.flash(erased)?;
         }
         self.is_empty = true;
         (self.state, self.length) = (UploadState::Receiving { received: 0 }, length);
@@ -131,22 +127,6 @@ impl Upload {
         whole.flatten().ok_or(Refusal::OutOfPlace { received })
     }
 
-    /// Writes the seal of the blob in `spare` behind it.
-    ///
-    /// # Errors
-    /// [`Refusal::TooLarge`] if the blob leaves no room, [`Refusal::Flash`] if writing fails.
-    pub fn seal<S: Slot>(&mut self, spare: &mut S, seal: &Seal) -> Result<(), Refusal> {
-        let (place, most) = (seal_place(spare.bytes()), capacity(spare.bytes()));
-        if place.saturating_add(SEAL_BYTES) > most {
-            self.abort();
-            return Err(Refusal::TooLarge { slot_bytes: most.saturating_sub(SEAL_BYTES) as u32 });
-        }
-        let head = [SEAL_MARK, seal.version.to_le_bytes()];
-        let tag_place = place + head.as_flattened().len();
-        let written = spare.write(place, head.as_flattened());
-        self.flash(written.and_then(|()| spare.write(tag_place, &seal.tag)))
-    }
-
     /// Notes that the blob, which must have been found sound, is on trial.
     pub fn begin_trial(&mut self, crc_32: u32) {
         self.state = UploadState::OnTrial { crc_32 };
@@ -159,28 +139,9 @@ impl Upload {
         }
     }
 
-    /// Commits the blob in `slot`, which must have been found sound: writes the pair of records that makes it the most
-    /// recent.
-    ///
-    /// # Errors
-    /// [`Refusal::Flash`] if writing the first one fails.
-    pub fn commit<S: Slot>(
-        &mut self,
-        slot: &mut S,
-        generation: u32,
-        crc_32: u32,
-    ) -> Result<(), Refusal> {
-        let place = capacity(slot.bytes()) + RECORD_MAGIC.len();
-        let record = record(generation, crc_32);
-        let rest = record.get(RECORD_MAGIC.len()..).unwrap_or_default();
-        self.flash(slot.write(place, rest))?;
-        let second = record_pairs(slot.bytes()).next().map(|[_, second]| second);
-        if let Some(second) = second {
-            // The first one counts without it: the next start writes another pair.
-            let _ = slot.write(second, &record);
-        }
+    /// Notes that the blob on trial is confirmed.
+    pub fn confirm(&mut self, crc_32: u32) {
         self.state = UploadState::Confirmed { crc_32 };
-        Ok(())
     }
 
     /// Ends the upload, and forgets the bytes received.

@@ -12,10 +12,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{Refusal, Report, Request};
+use firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
 use firmware::link::packet::PacketError;
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
+use firmware::seal::Key;
 use model_core::blob::Floats;
 
 use crate::error::{Error, Heard, Result};
@@ -34,10 +35,13 @@ pub mod check;
 use configuration::Kept;
 pub use configuration::{ActiveConfiguration, LEASE};
 pub use identity::DeviceIdentity;
-pub use key::{Sealing, check_sealing};
+use key::Counter;
+pub use key::key_of;
 
 /// Longest time that a board takes to answer a request that erases no flash.
 const ANSWER: Duration = Duration::from_millis(500);
+/// Longest time of a request that is written down: a page of flash may have to be erased.
+const WRITING: Duration = Duration::from_secs(5);
 /// Time that a device takes to start.
 const START: Duration = Duration::from_millis(100);
 /// Number of times that a request is sent before the device is given up.
@@ -70,6 +74,10 @@ pub struct Device<W> {
     /// Bytes that were read and not looked at yet.
     pending: VecDeque<u8>,
     number: u16,
+    /// Key that requests are sealed with.
+    pub key: Option<Key>,
+    /// Counter of sealed requests, once the device was asked for it.
+    counter: Option<Counter>,
     /// Configuration that is prolonged while reports are heard.
     kept: Option<Kept>,
     /// Time without requests after which the device returns to its own configuration.
@@ -101,6 +109,8 @@ impl<W: Wire> Device<W> {
             pending,
             // Answers to a host before this one may still come: they shall not have this one's numbers.
             number: RandomState::new().build_hasher().finish() as u16,
+            key: None,
+            counter: None,
             kept: None,
             lease: LEASE,
             stop: None,
@@ -131,10 +141,17 @@ impl<W: Wire> Device<W> {
         Ok(self.wire.flush()?)
     }
 
-    /// Sends a request with a new number, and returns the number.
+    /// Sends a request with a new number, and returns the number. It is sealed if it must be and there is a key.
     pub fn send(&mut self, request: &Request<'_>) -> Result<u16> {
         self.number = self.number.checked_add(1).unwrap_or(packet::UNASKED + 1);
-        self.send_raw(&request_bytes(self.number, request)?)?;
+        let number = self.number;
+        let bytes = match (self.key, &mut self.counter) {
+            (Some(key), Some(counter)) if !request.is_free() => {
+                counter.seal(&key, request, |sealed| request_bytes(number, sealed))?
+            }
+            _ => request_bytes(number, request)?,
+        };
+        self.send_raw(&bytes)?;
         if let Some(kept) = &mut self.kept {
             kept.asked = Instant::now();
         }
@@ -228,6 +245,17 @@ impl<W: Wire> Device<W> {
         timeout: Duration,
         read: impl Fn(&Report<'_>) -> Option<T>,
     ) -> Result<std::result::Result<T, Refusal>> {
+        if self.key.is_some() && self.counter.is_none() && !request.is_free() {
+            let identity = self.identify()?;
+            if identity.key == KeyState::Set {
+                self.counter = Some(Counter::new(&identity));
+            } else if !matches!(request, Request::Provision { .. }) {
+                self.check_key(&identity)?; // it would be carried out without a seal
+            }
+        }
+        // Now and then the counter is written down.
+        let is_sealed = self.counter.is_some() && !request.is_free();
+        let timeout = if is_sealed { timeout.max(WRITING) } else { timeout };
         self.heard = Heard::Nothing;
         for attempt in 0..ATTEMPTS {
             self.repeated += u64::from(attempt > 0);
@@ -239,6 +267,12 @@ impl<W: Wire> Device<W> {
                 })
             })?;
             match answer {
+                Some(Ok(Err(Refusal::Seal(SealFault::Counter { last })))) => {
+                    // Another host with the key was here.
+                    if let Some(counter) = &mut self.counter {
+                        counter.go_on(last);
+                    }
+                }
                 Some(Ok(answer)) => return Ok(answer),
                 Some(Err(answer)) => {
                     return Err(Error::Unexpected { request: format!("{request:?}"), answer });
@@ -285,7 +319,7 @@ impl<W: Wire> Device<W> {
         self.ask_plainly(&Request::Restart, |report| {
             matches!(report, Report::Restarting).then_some(())
         })?;
-        self.kept = None;
+        (self.kept, self.counter) = (None, None);
         // Bytes that arrive while it starts are lost, which is no fault of the line.
         let (patience, repeated) = (self.patience, self.repeated);
         let start = Instant::now();

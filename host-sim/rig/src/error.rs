@@ -96,10 +96,11 @@ pub enum Error {
     Data(#[from] taxel_data::Error),
 }
 
-/// Said of a device without a key, and of one whose key has decayed.
+/// Said of a device without a key, of one whose key is missing, and of one whose key has decayed.
 pub(crate) const NO_KEY: &str =
-    "the device has no key, and takes any model: `provision` it first, or leave --key out";
-pub(crate) const KEY_DAMAGED: &str = "the device's key has decayed, so it takes no model: provision the same key again, or erase its flash with a debugger";
+    "the device has no key, and does what any host asks: `provision` it first, or leave --key out";
+pub(crate) const KEY_MISSING: &str = "the device has a key, and changes nothing without it: give it with --key FILE; if it is lost, erase the whole flash with a debugger";
+pub(crate) const KEY_DAMAGED: &str = "the device's key has decayed, so it changes nothing any more: erase the whole flash with a debugger";
 
 impl Error {
     /// Error for what a device or an emulator does wrong, and the `reason`.
@@ -167,17 +168,17 @@ fn why(refusal: Refusal) -> String {
         }
         Refusal::Keep(KeepFault::TooLarge) => "it has no room to keep that".into(),
         Refusal::Keep(KeepFault::TooOften) => {
-            "settings were written too often since its start, which wears its flash; restart it to go on".into()
+            "settings or undos were written too often since its start, which wears its flash; restart it to go on".into()
+        }
+        Refusal::Keep(KeepFault::Unsupported) => {
+            "its image keeps no settings: build one with the feature `settings` (docs/board.md)".into()
         }
         Refusal::TooSoon { wait_us } => format!(
             "its flash was erased too often; upload again in {} s",
             wait_us.div_ceil(1_000_000)
         ),
-        Refusal::LastGeneration => {
-            "the record of its model has the last number; flash a model with a debugger".into()
-        }
         Refusal::NothingToUndo => {
-            "it has no previous model, or has gone back and forth too often; upload the model".into()
+            "it has no previous model; upload the model".into()
         }
         Refusal::Seal(fault) => why_not_trusted(fault),
         Refusal::OnTrial => "its model is on trial; `confirm` or `undo` it first".into(),
@@ -190,14 +191,17 @@ fn why(refusal: Refusal) -> String {
 /// Reason why the device's key forbids something, in words.
 fn why_not_trusted(fault: SealFault) -> String {
     match fault {
-        SealFault::Missing => "it takes sealed models only; give its key with --key".into(),
-        SealFault::Forged => "the seal was made with another key".into(),
-        SealFault::Outdated { highest } => format!(
-            "it had a model of version {highest}; seal this one as a higher version (--model-version), if you mean it"
+        SealFault::Missing => KEY_MISSING.into(),
+        SealFault::Forged => "the request was sealed with another key, or for another device, or another model was uploaded meanwhile: check --key".into(),
+        SealFault::Counter { last } => format!(
+            "another host sealed requests at the same time (the counter is at {last}): try again when it is done"
         ),
         SealFault::NoKey => NO_KEY.into(),
-        SealFault::KeyIsSet => "it has another key; a debugger can erase it".into(),
+        SealFault::NotAllowed => "it takes its first key only from somebody at the board: restart it with its button held (docs/board.md), and provision it then".into(),
         SealFault::KeyDamaged => KEY_DAMAGED.into(),
+        SealFault::Unsupported => {
+            "its image knows no keys: build one with the feature `seal` (docs/board.md)".into()
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use firmware::seal::Key;
 use taxel_data::input;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
-use taxel_rig::device::{Device, DeviceIdentity, LEASE, Sealing, Wire, serial, upload};
+use taxel_rig::device::{Device, DeviceIdentity, LEASE, Wire, key_of, serial, upload};
 
 use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
@@ -27,6 +27,9 @@ pub struct Arguments {
     /// Time without requests after which the device returns to its own configuration, if this program is killed.
     #[arg(long, value_name = "MS", default_value_t = LEASE.as_millis() as u32, value_parser = value_parser!(u32).range(100..=600_000))]
     lease_ms: u32,
+    /// File with the device's key, if it was provisioned: what changes the device is sealed with it.
+    #[arg(long, global = true, value_name = "FILE")]
+    key: Option<PathBuf>,
     #[command(subcommand)]
     action: Action,
 }
@@ -51,12 +54,13 @@ enum Action {
     /// previous one, whatever caused it.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
     Upload(UploadArguments),
-    /// Give the device its key, once: from then on it takes models only that are sealed with it.
+    /// Give the device a key: from then on it changes nothing for a host without it.
     ///
     /// The key is 32 random bytes, as bytes or as 64 hexadecimal digits: `(umask 077; openssl rand -hex 32 >
-    /// device.key)`. Keep it secret. A model that is on the device already has no seal, and is left: upload it with --key.
-    /// Only erasing the flash with a debugger removes a key (docs/reliability.md).
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 provision --key device.key")]
+    /// device.key)`. Keep it secret. The first key needs somebody at the board, who holds its button while it starts.
+    /// Another one replaces it if the old one is given with --key. A key that is lost goes only with the whole flash, by a
+    /// debugger (docs/reliability.md).
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 provision device.key")]
     Provision(ProvisionArguments),
     /// Confirm the model that `upload --trial` left on trial: it stays active over restarts.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 confirm")]
@@ -135,33 +139,12 @@ struct UploadArguments {
         value_parser = clap::value_parser!(u32).range(1..=30)
     )]
     trial: Option<u32>,
-    #[command(flatten)]
-    sealing: SealingArguments,
-}
-
-#[derive(Args)]
-struct SealingArguments {
-    /// File with the device's key, if it was provisioned: the model is sealed with it.
-    #[arg(long, value_name = "FILE")]
-    key: Option<PathBuf>,
-    /// Version that the model is sealed as; a device takes no lower one again [default: the device's next one].
-    #[arg(long, value_name = "N", requires = "key")]
-    model_version: Option<u32>,
-}
-
-impl SealingArguments {
-    /// Reads the key, if there is one.
-    fn read(&self) -> Result<Option<Sealing>> {
-        let key = self.key.as_deref().map(read_key).transpose()?;
-        Ok(key.map(|key| Sealing { key, version: self.model_version }))
-    }
 }
 
 #[derive(Args)]
 struct ProvisionArguments {
-    /// File with the key.
-    #[arg(long, value_name = "FILE")]
-    key: PathBuf,
+    /// File with the new key.
+    new_key: PathBuf,
 }
 
 /// Largest file with a key, in bytes.
@@ -171,8 +154,7 @@ const MOST_KEY_BYTES: u64 = 4096;
 fn read_key(path: &Path) -> Result<Key> {
     let content = input::read(path, MOST_KEY_BYTES)?;
     note_readers(path);
-    Sealing::key(&content)
-        .map_err(|bad| Error::Unfit { path: path.to_owned(), message: bad.to_string() })
+    key_of(&content).map_err(|bad| Error::Unfit { path: path.to_owned(), message: bad.to_string() })
 }
 
 /// Notes that others may read the secret at `path`.
@@ -189,7 +171,9 @@ fn note_readers(path: &Path) {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let open = || -> Result<_> {
+        let key = arguments.key.as_deref().map(read_key).transpose()?;
         let mut device = Device::new(serial::open(&arguments.port, arguments.baud)?)?;
+        device.key = key;
         device.lease = Duration::from_millis(arguments.lease_ms.into());
         device.stop = Some(interruption::flag());
         Ok(device)
@@ -201,10 +185,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Action::Upload(action) => {
             let model = ModelBlob::read(&action.model)?;
-            let sealing = action.sealing.read()?;
             let mut device = open()?;
             let before = device.identify()?;
-            let after = activate(&mut device, &model, sealing.as_ref())?;
+            let after = activate(&mut device, &model)?;
             note_another_sensor(&before, &after);
             match action.trial {
                 Some(minutes) => upload::prolong_trial(&mut device, minutes)?,
@@ -213,7 +196,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             status::show(&mut device, common)
         }
         Action::Provision(action) => {
-            let key = read_key(&action.key)?;
+            let key = read_key(&action.new_key)?;
             let mut device = open()?;
             device.provision(&key)?;
             status::show(&mut device, common)
@@ -227,7 +210,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Action::Baseline(action) => record::baseline(&mut open()?, action, common),
         Action::Configure(action) => settings::configure(&mut open()?, action, common),
         Action::Calibrate(action) => calibrate::execute(&mut open()?, action, common),
-        Action::Recalibrate(action) => recalibrate::execute(&mut open()?, action, common),
+        Action::Recalibrate(action) => {
+            recalibrate::execute(&mut open()?, action, arguments.key.as_deref(), common)
+        }
         Action::Undo => {
             let mut device = open()?;
             upload::undo(&mut device)?;
@@ -246,14 +231,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 /// Uploads `model`, puts it on trial, and waits until the device has decoded frames with it.
-fn activate<W: Wire>(
-    device: &mut Device<W>,
-    model: &ModelBlob,
-    sealing: Option<&Sealing>,
-) -> Result<DeviceIdentity> {
+fn activate<W: Wire>(device: &mut Device<W>, model: &ModelBlob) -> Result<DeviceIdentity> {
     let progress = Terminal::new();
-    let identity = device
-        .while_paused(|device| upload::start_trial(device, model.bytes(), sealing, &progress))?;
+    let identity =
+        device.while_paused(|device| upload::start_trial(device, model.bytes(), &progress))?;
     upload::see_frames(device)?;
     Ok(identity)
 }

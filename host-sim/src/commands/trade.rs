@@ -66,7 +66,7 @@ pub struct Arguments {
     /// the most accurate point within all bounds is chosen (of errors within 0.5 %, the cheapest).
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
-    /// Choose within a blob of so many bytes [default, with another bound: a slot's 131056].
+    /// Choose within a blob of so many bytes [default, with another bound: a slot's 131072].
     #[arg(long, value_name = "BYTES")]
     max_flash: Option<usize>,
     /// Choose among points that scan and decode at least so many frames a second.

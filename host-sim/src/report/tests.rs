@@ -131,7 +131,7 @@ fn result(groups: &[&str]) -> RunResult {
             ram_bytes: 2000,
             weights_in_ram: true,
             blob_bytes: 12_345,
-            slot_bytes: 131_056,
+            slot_bytes: 131_072,
             fits_slot: true,
         },
         verdict: Verdict {

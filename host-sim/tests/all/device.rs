@@ -163,7 +163,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     for (index, bytes) in new.bytes().chunks(512).enumerate() {
         add(&Request::Upload(UploadStep::Chunk { offset: 512 * index as u32, bytes }));
     }
-    add(&Request::Upload(UploadStep::Try { seal: None, lease_ms: 60_000 }));
+    add(&Request::Upload(UploadStep::Try { sha_256: None, lease_ms: 60_000 }));
     add(&Request::Identify);
     let again = Floats::new(readings[0].as_flattened());
     add(&Request::Decode { frame: 41, readings_ohm: again });
@@ -311,7 +311,7 @@ fn refusals_and_silence_are_told_apart() {
     let mut large = model.bytes().to_vec();
     large[5..9].fill(0xFF);
     let refusal = upload::step(&mut device, upload::begin(&large)).unwrap();
-    assert_eq!(refusal, Err(Refusal::TooLarge { slot_bytes: 128 * 1024 - 16 }));
+    assert_eq!(refusal, Err(Refusal::TooLarge { slot_bytes: 128 * 1024 }));
     // A report that does not belong to the request is no answer.
     let strange = device.ask_plainly(&Request::Statistics, |report| match report {
         Report::Identity(_) => Some(()),
@@ -380,7 +380,7 @@ fn chunks_of_no_bytes_and_a_line_that_takes_none_are_told() {
     let model = model(3);
     let mut device = device(SOUND, &model);
     for bytes in [0, 6] {
-        let outcome = upload::send(&mut device, (model.bytes(), None), bytes, &Silent);
+        let outcome = upload::send(&mut device, model.bytes(), bytes, &Silent);
         let refused = outcome.unwrap_err().to_string();
         assert!(refused.contains(&format!("chunks of {bytes} bytes")), "{refused}");
     }
@@ -499,7 +499,7 @@ pub mod serial_port {
         let alike = folder.run(&["link", &port, "recalibrate", "old.bin", "alike.csv"]);
         let said = String::from_utf8_lossy(&alike.stderr).into_owned();
         assert!(alike.status.code() == Some(1) && said.contains("too alike"), "{said}");
-        folder.write("device.key", "ab".repeat(32));
+        folder.write("device.key", "abcd".repeat(16));
         let key = ["old.bin", "presses.csv", "--key", "device.key", "-o", "./device.key"];
         let said = folder.fail(&[&["link", &port, "recalibrate"], &key[..]].concat(), 2);
         assert!(said.contains("would be written over"), "{said}");

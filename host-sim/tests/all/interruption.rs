@@ -221,10 +221,9 @@ fn a_model_on_trial_is_left_by_a_restart_unless_it_is_confirmed() {
 }
 
 #[test]
-fn with_a_key_a_device_takes_models_that_are_sealed_with_it_and_no_older_ones() {
+fn with_a_key_a_device_changes_nothing_without_it() {
     let (old, new) = (model(3), model(4));
     let rig = Rig::new("sealed", old.bytes());
-    rig.folder.write("old.bin", old.bytes());
     rig.folder.write("new.bin", new.bytes());
     let digits =
         |first: u8| (0..32).map(|i| format!("{:02x}", first + i)).collect::<Vec<_>>().concat();
@@ -237,24 +236,27 @@ fn with_a_key_a_device_takes_models_that_are_sealed_with_it_and_no_older_ones() 
         assert_eq!(output.status.code(), Some(status), "{arguments:?}: {said:?}");
         assert!(said.concat().contains(text), "{arguments:?}: {said:?}");
     };
-    let sealed = |name: &'static str, key: &'static str| ["upload", name, "--key", key];
-    link(&sealed("new.bin", "device.key"), 1, "has no key");
-    link(&["provision", "--key", "short.key"], 2, "64 hexadecimal digits");
-    link(&["provision", "--key", "device.key"], 0, "upload a model with --key");
-    link(&["provision", "--key", "device.key"], 0, "none: upload one");
-    link(&["provision", "--key", "other.key"], 1, "it has another key");
-    link(&["upload", "new.bin"], 1, "takes sealed models only");
-    link(&sealed("new.bin", "other.key"), 1, "made with another key");
-    link(&sealed("old.bin", "device.key"), 0, "this one is version 1");
-    link(&sealed("new.bin", "device.key"), 0, "this one is version 2");
-    link(&sealed("new.bin", "device.key"), 0, "this one is version 2");
-    let version =
-        |n: &'static str| [&sealed("old.bin", "device.key")[..], &["--model-version", n]].concat();
-    link(&version("1"), 1, "it had a model of version 2");
-    link(&version("2"), 1, "it had a model of version 2");
-    link(&["undo"], 1, "the device refused");
-    assert_eq!(rig.device().restart().unwrap().model.unwrap().crc_32, new.parse().crc());
-    link(&version("9"), 0, "this one is version 9");
+    link(&["upload", "new.bin", "--key", "device.key"], 1, "has no key");
+    link(&["configure", "--period-us", "7000", "--key", "device.key"], 1, "has no key");
+    link(&["provision", "short.key"], 2, "64 hexadecimal digits");
+    link(&["provision", "device.key"], 1, "restart it with its button held");
+    rig.device().restart().unwrap();
+    link(&["provision", "device.key"], 0, "set: nothing changes without --key");
+    link(&["provision", "device.key"], 0, "set");
+    link(&["provision", "other.key"], 1, "give it with --key");
+    link(&["upload", "new.bin"], 1, "give it with --key");
+    link(&["configure", "--period-us", "7000"], 1, "give it with --key");
+    link(&["undo"], 1, "give it with --key");
+    link(&["upload", "new.bin", "--key", "other.key"], 1, "another key");
+    link(&["--key", "device.key", "upload", "new.bin"], 0, "generation 1");
+    link(&["configure", "--period-us", "7000", "--key", "device.key"], 0, "");
+    link(&["undo", "--key", "device.key"], 0, "generation 2");
+    link(&["provision", "other.key", "--key", "device.key"], 0, "set");
+    link(&["undo", "--key", "device.key"], 1, "another key");
+    link(&["undo", "--key", "other.key"], 0, "generation 3");
+    let mut device = rig.device();
+    device.key = Some(std::array::from_fn(|i| 7 + i as u8));
+    assert_eq!(device.restart().unwrap().model.unwrap().crc_32, new.parse().crc());
 }
 
 #[test]
@@ -356,7 +358,8 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
                 chunk_bytes: 0,
                 memory: Memory::default(),
                 key: KeyState::None,
-                highest_version: None,
+                unique_id: [0; 12],
+                counter: 0,
             };
             let (scans, configuration) = match request.body {
                 Request::Identify => {

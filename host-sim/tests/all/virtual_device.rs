@@ -7,7 +7,7 @@ use firmware::capacity::Capacity;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use firmware::settings::SettingPages;
+use firmware::store::Journal;
 use mock_board::Flash;
 use taxel_data::random::{Purpose, Random, Stream};
 
@@ -22,8 +22,9 @@ pub struct Line {
 /// Board whose serial line is `W`, whose reads must not block.
 struct Board<'s, W, N> {
     wire: W,
-    settings: &'s mut SettingPages<Flash>,
-    key: &'s mut Flash,
+    journal: &'s mut Journal<Flash>,
+    /// Whether its button was held at the start: at every one but the first.
+    is_held: bool,
     /// Called with each request's last byte, before the device sees it.
     notice: N,
     start: Instant,
@@ -106,8 +107,7 @@ impl<W: Read + Write, N: FnMut()> Port for Board<'_, W, N> {
 }
 
 impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
-    type Settings = SettingPages<Flash>;
-    type KeyArea = Flash;
+    type Page = Flash;
 
     const BOARD: &'static str = "virtual";
 
@@ -117,12 +117,12 @@ impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
         Memory { text: 20_000, bss: 3000, stack_high_water: 1000, ..Memory::default() }
     }
 
-    fn settings(&mut self) -> &mut SettingPages<Flash> {
-        self.settings
+    fn journal(&mut self) -> &mut Journal<Flash> {
+        self.journal
     }
 
-    fn key_area(&mut self) -> &mut Flash {
-        self.key
+    fn may_provision(&self) -> bool {
+        self.is_held
     }
 }
 
@@ -199,13 +199,12 @@ fn run_on_its_own(
     std::thread::spawn(move || {
         let mut slots = Flash::pair(128 * 1024);
         slots[0].flash(0, &model);
-        let mut settings = SettingPages::new(Flash::pages());
-        let mut key = Flash::without_key();
+        let mut journal = Flash::journal();
         for life in 0.. {
             let board = Board {
                 wire: &mut wire,
-                settings: &mut settings,
-                key: &mut key,
+                journal: &mut journal,
+                is_held: life > 0,
                 notice: &mut notice,
                 start: Instant::now(),
                 line,

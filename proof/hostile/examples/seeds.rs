@@ -9,9 +9,10 @@ use firmware::app::Session;
 use firmware::link::cobs;
 use firmware::link::message::{Configuration, Report, Request, Setting};
 use firmware::link::packet;
+use firmware::store::{Kind, Slot};
 use hostile::seal;
 use mock_board::{
-    Bench, Flash, SharedSettings, ask, blob, blob_of_components, blob_with_confidence, configure,
+    Bench, Flash, ask, blob, blob_of_components, blob_with_confidence, configure,
     quiet, request_bytes, upload_steps,
 };
 use model_core::blob::Floats;
@@ -121,29 +122,28 @@ fn packets() -> Vec<Vec<u8>> {
 }
 
 fn settings() -> Vec<Vec<u8>> {
-    let mut kept = SharedSettings::default();
+    let mut kept = Flash::journal();
     let mut seeds = vec![vec![0], vec![1], vec![2]];
     for (setting, bytes) in Setting::ALL.into_iter().zip([&[1_u8; 20][..], &[2; 40], &[3; 60]]) {
-        let _ = kept.keep_bytes(setting, bytes);
+        let _ = kept.keep(setting.into(), &[bytes]);
         seeds.push([&[1], bytes].concat());
     }
-    let [page, _] = kept.bytes();
-    seeds.push([&[0], &page[..512.min(page.len())]].concat());
+    seeds.push([&[0], &kept.pages()[0].bytes()[..512]].concat());
     // What a device keeps by itself.
-    let mut kept = SharedSettings::default();
     let model = blob(1, 3);
     let mut slots = Flash::slots_with(&model);
-    let mut bench = Bench::with_settings(quiet(), &kept);
+    let mut bench = Bench::new(quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let other = Configuration { frame_period_us: 20_000, ..quiet() };
     for request in [configure(other), Request::Keep(Setting::Configuration)] {
         ask(&mut session, &board, &request, |_| ());
     }
-    let bytes = kept.read_owned(Setting::Configuration).unwrap_or_default();
-    seeds.push([&[1], &bytes[..]].concat());
-    let [page, _] = kept.bytes();
-    seeds.push([&[0], &page[..512.min(page.len())]].concat());
+    let _ = session;
+    let mut kept = bench.journal();
+    let bytes = kept.read(Kind::Configuration).unwrap_or_default();
+    seeds.push([&[1], bytes].concat());
+    seeds.push([&[0], &kept.pages()[0].bytes()[..512]].concat());
     seeds
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Bytes are steps, each an operation, a length and so many bytes of it: raw bytes, sealed packets, steps of an upload,
 //! passing time, a host that does not read, readings, restarts and power cuts. Whatever came before, a device that has
-//! power answers, and has a model in force.
+//! power answers, and has a model in force. With a key that the line does not know it has the same model for ever.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,8 +11,10 @@ use firmware::app::{Session, SessionEnd};
 use firmware::link::cobs;
 use firmware::link::message::Request;
 use firmware::link::packet::PROTOCOL_VERSION;
+use firmware::seal::Key;
+use firmware::store::Kind;
 use mock_board::{
-    Bench, Board, Flash, Memory, Running, SharedSettings, TestFrame, blob, model_crc, quiet,
+    Bench, Board, Flash, Memory, Running, TestFrame, blob, crc_of, model_crc, quiet,
     request_bytes, upload_steps,
 };
 use model_core::AlignedBytes;
@@ -30,9 +32,19 @@ const NUMBER: u16 = 9;
 
 /// Steps, as bytes.
 pub fn check(bytes: &[u8]) -> bool {
+    let has_taken = run(bytes, None);
+    assert!(!run(bytes, Some([0x42; 32])), "a device with a key takes a model without a seal");
+    has_taken
+}
+
+/// Takes the steps with a device that has this key, or none; returns whether it has taken a model.
+fn run(bytes: &[u8], key: Option<Key>) -> bool {
     let models = [blob(3, 4), blob(4, 3), blob(5, 6)];
     let mut slots = Flash::slots_with(&models[0]);
-    let settings = SharedSettings::default();
+    let mut journal = Flash::journal();
+    if let Some(key) = key {
+        journal.keep(Kind::Key, &[&key]).expect("there is room");
+    }
     let mut memory = Memory::new();
     let mut steps = Steps(bytes);
     let mut cut_after = None;
@@ -40,13 +52,14 @@ pub fn check(bytes: &[u8]) -> bool {
     for _ in 0..MOST_STARTS {
         if let Some(operations) = cut_after.take() {
             slots[0].cut_power_after(operations);
-            settings.cut_power_after(operations);
+            journal.pages()[0].cut_power_after(operations);
         }
-        let mut bench = Bench::within(&mut memory, quiet(), &settings);
+        let mut bench = Bench::on(Board::new(journal), &mut memory, quiet());
         let mut device = Device {
             board: bench.board.clone(),
             frame: bench.frame.clone(),
             session: Session::start(&mut bench.app, &mut slots, &mut []),
+            only: key.map(|_| crc_of(&models[0])),
         };
         device.answers();
         loop {
@@ -70,7 +83,8 @@ pub fn check(bytes: &[u8]) -> bool {
             }
         }
         drop(device);
-        let _ = (slots[0].power_on(), settings.power_on());
+        journal = bench.journal();
+        let _ = (slots[0].power_on(), journal.pages()[0].power_on());
     }
     has_taken
 }
@@ -91,13 +105,15 @@ impl<'b> Iterator for Steps<'b> {
 }
 
 /// A device that runs.
-struct Device<'d> {
-    session: Running<'d, 'd>,
+struct Device<'d, 'm> {
+    session: Running<'d, 'm>,
     board: Board,
     frame: Rc<RefCell<TestFrame>>,
+    /// CRC-32 of the only model that may be in force, if no other may.
+    only: Option<u32>,
 }
 
-impl Device<'_> {
+impl Device<'_, '_> {
     /// Takes a step; returns why the session ended, if it did.
     fn step(
         &mut self,
@@ -168,6 +184,7 @@ impl Device<'_> {
     fn answers(&mut self) {
         let crc = model_crc(&mut self.session, &self.board);
         assert!(crc.is_some(), "no model in force");
+        assert!(self.only.is_none() || crc == self.only, "another model in force");
     }
 }
 

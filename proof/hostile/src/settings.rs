@@ -1,10 +1,9 @@
-//! What the memory of settings holds when the device starts: any bytes in its pages, or any bytes that are kept as a
-//! setting. The device must start, take nothing that is out of range, and answer.
+//! What the journal holds when the device starts: any bytes in its pages, or any bytes that are kept as a setting. The device must start, take nothing that is out of range, and answer.
 
 use firmware::app::Session;
 use firmware::link::message::{Report, Request, Setting};
-use firmware::settings::PAGE_BYTES;
-use mock_board::{Bench, Flash, Memory, SharedSettings, ask, blob, crc_of, model_crc, quiet};
+use firmware::store::{Journal, PAGE_BYTES};
+use mock_board::{Bench, Board, Flash, Memory, ask, blob, crc_of, model_crc, quiet};
 
 /// Turns of the loop that the application takes on such settings.
 const TURNS: usize = 20;
@@ -12,14 +11,14 @@ const TURNS: usize = 20;
 /// The first byte says where the others go: over the pages, from a place on, or into one setting each.
 pub fn check(bytes: &[u8]) -> bool {
     let Some((kind, bytes)) = bytes.split_first() else { return false };
-    let settings = match kind % 3 {
+    let journal = match kind % 3 {
         0 => raw(bytes),
         kind => kept(bytes, kind == 2),
     };
     let model = blob(1, 3);
     let mut slots = Flash::slots_with(&model);
     let mut memory = Memory::new();
-    let mut bench = Bench::within(&mut memory, quiet(), &settings);
+    let mut bench = Bench::on(Board::new(journal), &mut memory, quiet());
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     for _ in 0..TURNS {
@@ -38,23 +37,23 @@ pub fn check(bytes: &[u8]) -> bool {
 }
 
 /// Pages that hold these bytes, and are erased behind them.
-fn raw(bytes: &[u8]) -> SharedSettings {
+fn raw(bytes: &[u8]) -> Journal<Flash> {
     let mut pages = vec![0xFF; 2 * PAGE_BYTES];
     let length = bytes.len().min(pages.len());
     pages[..length].copy_from_slice(&bytes[..length]);
     let (one, other) = pages.split_at(PAGE_BYTES);
-    SharedSettings::holding([one, other])
+    Flash::journal_of([one, other])
 }
 
 /// Pages in which these bytes are kept, all of them for each setting, or cut to three parts.
-fn kept(bytes: &[u8], is_cut: bool) -> SharedSettings {
-    let mut settings = SharedSettings::default();
+fn kept(bytes: &[u8], is_cut: bool) -> Journal<Flash> {
+    let mut journal = Flash::journal();
     let third = bytes.len().div_ceil(3).max(1);
     for (number, setting) in Setting::ALL.into_iter().enumerate() {
         let cut = || bytes.chunks(third).nth(number).unwrap_or_default();
         let part = if is_cut { cut() } else { bytes };
         // What is too long is refused, which is right.
-        let _ = settings.keep_bytes(setting, &part[..part.len().min(512)]);
+        let _ = journal.keep(setting.into(), &[&part[..part.len().min(512)]]);
     }
-    settings
+    journal
 }

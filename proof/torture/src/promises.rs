@@ -44,7 +44,7 @@ pub const PROMISES: &[Promise] = &[
     power::UPLOAD,
     power::UNDO,
     power::SETTINGS,
-    power::PROVISION,
+    power::KEY,
     power::DECAY,
     power::WORN,
     recheck::RECHECK,

@@ -1,14 +1,15 @@
 //! Slots that decay or wear out, after an upload that ended in any way.
 
 use firmware::link::message::UploadStep;
-use firmware::store::{RECORD_BYTES, Slot};
+use firmware::store::{PAGE_BYTES, Slot};
 use model_core::AlignedBytes;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{SLOT_WORDS, device};
-use crate::device::{Device, confirmed, confirmed_steps, trial_steps, upload_step};
-use crate::flash::{Torn, Worn};
+use super::SLOT_WORDS;
+use crate::device::{Device, confirmed, confirmed_steps, trial_steps};
+use crate::flash::{Flash, Supply, Torn, Worn};
+use crate::host::upload_step;
 use crate::models::{blob, crc_of};
 
 /// A device with an uploaded or flashed model in force, and what its flash went through.
@@ -23,13 +24,15 @@ struct Case {
 impl Case {
     fn new(seed: u64) -> Result<Self, String> {
         let torn = Torn::ALL[(seed % 4) as usize]; // all but weak bits
-        let mut device = device(seed, torn);
+        let supply = Supply::new(seed);
+        let mut device = Device::new([0, 1].map(|_| Flash::erased(SLOT_WORDS, &supply, torn)));
+        *device.journal.pages() = [0, 1].map(|_| Flash::erased(PAGE_BYTES / 4, &supply, torn));
         let uploads = seed / 4 % 4;
         let (old, earlier) = (blob(1, 2), blob(5, 1));
         device.slots[0].flash(0, if uploads == 0 { &old } else { &earlier });
         for upload in 1..=uploads {
             let blob = if upload == uploads { &old } else { &earlier };
-            let outcome = device.install(blob, None);
+            let outcome = device.install(blob);
             if outcome != confirmed(blob) {
                 return Err(format!("upload {upload}: {outcome:?}"));
             }
@@ -45,7 +48,7 @@ impl Case {
     /// Ends an upload of the new model in one of many ways; returns which.
     fn end_upload(&mut self) -> &'static str {
         let new = self.new.clone();
-        let mut whole = trial_steps(&new, None);
+        let mut whole = trial_steps(&new);
         whole.pop();
         match self.below(4) {
             0 => {
@@ -63,12 +66,12 @@ impl Case {
             2 => {
                 let _ = self.device.upload(&whole);
                 let cut = self.below(3);
-                let _ = self.device.cut(cut).upload(&confirmed_steps(&blob(3, 1), None)[..1]);
+                let _ = self.device.cut(cut).upload(&confirmed_steps(&blob(3, 1))[..1]);
                 "sent whole, then cut in the next begin"
             }
             _ => {
                 let cut = self.below(60);
-                let _ = self.device.cut(cut).install(&new, None);
+                let _ = self.device.cut(cut).install(&new);
                 "cut"
             }
         }
@@ -80,20 +83,25 @@ impl Case {
         slot.ok_or_else(|| "the model in force is in no slot".to_owned())
     }
 
-    /// Flips one bit of the model in slot `slot`, or of the first record behind it; returns whether of the record.
+    /// Flips one bit of the model in slot `slot`, or of what the journal holds; returns whether of the journal.
     fn decay(&mut self, slot: usize, blob: &[u8]) -> bool {
-        let (bits, record) = (blob.len() as u64 * 8, SLOT_WORDS * 4 - RECORD_BYTES);
-        let is_uploaded = self.device.slots[slot].bytes()[record..] != [0xFF; RECORD_BYTES];
-        let all = if is_uploaded { bits + RECORD_BYTES as u64 * 8 } else { bits };
-        let bit = self.below(all);
-        let is_of_record = bit >= bits;
-        let bit = if is_of_record { record as u64 * 8 + bit - bits } else { bit };
-        self.device.slots[slot].decay((bit / 32) as usize, 1 << (bit % 32));
-        is_of_record
+        let is_of_journal = self.below(4) == 0;
+        if is_of_journal {
+            let page = self.below(2) as usize;
+            let bytes = self.device.journal.pages()[page].bytes();
+            let used = bytes.iter().rposition(|byte| *byte != 0xFF).map_or(1, |last| last + 1);
+            let bit = self.below(8 * used as u64);
+            self.device.journal.pages()[page].decay((bit / 32) as usize, 1 << (bit % 32));
+        } else {
+            let bit = self.below(blob.len() as u64 * 8);
+            self.device.slots[slot].decay((bit / 32) as usize, 1 << (bit % 32));
+        }
+        is_of_journal
     }
 }
 
-/// Lets a bit of the slot in force decay behind an upload that was not confirmed: that must never take over. Returns
+/// Lets a bit of the slot in force or of the journal decay behind an upload that was not confirmed: that must never take
+/// over. Returns
 /// whether the same model is in force then (0), the one before it (1), or none (2).
 ///
 /// # Errors
@@ -108,7 +116,7 @@ pub fn abort_and_decay(seed: u64) -> Result<usize, String> {
         return Err(format!("{how}: in force is {before:08x?}"));
     }
     let slot = case.slot_of(&in_force)?;
-    // Behind a record that decays, there may be a second one.
+    // Behind an item that decays, an older one of its kind counts.
     let may_stay = case.decay(slot, &in_force);
     let after = case.device.restart();
     let stays = after == before;
@@ -121,7 +129,7 @@ pub fn abort_and_decay(seed: u64) -> Result<usize, String> {
         let torn = case.torn.name();
         return Err(format!("{how}, {torn}: {before:08x?}, after the decay {after:08x?}"));
     }
-    let outcome = case.device.install(&blob(9, 1), None);
+    let outcome = case.device.install(&blob(9, 1));
     let mended = case.device.restart();
     if mended != Some(crc_of(&blob(9, 1))) {
         return Err(format!("{how}: the next upload is {outcome:?}, in force {mended:08x?}"));
@@ -139,10 +147,7 @@ pub fn upload_to_worn(seed: u64) -> Result<usize, String> {
     // A bit or several that no erase sets, or that no programming clears; most where the upload writes.
     for _ in 0..=case.below(2) {
         let used = case.new.len() as u64 / 4 + 1;
-        let place = match case.below(4) {
-            0 => SLOT_WORDS as u64 - 1 - case.below(8),
-            _ => case.below(used),
-        };
+        let place = case.below(used);
         let bits = case.random.next_u32() & case.random.next_u32() & case.random.next_u32();
         let [zeros, ones] = if case.below(2) == 0 { [bits, 0] } else { [0, bits] };
         let worn = Worn { place: place as usize, zeros, ones };
@@ -151,7 +156,7 @@ pub fn upload_to_worn(seed: u64) -> Result<usize, String> {
     let cut = (case.below(4) == 0).then(|| case.below(60));
     let new = case.new.clone();
     case.device.cut_after = cut;
-    let outcome = case.device.install(&new, None);
+    let outcome = case.device.install(&new);
     let is_cut = case.device.is_cut();
     let found = [0, 1, 2].map(|_| case.device.restart());
     let (old, new) = (Some(crc_of(&case.old)), Some(crc_of(&case.new)));

@@ -17,7 +17,6 @@ use crate::decay::flip_bit;
 use crate::flash::Flash;
 use crate::host::{ask, install, model_crc, statistics};
 use crate::models::{blob, crc_of};
-use crate::pages::SharedSettings;
 use crate::shape::{COLS, ROWS};
 
 /// Bytes that a turn of the loop checks, at least.
@@ -81,7 +80,7 @@ fn run(case: Case, seed: u64) -> Result<Outcome, String> {
     let mut weights = vec![0; if case.is_in_flash { 0 } else { COPY_WORDS }];
     let mut buffers = Box::new(Memory::new());
     let scanning = Configuration { frame_period_us: 100, ..Configuration::DEFAULT };
-    let mut bench = Bench::within(&mut buffers, scanning, &SharedSettings::default());
+    let mut bench = Bench::on(Board::new(Flash::journal()), &mut buffers, scanning);
     install(&mut bench, &mut slots, &mut weights, (&new, 200))
         .map_err(|refusal| format!("the upload is refused: {refusal:?}"))?;
     let [other, slot] = slots.each_ref().map(|slot| slot.bytes().as_ptr().addr());

@@ -1,110 +1,149 @@
-//! Models for a device with a key: only what was sealed with it, and nothing older, comes into force.
+//! Requests to a device with a key: only what was sealed with it, for this device and just now, changes anything.
 
-use firmware::link::message::{Refusal, SealFault};
-use firmware::seal::{KEY_BYTES, Key, Seal};
-use model_core::checksum::CRC_32;
+use firmware::link::message::{Refusal, Report, Request, SealFault, Setting, UploadStep};
+use firmware::seal::{KEY_BYTES, Key, tag};
+use firmware::store::Slot;
+use model_core::blob::Floats;
 
-use crate::device::{Device, confirmed, confirmed_steps};
+use crate::bench::{Running, quiet};
+use crate::board::Board;
+use crate::device::{Device, confirmed};
 use crate::flash::Flash;
+use crate::host::{ask, configure, request_bytes, sealed, send};
 use crate::models::{blob, crc_of};
 
-/// Version of the model in force.
-const VERSION: u32 = 1000;
 /// Kinds of attack.
 pub const KINDS: u64 = 9;
 
-/// What an attacker sends.
-struct Attack {
-    blob: Vec<u8>,
-    seal: Option<Seal>,
-    /// Number of chunks that are left out at the end.
-    lost: usize,
-    /// The refusal that names it, if it is always the same.
-    named: Option<SealFault>,
+/// Number of an attacker's requests.
+const NUMBER: u16 = 77;
+
+/// Counter of the last request that was sealed before the attack.
+const LAST: u64 = 40_000;
+
+/// Calls `attack` with a request that changes something: each in turn.
+fn with_request<T>(turn: u64, head: &[u8], attack: impl FnOnce(&Request<'_>) -> T) -> T {
+    let ohm = [60.0_f32; 6];
+    let readings_ohm = Floats::new(&ohm);
+    attack(&match turn % 13 {
+        0 => configure(quiet()),
+        1 => Request::SetBaseline { readings_ohm },
+        2 => Request::CaptureBaseline { frames: 1 },
+        3 => Request::Keep(Setting::Configuration),
+        4 => Request::Forget(Setting::Constants),
+        5 => Request::Undo { crc_32: crc_of(&blob(1, 3)) },
+        6 => Request::Restart,
+        7 => Request::Resume,
+        8 => Request::Provision { key: [9; KEY_BYTES] },
+        9 => Request::Upload(UploadStep::Abort),
+        10 => Request::Upload(UploadStep::Confirm),
+        11 => Request::Upload(UploadStep::Try { sha_256: None, lease_ms: 60_000 }),
+        _ => Request::Upload(UploadStep::Begin { head }),
+    })
 }
 
-/// Each kind in turn, and with each kind another byte, bit or version in turn.
-fn attack(seed: u64, key: &Key) -> Attack {
-    let mut genuine = blob(2, 4).to_vec();
+/// The bytes that an attacker sends, and what the device must say to them: each kind in turn, and with each kind another
+/// bit or number.
+fn attack(seed: u64, key: &Key, request: &Request<'_>) -> (Vec<u8>, SealFault) {
     let place = (seed / KINDS) as usize;
-    let seal = |version, blob: &[u8]| Some(Seal::new(key, version, blob));
-    let good = Seal::new(key, VERSION + 1, &genuine);
-    let (mut lost, mut named) = (0, Some(SealFault::Forged));
-    let outdated = Some(SealFault::Outdated { highest: VERSION });
-    let seal = match seed % KINDS {
-        0 => {
-            let mut tag = good.tag;
-            tag[place % KEY_BYTES] ^= 1 << (place / KEY_BYTES % 8);
-            Some(Seal { tag, ..good })
+    let mut buffer = [0; 256];
+    let bytes = postcard::to_slice(request, &mut buffer).expect("it is short");
+    let genuine = tag(key, &Board::UNIQUE_ID, LAST + 1, bytes);
+    let with = |counter, tag, request: &[u8]| {
+        request_bytes(NUMBER, &Request::Sealed { counter, tag, request })
+    };
+    let other = |bytes: &[u8]| {
+        let mut other = bytes.to_vec();
+        let bit = place % (8 * bytes.len());
+        other[bit / 8] ^= 1 << (bit % 8);
+        other
+    };
+    let replayed = SealFault::Counter { last: LAST };
+    match seed % KINDS {
+        0 => (request_bytes(NUMBER, request), SealFault::Missing),
+        1 => {
+            let tag = other(&genuine).try_into().expect("as long as it was");
+            (with(LAST + 1, tag, bytes), SealFault::Forged)
         }
-        1 => Some(Seal { version: good.version ^ 1 << (place % 32), ..good }),
-        2 => {
-            // Any bit but those of the closing CRC-32, which is made right again.
-            let bits = 8 * (genuine.len() - 4);
-            let bit = place % bits;
-            genuine[bit / 8] ^= 1 << (bit % 8);
-            let (covered, crc) =
-                genuine.split_last_chunk_mut::<4>().expect("it ends with a CRC-32");
-            *crc = CRC_32.checksum(covered).to_le_bytes();
-            named = None; // it may be no sound model either
-            Some(good)
-        }
-        3 => {
-            named = outdated;
-            seal((place as u32).wrapping_mul(7) % VERSION, &genuine)
-        }
+        2 => (with(LAST + 1, genuine, &other(bytes)), SealFault::Forged),
+        3 => (with(LAST + 1 + (1 << (place % 20)), genuine, bytes), SealFault::Forged),
         4 => {
-            named = outdated;
-            seal(VERSION, &genuine)
+            let key = other(key).try_into().expect("as long as it was");
+            (sealed(&key, LAST + 1, request), SealFault::Forged)
         }
         5 => {
-            lost = 1 + place % 3;
-            named = None;
-            Some(good)
+            let id = other(&Board::UNIQUE_ID).try_into().expect("as long as it was");
+            (with(LAST + 1, tag(key, &id, LAST + 1, bytes), bytes), SealFault::Forged)
         }
-        6 => {
-            let mut other = *key;
-            other[place % KEY_BYTES] ^= 1 << (place / KEY_BYTES % 8);
-            Some(Seal::new(&other, VERSION + 1, &genuine))
-        }
-        7 => {
-            named = Some(SealFault::Missing);
-            None
-        }
-        _ => {
-            // Another sound model under the seal of this one.
-            genuine = blob(3 + place % 7, 4).to_vec();
-            Some(good)
-        }
-    };
-    Attack { blob: genuine, seal, lost, named }
+        6 => (sealed(key, LAST - place as u64 * 7 % LAST, request), replayed),
+        7 => (sealed(key, LAST + 1_000_001 + place as u64, request), replayed),
+        _ => (sealed(key, u64::MAX - place as u64, request), replayed),
+    }
 }
 
-/// Attacks a device by a model that its key's owner has not sealed: it must be refused, and a genuine one must come into
-/// force then.
+/// What a device's flash holds.
+fn flash(slots: &[Flash; 2], device: &mut Device) -> Vec<u8> {
+    let pages = device.journal.pages().iter().flat_map(Slot::bytes);
+    slots.iter().flat_map(Slot::bytes).chain(pages).copied().collect()
+}
+
+/// Attacks a device by a request that its key's owner has not sealed just now: it must be refused, nothing in flash may
+/// change, and what the owner asks for must be done then.
 ///
 /// # Errors
 /// What is wrong.
 pub fn forge(seed: u64) -> Result<f64, String> {
     let key: Key = std::array::from_fn(|i| (seed.wrapping_mul(31) >> (i % 8)) as u8 ^ i as u8);
-    let mut device = Device::new(Flash::slots());
-    device.key = Flash::with_key(&key);
-    let first = blob(1, 3);
-    let genuine = |device: &mut Device, version, blob: &[u8]| {
-        let taken = device.install(blob, Some(Seal::new(&key, version, blob)));
-        if taken == confirmed(blob) { Ok(()) } else { Err(format!("a genuine model: {taken:?}")) }
-    };
-    genuine(&mut device, VERSION, &first)?;
-    let attack = attack(seed, &key);
-    let mut steps = confirmed_steps(&attack.blob, attack.seal);
-    let chunks = steps.len() - 2;
-    steps.drain(chunks - attack.lost..chunks);
-    let outcome = device.upload(&steps);
-    let is_named = attack.named.is_none_or(|fault| outcome == Err(Refusal::Seal(fault)));
-    if outcome.is_ok() || !is_named || device.restart() != Some(crc_of(&first)) {
-        return Err(format!("attack {}: {outcome:?}", seed % KINDS));
+    let mut device = Device::with_key(Flash::slots_with(&blob(1, 3)), &key);
+    device.is_held = true; // which is of no use once there is a key
+    let model = blob(2, 4);
+    let head = &model[..16];
+    let before = flash(&device.slots.clone(), &mut device);
+    let outcome = device.session(|session, board| {
+        let last = sealed(&key, LAST, &Request::Resume);
+        let resumed = send(session, board, last, |report| !matches!(report, Report::Refused(_)));
+        if !resumed.0 {
+            return Err("a genuine request is refused".to_owned());
+        }
+        with_request(seed / KINDS, head, |request| {
+            let (bytes, fault) = attack(seed, &key, request);
+            expect(session, board, bytes, fault)
+                .map_err(|why| format!("attack {} by {request:?}: {why}", seed % KINDS))
+        })
+    });
+    outcome?;
+    // The one request that was sealed has had its counter written down, and nothing else.
+    let after = flash(&device.slots.clone(), &mut device);
+    let slots = 2 * Flash::SLOT_BYTES;
+    if before[..slots] != after[..slots] || device.restart() != Some(crc_of(&blob(1, 3))) {
+        return Err(format!("attack {}: it changes a slot or the model", seed % KINDS));
     }
-    let next = blob(2, 4);
-    genuine(&mut device, VERSION + 1, &next)?;
-    if device.restart() == Some(crc_of(&next)) { Ok(0.0) } else { Err("it is lost".to_owned()) }
+    let taken = device.install(&model);
+    let stays = taken == confirmed(&model) && device.restart() == Some(crc_of(&model));
+    if stays { Ok(0.0) } else { Err(format!("a genuine model: {taken:?}")) }
+}
+
+/// Sends bytes that must be refused for this reason, and change nothing that the device shows.
+fn expect(
+    session: &mut Running<'_, '_>,
+    board: &Board,
+    bytes: Vec<u8>,
+    fault: SealFault,
+) -> Result<(), String> {
+    let before = shown(session, board);
+    let (found, end) = send(session, board, bytes, |report| match report {
+        Report::Refused(refusal) => Ok(refusal),
+        other => Err(format!("{other:?}")),
+    });
+    let is_right = found? == Refusal::Seal(fault) && end.is_none();
+    match shown(session, board) {
+        after if is_right && after == before => Ok(()),
+        after => Err(format!("refused otherwise, or it changes {before} to {after}")),
+    }
+}
+
+/// What the device shows of itself.
+fn shown(session: &mut Running<'_, '_>, board: &Board) -> String {
+    let requests = [Request::Identify, Request::Configuration, Request::Constants, Request::Kept];
+    requests.map(|request| ask(session, board, &request, |report| format!("{report:?}")).0).concat()
 }

@@ -137,7 +137,7 @@ fn every_warning_is_raised_and_left_out() {
         Warning::few_test_frames(30),
         Warning::trained_on(false),
         Warning::out_of_range(0.0099),
-        Warning::larger_than_slot(131_056),
+        Warning::larger_than_slot(131_072),
         Warning::padded_centres(16, 16),
         Warning::outliers(&outliers(0)),
         Warning::costly_gate(99.0, 100.0),

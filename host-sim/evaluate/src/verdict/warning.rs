@@ -4,8 +4,8 @@ use serde::Serialize;
 use taxel_data::table::Table;
 use taxel_learn::outliers::Outliers;
 
-/// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB less the record behind it.
-pub const SLOT_BYTES: usize = 131_056;
+/// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB.
+pub const SLOT_BYTES: usize = 131_072;
 
 /// Frames for each weight of a network below which a warning is due.
 pub const FRAMES_A_WEIGHT: usize = 10;

@@ -32,11 +32,14 @@ pub struct DeviceIdentity {
     pub chunk_bytes: usize,
     /// Use of its flash and RAM.
     pub memory: Memory,
-    /// Whether it has a key, and takes sealed models only.
+    /// Whether it has a key, and changes nothing without a seal.
     #[serde(serialize_with = "key_with_text")]
     pub key: KeyState,
-    /// Highest version of a sealed model that was confirmed.
-    pub highest_version: Option<u32>,
+    /// Number that no other board of its kind has, as hexadecimal digits in JSON.
+    #[serde(serialize_with = "id_with_text")]
+    pub unique_id: [u8; 12],
+    /// Largest counter of a sealed request so far, or beyond.
+    pub counter: u64,
 }
 
 /// Serialises whether there is a key as text.
@@ -47,6 +50,11 @@ fn key_with_text<S: Serializer>(key: &KeyState, serializer: S) -> Result<S::Ok, 
         KeyState::Set => "set",
         KeyState::Damaged => "damaged",
     })
+}
+
+/// Serialises a device's number as text.
+fn id_with_text<S: Serializer>(id: &[u8; 12], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&id.map(|byte| format!("{byte:02x}")).concat())
 }
 
 /// Serialises a model's identity with checksums as text: programs read large numbers as floats, which round them.
@@ -68,7 +76,6 @@ fn model_with_text<S: Serializer>(
         inputs_crc: String,
         outputs_crc: String,
         on_trial: bool,
-        version: Option<u32>,
     }
     let with_text = model.map(|model| WithText {
         model_crc: format!("{:08x}", model.crc_32),
@@ -82,7 +89,6 @@ fn model_with_text<S: Serializer>(
         inputs_crc: format!("{:08x}", model.inputs_crc_32),
         outputs_crc: format!("{:08x}", model.outputs_crc_32),
         on_trial: model.on_trial,
-        version: model.version,
     });
     with_text.serialize(serializer)
 }
@@ -141,7 +147,8 @@ impl From<&Identity<'_>> for DeviceIdentity {
             chunk_bytes: identity.chunk_bytes.into(),
             memory: identity.memory,
             key: identity.key,
-            highest_version: identity.highest_version,
+            unique_id: identity.unique_id,
+            counter: identity.counter,
         }
     }
 }

@@ -1,54 +1,64 @@
-//! Keys of devices, and seals made with them.
-
-use std::time::Duration;
+//! Keys of devices, and requests sealed with them.
 
 use firmware::link::message::{KeyState, Report, Request};
-use firmware::seal::{Key, Seal};
-use model_core::blob::Model;
+use firmware::seal::{Key, tag};
 use taxel_data::BadValue;
 
-use super::{Device, DeviceIdentity, Wire};
+use super::{Device, DeviceIdentity, WRITING, Wire};
 use crate::error::{Error, KEY_DAMAGED, NO_KEY, Result};
 
-/// Longest time in which a board sets a key: it may erase flash.
-const SETTING: Duration = Duration::from_secs(5);
+/// Largest size of a request in a seal.
+const MOST_BYTES: usize = 4096;
 
-/// What a model is sealed with.
-#[derive(Clone, Copy)]
-pub struct Sealing {
-    pub key: Key,
-    /// Version of the model; if not given, the next one of the device.
-    pub version: Option<u32>,
+/// What a request is sealed with, besides the key.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counter {
+    unique_id: [u8; 12],
+    /// That of the last sealed request.
+    last: u64,
 }
 
-impl Sealing {
-    /// Reads a key from the content of a file: 32 bytes, or 64 hexadecimal digits and white space.
-    ///
-    /// # Errors
-    /// [`BadValue`] for anything else, and for a key whose bytes are all alike.
-    pub fn key(content: &[u8]) -> std::result::Result<Key, BadValue> {
-        let bad = |rule: &str| BadValue::new("key", format!("{} bytes", content.len()), rule);
-        let key = Key::try_from(content).ok().or_else(|| of_digits(content));
-        let key = key.ok_or_else(|| {
-            bad("give 32 bytes or 64 hexadecimal digits; `openssl rand -hex 32` makes them")
-        })?;
-        if key.iter().all(|byte| *byte == key[0]) {
-            return Err(bad("give other bytes than the same one again and again"));
-        }
-        Ok(key)
+impl Counter {
+    /// The counter of the device of this `identity`.
+    pub fn new(identity: &DeviceIdentity) -> Self {
+        Self { unique_id: identity.unique_id, last: identity.counter }
     }
 
-    /// The seal of `blob` for the device of this `identity`. A blob that the device has in force keeps its version.
-    fn seal(&self, identity: &DeviceIdentity, blob: &[u8]) -> Seal {
-        let same = || {
-            let model = identity.model?;
-            let is_same = Model::decode(blob).is_ok_and(|new| new.crc() == model.crc_32);
-            model.version.filter(|_| is_same)
-        };
-        let next = || identity.highest_version.map_or(1, |highest| highest.saturating_add(1));
-        let version = self.version.or_else(same).unwrap_or_else(next);
-        Seal::new(&self.key, version, blob)
+    /// Goes on behind the counter `last`.
+    pub fn go_on(&mut self, last: u64) {
+        self.last = last;
     }
+
+    /// Passes the `request`, sealed with `key` and the next counter, to `send`.
+    pub fn seal<T>(
+        &mut self,
+        key: &Key,
+        request: &Request<'_>,
+        send: impl FnOnce(&Request<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let mut buffer = [0; MOST_BYTES];
+        let request = postcard::to_slice(request, &mut buffer)
+            .map_err(|cause| Error::failed(format!("a request that cannot be sealed: {cause}")))?;
+        self.last = self.last.saturating_add(1);
+        let (counter, tag) = (self.last, tag(key, &self.unique_id, self.last, request));
+        send(&Request::Sealed { counter, tag, request })
+    }
+}
+
+/// Reads a key from the content of a file: 32 bytes, or 64 hexadecimal digits and white space.
+///
+/// # Errors
+/// [`BadValue`] for anything else, and for a key whose bytes are all alike.
+pub fn key_of(content: &[u8]) -> std::result::Result<Key, BadValue> {
+    let bad = |rule: &str| BadValue::new("key", format!("{} bytes", content.len()), rule);
+    let key = Key::try_from(content).ok().or_else(|| of_digits(content));
+    let key = key.ok_or_else(|| {
+        bad("give 32 bytes or 64 hexadecimal digits; `openssl rand -hex 32` makes them")
+    })?;
+    if key.iter().all(|byte| *byte == key[0]) {
+        return Err(bad("give other bytes than the same one again and again"));
+    }
+    Ok(key)
 }
 
 /// The key that these hexadecimal digits are.
@@ -62,39 +72,29 @@ fn of_digits(text: &[u8]) -> Option<Key> {
     Key::try_from(bytes).ok().filter(|_| whole)
 }
 
-/// Checks that the device of this `identity` takes models with such a `sealing`.
-///
-/// # Errors
-/// [`Error::Data`] for a seal that is missing or too many, and for a key that has decayed.
-pub fn check_sealing(identity: &DeviceIdentity, sealing: Option<&Sealing>) -> Result<()> {
-    match (identity.key, sealing) {
-        (KeyState::None, None) | (KeyState::Set, Some(_)) => Ok(()),
-        (KeyState::Set, None) => Err(Error::failed(
-            "the device takes sealed models only: give its key, `upload --key FILE`",
-        )),
-        (KeyState::None, Some(_)) => Err(Error::failed(NO_KEY)),
-        (KeyState::Damaged, _) => Err(Error::failed(KEY_DAMAGED)),
-    }
-}
-
-/// The seal that the device of this `identity` needs for `blob`, if any.
-pub(super) fn seal_for(
-    identity: &DeviceIdentity,
-    blob: &[u8],
-    sealing: Option<&Sealing>,
-) -> Result<Option<Seal>> {
-    check_sealing(identity, sealing)?;
-    Ok(sealing.map(|sealing| sealing.seal(identity, blob)))
-}
-
 impl<W: Wire> Device<W> {
-    /// Sets the device's key, once and for all.
+    /// Checks that this host may change something on the device of this `identity`, before work that would be in vain.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a key that is missing or too many, and for one that has decayed.
+    pub fn check_key(&self, identity: &DeviceIdentity) -> Result<()> {
+        match (identity.key, self.key) {
+            (KeyState::None, None) | (KeyState::Set, Some(_)) => Ok(()),
+            (KeyState::Set, None) => Err(Error::failed(crate::error::KEY_MISSING)),
+            (KeyState::None, Some(_)) => Err(Error::failed(NO_KEY)),
+            (KeyState::Damaged, _) => Err(Error::failed(KEY_DAMAGED)),
+        }
+    }
+
+    /// Sets the device's key. The first one needs somebody at the board; another one replaces it, sealed by the one before.
     pub fn provision(&mut self, key: &Key) -> Result<()> {
         let request = Request::Provision { key: *key };
-        let timeout = SETTING.max(self.patience);
+        let timeout = WRITING.max(self.patience);
         let answer = self
             .ask(&request, timeout, |report| matches!(report, Report::Provisioned).then_some(()));
-        answer?.map_err(Error::Refused)
+        answer?.map_err(Error::Refused)?;
+        self.key = Some(*key);
+        Ok(())
     }
 }
 
@@ -106,11 +106,11 @@ mod tests {
     fn a_key_is_bytes_or_digits() {
         let bytes: Vec<u8> = (0..32).collect();
         let digits = bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().concat();
-        let key = Sealing::key(&bytes).unwrap();
+        let key = key_of(&bytes).unwrap();
         assert_eq!(key.to_vec(), bytes);
-        assert_eq!(Sealing::key(format!("{digits}\n").as_bytes()).unwrap(), key);
+        assert_eq!(key_of(format!("{digits}\n").as_bytes()).unwrap(), key);
         for bad in [&bytes[1..], &digits.as_bytes()[1..], b"", &[7; 32], &[b'z'; 64], &[b'0'; 64]] {
-            assert!(Sealing::key(bad).is_err(), "{bad:?}");
+            assert!(key_of(bad).is_err(), "{bad:?}");
         }
     }
 }

@@ -1,15 +1,10 @@
 //! Constants of a device's circuit, and settings that it keeps over restarts.
 
-use std::time::Duration;
-
 use firmware::link::message::{Kept, Report, Request, Setting};
 
-use super::{Device, Wire};
+use super::{Device, WRITING, Wire};
 use crate::calibration::CircuitConstants;
 use crate::error::{Error, Result};
-
-/// Longest time that writing a setting takes: pages of flash may have to be erased.
-const WRITING: Duration = Duration::from_secs(5);
 
 impl<W: Wire> Device<W> {
     /// Asks for the active constants of the circuit.

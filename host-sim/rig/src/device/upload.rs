@@ -3,12 +3,11 @@
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{EstimateReport, Refusal, Report, Request, UploadState, UploadStep};
-use firmware::seal::Seal;
+use firmware::seal::sha_256;
 use model_core::blob::{Floats, Model};
 use taxel_data::progress::Progress;
 
-use super::key::{Sealing, seal_for};
-use super::{Device, DeviceIdentity, Wire};
+use super::{Device, DeviceIdentity, WRITING, Wire};
 use crate::error::{Error, Result};
 
 /// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
@@ -27,11 +26,12 @@ pub fn step<W: Wire>(
     device: &mut Device<W>,
     step: UploadStep<'_>,
 ) -> Result<std::result::Result<UploadState, Refusal>> {
-    let timeout = if matches!(step, UploadStep::Begin { .. }) {
-        ERASE.max(device.patience)
-    } else {
-        device.patience
+    let least = match step {
+        UploadStep::Begin { .. } => ERASE,
+        UploadStep::Confirm => WRITING,
+        _ => Duration::ZERO,
     };
+    let timeout = device.patience.max(least);
     device.ask(&Request::Upload(step), timeout, |report| match report {
         Report::Upload(state) => Some(*state),
         _ => None,
@@ -43,13 +43,13 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..blob.len().min(Model::HEAD_BYTES)] }
 }
 
-/// Sends `blob` and puts it on trial with this `seal`, until the device refuses a step. A trial that is going on ends.
+/// Sends `blob` and puts it on trial, until the device refuses a step. A trial that is going on ends.
 ///
 /// # Errors
 /// [`Error::NoAnswer`] if the device stops answering, and a failure if no chunk can be sent.
 pub fn send<W: Wire>(
     device: &mut Device<W>,
-    (blob, seal): (&[u8], Option<Seal>),
+    blob: &[u8],
     chunk_bytes: usize,
     progress: &dyn Progress,
 ) -> Result<std::result::Result<UploadState, Refusal>> {
@@ -76,20 +76,19 @@ pub fn send<W: Wire>(
     if answer.is_err() {
         Ok(answer)
     } else {
-        step(device, UploadStep::Try { seal, lease_ms: TRIAL_MS })
+        step(device, UploadStep::Try { sha_256: Some(sha_256(blob)), lease_ms: TRIAL_MS })
     }
 }
 
 /// Uploads `blob` and makes it the active model, on trial, and checks that the device decodes with it. Until
-/// [`confirm`] a restart brings the previous model back. A device with a key needs a `sealing`.
+/// [`confirm`] a restart brings the previous model back.
 ///
 /// # Errors
-/// [`Error`] if the device refuses it, needs a seal, has no room for it or does not decode with it, or the work is interrupted; its
+/// [`Error`] if the device refuses it, needs a key, has no room for it or does not decode with it, or the work is interrupted; its
 /// previous model is then active again.
 pub fn start_trial<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
-    sealing: Option<&Sealing>,
     progress: &dyn Progress,
 ) -> Result<DeviceIdentity> {
     let identity = device.identify()?;
@@ -99,9 +98,9 @@ pub fn start_trial<W: Wire>(
     {
         return Err(Error::no_room(capacity, shape));
     }
-    let seal = seal_for(&identity, blob, sealing)?;
+    device.check_key(&identity)?;
     or_abort(device, |device| {
-        let outcome = send(device, (blob, seal), identity.chunk_bytes, progress)?;
+        let outcome = send(device, blob, identity.chunk_bytes, progress)?;
         let crc_32 = match outcome.map_err(Error::Refused)? {
             UploadState::OnTrial { crc_32 } => crc_32,
             other => return Err(unexpected("a trial", other)),
@@ -172,7 +171,7 @@ pub fn see_frames<W: Wire>(device: &mut Device<W>) -> Result<()> {
 
 /// Lets the trial that is going on last for so many `minutes` from now on.
 pub fn prolong_trial<W: Wire>(device: &mut Device<W>, minutes: u32) -> Result<()> {
-    let again = UploadStep::Try { seal: None, lease_ms: 60_000 * minutes };
+    let again = UploadStep::Try { sha_256: None, lease_ms: 60_000 * minutes };
     match step(device, again)?.map_err(Error::Refused)? {
         UploadState::OnTrial { .. } => Ok(()),
         other => Err(unexpected("a longer trial", other)),
@@ -202,7 +201,7 @@ pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
 pub fn undo<W: Wire>(device: &mut Device<W>) -> Result<u32> {
     let active = device.identify()?.model.ok_or(Error::Refused(Refusal::NothingToUndo))?;
     let request = Request::Undo { crc_32: active.crc_32 };
-    let answer = device.ask(&request, device.patience, |report| match report {
+    let answer = device.ask(&request, device.patience.max(WRITING), |report| match report {
         Report::Upload(state) => Some(*state),
         _ => None,
     })?;
@@ -212,13 +211,13 @@ pub fn undo<W: Wire>(device: &mut Device<W>) -> Result<u32> {
     }
 }
 
-/// Uploads `blob` without a seal, makes it the active model, checks that the device decodes with it, and confirms it.
+/// Uploads `blob`, makes it the active model, checks that the device decodes with it, and confirms it.
 pub fn replace<W: Wire>(
     device: &mut Device<W>,
     blob: &[u8],
     progress: &dyn Progress,
 ) -> Result<DeviceIdentity> {
-    start_trial(device, blob, None, progress)?;
+    start_trial(device, blob, progress)?;
     or_abort(device, confirm)
 }
 

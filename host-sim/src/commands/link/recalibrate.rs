@@ -1,7 +1,7 @@
 //! Action `recalibrate`: the model is mended from reference presses, and uploaded.
 
 use std::io::{BufRead, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 use clap::Args;
@@ -14,14 +14,14 @@ use taxel_data::table::Table;
 use taxel_learn::health::judge;
 use taxel_learn::recalibration::{self, Recalibrated};
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_rig::device::{Device, DeviceIdentity, Wire, check_sealing, upload};
+use taxel_rig::device::{Device, DeviceIdentity, Wire, upload};
 
 use super::super::data_file::FieldArguments;
 use super::super::readings::{BaselineArgument, table_of};
 use super::super::{Common, print};
+use super::activate;
 use super::frames::hear_frames;
 use super::scan::{Confidence, ScanArguments, Wanted, configure, patience, reading_names};
-use super::{SealingArguments, activate};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -34,8 +34,6 @@ pub struct Arguments {
     output: Option<PathBuf>,
     #[command(flatten)]
     baseline: BaselineArgument,
-    #[command(flatten)]
-    sealing: SealingArguments,
     #[command(flatten)]
     scan: ScanArguments,
 }
@@ -55,12 +53,13 @@ struct Summary {
 pub fn execute<W: Wire>(
     device: &mut Device<W>,
     arguments: &Arguments,
+    key: Option<&Path>,
     common: &Common,
 ) -> Result<()> {
     if let Some(path) = &arguments.output {
-        let others = [&arguments.baseline.baseline, &arguments.sealing.key].into_iter().flatten();
-        let read = [&arguments.model, &arguments.presses].into_iter().chain(others);
-        print::check_output(path, &read.map(PathBuf::as_path).collect::<Vec<_>>())?;
+        let others = [arguments.baseline.baseline.as_deref(), key].into_iter().flatten();
+        let read = [&arguments.model, &arguments.presses].map(PathBuf::as_path);
+        print::check_output(path, &read.into_iter().chain(others).collect::<Vec<_>>())?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let (fields, limits) = (FieldArguments::default(), Some(Limits::USUAL));
@@ -70,7 +69,6 @@ pub fn execute<W: Wire>(
     let metadata = model.model().metadata();
     let file = DataFile::read(&arguments.presses)?;
     let outputs = outputs_of(&file, table_of(&file, metadata.output_names.iter())?)?;
-    let sealing = arguments.sealing.read()?;
     let identity = device.identify()?;
     if !identity.has_in_force(model.model().crc()) {
         return Err(Error::Usage(
@@ -80,7 +78,7 @@ pub fn execute<W: Wire>(
     if identity.model.is_some_and(|model| model.on_trial) {
         return Err(taxel_rig::Error::Refused(Refusal::OnTrial).into());
     }
-    check_sealing(&identity, sealing.as_ref())?;
+    device.check_key(&identity)?;
     let has_readings = metadata.input_names.iter().any(|name| file.column(name).is_ok());
     let readings = if has_readings {
         let mut readings = table_of(&file, metadata.input_names.iter())?;
@@ -93,7 +91,7 @@ pub fn execute<W: Wire>(
     if let Some(path) = &arguments.output {
         output::write_bytes(path, found.blob.bytes())?;
     }
-    activate(device, &found.blob, sealing.as_ref())?;
+    activate(device, &found.blob)?;
     upload::confirm(device)?;
     conclude(&found, outputs.len(), common)
 }
@@ -157,7 +155,7 @@ fn conclude(found: &Recalibrated, given: usize, common: &Common) -> Result<()> {
     }
     let mut page = print::Page::default();
     page.line(format_args!(
-        "The model is mended: {model_crc} is active, also after a restart. `undo` returns to the previous one, unless the device has a key."
+        "The model is mended: {model_crc} is active, also after a restart. `undo` returns to the previous one."
     ));
     page.line(format_args!(
         "{:<17} {} used, {} unusable (a reading missing, or far out of range)",

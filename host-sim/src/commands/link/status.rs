@@ -104,15 +104,11 @@ pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
 }
 
 /// What the device's key means, if it has one.
-fn sealed(device: &DeviceIdentity) -> Option<String> {
-    let version = device.model.and_then(|model| model.version);
-    match (device.key, version) {
-        (KeyState::None, _) => None,
-        (KeyState::Damaged, _) => Some("damaged: the device takes no model".into()),
-        (KeyState::Set, None) => Some("set: upload a model with --key".into()),
-        (KeyState::Set, Some(version)) => {
-            Some(format!("set: sealed models only; this one is version {version}"))
-        }
+fn sealed(device: &DeviceIdentity) -> Option<&'static str> {
+    match device.key {
+        KeyState::None => None,
+        KeyState::Set => Some("set: nothing changes without --key"),
+        KeyState::Damaged => Some("decayed: nothing changes any more"),
     }
 }
 

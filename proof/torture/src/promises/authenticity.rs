@@ -1,4 +1,4 @@
-//! Models for a device with a key: only what was sealed with it, and nothing older, comes into force.
+//! Requests to a device with a key: only what was sealed with it, for it and just now, changes anything.
 
 use mock_board::sweep::{KINDS, forge};
 
@@ -6,7 +6,7 @@ use crate::promise::Promise;
 
 pub const FORGED: Promise = Promise {
     name: "seal-forged",
-    text: "no forged, replayed or older model is confirmed",
+    text: "no forged or replayed request changes anything",
     share: 1,
     check: |effort, _| {
         let cases = (8 * KINDS * 256, 10_000_000);

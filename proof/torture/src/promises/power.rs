@@ -1,10 +1,8 @@
-//! Power that is cut at every operation of the flash, and again while the device recovers: always the old or the new
-//! model is in force.
+//! Power that is cut at operations of the flash, and again while the device recovers: always it is as before, or as
+//! after.
 
 use mock_board::Torn;
-use mock_board::sweep::{
-    Cuts, Job, abort_and_decay, cut_key, cut_model, cut_settings, upload_to_worn,
-};
+use mock_board::sweep::{Job, abort_and_decay, cut, upload_to_worn};
 
 use crate::effort::Effort;
 use crate::found::Found;
@@ -14,29 +12,29 @@ use crate::tally::{Tally, outcomes};
 pub const UPLOAD: Promise = Promise {
     name: "cut-upload",
     text: "power cut in an upload: old or new model",
-    share: 12,
-    check: |effort, _| Ok(sweep(effort, 600, |seed| cut_model(Job::Upload, seed))),
+    share: 8,
+    check: |effort, _| Ok(sweep(effort, Job::Upload)),
 };
 
 pub const UNDO: Promise = Promise {
     name: "cut-undo",
     text: "power cut in an undo: one of the two models",
-    share: 6,
-    check: |effort, _| Ok(sweep(effort, 600, |seed| cut_model(Job::Undo, seed))),
+    share: 8,
+    check: |effort, _| Ok(sweep(effort, Job::Undo)),
 };
 
 pub const SETTINGS: Promise = Promise {
     name: "cut-settings",
     text: "power cut while a setting is kept: old or new",
     share: 8,
-    check: |effort, _| Ok(sweep(effort, 160, cut_settings)),
+    check: |effort, _| Ok(sweep(effort, Job::Setting)),
 };
 
-pub const PROVISION: Promise = Promise {
-    name: "cut-provision",
-    text: "power cut while a key is set: none or that one",
-    share: 2,
-    check: |effort, _| Ok(sweep(effort, 600, cut_key)),
+pub const KEY: Promise = Promise {
+    name: "cut-key",
+    text: "power cut while a key is set: old or new one",
+    share: 8,
+    check: |effort, _| Ok(sweep(effort, Job::Key)),
 };
 
 pub const DECAY: Promise = Promise {
@@ -62,11 +60,14 @@ pub const WORN: Promise = Promise {
 /// Most cases.
 const MOST: u64 = 1 << 40;
 
-/// Sweeps over at least so many cases.
-fn sweep(effort: &Effort, least: u64, case: fn(u64) -> Result<Cuts, String>) -> Found {
+/// Least number of devices.
+const LEAST: u64 = 48;
+
+/// Sweeps over cuts in a `job`.
+fn sweep(effort: &Effort, job: Job) -> Found {
     let cuts = Tally::new(Torn::ALL.map(Torn::name));
-    let mut found = effort.worst((least, MOST), (0.0, "losses"), |seed| {
-        cuts.add(Torn::new(seed) as usize, case(seed)?.count);
+    let mut found = effort.worst((LEAST, MOST), (0.0, "losses"), |seed| {
+        cuts.add(Torn::new(seed) as usize, cut(job, seed)?.count);
         Ok(0.0)
     });
     found.cases = cuts.sum();

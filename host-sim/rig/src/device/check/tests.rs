@@ -16,7 +16,8 @@ fn good() -> Findings {
         chunk_bytes: 0,
         memory: firmware::link::message::Memory::default(),
         key: firmware::link::message::KeyState::None,
-        highest_version: None,
+        unique_id: [0; 12],
+        counter: 0,
     };
     let uploads = UploadFindings {
         blob_bytes: 1,

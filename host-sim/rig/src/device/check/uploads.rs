@@ -122,7 +122,7 @@ fn break_uploads_off<W: Wire>(
         }
         let is_tried = taken > chunks.len();
         if is_tried {
-            upload::step(device, UploadStep::Try { seal: None, lease_ms: 60_000 })?
+            upload::step(device, UploadStep::Try { sha_256: None, lease_ms: 60_000 })?
                 .map_err(Error::Refused)?;
         }
         let before = device.identify()?.has_in_force(crc_32) != is_tried;
@@ -160,7 +160,7 @@ fn upload_damaged<W: Wire>(
         return upload_with_a_chunk_lost(device, blob, chunk_bytes, random);
     }
     let damaged = damage(blob, index, random);
-    let outcome = upload::send(device, (&damaged, None), chunk_bytes, &Silent)?;
+    let outcome = upload::send(device, &damaged, chunk_bytes, &Silent)?;
     Ok(outcome.is_err())
 }
 
@@ -222,7 +222,7 @@ fn upload_with_a_chunk_lost<W: Wire>(
             return Ok(false);
         }
     }
-    Ok(upload::step(device, UploadStep::Try { seal: None, lease_ms: 60_000 })?.is_err())
+    Ok(upload::step(device, UploadStep::Try { sha_256: None, lease_ms: 60_000 })?.is_err())
 }
 
 #[cfg(test)]

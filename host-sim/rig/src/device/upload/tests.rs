@@ -74,7 +74,6 @@ fn identity(on_trial: bool) -> Report<'static> {
         inputs_crc_32: 0,
         outputs_crc_32: 0,
         on_trial,
-        version: None,
     };
     Report::Identity(Identity {
         board: "scripted",
@@ -89,7 +88,8 @@ fn identity(on_trial: bool) -> Report<'static> {
         chunk_bytes: 4,
         memory: Memory::default(),
         key: KeyState::None,
-        highest_version: None,
+        unique_id: [0; 12],
+        counter: 0,
     })
 }
 
@@ -157,7 +157,7 @@ fn a_trial_that_nobody_ended_does_not_block_an_upload() {
         }
         _ => Report::Upload(UploadState::Receiving { received: 0 }),
     });
-    let outcome = send(&mut device, (&[1; 8], None), 4, &Silent).unwrap();
+    let outcome = send(&mut device, &[1; 8], 4, &Silent).unwrap();
     assert_eq!(outcome, Ok(UploadState::OnTrial { crc_32: 7 }));
     drop(device);
     assert_eq!(received, 8);

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, EstimateReport, Report, Request};
 use mock_board::{
-    Bench, Board, Flash, Memory, Running, SharedSettings, ask, blob, blob_of_components,
+    Bench, Board, Flash, Memory, Running, ask, blob, blob_of_components,
     blob_with_confidence, find_report, frame_at_rest, quiet, statistics,
 };
 use rand_core::{Rng, SeedableRng};
@@ -40,13 +40,12 @@ const SETTLING: u32 = 200;
 
 thread_local! {
     /// Memory that cases use again, so that the process grows by what the firmware or its driver loses alone.
-    static MEMORY: RefCell<(Memory, SharedSettings)> =
-        RefCell::new((Memory::new(), SharedSettings::default()));
+    static MEMORY: RefCell<Memory> = const { RefCell::new(Memory::new()) };
 }
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
     let case = |seed| {
-        MEMORY.with_borrow_mut(|(memory, settings)| run(seed, memory, settings).map(|()| 0.0))
+        MEMORY.with_borrow_mut(|memory| run(seed, memory).map(|()| 0.0))
     };
     // Allocators of all threads settle first.
     let settled = effort.worst((16, 16), (0.0, ""), case);
@@ -87,7 +86,7 @@ fn years(seed: u64, frames: u64) -> f64 {
 }
 
 /// Runs an application for some thousands of frames: with a model or none, gated or not.
-fn run(seed: u64, memory: &mut Memory, settings: &SharedSettings) -> Result<(), String> {
+fn run(seed: u64, memory: &mut Memory) -> Result<(), String> {
     let models = [blob(1, 1), blob_with_confidence(false), blob_of_components(2), blob(3, 5)];
     let mut slots = match seed / 4 % 5 {
         4 => Flash::slots(),
@@ -102,7 +101,7 @@ fn run(seed: u64, memory: &mut Memory, settings: &SharedSettings) -> Result<(), 
         ..quiet()
     };
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut bench = Bench::within(memory, configuration, settings);
+    let mut bench = Bench::on(Board::new(Flash::journal()), memory, configuration);
     let (board, frame) = (bench.board.clone(), bench.frame.clone());
     let start_us = random.next_u32();
     board.pins.borrow_mut().now_us = start_us;

@@ -3,7 +3,7 @@
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, Report, Request};
 use mock_board::{
-    Bench, Flash, Memory, SharedSettings, blob, blob_with_confidence, configure, find_report,
+    Bench, Board, Flash, Memory, blob, blob_with_confidence, configure, find_report,
     quiet, request_bytes, settle, statistics,
 };
 use rand_core::{Rng, SeedableRng};
@@ -55,7 +55,7 @@ fn run(seed: u64) -> Result<[u64; 3], String> {
         ..quiet()
     };
     let mut memory = Box::new(Memory::new());
-    let mut bench = Bench::within(&mut memory, scanning, &SharedSettings::default());
+    let mut bench = Bench::on(Board::new(Flash::journal()), &mut memory, scanning);
     let (board, frame) = (bench.board.clone(), bench.frame.clone());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let has_health = seed / 6 % 2 == 1;

@@ -5,9 +5,9 @@ use std::rc::Rc;
 
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, Request, Setting, UploadStep};
-use firmware::settings::PAGE_BYTES;
+use firmware::store::{Journal, Kind, PAGE_BYTES};
 use mock_board::{
-    Bench, Board, Flash, Memory, Pins, SharedSettings, blob, blob_with_confidence, quiet,
+    Bench, Board, Flash, Memory, Pins, blob, blob_with_confidence, quiet,
     request_bytes, upload_steps,
 };
 use rand_core::{Rng, SeedableRng};
@@ -30,7 +30,7 @@ const LEAST: u64 = 240;
 const FASTEST_S: f64 = 5.4;
 /// Longest time in µs that the erase of a slot takes, with writes of 32 bits.
 const ERASE_US: u32 = 2_000_000;
-/// Longest time in µs that the erase of a page of settings takes.
+/// Longest time in µs that the erase of a page of the journal takes.
 const ERASE_PAGE_US: u32 = 500_000;
 /// Longest time in µs of writing a word.
 const WORD_US: u32 = 100;
@@ -54,15 +54,15 @@ fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
     Ok(effort.worst((LEAST, 1 << 40), (FASTEST_S, "s"), |seed| Ok(longest_unfed_s(seed))))
 }
 
-/// Settings in these pages, one of which is full: they are exchanged at the next write. From then on the pages may be worn.
-fn nearly_full(pages: [Flash; 2], is_worn: bool) -> SharedSettings {
-    let mut settings = SharedSettings::in_pages(pages);
+/// A journal in these pages, one of which is full: they are exchanged at the next write. From then on they may be worn.
+fn nearly_full(pages: [Flash; 2], is_worn: bool) -> Journal<Flash> {
+    let mut journal = Journal::new(pages);
     for number in 0..PAGE_BYTES / 64 - 1 {
-        let kept = settings.keep_bytes(Setting::Configuration, &[number as u8; 40]);
+        let kept = journal.keep(Kind::Configuration, &[&[number as u8; 40]]);
         assert_eq!(kept, Ok(true), "write {number}");
     }
-    settings.0.borrow_mut().pages().iter_mut().for_each(|page| page.fails_to_erase = is_worn);
-    settings
+    journal.pages().iter_mut().for_each(|page| page.fails_to_erase = is_worn);
+    journal
 }
 
 /// Longest time in s between feeds of the watchdog.
@@ -88,7 +88,7 @@ fn longest_unfed_s(seed: u64) -> f64 {
         pair
     };
     let mut board =
-        Board::with_settings(&nearly_full(slow(PAGE_BYTES, ERASE_PAGE_US, false), is_worn));
+        Board::new(nearly_full(slow(PAGE_BYTES, ERASE_PAGE_US, false), is_worn));
     *pins.borrow_mut() = Pins::default();
     board.pins = pins.clone();
     let mut bench = Bench::on(board.clone(), &mut memory, quiet());
