@@ -29,6 +29,9 @@ pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 pub const FEATURES: [&str; 7] =
     ["confidence", "f32", "f32-direct", "fill", "fixed16", "micromath", "settings"];
 
+/// The feature that the board's image does not have.
+pub const SEAL: &str = "seal";
+
 /// Name of the board's image with `fixed16` alone.
 pub const NUCLEO_FIXED16: &str = "nucleo-f446re-fixed16";
 

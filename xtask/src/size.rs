@@ -8,7 +8,7 @@ use std::path::Path;
 use budget::Budget;
 use object::{Object, ObjectSection, ObjectSymbol};
 
-use crate::images::{FEATURES, NUCLEO, NUCLEO_FIXED16, QEMU, build_image, build_variant};
+use crate::images::{FEATURES, NUCLEO, NUCLEO_FIXED16, QEMU, SEAL, build_image, build_variant};
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
 
@@ -46,12 +46,13 @@ pub fn run() -> Outcome {
     let text = fs::read_to_string(&path).map_err(|cause| format!("{BUDGET}: {cause}"))?;
     let budget = budget::parse(&text).map_err(|cause| format!("{BUDGET}: {cause}"))?;
     let toolchain = Toolchain::find()?;
-    let parts = FEATURES.map(|feature| Part::new(&budget, feature)).into_iter();
+    let features = FEATURES.into_iter().chain([SEAL]);
+    let parts = features.map(|feature| Part::new(&budget, feature));
     let parts: Vec<_> = parts.collect::<Outcome<_>>()?;
     build_image(&toolchain, QEMU)?;
     build_variant(&toolchain, &["fixed16"], NUCLEO_FIXED16)?;
-    let without = parts.iter().map(|part| part.build_without(&toolchain));
-    let without: Vec<_> = without.collect::<Outcome<_>>()?;
+    let others = parts.iter().map(|part| part.build_other(&toolchain));
+    let others: Vec<_> = others.collect::<Outcome<_>>()?;
     build_image(&toolchain, NUCLEO)?;
 
     println!(
@@ -83,9 +84,8 @@ pub fn run() -> Outcome {
         "feature", "flash", "budget", "RAM", "bud."
     );
     let whole = measure(&elf(NUCLEO[1]))?;
-    for (part, without) in parts.iter().zip(&without) {
-        let [flash, ram] =
-            [Size::flash, Size::ram].map(|of| of(&whole).saturating_sub(of(without)));
+    for (part, other) in parts.iter().zip(&others) {
+        let [flash, ram] = [Size::flash, Size::ram].map(|of| of(&whole).abs_diff(of(other)));
         let Budget { flash: most_flash, ram: most_ram, .. } = part.budget;
         println!("{:21} {flash:6} of {most_flash:6} | {ram:5} of {most_ram:5}", part.feature);
         exceeded.extend(part.budget.exceeded_by(flash, ram));
@@ -96,7 +96,7 @@ pub fn run() -> Outcome {
 /// First letters of a feature's price among the budgets.
 const PRICE: &str = "feature:";
 
-/// A feature of the board's image, whose price is what the image takes less without it.
+/// A feature of the board's image, whose price is what the image takes less without it, or more with it.
 struct Part<'a> {
     feature: &'static str,
     budget: Budget<'a>,
@@ -109,10 +109,14 @@ impl<'a> Part<'a> {
         Ok(Self { feature, budget })
     }
 
-    fn build_without(&self, toolchain: &Toolchain) -> Outcome<Size> {
-        let others: Vec<_> =
-            FEATURES.into_iter().filter(|feature| *feature != self.feature).collect();
-        let name = format!("nucleo-f446re-without-{}", self.feature);
+    /// Builds the board's image without the feature, or with one that it does not have.
+    fn build_other(&self, toolchain: &Toolchain) -> Outcome<Size> {
+        let mut others = FEATURES.to_vec();
+        match others.iter().position(|feature| *feature == self.feature) {
+            Some(place) => drop(others.remove(place)),
+            None => others.push(self.feature),
+        }
+        let name = format!("nucleo-f446re-other-{}", self.feature);
         build_variant(toolchain, &others, &name)?;
         measure(&elf(&name))
     }
