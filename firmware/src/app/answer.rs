@@ -52,27 +52,8 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         model: &InForce<'_, ROWS>,
         spare: &mut S,
     ) -> Option<SessionEnd> {
-        let packet = match received {
-            Received::Frame(bytes) => packet::decode::<Request<'_>>(bytes),
-            Received::Broken | Received::TooLong => Err(PacketError::Damaged),
-        };
-        let (number, request) = match packet {
-            Ok(packet) => (packet.number, packet.body),
-            Err(error) => {
-                self.reject(error);
-                return None;
-            }
-        };
+        let (number, request, is_sealed) = self.open(received)?;
         let Self { sensor, models, link, work } = self;
-        link.statistics.requests = link.statistics.requests.saturating_add(1);
-        let is_sealed = matches!(request, Request::Sealed { .. });
-        let request = match models.authenticity.open(request, link.platform()) {
-            Ok(request) => request,
-            Err(refusal) => {
-                link.send(number, &Report::Refused(refusal));
-                return None;
-            }
-        };
         let is_keyless = models.authenticity.key_state() == KeyState::None;
         if is_sealed || models.is_chunk(request) || is_keyless && !request.only_asks() {
             let now_us = link.platform().now_us();
@@ -150,6 +131,46 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Err(refusal) => link.send(number, &Report::Refused(refusal)),
         }
         end
+    }
+
+    /// Takes a request out of its packet, and out of its seal if it has one: number, request, and whether it was sealed. What
+    /// is no request, or may not be asked for, is refused.
+    #[inline(always)] // it has one caller
+    fn open<'r>(&mut self, received: Received<'r>) -> Option<(u16, Request<'r>, bool)> {
+        let packet = match received {
+            Received::Frame(bytes) => packet::unpack(bytes),
+            Received::Broken | Received::TooLong => Err(PacketError::Damaged),
+        };
+        let (number, mut body) = match packet {
+            Ok(packet) => (packet.number, packet.body),
+            Err(error) => {
+                self.reject(error);
+                return None;
+            }
+        };
+        let mut is_sealed = false;
+        loop {
+            let request = match packet::message::<Request<'_>>(number, body) {
+                Ok(request) => request,
+                Err(error) => {
+                    self.reject(error);
+                    return None;
+                }
+            };
+            if is_sealed {
+                return Some((number, request, is_sealed));
+            }
+            let requests = &mut self.link.statistics.requests;
+            *requests = requests.saturating_add(1);
+            match self.models.authenticity.open(&request, self.link.platform()) {
+                Ok(Some(sealed)) => (body, is_sealed) = (sealed, true),
+                Ok(None) => return Some((number, request, is_sealed)),
+                Err(refusal) => {
+                    self.link.send(number, &Report::Refused(refusal));
+                    return None;
+                }
+            }
+        }
     }
 
     /// Counts a frame that is no valid request, and refuses it if it is a whole packet.

@@ -49,30 +49,30 @@ mod keyed {
             self.last
         }
 
-        /// What a host asks for, if it may: the request in a seal, or one that needs none.
+        /// Checks whether a host may ask for this: it returns the bytes of a request in a seal, which it may.
         pub fn open<'r, P: Platform>(
             &mut self,
-            request: Request<'r>,
+            request: &Request<'r>,
             platform: &mut P,
-        ) -> Result<Request<'r>, Refusal> {
+        ) -> Result<Option<&'r [u8]>, Refusal> {
             let fault = match (self.state, request) {
-                (_, Request::Sealed { .. }) if self.state == KeyState::None => SealFault::NoKey,
+                (KeyState::None, Request::Sealed { .. }) => SealFault::NoKey,
                 (KeyState::Set, Request::Sealed { counter, tag: found, request }) => {
-                    let right = tag(&self.key, &platform.unique_id(), counter, request);
-                    if is_same(&right, &found) {
-                        self.count(counter, platform)?;
-                        return inner(request).ok_or(Refusal::Unknown);
+                    let right = tag(&self.key, &platform.unique_id(), *counter, request);
+                    if is_same(&right, found) {
+                        self.count(*counter, platform)?;
+                        return Ok(Some(request));
                     }
                     SealFault::Forged
                 }
-                _ if request.is_free() => return Ok(request),
+                _ if request.is_free() => return Ok(None),
                 (KeyState::None, Request::Provision { .. }) if !platform.may_provision() => {
                     SealFault::NotAllowed
                 }
-                (KeyState::None, _) => return Ok(request),
+                (KeyState::None, _) => return Ok(None),
                 // The answer was lost.
-                (KeyState::Set, Request::Provision { key }) if is_same(&key, &self.key) => {
-                    return Ok(request);
+                (KeyState::Set, Request::Provision { key }) if is_same(key, &self.key) => {
+                    return Ok(None);
                 }
                 (KeyState::Set, _) => SealFault::Missing,
                 (KeyState::Damaged, _) => SealFault::KeyDamaged,
@@ -122,14 +122,6 @@ mod keyed {
             Ok(())
         }
     }
-
-    /// The request in a seal. It is no seal itself.
-    fn inner(bytes: &[u8]) -> Option<Request<'_>> {
-        match postcard::take_from_bytes(bytes) {
-            Ok((Request::Sealed { .. }, _)) | Err(_) => None,
-            Ok((request, rest)) => rest.is_empty().then_some(request),
-        }
-    }
 }
 
 #[cfg(not(feature = "seal"))]
@@ -157,11 +149,11 @@ mod keyless {
 
         pub fn open<'r, P: Platform>(
             &mut self,
-            request: Request<'r>,
+            request: &Request<'r>,
             _: &mut P,
-        ) -> Result<Request<'r>, Refusal> {
+        ) -> Result<Option<&'r [u8]>, Refusal> {
             let is_known = !matches!(request, Request::Sealed { .. } | Request::Provision { .. });
-            if is_known { Ok(request) } else { Err(UNSUPPORTED) }
+            if is_known { Ok(None) } else { Err(UNSUPPORTED) }
         }
 
         pub fn check(&self, _: &[u8], _: Option<[u8; 32]>) -> Result<(), Refusal> {
