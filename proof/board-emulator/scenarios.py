@@ -167,21 +167,6 @@ def restart(make, files):
     bench.finish(resets=["program"])
 
 
-def provision(make, files):
-    """A key that is set once: it outlasts a restart, and no other one takes its place."""
-    bench = make()
-    bench.run_for(0.02)
-    key = files.directory / "device.key"
-    key.write_bytes(bytes(range(32)))
-    said = bench.host_sim("provision", "--key", key)
-    expect("set: upload a model with --key" in said, "it has no key")
-    bench.ask(RESTART)
-    bench.run_for(0.1)
-    said = bench.host_sim("identify")
-    expect("set: upload a model with --key" in said, "it has lost its key")
-    bench.finish(resets=["program"])
-
-
 def serve(make, files):
     """A board for you: its serial port stays open until Ctrl-C."""
     bench = make()
@@ -196,5 +181,5 @@ def serve(make, files):
 SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
     for scenario in (session, wide, slow_erase, slow_erase_bare, patience, silent_sensor, no_clock, log_abandoned,
-                     restart, provision)
+                     restart)
 }

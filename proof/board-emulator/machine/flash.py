@@ -12,7 +12,7 @@ PGPERR, PGSERR, ERRORS = 1 << 6, 1 << 7, 0x1F3
 #: Offset and length of each sector.
 SECTORS = [(0x0, 0x4000), (0x4000, 0x4000), (0x8000, 0x4000), (0xC000, 0x4000), (0x10000, 0x10000),
            (0x20000, 0x20000), (0x40000, 0x20000), (0x60000, 0x20000)]
-#: Sectors that hold the program. The others hold settings, the key, and two models.
+#: Sectors that hold the program. The others hold the journal and two models; one is free.
 PROGRAM = (0, 4, 5)
 #: Longest time in s to erase 128 KiB, by PSIZE: 8, 16 and 32 bits at once (DS10693).
 ERASE_S = (4.0, 2.6, 2.0, 2.0)
