@@ -147,13 +147,19 @@ fn an_item_that_was_torn_at_one_start_does_not_count_at_the_next() {
     // The power was cut in its CRC-32, whose bits are weak: they read as erased, and then as they should.
     let mut torn = whole.clone();
     torn[1][crc..crc + 8].fill(0xFF);
-    let mut journal = Flash::journal_of([&torn[0], &torn[1]]);
-    assert_eq!(journal.recover(), Ok(()));
-    assert_eq!(journal.read(Kind::Constants), Some(&[1; 40][..]));
-    let mut later = bytes_of(&mut journal);
-    later[1][crc..crc + 4].copy_from_slice(&whole[1][crc..crc + 4]);
-    let journal = Flash::journal_of([&later[0], &later[1]]);
-    assert_eq!(journal.read(Kind::Constants), Some(&[1; 40][..]));
+    for is_kept_at_once in [false, true] {
+        let mut journal = Flash::journal_of([&torn[0], &torn[1]]);
+        if is_kept_at_once {
+            assert_eq!(journal.keep(Kind::Configuration, &[&[3; 40]]), Ok(true));
+        } else {
+            assert_eq!(journal.recover(), Ok(()));
+        }
+        assert_eq!(journal.read(Kind::Constants), Some(&[1; 40][..]));
+        let mut later = bytes_of(&mut journal);
+        later[1][crc..crc + 4].copy_from_slice(&whole[1][crc..crc + 4]);
+        let journal = Flash::journal_of([&later[0], &later[1]]);
+        assert_eq!(journal.read(Kind::Constants), Some(&[1; 40][..]));
+    }
 }
 
 #[test]
