@@ -101,7 +101,7 @@ fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_i
     device.slots[1].decay(20, 4);
     assert_eq!(device.restart(), Some(crc_of(&flashed)));
     // In slot 1 none counts that was not uploaded.
-    device.slots = Flash::slots();
+    let mut device = Device::new(Flash::slots());
     device.slots[1].flash(0, &flashed);
     assert_eq!(device.restart(), None);
 }
