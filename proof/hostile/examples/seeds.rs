@@ -12,8 +12,8 @@ use firmware::link::packet;
 use firmware::store::{Kind, Slot};
 use hostile::seal;
 use mock_board::{
-    Bench, Flash, ask, blob, blob_of_components, blob_with_confidence, configure,
-    quiet, request_bytes, upload_steps,
+    Bench, Flash, ask, blob, blob_of_components, blob_with_confidence, configure, quiet,
+    request_bytes, upload_steps,
 };
 use model_core::blob::Floats;
 use model_core::rbf::Format;

@@ -14,8 +14,8 @@ use firmware::link::packet::PROTOCOL_VERSION;
 use firmware::seal::Key;
 use firmware::store::Kind;
 use mock_board::{
-    Bench, Board, Flash, Memory, Running, TestFrame, blob, crc_of, model_crc, quiet,
-    request_bytes, upload_steps,
+    Bench, Board, Flash, Memory, Running, TestFrame, blob, crc_of, model_crc, quiet, request_bytes,
+    upload_steps,
 };
 use model_core::AlignedBytes;
 

@@ -5,8 +5,8 @@ use std::cell::RefCell;
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, EstimateReport, Report, Request};
 use mock_board::{
-    Bench, Board, Flash, Memory, Running, ask, blob, blob_of_components,
-    blob_with_confidence, find_report, frame_at_rest, quiet, statistics,
+    Bench, Board, Flash, Memory, Running, ask, blob, blob_of_components, blob_with_confidence,
+    find_report, frame_at_rest, quiet, statistics,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -44,9 +44,7 @@ thread_local! {
 }
 
 fn check(effort: &Effort, _: &Tools) -> Result<Found, String> {
-    let case = |seed| {
-        MEMORY.with_borrow_mut(|memory| run(seed, memory).map(|()| 0.0))
-    };
+    let case = |seed| MEMORY.with_borrow_mut(|memory| run(seed, memory).map(|()| 0.0));
     // Allocators of all threads settle first.
     let settled = effort.worst((16, 16), (0.0, ""), case);
     let before = resident_kib()?;

@@ -3,8 +3,8 @@
 use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, Report, Request};
 use mock_board::{
-    Bench, Board, Flash, Memory, blob, blob_with_confidence, configure, find_report,
-    quiet, request_bytes, settle, statistics,
+    Bench, Board, Flash, Memory, blob, blob_with_confidence, configure, find_report, quiet,
+    request_bytes, settle, statistics,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

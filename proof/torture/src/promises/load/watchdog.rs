@@ -7,8 +7,8 @@ use firmware::app::Session;
 use firmware::link::message::{ConfidenceSent, Configuration, Request, Setting, UploadStep};
 use firmware::store::{Journal, Kind, PAGE_BYTES};
 use mock_board::{
-    Bench, Board, Flash, Memory, Pins, blob, blob_with_confidence, quiet,
-    request_bytes, upload_steps,
+    Bench, Board, Flash, Memory, Pins, blob, blob_with_confidence, quiet, request_bytes,
+    upload_steps,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -87,8 +87,7 @@ fn longest_unfed_s(seed: u64) -> f64 {
         }
         pair
     };
-    let mut board =
-        Board::new(nearly_full(slow(PAGE_BYTES, ERASE_PAGE_US, false), is_worn));
+    let mut board = Board::new(nearly_full(slow(PAGE_BYTES, ERASE_PAGE_US, false), is_worn));
     *pins.borrow_mut() = Pins::default();
     board.pins = pins.clone();
     let mut bench = Bench::on(board.clone(), &mut memory, quiet());
