@@ -224,6 +224,7 @@ def brown_out(make, files):
     expect(store.options == LEVEL_3_OPTIONS, f"the option bytes are {store.options:#010x}")
     bench.ask(RESTART)
     bench.run_for(0.05)
+    until_driven(bench)
     bench.board.supply(TOO_LOW_V)
     bench.run_for(0.05)
     expect(store.options_written == 1, f"the option bytes were written {store.options_written} times")

@@ -114,8 +114,7 @@ class Board:
         ]
         self.rcc = Rcc(bus, time, rules, self._hse, self._hsi_error, self._reset_flags, self._clocks_changed,
                        self.supply_v)
-        self.flash = flash.Flash(self.store, time, rules, self._stall, self.cpu.uc.mem_write, self.supply_v,
-                                 self._erase_s)
+        self.flash = flash.Flash(self.store, time, rules, self._stall, self.cpu.uc.mem_write, self._erase_s)
         self.rcc.flash_wait_states = self.flash.wait_states
         self.flash.wait_states_changed = self.rcc.check
         self.core = Core(time, rules, self._wait, self._ask_for_reset)

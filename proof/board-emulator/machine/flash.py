@@ -23,8 +23,6 @@ SECTORS = [(0x0, 0x4000), (0x4000, 0x4000), (0x8000, 0x4000), (0xC000, 0x4000), 
 ERASE_S = {0x4000: (0.8, 0.6, 0.5), 0x10000: (2.4, 1.4, 1.1), 0x20000: (4.0, 2.6, 2.0)}
 #: Longest time in s to program once, whatever the width (DS10693).
 PROGRAM_S = 100e-6
-#: Lowest supply in V for erasing and programming by PSIZE (RM0390, table 6).
-LOWEST_V = (1.7, 2.1, 2.7)
 
 
 class Flash(Registers):
@@ -36,10 +34,10 @@ class Flash(Registers):
 
     AFTER_RESET = {CR: LOCK}
 
-    def __init__(self, store, time, rules, stall, show, supply_v, erase_s=None):
+    def __init__(self, store, time, rules, stall, show, erase_s=None):
         super().__init__()
         self._store, self.content, self._time, self._rules = store, store.content, time, rules
-        self._stall, self._show, self._supply_v, self._erase_s = stall, show, supply_v, erase_s
+        self._stall, self._show, self._erase_s = stall, show, erase_s
         self.values[OPTCR] = store.options | OPTLOCK
         #: Threshold in V of the brown-out reset: of the options that this start has loaded.
         self.brown_out_v = BROWN_OUT_V[store.options >> 2 & 3]
@@ -144,11 +142,9 @@ class Flash(Registers):
                 self._rules.breach("option-bytes", f"{options:#010x}, and they were {self._store.options:#010x}")
             self._store.options = options
             self._store.options_written += 1
-            self._begin(ERASE_S[0x4000][2], LOWEST_V[2])
+            self._begin(ERASE_S[0x4000][2])
 
-    def _begin(self, seconds, lowest_v):
-        if self._supply_v() < lowest_v:
-            self._rules.breach("flash-supply", f"{self._supply_v():.2f} of {lowest_v} V")
+    def _begin(self, seconds):
         self._ends_s, self._looks = self._time.seconds() + seconds, 0
         self._store.busy_s += seconds
 
@@ -163,8 +159,7 @@ class Flash(Registers):
         self._store.erased[number] += 1
         self.content[start:start + length] = b"\xff" * length
         self._touch(start, start + length)
-        parallel = min(parallel, 2)
-        self._begin(self._erase_s or ERASE_S[length][parallel], LOWEST_V[parallel])
+        self._begin(self._erase_s or ERASE_S[length][min(parallel, 2)])
 
     def program(self, address, size, value):
         """Carries out a write to the flash by the program."""
@@ -184,7 +179,7 @@ class Flash(Registers):
                 self._rules.breach("flash-not-erased", f"{address:#x}")
             self.content[start:start + size] = (old & value).to_bytes(size, "little")
             self._touch(start, start + size)
-            self._begin(PROGRAM_S, LOWEST_V[control >> 8 & 3])
+            self._begin(PROGRAM_S)
 
     def _fail(self, flag):
         self.values[SR] = self.values.get(SR, 0) | flag
