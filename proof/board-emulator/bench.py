@@ -127,14 +127,10 @@ def protocol_version():
     return int(re.search(r"PROTOCOL_VERSION: u8 = (\d+);", PACKET.read_text())[1])
 
 
-#: Number of a blob's first bytes that begin an upload, and the place of its length among them.
+#: Number of a blob's first bytes that begin an upload.
 HEAD_BYTES = 16
-LENGTH = slice(5, 9)
 
 
-def begin(blob, length=None):
-    """The request that begins the upload of a blob, or of one that says to be of another length."""
-    head = bytearray(blob[:HEAD_BYTES])
-    if length is not None:
-        head[LENGTH] = length.to_bytes(4, "little")
-    return b"\x06\x00" + varint(HEAD_BYTES) + bytes(head)
+def begin(blob):
+    """The request that begins the upload of a blob."""
+    return b"\x06\x00" + varint(HEAD_BYTES) + blob[:HEAD_BYTES]

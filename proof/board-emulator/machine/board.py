@@ -245,6 +245,8 @@ class Board:
         """The program looks at the time, as it does in its main loop."""
         self.flash.finish()
         self.register.check_rest()
+        if self.register.outputs is None:
+            self.rules.breach("rows-undefined")
         if self.flash.stale:
             self.rules.breach("cache-stale")
         if not self.flash.caches_on():
