@@ -46,10 +46,13 @@ fn places(constants: &[u8], start: u64) -> BTreeMap<String, Vec<u32>> {
     for words in (0..constants.len()).step_by(4).filter_map(|at| constants.get(at..at + 16)) {
         let [name, length, line, column] =
             [0, 4, 8, 12].map(|at| u32::from_le_bytes(words[at..at + 4].try_into().unwrap()));
-        let place = u64::from(name).checked_sub(start).and_then(|place| usize::try_from(place).ok());
-        let text = place.and_then(|place| constants.get(place..place.checked_add(length as usize)?));
+        let place =
+            u64::from(name).checked_sub(start).and_then(|place| usize::try_from(place).ok());
+        let text =
+            place.and_then(|place| constants.get(place..place.checked_add(length as usize)?));
         let text = text.and_then(|text| str::from_utf8(text).ok()).unwrap_or_default();
-        if text.ends_with(".rs") && (1..1 << 16).contains(&line) && (1..1 << 10).contains(&column) {
+        let is_source = Path::new(text).extension().is_some_and(|ending| ending == "rs");
+        if is_source && (1..1 << 16).contains(&line) && (1..1 << 10).contains(&column) {
             places.entry(short(text)).or_default().push(line);
         }
     }
@@ -59,7 +62,8 @@ fn places(constants: &[u8], start: u64) -> BTreeMap<String, Vec<u32>> {
 /// A file of another crate without the registry's folder and the crate's version; any other as it is.
 fn short(file: &str) -> String {
     let Some((_, inside)) = file.split_once("/registry/src/") else { return file.to_owned() };
-    let (folder, path) = inside.split_once('/').and_then(|(_, rest)| rest.split_once('/')).unwrap_or_default();
+    let (folder, path) =
+        inside.split_once('/').and_then(|(_, rest)| rest.split_once('/')).unwrap_or_default();
     let name = folder.rsplit_once('-').map_or(folder, |(name, _)| name);
     format!("{name}/{path}")
 }
@@ -104,7 +108,9 @@ mod tests {
     fn a_file_of_others_is_named_without_folder_and_version() {
         let file = "/home/x/.cargo/registry/src/index.crates.io-1/some-hal-0.2.0/src/a/b.rs";
         assert_eq!(places(&section(file, 7), START)["some-hal/src/a/b.rs"], [7]);
-        let page = format!("{HEADING}\n\n| file | why |\n|---|---|\n| `some-hal/src/a/b.rs` | so |\n\n## Next\n| `x` |");
+        let page = format!(
+            "{HEADING}\n\n| file | why |\n|---|---|\n| `some-hal/src/a/b.rs` | so |\n\n## Next\n| `x` |"
+        );
         assert_eq!(listed(&page), ["some-hal/src/a/b.rs"]);
     }
 

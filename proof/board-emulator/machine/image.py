@@ -5,6 +5,8 @@ import struct
 
 from elftools.elf.elffile import ELFFile
 
+from .rules import Fault
+
 
 class Image:
     """Segments by their address in flash, and symbols."""
@@ -28,7 +30,7 @@ class Image:
                 text = data[name - start:name - start + length] if name >= start and 3 < length < 256 else b""
                 if text.endswith(b".rs") and 0 < line < 1 << 16 and 0 < column < 256:
                     return start + place
-        raise ValueError("the image has no place of a panic")
+        raise Fault("the image tells no place of a panic")
 
     def place(self, address):
         """The function that holds `address`, and the offset in it."""
