@@ -20,7 +20,6 @@ use crate::held_pin::HeldPin;
 use crate::oscillator::{EXTERNAL_MHZ, INTERNAL_MHZ, Oscillator};
 use crate::power;
 use crate::reset::ResetCause;
-use crate::rest::rest_rows;
 use crate::serial::Serial;
 use crate::slot::Slot;
 
@@ -81,8 +80,6 @@ impl Board {
     ///
     /// `None` if it was called before.
     pub fn take() -> Option<Self> {
-        // A row that a program left at ground would stay there until the first scan.
-        rest_rows();
         let parts = Peripherals::take()?;
         let mut core = cortex_m::Peripherals::take()?;
         let mut watchdog = IndependentWatchdog::new(parts.IWDG);

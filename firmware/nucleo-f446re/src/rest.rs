@@ -1,6 +1,7 @@
 //! Rows at rest, whatever the program was doing.
 
 use cortex_m::asm;
+use cortex_m_rt::pre_init;
 use stm32f4xx_hal::pac::{GPIOC, RCC};
 
 /// Pins of port C to the row registers: data, shift clock, storage clock.
@@ -40,4 +41,11 @@ pub(crate) fn rest_rows() {
     }
     set(LATCH);
     clear(LATCH);
+}
+
+/// A row that was left at ground would stay there until the first scan. This comes before RAM is filled, which takes 2 ms:
+/// no variable may be used.
+#[pre_init]
+unsafe fn rest_rows_first() {
+    rest_rows();
 }
