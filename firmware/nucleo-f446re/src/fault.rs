@@ -40,7 +40,7 @@ pub(crate) fn take() -> Option<Fault> {
         return None;
     }
     match cause {
-        PANIC => {
+        PANIC if place != 0 => {
             // SAFETY: `panic` left the address of a constant of this image, which is in flash.
             let place = unsafe { &*ptr::with_exposed_provenance::<Location>(place as usize) };
             Some(Fault::Panic(place.file(), place.line()))
