@@ -1,7 +1,8 @@
 //! Rows at rest, whatever the program was doing.
 
+use core::arch::naked_asm;
+
 use cortex_m::asm;
-use cortex_m_rt::pre_init;
 use stm32f4xx_hal::pac::{GPIOC, RCC};
 
 /// Pins of port C to the row registers: data, shift clock, storage clock.
@@ -21,7 +22,7 @@ const LEVEL_CYCLES: u32 = 18;
 
 /// Takes every row from ground: shifts zeros into the row registers. It needs nothing but power, so it works before
 /// anything is set up, and when nothing else works any more.
-pub(crate) fn rest_rows() {
+pub(crate) extern "C" fn rest_rows() {
     // SAFETY: whoever else uses these pins has not begun yet, or does not go on.
     let (rcc, port) = unsafe { (RCC::steal(), GPIOC::steal()) };
     let set = |pins: u32| {
@@ -43,9 +44,10 @@ pub(crate) fn rest_rows() {
     clear(LATCH);
 }
 
-/// A row that was left at ground would stay there until the first scan. This comes before RAM is filled, which takes 2 ms:
-/// no variable may be used.
-#[pre_init]
-unsafe fn rest_rows_first() {
-    rest_rows();
+/// What cortex-m-rt calls first: a row that was left at ground would stay there until the first scan. RAM is filled only
+/// afterwards, which takes 2 ms, so no variable may be used.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+unsafe extern "C" fn __pre_init() {
+    naked_asm!("b {}", sym rest_rows)
 }
