@@ -10,16 +10,29 @@ import pathlib
 import re
 import signal
 
-from bench import ERASE_PATIENCE_S, IDENTIFY, RESTART, begin, expect
-from machine.line import Terminal
+from bench import ERASE_PATIENCE_S, IDENTIFY, KEEP_CONFIGURATION, RESTART, begin, expect
+from machine.flash import FACTORY_OPTIONS, LEVEL_3_OPTIONS, PROGRAM_S, SECTORS
+from machine.line import Terminal, varint
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-#: Flash that was never erased: the slots hold rubbish at first.
-SLOT_A, SLOT_B, RUBBISH = 0x40000, 0x60000, bytes(place % 251 for place in range(0x20000))
+#: Sectors of the flash, by what they hold (docs/board.md).
+JOURNAL, SLOT_A, SLOT_B = (1, 2), 6, 7
+#: What flash holds that was never erased.
+RUBBISH = bytes(place % 251 for place in range(0x20000))
 #: First bytes of answers, by their variant.
-IDENTITY, UPLOAD, RESTARTING, REFUSED = 0, 7, 8, 9
-#: Fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
-FASTEST_LSI_HZ, SLOWEST_ERASE_S = 47_000, 4.0
+IDENTITY, UPLOAD, RESTARTING, REFUSED, KEPT = 0, 7, 8, 9, 11
+#: State of an upload.
+ON_TRIAL = 2
+#: Slowest and fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
+SLOWEST_LSI_HZ, FASTEST_LSI_HZ, SLOWEST_ERASE_S = 17_000, 47_000, 4.0
+#: By how much the internal oscillator may be off from -10 to 85 degrees, as a share (DS10693).
+LARGEST_HSI_ERROR = 0.04
+#: Supplies in V that are too low: for changing flash, and for running.
+LOW_V, TOO_LOW_V = 2.9, 2.6
+#: Writes of settings between two restarts, and such writes behind which both pages have been erased (docs/link.md).
+WRITES, MANY_WRITES = 100, 290
+#: Bytes that a device keeps while it is busy (docs/link.md).
+ROOM = 1000
 #: Pin that selects a fourth converter.
 FOURTH_SELECT = "C", 5
 
@@ -27,26 +40,32 @@ FOURTH_SELECT = "C", 5
 def session(make, files):
     """A whole session with `host-sim`: identify, upload, check, baseline."""
     bench = make()
-    bench.board.flash.fill(SLOT_B, RUBBISH)
+    fill(bench, SLOT_B, RUBBISH)
     bench.run_for(0.02)
     said = bench.host_sim("identify")
     expect("nucleo-f446re" in said and "none: upload one" in said, "it does not tell who it is")
     said = bench.host_sim("upload", files.model)
     expect("slot 1, generation 1" in said, "the model is not in force")
-    # Erasing takes 2 s at most with 32 bits at once, and a word 16 us.
-    most_s = 2.0 + 1.02 * 16e-6 * files.model.stat().st_size / 4
-    expect(bench.board.flash.busy_s <= most_s, f"erasing and writing take {bench.board.flash.busy_s:.2f} s")
+    # Erasing a slot and a page takes 2.5 s at most with 32 bits at once, and a word 100 us.
+    most_s, busy_s = 2.5 + 1.02 * PROGRAM_S * files.model.stat().st_size / 4, bench.board.store.busy_s
+    expect(busy_s <= most_s, f"erasing and writing take {busy_s:.2f} s")
     said = bench.host_sim("check", "press", "--model", files.model, "-n", files.frames)
     expect(f"{files.frames} of {files.frames} bit-identical" in said, "it does not decode as the host")
     check_baseline(bench, files)
     check_scan_time(bench.host_sim("identify"))
     # A model that is flashed into slot A now is not used, and the log says so (xtask reads it).
-    bench.board.flash.fill(SLOT_A, files.model.read_bytes())
+    fill(bench, SLOT_A, files.model.read_bytes())
     bench.ask(RESTART)
     bench.run_for(0.1)
     expect("slot 1, generation 1" in bench.host_sim("identify"), "the model is not in force any more")
     expect(bench.board.untouched(*FOURTH_SELECT), "the pin of a fourth converter is not as after a reset")
-    bench.finish(resets=["program"])
+    bench.finish(resets=["program"], erased=[JOURNAL[1], SLOT_B])
+
+
+def fill(bench, sector, content):
+    """Puts `content` at the start of a sector, as a programmer outside does."""
+    start, length = SECTORS[sector]
+    bench.board.flash.fill(start, content[:length])
 
 
 def wide(make, files):
@@ -93,7 +112,7 @@ def slow_erase(make, files):
     answer, seconds = bench.ask(begin(files.model.read_bytes()), ERASE_PATIENCE_S)
     expect(answer[0] == UPLOAD and seconds > SLOWEST_ERASE_S, f"begin is answered by {answer.hex(' ')}")
     bench.run_for(0.1)
-    bench.finish()
+    bench.finish(erased=[JOURNAL[1], SLOT_B])
 
 
 def slow_erase_bare(make, files):
@@ -105,7 +124,7 @@ def slow_erase_bare(make, files):
     answer, seconds = bench.ask(begin(files.model.read_bytes()), ERASE_PATIENCE_S)
     expect(answer[0] == UPLOAD and seconds > SLOWEST_ERASE_S, f"begin is answered by {answer.hex(' ')}")
     bench.run_for(0.1)
-    bench.finish()
+    bench.finish(erased=[JOURNAL[1], SLOT_B])
 
 
 def patience(make, files):
@@ -132,12 +151,153 @@ def silent_sensor(make, files):
     bench.finish(resets=["watchdog"])
 
 
+def silent_sensor_slow(make, files):
+    """The same with the watchdog at its slowest: 15 s, in which no row stands driven."""
+    bench = make(lsi_hz=SLOWEST_LSI_HZ, sensor=False)
+    bench.run_for(0.03)
+    bench.scan_every(2.0)
+    bench.run_for(14.9)
+    expect(not bench.board.resets, "it is reset too early")
+    bench.run_for(0.3)
+    bench.finish(resets=["watchdog"])
+
+
 def no_clock(make, files):
-    """A board without the ST-LINK's 8 MHz: it runs from its own oscillator."""
-    bench = make(hse=False)
+    """A board without the ST-LINK's 8 MHz: it runs from its own oscillator, however fast that is."""
+    for error in (-LARGEST_HSI_ERROR, LARGEST_HSI_ERROR, 0.0):
+        bench = make(hse=False, hsi_error=error)
+        bench.run_for(0.15)
+        said = bench.host_sim("identify")
+        expect("nucleo-f446re" in said, "it does not tell who it is")
+        bench.finish()
+
+
+def clock_stops(make, files):
+    """The ST-LINK's 8 MHz stop while a row is driven: the board restarts at once, from its own oscillator."""
+    bench = make()
+    bench.run_for(0.02)
+    until_driven(bench)
+    bench.board.stop_hse()
     bench.run_for(0.15)
-    said = bench.host_sim("identify")
-    expect("nucleo-f446re" in said, "it does not tell who it is")
+    expect(bench.board.rcc.clocks.hclk <= 168e6, f"it runs at {bench.board.rcc.clocks.hclk / 1e6:g} MHz")
+    answer, _ = bench.ask(IDENTIFY)
+    expect(answer[0] == IDENTITY, f"identify is answered by {answer.hex(' ')}")
+    bench.finish(resets=["program"])
+
+
+def fault_restarts(make, files):
+    """The program goes astray while a row is driven, and again with its stack at its end: it restarts at once."""
+    bench = make()
+    bench.run_for(0.02)
+    for _ in range(2):
+        until_driven(bench)
+        bench.board.derail()
+        bench.run_for(0.02)
+        answer, _ = bench.ask(IDENTIFY)
+        expect(answer[0] == IDENTITY, f"identify is answered by {answer.hex(' ')}")
+    until_driven(bench)
+    bench.board.derail(stack_ends=True)
+    bench.run_for(0.02)
+    bench.finish(resets=["program"] * 3)
+
+
+def panic_restarts(make, files):
+    """A panic while a row is driven: the board restarts at once, and its log tells the place (xtask reads it)."""
+    bench = make()
+    bench.run_for(0.02)
+    until_driven(bench)
+    bench.board.panic()
+    bench.run_for(0.02)
+    answer, _ = bench.ask(IDENTIFY)
+    expect(answer[0] == IDENTITY, f"identify is answered by {answer.hex(' ')}")
+    bench.finish(resets=["program"])
+
+
+def until_driven(bench):
+    """Runs until a row is driven."""
+    bench.board.run_until(lambda: bench.board.register.outputs)
+
+
+def brown_out(make, files):
+    """A chip as it comes: the first start sets the brown-out level, and no later one writes it again."""
+    bench = make(options=FACTORY_OPTIONS)
+    bench.run_for(0.6)
+    store = bench.board.store
+    expect(store.options == LEVEL_3_OPTIONS, f"the option bytes are {store.options:#010x}")
+    bench.ask(RESTART)
+    bench.run_for(0.05)
+    until_driven(bench)
+    bench.board.supply(TOO_LOW_V)
+    bench.run_for(0.05)
+    expect(store.options_written == 1, f"the option bytes were written {store.options_written} times")
+    bench.finish(resets=["program", "brown-out"])
+
+
+def sagging_supply(make, files):
+    """A supply that sags: nothing is erased or written, and below the brown-out level the board is held in reset."""
+    bench = make()
+    fill(bench, SLOT_A, RUBBISH)
+    bench.run_for(0.05)
+    bench.scan_every(0.02)
+    before = bytes(bench.board.store.content)
+    bench.board.supply(LOW_V)
+    for request in (begin(files.model.read_bytes()), KEEP_CONFIGURATION):
+        answer, _ = bench.ask(request, ERASE_PATIENCE_S)
+        expect(answer[0] == REFUSED, f"{request.hex(' ')} is answered by {answer.hex(' ')}")
+    expect(bytes(bench.board.store.content) == before and not bench.board.store.erased, "flash was changed")
+    bench.board.supply(TOO_LOW_V)
+    bench.run_for(0.05)
+    bench.scan_every(0.02)
+    answer, _ = bench.ask(KEEP_CONFIGURATION, ERASE_PATIENCE_S)
+    expect(answer[0] == KEPT, f"keep is answered by {answer.hex(' ')}")
+    found = set(bench.board.store.erased)
+    expect(found <= set(JOURNAL), f"sectors {found} were erased")
+    bench.finish(resets=["brown-out"], erased=found)
+
+
+def keep(make, files):
+    """A configuration is kept until both pages of settings have been erased, and outlasts each restart."""
+    bench = make(lsi_hz=FASTEST_LSI_HZ)
+    bench.run_for(0.05)
+    slowest_s, period_us = 0.0, 0
+    for number in range(MANY_WRITES):
+        period_us = 1_000_000 + number
+        bench.scan_every(period_us * 1e-6)
+        answer, seconds = bench.ask(KEEP_CONFIGURATION, ERASE_PATIENCE_S)
+        expect(answer[0] == KEPT, f"keep {number} is answered by {answer.hex(' ')}")
+        slowest_s = max(slowest_s, seconds)
+        if number % WRITES == WRITES - 1:
+            bench.ask(RESTART)
+            bench.run_for(0.05)
+            expect(bench.period_us() == period_us, "what was kept is not in force")
+    bench.board.note(f"keep: the slowest takes {slowest_s:.3f} s")
+    bench.finish(resets=["program"] * (MANY_WRITES // WRITES), erased=JOURNAL)
+
+
+def burst(make, files):
+    """As many bytes as a device must keep, and a request behind them, all during one scan."""
+    settling_s = 2e-3
+    bench = make()
+    bench.run_for(0.02)
+    bench.scan_every(1.0, settling_s)
+    bench.board.run_until(lambda: bench.board.register.outputs)
+    # Zeros are packets without content, which mean nothing.
+    answer, _ = bench.ask(IDENTIFY, before=bytes(ROOM - 20))
+    expect(answer[0] == IDENTITY, f"identify is answered by {answer.hex(' ')}")
+    bench.finish()
+
+
+def overrun(make, files):
+    """A byte is overrun between a look at the port's status and one at its data: the error alone must not block."""
+    bench = make()
+    bench.run_for(0.02)
+    bench.board.usart.overrun()
+    before = bench.board.interrupts
+    bench.run_for(0.005)
+    # An estimate of 600 bytes may be under way, each with an interrupt.
+    expect(bench.board.interrupts - before < ROOM, "the port's interrupt never rests")
+    answer, _ = bench.ask(IDENTIFY)
+    expect(answer[0] == IDENTITY, f"identify is answered by {answer.hex(' ')}")
     bench.finish()
 
 
@@ -146,10 +306,9 @@ def log_abandoned(make, files):
     bench = make()
     bench.run_for(0.02)
     bench.board.rtt.abandon(room=8)
-    for _ in range(4):
-        # Too large: it is logged, refused, and erases nothing.
-        answer, _ = bench.ask(begin(files.model.read_bytes(), 1 << 20))
-        expect(answer[0] == REFUSED, f"begin is answered by {answer.hex(' ')}")
+    for number in range(4):
+        # It is logged.
+        bench.scan_every(0.02 + 0.001 * number)
     bench.finish()
 
 
@@ -167,6 +326,21 @@ def restart(make, files):
     bench.finish(resets=["program"])
 
 
+def dead_host(make, files):
+    """A host that dies behind `try`: when its lease is over, the model before, here none, is in force again."""
+    bench = make()
+    bench.run_for(0.02)
+    bench.host_sim("upload", files.model, "--trial")
+    expect("on trial" in bench.host_sim("identify"), "the model is not on trial")
+    answer, _ = bench.ask(b"\x06\x02\x00" + varint(2000))
+    expect(answer[:2] == bytes([UPLOAD, ON_TRIAL]), f"another try is answered by {answer.hex(' ')}")
+    bench.run_for(1.9)
+    expect("on trial" in bench.host_sim("identify"), "the trial ended too early")
+    bench.run_for(0.2)
+    expect("none: upload one" in bench.host_sim("identify"), "the trial has no end")
+    bench.finish(erased=[JOURNAL[1], SLOT_B])
+
+
 def serve(make, files):
     """A board for you: its serial port stays open until Ctrl-C."""
     bench = make()
@@ -180,6 +354,7 @@ def serve(make, files):
 
 SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
-    for scenario in (session, wide, slow_erase, slow_erase_bare, patience, silent_sensor, no_clock, log_abandoned,
-                     restart)
+    for scenario in (session, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow, no_clock,
+                     clock_stops, fault_restarts, panic_restarts, brown_out, sagging_supply, keep, burst, overrun,
+                     log_abandoned, restart, dead_host)
 }

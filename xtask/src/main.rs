@@ -7,6 +7,7 @@ mod toolchain;
 mod queue;
 mod copy;
 
+mod panics;
 mod images;
 mod cores;
 mod size;

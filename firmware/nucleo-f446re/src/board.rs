@@ -15,14 +15,16 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 use crate::bus::Bus;
 use crate::clock::Clock;
+use crate::flash::set_brown_out_level;
 use crate::held_pin::HeldPin;
-use crate::oscillator::Oscillator;
+use crate::oscillator::{EXTERNAL_MHZ, INTERNAL_MHZ, Oscillator};
+use crate::power;
 use crate::reset::ResetCause;
 use crate::serial::Serial;
 use crate::slot::Slot;
 
-/// Watchdog period in ms. Erasing a slot takes up to 2 s, in which the watchdog is not fed, and its own clock
-/// may be up to 50 % too fast.
+/// Watchdog period in ms at 32 kHz. Erasing a slot takes up to 2 s, in which the watchdog is not fed. Its own clock has
+/// 17 to 47 kHz, so it waits 5.4 to 15 s.
 const WATCHDOG_MS: u32 = 8000;
 
 /// Clock of the converters' bus in Hz.
@@ -68,12 +70,13 @@ pub struct Board {
     pub pages: [Slot; 2],
     /// Whether the blue button was held at the start.
     pub is_button_held: bool,
-    /// Watchdog, already running; it restarts the program if it is not fed for 8 s.
+    /// Watchdog, already running; it restarts the program if it is not fed for 5.4 to 15 s.
     pub watchdog: IndependentWatchdog,
 }
 
 impl Board {
-    /// Sets up all parts: 180 MHz, from the ST-LINK's 8 MHz if they are there; all chip selects and row signals idle.
+    /// Sets up all parts: 180 MHz from the ST-LINK's 8 MHz if they are there, else 158 MHz; all chip selects and row
+    /// signals idle.
     ///
     /// `None` if it was called before.
     pub fn take() -> Option<Self> {
@@ -87,11 +90,20 @@ impl Board {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
         let oscillator = Oscillator::find(&parts.RCC);
+        power::watch(&parts.RCC, &parts.PWR);
+        if set_brown_out_level(&parts.FLASH) {
+            defmt::info!("brown-out level 3 is set: it holds from the next reset on");
+        }
         let source = match oscillator {
-            Oscillator::External => Config::hse(8.MHz()).bypass_hse_oscillator(),
-            Oscillator::Internal => Config::hsi(),
+            Oscillator::External => {
+                Config::hse(8.MHz()).bypass_hse_oscillator().sysclk(EXTERNAL_MHZ.MHz())
+            }
+            Oscillator::Internal => Config::hsi().sysclk(INTERNAL_MHZ.MHz()),
         };
-        let mut rcc = parts.RCC.freeze(source.sysclk(180.MHz()));
+        let mut rcc = parts.RCC.freeze(source);
+        if oscillator == Oscillator::External {
+            rcc.cr().modify(|_, w| w.csson().set_bit());
+        }
         let gpioa = parts.GPIOA.split(&mut rcc);
         let gpiob = parts.GPIOB.split(&mut rcc);
         let gpioc = parts.GPIOC.split(&mut rcc);

@@ -3,7 +3,7 @@
 use board_common::region::take_weights;
 use board_common::{BoardApp, CAPACITY, buffers};
 use cortex_m_rt::entry;
-use defmt::{info, unwrap, warn};
+use defmt::{info, warn};
 use defmt_rtt as _;
 use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
@@ -11,7 +11,6 @@ use firmware::platform::{Platform, Port};
 use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
 use firmware::store::Journal;
 use nucleo_f446re::{Board, Clock, Oscillator, Serial, Slot, memory, restart};
-use panic_probe as _;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
@@ -85,14 +84,16 @@ impl Platform for Nucleo {
 
 #[entry]
 fn main() -> ! {
-    let board = unwrap!(Board::take());
+    let Some(board) = Board::take() else { restart() };
     info!(
         "taxel {=str} on a NUCLEO-F446RE, started by: {}",
         env!("CARGO_PKG_VERSION"),
         board.reset_cause
     );
     if board.oscillator == Oscillator::Internal {
-        warn!("no 8 MHz from the ST-LINK: running from the internal oscillator, within 1 %");
+        warn!(
+            "no 8 MHz from the ST-LINK: running from the internal oscillator, 1 % off at 25 °C, up to 4 % elsewhere"
+        );
     }
     let drive = ShiftRegister595::<_, { CAPACITY.rows }> {
         data: board.row_data,
@@ -110,7 +111,7 @@ fn main() -> ! {
         journal: Journal::new(board.pages),
         is_button_held: board.is_button_held,
     };
-    let buffers = unwrap!(buffers());
+    let Some(buffers) = buffers() else { restart() };
     let mut app = BoardApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);
     let mut slots = board.slots;
     // SAFETY: the memory is taken here only.

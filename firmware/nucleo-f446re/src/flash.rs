@@ -1,4 +1,4 @@
-//! The flash controller: erasing a sector, and writing words.
+//! The flash controller: erasing a sector, writing words, and the option byte of the brown-out level.
 //!
 //! 32 bits at once, which 3.3 V allow: the HAL's functions take 8, and twice the time.
 
@@ -8,8 +8,16 @@ use stm32f4xx_hal::flash::FlashExt;
 use stm32f4xx_hal::pac::FLASH;
 use stm32f4xx_hal::pac::flash::cr::PSIZE;
 
+use crate::power;
+
 /// Values that unlock the controller, in this order.
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+
+/// Values that unlock the option bytes, in this order.
+const OPTION_KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
+
+/// Brown-out level 3 in the option bytes: a reset below 2.7 to 2.9 V. A chip comes with none.
+const BROWN_OUT_LEVEL_3: u8 = 0;
 
 /// Error flags of the status register, which are cleared by writing ones.
 const ERRORS: u32 = 0x1F2;
@@ -21,11 +29,15 @@ pub(crate) struct Refused;
 pub(crate) struct Unlocked(FLASH);
 
 impl Unlocked {
-    /// Unlocks the controller, and clears the errors of earlier operations.
+    /// Unlocks the controller, and clears the errors of earlier operations. `None`, and nothing is unlocked, while
+    /// the supply is too low.
     ///
     /// # Safety
     /// The caller must ensure that nobody else uses the controller meanwhile.
-    pub unsafe fn new() -> Self {
+    pub unsafe fn new() -> Option<Self> {
+        if power::is_low() {
+            return None;
+        }
         // SAFETY: the caller ensures that there is no other user.
         let flash = unsafe { FLASH::steal() };
         // SAFETY: no other bit of this register can be written.
@@ -34,7 +46,7 @@ impl Unlocked {
             // SAFETY: the register takes every value.
             flash.keyr().write(|w| unsafe { w.bits(key) });
         }
-        Self(flash)
+        Some(Self(flash))
     }
 
     /// Number of the sector that holds `address`.
@@ -75,7 +87,8 @@ impl Unlocked {
         written
     }
 
-    /// Waits until the operation has ended. The processor stands still meanwhile, since its code is in flash.
+    /// Waits until the operation has ended. Code that must be fetched from flash stands still meanwhile; code in the
+    /// instruction cache goes on.
     fn ended(&self) -> Result<(), Refused> {
         while self.0.sr().read().bsy().bit() {}
         if self.0.sr().read().bits() & ERRORS == 0 { Ok(()) } else { Err(Refused) }
@@ -91,4 +104,22 @@ impl Drop for Unlocked {
         self.0.acr().modify(|_, w| w.dcrst().clear_bit());
         self.0.acr().modify(|_, w| w.dcen().set_bit());
     }
+}
+
+/// Makes the chip reset while its supply is too low for 180 MHz and for writing flash, from the next reset on. Returns
+/// whether it had to: the option byte stays for good. Other options stay as they are.
+pub(crate) fn set_brown_out_level(flash: &FLASH) -> bool {
+    if flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3 || power::is_low() {
+        return false;
+    }
+    for key in OPTION_KEYS {
+        // SAFETY: the register takes every value.
+        flash.optkeyr().write(|w| unsafe { w.bits(key) });
+    }
+    // SAFETY: the level fits its field.
+    flash.optcr().modify(|_, w| unsafe { w.bor_lev().bits(BROWN_OUT_LEVEL_3) });
+    flash.optcr().modify(|_, w| w.optstrt().set_bit());
+    while flash.sr().read().bsy().bit() {}
+    flash.optcr().modify(|_, w| w.optlock().set_bit());
+    true
 }

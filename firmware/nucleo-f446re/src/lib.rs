@@ -7,6 +7,9 @@
 // From the ground up: a module imports only what is declared before it.
 mod bus;
 mod clock;
+mod rest;
+mod fault;
+mod power;
 mod flash;
 mod held_pin;
 mod oscillator;
@@ -19,6 +22,7 @@ pub use board::{Board, CONVERTERS, Converter, RowPin, SPI_HZ, Select};
 pub use board_common::memory;
 pub use bus::Bus;
 pub use clock::Clock;
+pub use fault::Fault;
 pub use held_pin::HeldPin;
 pub use oscillator::Oscillator;
 pub use reset::{ResetCause, restart};

@@ -3,11 +3,17 @@
 use cortex_m::peripheral::SCB;
 use stm32f4xx_hal::pac::RCC;
 
+use crate::fault::{self, Fault};
+
 /// Cause of the microcontroller's last reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
 pub enum ResetCause {
-    /// Power was switched on, or was too low for a moment.
+    /// Power was switched on.
     Power,
+    /// Power was too low.
+    BrownOut,
+    /// The program could not go on.
+    Fault(Fault),
     /// The program had stopped feeding the watchdog.
     Watchdog,
     /// The program restarted itself ([`restart`]), or a debugger did.
@@ -21,13 +27,16 @@ impl ResetCause {
     pub(crate) fn read(rcc: &RCC) -> Self {
         let flags = rcc.csr().read();
         rcc.csr().modify(|_, w| w.rmvf().set_bit());
+        let fault = fault::take();
         // Every reset sets the pin's flag as well, and a loss of power sets several flags.
-        if flags.porrstf().bit() || flags.borrstf().bit() {
+        if flags.porrstf().bit() {
             Self::Power
+        } else if flags.borrstf().bit() {
+            Self::BrownOut
         } else if flags.wdgrstf().bit() || flags.wwdgrstf().bit() {
             Self::Watchdog
         } else if flags.sftrstf().bit() {
-            Self::Software
+            fault.map_or(Self::Software, Self::Fault)
         } else {
             Self::Pin
         }

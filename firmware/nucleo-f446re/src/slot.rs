@@ -17,6 +17,8 @@ pub enum SlotError {
     Verify,
     /// The flash controller reported an error, most likely because of write protection.
     Refused,
+    /// The supply is too low; nothing was erased or written.
+    Supply,
 }
 
 /// Flash for one model, or one page of the journal. Erasing sets all its bits to 1; writing can only set bits to 0.
@@ -38,10 +40,10 @@ impl Slot {
     /// Sets all bytes to 0xFF. A slot takes 1 to 2 s, a page up to half a second, in which nothing else runs, not even interrupts.
     ///
     /// # Errors
-    /// [`SlotError::OutOfRange`], [`SlotError::Refused`], [`SlotError::Verify`].
+    /// Every variant of [`SlotError`] but [`SlotError::Unaligned`].
     pub fn erase(&mut self) -> Result<(), SlotError> {
         // SAFETY: `all` took the controller, and no slot keeps it beyond one call.
-        let mut flash = unsafe { Unlocked::new() };
+        let mut flash = unsafe { Unlocked::new() }.ok_or(SlotError::Supply)?;
         let sector = flash.sector(self.0.start()).ok_or(SlotError::OutOfRange)?;
         // SAFETY: the sector is this slot, which is borrowed mutably: nobody reads it.
         let erased = unsafe { flash.erase(sector) };
@@ -50,7 +52,7 @@ impl Slot {
         if self.bytes().iter().all(|&byte| byte == 0xFF) { Ok(()) } else { Err(SlotError::Verify) }
     }
 
-    /// Writes `bytes` from `offset` on, both multiples of four; takes 16 µs a word.
+    /// Writes `bytes` from `offset` on, both multiples of four; takes 16 µs a word, 100 at most.
     ///
     /// # Errors
     /// Every variant of [`SlotError`].
@@ -64,7 +66,7 @@ impl Slot {
             return Err(SlotError::Unaligned);
         }
         // SAFETY: `all` took the controller, and no slot keeps it beyond one call.
-        let mut flash = unsafe { Unlocked::new() };
+        let mut flash = unsafe { Unlocked::new() }.ok_or(SlotError::Supply)?;
         // SAFETY: the words lie within this slot, which is borrowed mutably: nobody reads it.
         let written = unsafe { flash.write(self.0.start() + offset, words) };
         drop(flash);

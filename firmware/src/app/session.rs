@@ -63,7 +63,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         }
         // Behind an uploaded model in slot 1, the spare slot is slot 0. For a line of the log, the blob's head will do.
         if slot == Some(1)
-            && confirmed.crcs[0].is_none()
+            && !confirmed.has(0, spare.bytes())
             && check_head(capacity, blob_in_slot(spare.bytes())).is_ok()
         {
             info!("slot 0 holds a model that was flashed, not uploaded: it is not used");

@@ -5,10 +5,10 @@ import math
 from . import circuit, flash, gpio
 from .bus import Bus
 from .core import Core
-from .cpu import FLASH, FLASH_BYTES, Cpu
+from .cpu import FLASH, FLASH_BYTES, SRAM, SRAM_BYTES, Cpu
 from .image import Image
 from .mcp3208 import Mcp3208
-from .rcc import Rcc
+from .rcc import HSI_HZ, Rcc
 from .rtt import Rtt
 from .rules import Fault, Rules
 from .shift_register import ShiftRegister
@@ -20,8 +20,16 @@ from .watchdog import Watchdog
 
 #: Number of the interrupt of USART2, and of the first interrupt among the exceptions.
 USART2, FIRST_INTERRUPT = 38, 16
-#: Flags of RCC_CSR after power-on, after a reset by the watchdog, and after one by the program.
-POWER_ON, BY_WATCHDOG, BY_PROGRAM = 0x0E00_0000, 0x2400_0000, 0x1400_0000
+#: Numbers of exceptions.
+NMI, HARD_FAULT = 2, 3
+#: How the name of the function ends that all panics go through.
+PANIC = "9panic_fmt"
+#: An address where nothing is.
+NOWHERE = 0x6000_0000
+#: Time in s after which a supply that has sagged is back, if the processor is held in reset meanwhile.
+DIP_S = 1e-3
+#: Flags of RCC_CSR after power-on, after a reset by the watchdog, by the program, and by a low supply.
+POWER_ON, BY_WATCHDOG, BY_PROGRAM, BROWN_OUT = 0x0E00_0000, 0x2400_0000, 0x1400_0000, 0x0600_0000
 #: Alternate functions that the pins need: SPI2 at PB13 to PB15, USART2 at PA2 and PA3.
 SPI_FUNCTION, USART_FUNCTION = 5, 7
 SCK, MISO, MOSI, TX, RX = 13, 14, 15, 2, 3
@@ -40,21 +48,26 @@ class Board:
     """A board that runs the image at `path`, with the resistances `ohm[row][column]` at its wires, and with as many
     shift registers and converters as these need.
 
-    `hse`: the ST-LINK gives its 8 MHz. `lsi_hz`: the watchdog's own clock. `erase_s`: how long erasing 128 KiB
-    takes, whatever the data sheet says. `sensor`: the converters are there. `settling_us`: the wait after each
-    change of rows that the device is configured to.
+    `hse`: the ST-LINK gives its 8 MHz. `hsi_error`: by how much, as a share, the internal oscillator is too fast.
+    `lsi_hz`: the watchdog's own clock. `erase_s`: how long erasing a slot takes, whatever the data sheet says. `options`:
+    the option bytes. `sensor`: the converters are there. `settling_us`: the wait after each change of rows that the
+    device is configured to.
     """
 
-    def __init__(self, path, ohm, *, hse=True, lsi_hz=32_000, erase_s=None, sensor=True, baud=921_600,
-                 settling_us=100.0, log=print):
+    def __init__(self, path, ohm, *, hse=True, hsi_error=0.0, lsi_hz=32_000, erase_s=None,
+                 options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=100.0, log=print):
         self.image = Image(path)
         self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
-        self._sensor, self._baud, self._settling_us, self._log = sensor, baud, settling_us, log
+        self._hsi_error, self._supply_v = hsi_error, 3.3
+        self._sensor, self._baud, self.settling_us, self._log = sensor, baud, settling_us, log
         self.time = Time()
         self.rules = Rules(self.where, self.note)
-        self.content = bytearray(b"\xff" * FLASH_BYTES)
-        for address, data in self.image.segments:
-            self.content[address - FLASH:address - FLASH + len(data)] = data
+        #: What its flash and option bytes hold, and what was done to them.
+        self.store = flash.Store(self.image.segments, options)
+        rows = CHIP_WIRES * math.ceil(len(ohm) / CHIP_WIRES)
+        self.register = ShiftRegister(self.time, self.rules, rows, lambda: self.settling_us)
+        #: Whether the next fault is the scenario's own.
+        self._derailed = False
         #: Causes of the resets so far.
         self.resets = []
         #: Bytes of the log so far.
@@ -64,7 +77,7 @@ class Board:
         #: Called again and again while the board runs, with whether the program idles.
         self.glance = lambda idle: None
         self._reset_flags, self._pending_reset = POWER_ON, None
-        self._start()
+        self._start(bytes(SRAM_BYTES))
 
     def note(self, text):
         """Logs `text` with the time."""
@@ -80,33 +93,33 @@ class Board:
 
     # Start and resets
 
-    def _start(self):
+    def _start(self, sram):
         time, rules = self.time, self.rules
-        time.change_clock(16_000_000)
+        time.change_clock(HSI_HZ * (1 + self._hsi_error))
         time.due = time.now
         bus = self._bus = Bus(time, rules)
-        self.cpu = Cpu(time, self, self.content)
+        self.cpu = Cpu(time, self, self.store.content, sram)
         self.rtt = Rtt(self.cpu, self.image.symbols["_SEGGER_RTT"])
         self.ports = {
             "A": gpio.Port({gpio.MODER: 0xA800_0000, gpio.OSPEEDR: 0x0C00_0000, gpio.PUPDR: 0x6400_0000}),
             "B": gpio.Port({gpio.MODER: 0x280, gpio.OSPEEDR: 0xC0, gpio.PUPDR: 0x100}),
             "C": gpio.Port(),
         }
-        rows, columns = len(self._ohm), len(self._ohm[0])
-        self.register = ShiftRegister(time, rules, outputs=CHIP_WIRES * math.ceil(rows / CHIP_WIRES))
+        columns = len(self._ohm[0])
         self.circuit = circuit.Circuit(time, rules, self.register, self._ohm)
         self.converters = [
             Mcp3208(time, rules, circuit.REFERENCE_V,
                     lambda channel, cycle, first=CHIP_WIRES * chip: self.circuit.volts(first + channel, cycle))
             for chip in range(max(FEWEST_CONVERTERS, math.ceil(columns / CHIP_WIRES)))
         ]
-        self.rcc = Rcc(bus, time, rules, self._hse, self._reset_flags, self._clocks_changed)
-        self.flash = flash.Flash(self.content, rules, self._stall, self.cpu.uc.mem_write, self._erase_s)
+        self.rcc = Rcc(bus, time, rules, self._hse, self._hsi_error, self._reset_flags, self._clocks_changed,
+                       self.supply_v)
+        self.flash = flash.Flash(self.store, time, rules, self._stall, self.cpu.uc.mem_write, self._erase_s)
         self.rcc.flash_wait_states = self.flash.wait_states
-        self.flash.wait_states_changed = self.rcc.flash_changed
+        self.flash.wait_states_changed = self.rcc.check
         self.core = Core(time, rules, self._wait, self._ask_for_reset)
         self.spi = Spi(time, rules, self._wait, lambda: self.rcc.clocks.pclk1, self._sck_slow, self._exchange)
-        self.usart = Usart(time, rules, lambda: self.rcc.clocks.pclk1, self._baud)
+        self.usart = Usart(time, rules, lambda: self.rcc.clocks.pclk1, lambda: self.rcc.clock_error(), self._baud)
         self.usart.on_send = self._before_sending
         self.timer = Timer(time, lambda: self.rcc.clocks.timer1, self._look, self._idle)
         self.watchdog = Watchdog(time, rules, self._lsi_hz)
@@ -132,10 +145,44 @@ class Board:
         self.note(f"RESET by {cause}")
         self.resets.append(cause)
         self.take_log()
+        self.register.check_rest()
         self._reset_flags, self._pending_reset = flags, None
         to_host = self.usart.to_host
-        self._start()
+        self._start(self.cpu.sram())
         self.usart.to_host = to_host
+
+    # What happens to the board
+
+    def supply_v(self):
+        """The supply in V."""
+        return self._supply_v
+
+    def supply(self, volts):
+        """The supply changes. Below the brown-out level the processor is held in reset, until it is back."""
+        self._supply_v = volts
+        if volts < self.flash.brown_out_v:
+            self._stall(DIP_S)
+            self._supply_v = 3.3
+            self._reset("brown-out", BROWN_OUT)
+        self.rcc.check()
+
+    def stop_hse(self):
+        """The ST-LINK's 8 MHz stop."""
+        self._hse = False
+        if self.rcc.stop_hse():
+            self.cpu.enter(NMI)
+        else:
+            self._wait_for_watchdog()
+
+    def derail(self, stack_ends=False):
+        """Lets the program go where nothing is, which is a fault; with `stack_ends`, without room on the stack."""
+        self._derailed = True
+        self.cpu.go(NOWHERE, {"sp": SRAM} if stack_ends else {})
+
+    def panic(self):
+        """Lets the program panic, at the first place in the image where it could."""
+        function = next(place for name, place in self.image.symbols.items() if name.endswith(PANIC))
+        self.cpu.go(function, dict.fromkeys(("r0", "r1", "r2"), self.image.panic_place()))
 
     def take_log(self):
         """Takes the log out of the board's memory."""
@@ -196,8 +243,16 @@ class Board:
 
     def _look(self):
         """The program looks at the time, as it does in its main loop."""
+        self.flash.finish()
+        self.register.check_rest()
+        if self.register.outputs is None:
+            self.rules.breach("rows-undefined")
         if self.flash.stale:
             self.rules.breach("cache-stale")
+        if not self.flash.caches_on():
+            self.rules.breach("caches-off")
+        if self.flash.unlocked():
+            self.rules.breach("flash-left-open")
 
     def _idle(self):
         """The program only looks at the time: it passes until something happens, or it is time for a glance."""
@@ -223,10 +278,19 @@ class Board:
         self.run_until(lambda: self.time.seconds() >= end)
 
     def _die(self, fault):
-        """A fault's handler never returns: only the watchdog helps."""
-        self.rules.breach("fault", str(fault))
+        """The program faults: its handler runs. A fault in there is a lock-up."""
+        if not self._derailed:
+            self.rules.breach("fault", str(fault))
+        if self.cpu.handles == HARD_FAULT:
+            self._wait_for_watchdog()
+        else:
+            self._derailed = False
+            self.cpu.enter(HARD_FAULT)
+
+    def _wait_for_watchdog(self):
+        """The processor stands still for good: only the watchdog helps."""
         if not self.watchdog.runs:
-            raise fault
+            raise Fault("the processor stands still, and the watchdog does not run")
         self._stall(max(0.0, self.watchdog.expires_s() - self.time.seconds()) + 1e-3)
 
     def _attend(self):
@@ -249,6 +313,7 @@ class Board:
         if self._interrupt_pending():
             if self.cpu.may_interrupt():
                 self._busy()
+                self.flash.finish()
                 self.interrupts += 1
                 self.cpu.enter(FIRST_INTERRUPT + USART2)
                 self._patience = 1
@@ -276,13 +341,15 @@ class Board:
 
     def _select(self, chip, high):
         self._busy()
+        self.flash.finish()
         now, ends = self.time.now, self.spi.ends
         if now < ends:
             self.rules.breach("select-early", f"{self.time.ns(ends - now):.0f} ns before the end")
         if not high:
-            waited_us = self.time.ns(now - self.register.changed_at) / 1e3
-            if waited_us < self._settling_us:
-                self.rules.breach("wait-short", f"{waited_us:.2f} us of {self._settling_us:g}")
+            # As the program reckons, whose clock may be off.
+            waited_us = self.time.ns(now - self.register.changed_at) / 1e3 * (1 + self.rcc.clock_error())
+            if waited_us < self.settling_us:
+                self.rules.breach("wait-short", f"{waited_us:.2f} us of {self.settling_us:g}")
         self.converters[chip].select(not high)
 
     def _exchange(self, byte, start, bit_cycles):

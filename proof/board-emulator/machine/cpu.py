@@ -63,13 +63,18 @@ HANDLER = Batch((arm.UC_ARM_REG_SP, arm.UC_ARM_REG_CONTROL, arm.UC_ARM_REG_LR))
 MASKS = Batch((arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_XPSR))
 
 
-def native():
-    """The library made of `blocks.c`, compiled when it is first needed."""
-    source = pathlib.Path(__file__).with_name("blocks.c")
+def native(name, directory):
+    """Path of a library made of the C file `name`, compiled into `directory`."""
+    source = pathlib.Path(__file__).with_name(name)
+    library = pathlib.Path(directory) / source.with_suffix(".so").name
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", library, source], check=True)
+    return library
+
+
+def blocks():
+    """The library made of `blocks.c`."""
     with tempfile.TemporaryDirectory() as directory:
-        library = pathlib.Path(directory) / "blocks.so"
-        subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", library, source], check=True)
-        return ctypes.CDLL(str(library))
+        return ctypes.CDLL(str(native("blocks.c", directory)))
 
 
 class Cpu:
@@ -81,16 +86,17 @@ class Cpu:
 
     library = None
 
-    def __init__(self, time, devices, flash):
+    def __init__(self, time, devices, flash, sram=bytes(SRAM_BYTES)):
         self.time = time
-        #: Bytes of the frame of the handler that runs; 0 if none does.
-        self._frame_bytes = 0
-        Cpu.library = Cpu.library or native()
+        #: Bytes of the frame of the handler that runs, and its number; 0 if none does.
+        self._frame_bytes, self.handles = 0, 0
+        Cpu.library = Cpu.library or blocks()
         uc = self.uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
         uc.mem_map(FLASH, FLASH_BYTES, unicorn.UC_PROT_READ | unicorn.UC_PROT_EXEC)
         uc.mem_write(FLASH, bytes(flash))
         uc.mem_map(SRAM, SRAM_BYTES)
+        uc.mem_write(SRAM, sram)
         uc.mem_map(SYSTEM_MEMORY, 0x1000, unicorn.UC_PROT_READ)
         uc.mem_write(FLASH_SIZE_KIB, struct.pack("<H", FLASH_BYTES >> 10))
         uc.mmio_map(PERIPHERALS, PERIPHERAL_BYTES, devices.read_peripheral, None, devices.write_peripheral, None)
@@ -122,6 +128,16 @@ class Cpu:
         """Stops after the present instruction."""
         self.uc.emu_stop()
 
+    def go(self, address, registers):
+        """Goes on at `address`, with these values in registers."""
+        self.pc = address & ~1
+        for name, value in registers.items():
+            self.uc.reg_write(getattr(arm, f"UC_ARM_REG_{name.upper()}"), value)
+
+    def sram(self):
+        """What RAM holds."""
+        return bytes(self.uc.mem_read(SRAM, SRAM_BYTES))
+
     def where(self):
         """Address of the instruction that is executed."""
         return self.uc.reg_read(arm.UC_ARM_REG_PC)
@@ -149,6 +165,7 @@ class Cpu:
 
     def enter(self, vector):
         """Takes interrupt or exception number `vector`: stacks the registers and jumps to its handler."""
+        self.handles = vector
         CONTEXT.read(self.uc)
         before, control, *words = CONTEXT.values
         self._frame_bytes = FRAME_WITH_FLOATS_BYTES if control & FPCA else FRAME_BYTES
@@ -158,7 +175,11 @@ class Cpu:
         words[7] = words[7] & ~MOVED | (MOVED if unaligned & 4 else 0)
         # The word behind the floats is reserved.
         stacked = struct.pack("<25I", *words)
-        self.uc.mem_write(frame, stacked if control & FPCA else stacked[:FRAME_BYTES])
+        try:
+            self.uc.mem_write(frame, stacked if control & FPCA else stacked[:FRAME_BYTES])
+        except unicorn.UcError:
+            # The stack has left RAM: the handler runs, but cannot return.
+            pass
         HANDLER.values[:] = frame, control & ~FPCA, 0xFFFF_FFE9 if control & FPCA else 0xFFFF_FFF9
         HANDLER.write(self.uc)
         self.pc = struct.unpack("<I", self.uc.mem_read(FLASH + 4 * vector, 4))[0] & ~1
@@ -179,5 +200,5 @@ class Cpu:
         words[7] &= ~MOVED
         batch.values[:] = control & ~FPCA | (FPCA if floats else 0), stack, *words
         batch.write(uc)
-        self._frame_bytes = 0
+        self._frame_bytes, self.handles = 0, 0
         self.time.now += ENTRY_CYCLES

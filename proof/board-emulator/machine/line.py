@@ -1,11 +1,50 @@
 """The host's end of the serial line: a pseudo-terminal, and packets of the link (docs/link.md)."""
 
+import ctypes
+import fcntl
 import os
 import pty
 import select
 import struct
+import termios
+import time
 import tty
 import zlib
+
+from .rules import Fault
+
+
+class HostClock(ctypes.Structure):
+    """What a host loaded with `host_clock.c` and the board share: the board's time, and whether and until when the host
+    waits for it."""
+
+    _fields_ = [("now_us", ctypes.c_int64), ("until_us", ctypes.c_int64), ("waits", ctypes.c_int64)]
+
+
+#: How a host waits.
+SLEEPS, READS = 1, 2
+#: Looks at the host, while it computes, until there is a pause in s between them; and the longest it may compute.
+QUICK_LOOKS, LOOK_S, LONGEST_S = 100, 50e-6, 300.0
+
+
+class Host:
+    """A program at the other end of the line whose clock is the board's, as `clock` has it."""
+
+    def __init__(self, clock, process):
+        self._clock, self._process = clock, process
+
+    def ended(self):
+        """Whether the program has ended."""
+        return self._process.poll() is not None
+
+    def tell(self, seconds):
+        """Tells the board's time."""
+        self._clock.now_us = int(seconds * 1e6)
+
+    def waits(self, unread):
+        """Whether it waits for the board: sleeps, or waits for bytes while none are `unread`, until a time to come."""
+        waits, unread = self._clock.waits, unread()
+        return (waits == SLEEPS or waits == READS and not unread) and self._clock.now_us < self._clock.until_us
 
 
 class Terminal:
@@ -17,22 +56,52 @@ class Terminal:
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         self._board = board
+        #: The program at the other end, if it lives by the board's clock; else by its own.
+        self.host = None
         board.glance = self._pass_on
 
     def _pass_on(self, idle):
-        """Passes bytes on in both directions; waits a moment for the host while the board idles."""
+        """Passes bytes on in both directions. A host that lives by the board's clock first ends what it does; for
+        another one an idle board waits a moment."""
         usart = self._board.usart
-        if usart.to_host:
+        # A host whose clock is the board's is woken for whole packets alone: waking it takes longest of all.
+        count = len(usart.to_host) if self.host is None else usart.to_host.rfind(0) + 1
+        if count:
             try:
-                del usart.to_host[:os.write(self._master, usart.to_host)]
+                del usart.to_host[:os.write(self._master, usart.to_host[:count])]
             except BlockingIOError:
-                usart.to_host.clear()  # nobody reads
-        if idle:
+                if self.host is None:
+                    usart.to_host.clear()  # nobody reads
+        if self.host is not None:
+            self._let_host_compute()
+        elif idle:
             select.select([self._master], [], [], 0.2e-3)
+        self._take()
+
+    def _take(self):
+        """Takes what the host has sent."""
         try:
-            usart.from_host.extend(os.read(self._master, 4096))
+            self._board.usart.from_host.extend(os.read(self._master, 4096))
         except BlockingIOError:
             pass
+
+    def _let_host_compute(self):
+        """Waits until the host has read all and waits for more, or has ended: whatever it does takes no time."""
+        self.host.tell(self._board.time.seconds())
+        start, looks = time.monotonic(), 0
+        while not self.host.waits(self._unread) and not self.host.ended():
+            self._take()
+            looks += 1
+            if looks < QUICK_LOOKS:
+                os.sched_yield()
+            else:
+                time.sleep(LOOK_S)
+            if time.monotonic() > start + LONGEST_S:
+                raise Fault("host-sim neither waits for the board nor ends")
+
+    def _unread(self):
+        """Number of bytes that the host has not read."""
+        return struct.unpack("i", fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)))[0]
 
     def close(self):
         """Unplugs the board."""
@@ -48,6 +117,16 @@ def varint(value):
         encoded.append(value & 0x7F | 0x80)
         value >>= 7
     return bytes([*encoded, value])
+
+
+def taken(message):
+    """A number that was encoded so, and what follows it."""
+    value = 0
+    for place, byte in enumerate(message):
+        value |= (byte & 0x7F) << 7 * place
+        if byte < 0x80:
+            return value, message[place + 1:]
+    raise ValueError("a number without an end")
 
 
 def framed(message, number, version):

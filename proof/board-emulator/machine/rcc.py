@@ -1,4 +1,5 @@
-"""RCC and PWR: oscillators, PLL, over-drive, prescalers, and the clocks of the peripherals (RM0390, chapters 5, 6)."""
+"""RCC and PWR: oscillators, PLL, supply, over-drive, prescalers, and the clocks of the peripherals (RM0390, chapters 5,
+6)."""
 
 from dataclasses import dataclass
 
@@ -7,9 +8,14 @@ from .bus import PAGE_BITS, Registers
 CR, PLLCFGR, CFGR, APB1RSTR, CSR = 0x00, 0x04, 0x08, 0x20, 0x74
 AHB1ENR, APB1ENR = 0x30, 0x40
 HSION, HSIRDY, HSEON, HSERDY, PLLON, PLLRDY = 1 << 0, 1 << 1, 1 << 16, 1 << 17, 1 << 24, 1 << 25
+CSSON = 1 << 19
 PLLSRC = 1 << 22
 LSION, LSIRDY, RMVF = 1 << 0, 1 << 1, 1 << 24
 HSI_HZ, HSE_HZ = 16_000_000, 8_000_000
+#: Voltages in V from which on a wait state lasts for so many Hz (table 5).
+WAIT_STATE_HZ = ((2.7, 30e6), (2.4, 24e6), (2.1, 22e6), (0.0, 20e6))
+#: Highest HCLK in Hz by the regulator's scale 3, 2, 1, and with over-drive (DS10693).
+SCALE_HZ = {1: (120e6, 120e6), 2: (144e6, 168e6), 3: (168e6, 180e6)}
 
 #: Enable bits by register and bit, with the page of the peripheral.
 GATES = {
@@ -36,20 +42,30 @@ class Clocks:
 
 
 class Pwr(Registers):
-    """Power controller: over-drive."""
+    """Power controller: the regulator's scale, over-drive, and the detector of a low supply, `supply_v()`."""
 
     CR, CSR = 0x0, 0x4
     ODEN, ODSWEN = 1 << 16, 1 << 17
+    PVDE, PVDO = 1 << 4, 1 << 2
+    #: The detector's levels in V while the supply falls, typically (DS10693).
+    LEVELS_V = (2.04, 2.19, 2.35, 2.51, 2.66, 2.84, 2.93, 3.03)
     AFTER_RESET = {0x0: 0xC000}
 
-    def __init__(self, changed):
+    def __init__(self, changed, supply_v):
         super().__init__()
-        self._changed = changed
+        self._changed, self._supply_v = changed, supply_v
 
     def read(self, offset):
-        value = super().read(offset)
+        value, control = super().read(offset), super().read(self.CR)
+        if offset != self.CSR:
+            return value
+        low = control & self.PVDE and self._supply_v() < self.LEVELS_V[control >> 5 & 7]
         # Ready bits stand where the bits of CR stand, and follow them.
-        return 0x4000 | super().read(self.CR) & (self.ODEN | self.ODSWEN) if offset == self.CSR else value
+        return 0x4000 | control & (self.ODEN | self.ODSWEN) | (self.PVDO if low else 0)
+
+    def scale(self):
+        """Bits of the regulator's scale: 3 for scale 1."""
+        return self.values[self.CR] >> 14 & 3
 
     def write(self, offset, value):
         super().write(offset, value)
@@ -66,12 +82,14 @@ class Rcc(Registers):
 
     AFTER_RESET = {CR: 0x83, PLLCFGR: 0x2400_3010, CFGR: 0}
 
-    def __init__(self, bus, time, rules, hse_present, reset_flags, on_change):
+    def __init__(self, bus, time, rules, hse_present, hsi_error, reset_flags, on_change, supply_v):
         super().__init__()
         self._bus, self._time, self._rules = bus, time, rules
-        self._hse_present, self._on_change = hse_present, on_change
+        self._hse_present, self._on_change, self._supply_v = hse_present, on_change, supply_v
+        #: By how much, as a share, HSI is too fast.
+        self.hsi_error = hsi_error
         self.values[CSR] = reset_flags
-        self.pwr, self.flash_wait_states = Pwr(self._check), lambda: 0
+        self.pwr, self.flash_wait_states = Pwr(self.check, supply_v), lambda: 0
         self.clocks = self._tree()
 
     def read(self, offset):
@@ -108,12 +126,28 @@ class Rcc(Registers):
                 change = self._bus.clocked.add if value >> bit & 1 else self._bus.clocked.discard
                 change(page >> PAGE_BITS)
 
+    def clock_error(self):
+        """By how much, as a share, the clock in use is too fast."""
+        internal = not super().read(PLLCFGR) & PLLSRC if self.clocks.from_pll else super().read(CFGR) & 3 != 1
+        return self.hsi_error if internal else 0.0
+
+    def stop_hse(self):
+        """The clock from outside stops. Returns whether the clock security system has seen it: then HSI goes on."""
+        self._hse_present = False
+        if not super().read(CR) & CSSON:
+            return False
+        self.values[CR] &= ~(HSEON | PLLON | CSSON)
+        self.values[CFGR] &= ~3
+        self._switch()
+        return True
+
     def _tree(self):
         pll, cfgr = super().read(PLLCFGR), super().read(CFGR)
-        source = HSE_HZ if pll & PLLSRC else HSI_HZ
+        hsi_hz = HSI_HZ * (1 + self.hsi_error)
+        source = HSE_HZ if pll & PLLSRC else hsi_hz
         pll_input = source / max(pll & 63, 1)
         vco = pll_input * (pll >> 6 & 511)
-        system = (HSI_HZ, HSE_HZ, vco / (2 * (pll >> 16 & 3) + 2), HSI_HZ)[cfgr & 3]
+        system = (hsi_hz, HSE_HZ, vco / (2 * (pll >> 16 & 3) + 2), hsi_hz)[cfgr & 3]
         ahb = cfgr >> 4 & 15
         hclk = system / (1 if ahb < 8 else (2, 4, 8, 16, 64, 128, 256, 512)[ahb - 8])
 
@@ -129,13 +163,10 @@ class Rcc(Registers):
         if clocks.hclk != self._time.hz:
             self._time.change_clock(clocks.hclk)
             self._on_change(clocks)
-        self._check()
+        self.check()
 
-    def flash_changed(self):
-        """The wait states of the flash were written."""
-        self._check()
-
-    def _check(self):
+    def check(self):
+        """Checks the clocks against what supply, regulator and flash allow."""
         clocks = self.clocks
         if clocks.from_pll and not (0.95e6 <= clocks.pll_input <= 2.1e6 and 100e6 <= clocks.vco <= 432e6):
             self._rules.breach("pll-range", f"{clocks.pll_input / 1e6:g} MHz in, {clocks.vco / 1e6:g} MHz out")
@@ -143,6 +174,9 @@ class Rcc(Registers):
             self._rules.breach("bus-speed", f"{clocks.hclk:g}, {clocks.pclk1:g}, {clocks.pclk2:g} Hz")
         if clocks.hclk > 168e6 and not self.pwr.over_drive():
             self._rules.breach("over-drive")
-        needed = int((clocks.hclk - 1) // 30e6)
+        elif clocks.hclk > SCALE_HZ.get(self.pwr.scale(), (0, 0))[self.pwr.over_drive()]:
+            self._rules.breach("voltage-scale", f"bits {self.pwr.scale():02b}")
+        step_hz = next(hz for volts, hz in WAIT_STATE_HZ if self._supply_v() >= volts)
+        needed = int((clocks.hclk - 1) // step_hz)
         if self.flash_wait_states() < needed:
             self._rules.breach("wait-states", f"{self.flash_wait_states()} of {needed}")
