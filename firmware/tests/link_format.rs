@@ -121,6 +121,7 @@ fn identity() -> Report<'static> {
         memory: Memory { vector_table: 1024, stack_reserved: 300, ..Memory::default() },
         key: KeyState::Set,
         highest_version: Some(299),
+        wires_crc_32: 3,
     })
 }
 

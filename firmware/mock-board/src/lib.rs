@@ -43,7 +43,8 @@ pub use host::{
     statistics, upload, upload_steps,
 };
 pub use models::{
-    blob, blob_of, blob_of_components, blob_of_length, blob_with_confidence, crc_of, parts,
+    blob, blob_of, blob_of_a_row, blob_of_components, blob_of_length, blob_with_confidence, crc_of,
+    parts,
 };
 pub use pages::SharedSettings;
 pub use shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};

@@ -63,6 +63,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             }
         };
         let Self { sensor, models, link, work } = self;
+        let wires_crc_32 = sensor.wiring.crc_32;
         link.statistics.requests = link.statistics.requests.saturating_add(1);
         if !request.only_asks() {
             let now_us = link.platform().now_us();
@@ -71,7 +72,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let mut end = None;
         // Nothing is sent for `Ok(None)`: the answer takes a while, or is sent already.
         let report = match request {
-            Request::Identify => Ok(Some(Report::Identity(models.identity(model, spare, link)))),
+            Request::Identify => {
+                Ok(Some(Report::Identity(models.identity(model, wires_crc_32, spare, link))))
+            }
             Request::Statistics => Ok(Some(Report::Statistics(link.statistics))),
             Request::Configuration => Ok(Some(configuration(sensor.configuration, link))),
             Request::Configure { configuration: wanted, lease_ms } => sensor
@@ -164,6 +167,7 @@ impl Models {
     fn identity<'i, P: Platform, S: Slot, const ROWS: usize>(
         &self,
         model: &'i InForce<'_, ROWS>,
+        wires_crc_32: u32,
         spare: &S,
         link: &mut Link<'_, P>,
     ) -> Identity<'i> {
@@ -181,6 +185,7 @@ impl Models {
             memory: link.platform().memory(),
             key: self.authenticity.key_state(),
             highest_version: self.authenticity.highest(),
+            wires_crc_32,
         }
     }
 }

@@ -219,6 +219,8 @@ pub struct Identity<'a> {
     pub key: KeyState,
     /// Highest version of a seal that was confirmed, as far as the slots tell.
     pub highest_version: Option<u32>,
+    /// CRC-32 of the wires of all readings, in their order: of a row and a column each, as bytes that count from 0.
+    pub wires_crc_32: u32,
 }
 
 /// Whether a device has a key.
@@ -621,6 +623,8 @@ pub enum ModelFault {
     Shape,
     /// The device's image was built without a part that the model needs.
     NotBuilt(Feature),
+    /// The board lacks wires that the names of the inputs say, or their order is unknown.
+    Wires,
 }
 
 #[cfg(test)]

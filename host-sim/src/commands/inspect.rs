@@ -11,7 +11,7 @@ use model_core::scratch_floats;
 use serde::Serialize;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_rig::error::image_for;
+use taxel_rig::error::{image_for, unscannable};
 
 use super::model_outputs::{self, ModelOutput};
 use super::{Common, print};
@@ -165,7 +165,11 @@ fn needs(model: &Model<'_>, bytes: usize) -> Vec<String> {
     let (room, shape) = (Capacity::PAPER, model.shape());
     let too_large = (bytes > SLOT_BYTES)
         .then(|| format!("no device takes it: a slot of the images holds {SLOT_BYTES} bytes"));
-    let other_image = room.wires_for(shape).is_none().then(|| image_for(room, shape));
+    let other_image = if room.has_room_for(shape) {
+        unscannable(room, model)
+    } else {
+        Some(image_for(room, shape))
+    };
     let (needed, most) = (scratch_floats(model), room.scratch_floats());
     let too_many = (other_image.is_none() && needed > most).then(|| {
         let spare = needed - most;

@@ -46,7 +46,7 @@ class Board:
     """
 
     def __init__(self, path, ohm, *, hse=True, lsi_hz=32_000, erase_s=None, sensor=True, baud=921_600,
-                 settling_us=100.0, log=print):
+                 settling_us=20.0, log=print):
         self.image = Image(path)
         self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
         self._sensor, self._baud, self._settling_us, self._log = sensor, baud, settling_us, log

@@ -37,6 +37,9 @@ pub struct DeviceIdentity {
     pub key: KeyState,
     /// Highest version of a sealed model that was confirmed.
     pub highest_version: Option<u32>,
+    /// CRC-32 of the wires of its readings.
+    #[serde(skip)]
+    pub wires_crc_32: u32,
 }
 
 /// Serialises whether there is a key as text.
@@ -93,15 +96,28 @@ impl DeviceIdentity {
         Capacity { rows: self.rows, columns: self.columns, outputs: self.outputs }
     }
 
-    /// Wires that the device scans: those of its model, or all without one.
-    pub fn wires(&self) -> Wires {
-        let capacity = self.capacity();
-        let shape = self.model.map(|model| ModelShape {
+    /// Shape of the active model; without one, all wires.
+    fn shape(&self) -> ModelShape {
+        self.model.map_or(self.capacity().wires_as_shape(), |model| ModelShape {
             rows: model.rows.into(),
             inputs: model.inputs.into(),
             outputs: model.outputs.into(),
-        });
-        shape.and_then(|shape| capacity.wires_for(shape)).unwrap_or(capacity.wires())
+        })
+    }
+
+    /// Number of readings in a frame.
+    pub fn readings(&self) -> usize {
+        self.shape().rows * self.shape().inputs
+    }
+
+    /// Wires that the device scans: those of its model, or all without one. `None` if its model takes other readings than
+    /// all between the first wires, row after row.
+    pub fn wires(&self) -> Option<Wires> {
+        let columns = self.capacity().line(self.shape()).max(1);
+        let wires = Wires { rows: self.readings() / columns, columns };
+        let cells = (0..self.readings()).map(|i| [(i / columns) as u8, (i % columns) as u8]);
+        let cells: Vec<u8> = cells.flatten().collect();
+        (CRC_32.checksum(&cells) == self.wires_crc_32).then_some(wires)
     }
 
     /// Whether the active model has the columns of `model` and was trained on the same: it is that model, or one that a
@@ -142,6 +158,7 @@ impl From<&Identity<'_>> for DeviceIdentity {
             memory: identity.memory,
             key: identity.key,
             highest_version: identity.highest_version,
+            wires_crc_32: identity.wires_crc_32,
         }
     }
 }

@@ -17,6 +17,7 @@ fn good() -> Findings {
         memory: firmware::link::message::Memory::default(),
         key: firmware::link::message::KeyState::None,
         highest_version: None,
+        wires_crc_32: 0,
     };
     let uploads = UploadFindings {
         blob_bytes: 1,

@@ -90,6 +90,7 @@ fn identity(on_trial: bool) -> Report<'static> {
         memory: Memory::default(),
         key: KeyState::None,
         highest_version: None,
+        wires_crc_32: 0,
     })
 }
 
