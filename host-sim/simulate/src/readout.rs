@@ -11,6 +11,9 @@ pub struct Readout {
     /// Row-wires that are read, from 1; only in a scene's file, since a world has
     /// [`read_rows`](crate::world::World::read_rows).
     pub row_wires: Option<Vec<usize>>,
+    /// Column-wires that are read, from 1; only in a scene's file, since a world's sensor has
+    /// [`read_columns`](crate::sensor::Sensor::read_columns).
+    pub column_wires: Option<Vec<usize>>,
     /// Circuit that turns resistances into voltages.
     pub circuit: Option<Circuit>,
     /// Parts that select rows.
