@@ -376,7 +376,7 @@ fn measurements_are_traded_as_they_are() {
     // Readings that are named after wires: three rows, one of them idle.
     let page = folder.succeed(&[&["trade", "data.csv", "--max-flash", "40000"], &few[..]].concat());
     assert!(page.contains("80 measured test frames (the last fifth)"), "{page}");
-    assert!(page.contains("2.144 ms to scan") && page.contains("2 × 18 wires"), "{page}");
+    assert!(page.contains("1.425 ms to scan") && page.contains("2 × 18 wires"), "{page}");
     assert!(folder.path("out/data/chosen.bin").exists());
 
     let csv = std::fs::read_to_string(folder.path("data.csv")).unwrap();
