@@ -158,11 +158,11 @@ impl Capacity {
     /// let expected = [Ok((RowWire(3), ColumnWire(16))), Err(1)];
     /// assert_eq!(cells.collect::<Vec<_>>(), expected);
     /// ```
-    pub fn cells<'n>(
+    pub fn cells(
         self,
-        names: Columns<'n>,
+        names: Columns<'_>,
         shape: ModelShape,
-    ) -> impl Iterator<Item = Result<(RowWire, ColumnWire), usize>> + 'n {
+    ) -> impl Iterator<Item = Result<(RowWire, ColumnWire), usize>> {
         let are_named = names.iter().any(|name| cell_of(name).is_some());
         let line = self.line(shape).max(1);
         // The number of readings whose order of wires is plain.

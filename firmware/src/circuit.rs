@@ -506,14 +506,11 @@ mod tests {
         let columns = ColumnWires(1 << 2 | 1 << 8 | 1 << 14);
         let read = |counts: &[f32; 18], idle: &[f32; 18], load: f32| {
             let mut readings = [counts[2], counts[8], counts[14]];
-            let row = ScannedRow { row: RowWire(1), columns, load };
-            circuit.row_ohm(row, idle, 4095, &mut readings);
-            let error = |(ohm, k): (f32, usize)| (f64::from(ohm) / row_of(k) - 1.0).abs();
+            let scanned = ScannedRow { row: RowWire(1), columns, load };
+            circuit.row_ohm(scanned, idle, 4095, &mut readings);
+            let error = |(ohm, k): (f32, usize)| (f64::from(ohm) / row()[k] - 1.0).abs();
             readings.into_iter().zip([2, 8, 14]).map(error).fold(0.0, f64::max)
         };
-        fn row_of(k: usize) -> f64 {
-            row()[k]
-        }
         let [sampled, idle] = zero_potential_counts(&circuit, &row());
         let load = circuit.load(columns, &idle, &sampled);
         assert!(read(&sampled, &idle, load) < 2e-6);
