@@ -9,7 +9,7 @@ use firmware::circuit::ZeroPotential;
 use firmware::readout::{
     FrameSource, Mcp3208s, ScanSettings, Scanner, Selection, ShiftRegister595,
 };
-use model_core::RowWire;
+use model_core::{ColumnWires, RowWire};
 
 /// What `host-sim export row4.bin --rust row4.rs` writes.
 #[path = "../../testdata/row4.rs"]
@@ -17,17 +17,18 @@ mod row4;
 
 /// Resistors and voltages of the circuit. `docs/readout.md` says how to measure them.
 static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
-/// A row settles for 46 µs. Each column is sampled once.
-const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 1 };
+/// A row settles for 20 µs. Each column is sampled once.
+const SETTINGS: ScanSettings = ScanSettings { settling_us: 20, oversampling: 1 };
 /// Row-wire 4 and its 18 column-wires.
-const WIRES: Selection<'static> = Selection { rows: &[RowWire(3)], columns: 18 };
+const WIRES: Selection<'static> =
+    Selection { rows: &[RowWire(3)], columns: ColumnWires::first(18) };
 
 type Rows<P> = ShiftRegister595<P, 8>;
 type Columns<S> = Mcp3208s<S, 3>;
 
 /// Sensor behind a 74HC595, which drives its row-wires, and three MCP3208, which sample its column-wires.
 pub struct Sensor<P, S, T> {
-    scanner: Scanner<Rows<P>, Columns<S>, T, &'static ZeroPotential<8, 18>, 18>,
+    scanner: Scanner<Rows<P>, Columns<S>, T, &'static ZeroPotential<8, 18>, 8, 18>,
 }
 
 impl<P: OutputPin, S: SpiDevice, T: DelayNs> Sensor<P, S, T> {

@@ -19,6 +19,7 @@ mod lease;
 mod link;
 mod session_end;
 mod model;
+mod wiring;
 mod sensor;
 mod saved_settings;
 mod work;
@@ -38,6 +39,7 @@ use sensor::Sensor;
 pub use session::Session;
 pub use session_end::SessionEnd;
 use trial::Trial;
+use wiring::Wiring;
 use work::Work;
 
 /// The application's state, except the model in force. `ROWS` is the largest number of rows.
@@ -67,6 +69,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             received,
             message,
             frame,
+            places,
             baseline,
             reciprocals,
             scratch,
@@ -89,7 +92,8 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
         let now_us = platform.now_us();
         let mut link = Link::new(platform, message);
         let memories = [frame.as_flattened_mut(), baseline.as_flattened_mut()];
-        let mut sensor = Sensor::new(source, configuration, capacity.wires(), memories, now_us);
+        let wiring = Wiring::new(capacity, places.as_flattened_mut());
+        let mut sensor = Sensor::new(source, configuration, wiring, memories, now_us);
         sensor.load_settings(&mut link);
         let work = Work {
             rows: ROWS,

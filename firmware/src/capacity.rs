@@ -1,8 +1,8 @@
 //! What an image has room for. The model in force decides what is scanned and decoded.
 
-use model_core::Wires;
-use model_core::blob::ModelShape;
+use model_core::blob::{Columns, ModelShape};
 use model_core::health::MOST_COLUMNS;
+use model_core::{ColumnWire, RowWire, Wires};
 
 /// RAM in bytes that this project's images reserve for a copy of the model in force. A larger blob is decoded from
 /// its slot.
@@ -64,6 +64,11 @@ impl Capacity {
         Wires { rows: self.rows, columns: self.columns }
     }
 
+    /// All wires, as a model of all readings has them.
+    pub const fn wires_as_shape(self) -> ModelShape {
+        ModelShape { rows: self.rows, inputs: self.columns, outputs: 0 }
+    }
+
     /// Number of outputs of all rows.
     pub const fn all_outputs(self) -> usize {
         self.rows * self.outputs
@@ -112,32 +117,81 @@ impl Capacity {
         possible.then_some(Self { rows, columns, outputs })
     }
 
-    /// The wires to be scanned for a model of this `shape`; `None` if there is no room for it.
-    ///
-    /// A row of the model is a row of the sensor. A model of one row with more readings than there are columns takes
-    /// the readings of several whole rows of the sensor.
+    /// Whether there is room for the readings and outputs of a model of this `shape`.
     ///
     /// ```
     /// use firmware::capacity::Capacity;
-    /// use model_core::Wires;
     /// use model_core::blob::ModelShape;
-    /// let wires = |rows, inputs, outputs| Capacity::PAPER.wires_for(ModelShape { rows, inputs, outputs });
-    /// assert_eq!(wires(4, 4, 1), Some(Wires { rows: 4, columns: 4 }));
-    /// assert_eq!(wires(1, 144, 6), Some(Wires { rows: 8, columns: 18 }));
-    /// assert_eq!(wires(16, 18, 18), None);
+    /// let fits = |rows, inputs, outputs| Capacity::PAPER.has_room_for(ModelShape { rows, inputs, outputs });
+    /// assert!(fits(8, 18, 18) && fits(1, 144, 6));
+    /// assert!(!fits(9, 1, 1) && !fits(1, 145, 6));
     /// ```
-    pub fn wires_for(self, shape: ModelShape) -> Option<Wires> {
+    pub fn has_room_for(self, shape: ModelShape) -> bool {
         let ModelShape { rows, inputs, outputs } = shape;
-        let wires = if inputs <= self.columns {
-            Wires { rows, columns: inputs }
-        } else if rows == 1 && inputs.is_multiple_of(self.columns) {
-            Wires { rows: inputs.checked_div(self.columns)?, columns: self.columns }
-        } else {
-            return None;
-        };
-        let fits = wires.rows <= self.rows && rows.saturating_mul(outputs) <= self.all_outputs();
-        fits.then_some(wires)
+        rows <= self.rows
+            && rows.saturating_mul(inputs) <= self.wires().readings()
+            && rows.saturating_mul(outputs) <= self.all_outputs()
     }
+
+    /// A model's frame, as health reports show it: lines of so many readings, of which the last may be shorter. A line
+    /// is a row of the model if there are as many columns.
+    pub fn line(self, shape: ModelShape) -> usize {
+        if shape.inputs <= self.columns { shape.inputs } else { self.columns }
+    }
+
+    /// The wires between which each reading of a model is taken.
+    ///
+    /// Names such as `r4c17_ohm` say them: row-wire 4 and column-wire 17, both counted from 1. A model with other names
+    /// takes the first wires in their order: a row-wire for each row of the model, or whole row-wires for a model of one
+    /// row.
+    ///
+    /// # Errors
+    /// Each time the index of an input that cannot be scanned: the board lacks one of its wires, its name says none
+    /// while another's does, or there are more without names than a row has.
+    ///
+    /// ```
+    /// use firmware::capacity::Capacity;
+    /// use model_core::blob::{Columns, ModelShape};
+    /// use model_core::{ColumnWire, RowWire};
+    /// let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
+    /// let cells = Capacity::PAPER.cells(Columns("r4c17_ohm\nr9c1_ohm"), shape);
+    /// let expected = [Ok((RowWire(3), ColumnWire(16))), Err(1)];
+    /// assert_eq!(cells.collect::<Vec<_>>(), expected);
+    /// ```
+    pub fn cells(
+        self,
+        names: Columns<'_>,
+        shape: ModelShape,
+    ) -> impl Iterator<Item = Result<(RowWire, ColumnWire), usize>> {
+        let are_named = names.iter().any(|name| cell_of(name).is_some());
+        let line = self.line(shape).max(1);
+        // The number of readings whose order of wires is plain.
+        let in_order = match shape.rows {
+            1 => shape.inputs.saturating_sub(shape.inputs.checked_rem(line).unwrap_or(0)),
+            _ if line == shape.inputs => usize::MAX,
+            _ => line,
+        };
+        let mut names = names.iter();
+        (0..shape.rows.saturating_mul(shape.inputs)).map(move |index| {
+            let name = names.next().unwrap_or_default();
+            let (row, column) = if are_named {
+                cell_of(name).ok_or(index)?
+            } else {
+                let of_line = |part: Option<usize>| part.filter(|_| index < in_order).ok_or(index);
+                let (row, column) = (index.checked_div(line), index.checked_rem(line));
+                (RowWire(of_line(row)?), ColumnWire(of_line(column)?))
+            };
+            let is_there = row.0 < self.rows && column.0 < self.columns;
+            if is_there { Ok((row, column)) } else { Err(index) }
+        })
+    }
+}
+
+/// The wires of a reading called `r{m}c{k}_ohm`, which counts both from 1.
+fn cell_of(name: &str) -> Option<(RowWire, ColumnWire)> {
+    let (row, column) = name.strip_prefix('r')?.strip_suffix("_ohm")?.split_once('c')?;
+    let wire = |number: &str| number.parse::<usize>().ok()?.checked_sub(1);
+    Some((RowWire(wire(row)?), ColumnWire(wire(column)?)))
 }
 
 #[cfg(test)]
@@ -145,24 +199,54 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shape_within_the_capacity_has_wires_and_no_other() {
+    fn every_shape_within_the_capacity_has_room_and_without_names_the_first_wires() {
         let capacity = Capacity { rows: 3, columns: 4, outputs: 2 };
         for rows in 1..6 {
             for inputs in 1..20 {
                 for outputs in 1..8 {
                     let shape = ModelShape { rows, inputs, outputs };
-                    let by_rows = rows <= 3 && inputs <= 4;
-                    let as_one = rows == 1 && [8, 12].contains(&inputs);
-                    let wires = capacity.wires_for(shape);
-                    let fits = (by_rows || as_one) && rows * outputs <= 6;
-                    assert_eq!(wires.is_some(), fits, "{shape:?}");
-                    if let Some(wires) = wires {
-                        assert_eq!(wires.readings(), rows * inputs, "{shape:?}");
-                        assert!(wires.rows <= 3 && wires.columns <= 4, "{shape:?}");
+                    let fits = rows <= 3 && rows * inputs <= 12 && rows * outputs <= 6;
+                    assert_eq!(capacity.has_room_for(shape), fits, "{shape:?}");
+                    if !fits {
+                        continue;
+                    }
+                    let names = ["x"].repeat(rows * inputs).join("\n");
+                    let cells: Result<Vec<_>, _> = capacity.cells(Columns(&names), shape).collect();
+                    let line = inputs.min(4);
+                    if inputs <= 4 || rows == 1 && inputs % 4 == 0 {
+                        let expected = (0..rows * inputs).map(|i| (i / line, i % line));
+                        let expected = expected.map(|(row, k)| (RowWire(row), ColumnWire(k)));
+                        assert_eq!(cells, Ok(expected.collect()), "{shape:?}");
+                    } else {
+                        let first = if rows == 1 { inputs / 4 * 4 } else { 4 };
+                        assert_eq!(cells, Err(first), "{shape:?}");
                     }
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_readings_name_tells_its_wires() {
+        let cell = |row, column| Some((RowWire(row), ColumnWire(column)));
+        assert_eq!(cell_of("r1c1_ohm"), cell(0, 0));
+        assert_eq!(cell_of("r16c32_ohm"), cell(15, 31));
+        let others = ["r0c1_ohm", "r1c0_ohm", "rc1_ohm", "r1c_ohm", "ch1", "", "r-1c1_ohm", "r1c1"];
+        for other in others {
+            assert_eq!(cell_of(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn the_first_input_that_cannot_be_scanned_is_told() {
+        let first = |names: &str| {
+            let shape = ModelShape { rows: 1, inputs: names.lines().count(), outputs: 1 };
+            Capacity::PAPER.cells(Columns(names), shape).find_map(Result::err)
+        };
+        assert_eq!(first("r8c18_ohm\nr1c1_ohm"), None);
+        assert_eq!(first("r8c18_ohm\nr9c1_ohm\nr1c19_ohm"), Some(1));
+        assert_eq!(first("r8c18_ohm\nr1c1_ohm\nr1c19_ohm"), Some(2));
+        assert_eq!((first("r1c1_ohm\nrest"), first("rest\nr1c1_ohm")), (Some(1), Some(0)));
     }
 
     #[test]

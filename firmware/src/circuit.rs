@@ -5,7 +5,7 @@
 //! in series with a row is therefore never negligible, and both circuits correct for it.
 
 use model_core::blob::Floats;
-use model_core::{RowWire, Wires};
+use model_core::{ColumnWires, RowWire, Wires};
 use serde::{Deserialize, Serialize};
 
 /// Smallest current in counts that counts as one; below it, the reading is open.
@@ -19,16 +19,20 @@ pub trait Circuit {
     /// Whether the circuit needs a sample of every column while all rows idle.
     const IDLE_SAMPLES: bool;
 
-    /// Converts the samples of `row` to Ω, in place.
+    /// Converts the samples of a row to Ω, in place.
     ///
-    /// `readings` holds averaged counts of every column, NaN where none could be taken, and Ω afterwards. `idle`
-    /// holds as many idle counts; it is ignored unless [`IDLE_SAMPLES`](Self::IDLE_SAMPLES).
+    /// `readings` holds averaged counts of the scanned columns, NaN where none could be taken, and Ω afterwards. `idle`
+    /// holds idle counts of every column; it is ignored unless [`IDLE_SAMPLES`](Self::IDLE_SAMPLES).
     /// `full_scale_counts` is the converter's largest count.
-    fn row_ohm(&self, row: RowWire, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]);
+    fn row_ohm(&self, row: ScannedRow, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]);
+
+    /// The [`load`](ScannedRow::load) of a row, from the `counts` of every column; what cannot be told is that of equal
+    /// columns.
+    fn load(&self, columns: ColumnWires, idle: &[f32], counts: &[f32]) -> f32;
 
     /// Corrects a whole `frame` (Ω, rows of `columns` readings) for the influence of its rows on each other, as far
     /// as that is known. Does nothing unless a circuit overrides it.
-    fn correct(&self, columns: usize, frame: &mut [f32]) {
+    fn correct(&self, columns: ColumnWires, frame: &mut [f32]) {
         let _ = (columns, frame);
     }
 
@@ -45,6 +49,17 @@ pub trait Circuit {
         let _ = constants;
         Err(ConstantsFault::Fixed)
     }
+}
+
+/// A row of which some columns, or all, were sampled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScannedRow {
+    /// The row-wire.
+    pub row: RowWire,
+    /// The columns that were sampled.
+    pub columns: ColumnWires,
+    /// Current of all columns over that of the sampled ones: all of them load the row. 1 if all were sampled.
+    pub load: f32,
 }
 
 /// Constants of a [`ZeroPotential`], for the link and for keeping.
@@ -115,11 +130,15 @@ const MOST_OHM: f32 = 1e6;
 impl<C: Circuit> Circuit for &C {
     const IDLE_SAMPLES: bool = C::IDLE_SAMPLES;
 
-    fn row_ohm(&self, row: RowWire, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
+    fn row_ohm(&self, row: ScannedRow, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
         C::row_ohm(self, row, idle, full_scale_counts, readings);
     }
 
-    fn correct(&self, columns: usize, frame: &mut [f32]) {
+    fn load(&self, columns: ColumnWires, idle: &[f32], counts: &[f32]) -> f32 {
+        C::load(self, columns, idle, counts)
+    }
+
+    fn correct(&self, columns: ColumnWires, frame: &mut [f32]) {
         C::correct(self, columns, frame);
     }
 
@@ -136,12 +155,13 @@ impl<C: Circuit> Circuit for &C {
 /// wrongly, whatever its calibration (`docs/readout.md` shows by how much).
 ///
 /// ```
-/// use firmware::circuit::{Circuit, Divider};
-/// use model_core::RowWire;
+/// use firmware::circuit::{Circuit, Divider, ScannedRow};
+/// use model_core::{ColumnWires, RowWire};
 /// let divider = Divider::<1, 1> { row_source_ohm: [0.0], ..Divider::TYPICAL };
 /// // 470 Ω below 58.75 Ω: eight ninths of 4096.
 /// let mut reading = [4096.0 * 8.0 / 9.0];
-/// divider.row_ohm(RowWire(0), &[f32::NAN], 4095, &mut reading);
+/// let row = ScannedRow { row: RowWire(0), columns: ColumnWires::first(1), load: 1.0 };
+/// divider.row_ohm(row, &[f32::NAN], 4095, &mut reading);
 /// assert!((reading[0] - 58.75).abs() < 1e-3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -166,17 +186,22 @@ impl<const ROWS: usize, const COLS: usize> Divider<ROWS, COLS> {
 impl<const ROWS: usize, const COLS: usize> Circuit for Divider<ROWS, COLS> {
     const IDLE_SAMPLES: bool = false;
 
-    fn row_ohm(&self, row: RowWire, _: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
+    fn row_ohm(&self, row: ScannedRow, _: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
         let counts = counts_at_reference(full_scale_counts);
         // Voltages in units of the reference.
-        let currents = readings.iter().zip(&self.reference_ohm).map(|(n, r)| n / counts / r);
-        let row = 1.0 - voltage_drop(&self.row_source_ohm, row, currents);
-        let columns = self.reference_ohm.iter().zip(&self.series_ohm);
-        for (reading, (r, series)) in readings.iter_mut().zip(columns) {
+        let columns = || row.columns.pick(self.reference_ohm.iter().zip(&self.series_ohm));
+        let currents = readings.iter().zip(columns()).map(|(n, (r, _))| n / counts / r);
+        let row_v = 1.0 - voltage_drop(&self.row_source_ohm, row, currents);
+        for (reading, (r, series)) in readings.iter_mut().zip(columns()) {
             let n = *reading;
-            let (across, current) = (row - n / counts, n / counts / r);
+            let (across, current) = (row_v - n / counts, n / counts / r);
             *reading = reading_of(n, n, full_scale_counts, across / current - series);
         }
+    }
+
+    fn load(&self, columns: ColumnWires, _: &[f32], counts: &[f32]) -> f32 {
+        let currents = || counts.iter().zip(&self.reference_ohm).map(|(n, r)| (*n, n / r));
+        load(columns, currents)
     }
 }
 
@@ -186,17 +211,18 @@ impl<const ROWS: usize, const COLS: usize> Circuit for Divider<ROWS, COLS> {
 /// V_out = V_b + R_f·I, and I = V_d/R. No current flows between wires at one potential, so the
 /// other rows do not disturb (D'Alessio, Sensors and Actuators A 72, 1999). Subtracting the idle sample removes
 /// V_b and the op-amp's offset exactly. The row's own drop V_d − R_s·ΣI is known because all its columns are
-/// measured. A lead in series with a column lets the idle rows feed it: it divides all currents of the column by
+/// measured, or their share is known. A lead in series with a column lets the idle rows feed it: it divides all currents of the column by
 /// 1 + s·Σ1/R, which [`correct`](Circuit::correct) undoes.
 ///
 /// ```
-/// use firmware::circuit::{Circuit, ZeroPotential};
-/// use model_core::RowWire;
+/// use firmware::circuit::{Circuit, ScannedRow, ZeroPotential};
+/// use model_core::{ColumnWires, RowWire};
 /// let circuit = ZeroPotential::<1, 1> { row_source_ohm: [0.0], ..ZeroPotential::TYPICAL };
 /// // 0.2 V across 62.5 Ω drive 3.2 mA through 560 Ω: 1.792 V above the idle 0.2 V.
 /// let counts = |v: f32| v / 3.3 * 4096.0;
 /// let mut reading = [counts(1.992)];
-/// circuit.row_ohm(RowWire(0), &[counts(0.2)], 4095, &mut reading);
+/// let row = ScannedRow { row: RowWire(0), columns: ColumnWires::first(1), load: 1.0 };
+/// circuit.row_ohm(row, &[counts(0.2)], 4095, &mut reading);
 /// assert!((reading[0] - 62.5).abs() < 1e-3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -231,10 +257,10 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
 impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS> {
     const IDLE_SAMPLES: bool = true;
 
-    fn row_ohm(&self, row: RowWire, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
+    fn row_ohm(&self, row: ScannedRow, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
         let volt_per_count = self.reference_v / counts_at_reference(full_scale_counts);
         let current = |n: f32, idle: f32, r: f32| (n - idle) * volt_per_count / r;
-        let columns = || idle.iter().zip(&self.feedback_ohm);
+        let columns = || row.columns.pick(idle.iter().zip(&self.feedback_ohm));
         let currents = readings.iter().zip(columns()).map(|(n, (idle, r))| current(*n, *idle, *r));
         let across = self.drive_v - voltage_drop(&self.row_source_ohm, row, currents);
         for (reading, (idle, r)) in readings.iter_mut().zip(columns()) {
@@ -243,17 +269,24 @@ impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS>
         }
     }
 
+    fn load(&self, columns: ColumnWires, idle: &[f32], counts: &[f32]) -> f32 {
+        let parts = || counts.iter().zip(idle.iter().zip(&self.feedback_ohm));
+        load(columns, || parts().map(|(n, (idle, r))| (n - idle, (n - idle) / r)))
+    }
+
     /// Corrects each reading to R·(1 − s·Σ1/R), with the sum over the column's rows. A row that was not measured, or
     /// is not read, counts as the mean of the others.
-    fn correct(&self, columns: usize, frame: &mut [f32]) {
-        for (column, series) in self.series_ohm.iter().enumerate().take(columns) {
-            let readings = frame.iter().skip(column).step_by(columns.max(1));
+    fn correct(&self, columns: ColumnWires, frame: &mut [f32]) {
+        let count = columns.count().max(1);
+        let leads = columns.pick(&self.series_ohm).enumerate();
+        for (column, series) in leads.filter(|(_, series)| **series != 0.0) {
+            let readings = frame.iter().skip(column).step_by(count);
             let measured = readings.filter(|ohm| **ohm > 0.0); // neither NaN nor short
-            let (count, sum_s) =
-                measured.fold((0_usize, 0.0), |(count, sum), ohm| (count + 1, sum + 1.0 / ohm));
-            if count > 0 {
-                let factor = 1.0 - series * (sum_s * (f32::from(self.sensor_rows) / count as f32));
-                let readings = frame.iter_mut().skip(column).step_by(columns.max(1));
+            let (rows, sum_s) =
+                measured.fold((0_usize, 0.0), |(rows, sum), ohm| (rows + 1, sum + 1.0 / ohm));
+            if rows > 0 {
+                let factor = 1.0 - series * (sum_s * (f32::from(self.sensor_rows) / rows as f32));
+                let readings = frame.iter_mut().skip(column).step_by(count);
                 readings
                     .filter(|ohm| ohm.is_finite()) // open stays open
                     .for_each(|ohm| *ohm = (*ohm * factor).max(0.0));
@@ -290,18 +323,33 @@ fn counts_at_reference(full_scale_counts: u16) -> f32 {
     f32::from(full_scale_counts) + 1.0
 }
 
-/// Voltage drop at the source of a `row`: R_s·ΣI. A column that could not be sampled counts as the mean of the
+/// Voltage drop at the source of a row: R_s·ΣI. A column that could not be sampled counts as the mean of the
 /// others.
 fn voltage_drop(
     row_source_ohm: &[f32],
-    row: RowWire,
-    currents: impl ExactSizeIterator<Item = f32>,
+    ScannedRow { row, columns, load }: ScannedRow,
+    currents: impl Iterator<Item = f32>,
 ) -> f32 {
     let source_ohm = row_source_ohm.get(row.0).copied().unwrap_or(0.0);
-    let columns = currents.len();
     let taken = currents.filter(|i| !i.is_nan());
     let (count, sum) = taken.fold((0_usize, 0.0), |(count, sum), i| (count + 1, sum + i));
-    if count == 0 { 0.0 } else { source_ohm * sum * (columns as f32 / count as f32) }
+    let share = columns.count() as f32 / count as f32;
+    if count == 0 { 0.0 } else { source_ohm * sum * (share * load) }
+}
+
+/// Current of all columns over that of `columns`, from each column's counts due to its current, and the current in any
+/// unit. A column that could not be sampled counts as the mean of the others; too few counts are no current.
+fn load<I: Iterator<Item = (f32, f32)>>(columns: ColumnWires, all: impl Fn() -> I) -> f32 {
+    fn mean(currents: impl Iterator<Item = (f32, f32)>) -> f32 {
+        let taken = currents.filter(|(counts, _)| !counts.is_nan());
+        let (taken, sum) = taken.fold((0_usize, 0.0), |(taken, sum), (counts, current)| {
+            (taken + 1, if counts < NO_CURRENT_COUNTS { sum } else { sum + current })
+        });
+        sum / taken as f32
+    }
+    let equal = all().count() as f32 / columns.count() as f32;
+    let load = equal * (mean(all()) / mean(columns.pick(all())));
+    if load.is_finite() { load } else { equal }
 }
 
 /// The reading: `ohm`, or NaN, infinity or 0 if the sample is missing, open or short.
@@ -357,7 +405,8 @@ mod tests {
         idle: &[f32; N],
     ) -> [f32; N] {
         let mut readings = *sampled;
-        circuit.row_ohm(RowWire(row), idle, 4095, &mut readings);
+        let row = ScannedRow { row: RowWire(row), columns: ColumnWires::first(N), load: 1.0 };
+        circuit.row_ohm(row, idle, 4095, &mut readings);
         readings
     }
 
@@ -367,7 +416,7 @@ mod tests {
         frame: [[f32; C]; R],
     ) -> [[f32; C]; R] {
         let mut corrected = frame;
-        circuit.correct(C, corrected.as_flattened_mut());
+        circuit.correct(ColumnWires::first(C), corrected.as_flattened_mut());
         corrected
     }
 
@@ -449,6 +498,36 @@ mod tests {
             let error = (f64::from(*ohm) / expected - 1.0).abs();
             assert!((1e-5..1e-3).contains(&error), "{ohm} Ω instead of {expected} Ω: {error}");
         }
+    }
+
+    #[test]
+    fn columns_that_are_not_read_load_the_row_by_their_measured_share() {
+        let circuit = ZeroPotential { row_source_ohm: [9.0, 0.3], ..ZeroPotential::TYPICAL };
+        let columns = ColumnWires(1 << 2 | 1 << 8 | 1 << 14);
+        let read = |counts: &[f32; 18], idle: &[f32; 18], load: f32| {
+            let mut readings = [counts[2], counts[8], counts[14]];
+            let scanned = ScannedRow { row: RowWire(1), columns, load };
+            circuit.row_ohm(scanned, idle, 4095, &mut readings);
+            let error = |(ohm, k): (f32, usize)| (f64::from(ohm) / row()[k] - 1.0).abs();
+            readings.into_iter().zip([2, 8, 14]).map(error).fold(0.0, f64::max)
+        };
+        let [sampled, idle] = zero_potential_counts(&circuit, &row());
+        let load = circuit.load(columns, &idle, &sampled);
+        assert!(read(&sampled, &idle, load) < 2e-6);
+        // Without the others' share readings are 7 % too high; with that of equal columns still a little off.
+        assert!(read(&sampled, &idle, 1.0) > 0.05);
+        assert!((1e-5..5e-3).contains(&read(&sampled, &idle, 6.0)));
+        // A column that could not be sampled counts as the mean, and one that is open draws nothing.
+        let (mut missing, mut open) = (sampled, sampled);
+        missing[5] = f32::NAN;
+        open[5] = idle[5] + 3.0;
+        assert!((circuit.load(columns, &idle, &missing) / load - 1.0).abs() < 1e-2);
+        let without = circuit.load(columns, &idle, &open) / load;
+        assert!((without - 17.0 / 18.0).abs() < 1e-2, "{without}");
+        // Nothing is known of a row without current.
+        assert_eq!(circuit.load(columns, &idle, &idle), 6.0);
+        let equal = Divider::<2, 18>::TYPICAL.load(columns, &[], &[100.0; 18]);
+        assert!((equal - 6.0).abs() < 1e-5, "{equal}");
     }
 
     #[test]

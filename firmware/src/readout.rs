@@ -7,7 +7,7 @@
 //!
 //! `docs/readout.md` has the circuits, their parts and the timing.
 
-use model_core::{ColumnWire, RowWire};
+use model_core::{ColumnWire, ColumnWires, RowWire};
 use serde::{Deserialize, Serialize};
 
 use crate::circuit::{Constants, ConstantsFault};
@@ -95,6 +95,9 @@ impl ScanSettings {
     }
 }
 
+/// Number of scans between two in which columns are sampled idle.
+pub const SCANS_A_ROUND: u8 = 16;
+
 /// Report on a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ScanReport {
@@ -108,8 +111,8 @@ pub struct ScanReport {
 pub struct Selection<'a> {
     /// Row-wires, in the order in which they are read and stand in a frame.
     pub rows: &'a [RowWire],
-    /// Number of column-wires, from the first on.
-    pub columns: usize,
+    /// Column-wires, which are read from the first on.
+    pub columns: ColumnWires,
 }
 
 /// Source of frames: a scanned sensor, or a substitute for one.

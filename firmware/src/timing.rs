@@ -2,7 +2,9 @@
 //!
 //! Waiting times are rounded up; a time that does not fit its type becomes the type's largest number.
 
+use crate::capacity::Capacity;
 use crate::link::message::Configuration;
+use crate::readout::SCANS_A_ROUND;
 
 /// Clock of the converters' bus on the NUCLEO-F446RE in Hz: 45 MHz/64. An MCP3208 takes at most 1 MHz at 3.3 V, and the
 /// divider has powers of two.
@@ -11,20 +13,37 @@ pub const NUCLEO_SPI_HZ: u32 = 703_125;
 /// Bytes that a sample of an MCP3208 takes on its bus.
 const MCP3208_BYTES: u32 = 3;
 
-/// Time constant in ns of a resistance (Ω) that charges a capacitance (pF).
+/// Times in ns that the NUCLEO-F446RE's code takes: for a sample besides its clocks, above all the 500 ns for which the
+/// chip select must be high; to turn a sample into a reading; and for a row, to shift it into the register and start.
+/// From the cycles of the emulated board, on which `cargo xtask board` holds whole scans to the plan.
+const NUCLEO_SAMPLE_NS: u32 = 1_350;
+const NUCLEO_READING_NS: u32 = 850;
+const NUCLEO_ROW_NS: u32 = 17_300;
+
+/// Gain–bandwidth product of an MCP6024, the op-amp of docs/readout.md, in Hz.
+pub const OP_AMP_HZ: f32 = 10e6;
+
+/// Noise gain of the op-amp that holds a column: 1 + R_f/R, with R the cells of all rows in parallel.
 ///
 /// ```
-/// assert_eq!(firmware::timing::time_constant_ns(560.0, 1000.0), 560.0); // 560 Ω and 1 nF
+/// let gain = firmware::timing::noise_gain(560.0, 55.0, 8); // the paper's sensor at rest
+/// assert!((gain - 82.5).abs() < 0.1);
 /// ```
-pub fn time_constant_ns(resistance_ohm: f32, capacitance_pf: f32) -> f32 {
-    resistance_ohm * capacitance_pf / 1000.0
+pub fn noise_gain(feedback_ohm: f32, cell_ohm: f32, rows: u16) -> f32 {
+    1.0 + feedback_ohm * f32::from(rows) / cell_ohm
+}
+
+/// Time constant in ns with which an op-amp follows, closed around this noise gain.
+pub fn time_constant_ns(noise_gain: f32, gain_bandwidth_hz: f32) -> f32 {
+    noise_gain / (2.0 * core::f32::consts::PI * gain_bandwidth_hz) * 1e9
 }
 
 /// Time in µs until a voltage is within half a count of its final value: τ·ln 2^(bits + 1).
 ///
 /// ```
-/// use firmware::timing::settling_us;
-/// assert_eq!(settling_us(5_000.0, 12), 46); // τ = 5 µs, 12 bits: nine time constants
+/// use firmware::timing::{OP_AMP_HZ, settling_us, time_constant_ns};
+/// let time_constant_ns = time_constant_ns(82.5, OP_AMP_HZ); // 1.3 µs
+/// assert_eq!(settling_us(time_constant_ns, 12), 12); // nine time constants
 /// ```
 pub fn settling_us(time_constant_ns: f32, bits: u8) -> u32 {
     let us = time_constant_ns * 1e-3 * ((f32::from(bits) + 1.0) * core::f32::consts::LN_2);
@@ -52,7 +71,9 @@ pub struct ScanPlan {
     pub rows: u16,
     /// Number of columns that are sampled for each row.
     pub columns: u16,
-    /// Whether every column is sampled once more while all rows idle.
+    /// Number of columns that the board can sample.
+    pub board_columns: u16,
+    /// Whether every column is sampled once a round while all rows idle.
     pub idle_samples: bool,
     /// Waiting time in µs after every change of the rows.
     pub settling_us: u32,
@@ -60,60 +81,94 @@ pub struct ScanPlan {
     pub oversampling: u16,
     /// Time of one sample in ns.
     pub sample_ns: u32,
+    /// Time in ns to turn the samples of a reading into Ω.
+    pub reading_ns: u32,
+    /// Time in ns for a row besides its wait, its samples and its readings.
+    pub row_ns: u32,
 }
 
 impl ScanPlan {
     /// Plan of the NUCLEO-F446RE's image for so many wires: its converters' bus, and its first configuration's wait.
     ///
     /// ```
-    /// assert_eq!(firmware::timing::ScanPlan::of_nucleo(8, 18, 1).scan_us(), 6_430);
+    /// assert_eq!(firmware::timing::ScanPlan::of_nucleo(8, 18, 1).scan_us(), 5_573);
     /// ```
     pub fn of_nucleo(rows: u16, columns: u16, oversampling: u16) -> Self {
         Self {
             rows,
             columns,
+            board_columns: columns.max(Capacity::PAPER.columns as u16),
             idle_samples: true,
             settling_us: Configuration::DEFAULT.scan.settling_us,
             oversampling,
-            sample_ns: spi_transfer_ns(MCP3208_BYTES, NUCLEO_SPI_HZ),
+            sample_ns: spi_transfer_ns(MCP3208_BYTES, NUCLEO_SPI_HZ) + NUCLEO_SAMPLE_NS,
+            reading_ns: NUCLEO_READING_NS,
+            row_ns: NUCLEO_ROW_NS,
         }
     }
 
-    /// Time of the whole scan in µs.
+    /// Time of a scan in µs, as a mean over a round of [`SCANS_A_ROUND`].
     ///
     /// ```
     /// use firmware::timing::{ScanPlan, spi_transfer_ns};
     /// let plan = ScanPlan {
     ///     rows: 8,
     ///     columns: 18,
+    ///     board_columns: 18,
     ///     idle_samples: true,
-    ///     settling_us: 46,
+    ///     settling_us: 20,
     ///     oversampling: 2,
     ///     sample_ns: spi_transfer_ns(3, 1_000_000),
+    ///     reading_ns: 0,
+    ///     row_ns: 0,
     /// };
-    /// assert_eq!(plan.scan_us(), 8_190); // fits the 10 ms of 100 Hz
+    /// assert_eq!(plan.scan_us(), 7_128); // fits the 10 ms of 100 Hz
+    /// assert_eq!(plan.longest_us(), 7_956); // with idle samples
     /// ```
     pub fn scan_us(&self) -> u32 {
-        let steps = u64::from(self.rows) + u64::from(self.idle_samples);
-        let samples_of_a_step = u64::from(self.columns) * u64::from(self.oversampling.max(1));
-        let sampling_us =
-            (steps * samples_of_a_step).saturating_mul(u64::from(self.sample_ns)).div_ceil(1000);
-        let waiting_us = steps.saturating_mul(u64::from(self.settling_us));
-        u32::try_from(sampling_us.saturating_add(waiting_us)).unwrap_or(u32::MAX)
+        let each_ns = self.of_round_ns() / u64::from(SCANS_A_ROUND);
+        in_us(self.of_rows_ns().saturating_add(each_ns))
     }
 
-    /// Largest oversampling at which a scan takes no longer than `period_us`; `None` if a single sample a reading
+    /// Time in µs of a scan that begins a round. The first one of a model that scans a part of the columns takes longer.
+    pub fn longest_us(&self) -> u32 {
+        in_us(self.of_rows_ns().saturating_add(self.of_round_ns()))
+    }
+
+    fn of_rows_ns(&self) -> u64 {
+        let readings_ns = u64::from(self.columns) * u64::from(self.reading_ns);
+        u64::from(self.rows).saturating_mul(self.step_ns(self.columns).saturating_add(readings_ns))
+    }
+
+    /// Time in ns that the first scan of a round takes besides its rows.
+    fn of_round_ns(&self) -> u64 {
+        let idle_ns = if self.idle_samples { self.step_ns(self.board_columns) } else { 0 };
+        idle_ns.saturating_add(self.samples_ns(self.board_columns.saturating_sub(self.columns)))
+    }
+
+    /// Time in ns to change the rows, wait, and sample so many columns.
+    fn step_ns(&self, columns: u16) -> u64 {
+        let wait_ns = u64::from(self.settling_us) * 1000 + u64::from(self.row_ns);
+        self.samples_ns(columns).saturating_add(wait_ns)
+    }
+
+    fn samples_ns(&self, columns: u16) -> u64 {
+        let samples = u64::from(columns) * u64::from(self.oversampling.max(1));
+        samples.saturating_mul(u64::from(self.sample_ns))
+    }
+
+    /// Largest oversampling at which no scan takes longer than `period_us`; `None` if a single sample a reading
     /// takes longer.
     ///
     /// ```
     /// # use firmware::timing::ScanPlan;
-    /// # let plan = ScanPlan { rows: 8, columns: 18, idle_samples: true, settling_us: 46,
-    /// #     oversampling: 1, sample_ns: 24_000 };
+    /// # let plan = ScanPlan { rows: 8, columns: 18, board_columns: 18, idle_samples: true, settling_us: 20,
+    /// #     oversampling: 1, sample_ns: 24_000, reading_ns: 0, row_ns: 0 };
     /// assert_eq!(plan.most_oversampling(10_000), Some(2));
     /// assert_eq!(plan.most_oversampling(1_000), None);
     /// ```
     pub fn most_oversampling(&self, period_us: u32) -> Option<u16> {
-        let fits = |oversampling| Self { oversampling, ..*self }.scan_us() <= period_us;
+        let fits = |oversampling| Self { oversampling, ..*self }.longest_us() <= period_us;
         if !fits(1) {
             return None;
         }
@@ -127,6 +182,10 @@ impl ScanPlan {
     }
 }
 
+fn in_us(ns: u64) -> u32 {
+    u32::try_from(ns.div_ceil(1000)).unwrap_or(u32::MAX)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,10 +193,13 @@ mod tests {
     const PLAN: ScanPlan = ScanPlan {
         rows: 8,
         columns: 18,
+        board_columns: 18,
         idle_samples: false,
         settling_us: 10,
         oversampling: 1,
         sample_ns: 1_500,
+        reading_ns: 0,
+        row_ns: 2_000,
     };
 
     #[test]
@@ -163,31 +225,55 @@ mod tests {
         let most = ScanPlan {
             rows: u16::MAX,
             columns: u16::MAX,
+            board_columns: u16::MAX,
             idle_samples: true,
             settling_us: u32::MAX,
             oversampling: u16::MAX,
             sample_ns: u32::MAX,
+            reading_ns: u32::MAX,
+            row_ns: u32::MAX,
         };
         assert_eq!(most.scan_us(), u32::MAX);
-        let nothing = ScanPlan { rows: 0, columns: 0, ..PLAN };
+        let nothing = ScanPlan { rows: 0, columns: 0, board_columns: 0, ..PLAN };
         assert_eq!((nothing.scan_us(), nothing.most_oversampling(0)), (0, Some(u16::MAX)));
+    }
+
+    #[test]
+    fn the_boards_wait_is_what_its_op_amp_needs_with_a_margin() {
+        let needed_us = |cell_ohm: f32, hz: f32| {
+            settling_us(time_constant_ns(noise_gain(560.0, cell_ohm, 8), hz), 12)
+        };
+        let waited_us = Configuration::DEFAULT.scan.settling_us;
+        assert_eq!((needed_us(55.0, OP_AMP_HZ), waited_us), (12, 20));
+        // With all cells pressed to 42 Ω, an op-amp that is a fifth slower will do.
+        assert!(needed_us(42.0, 0.8 * OP_AMP_HZ) <= waited_us);
     }
 
     #[test]
     fn the_boards_scan_leaves_a_third_of_the_period() {
         let Configuration { frame_period_us, scan, .. } = Configuration::DEFAULT;
         let plan = ScanPlan::of_nucleo(8, 18, scan.oversampling);
-        assert_eq!(plan.scan_us(), 6_430);
-        assert!(plan.scan_us() * 3 <= frame_period_us * 2);
+        // docs/board.md has these.
+        let sampling = ScanPlan { sample_ns: 34_134, reading_ns: 0, row_ns: 0, ..plan };
+        assert_eq!(sampling.scan_us(), 5_115);
+        assert_eq!((plan.scan_us(), plan.longest_us()), (5_573, 6_207));
+        assert!(plan.longest_us() * 3 <= frame_period_us * 2);
         assert_eq!(plan.most_oversampling(frame_period_us), Some(1));
     }
 
     #[test]
     fn a_scan_is_its_waits_and_its_samples() {
-        assert_eq!(PLAN.scan_us(), 8 * 10 + 8 * 18 * 3 / 2);
+        let [row_ns, sample_ns] = [12_000, 1_500];
+        assert_eq!(PLAN.scan_us(), 8 * row_ns / 1000 + 8 * 18 * sample_ns / 1000);
+        assert_eq!(PLAN.longest_us(), PLAN.scan_us());
+        // Idle samples are a row more, once in 16 scans.
         let idle = ScanPlan { idle_samples: true, ..PLAN };
-        assert_eq!(idle.scan_us(), 9 * 10 + 9 * 18 * 3 / 2);
-        assert_eq!(ScanPlan { oversampling: 4, ..PLAN }.scan_us(), 8 * 10 + 4 * 8 * 18 * 3 / 2);
+        assert_eq!(idle.longest_us(), 9 * row_ns / 1000 + 9 * 18 * sample_ns / 1000);
+        assert_eq!(idle.scan_us(), PLAN.scan_us() + (12_000_u32 + 18 * 1500).div_ceil(16_000));
+        // A part of the columns, and the others of one row once in 16 scans.
+        let part = ScanPlan { columns: 3, ..idle };
+        assert_eq!(part.longest_us(), 9 * row_ns / 1000 + (8 * 3 + 18 + 15) * 3 / 2 + 1);
+        assert_eq!(ScanPlan { oversampling: 4, ..PLAN }.scan_us(), 8 * 12 + 4 * 8 * 18 * 3 / 2);
         let most = PLAN.most_oversampling(10_000).unwrap();
         assert!(ScanPlan { oversampling: most, ..PLAN }.scan_us() <= 10_000);
         assert!(ScanPlan { oversampling: most + 1, ..PLAN }.scan_us() > 10_000);

@@ -130,6 +130,7 @@ fn identity() -> Report<'static> {
         key: KeyState::Set,
         unique_id: UNIQUE_ID,
         counter: 1001,
+        wires_crc_32: 3,
     })
 }
 

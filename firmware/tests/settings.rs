@@ -189,7 +189,7 @@ fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
 fn a_baseline_of_other_wires_is_ignored_until_a_model_of_its_wires_comes() {
     let mut journal = Flash::journal();
     let readings: Vec<u8> = [60.0_f32; 4].iter().flat_map(|ohm| ohm.to_le_bytes()).collect();
-    let bytes = [&[1, 2, 2, 7, 0, 0, 0, 0, 0][..], &readings].concat();
+    let bytes = [&[2, 2, 2, 7, 0, 0, 0, 0, 0][..], &readings].concat();
     journal.keep(Kind::Baseline, &[&bytes]).unwrap();
     let mut slots = Flash::slots_with(&blob(1, 3));
     let mut bench = Bench::with_journal(quiet(), journal);

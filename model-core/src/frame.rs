@@ -43,3 +43,47 @@ impl Wires {
         inside.then(|| row.0.saturating_mul(self.columns).saturating_add(column.0))
     }
 }
+
+/// A set of column-wires: bit k stands for column-wire k.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ColumnWires(pub u32);
+
+impl ColumnWires {
+    /// So many column-wires, from the first on; at most 32.
+    ///
+    /// ```
+    /// use model_core::ColumnWires;
+    /// assert_eq!(ColumnWires::first(3), ColumnWires(0b111));
+    /// ```
+    pub const fn first(count: usize) -> Self {
+        Self(match u32::MAX.checked_shl(count as u32) {
+            Some(others) => !others,
+            None => u32::MAX,
+        })
+    }
+
+    /// Number of column-wires.
+    pub const fn count(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// Adds `column`, if it is one of the first 32.
+    pub const fn insert(&mut self, column: ColumnWire) {
+        self.0 |= Self::first(column.0.saturating_add(1)).0 & !Self::first(column.0).0;
+    }
+
+    /// Number of column-wires below `column`: its place among those of the set.
+    pub const fn below(self, column: ColumnWire) -> usize {
+        Self(self.0 & Self::first(column.0).0).count()
+    }
+
+    /// The items of these column-wires among `items`, of which there is one for each column-wire from the first on.
+    pub fn pick<T>(self, items: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
+        let mut wires = self.0;
+        items.into_iter().filter(move |_| {
+            let is_in = wires & 1 == 1;
+            wires >>= 1;
+            is_in
+        })
+    }
+}

@@ -51,7 +51,7 @@ pub use decoder::{Decoder, Frame, decoder_ram_bytes, scratch_floats};
 pub use estimate::{Estimate, RowStatus};
 #[cfg(feature = "f32-direct")]
 pub use fixed::Fixed;
-pub use frame::{ColumnWire, RowWire, Wires};
+pub use frame::{ColumnWire, ColumnWires, RowWire, Wires};
 pub use gate::Gate;
 
 /// The README's example is a test.

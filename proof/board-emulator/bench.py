@@ -73,6 +73,14 @@ class Bench:
         expect(host.returncode == 0, f"host-sim link {arguments[0]} ended with {host.returncode}")
         return said
 
+    def program(self, *arguments):
+        """Runs another command of `host-sim`, and returns what it says."""
+        self._log("$ host-sim", *arguments)
+        command = [self._host_sim, *map(str, arguments)]
+        ended = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        expect(ended.returncode == 0, f"host-sim {arguments[0]} ended with {ended.returncode}: {ended.stderr}")
+        return ended.stdout
+
     def ask(self, message, patience_s=PATIENCE_S, before=b""):
         """Sends a request of the link to the board, behind other bytes; returns its answer, and how long that took in
         s."""

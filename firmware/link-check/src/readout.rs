@@ -12,7 +12,7 @@ use firmware::readout::{
     OnChipAdc, RowDrive, ScanSettings, Scanner, Selection, ShiftRegister595,
 };
 use firmware::timing;
-use model_core::RowWire;
+use model_core::{ColumnWires, RowWire};
 
 use crate::minimal;
 use crate::opaque::opaque;
@@ -70,10 +70,10 @@ impl OnChipAdc for Part {
 }
 
 fn scan<D: RowDrive, S: ColumnSampler, C: Circuit>(drive: D, sampler: S, circuit: C) {
-    let mut scanner = Scanner::<_, _, _, _, 18>::new(drive, sampler, Part, circuit);
+    let mut scanner = Scanner::<_, _, _, _, 8, 18>::new(drive, sampler, Part, circuit);
     let settings = ScanSettings { settling_us: opaque(46), oversampling: opaque(2) };
     let rows: [RowWire; 8] = array::from_fn(|_| RowWire(opaque(0)));
-    let wires = Selection { rows: &rows, columns: opaque(18) };
+    let wires = Selection { rows: &rows, columns: ColumnWires(opaque(0x24904)) };
     let mut frame = [0.0; 144];
     let Some(frame) = frame.get_mut(..opaque(144)) else { return };
     opaque(scanner.scan(settings, wires, frame).failed_samples);
@@ -113,15 +113,22 @@ pub fn exercise() {
     let mut sensor = minimal::Sensor::new([Part; 3], [Part; 3], Part);
     opaque(sensor.estimate_dz_mm());
 
-    let time_constant_ns = timing::time_constant_ns(opaque(560.0), opaque(1000.0));
+    let time_constant_ns = timing::time_constant_ns(
+        timing::noise_gain(opaque(560.0), opaque(55.0), opaque(8)),
+        opaque(timing::OP_AMP_HZ),
+    );
     let plan = timing::ScanPlan {
         rows: opaque(8),
         columns: opaque(18),
+        board_columns: opaque(18),
         idle_samples: opaque(true),
         settling_us: timing::settling_us(time_constant_ns, opaque(12)),
         oversampling: opaque(2),
         sample_ns: timing::spi_transfer_ns(opaque(3), opaque(1_000_000)),
+        reading_ns: opaque(1_000),
+        row_ns: opaque(5_000),
     };
     opaque(plan.scan_us());
+    opaque(plan.longest_us());
     opaque(plan.most_oversampling(opaque(10_000)));
 }

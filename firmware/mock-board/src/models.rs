@@ -136,6 +136,29 @@ pub fn parts<'a>(
     }
 }
 
+/// A blob of one network with this `shape`, which has one row, and this `metadata`.
+pub fn blob_of_a_row(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
+    let ModelShape { inputs, outputs, .. } = shape;
+    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
+    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
+    let (centre, weights, bias) = (list(1, inputs), list(2, outputs), list(3, outputs));
+    let (minimum, per_span) = (vec![50.0; inputs], vec![0.05; inputs]);
+    let network = direct::Network::try_new(
+        Shape { inputs, centres: 1, outputs },
+        Parameters {
+            input_minimum: &minimum,
+            input_per_span: &per_span,
+            centres: &centre,
+            decay: &[1.5],
+            output_weights: &weights,
+            bias: &bias,
+            affine: &[],
+        },
+    );
+    let networks = &[network.unwrap().into()];
+    encode_to_vec(&parts(networks, &[0], metadata)).unwrap()
+}
+
 /// The CRC-32 that closes a blob.
 pub fn crc_of(blob: &[u8]) -> u32 {
     u32::from_le_bytes(*blob.last_chunk().unwrap())

@@ -35,10 +35,10 @@ impl FrameSource for Source {
         frame: &mut [f32],
     ) -> ScanReport {
         assert!(settings.oversampling > 0, "a scan without samples");
-        assert_eq!(frame.len(), wires.rows.len() * wires.columns);
-        for (to, row) in frame.chunks_mut(wires.columns).zip(wires.rows) {
-            to.copy_from_slice(&self.frame.borrow()[row.0][..wires.columns]);
-        }
+        let (shown, columns) = (self.frame.borrow(), wires.columns);
+        let readings = wires.rows.iter().flat_map(|row| columns.pick(shown[row.0]));
+        assert_eq!(frame.len(), wires.rows.len() * columns.count());
+        frame.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
         let mut pins = self.board.pins.borrow_mut();
         pins.now_us = pins.now_us.wrapping_add(SCAN_US + pins.scan_us);
         let missing = frame.iter();

@@ -16,7 +16,7 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use crate::bus::Bus;
 use crate::clock::Clock;
 use crate::flash::set_brown_out_level;
-use crate::held_pin::HeldPin;
+use crate::held_pin::{ChipSelect, HeldPin};
 use crate::oscillator::{EXTERNAL_MHZ, INTERNAL_MHZ, Oscillator};
 use crate::power;
 use crate::reset::ResetCause;
@@ -37,7 +37,7 @@ pub const CONVERTERS: usize = if board_common::CONVERTERS > 3 { 4 } else { 3 };
 pub type Converter = RefCellDevice<'static, Bus, Select, NoDelay>;
 
 /// Chip select of an MCP3208, which must be high for 500 ns between two samples.
-pub type Select = HeldPin<90, 0>;
+pub type Select = ChipSelect<90>;
 
 /// A wire to the 74HC595; it keeps each level for 100 ns, so that slow edges do no harm.
 pub type RowPin = HeldPin<18, 18>;

@@ -18,6 +18,8 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 /// Constants of the circuit, until others are kept: `host-sim link PORT calibrate` measures your own.
 const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
 
+type BoardScanner<D, S, T, C> = Scanner<D, S, T, C, { CAPACITY.rows }, { CAPACITY.columns }>;
+
 struct Nucleo {
     serial: Serial,
     clock: Clock,
@@ -101,8 +103,7 @@ fn main() -> ! {
         latch: board.row_latch,
     };
     let sampler = Mcp3208s { chips: board.converters };
-    let scanner =
-        Scanner::<_, _, _, _, { CAPACITY.columns }>::new(drive, sampler, board.delay, CIRCUIT);
+    let scanner = BoardScanner::new(drive, sampler, board.delay, CIRCUIT);
     let nucleo = Nucleo {
         serial: board.serial,
         clock: board.clock,

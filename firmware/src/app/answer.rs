@@ -54,6 +54,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     ) -> Option<SessionEnd> {
         let (number, request, is_sealed) = self.open(received)?;
         let Self { sensor, models, link, work } = self;
+        let wires_crc_32 = sensor.wiring.crc_32;
         let is_keyless = models.authenticity.key_state() == KeyState::None;
         if is_sealed || models.is_chunk(request) || is_keyless && !request.only_asks() {
             let now_us = link.platform().now_us();
@@ -62,7 +63,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let mut end = None;
         // Nothing is sent for `Ok(None)`: the answer takes a while.
         let report = match request {
-            Request::Identify => Ok(Some(Report::Identity(models.identity(model, spare, link)))),
+            Request::Identify => {
+                Ok(Some(Report::Identity(models.identity(model, wires_crc_32, spare, link))))
+            }
             Request::Statistics => Ok(Some(Report::Statistics(link.statistics))),
             Request::Configuration => Ok(Some(configuration(sensor.configuration, link))),
             Request::Configure { configuration: wanted, lease_ms } => sensor
@@ -197,6 +200,7 @@ impl Models {
     fn identity<'i, P: Platform, S: Slot, const ROWS: usize>(
         &self,
         model: &'i InForce<'_, ROWS>,
+        wires_crc_32: u32,
         spare: &S,
         link: &mut Link<'_, P>,
     ) -> Identity<'i> {
@@ -215,6 +219,7 @@ impl Models {
             key: self.authenticity.key_state(),
             unique_id: link.platform().unique_id(),
             counter: self.authenticity.counter(),
+            wires_crc_32,
         }
     }
 }

@@ -15,6 +15,8 @@ pub struct Buffers<
     pub(super) received: [u8; BYTES],
     pub(super) message: [u8; BYTES],
     pub(super) frame: [[f32; COLUMNS]; ROWS],
+    /// Place of each reading of the model in a scan.
+    pub(super) places: [[u16; COLUMNS]; ROWS],
     pub(super) baseline: [[f32; COLUMNS]; ROWS],
     /// One over each reading of the baseline.
     pub(super) reciprocals: [[f32; COLUMNS]; ROWS],
@@ -67,6 +69,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             received: [0; BYTES],
             message: [0; BYTES],
             frame: [[0.0; COLUMNS]; ROWS],
+            places: [[0; COLUMNS]; ROWS],
             baseline: [[0.0; COLUMNS]; ROWS],
             reciprocals: [[0.0; COLUMNS]; ROWS],
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],

@@ -12,7 +12,7 @@ impl Configuration {
     /// 60 Ω, and every row is decoded.
     pub const DEFAULT: Self = Self {
         frame_period_us: 10_000,
-        scan: ScanSettings { settling_us: 100, oversampling: 1 },
+        scan: ScanSettings { settling_us: 20, oversampling: 1 },
         send_readings: false,
         send_estimates: true,
         confidence: ConfidenceSent::Nothing,

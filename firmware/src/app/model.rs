@@ -3,7 +3,7 @@
 use model_core::blob::{Columns, DecodeError, Model};
 use model_core::checksum::CRC_32;
 use model_core::rbf::NetworkError;
-use model_core::{Decoder, RowWire, scratch_floats};
+use model_core::{Decoder, scratch_floats};
 
 use crate::capacity::Capacity;
 use crate::link::message::{ModelFault, ModelIdentity};
@@ -88,43 +88,21 @@ fn crc_of(names: Columns<'_>, units: Columns<'_>) -> u32 {
 /// blob's length.
 pub fn check_head(capacity: Capacity, head: &[u8]) -> Result<usize, ModelFault> {
     let (length, shape) = Model::declared(head).ok_or(ModelFault::NotABlob)?;
-    capacity.wires_for(shape).map(|_| length).ok_or(ModelFault::Shape)
+    if capacity.has_room_for(shape) { Ok(length) } else { Err(ModelFault::Shape) }
 }
 
-/// Checks a blob from end to end, and that the image has room for its model.
+/// Checks a blob from end to end, that the image has room for its model, and that the board has its wires.
 pub fn check(capacity: Capacity, blob: &[u8]) -> Result<Model<'_>, ModelFault> {
     let model = Model::decode(blob).map_err(|error| fault(&error))?;
-    let driven =
-        model.metadata().input_names.iter().filter_map(row_of).all(|row| row.0 < capacity.rows);
+    let (shape, names) = (model.shape(), model.metadata().input_names);
     let room = scratch_floats(&model) <= capacity.scratch_floats();
-    match capacity.wires_for(model.shape()) {
-        Some(_) if driven && room => Ok(model),
-        _ => Err(ModelFault::Shape),
+    if !room || !capacity.has_room_for(shape) {
+        return Err(ModelFault::Shape);
     }
-}
-
-/// Row-wires of a model in the order of its readings, of which each wire has so many `columns`.
-///
-/// A reading's name tells its wires: `r4c1_ohm` is row-wire 4 with column-wire 1, both counted from 1. A model with
-/// other names takes the first row-wires in their order.
-pub fn row_wires<const ROWS: usize>(model: &Model<'_>, columns: usize) -> [RowWire; ROWS] {
-    let in_order = core::array::from_fn(RowWire);
-    let mut wires = in_order;
-    let first_names = model.metadata().input_names.iter().step_by(columns.max(1));
-    for (wire, name) in wires.iter_mut().zip(first_names) {
-        match row_of(name) {
-            Some(row) => *wire = row,
-            None => return in_order,
-        }
+    if capacity.cells(names, shape).any(|cell| cell.is_err()) {
+        return Err(ModelFault::Wires);
     }
-    wires
-}
-
-/// The row-wire of a reading called `r{m}c1_ohm`.
-fn row_of(name: &str) -> Option<RowWire> {
-    let number = name.strip_prefix('r')?.strip_suffix("c1_ohm")?;
-    let row: usize = number.parse().ok()?;
-    row.checked_sub(1).map(RowWire)
+    Ok(model)
 }
 
 /// A slot whose model may come into force, if it is sound.
@@ -193,15 +171,6 @@ fn fault(error: &DecodeError) -> ModelFault {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_readings_name_tells_its_row() {
-        assert_eq!(row_of("r1c1_ohm"), Some(RowWire(0)));
-        assert_eq!(row_of("r16c1_ohm"), Some(RowWire(15)));
-        for other in ["r1c2_ohm", "r0c1_ohm", "rc1_ohm", "ch1", "", "r-1c1_ohm", "r1c1", "x"] {
-            assert_eq!(row_of(other), None, "{other}");
-        }
-    }
 
     #[test]
     fn a_copy_holds_every_byte_or_is_not_made() {

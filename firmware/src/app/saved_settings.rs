@@ -5,8 +5,8 @@
 //! - Configuration: postcard fields, as in the link.
 //! - Constants: number of rows and of columns; reference and drive voltage; then source by row, feedback by column
 //!   and series resistance by column.
-//! - Baseline: number of rows and of columns, number of frames (u16), CRC-32 of the constants that it was read with,
-//!   readings.
+//! - Baseline: number of lines and of readings in one, as in a health report, number of frames (u16), CRC-32 of the
+//!   constants that it was read with and of the wires of its readings, readings.
 //!
 //! Numbers are little-endian; voltages and resistances are f32.
 
@@ -27,8 +27,9 @@ use crate::store::Kind;
 const fn version(setting: Setting) -> u8 {
     match setting {
         // Before version 2 it did not tell what is sent of a model's confidence.
-        Setting::Configuration => 2,
-        Setting::Constants | Setting::Baseline => 1,
+        // Before version 2 a baseline did not tell its wires.
+        Setting::Configuration | Setting::Baseline => 2,
+        Setting::Constants => 1,
     }
 }
 
@@ -64,9 +65,9 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         if !KEEPS {
             return;
         }
-        let constants_crc = self.constants_crc();
+        let (origin_crc, length) = (self.origin_crc(), 4 * self.wiring.readings);
         match link.platform().journal().read(Kind::Baseline).and_then(baseline) {
-            Some(kept) if kept.wires == self.wires && kept.constants_crc == constants_crc => {
+            Some(kept) if kept.origin_crc == origin_crc && kept.readings.0.len() == length => {
                 self.baseline.restore(kept.readings, kept.frames);
                 info!("baseline as kept: {=u16} frames", kept.frames);
             }
@@ -83,7 +84,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
     ) -> Result<(), Refusal> {
         const NOTHING: Refusal = Refusal::Keep(KeepFault::Nothing);
         link.may_keep()?;
-        let constants_crc = self.constants_crc();
+        let origin_crc = self.origin_crc();
         let journal = link.platform().journal();
         let version = version(setting);
         let written = match setting {
@@ -114,18 +115,20 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
                     return Err(NOTHING);
                 }
                 let [low, high] = frames.to_le_bytes();
-                let head = [version, self.wires.rows as u8, self.wires.columns as u8, low, high];
+                let (lines, line) = (self.wiring.lines(), self.wiring.line);
+                let head = [version, lines as u8, line as u8, low, high];
                 let readings = Floats::new(self.baseline.mean()).0;
-                journal.keep(setting.into(), &[&head, &constants_crc.to_le_bytes(), readings])
+                journal.keep(setting.into(), &[&head, &origin_crc.to_le_bytes(), readings])
             }
         };
         link.count_write(written)
     }
 
-    /// CRC-32 of the constants in force; 0 if there are none.
-    pub(super) fn constants_crc(&self) -> u32 {
-        let Some(c) = self.source.constants() else { return 0 };
+    /// CRC-32 of what readings come from: the wires, and the constants in force if there are any.
+    pub(super) fn origin_crc(&self) -> u32 {
         let mut digest = CRC_32.digest();
+        digest.update(&self.wiring.crc_32.to_le_bytes());
+        let Some(c) = self.source.constants() else { return digest.finalize() };
         let voltages = [c.reference_v.to_le_bytes(), c.drive_v.to_le_bytes()];
         let resistances = [c.row_source_ohm.0, c.feedback_ohm.0, c.series_ohm.0];
         digest.update(voltages.as_flattened());
@@ -151,8 +154,8 @@ impl<P: Platform> Link<'_, P> {
         let constants = journal.read(Kind::Constants).and_then(constants).is_some();
         let baseline = journal.read(Kind::Baseline).and_then(baseline);
         let baseline = baseline.map(|kept| KeptBaseline {
-            rows: kept.wires.rows as u8,
-            columns: kept.wires.columns as u8,
+            rows: kept.rows,
+            columns: kept.columns,
             frames: kept.frames,
         });
         Kept { configuration, constants, baseline, writes_left }
@@ -199,19 +202,19 @@ fn constants(bytes: &[u8]) -> Option<Constants<'_>> {
 
 /// A baseline as it is kept.
 struct Baseline<'b> {
-    wires: Wires,
+    rows: u8,
+    columns: u8,
     frames: u16,
-    constants_crc: u32,
+    origin_crc: u32,
     readings: Floats<'b>,
 }
 
 fn baseline(bytes: &[u8]) -> Option<Baseline<'_>> {
     let (&[rows, columns, low, high], rest) =
         content(Setting::Baseline, bytes)?.split_first_chunk()?;
-    let (constants_crc, readings) = rest.split_first_chunk()?;
-    let wires = Wires { rows: rows.into(), columns: columns.into() };
+    let (origin_crc, readings) = rest.split_first_chunk()?;
     let frames = u16::from_le_bytes([low, high]);
-    let constants_crc = u32::from_le_bytes(*constants_crc);
-    let sound = frames > 0 && readings.len() == 4 * wires.readings();
-    sound.then_some(Baseline { wires, frames, constants_crc, readings: Floats(readings) })
+    let origin_crc = u32::from_le_bytes(*origin_crc);
+    let readings = Floats(readings);
+    (frames > 0).then_some(Baseline { rows, columns, frames, origin_crc, readings })
 }

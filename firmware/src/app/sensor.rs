@@ -1,11 +1,12 @@
 //! The sensor: which wires are scanned, how, and its baseline.
 
-use model_core::blob::Floats;
+use model_core::blob::{Columns, Floats, ModelShape};
 use model_core::health::{Health, Limits};
-use model_core::{RowWire, Wires};
 
 use super::frame_clock::FrameClock;
 use super::link::Link;
+use super::wiring::Wiring;
+use crate::capacity::Capacity;
 use crate::circuit::{Constants, ConstantsFault};
 use crate::link::message::{Configuration, HealthReport, Refusal, Report};
 use crate::link::packet::UNASKED;
@@ -21,10 +22,8 @@ pub struct Sensor<'m, F, const ROWS: usize> {
     /// The device's own configuration, which is in force without a lease.
     pub own_configuration: Configuration,
     pub clock: FrameClock,
-    /// Numbers of wires that are scanned: those of the model in force, else all.
-    pub wires: Wires,
-    /// Which row-wires these are.
-    row_wires: [RowWire; ROWS],
+    /// The wires that are scanned: those of the model in force, else all.
+    pub wiring: Wiring<'m, ROWS>,
     /// Room for the longest frame.
     frame: &'m mut [f32],
     /// Bits of the last frame's faulty readings, a word a row.
@@ -47,11 +46,11 @@ pub struct Capture {
 }
 
 impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
-    /// Makes a sensor of which all `wires` are scanned. The memories have room for the longest frame each.
+    /// Makes a sensor with this `wiring`. The memories have room for the longest frame each.
     pub fn new(
         source: F,
         configuration: Configuration,
-        wires: Wires,
+        wiring: Wiring<'m, ROWS>,
         [frame, baseline]: [&'m mut [f32]; 2],
         now_us: u32,
     ) -> Self {
@@ -60,8 +59,7 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
             configuration,
             own_configuration: configuration,
             clock: FrameClock::starting_at(now_us),
-            wires,
-            row_wires: core::array::from_fn(RowWire),
+            wiring,
             frame,
             faulty_columns: [0; ROWS],
             baseline: Baseline::new(baseline),
@@ -72,20 +70,20 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
 
     /// The readings of the last frame, in Ω.
     pub fn frame(&self) -> &[f32] {
-        self.frame.get(..self.wires.readings()).unwrap_or_default()
+        self.frame.get(..self.wiring.readings).unwrap_or_default()
     }
 
     /// Replaces the frame with the `readings_ohm` of a request.
     pub fn set_frame(&mut self, readings_ohm: Floats<'_>) -> Result<(), Refusal> {
         self.check_length(readings_ohm)?;
-        let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
+        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
         frame.iter_mut().zip(readings_ohm.iter()).for_each(|(place, reading)| *place = reading);
         Ok(())
     }
 
     /// Checks that there are as many readings as are scanned.
     fn check_length(&self, readings_ohm: Floats<'_>) -> Result<(), Refusal> {
-        let expected = self.wires.readings();
+        let expected = self.wiring.readings;
         if readings_ohm.0.len() == 4 * expected {
             Ok(())
         } else {
@@ -99,8 +97,8 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
             shorted_below_ohm: self.configuration.shorted_below_ohm,
             open_above_ohm: self.configuration.open_above_ohm,
         };
-        let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
-        let health = Health::new(frame, self.wires.columns, limits, &mut self.faulty_columns);
+        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
+        let health = Health::new(frame, self.wiring.line, limits, &mut self.faulty_columns);
         (frame, health)
     }
 
@@ -118,25 +116,34 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
 }
 
 impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
-    /// Scans these wires from now on. A baseline of others is given up.
+    /// Scans the wires of a model with inputs of these `names` from now on. A baseline of others is given up.
     pub fn scan_wires<P: Platform>(
         &mut self,
-        wires: Wires,
-        row_wires: [RowWire; ROWS],
+        capacity: Capacity,
+        names: Columns<'_>,
+        shape: ModelShape,
         link: &mut Link<'_, P>,
     ) {
-        if (self.wires, self.row_wires) != (wires, row_wires) {
-            (self.wires, self.row_wires) = (wires, row_wires);
+        let of_wiring = |wiring: &Wiring<'_, ROWS>| (wiring.crc_32, wiring.line);
+        let before = of_wiring(&self.wiring);
+        self.wiring.take(capacity, names, shape);
+        if of_wiring(&self.wiring) != before {
             self.restart_baseline(link);
         }
     }
 
     /// Scans a frame, counts it and sends its readings if they are wanted. Returns its number.
-    pub fn scan<P: Platform>(&mut self, start_us: u64, link: &mut Link<'_, P>) -> u32 {
-        let frame = self.frame.get_mut(..self.wires.readings()).unwrap_or_default();
-        let rows = self.row_wires.get(..self.wires.rows).unwrap_or_default();
-        let wires = Selection { rows, columns: self.wires.columns };
-        let report = self.source.scan(self.configuration.scan, wires, frame);
+    pub fn scan<P: Platform>(
+        &mut self,
+        start_us: u64,
+        scratch: &mut [f32],
+        link: &mut Link<'_, P>,
+    ) -> u32 {
+        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
+        let settings = self.configuration.scan;
+        let scan =
+            |wires: Selection<'_>, frame: &mut [f32]| self.source.scan(settings, wires, frame);
+        let report = self.wiring.fill(frame, scratch, scan);
         self.answers = frame.iter().any(|reading| !reading.is_nan());
         let scan_us = link.now_us().wrapping_sub(start_us) as u32;
         let s = &mut link.statistics;
@@ -165,7 +172,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
             missing: health.missing,
             shorted: health.shorted,
             open: health.open,
-            faulty_columns: faulty.get(..self.wires.rows).unwrap_or_default().as_flattened(),
+            faulty_columns: faulty.get(..self.wiring.lines()).unwrap_or_default().as_flattened(),
         };
         link.send(UNASKED, &Report::Health(report));
     }
@@ -210,9 +217,9 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         constants: Constants<'_>,
         link: &mut Link<'_, P>,
     ) -> Result<bool, ConstantsFault> {
-        let before = self.constants_crc();
+        let before = self.origin_crc();
         self.source.set_constants(constants)?;
-        let changed = self.constants_crc() != before;
+        let changed = self.origin_crc() != before;
         if changed {
             self.restart_baseline(link);
             self.load_baseline(link);
@@ -262,13 +269,13 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
     /// Forgets the baseline, and refuses the request that waits for one.
     fn restart_baseline<P: Platform>(&mut self, link: &mut Link<'_, P>) {
         self.give_up_capture(link);
-        self.baseline.restart(self.wires.readings());
+        self.baseline.restart(self.wiring.readings);
     }
 
     /// Refuses the request that waits for a baseline, if there is one: no baseline will come.
     fn give_up_capture<P: Platform>(&mut self, link: &mut Link<'_, P>) {
         if let Some(Capture { number, .. }) = self.capture.take() {
-            self.baseline.restart(self.wires.readings());
+            self.baseline.restart(self.wiring.readings);
             link.send(number, &Report::Refused(Refusal::Baseline));
         }
     }

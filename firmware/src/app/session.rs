@@ -1,9 +1,9 @@
 //! A session: the application's loop while one model is in force.
 
-use model_core::blob::Floats;
-use model_core::{Decoder, RowWire};
+use model_core::Decoder;
+use model_core::blob::{Columns, Floats};
 
-use super::model::{InForce, candidates, check_head, choose, copy_to, row_wires};
+use super::model::{InForce, candidates, check_head, choose, copy_to};
 use super::recheck::{Checked, Recheck};
 use super::session_end::SessionEnd;
 use super::{App, Core};
@@ -123,15 +123,12 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     /// wires is replaced by the one that is kept, if that fits.
     fn take_shape_of(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
         let Self { sensor, models, link, work } = self;
-        let shape = decoder.map(Decoder::shape);
-        let wires = shape.and_then(|shape| models.capacity.wires_for(shape));
-        let wires = wires.unwrap_or(models.capacity.wires());
-        work.rows = shape.map_or(wires.rows, |shape| shape.rows);
-        work.outputs = shape.map_or(0, |shape| shape.rows.saturating_mul(shape.outputs));
-        let row_wires = decoder.map_or(core::array::from_fn(RowWire), |decoder| {
-            row_wires(decoder.model(), wires.columns)
-        });
-        sensor.scan_wires(wires, row_wires, link);
+        let capacity = models.capacity;
+        let shape = decoder.map_or(capacity.wires_as_shape(), Decoder::shape);
+        let names = decoder.map_or(Columns(""), |decoder| decoder.metadata().input_names);
+        work.rows = shape.rows;
+        work.outputs = shape.rows.saturating_mul(shape.outputs);
+        sensor.scan_wires(capacity, names, shape, link);
         if sensor.baseline.frames() == 0 && sensor.capture.is_none() {
             sensor.load_baseline(link);
         }
@@ -146,7 +143,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let missed_frames = &mut link.statistics.frames_missed;
         *missed_frames = missed_frames.saturating_add(missed);
         let start_us = link.now_us();
-        let frame = sensor.scan(start_us, link);
+        let frame = sensor.scan(start_us, work.scratch, link);
         let (mut flags, health) = work.decode(sensor, link, decoder);
         let sent = sensor.configuration.confidence;
         let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);

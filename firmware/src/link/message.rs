@@ -239,6 +239,8 @@ pub struct Identity<'a> {
     pub unique_id: [u8; 12],
     /// Largest counter of a sealed request so far, or beyond: the next one must be above it.
     pub counter: u64,
+    /// CRC-32 of the wires of all readings, in their order: of a row and a column each, as bytes that count from 0.
+    pub wires_crc_32: u32,
 }
 
 /// Whether a device has a key.
@@ -641,6 +643,8 @@ pub enum ModelFault {
     Shape,
     /// The device's image was built without a part that the model needs.
     NotBuilt(Feature),
+    /// The board lacks wires that the names of the inputs say, or their order is unknown.
+    Wires,
 }
 
 #[cfg(test)]

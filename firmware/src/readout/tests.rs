@@ -8,8 +8,10 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
 
+use model_core::ColumnWires;
+
 use super::*;
-use crate::circuit::{Circuit, Divider, ZeroPotential};
+use crate::circuit::{Circuit, Divider, ScannedRow, ZeroPotential};
 
 #[derive(Debug, Clone, PartialEq)]
 enum Event {
@@ -288,13 +290,14 @@ fn multiplexed_adc_disables_all_sets_the_address_enables_one_and_waits_for_the_r
 fn scanner<C: Circuit>(
     record: &Record,
     circuit: C,
-) -> Scanner<DirectPins<Pin, 2>, Mcp3208s<Spi, 1>, Record, C, 3> {
+) -> Scanner<DirectPins<Pin, 2>, Mcp3208s<Spi, 1>, Record, C, 2, 3> {
     record.0.borrow_mut().answers = vec![[0, 2000_u16.to_be_bytes()[0], 2000_u16.to_be_bytes()[1]]];
     let drive = DirectPins { rows: record.pins(["r0", "r1"]) };
     Scanner::new(drive, Mcp3208s { chips: record.chips() }, record.clone(), circuit)
 }
 
-const WIRES: Selection<'static> = Selection { rows: &[RowWire(0), RowWire(1)], columns: 3 };
+const WIRES: Selection<'static> =
+    Selection { rows: &[RowWire(0), RowWire(1)], columns: ColumnWires::first(3) };
 const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 };
 
 #[test]
@@ -334,7 +337,8 @@ fn readings_are_those_of_the_mean_counts() {
     let mut frame = [[f32::NAN; 3]; 2];
     scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
     let mut expected = [3602.0, 3000.0, 3000.0];
-    circuit.row_ohm(RowWire(0), &[f32::NAN; 3], 4095, &mut expected);
+    let row = ScannedRow { row: RowWire(0), columns: WIRES.columns, load: 1.0 };
+    circuit.row_ohm(row, &[f32::NAN; 3], 4095, &mut expected);
     assert_eq!(frame[0], expected);
     assert!((expected[0] - 470.0 * (4096.0 / 3602.0 - 1.0)).abs() < 1e-3);
 }
@@ -355,7 +359,7 @@ fn a_failed_transaction_costs_one_reading() {
 }
 
 #[test]
-fn a_failed_idle_sample_costs_its_column() {
+fn a_failed_idle_sample_costs_its_column_until_the_next_scan() {
     let record = Record::default();
     let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
     record.0.borrow_mut().failing_transfer = Some(4);
@@ -366,14 +370,56 @@ fn a_failed_idle_sample_costs_its_column() {
     );
     let missing = frame.map(|row| row.map(f32::is_nan));
     assert_eq!(missing, [[false, true, false]; 2]);
-    // Where rows are not released to take it, that of the scan before does not stand in for it.
+    // The next scan takes another; where rows are not released for it, the one before does not stand in.
     record.0.borrow_mut().failing_transfer = None;
     scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
     assert_eq!(frame.map(|row| row.map(f32::is_nan)), [[false; 3]; 2]);
+    scanner.restart();
     let next = record.pin_changes();
     record.0.borrow_mut().failing_pin_change = Some(next);
     scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
     assert_eq!(frame.map(|row| row.map(f32::is_nan)), [[true; 3]; 2]);
+}
+
+#[test]
+fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
+    let record = Record::default();
+    let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
+    let mut frame = [f32::NAN; 6];
+    let mut samples = |scanner: &mut dyn FrameSource, settings, wires: Selection<'_>| {
+        let before = record.transfers();
+        let frame = &mut frame[..wires.rows.len() * wires.columns.count()];
+        scanner.scan(settings, wires, frame);
+        assert!(
+            frame.iter().all(|ohm| !ohm.is_nan()) || record.0.borrow().failing_transfer.is_some()
+        );
+        (record.transfers() - before) / usize::from(settings.oversampling)
+    };
+    for scan in 0..40 {
+        let expected = if scan % 16 == 0 { 9 } else { 6 };
+        assert_eq!(samples(&mut scanner, SETTINGS, WIRES), expected, "scan {scan}");
+    }
+    // Other settings, constants or columns, and a sample that fails, begin another round; other rows do not.
+    let once = ScanSettings { oversampling: 1, ..SETTINGS };
+    assert_eq!([once, once].map(|settings| samples(&mut scanner, settings, WIRES)), [9, 6]);
+    let constants = ZeroPotential::<2, 3>::TYPICAL;
+    scanner.set_constants(constants.constants().unwrap()).unwrap();
+    assert_eq!([once, once].map(|settings| samples(&mut scanner, settings, WIRES)), [9, 6]);
+    record.0.borrow_mut().failing_transfer = Some(record.transfers() + 4);
+    assert_eq!([once, once, once].map(|it| samples(&mut scanner, it, WIRES)), [6, 9, 6]);
+    let second = Selection { rows: &[RowWire(1)], ..WIRES };
+    assert_eq!(samples(&mut scanner, once, second), 3);
+    // Where a part of the columns is scanned, all of them are sampled idle, and for every row at first; for one row in
+    // every round from there on.
+    let part = Selection { columns: ColumnWires(0b101), ..WIRES };
+    for scan in 0..48 {
+        let expected = match scan {
+            0 => 3 + 2 * 3,
+            16 | 32 => 3 + 3 + 2,
+            _ => 2 * 2,
+        };
+        assert_eq!(samples(&mut scanner, once, part), expected, "scan {scan} of a part");
+    }
 }
 
 #[test]
@@ -419,18 +465,31 @@ fn settings_out_of_range_are_taken_for_the_nearest() {
 }
 
 #[test]
-fn a_scan_touches_only_the_wires_that_it_is_asked_for() {
+fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its_own_input() {
     let record = Record::default();
     let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
-    let mut frame = [7.0; 4];
-    let report =
-        scanner.scan(SETTINGS, Selection { rows: &[RowWire(1)], columns: 2 }, &mut frame[..2]);
-    assert_eq!(report.failed_samples, 0);
-    assert_eq!(record.transfers(), 2 * 2 * 4); // idle and one row, two columns, four samples
+    let once = ScanSettings { oversampling: 1, ..SETTINGS };
+    let wires = Selection { rows: &[RowWire(1)], columns: ColumnWires(0b110) };
+    let answer = |n: u16| [0, n.to_be_bytes()[0], n.to_be_bytes()[1]];
+    // Idle in all columns, the asked ones first; then the second row's.
+    record.0.borrow_mut().answers = [251, 252, 250, 2001, 2002, 2000].map(answer).to_vec();
+    let mut frame = [7.0; 3];
+    assert_eq!(scanner.scan(once, wires, &mut frame[..2]).failed_samples, 0);
     let driven = |row| record.0.borrow().events.contains(&Event::Pin(row, HIGH));
     assert_eq!([driven("r0"), driven("r1")], [false, true]);
-    assert!(frame[..2].iter().all(|ohm| *ohm != 7.0));
-    assert_eq!(frame[2..], [7.0; 2]);
+    let asked: Vec<u8> = (record.take().iter())
+        .filter_map(
+            |event| if let Event::Transfer(_, bytes) = event { Some(bytes[1] >> 6) } else { None },
+        )
+        .collect();
+    assert_eq!(asked, [1, 2, 0, 1, 2, 0]);
+    let circuit = ZeroPotential::<2, 3>::TYPICAL;
+    let (idle, counts) = ([250.0, 251.0, 252.0], [2000.0, 2001.0, 2002.0]);
+    let load = circuit.load(wires.columns, &idle, &counts);
+    let mut expected = [2001.0, 2002.0];
+    let row = ScannedRow { row: RowWire(1), columns: wires.columns, load };
+    circuit.row_ohm(row, &idle, 4095, &mut expected);
+    assert_eq!(frame, [expected[0], expected[1], 7.0]);
 }
 
 #[test]
@@ -438,7 +497,11 @@ fn wires_that_a_scanner_does_not_have_are_missing() {
     let record = Record::default();
     let mut scanner = scanner(&record, ZeroPotential::<2, 3>::TYPICAL);
     let mut frame = [7.0; 4];
-    let report = scanner.scan(SETTINGS, Selection { rows: &[RowWire(0)], columns: 4 }, &mut frame);
+    let report = scanner.scan(
+        SETTINGS,
+        Selection { rows: &[RowWire(0)], columns: ColumnWires::first(4) },
+        &mut frame,
+    );
     assert!(frame.iter().all(|ohm| ohm.is_nan()));
     assert_eq!(report.failed_samples, 4);
 }

@@ -1,11 +1,11 @@
 //! The model in force: its identity, its shape, and the memory that it is decoded from.
 
 use firmware::app::Session;
-use firmware::link::message::{Configuration, EstimateReport, Report, Request};
+use firmware::link::message::{
+    Configuration, EstimateReport, ModelFault, Refusal, Report, Request, Setting,
+};
 use model_core::blob::{Columns, Floats, Metadata, Model, ModelShape, encode_to_vec};
 use model_core::checksum::CRC_32;
-use model_core::rbf::Shape;
-use model_core::rbf::direct::{self, Parameters};
 use model_core::{AlignedBytes, Decoder};
 
 use super::requests::{bits, capture, decode, expected};
@@ -50,30 +50,7 @@ fn the_identity_tells_what_the_model_was_trained_on() {
 /// A blob for one row of `inputs` readings and `outputs` outputs.
 fn blob_of_one_row(inputs: usize, outputs: usize) -> AlignedBytes {
     let shape = ModelShape { rows: 1, inputs, outputs };
-    blob_with(shape, Metadata::unnamed(shape))
-}
-
-/// A blob of one network with this `shape` of one row.
-fn blob_with(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
-    let ModelShape { inputs, outputs, .. } = shape;
-    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
-    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
-    let (centre, weights, bias) = (list(1, inputs), list(2, outputs), list(3, outputs));
-    let (minimum, per_span) = (vec![50.0; inputs], vec![0.05; inputs]);
-    let network = direct::Network::try_new(
-        Shape { inputs, centres: 1, outputs },
-        Parameters {
-            input_minimum: &minimum,
-            input_per_span: &per_span,
-            centres: &centre,
-            decay: &[1.5],
-            output_weights: &weights,
-            bias: &bias,
-            affine: &[],
-        },
-    );
-    let networks = &[network.unwrap().into()];
-    encode_to_vec(&parts(networks, &[0], metadata)).unwrap()
+    blob_of_a_row(shape, Metadata::unnamed(shape))
 }
 
 /// Reports on the first scan with the model in `blob`: readings, and then the estimate.
@@ -105,7 +82,7 @@ fn the_model_says_what_is_scanned_and_decoded() {
 }
 
 #[test]
-fn the_names_of_readings_say_which_rows_are_scanned() {
+fn the_names_of_readings_say_which_cells_are_scanned_and_in_which_order() {
     let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
     let [first, second] = frame_at_rest();
     for (names, readings) in [
@@ -114,26 +91,69 @@ fn the_names_of_readings_say_which_rows_are_scanned() {
         ("a\nb", first[..2].to_vec()),
         // One row of the model with the readings of both row-wires, in the other order.
         ("r2c1_ohm\nr2c2_ohm\nr2c3_ohm\nr1c1_ohm\nr1c2_ohm\nr1c3_ohm", [second, first].concat()),
+        // Some columns, another order, and cells that are not all between their wires.
+        ("r1c2_ohm\nr1c3_ohm\nr2c2_ohm\nr2c3_ohm", [&first[1..], &second[1..]].concat()),
+        ("r2c3_ohm\nr2c1_ohm", vec![second[2], second[0]]),
+        ("r1c3_ohm\nr2c1_ohm\nr1c2_ohm", vec![first[2], second[0], first[1]]),
+        ("r2c2_ohm", vec![second[1]]),
     ] {
         let shape = ModelShape { inputs: readings.len(), ..shape };
         let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
-        let all = reports_on_a_scan(&blob_with(shape, metadata));
+        let all = reports_on_a_scan(&blob_of_a_row(shape, metadata));
         let expected = format!("readings_ohm: {:?}", Floats::new(&readings));
         assert!(all[0].1.contains(&expected), "{names}: {all:?}");
     }
-    let metadata =
-        Metadata { input_names: Columns("r3c1_ohm\nr3c2_ohm"), ..Metadata::unnamed(shape) };
-    let mut slots = Flash::slots_with(&blob_with(shape, metadata));
+}
+
+#[test]
+fn a_model_of_wires_that_the_board_lacks_is_refused_and_not_put_in_force() {
+    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
+    for names in
+        ["r3c1_ohm\nr3c2_ohm", "r1c1_ohm\nr1c4_ohm", "r1c1_ohm\nrest", "r0c1_ohm\nr1c1_ohm"]
+    {
+        let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
+        let blob = blob_of_a_row(shape, metadata);
+        let mut slots = Flash::slots_with(&blob);
+        let mut bench = Bench::new(quiet());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        assert_eq!(model_crc(&mut session, &bench.board), None, "{names}");
+        let _ = session;
+        let mut slots = Flash::slots_with(&[]);
+        let refused = upload(&mut bench, &mut slots, &mut [], &upload_steps(&blob, 64));
+        assert_eq!(refused, Err(Refusal::BadModel(ModelFault::Wires)), "{names}");
+    }
+}
+
+#[test]
+fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
+    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
+    let [first, second] = ["r1c1_ohm\nr1c2_ohm", "r1c2_ohm\nr1c1_ohm"].map(|names| {
+        blob_of_a_row(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
+    });
+    let mut slots = Flash::slots_with(&first);
     let mut bench = Bench::new(quiet());
+    let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &bench.board), None, "there are two rows");
+    let baseline = Request::SetBaseline { readings_ohm: Floats::new(&[60.0, 50.0]) };
+    ask(&mut session, &board, &baseline, |_| ());
+    ask(&mut session, &board, &Request::Keep(Setting::Baseline), |_| ());
+    let _ = session;
+    for (next, contact) in [(&second, 0), (&first, EstimateReport::CONTACT)] {
+        install(&mut bench, &mut slots, &mut [], (next, 64)).unwrap();
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let request = Request::Decode { frame: 1, readings_ohm: Floats::new(&[30.0; 2]) };
+        ask(&mut session, &board, &request, |report| match report {
+            Report::Estimate(it) => assert_eq!(it.flags & EstimateReport::CONTACT, contact),
+            other => panic!("{other:?}"),
+        });
+    }
 }
 
 #[test]
 fn a_model_of_other_rows_does_not_take_the_baseline_of_the_rows_before() {
     let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
     let [first, second] = ["r1c1_ohm\nr1c2_ohm", "r2c1_ohm\nr2c2_ohm"].map(|names| {
-        blob_with(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
+        blob_of_a_row(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
     });
     for (next, contact) in [(&first, EstimateReport::CONTACT), (&second, 0)] {
         let mut slots = Flash::slots_with(&first);

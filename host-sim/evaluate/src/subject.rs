@@ -26,6 +26,20 @@ pub enum Subject {
 }
 
 impl Subject {
+    /// This subject, of whose column-wires only every so many are read if it is a scene: those in the middle of each
+    /// step, and at least one.
+    pub fn with_every_column(&self, step: usize) -> Cow<'_, Self> {
+        let Self::Scene(scene) = self else { return Cow::Borrowed(self) };
+        if step <= 1 {
+            return Cow::Borrowed(self);
+        }
+        let mut scene = scene.clone();
+        let sensor = &scene.world.sensor;
+        let columns: Vec<usize> = ((step - 1) / 2..sensor.column_wires).step_by(step).collect();
+        scene.world.sensor = sensor.with_columns(&columns);
+        Cow::Owned(Self::Scene(scene))
+    }
+
     /// Name, which names the output folder and the model.
     pub fn name(&self) -> &str {
         match self {

@@ -6,7 +6,8 @@ use firmware::capacity::Capacity;
 use firmware::circuit::ConstantsFault;
 use firmware::link::message::{KeepFault, ModelFault, Refusal, SealFault};
 use firmware::link::packet::PROTOCOL_VERSION;
-use model_core::blob::ModelShape;
+use model_core::blob::{Model, ModelShape};
+use model_core::{ColumnWire, RowWire};
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -154,6 +155,9 @@ fn why(refusal: Refusal) -> String {
              without it (another --format, or no --confidence or --fill)",
             feature.name()
         ),
+        Refusal::BadModel(ModelFault::Wires) => {
+            "its board lacks wires that the model's inputs name; `inspect` names the first".into()
+        }
         Refusal::BadModel(fault) => {
             format!("the model is faulty ({fault:?}); `inspect` shows more")
         }
@@ -203,6 +207,39 @@ fn why_not_trusted(fault: SealFault) -> String {
             "its image knows no keys: build one with the feature `seal` (docs/board.md)".into()
         }
     }
+}
+
+/// Checks that a device of this `capacity` has room for `model`, and its board the wires of all inputs.
+pub(crate) fn check_room(capacity: Capacity, model: &Model<'_>) -> Result<()> {
+    if !capacity.has_room_for(model.shape()) {
+        return Err(Error::no_room(capacity, model.shape()));
+    }
+    unscannable(capacity, model).map_or(Ok(()), |reason| Err(Error::unfit_for("", reason)))
+}
+
+/// Reason why a board of this `capacity` cannot scan all inputs of `model`, and the fix; `None` if it can.
+pub fn unscannable(capacity: Capacity, model: &Model<'_>) -> Option<String> {
+    let (names, shape) = (model.metadata().input_names, model.shape());
+    let first = capacity.cells(names, shape).find_map(std::result::Result::err)?;
+    let name = names.iter().nth(first).unwrap_or_default();
+    let Capacity { rows, columns, .. } = capacity;
+    let any = Capacity { rows: usize::MAX, columns: usize::MAX, ..capacity };
+    let named: std::result::Result<Vec<_>, _> = any.cells(names, shape).collect();
+    let of_names = |cells: Vec<(RowWire, ColumnWire)>| {
+        let enlarged = cells.iter().fold(shape, |shape, (row, column)| ModelShape {
+            rows: shape.rows.max(row.0 + 1),
+            inputs: shape.inputs.min(capacity.columns).max(column.0 + 1),
+            ..shape
+        });
+        format!("{}, or train without it (--inputs)", image_for(capacity, enlarged))
+    };
+    let fix = named.map_or_else(
+        |_| "name every input after its wires, such as r4c17_ohm, or none and no more than a row has".into(),
+        of_names,
+    );
+    Some(format!(
+        "input {name} cannot be scanned: the board has {rows} row-wires and {columns} column-wires; {fix}"
+    ))
 }
 
 /// What image a model of this `shape` needs, if those of this `capacity` have no room for it.

@@ -45,8 +45,10 @@ pub struct Sensor {
     pub row_wires: usize,
     /// Number of electrodes on each row-wire.
     pub electrodes_per_row_wire: usize,
-    /// Number of column-wires, in the lower layer.
+    /// Number of column-wires, in the lower layer: those that are read.
     pub column_wires: usize,
+    /// Numbers of the column-wires that are read, from 0, if there are others.
+    pub read_columns: Option<Vec<usize>>,
     /// Number of electrodes on each column-wire.
     pub electrodes_per_column_wire: usize,
     /// Upper electrodes at rest, row-wire after row-wire: `row_wires × electrodes_per_row_wire`.
@@ -103,6 +105,7 @@ impl Sensor {
             row_wires: 8,
             electrodes_per_row_wire: 6,
             column_wires: 18,
+            read_columns: None,
             electrodes_per_column_wire: 3,
             upper_electrodes_mm: default_upper_electrodes_mm(8, 6, size_mm),
             lower_electrodes_mm: default_lower_electrodes_mm(18, 3, size_mm),
@@ -189,9 +192,33 @@ impl Sensor {
             .collect()
     }
 
+    /// This sensor, of whose column-wires (from 0) only these are read. A reading depends on its own two wires alone.
+    ///
+    /// # Panics
+    /// If it lacks one of these wires.
+    #[must_use]
+    pub fn with_columns(&self, columns: &[usize]) -> Self {
+        let n = self.electrodes_per_column_wire;
+        let electrodes = columns.iter().map(|k| &self.lower_electrodes_mm[k * n..(k + 1) * n]);
+        Self {
+            column_wires: columns.len(),
+            lower_electrodes_mm: electrodes.flatten().copied().collect(),
+            read_columns: Some(
+                columns.iter().filter_map(|k| self.column_numbers().nth(*k)).collect(),
+            ),
+            ..self.clone()
+        }
+    }
+
+    /// Numbers of the column-wires that are read, from 0.
+    pub fn column_numbers(&self) -> impl Iterator<Item = usize> + Clone {
+        let numbers = self.read_columns.as_deref();
+        (0..self.column_wires).map(move |column| numbers.map_or(column, |numbers| numbers[column]))
+    }
+
     /// Names `r{m}c{k}_ohm` of the readings of `rows` (from 0), row after row.
     pub fn reading_names(&self, rows: &[usize]) -> Vec<String> {
-        let columns = 1..=self.column_wires;
+        let columns = self.column_numbers().map(|column| column + 1);
         let rows = rows.iter().map(|row| row + 1);
         rows.flat_map(|m| columns.clone().map(move |k| format!("r{m}c{k}_ohm"))).collect()
     }

@@ -1,17 +1,19 @@
 //! Command `inspect`: content and cost of a weight blob.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use crate::Result;
 use crate::evaluate::trade::SLOT_BYTES;
 use clap::Args;
 use firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
+use firmware::timing::ScanPlan;
 use model_core::blob::Model;
 use model_core::scratch_floats;
 use serde::Serialize;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_rig::error::image_for;
+use taxel_rig::error::{image_for, unscannable};
 
 use super::model_outputs::{self, ModelOutput};
 use super::{Common, print};
@@ -56,10 +58,22 @@ struct Summary {
     weights_in_ram: bool,
     /// Why the images as they are cannot decode the model.
     needs: Vec<String>,
+    /// Its scan on the NUCLEO-F446RE; `None` if that cannot scan it.
+    scan: Option<ScanSummary>,
     /// What decoding a frame costs a Cortex-M4F.
     frame_costs: Frames<Cost>,
     inputs: Vec<ColumnSummary>,
     outputs: Vec<ModelOutput>,
+}
+
+/// Wires that are scanned for a model, and how long that takes.
+#[derive(Serialize)]
+struct ScanSummary {
+    rows: usize,
+    columns: usize,
+    /// Mean time, and that of the scans with idle samples.
+    mean_us: u32,
+    longest_us: u32,
 }
 
 /// Size of what fills missing readings.
@@ -154,6 +168,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         ram_parts_bytes: ram,
         weights_in_ram: design.weights_in_ram,
         needs: needs(&model, blob.bytes().len()),
+        scan: scan(&model),
         frame_costs: Prices::accepted()?.frames(&design, Exponential::default())?,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: model_outputs::of(&model),
@@ -165,7 +180,11 @@ fn needs(model: &Model<'_>, bytes: usize) -> Vec<String> {
     let (room, shape) = (Capacity::PAPER, model.shape());
     let too_large = (bytes > SLOT_BYTES)
         .then(|| format!("no device takes it: a slot of the images holds {SLOT_BYTES} bytes"));
-    let other_image = room.wires_for(shape).is_none().then(|| image_for(room, shape));
+    let other_image = if room.has_room_for(shape) {
+        unscannable(room, model)
+    } else {
+        Some(image_for(room, shape))
+    };
     let (needed, most) = (scratch_floats(model), room.scratch_floats());
     let too_many = (other_image.is_none() && needed > most).then(|| {
         let spare = needed - most;
@@ -177,6 +196,16 @@ fn needs(model: &Model<'_>, bytes: usize) -> Vec<String> {
         format!("no device takes it: {fewer}")
     });
     too_large.into_iter().chain(other_image).chain(too_many).collect()
+}
+
+/// Scan for a `model`, with one sample a reading.
+fn scan(model: &Model<'_>) -> Option<ScanSummary> {
+    let cells = Capacity::PAPER.cells(model.metadata().input_names, model.shape());
+    let cells: Vec<_> = cells.collect::<std::result::Result<_, _>>().ok()?;
+    let rows = cells.iter().map(|(row, _)| row).collect::<BTreeSet<_>>().len();
+    let columns = cells.iter().map(|(_, column)| column).collect::<BTreeSet<_>>().len();
+    let plan = ScanPlan::of_nucleo(rows as u16, columns as u16, 1);
+    Some(ScanSummary { rows, columns, mean_us: plan.scan_us(), longest_us: plan.longest_us() })
 }
 
 /// Cost of a frame for people.
@@ -280,6 +309,14 @@ fn page_of(s: &Summary) -> print::Page {
     line("weights", weights);
     for need in &s.needs {
         line("device", need.clone());
+    }
+    if let Some(ScanSummary { rows, columns, mean_us, longest_us }) = s.scan {
+        line(
+            "scan",
+            format!(
+                "{rows} × {columns} wires, {mean_us} µs on a NUCLEO-F446RE, {longest_us} µs at most"
+            ),
+        );
     }
     for (label, cost) in [
         ("a frame", s.frame_costs.ungated),

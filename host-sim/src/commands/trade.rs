@@ -49,6 +49,10 @@ pub struct Arguments {
     /// multiplications (docs/projection.md); `none` for networks that compute all outputs alone.
     #[arg(long, value_name = "R,…", value_delimiter = ',', default_value = "24")]
     output_rank: Vec<RankOption>,
+    /// Columns of a scene to read, to try: every, every 2nd and so on. Fewer make the scan shorter [default: 1,2,3,6
+    /// with --frame-rate or --max-latency-ms, else 1].
+    #[arg(long, value_name = "STEP", value_delimiter = ',')]
+    column_step: Vec<usize>,
     /// Numbers of samples averaged for each reading, to try: more lower the noise, and make the scan longer.
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1")]
     average: Vec<usize>,
@@ -114,6 +118,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let plan = Plan {
         centres: centres(&arguments.centres, &subject)?,
         output_ranks: output_ranks(&arguments.output_rank)?,
+        column_steps: column_steps(arguments, &subject)?,
         samples_averaged: distinct("--average", &arguments.average)?,
         gate_k: gate_k(&arguments.gate, &subject)?,
         device,
@@ -164,12 +169,13 @@ fn command() -> String {
 }
 
 /// Options by the settings that they set.
-const OPTIONS: [(&str, &str); 11] = [
+const OPTIONS: [(&str, &str); 12] = [
     ("output-rank", "--output-rank"),
     ("clock-mhz", "--clock-mhz"),
     ("scan-ms", "--scan-ms"),
     ("centres", "--centres"),
     ("average", "--average"),
+    ("column-step", "--column-step"),
     ("gate", "--gate"),
     ("max-error", option(Bounded::Error)),
     ("max-cycles", option(Bounded::Cycles)),
@@ -265,6 +271,19 @@ fn centres(given: &[usize], subject: &Subject) -> Result<Vec<usize>> {
         );
     }
     Ok(fit)
+}
+
+/// Steps of columns to try: those that are given, or that shorten the scan where its time matters.
+fn column_steps(arguments: &Arguments, subject: &Subject) -> Result<Vec<usize>> {
+    let time_matters = arguments.frame_rate.is_some() || arguments.max_latency_ms.is_some();
+    match subject {
+        _ if !arguments.column_step.is_empty() => distinct("--column-step", &arguments.column_step),
+        Subject::Scene(scene) if time_matters && arguments.scan_ms.is_none() => {
+            let columns = scene.world.sensor.column_wires;
+            Ok([1, 2, 3, 6].into_iter().filter(|step| columns.is_multiple_of(*step)).collect())
+        }
+        _ => Ok(vec![1]),
+    }
 }
 
 /// Ranks that are asked for, in order; networks that compute all outputs there are always.

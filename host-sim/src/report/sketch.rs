@@ -28,11 +28,11 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
 
     let dense = sensor.column_wires_mm.iter().map(Vec::len).sum::<usize>() > 300;
     let size = if dense { 2.0 } else { 3.0 };
-    for (k, column) in sensor.column_wires_mm.iter().enumerate() {
+    for (k, column) in sensor.column_numbers.iter().zip(&sensor.column_wires_mm) {
         let points: Vec<[f64; 2]> = column.iter().map(|p| place(*p)).collect();
         wire(&mut svg, &points, "c2 wire");
         for [x, y] in points {
-            let text = format!("column-wire {}", k + 1);
+            let text = format!("column-wire {k}");
             svg.hovered_rect([x - size, y - size], [2.0 * size, 2.0 * size], "c2 mark", &text);
         }
     }
@@ -63,9 +63,9 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
         svg.text(right + 8.0, y + TEXT_PX * 0.35, Anchor::Start, "c1 name", &m.to_string());
     }
     let mut columns: Vec<(f64, usize)> = Vec::new();
-    for (k, column) in sensor.column_wires_mm.iter().enumerate() {
+    for (k, column) in sensor.column_numbers.iter().zip(&sensor.column_wires_mm) {
         let last = column.iter().max_by(|a, b| a[1].total_cmp(&b[1]));
-        columns.extend(last.map(|last| (place(*last)[0], k + 1)));
+        columns.extend(last.map(|last| (place(*last)[0], *k)));
     }
     for (x, k) in ticks::spread_out(columns, text_width("00") + 3.0) {
         svg.text(x, top - 7.0, Anchor::Middle, "c2 name", &k.to_string());

@@ -87,6 +87,7 @@ fn sensor() -> SensorSketch {
     SensorSketch {
         face_mm: [20.0, 18.0],
         row_wires: (0..5).map(row).collect(),
+        column_numbers: vec![1, 2],
         column_wires_mm: vec![vec![[5.0, 4.0], [5.0, 14.0]], vec![[15.0, 4.0], [15.0, 14.0]]],
     }
 }

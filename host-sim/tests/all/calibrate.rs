@@ -19,7 +19,7 @@ use taxel_rig::device::Device;
 use taxel_rig::device::calibrate::{Reading, calibrate};
 use taxel_rig::emulator::{self, Emulator};
 use taxel_rig::mailbox::Mailbox;
-use taxel_simulate::readout::{Drive, Readout};
+use taxel_simulate::readout::{Drive, Readout, op_amp_time_constant_us};
 use taxel_simulate::virtual_board::{Parts, Pin, VirtualBoard};
 use taxel_simulate::{World, synthesise};
 
@@ -44,7 +44,7 @@ fn world() -> World {
         cross_talk: Some(true),
         op_amp_offset_v: Some(5e-4),
         adc_noise_counts: Some(0.5),
-        time_constant_us: Some(5.0),
+        time_constant_us: Some(op_amp_time_constant_us()),
         ..Readout::default()
     };
     World { readout, ..World::press() }
@@ -81,7 +81,7 @@ impl FrameSource for Bench {
             };
             let sampler = Mcp3208s { chips: [0, 1, 2].map(|chip| board.spi(chip)) };
             let mut scanner =
-                Scanner::<_, _, _, _, 18>::new(drive, sampler, board.delay(), &self.circuit);
+                Scanner::<_, _, _, _, 8, 18>::new(drive, sampler, board.delay(), &self.circuit);
             let report = scanner.scan(settings, wires, frame);
             board.check().unwrap();
             report
@@ -115,7 +115,7 @@ fn device() -> (Device<Mailbox<Memory>>, Arc<Mutex<Vec<f64>>>) {
 }
 
 fn reading(frames: u16) -> Reading {
-    let scan = ScanSettings { settling_us: 100, oversampling: 1 };
+    let scan = ScanSettings { settling_us: 20, oversampling: 1 };
     Reading { frames, period_us: 1000, scan, patience: Duration::from_secs(20) }
 }
 

@@ -55,6 +55,7 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
     let plan = Plan {
         centres: vec![16],
         output_ranks: vec![],
+        column_steps: vec![1],
         samples_averaged: vec![1],
         gate_k: vec![3.5],
         device: Device::default(),

@@ -12,6 +12,7 @@ use firmware::link::message::{Configuration, Identity, KeyState, Memory, Report,
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use model_core::blob::Floats;
+use model_core::checksum::CRC_32;
 use serialport::SerialPort;
 use taxel_rig::device::{Device, serial};
 
@@ -345,6 +346,7 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
                 });
                 far.write_all(&bytes).unwrap();
             };
+            let all_wires: Vec<u8> = (0..144).flat_map(|i| [i / 18, i % 18]).collect();
             let identity = Identity {
                 board: "liar",
                 firmware: "0",
@@ -360,6 +362,7 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
                 key: KeyState::None,
                 unique_id: [0; 12],
                 counter: 0,
+                wires_crc_32: CRC_32.checksum(&all_wires),
             };
             let (scans, configuration) = match request.body {
                 Request::Identify => {

@@ -26,4 +26,5 @@ mod recursion;
 mod refusals;
 mod refused_readings;
 mod trade;
+mod wires;
 mod workflow;

@@ -140,9 +140,8 @@ struct Source {
 impl FrameSource for Source {
     fn scan(&mut self, _: ScanSettings, wires: Selection<'_>, frame: &mut [f32]) -> ScanReport {
         let shown = &self.frames[self.next % self.frames.len()];
-        for (to, row) in frame.chunks_mut(wires.columns).zip(wires.rows) {
-            to.copy_from_slice(&shown[row.0][..wires.columns]);
-        }
+        let readings = wires.rows.iter().flat_map(|row| wires.columns.pick(shown[row.0]));
+        frame.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
         self.next += 1;
         ScanReport::default()
     }

@@ -55,7 +55,7 @@ class Board:
     """
 
     def __init__(self, path, ohm, *, hse=True, hsi_error=0.0, lsi_hz=32_000, erase_s=None,
-                 options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=100.0, log=print):
+                 options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=20.0, log=print):
         self.image = Image(path)
         self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
         self._hsi_error, self._supply_v = hsi_error, 3.3

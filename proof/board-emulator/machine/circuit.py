@@ -1,11 +1,13 @@
 """The zero-potential circuit of docs/board.md, with typical values."""
 
+import math
+
 #: Voltages in V, resistances in Ω.
 REFERENCE_V, BIAS_V, FEEDBACK_OHM, ROW_SOURCE_OHM = 3.3, 0.2, 560.0, 0.26
 #: Largest output in V of an op-amp.
 LARGEST_V = 3.28
-#: Time in µs after which a row has settled to half a count: nine time constants of 5 µs.
-SETTLED_US = 46
+#: Gain-bandwidth product of the op-amps in Hz (MCP6024), and the converters' resolution in bits.
+OP_AMP_HZ, BITS = 10e6, 12
 
 
 class Circuit:
@@ -13,6 +15,13 @@ class Circuit:
 
     def __init__(self, time, rules, register, ohm):
         self._time, self._rules, self._register, self._ohm = time, rules, register, ohm
+        #: Time in µs after which each column is within half a count: the op-amp is closed around 1 + R_f/R, with R all
+        #: cells of the column in parallel.
+        self.settled_us = [
+            (1 + FEEDBACK_OHM * sum(1 / row[column] for row in ohm)) / (2 * math.pi * OP_AMP_HZ)
+            * math.log(2) * (BITS + 1) * 1e6
+            for column in range(len(ohm[0]))
+        ]
 
     def volts(self, column, cycle):
         """Output in V of a column's op-amp. Columns beyond the last are grounded."""
@@ -23,7 +32,7 @@ class Circuit:
             self._rules.breach("rows-undefined")
             return BIAS_V
         settled_us = self._time.ns(cycle - register.changed_at) / 1e3
-        if settled_us < SETTLED_US:
+        if settled_us < self.settled_us[column]:
             self._rules.breach("not-settled", f"{settled_us:.1f} us")
         if not register.outputs:
             return BIAS_V

@@ -3,6 +3,7 @@
 //! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are predicted by
 //! the price list of the firmware's own code ([`Prices`]), the time of a scan by the firmware's own plan ([`Device`]).
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
@@ -51,6 +52,8 @@ pub struct Plan {
     pub output_ranks: Vec<usize>,
     /// Numbers of samples averaged for each reading: white noise falls with the square root.
     pub samples_averaged: Vec<usize>,
+    /// Steps from one column-wire that is read to the next: 1 reads all. Only scenes have others than 1.
+    pub column_steps: Vec<usize>,
     /// Tolerances of gates, in standard deviations of the averaged readings' noise. There are always
     /// points without a gate as well.
     pub gate_k: Vec<f64>,
@@ -199,8 +202,11 @@ pub fn compute(
 ) -> Result<Trade> {
     let prices = Prices::accepted()?;
     check(subject, plan)?;
-    progress.stage("prepare frames", plan.samples_averaged.len());
-    let synthesised = plan.samples_averaged.iter().map(|&samples| {
+    let subjects: Vec<Cow<'_, Subject>> =
+        plan.column_steps.iter().map(|step| subject.with_every_column(*step)).collect();
+    progress.stage("prepare frames", subjects.len() * plan.samples_averaged.len());
+    let each = subjects.iter().flat_map(|of| plan.samples_averaged.iter().map(move |n| (of, *n)));
+    let synthesised = each.clone().map(|(subject, samples)| {
         let frames = Frames::new(subject, samples, plan);
         progress.step();
         frames
@@ -224,7 +230,7 @@ pub fn compute(
     };
     possible(&vec![0.0; frames.len()])?;
     let measures: Vec<(Measure, LimitSummary)> =
-        frames.iter().map(|frames| subject.measure(frames.samples_averaged, progress)).collect();
+        each.map(|(subject, samples)| subject.measure(samples, progress)).collect();
     let least = |limit| least_error(limit, group).map_or(0.0, |[limit, se]| limit - CERTAIN * se);
     possible(&measures.iter().map(|(_, limit)| least(limit)).collect::<Vec<_>>())?;
 
@@ -295,6 +301,16 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
         plan.samples_averaged.iter().find(|samples| !(1..=256).contains(*samples))
     {
         return Err(BadValue::new("average", samples, "the firmware averages 1 to 256 samples"));
+    }
+    let columns = match subject {
+        Subject::Scene(scene) => scene.world.sensor.column_wires,
+        Subject::Measured(_) => 1,
+    };
+    if let Some(step) = plan.column_steps.iter().find(|step| !(1..=columns).contains(*step)) {
+        let rule = format!(
+            "give steps from 1 to {columns}, the columns of the scene; of a data file, choose --inputs instead"
+        );
+        return Err(BadValue::new("column-step", step, rule));
     }
     if plan.output_ranks.contains(&0) {
         return Err(BadValue::new("output-rank", 0, "a network computes one component at least"));

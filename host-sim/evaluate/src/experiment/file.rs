@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 use taxel_data::BadValue;
+use taxel_data::error::require;
 use taxel_simulate::World;
 use taxel_simulate::drift::Drift;
 use taxel_simulate::motion;
@@ -85,6 +86,19 @@ pub(super) mod solver {
     }
 }
 
+/// Column-wires of a list that counts from 1, of a sensor that has so many.
+fn columns_from_0(columns: &[usize], most: usize) -> Result<Vec<usize>, BadValue> {
+    let ascending = columns.windows(2).all(|pair| pair[0] < pair[1]);
+    let there = columns.iter().all(|column| (1..=most).contains(column));
+    require(
+        !columns.is_empty() && ascending && there,
+        "readout.column_wires",
+        format!("{columns:?}"),
+        || format!("list columns from 1 to {most}, ascending"),
+    )?;
+    Ok(columns.iter().map(|column| column - 1).collect())
+}
+
 impl SceneFile {
     /// The experiment, with all defaults.
     ///
@@ -112,12 +126,17 @@ impl SceneFile {
             row_wires: s.row_wires,
             electrodes_per_row_wire: s.electrodes_per_row_wire,
             column_wires: s.column_wires,
+            read_columns: None,
             electrodes_per_column_wire: s.electrodes_per_column_wire,
             size_mm: s.size_mm,
             resistance_ohm_per_mm: s.resistance_ohm_per_mm,
             stiffness_n_per_mm: s.stiffness_n_per_mm,
         };
         let mut readout = self.readout;
+        let sensor = match readout.column_wires.take() {
+            Some(columns) => sensor.with_columns(&columns_from_0(&columns, sensor.column_wires)?),
+            None => sensor,
+        };
         let read_rows = match readout.row_wires.take() {
             // Row 0 does not exist in a file; it becomes one that the check refuses.
             Some(rows) => rows.into_iter().map(|row| row.wrapping_sub(1)).collect(),

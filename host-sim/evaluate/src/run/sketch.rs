@@ -13,7 +13,9 @@ pub struct SensorSketch {
     pub face_mm: [f64; 2],
     /// Row-wires, in the upper layer.
     pub row_wires: Vec<RowWire>,
-    /// Electrodes of each column-wire, in the lower layer: x and y in mm.
+    /// Numbers of the column-wires that are read, from 1.
+    pub column_numbers: Vec<usize>,
+    /// Electrodes of each of them, in the lower layer: x and y in mm.
     pub column_wires_mm: Vec<Vec<[f64; 2]>>,
 }
 
@@ -39,6 +41,7 @@ impl SensorSketch {
         (count <= MOST_ELECTRODES).then(|| Self {
             face_mm: [sensor.size_mm[0], sensor.size_mm[1]],
             row_wires: (0..sensor.row_wires).map(row_wire).collect(),
+            column_numbers: sensor.column_numbers().map(|number| number + 1).collect(),
             column_wires_mm: columns.map(plan).collect(),
         })
     }

@@ -11,7 +11,7 @@ use taxel_data::table::Table;
 use taxel_learn::{Exponential, ModelBlob};
 
 use super::{Device, DeviceIdentity, Wire, stream, upload};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_room};
 
 /// Frames of a scene with the answers that the host computes.
 pub(super) struct Expected {
@@ -156,10 +156,7 @@ pub(super) fn prepare<W: Wire>(
 
 /// Exponential that the device decodes with, if the device has room for this model.
 fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<Exponential> {
-    let (capacity, shape) = (identity.capacity(), model.shape());
-    if capacity.wires_for(shape).is_none() {
-        return Err(Error::no_room(capacity, shape));
-    }
+    check_room(identity.capacity(), model)?;
     let name = &identity.exponential;
     Exponential::by_name(name).ok_or_else(|| {
         Error::failed(format!("the device decodes with {name:?}, which this host does not know"))

@@ -40,6 +40,9 @@ pub struct DeviceIdentity {
     pub unique_id: [u8; 12],
     /// Largest counter of a sealed request so far, or beyond.
     pub counter: u64,
+    /// CRC-32 of the wires of its readings.
+    #[serde(skip)]
+    pub wires_crc_32: u32,
 }
 
 /// Serialises whether there is a key as text.
@@ -99,15 +102,28 @@ impl DeviceIdentity {
         Capacity { rows: self.rows, columns: self.columns, outputs: self.outputs }
     }
 
-    /// Wires that the device scans: those of its model, or all without one.
-    pub fn wires(&self) -> Wires {
-        let capacity = self.capacity();
-        let shape = self.model.map(|model| ModelShape {
+    /// Shape of the active model; without one, all wires.
+    fn shape(&self) -> ModelShape {
+        self.model.map_or(self.capacity().wires_as_shape(), |model| ModelShape {
             rows: model.rows.into(),
             inputs: model.inputs.into(),
             outputs: model.outputs.into(),
-        });
-        shape.and_then(|shape| capacity.wires_for(shape)).unwrap_or(capacity.wires())
+        })
+    }
+
+    /// Number of readings in a frame.
+    pub fn readings(&self) -> usize {
+        self.shape().rows * self.shape().inputs
+    }
+
+    /// Wires that the device scans: those of its model, or all without one. `None` if its model takes other readings than
+    /// all between the first wires, row after row.
+    pub fn wires(&self) -> Option<Wires> {
+        let columns = self.capacity().line(self.shape()).max(1);
+        let wires = Wires { rows: self.readings() / columns, columns };
+        let cells = (0..self.readings()).map(|i| [(i / columns) as u8, (i % columns) as u8]);
+        let cells: Vec<u8> = cells.flatten().collect();
+        (CRC_32.checksum(&cells) == self.wires_crc_32).then_some(wires)
     }
 
     /// Whether the active model has the columns of `model` and was trained on the same: it is that model, or one that a
@@ -149,6 +165,7 @@ impl From<&Identity<'_>> for DeviceIdentity {
             key: identity.key,
             unique_id: identity.unique_id,
             counter: identity.counter,
+            wires_crc_32: identity.wires_crc_32,
         }
     }
 }

@@ -8,7 +8,7 @@ use model_core::blob::{Floats, Model};
 use taxel_data::progress::Progress;
 
 use super::{Device, DeviceIdentity, WRITING, Wire};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_room};
 
 /// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
 const ERASE: Duration = Duration::from_secs(6);
@@ -94,9 +94,12 @@ pub fn start_trial<W: Wire>(
     let identity = device.identify()?;
     let capacity = identity.capacity();
     if let Some((_, shape)) = Model::declared(blob)
-        && capacity.wires_for(shape).is_none()
+        && !capacity.has_room_for(shape)
     {
         return Err(Error::no_room(capacity, shape));
+    }
+    if let Ok(model) = Model::decode(blob) {
+        check_room(capacity, &model)?;
     }
     device.check_key(&identity)?;
     or_abort(device, |device| {
@@ -131,7 +134,7 @@ fn see_estimate<W: Wire>(device: &mut Device<W>, crc_32: u32) -> Result<DeviceId
         let in_force = format!("{:08x?}", identity.model.map(|model| model.crc_32));
         return Err(Error::NotInForce { committed: crc_32, in_force });
     }
-    let frame = vec![ANY_OHM; identity.wires().readings()];
+    let frame = vec![ANY_OHM; identity.readings()];
     let request = Request::Decode { frame: 0, readings_ohm: Floats::new(&frame) };
     let flags = device.ask_plainly(&request, |report| match report {
         Report::Estimate(estimate) => Some(estimate.flags),

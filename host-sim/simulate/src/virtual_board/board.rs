@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use firmware::readout::{ScanSettings, Selection};
 use firmware::timing;
-use model_core::RowWire;
+use model_core::{ColumnWires, RowWire};
 use taxel_data::BadValue;
 use taxel_data::random::{Purpose, Random, Stream};
 
@@ -119,7 +119,7 @@ impl VirtualBoard {
 
     /// Wires that a scan reads: the world's rows, and all columns of its sensor.
     pub fn wires(&self) -> Selection<'_> {
-        Selection { rows: &self.rows, columns: self.columns }
+        Selection { rows: &self.rows, columns: ColumnWires::first(self.columns) }
     }
 
     /// Connects a sensor with the given row–column resistances in Ω, row after row; infinite is open.

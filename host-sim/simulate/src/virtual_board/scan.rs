@@ -31,8 +31,8 @@ pub fn scan(board: &VirtualBoard, series: SeriesResistance, readings: &Table) ->
     let mut scanner = board.scanner(series);
     let (settings, wires) = (board.scan_settings(), board.wires());
     let names = wires.rows.iter().flat_map(|row| {
-        let first = row.0 * wires.columns;
-        readings.names[first..first + wires.columns].iter().cloned()
+        let of_row = &readings.names[row.0 * wires.columns.count()..];
+        wires.columns.pick(of_row).cloned()
     });
     let names: Vec<String> = names.collect();
     let mut frame = vec![f32::NAN; names.len()];

@@ -108,7 +108,7 @@ impl VirtualBoard {
         sampler: impl ColumnSampler + 'static,
         drive: impl RowDrive + 'static,
     ) -> FrameScanner {
-        Box::new(Scanner::<_, _, _, _, COLUMNS>::new(drive, sampler, self.delay(), circuit))
+        Box::new(Scanner::<_, _, _, _, ROWS, COLUMNS>::new(drive, sampler, self.delay(), circuit))
     }
 
     fn pins<const N: usize>(&self, pin: fn(u8) -> Pin) -> [super::VirtualPin; N] {

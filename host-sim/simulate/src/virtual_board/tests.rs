@@ -4,7 +4,7 @@ use firmware::readout::{ScanReport, ScanSettings};
 use firmware::timing::ScanPlan;
 
 use super::*;
-use crate::readout::{Circuit, Drive, Readout, Sampler};
+use crate::readout::{Circuit, Drive, Readout, Sampler, op_amp_time_constant_us};
 use crate::sensor::Sensor;
 use crate::world::World;
 
@@ -19,7 +19,7 @@ fn ohm() -> Vec<f64> {
 
 fn scan(board: &VirtualBoard, ohm: &[f64], settings: ScanSettings) -> (Vec<f64>, ScanReport) {
     board.set_readings(ohm);
-    let mut frame = vec![f32::NAN; board.wires().rows.len() * board.wires().columns];
+    let mut frame = vec![f32::NAN; board.wires().rows.len() * board.wires().columns.count()];
     let mut scanner = board.scanner(board.series_resistance());
     let report = scanner.scan(settings, board.wires(), &mut frame);
     (frame.iter().map(|ohm| f64::from(*ohm)).collect(), report)
@@ -73,11 +73,14 @@ fn every_drive_sampler_and_circuit_reads_the_resistances_with_no_more_than_it_ne
 
 #[test]
 fn a_scan_takes_the_transactions_and_the_time_that_are_planned() {
-    let readout =
-        Readout { time_constant_us: Some(5.0), oversampling: Some(2), ..Readout::default() };
+    let readout = Readout {
+        time_constant_us: Some(op_amp_time_constant_us()),
+        oversampling: Some(2),
+        ..Readout::default()
+    };
     let board = board(readout);
     let settings = board.scan_settings();
-    assert_eq!(settings, ScanSettings { settling_us: 46, oversampling: 2 });
+    assert_eq!(settings, ScanSettings { settling_us: 12, oversampling: 2 });
     scan(&board, &ohm(), settings);
     board.check().unwrap();
     let used = board.transactions();
@@ -88,32 +91,39 @@ fn a_scan_takes_the_transactions_and_the_time_that_are_planned() {
     let plan = ScanPlan {
         rows: 8,
         columns: 18,
+        board_columns: 18,
         idle_samples: true,
-        settling_us: 46,
+        settling_us: 12,
         oversampling: 2,
         sample_ns: 24_000,
+        reading_ns: 0,
+        row_ns: 0,
     };
-    assert_eq!(board.elapsed_ns(), u64::from(plan.scan_us()) * 1000);
+    assert_eq!(board.elapsed_ns(), u64::from(plan.longest_us()) * 1000);
     assert_eq!(board.active_row(), None);
 }
 
 #[test]
 fn sampling_before_voltages_have_settled_is_refused() {
-    let hasty =
-        Readout { time_constant_us: Some(5.0), settling_us: Some(20), ..Readout::default() };
+    let hasty = Readout {
+        time_constant_us: Some(op_amp_time_constant_us()),
+        settling_us: Some(5),
+        ..Readout::default()
+    };
     let board = board(hasty);
     let (readings, report) = scan(&board, &ohm(), board.scan_settings());
     // Nothing has changed yet when the idle samples are taken, so only the first of a row are early.
     assert!(report.failed_samples >= 8, "{report:?}");
     assert!(readings.iter().filter(|r| r.is_nan()).count() >= 8);
     let refused = board.check().unwrap_err().to_string();
-    assert!(refused.contains("settling takes 46 µs"), "{refused}");
+    assert!(refused.contains("settling takes 12 µs"), "{refused}");
     assert_eq!(board.active_row(), None);
 }
 
 #[test]
 fn what_is_left_of_settling_is_below_half_a_count() {
-    let settled = Readout { time_constant_us: Some(5.0), ..Readout::default() };
+    let settled =
+        Readout { time_constant_us: Some(op_amp_time_constant_us()), ..Readout::default() };
     let worst = worst_error(settled);
     assert!((1e-5..9e-4).contains(&worst), "{worst}");
 }

@@ -17,7 +17,7 @@ use taxel_rig::device::{Device, Wire};
 
 use super::super::progress::Terminal;
 use super::super::{Common, print};
-use super::scan::{ScanArguments, patience, reading_names};
+use super::scan::{ScanArguments, all_wires, patience, reading_names};
 use super::settings::constants_lines;
 
 #[derive(Args)]
@@ -79,9 +79,9 @@ pub fn execute<W: Wire>(
     common: &Common,
 ) -> Result<()> {
     let identity = device.identify()?;
-    let wires = identity.wires();
+    let wires = all_wires(&identity)?;
     let known = match &arguments.known {
-        Some(path) => read_known(path, &reading_names(&identity), wires)?,
+        Some(path) => read_known(path, &reading_names(&identity, None)?, wires)?,
         None => Vec::new(),
     };
     let before = device.constants()?;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::Refusal;
+use model_core::blob::Model;
 use model_core::health::Limits;
 use serde::Serialize;
 use taxel_data::data_file::DataFile;
@@ -85,7 +86,7 @@ pub fn execute<W: Wire>(
         judge(&mut readings, limits);
         readings
     } else {
-        record_presses(device, &identity, &arguments.scan, &outputs)?
+        record_presses(device, &identity, model.model(), &arguments.scan, &outputs)?
     };
     let found = recalibration::recalibrate(&model, &readings, &outputs)?;
     if let Some(path) = &arguments.output {
@@ -117,10 +118,11 @@ fn outputs_of(file: &DataFile, outputs: Table) -> Result<Table> {
 fn record_presses<W: Wire>(
     device: &mut Device<W>,
     identity: &DeviceIdentity,
+    model: &Model<'_>,
     scan: &ScanArguments,
     outputs: &Table,
 ) -> Result<Table> {
-    let (names, patience) = (reading_names(identity), patience(scan, identity));
+    let (names, patience) = (reading_names(identity, Some(model))?, patience(scan, identity));
     let mut values = Vec::new();
     for number in 0..outputs.len() {
         ask_for_press(number, outputs)?;

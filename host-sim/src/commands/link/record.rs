@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::{Configuration, Report, Request, Setting};
+use model_core::blob::Model;
 use serde::Serialize;
 use taxel_data::csv_file;
 use taxel_data::table::Table;
@@ -44,6 +45,9 @@ pub struct RecordArguments {
 pub struct BaselineArguments {
     #[command(flatten)]
     scan: ScanArguments,
+    /// The model that is active, if it takes some of the readings: its blob tells their names.
+    #[arg(long, value_name = "BLOB")]
+    model: Option<PathBuf>,
     /// Keep the baseline over restarts; otherwise it is active until the next one.
     #[arg(long)]
     store: bool,
@@ -77,7 +81,7 @@ pub fn record<W: Wire>(
     let identity = device.identify()?;
     let (wanted, mut names) = match &model {
         Some(model) => (Wanted::Estimates, output_names(model, &identity, action.recalibrated)?),
-        None => (Wanted::Readings, reading_names(&identity)),
+        None => (Wanted::Readings, reading_names(&identity, None)?),
     };
     let values = names.len();
     if let Some(model) = &model {
@@ -113,14 +117,20 @@ fn output_names(
     let model = model.parse();
     let is_it =
         if recalibrated { identity.is_made_of(&model) } else { identity.has_in_force(model.crc()) };
-    if !is_it {
-        return Err(Error::Usage(format!(
-            "MODEL {:08x}: {} is active on the device; `upload` this one, or name that one",
-            model.crc(),
-            identity.model.map_or("none".into(), |found| format!("{:08x}", found.crc_32))
-        )));
-    }
+    check_active(&model, is_it, identity)?;
     Ok(model.metadata().output_names.iter().map(String::from).collect())
+}
+
+/// Checks that a model `is_active` on the device.
+fn check_active(model: &Model<'_>, is_active: bool, identity: &DeviceIdentity) -> Result<()> {
+    if is_active {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "MODEL {:08x}: {} is active on the device; `upload` this one, or name that one",
+        model.crc(),
+        identity.model.map_or("none".into(), |found| format!("{:08x}", found.crc_32))
+    )))
 }
 
 /// Names of the columns for what is `wanted` of the model's confidence, beside those of its `outputs`.
@@ -150,8 +160,15 @@ pub fn baseline<W: Wire>(
     action: &BaselineArguments,
     common: &Common,
 ) -> Result<()> {
-    print::check_output(&action.output, &[])?;
+    let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
+    print::check_output(&action.output, &inputs)?;
     let identity = device.identify()?;
+    let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
+    let model = model.as_ref().map(ModelBlob::parse);
+    if let Some(model) = &model {
+        check_active(model, identity.is_made_of(model), &identity)?;
+    }
+    let names = reading_names(&identity, model.as_ref())?;
     let frames = action.scan.frames;
     let request = Request::CaptureBaseline { frames };
     let patience = patience(&action.scan, &identity);
@@ -165,7 +182,6 @@ pub fn baseline<W: Wire>(
         })
     })?;
     let readings = answer.map_err(taxel_rig::Error::Refused)?;
-    let names = reading_names(&identity);
     check_length(0, &readings, names.len())?;
     let values_missing = missing(readings.iter(), Wanted::Readings)?;
     if action.store {

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum, value_parser};
 use firmware::link::message::{ConfidenceSent, Configuration};
 use firmware::timing::ScanPlan;
 use model_core::Wires;
+use model_core::blob::Model;
 use taxel_rig::device::{Device, DeviceIdentity, Wire};
 
 #[derive(Args)]
@@ -86,22 +87,40 @@ const SLOWEST_SAMPLE_NS: u32 = 100_000;
 
 /// Time within which so many frames must have come.
 pub fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
-    let wires = identity.wires();
     let plan = ScanPlan {
-        rows: wires.rows as u16,
-        columns: wires.columns as u16,
+        rows: identity.rows as u16,
+        columns: identity.columns as u16,
+        board_columns: identity.columns as u16,
         idle_samples: true,
         settling_us: scan.settling_us,
         oversampling: scan.oversampling,
         sample_ns: SLOWEST_SAMPLE_NS,
+        reading_ns: SLOWEST_SAMPLE_NS,
+        row_ns: SLOWEST_SAMPLE_NS,
     };
-    let period = Duration::from_micros(scan.period_us.max(plan.scan_us()).into());
+    let period = Duration::from_micros(scan.period_us.max(plan.longest_us()).into());
     Duration::from_secs(2) + 4 * u32::from(scan.frames) * period
 }
 
-pub fn reading_names(identity: &DeviceIdentity) -> Vec<String> {
-    let Wires { rows, columns } = identity.wires();
-    (1..=rows).flat_map(|m| (1..=columns).map(move |k| format!("r{m}c{k}_ohm"))).collect()
+/// Names of the readings in a frame: those of the `model` that is active on the device, or else of its wires.
+pub fn reading_names(identity: &DeviceIdentity, model: Option<&Model<'_>>) -> Result<Vec<String>> {
+    if let Some(model) = model {
+        return Ok(model.metadata().input_names.iter().map(String::from).collect());
+    }
+    let Wires { rows, columns } = all_wires(identity)?;
+    let names = (1..=rows).flat_map(|m| (1..=columns).map(move |k| format!("r{m}c{k}_ohm")));
+    Ok(names.collect())
+}
+
+/// Wires of a device that scans all readings between its first wires.
+pub fn all_wires(identity: &DeviceIdentity) -> Result<Wires> {
+    identity.wires().ok_or_else(|| {
+        Error::Usage(
+            "the active model takes some of the readings, or in another order: give its file as --model, \
+             or upload one of all readings"
+                .into(),
+        )
+    })
 }
 
 /// Checks the number of values in a frame.

@@ -23,11 +23,12 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
     ));
     page.line(format_args!(
-        "\n  {:<26} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {:>7} {:>7} {:>8} {:>8} {:>10} {:>7} {:>6}",
+        "\n  {:<24} {:>4} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>8} {:>7} {:>10} {:>6} {:>6}",
         "format",
         "K",
         "rank",
         "tail",
+        "cols",
         "avg",
         "gate",
         "RMSE",
@@ -137,11 +138,12 @@ fn line_of(trade: &Trade, i: usize) -> String {
     };
     let ratio = point.ratio_to_limit(&trade.group).map_or("-".into(), |r| format!("{r:.2}"));
     format!(
-        "{mark} {:<26} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>7} {:>8} {:>8} {:>10} {:>7} {:>6}",
+        "{mark} {:<24} {:>4} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>8} {:>7} {:>10} {:>6} {:>6}",
         point.way(),
         point.centres,
         point.output_rank.map_or("-".into(), |rank| rank.to_string()),
         if point.affine_tail { "yes" } else { "no" },
+        point.columns.map_or("-".into(), |columns| columns.to_string()),
         point.samples_averaged,
         point.gate_k.map_or("-".into(), |k| k.to_string()),
         error(point.rmse(&trade.group)),

@@ -6,7 +6,7 @@ use taxel_data::table::Table;
 use taxel_learn::PreparedModel;
 use taxel_learn::decoders::mean;
 use taxel_simulate::Synthesis;
-use taxel_simulate::readout::{Circuit, Readout};
+use taxel_simulate::readout::{Circuit, Readout, op_amp_time_constant_us};
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::virtual_board::{VirtualBoard, all_readings, scan, untouched_readings};
 
@@ -66,7 +66,11 @@ impl Stage {
             line_ohm: from(Self::Series, of_scene.line_ohm, 0.1),
             op_amp_offset_v: from(Self::Everything, of_scene.op_amp_offset_v, 5e-4),
             adc_noise_counts: from(Self::Everything, of_scene.adc_noise_counts, 0.5),
-            time_constant_us: from(Self::Everything, of_scene.time_constant_us, 5.0),
+            time_constant_us: from(
+                Self::Everything,
+                of_scene.time_constant_us,
+                op_amp_time_constant_us(),
+            ),
             ..of_scene.clone()
         }
     }

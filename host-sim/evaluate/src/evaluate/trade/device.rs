@@ -122,12 +122,12 @@ mod tests {
         let board = Device::default();
         let cost = Cost { instructions: 1, cycles: 18_000, flash_cycles: 36_000 };
         let paper = Some(Wires { rows: 8, columns: 18 });
-        // docs/board.md: 6.4 ms with one sample a reading, 23 ms with four.
+        // docs/board.md: 5.6 ms with one sample a reading, 21 ms with four.
         let scans = [1, 4].map(|samples| board.scan_ms(paper, samples).unwrap());
-        assert_eq!(scans, [6.43, 23.019]);
-        let times = board.times(Some(6.43), &cost);
-        assert_eq!((times.decode_ms, times.frame_ms), (0.2, 6.63));
-        assert!((times.frames_per_s - 150.8).abs() < 0.1);
+        assert_eq!(scans, [5.573, 21.022]);
+        let times = board.times(Some(5.5), &cost);
+        assert_eq!((times.decode_ms, times.frame_ms), (0.2, 5.7));
+        assert!((times.frames_per_s - 175.4).abs() < 0.1);
         let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
         assert_eq!(ram.times(None, &cost).frame_ms, 0.2);
         assert_eq!(ram.times(None, &cost).frames_per_s, 5000.0);

@@ -106,6 +106,7 @@ impl Judged {
                 output_rank: variant.output_rank,
                 spread: blob.spread(),
                 affine_tail: variant.affine_tail,
+                columns: frames.wires.map(|wires| wires.columns),
                 samples_averaged: frames.samples_averaged,
                 gate_k,
                 errors: metrics::by_group(&test.outputs, estimate, measure),

@@ -59,6 +59,8 @@ pub struct Point {
     /// Width σ on scaled inputs.
     pub spread: f64,
     pub affine_tail: bool,
+    /// Number of column-wires that are read; `None` if the readings are not those of wires.
+    pub columns: Option<usize>,
     /// Number of samples averaged for each reading.
     pub samples_averaged: usize,
     /// Tolerance of the gate, in standard deviations of the averaged readings' noise; `None` without a gate.
@@ -105,9 +107,10 @@ impl Point {
             1 => String::new(),
             samples => format!(", {samples} samples"),
         };
+        let columns = self.columns.map_or(String::new(), |columns| format!(", {columns} columns"));
         let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
         let rank = self.output_rank.map_or(String::new(), |rank| format!(", rank {rank}"));
-        format!("{}, K = {}{rank}{tail}{average}{gate}", self.way(), self.centres)
+        format!("{}, K = {}{rank}{tail}{columns}{average}{gate}", self.way(), self.centres)
     }
 
     /// What the point has to offer by the error of a group.

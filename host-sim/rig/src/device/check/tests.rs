@@ -18,6 +18,7 @@ fn good() -> Findings {
         key: firmware::link::message::KeyState::None,
         unique_id: [0; 12],
         counter: 0,
+        wires_crc_32: 0,
     };
     let uploads = UploadFindings {
         blob_bytes: 1,

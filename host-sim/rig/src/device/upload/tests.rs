@@ -90,6 +90,7 @@ fn identity(on_trial: bool) -> Report<'static> {
         key: KeyState::None,
         unique_id: [0; 12],
         counter: 0,
+        wires_crc_32: 0,
     })
 }
 
