@@ -16,7 +16,7 @@ use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_learn::cost::{Design, Gating, Prices};
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_rig::device::{Device, DeviceIdentity, Wire, stream, upload};
+use taxel_rig::device::{Device, Wire, stream, upload};
 use taxel_simulate::{Synthesis, World};
 
 use crate::cycles::models;
@@ -107,6 +107,8 @@ struct Record<'a> {
     revision: Option<String>,
     compiler: String,
     board: &'a str,
+    /// Number of the chip, as hexadecimal digits.
+    unique_id: &'a str,
     memory: Memory,
     /// What the stack took at most.
     stack_bytes: Beside<u32>,
@@ -130,6 +132,7 @@ pub fn run(options: &Options) -> Outcome {
     let mut device = board.open()?;
     let identity = device.identify().map_err(text)?;
     println!("{}, firmware {}", identity.board, identity.firmware);
+    let unique_id: String = identity.unique_id.iter().map(|byte| format!("{byte:02x}")).collect();
     let decoding = decode_all(&mut device)?;
     let (erase_ms, scan_us) = erase_and_scan(&mut device)?;
     let last = device.identify().map_err(text)?.memory.stack_high_water;
@@ -143,6 +146,7 @@ pub fn run(options: &Options) -> Outcome {
         revision: first_line("git", &git),
         compiler: toolchain.compiler()?,
         board: &identity.board,
+        unique_id: &unique_id,
         memory: identity.memory,
         stack_bytes: Beside { measured: stack_bytes, predicted: STACK_BYTES },
         decoding,
@@ -151,7 +155,10 @@ pub fn run(options: &Options) -> Outcome {
         keeps_its_model_over_a_restart: restart,
         resistors_rms_percent: resistors,
     };
-    let path = options.output.clone().unwrap_or_else(|| default_file(&identity, options.emulated));
+    let path = options
+        .output
+        .clone()
+        .unwrap_or_else(|| default_file(&identity.board, &unique_id, options.emulated));
     write(&path, &serde_json::to_string_pretty(&record).map_err(text)?)?;
     println!("written to {}", path.display());
     if record.is_as_predicted() {
@@ -173,9 +180,9 @@ impl Record<'_> {
 }
 
 /// The file of a board: one for each chip.
-fn default_file(identity: &DeviceIdentity, emulated: bool) -> PathBuf {
+fn default_file(board: &str, unique_id: &str, emulated: bool) -> PathBuf {
     let folder = if emulated { target_dir().join("accept") } else { root().join("proof/silicon") };
-    folder.join(format!("{}.json", identity.board))
+    folder.join(format!("{board}-{unique_id}.json"))
 }
 
 fn write(path: &Path, text: &str) -> Outcome {
