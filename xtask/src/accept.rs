@@ -132,7 +132,8 @@ pub fn run(options: &Options) -> Outcome {
     let mut device = board.open()?;
     let identity = device.identify().map_err(text)?;
     println!("{}, firmware {}", identity.board, identity.firmware);
-    let unique_id: String = identity.unique_id.iter().map(|byte| format!("{byte:02x}")).collect();
+    let digits: Vec<String> = identity.unique_id.iter().map(|byte| format!("{byte:02x}")).collect();
+    let unique_id = digits.concat();
     let decoding = decode_all(&mut device)?;
     let (erase_ms, scan_us) = erase_and_scan(&mut device)?;
     let last = device.identify().map_err(text)?.memory.stack_high_water;

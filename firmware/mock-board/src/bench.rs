@@ -40,7 +40,7 @@ pub struct Bench<'m> {
 
 impl Bench<'static> {
     /// An application on a new board. Its memory, half a kilobyte, is never freed: whoever makes many uses
-    /// [`Bench::within`].
+    /// [`Bench::on`].
     pub fn new(configuration: Configuration) -> Self {
         Self::with_journal(configuration, Flash::journal())
     }

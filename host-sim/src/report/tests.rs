@@ -214,7 +214,7 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
         "<li>Few frames for Δz.</li>",
         "200 <span>µs</span>",
         "14\u{202f}345 <span>B</span>",
-        "fits a slot of 131\u{202f}056 B",
+        "fits a slot of 131\u{202f}072 B",
         "host-sim run &#39;by &lt;hand&gt;.toml&#39; --seed 7",
         "<a href=\"model.bin\">model.bin</a>",
         env!("CARGO_PKG_VERSION"),

@@ -96,8 +96,7 @@ fn fifty_random_subsets_of_wires_are_read_and_decoded_as_on_the_virtual_board() 
         assert_eq!(identity.wires().is_some(), is_grid, "{names:?}");
 
         let expected: Vec<f32> = cells.iter().map(|cell| readings_ohm[*cell]).collect();
-        let outputs =
-            Decoder::<1>::load(&blob).unwrap().decode(&*expected).unwrap().outputs.to_vec();
+        let outputs = Decoder::<1>::load(&blob).unwrap().decode(&*expected).unwrap().outputs;
         let scanning = Configuration {
             frame_period_us: 1000,
             send_readings: true,
