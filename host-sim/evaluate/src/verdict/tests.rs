@@ -121,7 +121,7 @@ fn every_warning_is_raised_and_left_out() {
         (Warning::few_test_frames(29), "few-test-frames"),
         (Warning::trained_on(true), "judged-by-training-data"),
         (Warning::out_of_range(0.0101), "readings-out-of-range"),
-        (Warning::larger_than_slot(131_057), "larger-than-slot"),
+        (Warning::larger_than_slot(131_073), "larger-than-slot"),
         (Warning::padded_centres(8, 16), "padded-centres"),
         (Warning::outliers(&outliers(1)), "outliers"),
         (Warning::costly_gate(101.0, 100.0), "gate-costs-more"),

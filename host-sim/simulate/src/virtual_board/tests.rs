@@ -107,7 +107,7 @@ fn a_scan_takes_the_transactions_and_the_time_that_are_planned() {
 fn sampling_before_voltages_have_settled_is_refused() {
     let hasty = Readout {
         time_constant_us: Some(op_amp_time_constant_us()),
-        settling_us: Some(5),
+        settling_us: Some(3), // a converter samples 8 µs later
         ..Readout::default()
     };
     let board = board(hasty);
@@ -313,7 +313,9 @@ fn a_smaller_sensor_and_some_of_its_rows_are_read_alone() {
         let board = VirtualBoard::new(&world).unwrap();
         let (readings, report) = scan(&board, &ohm, board.scan_settings());
         board.check().unwrap();
-        assert_eq!((report.failed_samples, board.transactions().transfers), (0, steps * 5));
+        // The first scan reads all columns of the board: it does not know how many of them load a row.
+        let transfers = board.transactions().transfers;
+        assert_eq!((report.failed_samples, transfers), (0, steps * COLUMNS));
         assert_eq!(readings.len(), (steps - 1) * 5);
         assert!((readings[0] / ohm[first] - 1.0).abs() < 1e-3, "{readings:?}");
     }

@@ -23,7 +23,7 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
     ));
     page.line(format_args!(
-        "\n  {:<24} {:>4} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>8} {:>7} {:>10} {:>6} {:>6}",
+        "\n  {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>8} {:>7} {:>10} {:>6} {:>5}",
         "format",
         "K",
         "rank",
@@ -47,7 +47,7 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     for baseline in &trade.decoders {
         let rmse = baseline.errors.iter().find(|errors| errors.group == trade.group);
         let rmse = rmse.map_or(f64::NAN, |errors| errors.rmse);
-        page.line(format_args!("  {:<50} {:>7}", baseline.decoder, error(rmse)));
+        page.line(format_args!("  {:<54} {:>7}", baseline.decoder, error(rmse)));
     }
     page.line(format_args!("\n{}", legend(trade, all)));
     if let Some(limit) = &trade.limit {
@@ -138,7 +138,7 @@ fn line_of(trade: &Trade, i: usize) -> String {
     };
     let ratio = point.ratio_to_limit(&trade.group).map_or("-".into(), |r| format!("{r:.2}"));
     format!(
-        "{mark} {:<24} {:>4} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>8} {:>7} {:>10} {:>6} {:>6}",
+        "{mark} {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>8} {:>7} {:>10} {:>6} {:>5}",
         point.way(),
         point.centres,
         point.output_rank.map_or("-".into(), |rank| rank.to_string()),
