@@ -222,7 +222,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(lines.next().unwrap().starts_with(
         "kernel,whole_array,centres,spread,affine_tail,columns,samples_averaged,gate_k,"
     ));
-    let k_of = |line: &str| line.split(',').nth(6).unwrap().to_owned();
+    let k_of = |line: &str| line.split(',').nth(7).unwrap().to_owned();
     let of_fixed16: Vec<String> =
         lines.filter(|line| line.starts_with("fixed16,false,")).map(k_of).collect();
     assert_eq!(of_fixed16, ["", "3", "4", "", "3", "4"]);
