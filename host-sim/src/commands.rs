@@ -38,6 +38,8 @@ pub mod link;
 
 use std::process::ExitCode;
 
+use firmware::link::message::Refusal;
+
 use crate::{Error, Result};
 
 /// Options of every command.
@@ -95,6 +97,8 @@ fn advice(error: &Error) -> &'static str {
 /// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
 fn exit_status(error: &Error) -> u8 {
     match error {
+        // The model is an input too.
+        Error::Rig(taxel_rig::Error::Refused(Refusal::BadModel(_))) => 2,
         Error::Rig(_) | Error::Data(taxel_data::Error::Failed(_)) => 1,
         _ => 2,
     }

@@ -48,9 +48,9 @@ class Bench:
         """Lets the board run for so many seconds of its own time."""
         self.board.run_for(seconds)
 
-    def host_sim(self, *arguments):
-        """Runs `host-sim link` with the board's serial port and `arguments` to its end, and returns what it says. Its
-        clock is the board's, so it does not matter how busy the computer is.
+    def host_sim(self, *arguments, status=0):
+        """Runs `host-sim link` with the board's serial port and `arguments` to its end, with this exit status, and returns
+        what it says. Its clock is the board's, so it does not matter how busy the computer is.
         """
         terminal = Terminal(self.board)
         command = [self._host_sim, "link", terminal.path, *map(str, arguments)]
@@ -70,7 +70,7 @@ class Bench:
                 said = host.communicate()[0]
                 terminal.close()
         self._log(said.rstrip())
-        expect(host.returncode == 0, f"host-sim link {arguments[0]} ended with {host.returncode}")
+        expect(host.returncode == status, f"host-sim link {arguments[0]} ended with {host.returncode}")
         return said
 
     def program(self, *arguments):
@@ -81,9 +81,9 @@ class Bench:
         expect(ended.returncode == 0, f"host-sim {arguments[0]} ended with {ended.returncode}: {ended.stderr}")
         return ended.stdout
 
-    def ask(self, message, patience_s=PATIENCE_S, before=b""):
-        """Sends a request of the link to the board, behind other bytes; returns its answer, and how long that took in
-        s."""
+    def ask(self, message, expected, patience_s=PATIENCE_S, before=b""):
+        """Sends a request of the link to the board, behind other bytes. Returns its answer, which must begin with what is
+        expected, and how long that took in s."""
         board = self.board
         # Numbers that take one byte.
         self._number = self._number % 126 + 1
@@ -101,23 +101,22 @@ class Bench:
         resets = ", ".join(board.resets[resets:]) or "none"
         silent = f"request {message.hex(' ')} is not answered; resets by: {resets}; it stands in {board.where()}"
         expect(answers, silent)
+        expect(answers[0].startswith(expected), f"request {message.hex(' ')} is answered by {answers[0].hex(' ')}")
         return answers[0], board.time.seconds() - start
 
     def scan_every(self, seconds, settling_s=None):
         """Configures the time from one scan to the next, and the settling; nothing else."""
-        answer, _ = self.ask(CONFIGURATION)
-        expect(answer[:1] == CONFIGURED, f"configuration is answered by {answer.hex(' ')}")
+        answer, _ = self.ask(CONFIGURATION, CONFIGURED)
         # The first fields, whatever follows them.
         _, rest = taken(answer[1:])
         settling_us, rest = taken(rest)
         if settling_s is not None:
             settling_us = self.board.settling_us = round(settling_s * 1e6)
-        answer, _ = self.ask(CONFIGURE + varint(round(seconds * 1e6)) + varint(settling_us) + rest)
-        expect(answer[:1] == CONFIGURED, f"configure is answered by {answer.hex(' ')}")
+        self.ask(CONFIGURE + varint(round(seconds * 1e6)) + varint(settling_us) + rest, CONFIGURED)
 
     def period_us(self):
         """The time from one scan to the next that is in force."""
-        return taken(self.ask(CONFIGURATION)[0][1:])[0]
+        return taken(self.ask(CONFIGURATION, CONFIGURED)[0][1:])[0]
 
     def finish(self, resets=(), erased=()):
         """Ends the scenario: no rule may be broken, and the resets and the sectors that were erased must be these."""

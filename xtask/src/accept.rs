@@ -11,7 +11,9 @@ use firmware::link::message::{Configuration, Memory, ModelIdentity, Report, Requ
 use firmware::timing::ScanPlan;
 use model_core::Decoder;
 use serde::Serialize;
+use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
+use taxel_data::output::write_bytes;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_learn::cost::{Design, Gating, Prices};
@@ -132,8 +134,7 @@ pub fn run(options: &Options) -> Outcome {
     let mut device = board.open()?;
     let identity = device.identify().map_err(text)?;
     println!("{}, firmware {}", identity.board, identity.firmware);
-    let digits: Vec<String> = identity.unique_id.iter().map(|byte| format!("{byte:02x}")).collect();
-    let unique_id = digits.concat();
+    let unique_id = identity.unique_id_text();
     let decoding = decode_all(&mut device)?;
     let (erase_ms, scan_us) = erase_and_scan(&mut device)?;
     let last = device.identify().map_err(text)?.memory.stack_high_water;
@@ -160,7 +161,8 @@ pub fn run(options: &Options) -> Outcome {
         .output
         .clone()
         .unwrap_or_else(|| default_file(&identity.board, &unique_id, options.emulated));
-    write(&path, &serde_json::to_string_pretty(&record).map_err(text)?)?;
+    path.parent().map_or(Ok(()), fs::create_dir_all).map_err(text)?;
+    write_bytes(&path, &serde_json::to_vec_pretty(&record).map_err(text)?).map_err(text)?;
     println!("written to {}", path.display());
     if record.is_as_predicted() {
         Ok(())
@@ -182,16 +184,13 @@ impl Record<'_> {
 
 /// The file of a board: one for each chip.
 fn default_file(board: &str, unique_id: &str, emulated: bool) -> PathBuf {
-    let folder = if emulated { target_dir().join("accept") } else { root().join("proof/silicon") };
+    let folder = if emulated { own_folder() } else { root().join("proof/silicon") };
     folder.join(format!("{board}-{unique_id}.json"))
 }
 
-fn write(path: &Path, text: &str) -> Outcome {
-    let failed = |cause: std::io::Error| format!("{}: {cause}", path.display());
-    let half = path.with_extension("json.part");
-    path.parent().map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
-    fs::write(&half, format!("{text}\n")).map_err(failed)?;
-    fs::rename(&half, path).map_err(failed)
+/// Folder for models, and the file of the emulated board.
+fn own_folder() -> PathBuf {
+    target_dir().join("accept")
 }
 
 /// Uploads a model of every format and size, and lets each decode the same frames as the host.
@@ -201,7 +200,7 @@ fn decode_all<W: Wire>(device: &mut Device<W>) -> Outcome<Vec<Decoding>> {
         (false, false) => CENTRES.contains(&options.centres),
         (array, affine) => array && affine && options.centres == CENTRES[0],
     };
-    let folder = target_dir().join("accept");
+    let folder = own_folder();
     let mut models: Vec<PathBuf> =
         models::train(&folder, wanted)?.into_iter().map(|model| model.path).collect();
     let assessed = folder.join("fixed16-16-confidence.bin");
@@ -236,7 +235,7 @@ fn decode<W: Wire>(device: &mut Device<W>, path: &Path, frames: &Dataset) -> Out
     let predicted = cost.map_err(text)?.flash_cycles;
     let model = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     println!(
-        "{model:22} {bit_identical} of {FRAMES} frames bit-identical, {measured} cycles a frame, predicted {predicted}"
+        "{model:24} {bit_identical} of {FRAMES} frames bit-identical, {measured} cycles a frame, predicted {predicted}"
     );
     Ok(Decoding {
         model,
@@ -253,19 +252,16 @@ fn erase_and_scan<W: Wire>(device: &mut Device<W>) -> Outcome<(Beside<Vec<u32>>,
     let own = device.configuration().map_err(text)?.configuration;
     let scanning = Configuration { frame_period_us: PERIOD_US, send_estimates: false, ..own };
     device.configure_until_restart(scanning).map_err(text)?;
-    let before = device.statistics().map_err(text)?;
-    let head = fs::read(root().join("target/accept/fixed16-16.bin")).map_err(text)?;
+    let missed_before = device.statistics().map_err(text)?.frames_missed;
+    let head = fs::read(own_folder().join("fixed16-16.bin")).map_err(text)?;
     let begun = upload::step(device, upload::begin(&head)).map_err(text)?;
     if !matches!(begun, Ok(UploadState::Receiving { .. })) {
         return Err(format!("an upload begins with {begun:?}"));
     }
-    // One more request is answered behind the next scan.
-    let missed = |device: &mut Device<W>| device.statistics().map(|it| it.frames_missed);
-    let (first, last) = (before.frames_missed, missed(device).map_err(text)?);
-    let erase_ms = last.wrapping_sub(first) * (PERIOD_US / 1000);
     let after = device.statistics().map_err(text)?;
+    let erase_ms = after.frames_missed.wrapping_sub(missed_before) * (PERIOD_US / 1000);
     let plan = ScanPlan::of_nucleo(8, 18, scanning.scan.oversampling);
-    let (scan_us, predicted) = (after.longest_scan_us, plan.scan_us());
+    let (scan_us, predicted) = (after.longest_scan_us, plan.longest_us());
     println!(
         "erasing a slot took {erase_ms} ms; the longest scan {scan_us} µs, predicted {predicted}"
     );
@@ -307,14 +303,20 @@ fn compare<W: Wire>(device: &mut Device<W>, known: &[f32]) -> Outcome<Beside<f64
 
 /// Resistances in Ω of a CSV file of one line under names, row after row.
 fn read_resistors(path: &Path) -> Outcome<Vec<f32>> {
-    let named = |cause: &dyn Display| format!("--resistors {}: {cause}", path.display());
-    let content = fs::read_to_string(path).map_err(|cause| named(&cause))?;
-    let line = content.lines().nth(1).ok_or(named(&"no line under the names"))?;
-    let numbers = line.split(',').map(|number| number.trim().parse::<f32>());
-    let ohm: Vec<f32> = numbers.collect::<Result<_, _>>().map_err(|cause| named(&cause))?;
-    match ohm.iter().position(|ohm| !(ohm.is_finite() && *ohm > 0.0)) {
-        Some(place) => Err(named(&format!("column {} is no resistance", place + 1))),
-        None => Ok(ohm),
+    let file = DataFile::read(path).map_err(text)?;
+    if file.lines() != 1 {
+        let (path, lines) = (path.display(), file.lines());
+        return Err(format!("--resistors {path} has {lines} lines of resistances: give one"));
+    }
+    let ohm = file.row(0).iter().map(|ohm| *ohm as f32);
+    match file.row(0).iter().position(|ohm| !(ohm.is_finite() && *ohm > 0.0)) {
+        Some(column) => Err(format!(
+            "--resistors {}: {} is {} Ω: give the resistance there",
+            path.display(),
+            file.header[column],
+            file.row(0)[column]
+        )),
+        None => Ok(ohm.collect()),
     }
 }
 
@@ -335,7 +337,7 @@ mod tests {
         };
         assert_eq!(read("r1c1_ohm,r1c2_ohm\n56, 56.2\n"), Ok(vec![56.0, 56.2]));
         for (content, says) in
-            [("a\n", "no line"), ("a\nx\n", "invalid"), ("a,b\n1,0\n", "column 2")]
+            [("a\n1\n2\n", "2 lines"), ("a\nx\n", "number"), ("a,b\n1,0\n", "b is 0")]
         {
             assert!(read(content).unwrap_err().contains(says), "{content}");
         }

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::emulate::qemu::decoded;
-use crate::images::{NUCLEO, build_image};
+use crate::images::{NUCLEO, NUCLEO_FIXED16, build_image, build_variant};
 use crate::process::{Outcome, Said};
 use crate::toolchain::{Toolchain, elf};
 use copy::Copy;
@@ -53,6 +53,9 @@ const IMAGE: &str = "nucleo-f446re";
 /// Scenario of an image with room for a larger sensor.
 const WIDE: &str = "wide";
 
+/// Scenario of an image with one feature alone.
+const FEW_FEATURES: &str = "few-features";
+
 /// Texts that the log of a scenario must contain.
 const LOGGED: [(&str, &str); 7] = [
     ("session", "slot 0 holds a model that was flashed, not uploaded"),
@@ -74,6 +77,9 @@ pub fn run(options: &Options) -> Outcome {
     let run = |scenario: &str| {
         options.names.is_empty() || options.names.iter().any(|name| name == scenario)
     };
+    if run(FEW_FEATURES) {
+        build_variant(&toolchain, &["fixed16"], NUCLEO_FIXED16)?;
+    }
     build_image(&toolchain, NUCLEO)?;
     if run(WIDE) {
         Copy::make()?.build_wide(&toolchain)?;

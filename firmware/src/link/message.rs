@@ -134,7 +134,7 @@ pub enum UploadStep<'a> {
         /// SHA-256 of the blob, for a device with a key.
         sha_256: Option<[u8; 32]>,
         /// Time in ms, at most half an hour, after which the previous model comes back unless the trial is confirmed.
-        /// The same step again lets it last so long from then on.
+        /// If the step is sent again, this time counts from then on.
         lease_ms: u32,
     },
     /// Abort the upload, and forget the bytes received. A model on trial is left for the previous one.

@@ -7,7 +7,9 @@ use std::process::Command;
 
 use super::Options;
 use super::copy;
+use crate::images::NUCLEO_FIXED16;
 use crate::process::{Outcome, Said, capture, cargo, first_line, root, run, target_dir};
+use crate::toolchain::elf;
 
 const FOLDER: &str = "proof/board-emulator";
 
@@ -43,12 +45,12 @@ impl Emulator {
             model
         };
         let frames = options.frames.to_string();
-        let wide = copy::image();
         let named = [
             ("--host-sim", host_sim),
             ("--model", model),
             ("--directory", folder),
-            ("--wide-image", wide),
+            ("--wide-image", copy::image()),
+            ("--fixed16-image", elf(NUCLEO_FIXED16)),
         ];
         let mut arguments = vec![root().join(FOLDER).join("run.py").into_os_string()];
         for (name, value) in named {

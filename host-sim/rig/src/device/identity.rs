@@ -57,7 +57,11 @@ fn key_with_text<S: Serializer>(key: &KeyState, serializer: S) -> Result<S::Ok, 
 
 /// Serialises a device's number as text.
 fn id_with_text<S: Serializer>(id: &[u8; 12], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(&id.map(|byte| format!("{byte:02x}")).concat())
+    serializer.serialize_str(&hexadecimal(id))
+}
+
+fn hexadecimal(id: &[u8; 12]) -> String {
+    id.map(|byte| format!("{byte:02x}")).concat()
 }
 
 /// Serialises a model's identity with checksums as text: programs read large numbers as floats, which round them.
@@ -97,6 +101,11 @@ fn model_with_text<S: Serializer>(
 }
 
 impl DeviceIdentity {
+    /// The device's number, as hexadecimal digits.
+    pub fn unique_id_text(&self) -> String {
+        hexadecimal(&self.unique_id)
+    }
+
     /// Sensor and model that the device has room for.
     pub fn capacity(&self) -> Capacity {
         Capacity { rows: self.rows, columns: self.columns, outputs: self.outputs }

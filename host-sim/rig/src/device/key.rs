@@ -14,7 +14,7 @@ const MOST_BYTES: usize = 4096;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Counter {
     unique_id: [u8; 12],
-    /// That of the last sealed request.
+    /// Counter of the last sealed request.
     last: u64,
 }
 
