@@ -111,7 +111,7 @@ pub struct ScanReport {
 pub struct Selection<'a> {
     /// Row-wires, in the order in which they are read and stand in a frame.
     pub rows: &'a [RowWire],
-    /// Column-wires, which are read from the first on.
+    /// Column-wires that are read, in ascending order.
     pub columns: ColumnWires,
 }
 

@@ -82,7 +82,7 @@ fn a_key_is_replaced_by_whoever_has_it_and_by_nobody_else() {
 
 #[test]
 fn a_model_comes_into_force_by_whoever_has_the_key_alone() {
-    let (old, new) = (blob(1, 3), blob(2, 4));
+    let new = blob(2, 4);
     let mut device = with_key();
     for (key, why) in [(None, SealFault::Missing), (Some(OTHER), SealFault::Forged)] {
         device.key = key;
@@ -90,17 +90,15 @@ fn a_model_comes_into_force_by_whoever_has_the_key_alone() {
         assert_eq!(device.slots[1].erases, 0);
     }
     device.key = Some(KEY);
-    // The owner's upload, into which somebody else puts the chunks of another model of that length.
-    let forged = blob(5, 4);
-    let mut steps = trial_steps(&new);
-    let last = steps.len() - 1;
-    steps.splice(1..last, trial_steps(&forged).drain(1..last));
-    assert_eq!(device.upload(&steps), fault(SealFault::Forged));
-    // Or a host that does not say which model it means.
-    let mut steps = trial_steps(&new);
-    steps[last] = UploadStep::Try { sha_256: None, lease_ms: 60_000 };
-    assert_eq!(device.upload(&steps), fault(SealFault::Missing));
-    assert_eq!(device.restart(), Some(crc_of(&old)));
+    // Somebody else puts chunks of another model of that length into the owner's upload.
+    let other = blob(5, 4);
+    let forged = trial_steps(&other)[1];
+    device.session(|session, board| {
+        ask(session, board, &Request::Upload(begin(&new)), |_| ());
+        let refused = said(session, board, request_bytes(NUMBER, &Request::Upload(forged)));
+        assert_eq!(refused, fault(SealFault::Missing));
+    });
+    assert_eq!(device.slots[1].words_written, 0);
     assert_eq!(device.install(&new), confirmed(&new));
     assert_eq!(device.restart(), Some(crc_of(&new)));
 }
@@ -111,10 +109,7 @@ fn an_older_model_comes_back_neither_by_a_replay_nor_by_an_undo() {
     let mut device = with_key();
     let steps: Vec<Vec<u8>> = (1..)
         .zip(confirmed_steps(&first))
-        .map(|(counter, step)| match step {
-            UploadStep::Chunk { .. } => request_bytes(NUMBER, &Request::Upload(step)),
-            step => sealed(&KEY, counter, &Request::Upload(step)),
-        })
+        .map(|(counter, step)| sealed(&KEY, counter, &Request::Upload(step)))
         .collect();
     device.install(&first).unwrap();
     device.install(&second).unwrap();
@@ -306,8 +301,9 @@ fn requests_without_the_key_prolong_no_lease() {
         let leased = Configuration { contact_threshold: 0.25, ..quiet() };
         let request = Request::Configure { configuration: leased, lease_ms: 10_000 };
         ask(session, board, &request, |_| ());
-        let ohm = [60.0; 6];
+        let (ohm, model) = ([60.0; 6], blob(2, 4));
         let chunk = UploadStep::Chunk { offset: 0, bytes: &[0; 4] };
+        ask(session, board, &Request::Upload(begin(&model)), |_| ());
         for request in [
             Request::Decode { frame: 1, readings_ohm: Floats::new(&ohm) },
             Request::Kept,

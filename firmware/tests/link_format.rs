@@ -86,11 +86,7 @@ fn requests() -> Vec<Example> {
         ),
         ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
         ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
-        ("try", upload(UploadStep::Try { sha_256: None, lease_ms: 60_000 })),
-        (
-            "try a blob with a digest",
-            upload(UploadStep::Try { sha_256: Some([0x5A; 32]), lease_ms: 60_000 }),
-        ),
+        ("try", upload(UploadStep::Try { lease_ms: 60_000 })),
         ("abort", upload(UploadStep::Abort)),
         ("confirm", upload(UploadStep::Confirm)),
         ("restart", request_bytes(7, &Request::Restart)),

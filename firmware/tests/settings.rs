@@ -162,6 +162,30 @@ fn a_configuration_that_is_kept_under_a_lease_outlasts_the_lease() {
 }
 
 #[test]
+fn a_configuration_that_could_not_be_kept_ends_with_its_lease() {
+    let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
+    let supply = device.journal.pages()[0].supply();
+    device.session(|session, board| {
+        let leased = Configuration { frame_period_us: 0, contact_threshold: 0.25, ..quiet() };
+        let request = Request::Configure { configuration: leased, lease_ms: 500 };
+        ask(session, board, &request, |_| ());
+        supply.borrow_mut().on(Some(0));
+        let refused = ask(session, board, &Request::Keep(Setting::Configuration), |report| {
+            matches!(report, Report::Refused(Refusal::Flash))
+        });
+        assert!(refused.0);
+        supply.borrow_mut().on(None);
+        board.pins.borrow_mut().now_us += 501_000;
+        session.step();
+        let own = ask(session, board, &Request::Configuration, |report| match report {
+            Report::Configuration { configuration, .. } => configuration,
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(own.0, quiet());
+    });
+}
+
+#[test]
 fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
     let mut slots = Flash::slots_with(&blob(1, 3));
     let mut bench = Bench::new(quiet());

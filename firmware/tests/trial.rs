@@ -44,11 +44,7 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
 fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let (mut slots, mut bench) = on_trial(&old, &new);
-    let confirm = [
-        UploadStep::Try { sha_256: None, lease_ms: 60_000 },
-        UploadStep::Confirm,
-        UploadStep::Confirm,
-    ];
+    let confirm = [UploadStep::Try { lease_ms: 60_000 }, UploadStep::Confirm, UploadStep::Confirm];
     let state = upload(&mut bench, &mut slots, &mut [], &confirm);
     assert_eq!(state, confirmed(&new));
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -153,7 +149,7 @@ fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
     };
     assert_eq!(pass(&mut session, 59_000_000), None);
     // The host may let it last longer, and asking alone does not.
-    let again = Request::Upload(UploadStep::Try { sha_256: None, lease_ms: 120_000 });
+    let again = Request::Upload(UploadStep::Try { lease_ms: 120_000 });
     ask(&mut session, &board, &again, |_| ());
     assert_eq!(pass(&mut session, 119_000_000), None);
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
@@ -177,7 +173,7 @@ fn a_trial_lasts_half_an_hour_at_most() {
     let (mut slots, mut bench) = on_trial(&old, &new);
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let again = Request::Upload(UploadStep::Try { sha_256: None, lease_ms: u32::MAX });
+    let again = Request::Upload(UploadStep::Try { lease_ms: u32::MAX });
     ask(&mut session, &board, &again, |_| ());
     board.pins.borrow_mut().now_us += 1_799_000_000;
     assert_eq!(session.step(), None);

@@ -39,6 +39,21 @@ fn once_an_upload_has_begun_there_is_no_way_back_even_if_it_sends_the_same_bytes
 }
 
 #[test]
+fn an_upload_that_could_not_begin_leaves_the_way_back() {
+    let (old, new) = (blob(1, 3), blob(4, 3));
+    let mut device = device(&old, &[&new]);
+    let supply = device.journal.pages()[0].supply();
+    device.session(|session, board| {
+        supply.borrow_mut().on(Some(0));
+        assert_eq!(upload_step(session, board, begin(&old)).0, Err(Refusal::Flash));
+        supply.borrow_mut().on(None);
+        assert_eq!(statistics(session, board).slot_erases, 0);
+        let back = UploadState::Confirmed { crc_32: crc_of(&old) };
+        assert_eq!(undo(session, board, crc_of(&new)).0, Ok(back));
+    });
+}
+
+#[test]
 fn undos_wear_flash_and_are_limited_between_restarts() {
     let (old, new) = (blob(1, 3), blob(4, 3));
     let mut slots = Flash::slots_with(&old);

@@ -12,7 +12,7 @@ use model_core::rbf::direct::{Network, Parameters};
 const CHUNK: usize = 60;
 
 /// A trial of whatever was uploaded.
-const TRY: UploadStep<'_> = UploadStep::Try { sha_256: None, lease_ms: 60_000 };
+const TRY: UploadStep<'_> = UploadStep::Try { lease_ms: 60_000 };
 
 /// Carries out an upload as far as it goes; returns the last answer, and whether the session ended.
 fn upload(

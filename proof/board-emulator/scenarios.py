@@ -365,7 +365,7 @@ def dead_host(make, files):
     bench.run_for(0.02)
     bench.host_sim("upload", files.model, "--trial")
     expect("on trial" in bench.host_sim("identify"), "the model is not on trial")
-    bench.ask(b"\x06\x02\x00" + varint(2000), ON_TRIAL)
+    bench.ask(b"\x06\x02" + varint(2000), ON_TRIAL)
     bench.run_for(1.9)
     expect("on trial" in bench.host_sim("identify"), "the trial ended too early")
     bench.run_for(0.2)

@@ -107,6 +107,12 @@ impl Board {
         let gpioa = parts.GPIOA.split(&mut rcc);
         let gpiob = parts.GPIOB.split(&mut rcc);
         let gpioc = parts.GPIOC.split(&mut rcc);
+        // At once: splitting has made inputs of all pins, and the row registers' clocks must not float.
+        let [row_data, row_clock, row_latch] = [
+            gpioc.pc6.into_push_pull_output().erase(),
+            gpioc.pc8.into_push_pull_output().erase(),
+            gpioc.pc9.into_push_pull_output().erase(),
+        ];
 
         // The pull-up makes a line that no converter drives read as no answer.
         let data_in = gpiob.pb14.into_alternate::<5>().internal_resistor(Pull::Up);
@@ -138,9 +144,9 @@ impl Board {
             oscillator,
             led: gpioa.pa5.into_push_pull_output().erase(),
             converters: converters.into_array().ok()?,
-            row_data: gpioc.pc6.into_push_pull_output().erase().into(),
-            row_clock: gpioc.pc8.into_push_pull_output().erase().into(),
-            row_latch: gpioc.pc9.into_push_pull_output().erase().into(),
+            row_data: row_data.into(),
+            row_clock: row_clock.into(),
+            row_latch: row_latch.into(),
             serial,
             clock,
             // From the processor's own clock: from an eighth of it, the HAL's waits would be 2 % short.

@@ -14,8 +14,8 @@ const LATCH: u32 = 1 << 9;
 const MODES: u32 = 3 << 12 | 3 << 16 | 3 << 18;
 const OUTPUTS: u32 = 1 << 12 | 1 << 16 | 1 << 18;
 
-/// Outputs of the row registers of the largest sensor.
-const MOST_ROWS: usize = 32;
+/// Outputs of the row registers, of eight each.
+const OUTPUTS_OF_ROWS: usize = board_common::CAPACITY.rows.next_multiple_of(8);
 
 /// Cycles that each level lasts: 100 ns at 180 MHz.
 const LEVEL_CYCLES: u32 = 18;
@@ -36,7 +36,7 @@ pub(crate) extern "C" fn rest_rows() {
     clear(DATA | CLOCK | LATCH);
     // SAFETY: the other pins' fields stay as they are.
     port.moder().modify(|r, w| unsafe { w.bits(r.bits() & !MODES | OUTPUTS) });
-    for _ in 0..MOST_ROWS {
+    for _ in 0..OUTPUTS_OF_ROWS {
         set(CLOCK);
         clear(CLOCK);
     }

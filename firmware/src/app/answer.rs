@@ -12,7 +12,6 @@ use super::session_end::SessionEnd;
 use crate::circuit::ConstantsFault;
 use crate::link::message::{
     ConfidenceSent, Configuration, Identity, KeyState, Refusal, Report, Request, UploadState,
-    UploadStep,
 };
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
@@ -25,8 +24,11 @@ use crate::store::Slot;
 /// while it writes the previous chunk.
 const LARGEST_CHUNK_BYTES: usize = 512;
 
+/// Bytes of a message that are not the chunk's: those of a seal, packet and fields.
+const AROUND_CHUNK_BYTES: usize = if cfg!(feature = "seal") { 72 } else { 24 };
+
 const fn chunk_bytes(message_bytes: usize) -> usize {
-    let room = message_bytes.saturating_sub(24) / 4 * 4;
+    let room = message_bytes.saturating_sub(AROUND_CHUNK_BYTES) / 4 * 4;
     if room < LARGEST_CHUNK_BYTES { room } else { LARGEST_CHUNK_BYTES }
 }
 
@@ -56,7 +58,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let Self { sensor, models, link, work } = self;
         let wires_crc_32 = sensor.wiring.crc_32;
         let is_keyless = models.authenticity.key_state() == KeyState::None;
-        if is_sealed || models.is_chunk(request) || is_keyless && !request.only_asks() {
+        if is_sealed || is_keyless && !request.only_asks() {
             let now_us = link.platform().now_us();
             link.lease.hear(now_us);
         }
@@ -192,11 +194,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
 }
 
 impl Models {
-    /// Whether a request is a chunk of the upload that is going on.
-    fn is_chunk(&self, request: Request<'_>) -> bool {
-        matches!(request, Request::Upload(UploadStep::Chunk { .. })) && self.upload.is_receiving()
-    }
-
     fn identity<'i, P: Platform, S: Slot, const ROWS: usize>(
         &self,
         model: &'i InForce<'_, ROWS>,

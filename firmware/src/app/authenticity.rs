@@ -7,7 +7,7 @@ use crate::platform::Platform;
 mod keyed {
     use super::{KeyState, Platform, Refusal, Request, SealFault};
     use crate::log::info;
-    use crate::seal::{Key, is_same, sha_256, tag};
+    use crate::seal::{Key, is_same, tag};
     use crate::store::{Journal, KeyFound, Kind, Slot};
 
     /// Largest distance from one counter to the next: nobody who has the key for a while can use up all of them.
@@ -97,16 +97,6 @@ mod keyed {
             Ok(())
         }
 
-        /// Checks the digest of a `blob` that is to be tried out.
-        pub fn check(&self, blob: &[u8], digest: Option<[u8; 32]>) -> Result<(), Refusal> {
-            match digest {
-                _ if self.state == KeyState::None => Ok(()),
-                None => Err(Refusal::Seal(SealFault::Missing)),
-                Some(digest) if digest == sha_256(blob) => Ok(()),
-                Some(_) => Err(Refusal::Seal(SealFault::Forged)),
-            }
-        }
-
         /// Sets the key.
         pub fn provision<P: Platform>(
             &mut self,
@@ -155,10 +145,6 @@ mod keyless {
         ) -> Result<Option<&'r [u8]>, Refusal> {
             let is_known = !matches!(request, Request::Sealed { .. } | Request::Provision { .. });
             if is_known { Ok(None) } else { Err(UNSUPPORTED) }
-        }
-
-        pub fn check(&self, _: &[u8], _: Option<[u8; 32]>) -> Result<(), Refusal> {
-            Ok(())
         }
 
         pub fn provision<P: Platform>(&mut self, _: &[u8; 32], _: &mut P) -> Result<(), Refusal> {

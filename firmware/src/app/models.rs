@@ -37,9 +37,9 @@ impl Models {
         confirmed.crcs.iter_mut().skip(slot).take(1).for_each(|crc| *crc = None);
         let mut is_erased = false;
         let begun = self.upload.begin(spare, length, now_us, || {
-            is_erased = true;
             platform.feed_watchdog();
             confirmed.keep(platform.journal()).map_err(|_| FlashError)?;
+            is_erased = true;
             platform.feed_watchdog();
             Ok(())
         });
@@ -78,18 +78,14 @@ impl Models {
                 self.upload.abort();
                 Ok(())
             }
-            UploadStep::Try { sha_256, lease_ms } => {
+            UploadStep::Try { lease_ms } => {
                 self.trial.lease(link.now_us(), lease_ms);
                 if self.trial.is_going_on() {
                     return Ok(()); // the answer was lost, or the trial is to last longer
                 }
                 let blob = self.upload.complete(spare)?;
-                let checked = model::check(self.capacity, blob).map_err(Refusal::BadModel);
-                let checked = checked.and_then(|model| {
-                    self.authenticity.check(blob, sha_256)?;
-                    Ok(model.crc())
-                });
-                let crc_32 = checked.inspect_err(|_| {
+                let checked = model::check(self.capacity, blob).map(|model| model.crc());
+                let crc_32 = checked.map_err(Refusal::BadModel).inspect_err(|_| {
                     warning!("uploaded model refused");
                     self.upload.abort();
                 })?;

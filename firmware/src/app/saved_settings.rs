@@ -89,8 +89,6 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         let version = version(setting);
         let written = match setting {
             Setting::Configuration => {
-                // What is kept is the device's own: a lease must not end with another one.
-                self.own_configuration = self.configuration;
                 let mut bytes = [0; CONFIGURATION_BYTES];
                 let fields = postcard::to_slice(&self.configuration, &mut bytes);
                 let fields = fields.map_err(|_| Refusal::Keep(KeepFault::TooLarge))?;
@@ -121,6 +119,10 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
                 journal.keep(setting.into(), &[&head, &origin_crc.to_le_bytes(), readings])
             }
         };
+        if setting == Setting::Configuration && written.is_ok() {
+            // What is kept is the device's own: a lease must not end with another one.
+            self.own_configuration = self.configuration;
+        }
         link.count_write(written)
     }
 

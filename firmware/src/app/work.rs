@@ -93,11 +93,13 @@ impl<const ROWS: usize> Work<'_, ROWS> {
     fn count_decoded(&mut self, us: u32, cycles: u32, s: &mut Statistics) {
         let status = cut(&mut self.estimate, self.rows, 0).status;
         let at_rest = status.iter().filter(|status| **status == RowStatus::AtRest);
+        // A row without a reading is not decoded, which takes no time.
+        let is_whole = !status.contains(&RowStatus::MissingReading);
         s.rows_at_rest = s.rows_at_rest.saturating_add(at_rest.count() as u32);
         s.frames_decoded = s.frames_decoded.saturating_add(1);
         s.longest_decode_us = s.longest_decode_us.max(us);
         s.longest_decode_cycles = s.longest_decode_cycles.max(cycles);
-        if s.shortest_decode_cycles == 0 || cycles < s.shortest_decode_cycles {
+        if is_whole && (s.shortest_decode_cycles == 0 || cycles < s.shortest_decode_cycles) {
             s.shortest_decode_cycles = cycles;
         }
     }

@@ -100,13 +100,9 @@ impl Request<'_> {
         matches!(self, Self::Identify | Self::Statistics | Self::Configuration)
     }
 
-    /// Whether it needs no seal on a device with a key: it changes neither estimates nor flash, or is a chunk of an
-    /// upload, whose bytes the seal of the trial covers.
+    /// Whether it needs no seal on a device with a key: it changes neither estimates nor flash.
     pub fn is_free(&self) -> bool {
-        let chunk = matches!(self, Self::Upload(UploadStep::Chunk { .. }));
-        chunk
-            || self.only_asks()
-            || matches!(self, Self::Decode { .. } | Self::Constants | Self::Kept)
+        self.only_asks() || matches!(self, Self::Decode { .. } | Self::Constants | Self::Kept)
     }
 }
 
@@ -131,8 +127,6 @@ pub enum UploadStep<'a> {
     /// Check the blob from end to end, and put it in force on trial if it is sound: until it is confirmed, a restart
     /// brings the previous model back.
     Try {
-        /// SHA-256 of the blob, for a device with a key.
-        sha_256: Option<[u8; 32]>,
         /// Time in ms, at most half an hour, after which the previous model comes back unless the trial is confirmed.
         /// If the step is sent again, this time counts from then on.
         lease_ms: u32,
@@ -370,9 +364,9 @@ pub struct Kept {
 /// A baseline that is kept over restarts. It comes into force if the device scans these wires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeptBaseline {
-    /// Number of row-wires.
+    /// Number of lines of readings.
     pub rows: u8,
-    /// Number of column-wires.
+    /// Number of readings in a line.
     pub columns: u8,
     /// Number of frames that it is the mean of.
     pub frames: u16,
@@ -438,7 +432,7 @@ pub struct HealthReport<'a> {
     pub shorted: u16,
     /// Number of readings above the upper limit.
     pub open: u16,
-    /// Faulty columns: four bytes a row, little-endian, in which bit k is column k.
+    /// Faulty readings: four bytes a line, little-endian, in which bit k is the reading k of the line, from 0.
     pub faulty_columns: &'a [u8],
 }
 

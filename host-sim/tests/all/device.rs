@@ -163,7 +163,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     for (index, bytes) in new.bytes().chunks(512).enumerate() {
         add(&Request::Upload(UploadStep::Chunk { offset: 512 * index as u32, bytes }));
     }
-    add(&Request::Upload(UploadStep::Try { sha_256: None, lease_ms: 60_000 }));
+    add(&Request::Upload(UploadStep::Try { lease_ms: 60_000 }));
     add(&Request::Identify);
     let again = Floats::new(readings[0].as_flattened());
     add(&Request::Decode { frame: 41, readings_ohm: again });

@@ -253,6 +253,9 @@ fn with_a_key_a_device_changes_nothing_without_it() {
     link(&["configure", "--period-us", "7000", "--key", "device.key"], 0, "");
     link(&["undo", "--key", "device.key"], 0, "generation 2");
     link(&["provision", "other.key", "--key", "device.key"], 0, "set");
+    // As if the answer had been lost.
+    link(&["provision", "other.key", "--key", "device.key"], 0, "set");
+    link(&["provision", "device.key", "--key", "device.key"], 1, "another key");
     link(&["undo", "--key", "device.key"], 1, "another key");
     link(&["undo", "--key", "other.key"], 0, "generation 3");
     let mut device = rig.device();

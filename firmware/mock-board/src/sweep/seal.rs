@@ -25,7 +25,7 @@ const LAST: u64 = 40_000;
 fn with_request<T>(turn: u64, head: &[u8], attack: impl FnOnce(&Request<'_>) -> T) -> T {
     let ohm = [60.0_f32; 6];
     let readings_ohm = Floats::new(&ohm);
-    attack(&match turn % 13 {
+    attack(&match turn % 14 {
         0 => configure(quiet()),
         1 => Request::SetBaseline { readings_ohm },
         2 => Request::CaptureBaseline { frames: 1 },
@@ -37,7 +37,8 @@ fn with_request<T>(turn: u64, head: &[u8], attack: impl FnOnce(&Request<'_>) -> 
         8 => Request::Provision { key: [9; KEY_BYTES] },
         9 => Request::Upload(UploadStep::Abort),
         10 => Request::Upload(UploadStep::Confirm),
-        11 => Request::Upload(UploadStep::Try { sha_256: None, lease_ms: 60_000 }),
+        11 => Request::Upload(UploadStep::Try { lease_ms: 60_000 }),
+        12 => Request::Upload(UploadStep::Chunk { offset: 0, bytes: head }),
         _ => Request::Upload(UploadStep::Begin { head }),
     })
 }

@@ -1,6 +1,6 @@
 //! Keys of devices, and requests sealed with them.
 
-use firmware::link::message::{KeyState, Report, Request};
+use firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
 use firmware::seal::{Key, tag};
 use taxel_data::BadValue;
 
@@ -88,13 +88,24 @@ impl<W: Wire> Device<W> {
 
     /// Sets the device's key. The first one needs somebody at the board; another one replaces it, sealed by the one before.
     pub fn provision(&mut self, key: &Key) -> Result<()> {
-        let request = Request::Provision { key: *key };
-        let timeout = WRITING.max(self.patience);
-        let answer = self
-            .ask(&request, timeout, |report| matches!(report, Report::Provisioned).then_some(()));
-        answer?.map_err(Error::Refused)?;
+        let mut answer = self.ask_to_provision(key)?;
+        if answer == Err(Refusal::Seal(SealFault::Forged)) {
+            // The answer was lost, and the old key counts no more. The key that is in force already needs no seal.
+            let old = self.key.take();
+            if self.ask_to_provision(key)?.is_ok() {
+                answer = Ok(());
+            }
+            self.key = old;
+        }
+        answer.map_err(Error::Refused)?;
         self.key = Some(*key);
         Ok(())
+    }
+
+    fn ask_to_provision(&mut self, key: &Key) -> Result<std::result::Result<(), Refusal>> {
+        let request = Request::Provision { key: *key };
+        let timeout = WRITING.max(self.patience);
+        self.ask(&request, timeout, |report| matches!(report, Report::Provisioned).then_some(()))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use serialport::SerialPort;
+use serialport::{ClearBuffer, SerialPort};
 
 use super::Wire;
 use crate::error::{Error, Result};
@@ -13,9 +13,12 @@ impl Wire for Box<dyn SerialPort> {
     }
 }
 
-/// Opens `port` with 8 data bits, no parity, 1 stop bit.
+/// Opens `port` with 8 data bits, no parity, 1 stop bit. What came before anybody listened is dropped: the system's buffer
+/// was full at some time, and the reports in it are cut.
 pub fn open(port: &str, baud: u32) -> Result<Box<dyn SerialPort>> {
-    serialport::new(port, baud).open().map_err(|cause| {
+    let opened = serialport::new(port, baud).open();
+    let cleared = opened.and_then(|port| port.clear(ClearBuffer::Input).map(|()| port));
+    cleared.map_err(|cause| {
         let ports = serialport::available_ports().unwrap_or_default();
         let names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
         let known = if names.is_empty() {

@@ -3,7 +3,6 @@
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{EstimateReport, Refusal, Report, Request, UploadState, UploadStep};
-use firmware::seal::sha_256;
 use model_core::blob::{Floats, Model};
 use taxel_data::progress::Progress;
 
@@ -73,11 +72,7 @@ pub fn send<W: Wire>(
         answer = step(device, UploadStep::Chunk { offset, bytes })?;
         progress.step();
     }
-    if answer.is_err() {
-        Ok(answer)
-    } else {
-        step(device, UploadStep::Try { sha_256: Some(sha_256(blob)), lease_ms: TRIAL_MS })
-    }
+    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Try { lease_ms: TRIAL_MS }) }
 }
 
 /// Uploads `blob` and makes it the active model, on trial, and checks that the device decodes with it. Until
@@ -174,7 +169,7 @@ pub fn see_frames<W: Wire>(device: &mut Device<W>) -> Result<()> {
 
 /// Lets the trial that is going on last for so many `minutes` from now on.
 pub fn prolong_trial<W: Wire>(device: &mut Device<W>, minutes: u32) -> Result<()> {
-    let again = UploadStep::Try { sha_256: None, lease_ms: 60_000 * minutes };
+    let again = UploadStep::Try { lease_ms: 60_000 * minutes };
     match step(device, again)?.map_err(Error::Refused)? {
         UploadState::OnTrial { .. } => Ok(()),
         other => Err(unexpected("a longer trial", other)),

@@ -88,6 +88,12 @@ impl VirtualBoard {
             );
             return Err(BadValue::new("sensor", wires, rule));
         }
+        if !sensor.column_numbers().eq(0..sensor.column_wires) {
+            // The columns that are not read load the rows too.
+            let columns = format!("{} of the sensor's", sensor.column_wires);
+            let rule = "the virtual board holds the whole sensor; leave this out";
+            return Err(BadValue::new("readout.column_wires", columns, rule));
+        }
         let columns = match readout.sampler.unwrap_or_default() {
             Sampler::Mcp3208 => None,
             Sampler::OnChip => Some(ColumnSelector::new()),

@@ -322,6 +322,9 @@ fn a_smaller_sensor_and_some_of_its_rows_are_read_alone() {
     let wide = Sensor { row_wires: 9, ..World::press().sensor };
     let refused = VirtualBoard::new(&World { sensor: wide, ..World::press() }).unwrap_err();
     assert!(refused.to_string().contains("parts for 8 and 18"), "{refused}");
+    let part = World::press().sensor.with_columns(&[2, 8, 14]);
+    let refused = VirtualBoard::new(&World { sensor: part, ..World::press() }).unwrap_err();
+    assert!(refused.to_string().contains("readout.column_wires"), "{refused}");
 }
 
 #[test]

@@ -26,6 +26,9 @@ pub struct RecordArguments {
     /// MODEL has been recalibrated since: one of the same columns and scene is active.
     #[arg(long, requires = "model")]
     recalibrated: bool,
+    /// Save the readings that MODEL takes, not its estimates.
+    #[arg(long, requires = "model", conflicts_with = "confidence")]
+    readings: bool,
     #[command(flatten)]
     scan: ScanArguments,
     /// Relative change within which a row counts as untouched and is not decoded, once the device has a
@@ -59,6 +62,9 @@ pub struct BaselineArguments {
 #[derive(Serialize)]
 struct Saved {
     frames: usize,
+    /// Frames a second that the device scanned: fewer than it was asked for if it misses some, such as those that the line
+    /// cannot carry. `None` for a baseline.
+    frames_per_s: Option<f64>,
     /// Frame numbers missing between the first frame and the last: lost on the line.
     frames_lost: u32,
     /// Readings or outputs that are empty.
@@ -79,9 +85,21 @@ pub fn record<W: Wire>(
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     print::check_output(&action.output, &inputs)?;
     let identity = device.identify()?;
+    let model = model.as_ref().map(ModelBlob::parse);
+    if let Some(model) = &model {
+        let is_it = if action.recalibrated {
+            identity.is_made_of(model)
+        } else {
+            identity.has_in_force(model.crc())
+        };
+        check_active(model, is_it, &identity)?;
+    }
     let (wanted, mut names) = match &model {
-        Some(model) => (Wanted::Estimates, output_names(model, &identity, action.recalibrated)?),
-        None => (Wanted::Readings, reading_names(&identity, None)?),
+        Some(model) if !action.readings => {
+            let names = model.metadata().output_names.iter().map(String::from).collect();
+            (Wanted::Estimates, names)
+        }
+        _ => (Wanted::Readings, reading_names(&identity, model.as_ref())?),
     };
     let values = names.len();
     if let Some(model) = &model {
@@ -100,25 +118,23 @@ pub fn record<W: Wire>(
     let lines = frames.iter().map(|frame| frame.values.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let ends = frames.last().zip(frames.first());
-    let span = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number) + 1);
-    let frames_lost = span.saturating_sub(frames.len() as u32);
+    let steps = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number));
+    let frames_lost = (steps + 1).saturating_sub(frames.len() as u32);
+    let elapsed_us = ends.map_or(0, |(last, first)| last.start_us - first.start_us);
+    let frames_per_s = (elapsed_us > 0).then(|| f64::from(steps) / (elapsed_us as f64 * 1e-6));
     let frames_novel = frames.iter().filter(|frame| frame.novel).count();
     let file = action.output.clone();
     let (frames, values_missing) = (frames.len(), missing);
-    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, frames_novel, file }, common)
-}
-
-/// Names of the model's outputs, if it is the active one, or was before it was `recalibrated`.
-fn output_names(
-    model: &ModelBlob,
-    identity: &DeviceIdentity,
-    recalibrated: bool,
-) -> Result<Vec<String>> {
-    let model = model.parse();
-    let is_it =
-        if recalibrated { identity.is_made_of(&model) } else { identity.has_in_force(model.crc()) };
-    check_active(&model, is_it, identity)?;
-    Ok(model.metadata().output_names.iter().map(String::from).collect())
+    let saved = Saved {
+        frames,
+        frames_per_s,
+        frames_lost,
+        values_missing,
+        rows_at_rest,
+        frames_novel,
+        file,
+    };
+    saved.print(common)
 }
 
 /// Checks that a model `is_active` on the device.
@@ -135,14 +151,14 @@ fn check_active(model: &Model<'_>, is_active: bool, identity: &DeviceIdentity) -
 
 /// Names of the columns for what is `wanted` of the model's confidence, beside those of its `outputs`.
 fn confidence_names(
-    model: &ModelBlob,
+    model: &Model<'_>,
     wanted: Confidence,
     outputs: &[String],
 ) -> Result<Vec<String>> {
     if wanted == Confidence::Nothing {
         return Ok(Vec::new());
     }
-    if model.parse().confidence().is_none() {
+    if model.confidence().is_none() {
         return Err(Error::Usage(
             "--confidence: MODEL has none; leave the option out, or train one that has".into(),
         ));
@@ -190,27 +206,40 @@ pub fn baseline<W: Wire>(
     let lines = std::iter::once(readings.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let file = action.output.clone();
-    let (frames, frames_lost, rows_at_rest, frames_novel) = (frames.into(), 0, 0, 0);
-    saved(&Saved { frames, frames_lost, values_missing, rows_at_rest, frames_novel, file }, common)
+    let saved = Saved {
+        frames: frames.into(),
+        frames_per_s: None,
+        frames_lost: 0,
+        values_missing,
+        rows_at_rest: 0,
+        frames_novel: 0,
+        file,
+    };
+    saved.print(common)
 }
 
-fn saved(saved: &Saved, common: &Common) -> Result<()> {
-    if common.json {
-        return print::json(saved);
+impl Saved {
+    fn print(&self, common: &Common) -> Result<()> {
+        if common.json {
+            return print::json(self);
+        }
+        let mut page = print::Page::default();
+        page.line(format_args!(
+            "{} frames in {}, {} lost on the line, {} values missing",
+            self.frames,
+            self.file.display(),
+            self.frames_lost,
+            self.values_missing
+        ));
+        if let Some(rate) = self.frames_per_s {
+            page.line(format_args!("{rate:.1} frames a second were scanned"));
+        }
+        if self.rows_at_rest > 0 {
+            page.line(format_args!("{} rows were untouched, and not decoded", self.rows_at_rest));
+        }
+        if self.frames_novel > 0 {
+            page.line(format_args!("{} frames were unlike those of training", self.frames_novel));
+        }
+        page.print()
     }
-    let mut page = print::Page::default();
-    page.line(format_args!(
-        "{} frames in {}, {} lost on the line, {} values missing",
-        saved.frames,
-        saved.file.display(),
-        saved.frames_lost,
-        saved.values_missing
-    ));
-    if saved.rows_at_rest > 0 {
-        page.line(format_args!("{} rows were untouched, and not decoded", saved.rows_at_rest));
-    }
-    if saved.frames_novel > 0 {
-        page.line(format_args!("{} frames were unlike those of training", saved.frames_novel));
-    }
-    page.print()
 }

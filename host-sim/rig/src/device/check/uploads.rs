@@ -117,8 +117,7 @@ fn break_uploads_off<W: Wire>(
         }
         let is_tried = taken > chunks.len();
         if is_tried {
-            upload::step(device, UploadStep::Try { sha_256: None, lease_ms: 60_000 })?
-                .map_err(Error::Refused)?;
+            upload::step(device, UploadStep::Try { lease_ms: 60_000 })?.map_err(Error::Refused)?;
         }
         let before = device.identify()?.has_in_force(crc_32) != is_tried;
         device.restart()?;
@@ -217,7 +216,7 @@ fn upload_with_a_chunk_lost<W: Wire>(
             return Ok(false);
         }
     }
-    Ok(upload::step(device, UploadStep::Try { sha_256: None, lease_ms: 60_000 })?.is_err())
+    Ok(upload::step(device, UploadStep::Try { lease_ms: 60_000 })?.is_err())
 }
 
 #[cfg(test)]
