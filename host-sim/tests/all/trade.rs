@@ -377,38 +377,41 @@ fn chosen_columns_are_judged_beside_what_can_be_told_from_these_alone() {
 fn a_choice_of_columns_tells_how_to_use_it_and_what_the_line_carries() {
     let folder = Folder::new("trade-columns");
     let scene = include_str!("../../../scenes/press.toml")
+        .replace("name = \"press\"", "name = \"few\"")
         .replace("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]")
         .replace("frames = 20000", "frames = 400")
         .replace("test_frames = 8000", "test_frames = 100");
     folder.write("few.toml", scene);
     let few = ["trade", "few.toml", "--no-refine", "--centres", "16", "--output-rank", "none"];
-    let rate = |hz| [&few[..], &["--gate", "none", "--frame-rate", hz]].concat();
-    let page = folder.succeed(&rate("1000"));
+    let ask = |hz, steps| {
+        [&few[..], &["--gate", "none", "--frame-rate", hz, "--column-step", steps]].concat()
+    };
+    let page = folder.succeed(&ask("1300", "1,3"));
     assert!(page.lines().all(|line| line.chars().count() <= 120), "{page}");
     for words in [
-        "for 2 rows and `cols` columns",
+        "for 2 × `cols` wires)",
         "\ncols: ",
         "\nin a scene, below [readout]: column_wires = [2, 5, 8, 11, 14, 17]\n",
-        "\non a device: host-sim link PORT configure --period-us 1000\n",
+        "\non a device: host-sim link PORT configure --period-us 769\n",
         "With 6 columns: Least possible RMSE",
     ] {
         assert!(page.contains(words), "{words}: {page}");
     }
-    // 36 outputs of 4 bytes, and some 22 bytes around them.
+    // 36 outputs of 4 bytes, and some 25 bytes around them.
     let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("carries at most 552 estimates a second: 167 bytes each"), "{words}");
-    assert!(words.contains("For 1000 a second decode fewer outputs (axes of"), "{words}");
+    assert!(words.contains("carries at most 545 estimates a second: 169 bytes each"), "{words}");
+    assert!(words.contains("For 1300 a second decode fewer outputs (axes of"), "{words}");
     let html = std::fs::read_to_string(folder.path("out/few/trade.html")).unwrap();
     assert!(html.contains("columns</th>") && html.contains(">K 16, 6 columns<"), "{html}");
     assert!(html.contains("With 18 columns: best linear decoder "), "{html}");
 
     // Files of an earlier run stay where nothing was trained.
-    let refused = folder.fail(&rate("3000"), 2);
-    assert!(refused.contains("fewer columns are faster: try --column-step 18"), "{refused}");
+    let refused = folder.fail(&ask("3000", "1,3"), 2);
+    assert!(refused.contains("fewer columns are faster: try --column-step 9"), "{refused}");
     assert!(folder.path("out/few/chosen.bin").exists());
-    let refused = folder.fail(&rate("1e6"), 2);
+    let refused = folder.fail(&ask("1e6", "1,3"), 2);
     assert!(refused.contains("lower the bound") && !refused.contains("--column-step"), "{refused}");
-    let page = folder.succeed(&[&rate("100")[..], &["--column-step", "18"]].concat());
+    let page = folder.succeed(&ask("100", "18"));
     assert!(page.contains(", 1 column.") && !page.contains("decode fewer outputs"), "{page}");
 }
 

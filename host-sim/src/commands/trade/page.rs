@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::evaluate::trade::{Memory, Point, Trade};
+use crate::evaluate::trade::{Memory, Point, Trade, Wires};
 
 use crate::commands::print::{Page, wrapped};
 
@@ -95,10 +95,13 @@ fn legend(trade: &Trade, all: bool) -> String {
         (Some(ms), _) => {
             format!("ms: time of a frame, scan ({ms} ms a sample, as given) and decoding")
         }
-        (None, Some(wires)) => format!(
-            "ms: time of a frame, scan (by the board's plan for {} rows and `cols` columns) and decoding",
-            wires.rows
-        ),
+        (None, Some(Wires { rows, columns })) => {
+            let is_same = trade.readings.iter().all(|readings| readings.wires == wires);
+            let columns = if is_same { columns.to_string() } else { "`cols`".into() };
+            format!(
+                "ms: time of a frame, scan (by the board's plan for {rows} × {columns} wires) and decoding"
+            )
+        }
         (None, None) => {
             "ms: time of decoding a frame alone; the scan's is unknown (--scan-ms)".into()
         }
