@@ -87,6 +87,12 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
         assert_eq!(least, 1.0);
     }
 
+    // Whatever else is averaged has its own limit and linear decoder.
+    let [once, often] = trade.readings.as_slice() else { panic!("{:?}", trade.readings) };
+    assert_eq!([once, often].map(|it| trade.distinction(it)), ["1 sample", "16 samples"]);
+    let errors: Vec<_> = once.references("dz_mm").zip(often.references("dz_mm")).collect();
+    assert!(errors.len() == 3 && errors[1..].iter().all(|(a, b)| b.1 < 0.9 * a.1), "{errors:?}");
+
     // More samples have less error, and 16 bits are as good as 32.
     let find = |kernel: &str, centres, samples| {
         let wanted = |p: &&trade::Point| {
@@ -321,7 +327,7 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
 
     // One network for the array has half of the spread, which 16 bits cannot hold.
     scene.world.read_rows = vec![3, 4];
-    scene.training.spread = 0.500123;
+    scene.training.spread = 0.500_123;
     let narrow = compute_plan(&scene, &plan, Bounds::default()).unwrap();
     assert!(
         narrow

@@ -168,10 +168,11 @@ impl Trade {
 
     /// What tells these readings from the others of the trade, such as `6 columns, 4 samples`; empty if nothing does.
     pub fn distinction(&self, readings: &Readings) -> String {
-        let several = |differ: &dyn Fn(&Readings) -> bool| self.readings.iter().any(differ);
-        let columns = readings.columns().filter(|_| several(&|it| it.wires != readings.wires));
-        let samples =
-            if several(&|it| it.samples_averaged != 1) { readings.samples_averaged } else { 1 };
+        let Readings { wires, samples_averaged, .. } = readings;
+        let differ = |by: &dyn Fn(&Readings) -> bool| self.readings.iter().any(by);
+        let columns = readings.columns().filter(|_| differ(&|other| other.wires != *wires));
+        let samples = differ(&|other| other.samples_averaged != *samples_averaged);
+        let samples = samples.then_some(*samples_averaged);
         readings::in_words(columns, samples).trim_start_matches(", ").into()
     }
 

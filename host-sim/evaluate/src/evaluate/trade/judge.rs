@@ -8,7 +8,6 @@ use taxel_learn::train::{
 };
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, Trained, pack};
 
-use super::frames::Frames;
 use super::progress::Part;
 use super::readings::in_words;
 use super::ways::{Variant, Ways};
@@ -72,8 +71,7 @@ impl Judged {
     fn leave_out(&mut self, variant: Variant, ways: &Ways<'_>, cause: &taxel_learn::Error) {
         let of = if ways.inputs.whole_array() { " array" } else { "" };
         let (name, centres) = (variant.format.name(), ways.centres);
-        let Frames { wires, samples_averaged, .. } = ways.frames;
-        let readings = in_words(wires.map(|wires| wires.columns), *samples_averaged);
+        let readings = in_words(ways.frames.wires.map(|wires| wires.columns), None);
         let cause = match cause {
             taxel_learn::Error::Setting(bad) if bad.field == "spread" => {
                 let spread =

@@ -106,7 +106,8 @@ impl Point {
     /// Settings of the point in a few words.
     pub fn name(&self) -> String {
         let tail = if self.affine_tail { " + tail" } else { "" };
-        let readings = in_words(self.columns, self.samples_averaged);
+        let samples = Some(self.samples_averaged).filter(|samples| *samples > 1);
+        let readings = in_words(self.columns, samples);
         let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
         let rank = self.output_rank.map_or(String::new(), |rank| format!(", rank {rank}"));
         format!("{}, K = {}{rank}{tail}{readings}{gate}", self.way(), self.centres)

@@ -65,15 +65,12 @@ impl Readings {
     }
 }
 
-/// Numbers of columns and samples in words, each behind a comma; one sample goes without saying.
-pub(super) fn in_words(columns: Option<usize>, samples: usize) -> String {
-    let columns = match columns {
+/// Numbers of columns and samples in words, as far as they are told, each behind a comma.
+pub(super) fn in_words(columns: Option<usize>, samples: Option<usize>) -> String {
+    let counted = |number: Option<usize>, name| match number {
         None => String::new(),
-        Some(1) => ", 1 column".into(),
-        Some(columns) => format!(", {columns} columns"),
+        Some(1) => format!(", 1 {name}"),
+        Some(number) => format!(", {number} {name}s"),
     };
-    match samples {
-        1 => columns,
-        samples => format!("{columns}, {samples} samples"),
-    }
+    counted(columns, "column") + &counted(samples, "sample")
 }
