@@ -339,6 +339,9 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
         trade.points.iter().filter(|p| p.whole_array && p.arithmetic.name() == name).count()
     };
     assert!(!narrow.left_out.is_empty() && of_array(&narrow, "fixed16") == 0);
+    assert!(
+        narrow.left_out[0].ends_with("spread (in a scene's [training], or by `train --spread`)")
+    );
     // With a tail and without, of full rank and of rank 4.
     assert!(of_array(&narrow, "f32-direct") == 4);
 }
@@ -406,7 +409,7 @@ fn a_choice_of_columns_tells_how_to_use_it_and_what_the_line_carries() {
     // 36 outputs of 4 bytes, and some 25 bytes around them.
     let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(words.contains("carries at most 545 estimates a second: 169 bytes each"), "{words}");
-    assert!(words.contains("For 1300 a second decode fewer outputs (axes of"), "{words}");
+    assert!(words.contains("For 1300 a second decode fewer outputs (axes of a scene"), "{words}");
     let html = std::fs::read_to_string(folder.path("out/few/trade.html")).unwrap();
     assert!(html.contains("columns</th>") && html.contains(">K 16, 6 columns<"), "{html}");
     assert!(html.contains("With 18 columns: best linear decoder "), "{html}");

@@ -183,14 +183,9 @@ impl Trade {
             "The board's serial line carries at most {estimates_per_s:.0} estimates a second: {estimate_bytes} bytes each, \
              at {baud} baud."
         );
-        // Only measured data says how test frames were chosen.
-        let fewer = match self.test_choice {
-            None => "axes of the scene's [outputs]",
-            Some(_) => "such as --outputs '*_dz_mm'",
-        };
         match self.bounds.frame_rate_hz {
             Some(asked) if asked > estimates_per_s => format!(
-                "{carries} For {asked} a second decode fewer outputs ({fewer}), or use the estimates on the device."
+                "{carries} For {asked} a second decode fewer outputs (axes of a scene's [outputs], or --outputs '*_dz_mm' of a CSV file), or use the estimates on the device."
             ),
             _ => carries,
         }

@@ -60,12 +60,6 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     for note in &trade.left_out {
         wrapped(&mut page, &format!("left out: {note}"));
     }
-    if trade.left_out.iter().any(|note| note.contains("spread = ")) {
-        page.line(match trade.test_choice {
-            None => "another spread is set in the scene, below [training]",
-            Some(_) => "`host-sim train --spread` takes another spread",
-        });
-    }
     if !all && trade.points.len() > shown.len() {
         let more = trade.points.len() - shown.len();
         page.line(format_args!("{more} more points with --all, and in trade.csv"));

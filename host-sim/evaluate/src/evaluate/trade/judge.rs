@@ -67,7 +67,7 @@ impl Judged {
         Ok(())
     }
 
-    /// Notes why a format cannot hold a network of these settings. What to do about it depends on the subject.
+    /// Notes why a format cannot hold a network of these settings.
     fn leave_out(&mut self, variant: Variant, ways: &Ways<'_>, cause: &taxel_learn::Error) {
         let of = if ways.inputs.whole_array() { " array" } else { "" };
         let (name, centres) = (variant.format.name(), ways.centres);
@@ -76,8 +76,9 @@ impl Judged {
             taxel_learn::Error::Setting(bad) if bad.field == "spread" => {
                 let spread =
                     bad.value.parse::<f64>().map_or(f64::NAN, |it| (it * 1e4).round() / 1e4);
-                let why = bad.rule.split(';').next().unwrap_or_default();
-                format!("spread = {spread}: {why}")
+                let where_to = " (in a scene's [training], or by `train --spread`)";
+                let rule = bad.rule.replace(", or another format (f32)", where_to);
+                format!("spread = {spread}: {rule}")
             }
             cause => cause.to_string(),
         };
