@@ -4,9 +4,9 @@ use std::cmp::Ordering;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use crate::error::Bounded;
+use crate::error::{Bounded, NoPoint};
 use crate::evaluate::gate::{self, RECOMMENDED_K};
-use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan};
+use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan, Wires};
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::{Args, ValueEnum};
@@ -131,6 +131,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         latency_ms: arguments.max_latency_ms,
     };
     bounds.check().map_err(|bad| of_option(bad, &OPTIONS))?;
+    let refused = |cause: &NoPoint| match wider_step(cause, &subject, &plan) {
+        Some(step) => Error::Usage(format!(
+            "{}; fewer columns are faster: try --column-step {step}",
+            cause.text(option)
+        )),
+        None => Error::Usage(cause.text(option)),
+    };
     let folder = arguments.output.join(subject.name());
     files::FILES.check(&folder, &arguments.subject.paths())?;
     let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
@@ -140,7 +147,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             Error::Usage(format!("training takes {}, more than 8 GB: {fix}", bad.value))
         }
         Error::Data(taxel_data::Error::Setting(bad)) => of_option(bad, &OPTIONS),
-        Error::NoPoint(cause) => Error::Usage(cause.text(option)),
+        Error::NoPoint(cause) => refused(&cause),
         other => other,
     })?;
     let choice = trade.choose(&bounds);
@@ -151,7 +158,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         page::of(&trade, arguments.all, &folder).print()?;
     }
     // Measurements are kept and shown even if no point is within the bounds.
-    choice.map_err(|cause| Error::Usage(cause.text(option)))
+    choice.map_err(|cause| refused(&cause))
 }
 
 /// The command that is running, as it can be typed again.
@@ -284,6 +291,26 @@ fn column_steps(arguments: &Arguments, subject: &Subject) -> Result<Vec<usize>> 
         }
         _ => Ok(vec![1]),
     }
+}
+
+/// Least step of columns beyond those of the plan, into equal parts, whose scan is shorter than bounds on time that no point meets.
+fn wider_step(cause: &NoPoint, subject: &Subject, plan: &Plan) -> Option<usize> {
+    let NoPoint::Each { unmet, .. } = cause else { return None };
+    let Subject::Scene(scene) = subject else { return None };
+    let most_ms = unmet.iter().filter_map(|unmet| match unmet.bounded {
+        Bounded::FrameRate => Some(1000.0 / unmet.bound),
+        Bounded::Latency => Some(unmet.bound),
+        _ => None,
+    });
+    let most_ms = most_ms.reduce(f64::min).filter(|_| plan.device.scan_ms.is_none())?;
+    let (tried, samples) = (plan.column_steps.last()?, plan.samples_averaged.first()?);
+    let all = scene.world.sensor.column_wires;
+    (tried + 1..=all).filter(|step| all.is_multiple_of(*step)).find(|step| {
+        let subject = subject.with_every_column(*step);
+        let columns = subject.scene().map_or(0, |scene| scene.world.sensor.column_wires);
+        let wires = Wires { rows: scene.world.read_rows.len(), columns };
+        plan.device.scan_ms(Some(wires), *samples).is_some_and(|scan_ms| scan_ms < most_ms)
+    })
 }
 
 /// Ranks that are asked for, in order; networks that compute all outputs there are always.

@@ -6,7 +6,6 @@ use super::format::{fixed, grouped, percent, significant, symbol};
 use super::html::document;
 use super::svg::{escape, standalone};
 use taxel_evaluate::evaluate::trade::{Memory, Trade};
-use taxel_evaluate::metrics::LimitSummary;
 
 mod scales;
 mod labels;
@@ -59,7 +58,6 @@ pub fn html(trade: &Trade, command: &str) -> String {
         symbol(&trade.group),
         hidden_bounds(trade),
     );
-    let note = trade.limit.as_ref().map_or(String::new(), LimitSummary::note);
     let _ = write!(
         body,
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> The Pareto front, from fast to slow. \
@@ -69,7 +67,7 @@ pub fn html(trade: &Trade, command: &str) -> String {
          <p class=\"note\">Made by <code>{}</code></p>\n",
         grouped(trade.points.len()),
         table::of_front(trade),
-        escape(&note),
+        escape(&references(trade)),
         escape(&trade.compiler),
         scan(trade),
         escape(command),
@@ -109,10 +107,25 @@ fn answer(trade: &Trade) -> String {
     fact("Decoding", significant(1000.0 * times.decode_ms, 3), "µs");
     fact("Blob", significant(point.blob_bytes as f64 / 1000.0, 3), "kB");
     html += "</dl>\n";
-    for warning in &verdict.warnings {
-        let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(&warning.to_string()));
+    let warnings = verdict.warnings.iter().map(ToString::to_string);
+    for note in std::iter::once(trade.line_note()).chain(warnings) {
+        let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(&note));
     }
     html + "</section>\n"
+}
+
+/// Errors to compare with, and what they are of if readings differ.
+fn references(trade: &Trade) -> String {
+    let others = trade.readings.iter().filter(|_| trade.readings.len() > 1).map(|readings| {
+        let all = readings.references(&trade.group).skip(1);
+        let all = all.map(|(name, rmse)| format!("{name} {}", words::error(trade, rmse)));
+        format!(" With {}: {}.", trade.distinction(readings), all.collect::<Vec<_>>().join(", "))
+    });
+    let main = trade.main_readings();
+    match trade.distinction(main) {
+        of if of.is_empty() => main.limit.note(),
+        of => format!("With {of}: {}{}", main.limit.note(), others.collect::<String>()),
+    }
 }
 
 /// Bounds that the picture cannot show.
@@ -131,14 +144,13 @@ fn hidden_bounds(trade: &Trade) -> String {
 
 /// Where the time of a scan comes from.
 fn scan(trade: &Trade) -> String {
-    match (trade.device.scan_ms, trade.wires) {
+    match (trade.device.scan_ms, trade.main_readings().wires) {
         (Some(ms), _) => {
             format!("The time of a scan was given: {ms} ms for each sample of a reading.")
         }
         (None, Some(wires)) => format!(
-            "The time of a scan is computed from the board’s firmware, for {} × {} wires; the emulated board takes about an \
-             eighth longer.",
-            wires.rows, wires.columns
+            "The time of a scan is computed from the board’s firmware for {} rows, within 3 % of the emulated board.",
+            wires.rows
         ),
         (None, None) => "The time of a scan is unknown.".into(),
     }

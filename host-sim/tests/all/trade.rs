@@ -87,6 +87,12 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
         assert_eq!(least, 1.0);
     }
 
+    // Whatever else is averaged has its own limit and linear decoder.
+    let [once, often] = trade.readings.as_slice() else { panic!("{:?}", trade.readings) };
+    assert_eq!([once, often].map(|it| trade.distinction(it)), ["1 sample", "16 samples"]);
+    let errors: Vec<_> = once.references("dz_mm").zip(often.references("dz_mm")).collect();
+    assert!(errors.len() == 3 && errors[1..].iter().all(|(a, b)| b.1 < 0.9 * a.1), "{errors:?}");
+
     // More samples have less error, and 16 bits are as good as 32.
     let find = |kernel: &str, centres, samples| {
         let wanted = |p: &&trade::Point| {
@@ -321,15 +327,101 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
 
     // One network for the array has half of the spread, which 16 bits cannot hold.
     scene.world.read_rows = vec![3, 4];
-    scene.training.spread = 0.5;
+    scene.training.spread = 0.500_123;
     let narrow = compute_plan(&scene, &plan, Bounds::default()).unwrap();
-    assert!(narrow.left_out.iter().all(|note| note.starts_with("fixed16 array, K = 20: ")));
+    assert!(
+        narrow
+            .left_out
+            .iter()
+            .all(|note| note.starts_with("fixed16 array, K = 20, 18 columns: spread = 0.2501: "))
+    );
     let of_array = |trade: &Trade, name: &str| {
         trade.points.iter().filter(|p| p.whole_array && p.arithmetic.name() == name).count()
     };
     assert!(!narrow.left_out.is_empty() && of_array(&narrow, "fixed16") == 0);
+    assert!(
+        narrow.left_out[0].ends_with("spread (in a scene's [training], or by `train --spread`)")
+    );
     // With a tail and without, of full rank and of rank 4.
     assert!(of_array(&narrow, "f32-direct") == 4);
+}
+
+#[test]
+fn chosen_columns_are_judged_beside_what_can_be_told_from_these_alone() {
+    let mut scene = press();
+    scene.world.read_rows = vec![3];
+    scene.training.frames = 600;
+    let chosen = |column_steps: &[usize]| Plan {
+        centres: vec![16],
+        output_ranks: vec![],
+        column_steps: column_steps.to_vec(),
+        samples_averaged: vec![1],
+        gate_k: vec![],
+        device: Device::default(),
+    };
+    let trade = compute_plan(&scene, &chosen(&[1, 3]), Bounds::default()).unwrap();
+    let columns = [2, 5, 8, 11, 14, 17];
+    scene.world.sensor = scene.world.sensor.with_columns(&columns.map(|column| column - 1));
+    let alone = compute_plan(&scene, &chosen(&[1]), Bounds::default()).unwrap();
+    let [all, few] = trade.readings.as_slice() else { panic!("{:?}", trade.readings) };
+    assert_eq!(
+        (all.column_wires.as_deref(), few.column_wires.as_deref()),
+        (None, Some(&columns[..]))
+    );
+    assert_eq!(few, &alone.readings[0]);
+    assert_eq!([trade.distinction(few), alone.distinction(few)], ["6 columns", ""]);
+    let errors =
+        |of: &trade::Readings| -> Vec<f64> { of.references("dz_mm").map(|it| it.1).collect() };
+    let ([mean, linear, least], few) = (<[f64; 3]>::try_from(errors(all)).unwrap(), errors(few));
+    assert!(few[0] == mean && few[1] > linear && few[2] > 1.1 * least, "{few:?}");
+    // Each point is judged as in a scene that reads these columns.
+    let places = (0..trade.points.len()).filter(|i| trade.points[*i].columns == Some(6));
+    for (place, of_scene) in places.zip(0..) {
+        assert_eq!(trade.points[place].name(), alone.points[of_scene].name());
+        assert_eq!(trade.verdict_on(place), alone.verdict_on(of_scene));
+    }
+}
+
+#[test]
+fn a_choice_of_columns_tells_how_to_use_it_and_what_the_line_carries() {
+    let folder = Folder::new("trade-columns");
+    let scene = include_str!("../../../scenes/press.toml")
+        .replace("name = \"press\"", "name = \"few\"")
+        .replace("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]")
+        .replace("frames = 20000", "frames = 400")
+        .replace("test_frames = 8000", "test_frames = 100");
+    folder.write("few.toml", scene);
+    let few = ["trade", "few.toml", "--no-refine", "--centres", "16", "--output-rank", "none"];
+    let ask = |hz, steps| {
+        [&few[..], &["--gate", "none", "--frame-rate", hz, "--column-step", steps]].concat()
+    };
+    let page = folder.succeed(&ask("1300", "1,3"));
+    assert!(page.lines().all(|line| line.chars().count() <= 120), "{page}");
+    for words in [
+        "for 2 × `cols` wires)",
+        "\ncols: ",
+        "\nin a scene, below [readout]: column_wires = [2, 5, 8, 11, 14, 17]\n",
+        "\non a device: host-sim link PORT configure --period-us 769\n",
+        "With 6 columns: Least possible RMSE",
+    ] {
+        assert!(page.contains(words), "{words}: {page}");
+    }
+    // 36 outputs of 4 bytes, and some 25 bytes around them.
+    let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("carries at most 545 estimates a second: 169 bytes each"), "{words}");
+    assert!(words.contains("For 1300 a second decode fewer outputs (axes of a scene"), "{words}");
+    let html = std::fs::read_to_string(folder.path("out/few/trade.html")).unwrap();
+    assert!(html.contains("columns</th>") && html.contains(">K 16, 6 columns<"), "{html}");
+    assert!(html.contains("With 18 columns: best linear decoder "), "{html}");
+
+    // Files of an earlier run stay where nothing was trained.
+    let refused = folder.fail(&ask("3000", "1,3"), 2);
+    assert!(refused.contains("fewer columns are faster: try --column-step 9"), "{refused}");
+    assert!(folder.path("out/few/chosen.bin").exists());
+    let refused = folder.fail(&ask("1e6", "1,3"), 2);
+    assert!(refused.contains("lower the bound") && !refused.contains("--column-step"), "{refused}");
+    let page = folder.succeed(&ask("100", "18"));
+    assert!(page.contains(", 1 column.") && !page.contains("decode fewer outputs"), "{page}");
 }
 
 #[test]
@@ -389,11 +481,14 @@ fn measurements_are_traded_as_they_are() {
     );
     let page = folder.succeed(&[&other[..], &["--scan-ms", "2", "--frame-rate", "400"]].concat());
     assert!(page.contains("(2.000 ms to scan"), "{page}");
-    for (option, value) in [("--average", "4"), ("--scan-ms", "0"), ("--frame-rate", "0")] {
+    let bad =
+        [("--average", "4"), ("--column-step", "3"), ("--scan-ms", "0"), ("--frame-rate", "0")];
+    for (option, value) in bad {
         let output = folder.run(&[&other[..], &[option, value]].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{stderr}");
         assert!(stderr.contains(&format!("{option} {value}: ")), "{stderr}");
+        assert_eq!(stderr.contains("choose --inputs"), option == "--column-step", "{stderr}");
     }
     let gated = folder.fail(&[&other[..], &["--gate", "3"]].concat(), 2);
     assert!(gated.contains("--baseline FILE"), "{gated}");

@@ -10,22 +10,23 @@ use serde::Serialize;
 use taxel_data::progress::Progress;
 use taxel_data::{BadValue, columns};
 use taxel_learn::cost::Prices;
-use taxel_learn::decoders::BASELINES;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{ModelBlob, Options};
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
-use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::metrics::{DecoderErrors, Errors, LimitSummary, Measure};
 use crate::subject::Subject;
 use crate::verdict::Verdict;
 
 mod progress;
 mod device;
+mod line;
 mod choice;
 mod point;
 mod gating;
 mod frames;
+mod readings;
 mod ways;
 mod judge;
 
@@ -34,7 +35,9 @@ use choice::{Offer, SAME_ERROR};
 pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Times, Wires};
 use frames::Frames;
 use judge::Judged;
+pub use line::Line;
 pub use point::{Arithmetic, Point};
+pub use readings::Readings;
 use ways::Ways;
 
 pub use crate::verdict::SLOT_BYTES;
@@ -78,16 +81,12 @@ pub struct Trade {
     /// Compiler of the code whose costs are given.
     pub compiler: String,
     pub device: Device,
-    /// Wires that a scan reads; `None` if the readings are not those of wires.
-    pub wires: Option<Wires>,
+    pub line: Line,
     /// Group of outputs by which front and choice are determined.
     pub group: String,
     pub unit: String,
-    /// Least possible errors with the first number of samples a reading, of a decoder that sees all readings of a frame.
-    /// Ratios to the limit are to that of the point's own number of samples.
-    pub limit: Option<LimitSummary>,
-    /// Errors of the baselines, from one sample a reading.
-    pub decoders: Vec<DecoderErrors>,
+    /// Readings that points decode, for each choice of columns and number of samples.
+    pub readings: Vec<Readings>,
     /// Every point that was judged.
     pub points: Vec<Point>,
     /// Formats that cannot hold a network of some settings, and why.
@@ -143,20 +142,15 @@ impl Trade {
         let of_group = |errors: &[Errors]| -> Vec<Errors> {
             errors.iter().filter(|errors| errors.group == self.group).cloned().collect()
         };
-        let Point { errors, samples_averaged, .. } = &self.points[point];
+        let Point { errors, readings, .. } = &self.points[point];
+        let Readings { decoders, limit, .. } = &self.readings[*readings];
         let network = DecoderErrors { decoder: "network".into(), errors: of_group(errors) };
-        let baselines = self.decoders.iter().map(|baseline| DecoderErrors {
+        let baselines = decoders.iter().map(|baseline| DecoderErrors {
             decoder: baseline.decoder.clone(),
             errors: of_group(&baseline.errors),
         });
         let decoders: Vec<DecoderErrors> = std::iter::once(network).chain(baselines).collect();
-        // The limit is that of the first number of samples.
-        let first = self.points.first().map(|point| point.samples_averaged);
-        let limit = self.limit.as_ref().filter(|_| first == Some(*samples_averaged));
-        let groups = limit.map_or(vec![], |limit| limit.groups.clone());
-        let groups = groups.into_iter().filter(|limit| limit.group == self.group).collect();
-        let limit = LimitSummary { frames: 0, groups, refused: None };
-        let verdict = Verdict::new(&decoders, &limit);
+        let verdict = Verdict::new(&decoders, limit);
         match ModelBlob::of_bytes(self.blob(point)) {
             Ok(blob) => verdict.of_blob(&blob, self.training_frames),
             Err(_) => verdict,
@@ -164,14 +158,42 @@ impl Trade {
         .of_frames(self.outliers.as_ref(), self.test_frames)
     }
 
-    /// Limit of the chosen group with the first number of samples a reading.
-    pub fn limit_rmse(&self) -> Option<f64> {
-        least_error(self.limit.as_ref()?, &self.group).map(|[limit, _]| limit)
+    /// Readings of the chosen point; if none is chosen, of the first.
+    ///
+    /// # Panics
+    /// If there are no readings.
+    pub fn main_readings(&self) -> &Readings {
+        &self.readings[self.chosen.map_or(0, |point| self.points[point].readings)]
+    }
+
+    /// What tells these readings from the others of the trade, such as `6 columns, 4 samples`; empty if nothing does.
+    pub fn distinction(&self, readings: &Readings) -> String {
+        let Readings { wires, samples_averaged, .. } = readings;
+        let differ = |by: &dyn Fn(&Readings) -> bool| self.readings.iter().any(by);
+        let columns = readings.columns().filter(|_| differ(&|other| other.wires != *wires));
+        let samples = differ(&|other| other.samples_averaged != *samples_averaged);
+        let samples = samples.then_some(*samples_averaged);
+        readings::in_words(columns, samples).trim_start_matches(", ").into()
+    }
+
+    /// What the board's line carries, and what helps if that is less than the frames a second that were asked for.
+    pub fn line_note(&self) -> String {
+        let Line { baud, estimate_bytes, estimates_per_s } = self.line;
+        let carries = format!(
+            "The board's serial line carries at most {estimates_per_s:.0} estimates a second: {estimate_bytes} bytes each, \
+             at {baud} baud."
+        );
+        match self.bounds.frame_rate_hz {
+            Some(asked) if asked > estimates_per_s => format!(
+                "{carries} For {asked} a second decode fewer outputs (axes of a scene's [outputs], or --outputs '*_dz_mm' of a CSV file), or use the estimates on the device."
+            ),
+            _ => carries,
+        }
     }
 
     /// Groups of outputs, with their units.
     pub fn groups(&self) -> impl Iterator<Item = (&str, &str)> {
-        let errors = self.decoders.first().map_or(&[][..], |baseline| &baseline.errors);
+        let errors = self.points.first().map_or(&[][..], |point| &point.errors);
         errors.iter().map(|errors| (errors.group.as_str(), errors.unit.as_str()))
     }
 
@@ -193,6 +215,9 @@ impl Trade {
 /// # Errors
 /// [`Error`] for a plan that cannot be carried out, or a subject that cannot be trained; [`Error::NoPoint`] for `bounds`
 /// that nothing can meet, before anything is trained.
+///
+/// # Panics
+/// If the plan has no steps of columns or no numbers of samples.
 pub fn compute(
     subject: &Subject,
     plan: &Plan,
@@ -230,15 +255,15 @@ pub fn compute(
     };
     possible(&vec![0.0; frames.len()])?;
     let measures: Vec<(Measure, LimitSummary)> =
-        each.map(|(subject, samples)| subject.measure(samples, progress)).collect();
+        each.clone().map(|(subject, samples)| subject.measure(samples, progress)).collect();
     let least = |limit| least_error(limit, group).map_or(0.0, |[limit, se]| limit - CERTAIN * se);
     possible(&measures.iter().map(|(_, limit)| least(limit)).collect::<Vec<_>>())?;
 
     progress.stage("train and measure", ways.iter().flatten().map(judge::steps).sum());
     let mut judged = Judged::default();
-    for (ways, (measure, _)) in ways.iter().zip(&measures) {
+    for (place, (ways, (measure, _))) in ways.iter().zip(&measures).enumerate() {
         for ways in ways {
-            judged.add(ways, measure, (&plan.device, &prices), progress)?;
+            judged.add(ways, (place, measure), (&plan.device, &prices), progress)?;
         }
     }
     let Judged { mut points, left_out, blobs, distinct } = judged;
@@ -246,10 +271,11 @@ pub fn compute(
         return Err(Error::failed(format!("no way to decode can be trained: {cause}")));
     }
     compare(&mut points, group);
-    let first = frames.first().zip(measures.first());
-    let baselines = first.map_or(vec![], |(frames, (measure, _))| {
-        let fitted = BASELINES.iter().map(|baseline| baseline.fit(frames.training()));
-        fitted.map(|it| metrics::judge(it.as_ref(), &frames.test, measure)).collect()
+    let outputs = &frames[0].training().outputs.names;
+    let line = Line::new(frames[0].training().rows, outputs.len());
+    let of_frames = each.zip(&frames).zip(measures);
+    let readings = of_frames.map(|(((subject, _), frames), (measure, limit))| {
+        Readings::new(subject, frames, (&measure, limit))
     });
     Ok(Trade {
         subject: subject.name().into(),
@@ -267,11 +293,10 @@ pub fn compute(
         outliers: subject.measurements().map(|data| data.outliers.clone()),
         compiler: prices.compiler,
         device: plan.device,
-        wires: frames.first().and_then(|frames| frames.wires),
+        line,
         group: group.into(),
         unit: unit.into(),
-        limit: measures.into_iter().next().map(|(_, limit)| limit),
-        decoders: baselines,
+        readings: readings.collect(),
         points,
         left_out,
         bounds: Bounds::default(),
@@ -302,14 +327,16 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
     {
         return Err(BadValue::new("average", samples, "the firmware averages 1 to 256 samples"));
     }
-    let columns = match subject {
-        Subject::Scene(scene) => scene.world.sensor.column_wires,
-        Subject::Measured(_) => 1,
+    let (columns, rule) = match subject {
+        Subject::Scene(scene) => {
+            let columns = scene.world.sensor.column_wires;
+            (columns, format!("give steps from 1 to {columns}, the columns of the scene"))
+        }
+        Subject::Measured(_) => {
+            (1, "only a scene has columns to leave out; of a data file, choose --inputs".into())
+        }
     };
     if let Some(step) = plan.column_steps.iter().find(|step| !(1..=columns).contains(*step)) {
-        let rule = format!(
-            "give steps from 1 to {columns}, the columns of the scene; of a data file, choose --inputs instead"
-        );
         return Err(BadValue::new("column-step", step, rule));
     }
     if plan.output_ranks.contains(&0) {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::evaluate::trade::{Memory, Point, Trade};
+use crate::evaluate::trade::{Memory, Point, Trade, Wires};
 
 use crate::commands::print::{Page, wrapped};
 
@@ -44,15 +44,19 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     for i in &shown {
         page.line(line_of(trade, *i));
     }
-    for baseline in &trade.decoders {
-        let rmse = baseline.errors.iter().find(|errors| errors.group == trade.group);
-        let rmse = rmse.map_or(f64::NAN, |errors| errors.rmse);
-        page.line(format_args!("  {:<54} {:>7}", baseline.decoder, error(rmse)));
+    for (place, readings) in trade.readings.iter().enumerate() {
+        // Always predicting the mean is the same whatever is read.
+        for (name, rmse) in readings.references(&trade.group).skip(usize::from(place > 0)) {
+            page.line(format_args!(
+                "  {name:<40} {:>4} {:>3} {:>12}",
+                readings.columns().map_or("-".into(), |columns| columns.to_string()),
+                readings.samples_averaged,
+                error(rmse)
+            ));
+        }
     }
     page.line(format_args!("\n{}", legend(trade, all)));
-    if let Some(limit) = &trade.limit {
-        wrapped(&mut page, &limit.note());
-    }
+    wrapped(&mut page, &limit_note(trade));
     for note in &trade.left_out {
         wrapped(&mut page, &format!("left out: {note}"));
     }
@@ -69,16 +73,29 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     page
 }
 
+/// The limit that ratios of the chosen point are to.
+fn limit_note(trade: &Trade) -> String {
+    let readings = trade.main_readings();
+    match trade.distinction(readings) {
+        of if of.is_empty() => readings.limit.note(),
+        of => format!("With {of}: {}", readings.limit.note()),
+    }
+}
+
 /// Explanation of the columns.
 fn legend(trade: &Trade, all: bool) -> String {
-    let scan = match (trade.device.scan_ms, trade.wires) {
+    let wires = trade.main_readings().wires;
+    let scan = match (trade.device.scan_ms, wires) {
         (Some(ms), _) => {
             format!("ms: time of a frame, scan ({ms} ms a sample, as given) and decoding")
         }
-        (None, Some(wires)) => format!(
-            "ms: time of a frame, scan (by the board's plan for {} × {} wires) and decoding",
-            wires.rows, wires.columns
-        ),
+        (None, Some(Wires { rows, columns })) => {
+            let is_same = trade.readings.iter().all(|readings| readings.wires == wires);
+            let columns = if is_same { columns.to_string() } else { "`cols`".into() };
+            format!(
+                "ms: time of a frame, scan (by the board's plan for {rows} × {columns} wires) and decoding"
+            )
+        }
         (None, None) => {
             "ms: time of decoding a frame alone; the scan's is unknown (--scan-ms)".into()
         }
@@ -90,8 +107,12 @@ fn legend(trade: &Trade, all: bool) -> String {
     let mut lines = vec![
         format!("{scan}, {memory} at {} MHz", trade.device.clock_mhz),
         "cycles: of decoding on a Cortex-M4F, at zero wait and from flash (docs/cycles.md); blob, RAM: bytes".into(),
-        "× limit: RMSE relative to the least possible one with as many samples a reading; avg: samples a reading".into(),
+        "× limit: RMSE relative to the least possible one with as many samples a reading and the same columns".into(),
+        "avg: samples a reading; frames/s: computed on the device, the serial line may carry fewer".into(),
     ];
+    if wires.is_some() {
+        lines.push("cols: column-wires that are read".into());
+    }
     if all {
         lines.push("*: on the Pareto front (RMSE, time of a frame); >: chosen".into());
     } else {
@@ -162,19 +183,31 @@ fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
     let verdict = trade.verdict_on(chosen);
     wrapped(page, &format!("Chosen: {}. {}", point.name(), verdict.sentence));
     wrapped(page, &cost(point));
+    wrapped(page, &trade.line_note());
     for warning in &verdict.warnings {
         wrapped(page, &warning.to_string());
     }
     page.line(format_args!("the blob: {}", folder.join("chosen.bin").display()));
+    if let Some(columns) = &trade.main_readings().column_wires {
+        page.line(format_args!("in a scene, below [readout]: column_wires = {columns:?}"));
+    }
+    let period = period_us(trade, point).map(|us| format!(" --period-us {us}"));
     let oversampling =
         (point.samples_averaged > 1).then(|| format!(" --oversampling {}", point.samples_averaged));
     let tolerance = trade
         .rest_tolerance(chosen)
-        .map(|tolerance| format!(" --rest-tolerance {tolerance}, once it has a baseline"));
-    let options: Vec<String> = oversampling.into_iter().chain(tolerance).collect();
+        .map(|tolerance| format!(" --rest-tolerance {tolerance} (once it has a baseline)"));
+    let options: String = [period, oversampling, tolerance].into_iter().flatten().collect();
     if !options.is_empty() {
-        page.line(format_args!("on a device, `host-sim link`:{}", options.join(";")));
+        page.line(format_args!("on a device: host-sim link PORT configure{options}"));
     }
+}
+
+/// Period of frames in µs to configure: as asked for, or the shortest that the point can keep up with.
+fn period_us(trade: &Trade, point: &Point) -> Option<u64> {
+    let shortest = point.times.scan_ms.map(|_| (1000.0 * point.times.frame_ms).ceil())?;
+    let asked = trade.bounds.frame_rate_hz.map(|hz| (1e6 / hz).floor());
+    Some(asked.unwrap_or(shortest) as u64)
 }
 
 /// What the ends of the front are worth, where nothing is chosen.

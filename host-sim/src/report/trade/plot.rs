@@ -180,16 +180,17 @@ impl Place {
         }
     }
 
-    /// Writes K beside points of the front, as far as there is room: each K once for rows and once for the array.
+    /// Writes K beside points of the front, and what is read if that differs, as far as there is room: once for rows
+    /// and once for the array.
     fn draw_notes(&self, svg: &mut Svg, trade: &Trade, labels: &mut Labels) {
         let mut known = Vec::new();
         for i in trade.front() {
             let point = &trade.points[i];
-            let which = (point.whole_array, point.centres, point.samples_averaged);
+            let which = (point.whole_array, point.centres, point.readings);
             let Some(at) = self.of(trade, point).filter(|_| !known.contains(&which)) else {
                 continue;
             };
-            if labels.beside(svg, at, &format!("K {}", point.centres), "note-in-chart") {
+            if labels.beside(svg, at, &words::brief(trade, point), "note-in-chart") {
                 known.push(which);
             }
         }

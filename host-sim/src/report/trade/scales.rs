@@ -1,10 +1,7 @@
 //! Axes of the picture: time of a frame against error, both logarithmic.
 
-use taxel_learn::decoders::{linear, mean};
-
 use crate::report::axes::Axis;
 use crate::report::format::{grouped, significant, symbol};
-use crate::report::tables;
 use crate::report::ticks::{self, Ticks, extent};
 use taxel_evaluate::evaluate::trade::{Point, Times, Trade};
 
@@ -64,9 +61,8 @@ impl Axes {
         let error_of = |point: &Point| point.rmse(&trade.group);
         let [least, most] = range(shown().map(error_of));
         // Lines that lie near are shown as well.
-        let lines = trade.decoders.iter().map(|it| tables::rmse(&it.errors, &trade.group));
-        let lines = lines.chain(trade.bounds.error).chain(trade.limit_rmse());
-        let near = lines.filter(|y| *y > least / 2.0 && *y < most * 1.6);
+        let lines = trade.main_readings().references(&trade.group).map(|(_, rmse)| rmse);
+        let near = lines.chain(trade.bounds.error).filter(|y| *y > least / 2.0 && *y < most * 1.6);
         let [least, most] = range(near.chain([least, most]));
         let errors = trade.points.iter().map(error_of).filter(|error| *error < 1.15 * most);
         let most = errors.fold(most, f64::max);
@@ -135,26 +131,18 @@ impl AxisOfTimes {
 
 /// Lines across the picture: what they are, and their errors.
 pub fn levels(trade: &Trade) -> Vec<(String, f64, &'static str)> {
-    let named = |name: &str, words: &str, class| {
-        let rmse = trade.decoders.iter().find(|baseline| baseline.decoder == name)?;
-        let rmse = tables::rmse(&rmse.errors, &trade.group);
-        Some((format!("{words} {}", significant(rmse, 3)), rmse, class))
+    let readings = trade.main_readings();
+    let with = match trade.distinction(readings) {
+        of if of.is_empty() => of,
+        of => format!(" with {of}"),
     };
-    let samples = trade.points.first().map_or(1, |point| point.samples_averaged);
-    let several = trade.points.iter().any(|point| point.samples_averaged != samples);
-    let with = match (several, samples) {
-        (false, _) => String::new(),
-        (true, 1) => " with 1 sample a reading".into(),
-        (true, samples) => format!(" with {samples} samples a reading"),
-    };
-    let words = |y| format!("least possible{with} {}", significant(y, 3));
-    let levels = [
-        named(mean::NAME, "always predicting the mean", "level"),
-        named(linear::NAME, "best linear decoder", "level"),
-        trade.limit_rmse().map(|y| (words(y), y, "level")),
-        trade.bounds.error.map(|y| (format!("at most {y}"), y, "bound")),
-    ];
-    levels.into_iter().flatten().collect()
+    let references = readings.references(&trade.group).enumerate().map(|(place, (name, rmse))| {
+        // What is read matters to all but the mean.
+        let with = if place == 0 { "" } else { &with };
+        (format!("{name}{with} {}", significant(rmse, 3)), rmse, "level")
+    });
+    let bound = trade.bounds.error.map(|y| (format!("at most {y}"), y, "bound"));
+    references.chain(bound).collect()
 }
 
 /// Least and greatest of positive values.

@@ -60,6 +60,9 @@ fn columns(trade: &Trade) -> Vec<Column> {
             number("rank", |_, p| p.output_rank.map_or(UNDEFINED.into(), |rank| rank.to_string()))
         }),
         Some(number("tail", |_, p| if p.affine_tail { "yes" } else { "no" }.into())),
+        any(|p| p.columns.is_some()).then(|| {
+            number("columns", |_, p| p.columns.map_or(UNDEFINED.into(), |it| it.to_string()))
+        }),
         any(|p| p.samples_averaged > 1)
             .then(|| number("samples", |_, p| p.samples_averaged.to_string())),
         any(|p| p.gate_k.is_some())

@@ -46,9 +46,19 @@ pub fn in_full(trade: &Trade, point: &Point) -> String {
     )
 }
 
+/// Number of centres, and what is read if points differ in it.
+pub fn brief(trade: &Trade, point: &Point) -> String {
+    let of = trade.distinction(&trade.readings[point.readings]);
+    if of.is_empty() {
+        format!("K {}", point.centres)
+    } else {
+        format!("K {}, {of}", point.centres)
+    }
+}
+
 /// The chosen point in few words.
 pub fn chosen(trade: &Trade, point: &Point) -> String {
-    format!("chosen: K {}, {}", point.centres, error(trade, point.rmse(&trade.group)))
+    format!("chosen: {}, {}", brief(trade, point), error(trade, point.rmse(&trade.group)))
 }
 
 /// Bounds that are given.

@@ -9,6 +9,7 @@ use taxel_learn::train::{
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, Trained, pack};
 
 use super::progress::Part;
+use super::readings::in_words;
 use super::ways::{Variant, Ways};
 use super::{Arithmetic, Device, Point, SLOT_BYTES};
 use crate::error::Result;
@@ -26,11 +27,11 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    /// Trains networks for all `ways`, and judges them by their `measure`.
+    /// Trains networks for all `ways`, and judges them by the `measure` of their readings.
     pub fn add(
         &mut self,
         ways: &Ways<'_>,
-        measure: &Measure,
+        readings: (usize, &Measure),
         (device, prices): (&Device, &Prices),
         progress: &dyn Progress,
     ) -> Result<()> {
@@ -59,7 +60,7 @@ impl Judged {
                 continue;
             }
             for arithmetic in Arithmetic::all().filter(|a| a.format == variant.format) {
-                self.points(&blob, (ways, *variant), arithmetic, measure, (device, prices))?;
+                self.points(&blob, (ways, *variant), arithmetic, readings, (device, prices))?;
             }
             self.distinct.push(blob.bytes().to_vec());
         }
@@ -70,7 +71,18 @@ impl Judged {
     fn leave_out(&mut self, variant: Variant, ways: &Ways<'_>, cause: &taxel_learn::Error) {
         let of = if ways.inputs.whole_array() { " array" } else { "" };
         let (name, centres) = (variant.format.name(), ways.centres);
-        let note = |rank: &str| format!("{name}{of}, K = {centres}{rank}: {cause}");
+        let readings = in_words(ways.frames.wires.map(|wires| wires.columns), None);
+        let cause = match cause {
+            taxel_learn::Error::Setting(bad) if bad.field == "spread" => {
+                let spread =
+                    bad.value.parse::<f64>().map_or(f64::NAN, |it| (it * 1e4).round() / 1e4);
+                let where_to = " (in a scene's [training], or by `train --spread`)";
+                let rule = bad.rule.replace(", or another format (f32)", where_to);
+                format!("spread = {spread}: {rule}")
+            }
+            cause => cause.to_string(),
+        };
+        let note = |rank: &str| format!("{name}{of}, K = {centres}{rank}{readings}: {cause}");
         // What holds for full rank need not be said again.
         let rank = variant.output_rank.filter(|_| !self.left_out.contains(&note("")));
         let note = note(&rank.map_or(String::new(), |rank| format!(", rank {rank}")));
@@ -86,7 +98,7 @@ impl Judged {
         blob: &ModelBlob,
         (Ways { frames, inputs, .. }, variant): (&Ways<'_>, Variant),
         arithmetic: Arithmetic,
-        measure: &Measure,
+        (readings, measure): (usize, &Measure),
         (device, prices): (&Device, &Prices),
     ) -> Result<()> {
         let test = &frames.test;
@@ -106,6 +118,7 @@ impl Judged {
                 output_rank: variant.output_rank,
                 spread: blob.spread(),
                 affine_tail: variant.affine_tail,
+                readings,
                 columns: frames.wires.map(|wires| wires.columns),
                 samples_averaged: frames.samples_averaged,
                 gate_k,

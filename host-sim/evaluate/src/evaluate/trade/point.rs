@@ -7,6 +7,7 @@ use taxel_learn::cost::{Cost, kernel_name};
 
 use super::choice::Offer;
 use super::device::Times;
+use super::readings::in_words;
 use crate::metrics::Errors;
 
 /// Number format and exponential with which networks are decoded.
@@ -59,6 +60,8 @@ pub struct Point {
     /// Width σ on scaled inputs.
     pub spread: f64,
     pub affine_tail: bool,
+    /// Index of the [readings](super::Trade::readings) that are decoded.
+    pub readings: usize,
     /// Number of column-wires that are read; `None` if the readings are not those of wires.
     pub columns: Option<usize>,
     /// Number of samples averaged for each reading.
@@ -103,14 +106,11 @@ impl Point {
     /// Settings of the point in a few words.
     pub fn name(&self) -> String {
         let tail = if self.affine_tail { " + tail" } else { "" };
-        let average = match self.samples_averaged {
-            1 => String::new(),
-            samples => format!(", {samples} samples"),
-        };
-        let columns = self.columns.map_or(String::new(), |columns| format!(", {columns} columns"));
+        let samples = Some(self.samples_averaged).filter(|samples| *samples > 1);
+        let readings = in_words(self.columns, samples);
         let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
         let rank = self.output_rank.map_or(String::new(), |rank| format!(", rank {rank}"));
-        format!("{}, K = {}{rank}{tail}{columns}{average}{gate}", self.way(), self.centres)
+        format!("{}, K = {}{rank}{tail}{readings}{gate}", self.way(), self.centres)
     }
 
     /// What the point has to offer by the error of a group.

@@ -1,0 +1,66 @@
+//! Serial line of the board, which carries fewer estimates than a device may compute.
+
+use firmware::link::message::{EstimateReport, Report};
+use firmware::link::{cobs, packet};
+use model_core::blob::Floats;
+use serde::Serialize;
+
+/// Bits a second of the board's line; a byte takes ten.
+const BAUD: u32 = 921_600;
+
+/// Line of the board, and the estimates that it carries.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Line {
+    pub baud: u32,
+    /// Length of an estimate on the line, without a confidence.
+    pub estimate_bytes: usize,
+    /// Number of estimates that it carries in a second, at most.
+    pub estimates_per_s: f64,
+}
+
+impl Line {
+    /// Line that carries estimates of so many outputs, in so many rows.
+    pub fn new(rows: usize, outputs: usize) -> Self {
+        let estimate_bytes = estimate_bytes(rows, outputs);
+        let estimates_per_s = f64::from(BAUD) / (10 * estimate_bytes) as f64;
+        Self { baud: BAUD, estimate_bytes, estimates_per_s }
+    }
+}
+
+/// Length of the frame of an estimate, an hour after the start.
+fn estimate_bytes(rows: usize, outputs: usize) -> usize {
+    let (row_status, outputs) = (vec![0; rows], vec![0.1_f32; outputs]);
+    let report = Report::Estimate(EstimateReport {
+        frame: 360_000,
+        start_us: 3_600_000_000,
+        flags: 0,
+        row_status: &row_status,
+        outputs: Floats::new(&outputs),
+        novelty: None,
+        deviation: Floats::new(&[]),
+    });
+    let mut buffer = vec![0; 100 + rows + 4 * outputs.len()];
+    let message = packet::encode(packet::UNASKED, &report, &mut buffer).unwrap_or_default();
+    let mut bytes = 0;
+    cobs::encode(message, |_| {
+        bytes += 1;
+        true
+    });
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_carries_fewer_estimates_the_more_outputs_they_have() {
+        // docs/link.md: 18 outputs of 4 bytes in each of 8 rows, the rows' status, and some 20 bytes around them.
+        let paper = Line::new(8, 144);
+        assert!((600..=610).contains(&paper.estimate_bytes), "{paper:?}");
+        assert!((151.0..154.0).contains(&paper.estimates_per_s), "{paper:?}");
+        let z_alone = Line::new(8, 48);
+        assert!((384..=388).contains(&(paper.estimate_bytes - z_alone.estimate_bytes)));
+        assert!(z_alone.estimates_per_s > 400.0, "{z_alone:?}");
+    }
+}
