@@ -63,8 +63,9 @@ impl Unlocked {
         self.0.cr().modify(|_, w| {
             // SAFETY: the sector's number fits its field.
             unsafe { w.snb().bits(sector) };
-            w.psize().variant(PSIZE::Psize32).ser().set_bit().strt().set_bit()
+            w.psize().variant(PSIZE::Psize32).ser().set_bit()
         });
+        self.0.cr().modify(|_, w| w.strt().set_bit());
         let erased = self.ended();
         self.0.cr().modify(|_, w| w.ser().clear_bit());
         erased
