@@ -57,6 +57,11 @@ impl Size {
         })
     }
 
+    /// Vector table, text, rodata and data, as a device tells them of its program.
+    pub fn of_flash(&self) -> [u64; 4] {
+        [self.vector_table, self.text, self.rodata, self.data]
+    }
+
     /// Flash without the weights of networks of fixed size.
     fn flash(&self) -> u64 {
         self.vector_table + self.text + self.rodata + self.data - self.weights
