@@ -21,6 +21,8 @@ def main():
                         help="the same with room for 16 rows and 32 columns, for the scenario `wide`")
     parser.add_argument("--fixed16-image", type=pathlib.Path, required=True,
                         help="the same with the feature `fixed16` alone, for the scenario `few-features`")
+    parser.add_argument("--seal-image", type=pathlib.Path, required=True,
+                        help="the same with the feature `seal` too, for the scenario `seal`")
     parser.add_argument("scenarios", nargs="*", metavar="scenario",
                         help=f"all, or some of: {', '.join(SCENARIOS)}; or serve")
     parser.add_argument("--host-sim", type=pathlib.Path, required=True, help="the program host-sim")

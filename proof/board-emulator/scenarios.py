@@ -24,6 +24,9 @@ RUBBISH = bytes(place % 251 for place in range(0x20000))
 IDENTITY, UPLOAD, RESTARTING, REFUSED, KEPT = b"\x00", b"\x07", b"\x08", b"\x09", b"\x0b"
 #: That of an upload which is on trial.
 ON_TRIAL = b"\x07\x02"
+#: Requests to set a key and in a seal, and refusals: no seal, a counter that counted before, nobody holds the button.
+PROVISION, SEALED = b"\x10", b"\x11"
+NO_SEAL, COUNTER_USED, NOT_ALLOWED = (REFUSED + bytes([15, fault]) for fault in (0, 2, 4))
 #: Slowest and fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
 SLOWEST_LSI_HZ, FASTEST_LSI_HZ, SLOWEST_ERASE_S = 17_000, 47_000, 4.0
 #: By how much the internal oscillator may be off from -10 to 85 degrees, as a share (DS10693).
@@ -144,11 +147,12 @@ def check_scan_time(bench, model):
             scans.append((last - start) * 1e6)
             start = edge
     scans = scans[1:33]
+    expect(len(scans) == 32, f"there are {len(scans)} scans where 32 should be")
     for name, found in (("mean_us", sum(scans) / len(scans)), ("longest_us", max(scans))):
         off = computed[name] / found - 1
         board.note(f"scan of {computed['rows']} x {computed['columns']}, {name}: {found:.0f}, computed {computed[name]} "
                    f"({100 * off:+.1f} %)")
-        expect(len(scans) == 32 and abs(off) <= 0.03, f"a scan takes {found:.0f} us, computed {computed[name]} us")
+        expect(abs(off) <= 0.03, f"a scan takes {found:.0f} us, computed {computed[name]} us")
 
 
 def slow_erase(make, files):
@@ -373,6 +377,35 @@ def dead_host(make, files):
     bench.finish(erased=[JOURNAL[1], SLOT_B])
 
 
+def seal(make, files):
+    """A key, in an image that knows seals: the button lets it in over rubbish in flash, and nothing changes without it."""
+    bench, key = make(image=files.seal_image), files.directory / "device.key"
+    key.write_bytes(bytes(range(32)))
+    for page in JOURNAL:
+        fill(bench, page, RUBBISH)
+    bench.run_for(1.2)
+    bench.ask(PROVISION + bytes(32), NOT_ALLOWED, ERASE_PATIENCE_S)
+    bench.board.button_held = True
+    bench.ask(RESTART, RESTARTING)
+    bench.run_for(0.02)
+    bench.board.button_held = False
+    bench.host_sim("provision", key)
+    bench.ask(KEEP_CONFIGURATION, NO_SEAL)
+    bench.host_sim("upload", files.model, "--key", key)
+    last = [request for request in bench.requests if request[:1] == SEALED][-1]
+    bench.ask(last, COUNTER_USED)
+    # A host without the key cannot restart it, so a fault does.
+    bench.ask(RESTART, NO_SEAL)
+    bench.board.derail()
+    bench.run_for(0.02)
+    said = bench.host_sim("identify")
+    expect("set: nothing changes without --key" in said and "slot 1, generation 1" in said, "key or model is gone")
+    bench.ask(last, COUNTER_USED)
+    bench.host_sim("configure", "--period-us", 20_000, "--key", key)
+    expect(bench.period_us() == 20_000, "the owner of the key cannot change the configuration")
+    bench.finish(resets=["program"] * 2, erased=[*JOURNAL, SLOT_B])
+
+
 def serve(make, files):
     """A board for you: its serial port stays open until Ctrl-C."""
     bench = make()
@@ -388,5 +421,5 @@ SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
     for scenario in (session, sparse, few_features, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow,
                      no_clock, clock_stops, fault_restarts, panic_restarts, brown_out, sagging_supply, keep, burst, overrun,
-                     log_abandoned, restart, dead_host)
+                     log_abandoned, restart, dead_host, seal)
 }

@@ -1,17 +1,16 @@
 //! Acceptance of a board: what it does, as it says itself over the link, beside what is predicted, in one JSON file.
 
 mod board;
+mod record;
+mod resistors;
 
 use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-use firmware::link::message::{Configuration, Memory, ModelIdentity, Report, Request, UploadState};
+use firmware::link::message::{Configuration, Memory, ModelIdentity, UploadState};
 use firmware::timing::ScanPlan;
 use model_core::Decoder;
-use serde::Serialize;
-use taxel_data::data_file::DataFile;
 use taxel_data::dataset::Dataset;
 use taxel_data::output::write_bytes;
 use taxel_data::progress::Silent;
@@ -22,9 +21,13 @@ use taxel_rig::device::{Device, Wire, stream, upload};
 use taxel_simulate::{Synthesis, World};
 
 use crate::cycles::models;
+use crate::images::NUCLEO;
 use crate::process::{Outcome, cargo, first_line, root, run as run_command, target_dir};
-use crate::toolchain::Toolchain;
+use crate::size::Size;
+use crate::toolchain::{Toolchain, elf};
 use board::Board;
+use record::{Beside, Decoding, Record};
+use resistors::{compare, read_resistors};
 
 /// Numbers of centres of the models that are tried, in every format.
 const CENTRES: [usize; 3] = [16, 64, 256];
@@ -39,7 +42,7 @@ const PERIOD_US: u32 = 20_000;
 const ERASE_MS: [u32; 2] = [1000, 2000];
 
 /// Trains a model with a confidence, and with what fills missing readings.
-const TRAIN_CONFIDENCE: [&str; 12] = [
+const TRAIN_CONFIDENCE: [&str; 13] = [
     "run",
     "--quiet",
     "--package",
@@ -49,6 +52,7 @@ const TRAIN_CONFIDENCE: [&str; 12] = [
     "press",
     "--no-refine",
     "--centres=16",
+    "--format=fixed16",
     "--confidence",
     "--fill",
     "--output",
@@ -56,9 +60,6 @@ const TRAIN_CONFIDENCE: [&str; 12] = [
 
 /// Most bytes that the stack may take, of the 8192 that the image has for it.
 const STACK_BYTES: u32 = 7168;
-
-/// RMS error in per cent of readings of known resistors, and what it may be: a metal film resistor's tolerance.
-const RESISTORS_PERCENT: f64 = 1.0;
 
 /// What to accept.
 #[derive(clap::Args)]
@@ -72,7 +73,10 @@ pub struct Options {
     /// The board has this revision's image already: do not flash it.
     #[arg(long)]
     flashed: bool,
-    /// CSV of the known resistors at the wires in Ω: columns r1c1_ohm, r1c2_ohm and so on, one line.
+    /// Speed of the serial line in bits a second: the image is built for it [default: TAXEL_BAUD of the environment, or 921600]
+    #[arg(long, value_name = "N", conflicts_with = "emulated", value_parser = clap::value_parser!(u32).range(1..))]
+    baud: Option<u32>,
+    /// CSV of the known resistors at the wires in Ω: columns r1c1_ohm, r1c2_ohm and so on in any order, one line.
     #[arg(long, value_name = "FILE")]
     resistors: Option<PathBuf>,
     /// Where to write the file. By default proof/silicon, or a build folder for the emulated board.
@@ -80,62 +84,27 @@ pub struct Options {
     output: Option<PathBuf>,
 }
 
-/// A measured number beside what is predicted.
-#[derive(Serialize)]
-struct Beside<T> {
-    measured: T,
-    predicted: T,
-}
-
-/// How a model decodes.
-#[derive(Serialize)]
-struct Decoding {
-    /// Format and number of centres; *array* if one network decodes the whole array, *confidence* if the model has one.
-    model: String,
-    frames: usize,
-    /// Frames whose every output has the bits of the host's; all are predicted.
-    bit_identical: Beside<usize>,
-    /// Cycles of the fastest frame, its readings checked and its contact told; predicted is decoding alone, from flash.
-    cycles: Beside<u64>,
-    /// What the stack has taken at most since the start with this model.
-    stack_bytes: u32,
-}
-
-/// What the file holds.
-#[derive(Serialize)]
-struct Record<'a> {
-    is_emulated: bool,
-    /// Revision of the repository.
-    revision: Option<String>,
-    compiler: String,
-    board: &'a str,
-    /// Number of the chip, as hexadecimal digits.
-    unique_id: &'a str,
-    memory: Memory,
-    /// What the stack took at most.
-    stack_bytes: Beside<u32>,
-    decoding: Vec<Decoding>,
-    scan_us: Beside<u32>,
-    erase_ms: Beside<Vec<u32>>,
-    keeps_its_model_over_a_restart: Beside<bool>,
-    /// Error of the readings of known resistors, if there are any; predicted is the resistors' tolerance.
-    resistors_rms_percent: Option<Beside<f64>>,
-}
-
 /// Accepts a board, and writes the file.
 pub fn run(options: &Options) -> Outcome {
-    let known = options.resistors.as_deref().map(read_resistors).transpose()?;
+    let frames = Synthesis::new(&World::press()).frames(Stream::Test, FRAMES);
+    let read = |file: &PathBuf| read_resistors(file, &frames.inputs.names);
+    let known = options.resistors.as_ref().map(read).transpose()?;
     let toolchain = Toolchain::find()?;
     let mut board = if let Some(port) = &options.port {
-        Board::real(port, options.flashed, &toolchain)?
+        Board::real(port, options.baud, options.flashed, &toolchain)?
     } else {
         Board::emulated(&toolchain)?
     };
     let mut device = board.open()?;
     let identity = device.identify().map_err(text)?;
     println!("{}, firmware {}", identity.board, identity.firmware);
+    let image = elf(NUCLEO[1]);
+    // Who flashed the board without a build has nothing to compare with.
+    if image.exists() {
+        check_image(&identity.memory, Size::new(&image)?.of_flash())?;
+    }
     let unique_id = identity.unique_id_text();
-    let decoding = decode_all(&mut device)?;
+    let decoding = decode_all(&mut device, &frames)?;
     let (erase_ms, scan_us) = erase_and_scan(&mut device)?;
     let last = device.identify().map_err(text)?.memory.stack_high_water;
     let stack_bytes = decoding.iter().map(|it| it.stack_bytes).fold(last, u32::max);
@@ -148,6 +117,7 @@ pub fn run(options: &Options) -> Outcome {
         revision: first_line("git", &git),
         compiler: toolchain.compiler()?,
         board: &identity.board,
+        firmware: &identity.firmware,
         unique_id: &unique_id,
         memory: identity.memory,
         stack_bytes: Beside { measured: stack_bytes, predicted: STACK_BYTES },
@@ -171,15 +141,17 @@ pub fn run(options: &Options) -> Outcome {
     }
 }
 
-impl Record<'_> {
-    /// Whether everything is right that must be. Times and cycles may differ.
-    fn is_as_predicted(&self) -> bool {
-        let resistors = self.resistors_rms_percent.as_ref();
-        self.decoding.iter().all(|it| it.bit_identical.measured == it.bit_identical.predicted)
-            && resistors.is_none_or(|it| it.measured <= it.predicted)
-            && self.keeps_its_model_over_a_restart.measured
-            && self.stack_bytes.measured <= self.stack_bytes.predicted
+/// Fails unless a board, by its use of `memory`, runs the image of this `built` size.
+fn check_image(memory: &Memory, built: [u64; 4]) -> Outcome {
+    let found = [memory.vector_table, memory.text, memory.rodata, memory.data].map(u64::from);
+    if found == built {
+        return Ok(());
     }
+    Err(format!(
+        "the board runs another image than the one that was built: vector table, code, constants and start values take \
+         {found:?} bytes on the board, {built:?} in the image. Leave --flashed out, and the board at the debug probe gets \
+         this image"
+    ))
 }
 
 /// The file of a board: one for each chip.
@@ -194,8 +166,7 @@ fn own_folder() -> PathBuf {
 }
 
 /// Uploads a model of every format and size, and lets each decode the same frames as the host.
-fn decode_all<W: Wire>(device: &mut Device<W>) -> Outcome<Vec<Decoding>> {
-    let frames = Synthesis::new(&World::press()).frames(Stream::Test, FRAMES);
+fn decode_all<W: Wire>(device: &mut Device<W>, frames: &Dataset) -> Outcome<Vec<Decoding>> {
     let wanted = |options: &taxel_learn::Options| match (options.whole_array, options.affine_tail) {
         (false, false) => CENTRES.contains(&options.centres),
         (array, affine) => array && affine && options.centres == CENTRES[0],
@@ -206,7 +177,7 @@ fn decode_all<W: Wire>(device: &mut Device<W>) -> Outcome<Vec<Decoding>> {
     let assessed = folder.join("fixed16-16-confidence.bin");
     run_command(cargo(&TRAIN_CONFIDENCE).arg(&assessed))?;
     models.push(assessed);
-    models.iter().map(|model| decode(device, model, &frames)).collect()
+    models.iter().map(|model| decode(device, model, frames)).collect()
 }
 
 fn decode<W: Wire>(device: &mut Device<W>, path: &Path, frames: &Dataset) -> Outcome<Decoding> {
@@ -279,47 +250,6 @@ fn restart<W: Wire>(device: &mut Device<W>) -> Outcome<Beside<bool>> {
     Ok(Beside { measured, predicted: true })
 }
 
-/// RMS error in per cent of the board's readings of `known` resistances in Ω.
-fn compare<W: Wire>(device: &mut Device<W>, known: &[f32]) -> Outcome<Beside<f64>> {
-    let request = Request::CaptureBaseline { frames: 100 };
-    let patience = Duration::from_secs(10);
-    let answer = device.ask(&request, patience, |report| match report {
-        Report::Baseline { readings_ohm } => Some(readings_ohm.iter().collect::<Vec<f32>>()),
-        _ => None,
-    });
-    let read = answer.map_err(text)?.map_err(|refusal| format!("{refusal:?}"))?;
-    if read.len() != known.len() {
-        return Err(format!(
-            "--resistors has {} columns, the board reads {}",
-            known.len(),
-            read.len()
-        ));
-    }
-    let squares = read.iter().zip(known).map(|(read, known)| f64::from(read / known - 1.0).powi(2));
-    let measured = 100.0 * (squares.sum::<f64>() / known.len() as f64).sqrt();
-    println!("readings of the known resistors are {measured:.3} % off (RMS)");
-    Ok(Beside { measured, predicted: RESISTORS_PERCENT })
-}
-
-/// Resistances in Ω of a CSV file of one line under names, row after row.
-fn read_resistors(path: &Path) -> Outcome<Vec<f32>> {
-    let file = DataFile::read(path).map_err(text)?;
-    if file.lines() != 1 {
-        let (path, lines) = (path.display(), file.lines());
-        return Err(format!("--resistors {path} has {lines} lines of resistances: give one"));
-    }
-    let ohm = file.row(0).iter().map(|ohm| *ohm as f32);
-    match file.row(0).iter().position(|ohm| !(ohm.is_finite() && *ohm > 0.0)) {
-        Some(column) => Err(format!(
-            "--resistors {}: {} is {} Ω: give the resistance there",
-            path.display(),
-            file.header[column],
-            file.row(0)[column]
-        )),
-        None => Ok(ohm.collect()),
-    }
-}
-
 fn text(cause: impl Display) -> String {
     cause.to_string()
 }
@@ -329,18 +259,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn resistors_are_one_line_of_positive_numbers_under_their_names() {
-        let path = std::env::temp_dir().join(format!("resistors-{}.csv", std::process::id()));
-        let read = |content: &str| {
-            fs::write(&path, content).unwrap();
-            read_resistors(&path)
-        };
-        assert_eq!(read("r1c1_ohm,r1c2_ohm\n56, 56.2\n"), Ok(vec![56.0, 56.2]));
-        for (content, says) in
-            [("a\n1\n2\n", "2 lines"), ("a\nx\n", "number"), ("a,b\n1,0\n", "b is 0")]
-        {
-            assert!(read(content).unwrap_err().contains(says), "{content}");
-        }
-        fs::remove_file(&path).unwrap();
+    fn a_board_that_runs_another_image_is_told_by_the_bytes_of_both() {
+        let memory = Memory { vector_table: 1, text: 20, rodata: 3, data: 4, ..Memory::default() };
+        assert_eq!(check_image(&memory, [1, 20, 3, 4]), Ok(()));
+        let error = check_image(&memory, [1, 24, 3, 4]).unwrap_err();
+        assert!(error.contains("[1, 20, 3, 4]") && error.contains("[1, 24, 3, 4]"), "{error}");
     }
 }

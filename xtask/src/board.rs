@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::emulate::qemu::decoded;
-use crate::images::{NUCLEO, NUCLEO_FIXED16, build_image, build_variant};
+use crate::images::{NUCLEO, NUCLEO_FIXED16, SEAL, build_image, build_other, build_variant};
 use crate::process::{Outcome, Said};
 use crate::toolchain::{Toolchain, elf};
 use copy::Copy;
@@ -79,6 +79,10 @@ pub fn run(options: &Options) -> Outcome {
     };
     if run(FEW_FEATURES) {
         build_variant(&toolchain, &["fixed16"], NUCLEO_FIXED16)?;
+    }
+    // The scenario has the feature's name.
+    if run(SEAL) {
+        build_other(&toolchain, SEAL)?;
     }
     build_image(&toolchain, NUCLEO)?;
     if run(WIDE) {

@@ -1,6 +1,7 @@
 //! Building and linting the firmware for its target, and proving that it cannot panic.
 
 use std::fs;
+use std::path::PathBuf;
 
 use crate::panics;
 use crate::process::{Outcome, Watched, run as run_command, watch};
@@ -47,8 +48,9 @@ pub fn run() -> Outcome {
     println!("toolchain: {toolchain}");
     link_check(&toolchain)?;
     build_image(&toolchain, QEMU)?;
+    panics::check(&build_other(&toolchain, SEAL)?)?;
     build_image(&toolchain, NUCLEO)?;
-    panics::check(&elf("nucleo-f446re"))?;
+    panics::check(&elf(NUCLEO[1]))?;
     [LIBRARIES, QEMU, NUCLEO].iter().try_for_each(|packages| lint(&toolchain, packages))
 }
 
@@ -67,6 +69,24 @@ pub fn build_variant(toolchain: &Toolchain, features: &[&str], name: &str) -> Ou
     let [built, kept] = [NUCLEO[1], name].map(elf);
     fs::copy(&built, &kept).map_err(|cause| format!("{}: {cause}", kept.display()))?;
     Ok(())
+}
+
+/// Builds the board's image without `feature`, or with one that it does not have, and returns its path. The image of the
+/// usual name must be built again afterwards.
+pub fn build_other(toolchain: &Toolchain, feature: &str) -> Outcome<PathBuf> {
+    let mut features = FEATURES.to_vec();
+    match features.iter().position(|other| *other == feature) {
+        Some(place) => drop(features.remove(place)),
+        None => features.push(feature),
+    }
+    let name = other_name(feature);
+    build_variant(toolchain, &features, &name)?;
+    Ok(elf(&name))
+}
+
+/// Name of the image that differs in one `feature`.
+pub fn other_name(feature: &str) -> String {
+    format!("nucleo-f446re-other-{feature}")
 }
 
 fn lint(toolchain: &Toolchain, packages: Packages) -> Outcome {

@@ -8,7 +8,9 @@ use std::path::Path;
 use budget::Budget;
 use object::{Object, ObjectSection, ObjectSymbol};
 
-use crate::images::{FEATURES, NUCLEO, NUCLEO_FIXED16, QEMU, SEAL, build_image, build_variant};
+use crate::images::{
+    FEATURES, NUCLEO, NUCLEO_FIXED16, QEMU, SEAL, build_image, build_other, build_variant,
+};
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
 
@@ -16,7 +18,7 @@ const BUDGET: &str = "firmware/budget.txt";
 
 /// Bytes of flash and RAM that an image takes as linked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Size {
+pub struct Size {
     vector_table: u64,
     text: u64,
     rodata: u64,
@@ -30,6 +32,36 @@ struct Size {
 }
 
 impl Size {
+    /// Reads the sections of an image.
+    pub fn new(elf: &Path) -> Outcome<Self> {
+        let failed = |cause: String| format!("{}: {cause}", elf.display());
+        let bytes = fs::read(elf).map_err(|cause| failed(cause.to_string()))?;
+        let file = object::File::parse(&*bytes).map_err(|cause| failed(cause.to_string()))?;
+        let section = |name| file.section_by_name(name).map_or(0, |section| section.size());
+        let address = |name| {
+            let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
+            symbol
+                .map(|symbol| symbol.address())
+                .ok_or(failed(format!("there is no symbol {name}")))
+        };
+        let weights = file.symbols().filter(|symbol| symbol.name().is_ok_and(is_weights));
+        Ok(Self {
+            weights: weights.map(|symbol| symbol.size()).sum(),
+            vector_table: section(".vector_table"),
+            text: section(".text"),
+            rodata: section(".rodata"),
+            data: section(".data"),
+            bss: section(".bss"),
+            uninit: section(".uninit"),
+            stack: address("_stack_start")?.saturating_sub(address("_stack_end")?),
+        })
+    }
+
+    /// Vector table, text, rodata and data, as a device tells them of its program.
+    pub fn of_flash(&self) -> [u64; 4] {
+        [self.vector_table, self.text, self.rodata, self.data]
+    }
+
     /// Flash without the weights of networks of fixed size.
     fn flash(&self) -> u64 {
         self.vector_table + self.text + self.rodata + self.data - self.weights
@@ -51,7 +83,7 @@ pub fn run() -> Outcome {
     let parts: Vec<_> = parts.collect::<Outcome<_>>()?;
     build_image(&toolchain, QEMU)?;
     build_variant(&toolchain, &["fixed16"], NUCLEO_FIXED16)?;
-    let others = parts.iter().map(|part| part.build_other(&toolchain));
+    let others = parts.iter().map(|part| Size::new(&build_other(&toolchain, part.feature)?));
     let others: Vec<_> = others.collect::<Outcome<_>>()?;
     build_image(&toolchain, NUCLEO)?;
 
@@ -75,7 +107,7 @@ pub fn run() -> Outcome {
     );
     let mut exceeded = Vec::new();
     for image in budget.iter().filter(|budget| !budget.name.starts_with(PRICE)) {
-        let size = measure(&elf(image.name))?;
+        let size = Size::new(&elf(image.name))?;
         print_line(image, &size);
         exceeded.extend(image.exceeded_by(size.flash(), size.ram()));
     }
@@ -83,7 +115,7 @@ pub fn run() -> Outcome {
         "\n{:21} {:>6} of {:>6} | {:>5} of {:>5}",
         "feature", "flash", "budget", "RAM", "bud."
     );
-    let whole = measure(&elf(NUCLEO[1]))?;
+    let whole = Size::new(&elf(NUCLEO[1]))?;
     for (part, other) in parts.iter().zip(&others) {
         let [flash, ram] = [Size::flash, Size::ram].map(|of| of(&whole).abs_diff(of(other)));
         let Budget { flash: most_flash, ram: most_ram, .. } = part.budget;
@@ -108,18 +140,6 @@ impl<'a> Part<'a> {
         let budget = *budgets.iter().find(price).ok_or(format!("no price of {feature}"))?;
         Ok(Self { feature, budget })
     }
-
-    /// Builds the board's image without the feature, or with one that it does not have.
-    fn build_other(&self, toolchain: &Toolchain) -> Outcome<Size> {
-        let mut others = FEATURES.to_vec();
-        match others.iter().position(|feature| *feature == self.feature) {
-            Some(place) => drop(others.remove(place)),
-            None => others.push(self.feature),
-        }
-        let name = format!("nucleo-f446re-other-{}", self.feature);
-        build_variant(toolchain, &others, &name)?;
-        measure(&elf(&name))
-    }
 }
 
 fn print_line(image: &Budget<'_>, size: &Size) {
@@ -142,28 +162,6 @@ fn print_line(image: &Budget<'_>, size: &Size) {
         left(image.ram, size.ram()),
         size.stack,
     );
-}
-
-fn measure(elf: &Path) -> Outcome<Size> {
-    let failed = |cause: String| format!("{}: {cause}", elf.display());
-    let bytes = fs::read(elf).map_err(|cause| failed(cause.to_string()))?;
-    let file = object::File::parse(&*bytes).map_err(|cause| failed(cause.to_string()))?;
-    let section = |name| file.section_by_name(name).map_or(0, |section| section.size());
-    let address = |name| {
-        let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
-        symbol.map(|symbol| symbol.address()).ok_or(failed(format!("there is no symbol {name}")))
-    };
-    let weights = file.symbols().filter(|symbol| symbol.name().is_ok_and(is_weights));
-    Ok(Size {
-        weights: weights.map(|symbol| symbol.size()).sum(),
-        vector_table: section(".vector_table"),
-        text: section(".text"),
-        rodata: section(".rodata"),
-        data: section(".data"),
-        bss: section(".bss"),
-        uninit: section(".uninit"),
-        stack: address("_stack_start")?.saturating_sub(address("_stack_end")?),
-    })
 }
 
 /// Whether a mangled name is that of a network in the module `row4`, as `host-sim export` writes it.
@@ -200,7 +198,7 @@ mod tests {
 
     #[test]
     fn what_is_no_image_is_refused_by_name() {
-        let error = measure(Path::new(file!())).unwrap_err();
+        let error = Size::new(Path::new(file!())).unwrap_err();
         assert!(error.contains("size.rs: "), "{error}");
     }
 }

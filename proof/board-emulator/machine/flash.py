@@ -8,7 +8,7 @@ from .cpu import FLASH, FLASH_BYTES
 ACR, KEYR, OPTKEYR, SR, CR, OPTCR = 0x00, 0x04, 0x08, 0x0C, 0x10, 0x14
 PRFTEN, ICEN, DCEN, DCRST = 1 << 8, 1 << 9, 1 << 10, 1 << 12
 KEYS, OPTION_KEYS = (0x4567_0123, 0xCDEF_89AB), (0x0819_2A3B, 0x4C5D_6E7F)
-PG, SER, STRT, LOCK = 1 << 0, 1 << 1, 1 << 16, 1 << 31
+PG, SER, SNB, STRT, LOCK = 1 << 0, 1 << 1, 15 << 3, 1 << 16, 1 << 31
 OPTLOCK, OPTSTRT, BOR_LEVEL = 1 << 0, 1 << 1, 3 << 2
 BSY, PGPERR, PGSERR, ERRORS = 1 << 16, 1 << 6, 1 << 7, 0x1F3
 #: Option bytes as a chip comes, and with brown-out level 3.
@@ -125,8 +125,11 @@ class Flash(Registers):
         if self.values[CR] & LOCK:
             self._rules.breach("flash-locked", "its control register is written")
             return
+        chosen = self.values[CR]
         self.values[CR] = value & ~STRT
         if value & STRT:
+            if (value ^ chosen) & (SER | SNB):
+                self._rules.breach("flash-start", f"CR was {chosen:#x}, and {value:#x} is written")
             self._erase(value)
         if value & LOCK:
             self.publish()

@@ -14,6 +14,8 @@ class Port(Registers):
         super().__init__()
         self.values.update(after_reset or {})
         self.listeners = {}
+        #: Functions by pin that tell whether something outside holds it high; without one it reads its output.
+        self.inputs = {}
         self._levels = {}
 
     def _field(self, offset, pin):
@@ -41,7 +43,13 @@ class Port(Registers):
         return bool(self.values.get(ODR, 0) >> pin & 1)
 
     def read(self, offset):
-        return super().read(ODR if offset == IDR else offset)
+        if offset != IDR:
+            return super().read(offset)
+        levels = super().read(ODR)
+        for pin, is_high in self.inputs.items():
+            if self.mode(pin) == INPUT:
+                levels = levels & ~(1 << pin) | is_high() << pin
+        return levels
 
     def write(self, offset, value):
         if offset == BSRR:

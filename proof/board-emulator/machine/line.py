@@ -56,6 +56,8 @@ class Terminal:
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         self._board = board
+        #: Bytes that came from the other end.
+        self.sent = bytearray()
         #: The program at the other end, if it lives by the board's clock; else by its own.
         self.host = None
         board.glance = self._pass_on
@@ -81,9 +83,11 @@ class Terminal:
     def _take(self):
         """Takes what the host has sent."""
         try:
-            self._board.usart.from_host.extend(os.read(self._master, 4096))
+            taken_now = os.read(self._master, 4096)
         except BlockingIOError:
-            pass
+            return
+        self.sent += taken_now
+        self._board.usart.from_host.extend(taken_now)
 
     def _let_host_compute(self):
         """Waits until the host has read all and waits for more, or has ended: whatever it does takes no time."""
@@ -140,7 +144,7 @@ def framed(message, number, version):
 
 
 def packets(line):
-    """Whole packets among the bytes from a device: number and message."""
+    """Whole packets among the bytes of a line: number and message."""
     for frame in bytes(line).split(b"\0")[:-1]:
         packet, place = bytearray(), 0
         while place < len(frame):
@@ -151,5 +155,4 @@ def packets(line):
                 packet.append(0)
         body, crc = bytes(packet[:-4]), packet[-4:]
         if len(body) > 2 and zlib.crc32(body) == int.from_bytes(crc, "little"):
-            # Numbers here are below 128: one byte.
-            yield body[1], body[2:]
+            yield taken(body[1:])

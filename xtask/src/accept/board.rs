@@ -1,5 +1,6 @@
 //! The board that is accepted: one at a serial port, or the emulated one.
 
+use std::env;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -8,12 +9,15 @@ use std::time::Duration;
 use taxel_rig::device::{Device, Wire, serial};
 
 use crate::board::{Emulator, Options};
-use crate::images::{NUCLEO, build_image};
+use crate::images::{NUCLEO, PROFILE, build_image};
 use crate::process::{Outcome, run};
 use crate::toolchain::{Toolchain, elf};
 
-/// Baud rate of the boards' serial line.
+/// Baud rate of the boards' serial line, unless the build's environment has another.
 const BAUD: u32 = 921_600;
+
+/// Variable of the build's environment for another.
+const BAUD_VARIABLE: &str = "TAXEL_BAUD";
 
 /// Chip of the board, as probe-rs names it.
 const CHIP: &str = "STM32F446RETx";
@@ -26,17 +30,27 @@ const PORT: &str = "host-sim link ";
 
 pub struct Board {
     port: String,
+    baud: u32,
     emulator: Option<Child>,
 }
 
 impl Board {
-    /// The board at this `port`. The image is built and flashed, unless it is there already.
-    pub fn real(port: &str, is_flashed: bool, toolchain: &Toolchain) -> Outcome<Self> {
+    /// The board at this `port`, with a serial line of this `baud` rate if it is not the usual one. The image is built and
+    /// flashed, unless it is there already.
+    pub fn real(
+        port: &str,
+        baud: Option<u32>,
+        is_flashed: bool,
+        toolchain: &Toolchain,
+    ) -> Outcome<Self> {
         if !is_flashed {
-            build_image(toolchain, NUCLEO)?;
+            let mut build = toolchain.build();
+            build.args(PROFILE).args(NUCLEO);
+            run(build.envs(baud.map(|baud| (BAUD_VARIABLE, baud.to_string()))))?;
             flash(&elf(NUCLEO[1]))?;
         }
-        Ok(Self { port: port.into(), emulator: None })
+        let baud = baud.map_or_else(usual_baud, Ok)?;
+        Ok(Self { port: port.into(), baud, emulator: None })
     }
 
     /// The emulated board, running the image.
@@ -53,12 +67,12 @@ impl Board {
         // What it says from now on is of no interest, but it must not be stopped by it.
         std::thread::spawn(move || lines.for_each(drop));
         let port = port.ok_or("the emulated board opens no port");
-        Ok(Self { port: port?, emulator: Some(emulator) })
+        Ok(Self { port: port?, baud: BAUD, emulator: Some(emulator) })
     }
 
     /// Opens the line to the board.
     pub fn open(&mut self) -> Outcome<Device<impl Wire + use<>>> {
-        let wire = serial::open(&self.port, BAUD).map_err(|cause| cause.to_string())?;
+        let wire = serial::open(&self.port, self.baud).map_err(|cause| cause.to_string())?;
         let mut device = Device::new(wire).map_err(|cause| cause.to_string())?;
         device.patience = PATIENCE;
         Ok(device)
@@ -72,6 +86,12 @@ impl Drop for Board {
             let _ = emulator.wait();
         }
     }
+}
+
+/// Baud rate of an image that is built in this environment.
+fn usual_baud() -> Outcome<u32> {
+    let Ok(text) = env::var(BAUD_VARIABLE) else { return Ok(BAUD) };
+    text.parse().map_err(|_| format!("{BAUD_VARIABLE}={text}: give a number of bits a second"))
 }
 
 /// Writes the image to the board at the only debug probe, and starts it.

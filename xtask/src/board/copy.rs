@@ -10,6 +10,7 @@ use std::process::Command;
 
 use super::mutants::Mutant;
 use crate::copy::{update, write_if_new};
+use crate::images::SEAL;
 use crate::process::{Outcome, run, target_dir, watch};
 use crate::toolchain::{Toolchain, elf};
 
@@ -48,12 +49,16 @@ impl Copy {
         Ok(Self { folder })
     }
 
-    /// Builds the image of `mutant`, and returns its path.
+    /// Builds the image of `mutant`, with the features that its scenario needs, and returns its path.
     pub fn build_mutant(&self, toolchain: &Toolchain, mutant: &Mutant) -> Outcome<PathBuf> {
         let file = self.folder.join(&mutant.file);
         let sound = read(&file)?;
         write_if_new(&file, mutant.apply(&sound)?.as_bytes())?;
-        let built = watch(&mut self.command(toolchain), false);
+        let mut command = self.command(toolchain);
+        if mutant.scenario == SEAL {
+            command.args(["--features", SEAL]);
+        }
+        let built = watch(&mut command, false);
         write_if_new(&file, sound.as_bytes())?;
         let built = built?;
         if built.success {

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use super::Options;
 use super::copy;
-use crate::images::NUCLEO_FIXED16;
+use crate::images::{NUCLEO_FIXED16, SEAL, other_name};
 use crate::process::{Outcome, Said, capture, cargo, first_line, root, run, target_dir};
 use crate::toolchain::elf;
 
@@ -18,6 +18,9 @@ const OWN_PYTHON: &str = "proof/board-emulator/.venv/bin/python";
 
 /// A Python program that fails if a package is missing, and prints a line otherwise.
 const NEEDS: &str = "import elftools, unicorn; print(unicorn.__version__)";
+
+/// Option for the image with seals.
+const SEAL_IMAGE: &str = "--seal-image";
 
 /// Arguments that train the model which scenarios upload, small enough that an upload takes seconds.
 const TRAIN: [&str; 5] = ["train", "press", "--no-refine", "--centres=16", "--output"];
@@ -51,6 +54,7 @@ impl Emulator {
             ("--directory", folder),
             ("--wide-image", copy::image()),
             ("--fixed16-image", elf(NUCLEO_FIXED16)),
+            (SEAL_IMAGE, elf(&other_name(SEAL))),
         ];
         let mut arguments = vec![root().join(FOLDER).join("run.py").into_os_string()];
         for (name, value) in named {
@@ -65,9 +69,9 @@ impl Emulator {
         run(self.command(image).args(scenarios)).map_err(|_| "a scenario failed: see above".into())
     }
 
-    /// Runs a scenario on `image`, and returns its output.
+    /// Runs a scenario on `image`, which has what it needs, and returns its output.
     pub fn capture(&self, image: &Path, scenario: &str) -> Said {
-        capture(self.command(image).arg(scenario))
+        capture(self.command(image).arg(SEAL_IMAGE).arg(image).arg(scenario))
     }
 
     /// The emulator with this `image`, before the names of scenarios.

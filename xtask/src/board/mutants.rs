@@ -65,12 +65,17 @@ mod tests {
     }
 
     #[test]
-    fn every_mutant_finds_its_text_once_and_has_a_name_of_its_own() {
+    fn every_mutant_finds_its_text_once_and_has_a_scenario_and_a_name_of_its_own() {
         let mutants = load(&[]).unwrap();
         for mutant in &mutants {
             let text = read(&mutant.file);
             let faulty = mutant.apply(&text).unwrap_or_else(|cause| panic!("{cause}"));
             assert_ne!(faulty, text, "{}", mutant.name);
+        }
+        let scenarios = read("proof/board-emulator/scenarios.py");
+        for Mutant { name, scenario, .. } in &mutants {
+            let function = format!("def {}(make, files)", scenario.replace('-', "_"));
+            assert!(scenarios.contains(&function), "{name}: there is no scenario {scenario}");
         }
         let names: BTreeSet<_> = mutants.iter().map(|mutant| &mutant.name).collect();
         assert_eq!(names.len(), mutants.len());
