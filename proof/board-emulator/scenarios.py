@@ -29,6 +29,8 @@ PROVISION, SEALED = b"\x10", b"\x11"
 NO_SEAL, COUNTER_USED, NOT_ALLOWED = (REFUSED + bytes([15, fault]) for fault in (0, 2, 4))
 #: Slowest and fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
 SLOWEST_LSI_HZ, FASTEST_LSI_HZ, SLOWEST_ERASE_S = 17_000, 47_000, 4.0
+#: Gain-bandwidth product of the slowest op-amps in Hz that settle while the board waits (docs/readout.md).
+SLOWEST_OP_AMP_HZ = 6e6
 #: By how much the internal oscillator may be off from -10 to 85 degrees, as a share (DS10693).
 LARGEST_HSI_ERROR = 0.04
 #: Supplies in V that are too low: for changing flash, and for running.
@@ -352,8 +354,8 @@ def log_abandoned(make, files):
 
 
 def restart(make, files):
-    """A restart that the host asks for; and the clocks, which no request shows."""
-    bench = make()
+    """A restart that the host asks for; the clocks, which no request shows; and op-amps as slow as the wait allows."""
+    bench = make(op_amp_hz=SLOWEST_OP_AMP_HZ)
     bench.run_for(0.02)
     expect(bench.board.timer.period() == 1 << 32, "the clock in us ends early")
     expect(bench.board.core.counts_cycles(), "the counter of cycles is off")

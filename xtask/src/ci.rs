@@ -17,8 +17,13 @@ type Step = (&'static str, Command);
 type Ended = (&'static str, Duration, Outcome<String>);
 
 /// Mutants of the board's image that CI builds: one for each of its files that matter most. All take some minutes.
-const MUTANTS: [&str; 4] =
-    ["select-early", "flash-busy", "rows-driven-at-a-fault", "not-fed-before-erase"];
+const MUTANTS: [&str; 5] = [
+    "select-early",
+    "flash-busy",
+    "rows-driven-at-a-fault",
+    "not-fed-before-erase",
+    "button-inverted",
+];
 
 /// Runs every step, even after a failure, and prints a summary.
 pub fn run() -> Outcome {

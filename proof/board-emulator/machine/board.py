@@ -53,14 +53,15 @@ class Board:
     `hse`: the ST-LINK gives its 8 MHz. `hsi_error`: by how much, as a share, the internal oscillator is too fast.
     `lsi_hz`: the watchdog's own clock. `erase_s`: how long erasing a slot takes, whatever the data sheet says. `options`:
     the option bytes. `sensor`: the converters are there. `settling_us`: the wait after each change of rows that the
-    device is configured to.
+    device is configured to. `op_amp_hz`: the gain-bandwidth product of the op-amps.
     """
 
     def __init__(self, path, ohm, *, hse=True, hsi_error=0.0, lsi_hz=32_000, erase_s=None,
-                 options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=20.0, log=print):
+                 options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=20.0,
+                 op_amp_hz=circuit.OP_AMP_HZ, log=print):
         self.image = Image(path)
         self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
-        self._hsi_error, self._supply_v = hsi_error, 3.3
+        self._hsi_error, self._supply_v, self._op_amp_hz = hsi_error, 3.3, op_amp_hz
         self._sensor, self._baud, self.settling_us, self._log = sensor, baud, settling_us, log
         #: Whether the blue button is held.
         self.button_held = False
@@ -111,7 +112,7 @@ class Board:
         }
         self.ports["C"].inputs[BUTTON] = lambda: not self.button_held
         columns = len(self._ohm[0])
-        self.circuit = circuit.Circuit(time, rules, self.register, self._ohm)
+        self.circuit = circuit.Circuit(time, rules, self.register, self._ohm, self._op_amp_hz)
         self.converters = [
             Mcp3208(time, rules, circuit.REFERENCE_V,
                     lambda channel, cycle, first=CHIP_WIRES * chip: self.circuit.volts(first + channel, cycle))

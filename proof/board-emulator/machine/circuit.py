@@ -11,14 +11,16 @@ OP_AMP_HZ, BITS = 10e6, 12
 
 
 class Circuit:
-    """Voltages at the columns' op-amps, for row-column resistances `ohm[row][column]`."""
+    """Voltages at the columns' op-amps, for row-column resistances `ohm[row][column]`. `op_amp_hz`: the op-amps'
+    gain-bandwidth product.
+    """
 
-    def __init__(self, time, rules, register, ohm):
+    def __init__(self, time, rules, register, ohm, op_amp_hz):
         self._time, self._rules, self._register, self._ohm = time, rules, register, ohm
         #: Time in µs after which each column is within half a count: the op-amp is closed around 1 + R_f/R, with R all
         #: cells of the column in parallel.
         self.settled_us = [
-            (1 + FEEDBACK_OHM * sum(1 / row[column] for row in ohm)) / (2 * math.pi * OP_AMP_HZ)
+            (1 + FEEDBACK_OHM * sum(1 / row[column] for row in ohm)) / (2 * math.pi * op_amp_hz)
             * math.log(2) * (BITS + 1) * 1e6
             for column in range(len(ohm[0]))
         ]
