@@ -39,8 +39,8 @@ impl Models {
         let begun = self.upload.begin(spare, length, now_us, || {
             platform.feed_watchdog();
             confirmed.keep(platform.journal()).map_err(|_| FlashError)?;
-            is_erased = true;
             platform.feed_watchdog();
+            is_erased = true;
             Ok(())
         });
         if is_erased {

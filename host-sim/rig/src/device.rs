@@ -432,13 +432,14 @@ mod tests {
             line
         };
         let version = packet::PROTOCOL_VERSION;
+        let other_version = format!(
+            "it speaks version {} of the link, and this program version {version}",
+            version + 1
+        );
         for (bytes, says) in [
             (vec![], "nothing comes from it"),
             (vec![0x55; 40], "bytes come from it that are no packets: check the speed"),
-            (
-                packet(&[version + 1, 0, 3]),
-                "it speaks version 9 of the link, and this program version 8",
-            ),
+            (packet(&[version + 1, 0, 3]), &other_version),
             (framed(), "it sends reports, but no answer in time"),
             (packet(&[version, 0, 120]), "messages that this program does not know"),
         ] {

@@ -192,15 +192,19 @@ fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share()
     assert!(trade.points[chosen].gate_k.is_some() && trade.points[chosen].on_front);
 }
 
-#[test]
-fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
-    let folder = Folder::new("trade-files");
-    let scene = include_str!("../../../scenes/press.toml")
+/// The scene `press` with two rows and few frames.
+fn few_frames_of_two_rows() -> String {
+    include_str!("../../../scenes/press.toml")
         .replace("name = \"press\"", "name = \"few\"")
         .replace("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]")
         .replace("frames = 20000", "frames = 400")
-        .replace("test_frames = 8000", "test_frames = 100");
-    folder.write("few.toml", scene);
+        .replace("test_frames = 8000", "test_frames = 100")
+}
+
+#[test]
+fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
+    let folder = Folder::new("trade-files");
+    folder.write("few.toml", few_frames_of_two_rows());
     let few = ["trade", "few.toml", "--no-refine", "--centres", "16", "--average", "1"];
     let times_of = |page: &str| -> Vec<f64> {
         let points =
@@ -385,12 +389,7 @@ fn chosen_columns_are_judged_beside_what_can_be_told_from_these_alone() {
 #[test]
 fn a_choice_of_columns_tells_how_to_use_it_and_what_the_line_carries() {
     let folder = Folder::new("trade-columns");
-    let scene = include_str!("../../../scenes/press.toml")
-        .replace("name = \"press\"", "name = \"few\"")
-        .replace("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]")
-        .replace("frames = 20000", "frames = 400")
-        .replace("test_frames = 8000", "test_frames = 100");
-    folder.write("few.toml", scene);
+    folder.write("few.toml", few_frames_of_two_rows());
     let few = ["trade", "few.toml", "--no-refine", "--centres", "16", "--output-rank", "none"];
     let ask = |hz, steps| {
         [&few[..], &["--gate", "none", "--frame-rate", hz, "--column-step", steps]].concat()
