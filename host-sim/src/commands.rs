@@ -97,8 +97,10 @@ fn advice(error: &Error) -> &'static str {
 /// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
 fn exit_status(error: &Error) -> u8 {
     match error {
-        // The model is an input too.
-        Error::Rig(taxel_rig::Error::Refused(Refusal::BadModel(_))) => 2,
+        // A model and a configuration are inputs too.
+        Error::Rig(taxel_rig::Error::Refused(Refusal::BadModel(_) | Refusal::Configuration(_))) => {
+            2
+        }
         Error::Rig(_) | Error::Data(taxel_data::Error::Failed(_)) => 1,
         _ => 2,
     }

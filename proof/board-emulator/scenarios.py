@@ -416,7 +416,8 @@ def serve(make, files):
     stopped = []
     signal.signal(signal.SIGINT, lambda *_: stopped.append(True))
     bench.board.run_until(lambda: stopped)
-    bench.finish()
+    # Whatever was asked of it.
+    bench.finish(resets=bench.board.resets, erased=[sector for sector, times in bench.board.store.erased.items() if times])
 
 
 SCENARIOS = {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use firmware::capacity::Capacity;
 use firmware::circuit::ConstantsFault;
-use firmware::link::message::{KeepFault, ModelFault, Refusal, SealFault};
+use firmware::link::message::{ConfigurationField, KeepFault, ModelFault, Refusal, SealFault};
 use firmware::link::packet::PROTOCOL_VERSION;
 use model_core::blob::{Model, ModelShape};
 use model_core::{ColumnWire, RowWire};
@@ -138,13 +138,26 @@ impl Error {
     }
 }
 
+/// A field of the configuration in words, its option, and what it may be.
+fn configuration_range(field: ConfigurationField) -> &'static str {
+    use ConfigurationField as Field;
+    match field {
+        Field::FramePeriod => "the time between scans (--period-us: 0, or 100 to 1000000000)",
+        Field::Settling => "the wait behind a change of rows (--settling-us: 0 to 10000)",
+        Field::Oversampling => "the number of samples (--oversampling: 1 to 256)",
+        Field::Limits => "a limit of readings (--shorted-below-ohm must be below --open-above-ohm)",
+        Field::ContactThreshold => "the change that is a contact (--contact-threshold: above 0)",
+        Field::RestTolerance => "the tolerance of rows at rest (--rest-tolerance: 0 to below 1)",
+    }
+}
+
 /// Reason of a refusal, in words.
 fn why(refusal: Refusal) -> String {
     match refusal {
         Refusal::Version(version) => format!("it speaks version {version} of the protocol"),
         Refusal::Unknown => "it does not know the request".into(),
         Refusal::FrameLength { expected } => format!("a frame of it has {expected} readings"),
-        Refusal::Configuration(field) => format!("{field:?} of the configuration is out of range"),
+        Refusal::Configuration(field) => format!("{} is out of range", configuration_range(field)),
         Refusal::Baseline => "it scans nothing, or another baseline was asked for".into(),
         Refusal::TooLarge { slot_bytes } => format!("a model may have {slot_bytes} bytes at most"),
         Refusal::NoUpload => "no upload has begun, or no model is on trial".into(),

@@ -574,6 +574,14 @@ pub mod serial_port {
         let deviations: Vec<String> =
             outputs.split(',').map(|name| format!("{name}_deviation")).collect();
         assert_eq!(header(&folder), format!("{outputs},{},novelty_nats", deviations.join(",")));
+        for (option, value, says) in [
+            ("--period-us", "10", "(--period-us: 0, or 100 to 1000000000) is out of range"),
+            ("--contact-threshold", "-1", "(--contact-threshold: above 0) is out of range"),
+        ] {
+            let output = folder.run(&["link", &port, "configure", option, value]);
+            let said = String::from_utf8(output.stderr).unwrap();
+            assert!(output.status.code() == Some(2) && said.contains(says), "{said}");
+        }
         let page = folder.succeed(&["link", &port, "configure", "--confidence", "novelty"]);
         assert!(page.contains("estimates yes, of confidence novelty\n"), "{page}");
     }

@@ -35,7 +35,7 @@ pub struct ConfigureArguments {
     #[arg(long, value_name = "OHM")]
     open_above_ohm: Option<f32>,
     /// Relative change against the baseline that counts as contact.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     contact_threshold: Option<f32>,
     /// Relative change within which a row counts as untouched and is not decoded; 0 decodes all rows.
     #[arg(long, value_name = "SHARE", value_parser = tolerance, allow_negative_numbers = true)]
