@@ -10,6 +10,9 @@ use crate::readout::SCANS_A_ROUND;
 /// divider has powers of two.
 pub const NUCLEO_SPI_HZ: u32 = 703_125;
 
+/// Speed of the NUCLEO-F446RE's serial line in bits a second, unless its image is built for another.
+pub const NUCLEO_BAUD: u32 = 921_600;
+
 /// Bytes that a sample of an MCP3208 takes on its bus.
 const MCP3208_BYTES: u32 = 3;
 

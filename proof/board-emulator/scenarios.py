@@ -191,11 +191,7 @@ def patience(make, files):
 
 def silent_sensor(make, files):
     """A sensor that is silent: the watchdog, at its fastest, resets the board."""
-    bench = make(lsi_hz=FASTEST_LSI_HZ, sensor=False)
-    bench.run_for(0.03)
-    bench.scan_every(2.0)
-    bench.run_for(5.4)
-    expect(not bench.board.resets, "it is reset too early")
+    bench = silent(make, FASTEST_LSI_HZ, 5.4)
     bench.run_for(0.1)
     bench.ask(IDENTIFY, IDENTITY)
     bench.finish(resets=["watchdog"])
@@ -203,13 +199,19 @@ def silent_sensor(make, files):
 
 def silent_sensor_slow(make, files):
     """The same with the watchdog at its slowest: 15 s, in which no row stands driven."""
-    bench = make(lsi_hz=SLOWEST_LSI_HZ, sensor=False)
-    bench.run_for(0.03)
-    bench.scan_every(2.0)
-    bench.run_for(14.9)
-    expect(not bench.board.resets, "it is reset too early")
+    bench = silent(make, SLOWEST_LSI_HZ, 14.9)
     bench.run_for(0.3)
     bench.finish(resets=["watchdog"])
+
+
+def silent(make, lsi_hz, seconds):
+    """A board whose sensor has been silent for so long, without a reset so far."""
+    bench = make(lsi_hz=lsi_hz, sensor=False)
+    bench.run_for(0.03)
+    bench.scan_every(2.0)
+    bench.run_for(seconds)
+    expect(not bench.board.resets, "it is reset too early")
+    return bench
 
 
 def no_clock(make, files):
@@ -323,7 +325,7 @@ def burst(make, files):
     bench = make()
     bench.run_for(0.02)
     bench.scan_every(1.0, settling_s)
-    bench.board.run_until(lambda: bench.board.register.outputs)
+    until_driven(bench)
     # Zeros are packets without content, which mean nothing.
     bench.ask(IDENTIFY, IDENTITY, before=bytes(ROOM - 20))
     bench.finish()

@@ -1,13 +1,16 @@
 //! Default and ranges of a configuration.
 
+use core::ops::RangeInclusive;
+
 use model_core::health::Limits;
 
 use crate::link::message::{ConfidenceSent, Configuration, ConfigurationField};
 use crate::readout::ScanSettings;
 
-/// Range of frame periods in µs.
-const FRAME_PERIOD_US: core::ops::RangeInclusive<u32> = 100..=1_000_000_000;
 impl Configuration {
+    /// Range of frame periods in µs, besides 0.
+    pub const FRAME_PERIOD_US: RangeInclusive<u32> = 100..=1_000_000_000;
+
     /// The default configuration: 100 frames a second, estimates are sent without confidence, limits for rubber of about
     /// 60 Ω, and every row is decoded.
     pub const DEFAULT: Self = Self {
@@ -31,7 +34,7 @@ impl Configuration {
         let limits = [self.shorted_below_ohm, self.open_above_ohm];
         let checks = [
             (
-                self.frame_period_us == 0 || FRAME_PERIOD_US.contains(&self.frame_period_us),
+                self.frame_period_us == 0 || Self::FRAME_PERIOD_US.contains(&self.frame_period_us),
                 ConfigurationField::FramePeriod,
             ),
             (self.scan.settling_us <= ScanSettings::MOST_SETTLING_US, ConfigurationField::Settling),

@@ -4,8 +4,11 @@ use std::time::Duration;
 
 use firmware::capacity::Capacity;
 use firmware::circuit::ConstantsFault;
-use firmware::link::message::{ConfigurationField, KeepFault, ModelFault, Refusal, SealFault};
+use firmware::link::message::{
+    Configuration, ConfigurationField, KeepFault, ModelFault, Refusal, SealFault,
+};
 use firmware::link::packet::PROTOCOL_VERSION;
+use firmware::readout::ScanSettings;
 use model_core::blob::{Model, ModelShape};
 use model_core::{ColumnWire, RowWire};
 
@@ -139,15 +142,30 @@ impl Error {
 }
 
 /// A field of the configuration in words, its option, and what it may be.
-fn configuration_range(field: ConfigurationField) -> &'static str {
+fn configuration_range(field: ConfigurationField) -> String {
     use ConfigurationField as Field;
     match field {
-        Field::FramePeriod => "the time between scans (--period-us: 0, or 100 to 1000000000)",
-        Field::Settling => "the wait behind a change of rows (--settling-us: 0 to 10000)",
-        Field::Oversampling => "the number of samples (--oversampling: 1 to 256)",
-        Field::Limits => "a limit of readings (--shorted-below-ohm must be below --open-above-ohm)",
-        Field::ContactThreshold => "the change that is a contact (--contact-threshold: above 0)",
-        Field::RestTolerance => "the tolerance of rows at rest (--rest-tolerance: 0 to below 1)",
+        Field::FramePeriod => {
+            let (least, most) = Configuration::FRAME_PERIOD_US.into_inner();
+            format!("the time between scans (--period-us: 0, or {least} to {most})")
+        }
+        Field::Settling => format!(
+            "the wait behind a change of rows (--settling-us: 0 to {})",
+            ScanSettings::MOST_SETTLING_US
+        ),
+        Field::Oversampling => format!(
+            "the number of samples (--oversampling: 1 to {})",
+            ScanSettings::MOST_OVERSAMPLING
+        ),
+        Field::Limits => {
+            "a limit of readings (--shorted-below-ohm must be below --open-above-ohm)".into()
+        }
+        Field::ContactThreshold => {
+            "the change that is a contact (--contact-threshold: above 0)".into()
+        }
+        Field::RestTolerance => {
+            "the tolerance of rows at rest (--rest-tolerance: 0 to below 1)".into()
+        }
     }
 }
 

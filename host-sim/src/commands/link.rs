@@ -6,6 +6,7 @@ use std::time::Duration;
 use crate::{Error, Result};
 use clap::{Args, Subcommand, value_parser};
 use firmware::seal::Key;
+use firmware::timing::NUCLEO_BAUD;
 use taxel_data::input;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
@@ -22,7 +23,7 @@ pub struct Arguments {
     /// Serial port, such as /dev/ttyACM0 or COM3.
     port: String,
     /// Speed of the line in bits a second.
-    #[arg(long, value_name = "BAUD", default_value_t = 921_600, value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "BAUD", default_value_t = NUCLEO_BAUD, value_parser = value_parser!(u32).range(1..))]
     baud: u32,
     /// Time without requests after which the device returns to its own configuration, if this program is killed.
     #[arg(long, value_name = "MS", default_value_t = LEASE.as_millis() as u32, value_parser = value_parser!(u32).range(100..=600_000))]

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use firmware::timing::NUCLEO_BAUD;
 use taxel_rig::device::{Device, Wire, serial};
 
 use crate::board::{Emulator, Options};
@@ -13,10 +14,7 @@ use crate::images::{NUCLEO, PROFILE, build_image};
 use crate::process::{Outcome, run};
 use crate::toolchain::{Toolchain, elf};
 
-/// Baud rate of the boards' serial line, unless the build's environment has another.
-const BAUD: u32 = 921_600;
-
-/// Variable of the build's environment for another.
+/// Variable of the build's environment for another baud rate than the usual one.
 const BAUD_VARIABLE: &str = "TAXEL_BAUD";
 
 /// Chip of the board, as probe-rs names it.
@@ -67,7 +65,7 @@ impl Board {
         // What it says from now on is of no interest, but it must not be stopped by it.
         std::thread::spawn(move || lines.for_each(drop));
         let port = port.ok_or("the emulated board opens no port");
-        Ok(Self { port: port?, baud: BAUD, emulator: Some(emulator) })
+        Ok(Self { port: port?, baud: NUCLEO_BAUD, emulator: Some(emulator) })
     }
 
     /// Opens the line to the board.
@@ -90,7 +88,7 @@ impl Drop for Board {
 
 /// Baud rate of an image that is built in this environment.
 fn usual_baud() -> Outcome<u32> {
-    let Ok(text) = env::var(BAUD_VARIABLE) else { return Ok(BAUD) };
+    let Ok(text) = env::var(BAUD_VARIABLE) else { return Ok(NUCLEO_BAUD) };
     text.parse().map_err(|_| format!("{BAUD_VARIABLE}={text}: give a number of bits a second"))
 }
 

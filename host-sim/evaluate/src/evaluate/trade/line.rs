@@ -2,11 +2,9 @@
 
 use firmware::link::message::{EstimateReport, Report};
 use firmware::link::{cobs, packet};
+use firmware::timing::NUCLEO_BAUD;
 use model_core::blob::Floats;
 use serde::Serialize;
-
-/// Bits a second of the board's line; a byte takes ten.
-const BAUD: u32 = 921_600;
 
 /// Line of the board, and the estimates that it carries.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -22,8 +20,9 @@ impl Line {
     /// Line that carries estimates of so many outputs, in so many rows.
     pub fn new(rows: usize, outputs: usize) -> Self {
         let estimate_bytes = estimate_bytes(rows, outputs);
-        let estimates_per_s = f64::from(BAUD) / (10 * estimate_bytes) as f64;
-        Self { baud: BAUD, estimate_bytes, estimates_per_s }
+        // A byte takes ten bits.
+        let estimates_per_s = f64::from(NUCLEO_BAUD) / (10 * estimate_bytes) as f64;
+        Self { baud: NUCLEO_BAUD, estimate_bytes, estimates_per_s }
     }
 }
 
