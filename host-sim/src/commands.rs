@@ -1,5 +1,6 @@
 //! Subcommands, one small file each: arguments in, library calls, results out.
 
+mod stderr;
 mod stdout;
 pub mod print;
 pub mod progress;
@@ -51,10 +52,17 @@ pub struct Common {
     /// Print the results as JSON.
     #[arg(long, global = true)]
     pub json: bool,
+    /// Say nothing on stderr but errors: no notes, no progress.
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Say how long each stage took, and how far a long one is.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    verbose: bool,
 }
 
 /// Runs the `work` of the command of this `name`, prints its error, and returns the program's exit status.
-pub fn run_to_end(name: &str, work: impl FnOnce() -> Result<()>) -> ExitCode {
+pub fn run_to_end(name: &str, common: &Common, work: impl FnOnce() -> Result<()>) -> ExitCode {
+    stderr::set(common.quiet, common.verbose);
     print::begin(name);
     let outcome = interruption::watch()
         .map_err(|cause| Error::failed(format!("cannot watch for Ctrl-C: {cause}")))

@@ -2,12 +2,13 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
-use host_sim::Result;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
 use host_sim::commands::{
     self, Common, decode, emulate, eval, export, forward, gate, inspect, join, limit, link, run,
     synth, table1, trade, train,
 };
+use host_sim::{Error, Result};
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
@@ -42,6 +43,17 @@ enum Command {
     Limit(limit::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
+    /// Print a script that completes commands and options in a shell.
+    ///
+    /// bash: `host-sim completions bash > ~/.local/share/bash-completion/completions/host-sim`.
+    Completions {
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page of the program or of a command: `host-sim man train | man -l -`.
+    Man {
+        /// Command, instead of the whole program.
+        command: Option<String>,
+    },
 }
 
 impl Command {
@@ -63,6 +75,8 @@ impl Command {
             Self::Limit(_) => "limit",
             Self::Emulate(_) => "emulate",
             Self::Join(_) => "join",
+            Self::Completions { .. } => "completions",
+            Self::Man { .. } => "man",
         };
         name.into()
     }
@@ -72,9 +86,42 @@ fn main() -> ExitCode {
     // glibc returns large blocks to the system one by one, until it has seen such a block freed: refinement would spend a
     // twentieth of its time on new pages.
     drop(std::hint::black_box(Vec::<u8>::with_capacity(31 << 20)));
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|error| advised(error).exit());
     let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
-    commands::run_to_end(&command.name(), || execute(command, &cli.common))
+    commands::run_to_end(&command.name(), &cli.common, || execute(command, &cli.common))
+}
+
+/// A usage error with advice, where an option was taken for one with a similar name.
+fn advised(mut error: clap::Error) -> clap::Error {
+    let of_output = matches!(
+        error.get(ContextKind::InvalidArg),
+        Some(ContextValue::String(argument)) if argument.starts_with("--output ")
+    );
+    if error.kind() == ErrorKind::ArgumentConflict && of_output {
+        let tip = "columns that a model is to predict are given by '--outputs <GLOB>'";
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+    }
+    error
+}
+
+/// Prints the manual page of the program, or of its `command`.
+fn print_manual(command: Option<&str>) -> Result<()> {
+    let mut program = Cli::command();
+    program.build();
+    let of_command = |name: &str| program.find_subcommand(name).cloned();
+    let page = match command {
+        None => program,
+        Some(name) => of_command(name).ok_or_else(|| {
+            Error::Usage(format!(
+                "man {name}: there is no such command; `host-sim --help` lists them"
+            ))
+        })?,
+    };
+    let mut text = Vec::new();
+    clap_mangen::Man::new(page)
+        .render(&mut text)
+        .map_err(|cause| Error::failed(cause.to_string()))?;
+    commands::print::show(&String::from_utf8_lossy(&text))
 }
 
 fn execute(command: Command, common: &Common) -> Result<()> {
@@ -94,5 +141,11 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::Limit(arguments) => limit::execute(&arguments, common),
         Command::Emulate(arguments) => emulate::execute(&arguments, common),
         Command::Link(arguments) => link::execute(&arguments, common),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut script);
+            commands::print::show(&String::from_utf8_lossy(&script))
+        }
+        Command::Man { command } => print_manual(command.as_deref()),
     }
 }

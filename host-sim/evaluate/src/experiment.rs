@@ -44,6 +44,9 @@ pub const EMBEDDED: [(&str, &str); 4] = [
     ("paper-as-printed", include_str!("../../../scenes/paper-as-printed.toml")),
 ];
 
+/// Extensions of files that hold measurements, and no scene.
+const DATA_FILES: [&str; 6] = ["csv", "tsv", "dat", "gz", "npy", "npz"];
+
 /// Experiment of a scene, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
@@ -179,6 +182,14 @@ impl Experiment {
             return Self::parse_open(name_or_path, text);
         }
         let path = Path::new(name_or_path);
+        let kind = path.extension().unwrap_or_default();
+        if DATA_FILES.iter().any(|of| kind.eq_ignore_ascii_case(of)) {
+            let known = EMBEDDED.map(|(name, _)| name).join(", ");
+            return Err(Error::Usage(format!(
+                "{name_or_path} is a data file, and a scene is wanted here: {known}, or a scene file (.toml). Measured data \
+                 tells neither the sensor nor what may happen to it; `train`, `run`, `trade` and `gate` take it"
+            )));
+        }
         let text = input::read_text(path).map_err(|error| match error {
             taxel_data::Error::Read { path, cause } => {
                 let names: Vec<_> = EMBEDDED.iter().map(|(name, _)| *name).collect();

@@ -18,7 +18,7 @@ use super::data_file::FieldArguments;
 use super::progress::Terminal;
 use super::readings::{BaselineArgument, model_inputs};
 use super::scene_argument::{DEFAULT_SCENE, SceneArgument, Sizes};
-use super::{Common, arguments, print};
+use super::{Common, arguments, print, stderr};
 
 /// Options of a check.
 #[derive(Args)]
@@ -132,11 +132,11 @@ impl CheckArguments {
         let parsed = model.parse();
         let metadata = parsed.metadata();
         if metadata.scene_digest != scene.digest {
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: the model was trained on {:?}, not on this scene; its bits can be compared all \
                  the same",
                 metadata.name
-            );
+            ));
         }
         let inputs = metadata.input_names;
         if !inputs.iter().eq(scene.world.reading_names().iter().map(String::as_str)) {

@@ -1,12 +1,15 @@
 //! Command lines that give the same results again, for reports.
 
 /// Command line of this process, with the `seed` that it drew from. It has no `left_out` options, which do not change
-/// results and take a value, and no `--json`.
+/// results and take a value, and none that says how results are told.
 pub fn of_this_process(command: &str, left_out: &[&str], seed: Option<u64>) -> String {
     let given: Vec<String> =
         std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
     repeated(&given, command, left_out, seed)
 }
+
+/// Options that change what is said, and no result.
+const TOLD: [&str; 5] = ["--json", "-q", "--quiet", "-v", "--verbose"];
 
 fn repeated(given: &[String], command: &str, left_out: &[&str], seed: Option<u64>) -> String {
     let mut words = vec!["host-sim".to_owned()];
@@ -22,7 +25,7 @@ fn repeated(given: &[String], command: &str, left_out: &[&str], seed: Option<u64
         };
         if left_out.contains(&word.as_str()) {
             given.next();
-        } else if word != "--json" && !left_out.iter().any(joined) {
+        } else if !TOLD.contains(&word.as_str()) && !left_out.iter().any(joined) {
             words.push(quoted(word));
         }
     }
@@ -54,7 +57,7 @@ mod tests {
         for words in [
             &["run", "press", "--noise", "0.01"][..],
             &["run", "press", "--noise", "0.01", "-o", "there"],
-            &["run", "press", "-othere", "--noise", "0.01", "--json"],
+            &["run", "press", "-othere", "--noise", "0.01", "--json", "-q"],
             &["run", "press", "--output=there", "--noise", "0.01", "--seed", "7"],
         ] {
             assert_eq!(of_run(words), plain);

@@ -6,6 +6,8 @@ use taxel_data::columns;
 use taxel_data::error::{cut, number};
 use taxel_learn::outliers::{Outlier, Outliers};
 
+use super::stderr;
+
 /// Most lines with outliers that are named.
 const MOST_NAMED: usize = 5;
 
@@ -13,13 +15,13 @@ const MOST_NAMED: usize = 5;
 pub fn print_outliers(outliers: &Outliers, path: &Path, lines: usize, left_out: &str) {
     notes_on_outliers(outliers, &path.display().to_string(), lines, left_out)
         .iter()
-        .for_each(|note| eprintln!("{note}"));
+        .for_each(stderr::remark);
 }
 
 /// Names the columns of the file at `path` that never change.
 pub fn print_constant(columns: &[String], path: &Path) {
     if let Some(note) = note_on_constant(columns, &path.display().to_string()) {
-        eprintln!("{note}");
+        stderr::remark(note);
     }
 }
 

@@ -17,7 +17,7 @@ use super::arguments::exponential;
 use super::data_file::DataFileArguments;
 use super::health::{Health, HealthArguments};
 use super::readings::{BaselineArgument, model_inputs};
-use super::{Common, print};
+use super::{Common, print, stderr};
 
 /// Decode readings from a data file, one line of estimates a line.
 ///
@@ -258,7 +258,7 @@ fn kept<'k>(
 /// Remarks on stderr if many readings lie outside the range that the model was trained on.
 fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
     if let Some(warning) = Warning::out_of_range(model.share_out_of_range(&readings.values)) {
-        eprintln!("{warning}");
+        stderr::remark(warning);
     }
 }
 

@@ -17,7 +17,7 @@ use taxel_learn::{Exponential, PreparedModel};
 
 use super::arguments::of_option;
 use super::subject_argument::{self, SubjectArgument};
-use super::{Common, print};
+use super::{Common, print, stderr};
 
 /// Skip untouched rows: work saved, touches missed, and errors.
 ///
@@ -137,11 +137,11 @@ fn check(arguments: &Arguments, subject: &Subject, numbers: [usize; 2]) -> Resul
 fn remark_on_noise(model: &PreparedModel<'_>, level: f64) {
     let own = f64::from(model.model().metadata().noise_level);
     if (own - level).abs() > 1e-3 * level {
-        eprintln!(
+        stderr::remark(format_args!(
             "note: the model was trained for noise of {}, and is judged at the scene's {}; see --noise",
             percent(own, 2),
             percent(level, 2)
-        );
+        ));
     }
 }
 

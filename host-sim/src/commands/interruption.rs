@@ -4,6 +4,7 @@ pub use system::{end, flag, watch};
 
 #[cfg(unix)]
 mod system {
+    use std::io::IsTerminal;
     use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
     use std::sync::{Arc, OnceLock};
     use std::{fs, io, process, thread};
@@ -31,6 +32,11 @@ mod system {
                 let is_first = |flag: &Arc<AtomicBool>| !flag.swap(true, Ordering::SeqCst);
                 if !GENTLE.get().is_some_and(is_first) {
                     output::abandon();
+                    // A bar of progress stands on its line.
+                    let bar = if std::io::stderr().is_terminal() { "\n" } else { "" };
+                    eprintln!(
+                        "{bar}interrupted: no result was written; older files are as they were"
+                    );
                     end();
                 }
             }

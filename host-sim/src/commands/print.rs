@@ -50,7 +50,7 @@ pub fn check_output(path: &Path, inputs: &[&Path]) -> Result<()> {
 }
 
 /// Shows a result; a reader who has seen enough (`| head`) is no failure.
-fn show(text: &str) -> Result<()> {
+pub fn show(text: &str) -> Result<()> {
     let (place, written) = if STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
         ("stderr", io::stderr().write_all(text.as_bytes()))
     } else {

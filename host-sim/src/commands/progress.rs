@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use taxel_data::progress::Progress;
 
+use super::stderr;
+
 /// Least time between two lines of the same stage.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
@@ -32,7 +34,8 @@ pub struct Log {
 impl Terminal {
     /// Display of progress on stderr.
     pub fn new() -> Self {
-        if ProgressDrawTarget::stderr().is_hidden() {
+        let is_log = stderr::is_quiet() || stderr::is_verbose();
+        if is_log || ProgressDrawTarget::stderr().is_hidden() {
             return Self::Log(Mutex::new(Log::new(Instant::now())));
         }
         let bar = ProgressBar::new(0);
@@ -60,9 +63,9 @@ impl Progress for Terminal {
                 bar.tick();
             }
             Self::Log(log) => {
-                if let Some(line) = locked(log).stage(name, steps, Instant::now()) {
-                    eprintln!("{line}");
-                }
+                let mut log = locked(log);
+                log.end(Instant::now());
+                log.stage(name, steps, Instant::now()).into_iter().for_each(stderr::remark);
             }
         }
     }
@@ -71,9 +74,7 @@ impl Progress for Terminal {
         match self {
             Self::Bar(bar) => bar.inc(1),
             Self::Log(log) => {
-                if let Some(line) = locked(log).step(Instant::now()) {
-                    eprintln!("{line}");
-                }
+                locked(log).step(Instant::now()).into_iter().for_each(stderr::remark);
             }
         }
     }
@@ -81,8 +82,9 @@ impl Progress for Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        if let Self::Bar(bar) = self {
-            bar.finish_and_clear();
+        match self {
+            Self::Bar(bar) => bar.finish_and_clear(),
+            Self::Log(log) => locked(log).end(Instant::now()),
         }
     }
 }
@@ -91,6 +93,14 @@ impl Log {
     fn new(now: Instant) -> Self {
         let known = BTreeSet::new();
         Self { stage: String::new(), steps: 0, done: 0, started: now, written: now, known }
+    }
+
+    /// Says how long the stage took that ends, if that is wanted.
+    fn end(&self, now: Instant) {
+        if stderr::is_verbose() && !self.stage.is_empty() {
+            let elapsed_s = now.duration_since(self.started).as_secs_f64();
+            stderr::remark(format_args!("{}: took {elapsed_s:.2} s", self.stage));
+        }
     }
 
     /// Begins a stage; the line to write, if it is the first of that name.

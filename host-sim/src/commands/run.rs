@@ -14,7 +14,7 @@ use taxel_learn::{ModelBlob, Options};
 
 use super::model_argument::ModelArguments;
 use super::subject_argument::SubjectArgument;
-use super::{Common, arguments, command_line, print, refused_readings};
+use super::{Common, arguments, command_line, print, refused_readings, stderr};
 
 const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
@@ -85,7 +85,7 @@ fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common
         return print::json(&result);
     }
     page_of(&result, folder, &files).print()?;
-    eprintln!("done in {:.1} s", started.elapsed().as_secs_f64());
+    stderr::remark(format_args!("done in {:.1} s", started.elapsed().as_secs_f64()));
     Ok(())
 }
 

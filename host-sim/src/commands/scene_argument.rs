@@ -10,7 +10,7 @@ use taxel_data::progress::Progress;
 use taxel_learn::ModelBlob;
 use taxel_simulate::sensor::Precision;
 
-use super::{Common, arguments};
+use super::{Common, arguments, stderr};
 
 /// Scene that stands for none.
 pub const DEFAULT_SCENE: &str = "press";
@@ -182,13 +182,13 @@ pub fn model(
         && metadata.output_names.iter().eq(scene.output_names());
     if fits {
         if metadata.name != scene.name {
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: {} was trained on {:?}, not on {:?}; give --model a model of the scene's own, or leave \
                  it out to train one",
                 path.display(),
                 metadata.name,
                 scene.name
-            );
+            ));
         }
         return Ok(blob);
     }

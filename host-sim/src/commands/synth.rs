@@ -11,7 +11,7 @@ use taxel_data::random::Stream;
 use taxel_simulate::Synthesis;
 
 use super::scene_argument::{NoiseArgument, SceneArgument};
-use super::{Common, print};
+use super::{Common, print, stderr};
 
 /// Synthesise frames of a scene as CSV: noisy readings, true outputs.
 #[derive(Args)]
@@ -69,7 +69,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
     csv_file::write(&arguments.output, names, lines)?;
     if let Some(warning) = Warning::not_positive(&dataset.inputs) {
-        eprintln!("{warning}");
+        stderr::remark(warning);
     }
     let summary = Summary {
         subject: scene.name.clone(),

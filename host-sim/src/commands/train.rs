@@ -23,7 +23,7 @@ use super::model_argument::ModelArguments;
 use super::model_outputs::{self, ModelOutput};
 use super::scene_argument::Sizes;
 use super::subject_argument::SubjectOptions;
-use super::{Common, print, refused_readings};
+use super::{Common, print, refused_readings, stderr};
 
 mod choice;
 mod recursion;
@@ -181,7 +181,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if options.format == Format::F32
         && model.networks().any(|network| network.format() == Format::F32Direct)
     {
-        eprintln!("note: {}", why_direct(options.widths));
+        stderr::remark(format_args!("note: {}", why_direct(options.widths)));
     }
     let summary = Summary {
         subject: subject.name().into(),

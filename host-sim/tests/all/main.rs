@@ -18,6 +18,7 @@ mod health;
 mod interruption;
 mod json_schema;
 mod limit;
+mod manners;
 mod measured;
 #[cfg(unix)]
 mod output;

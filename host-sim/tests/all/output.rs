@@ -216,6 +216,10 @@ fn an_interrupted_run_leaves_no_folder_and_an_emulator_no_file() {
         signal(&child, name);
         let output = child.wait_with_output().unwrap();
         assert_ne!(output.status.code(), Some(0));
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            told.ends_with("interrupted: no result was written; older files are as they were\n")
+        );
         assert!(folder.names().is_empty(), "{:?}", folder.names());
     }
     folder.write("small.toml", small_scene());

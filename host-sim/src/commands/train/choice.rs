@@ -1,5 +1,6 @@
 //! Centres, spread and penalty: as given, or chosen among candidates by cross-validation.
 
+use crate::commands::stderr;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use crate::{Error, Result};
@@ -27,10 +28,10 @@ pub fn choose(
     let usual = Options::default().centres;
     if arguments.centres.is_empty() && subject.scene().is_none() && options.centres < usual {
         let (frames, centres) = (set.frames.frames(), options.centres);
-        eprintln!(
+        stderr::remark(format_args!(
             "note: {frames} lines are few for {usual} centres, so the default is {centres}; \
              choose with --centres"
-        );
+        ));
     }
     if !arguments.select {
         options.centres = one("--centres", &arguments.centres)?.unwrap_or(options.centres);
@@ -53,7 +54,7 @@ pub fn choose(
     let best = selection.best();
     (options.centres, options.spread) = (best.centres, best.spread);
     options.penalty = best.penalty;
-    selection.edges.iter().for_each(|edge| eprintln!("note: {}", beyond(edge)));
+    selection.edges.iter().for_each(|edge| stderr::remark(format_args!("note: {}", beyond(edge))));
     Ok(Some(selection))
 }
 

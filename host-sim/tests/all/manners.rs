@@ -1,0 +1,47 @@
+//! What the program says of its work, and what it tells a shell of itself.
+
+use crate::common::{Folder, small_scene};
+
+/// What a command says on stderr.
+fn told(folder: &Folder, arguments: &[&str]) -> String {
+    let output = folder.run(arguments);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{arguments:?}: {told}");
+    told
+}
+
+#[test]
+fn quiet_work_says_nothing_and_verbose_work_the_time_of_each_stage() {
+    let folder = Folder::new("manners");
+    folder.write("scene.toml", small_scene());
+    let run = ["run", "scene.toml", "--no-refine"];
+    let usual = told(&folder, &run);
+    assert!(usual.contains("fit weights …") && !usual.contains("took"), "{usual}");
+    let verbose = told(&folder, &[&run[..], &["-v"]].concat());
+    assert!(verbose.contains("fit weights: took 0."), "{verbose}");
+    assert_eq!(told(&folder, &[&run[..], &["--quiet"]].concat()), "");
+    // Notes of a data file too.
+    folder.write("log.csv", "ch1,ch2,f_n\n1,7,2\n3,7,4\n5,7,5\n7,7,9\n9,7,9\n");
+    let train = ["train", "log.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
+    let train = [&train[..], &["--centres", "2", "--no-refine"]].concat();
+    assert!(told(&folder, &train).contains("ch2"));
+    assert_eq!(told(&folder, &[&train[..], &["-q"]].concat()), "");
+    // Errors are said.
+    assert!(folder.fail(&["-q", "inspect", "none.bin"], 2).contains("none.bin"));
+}
+
+#[test]
+fn shells_learn_every_command_and_manuals_every_option() {
+    let folder = Folder::new("shells");
+    for shell in ["bash", "zsh", "fish"] {
+        let script = folder.succeed(&["completions", shell]);
+        let known = ["--relative-inputs", "inspect", "fixed16"];
+        assert!(known.iter().all(|word| script.contains(word)), "{shell}");
+    }
+    let page = folder.succeed(&["man"]);
+    assert!(page.contains(".TH host-sim 1") && page.contains("host\\-sim\\-trade(1)"), "{page}");
+    assert!(folder.succeed(&["man", "train"]).contains("\\-\\-whole\\-array"));
+    assert!(folder.fail(&["man", "rain"], 2).contains("man rain: there is no such command"));
+    let mistyped = ["train", "log.csv", "--output", "f_n", "-o", "m.bin"];
+    assert!(folder.fail(&mistyped, 2).contains("'--outputs <GLOB>'"));
+}
