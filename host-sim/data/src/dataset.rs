@@ -19,7 +19,7 @@ pub struct Dataset {
     /// ones).
     pub inputs: Table,
     /// Outputs that it should predict, `frames × outputs`, in the columns' own units (mm or N for
-    /// simulated ones).
+    /// simulated ones). NaN is missing.
     pub outputs: Table,
     /// Number of row tables: equal groups of consecutive columns, each with a network of its own.
     pub rows: usize,
@@ -45,6 +45,11 @@ impl Dataset {
     /// Number of frames in the set.
     pub fn frames(&self) -> usize {
         self.inputs.len()
+    }
+
+    /// Number of values of the output that is missing most often.
+    pub fn fewest_values(&self) -> usize {
+        self.outputs.counts().into_iter().min().unwrap_or(0)
     }
 
     /// Readings and outputs of row table number `row` (from 0).

@@ -132,7 +132,7 @@ impl<'d> Judge<'d> {
     }
 
     fn smallest_training_part(&self) -> usize {
-        smallest_training_part(self.fold_of)
+        smallest_training_part(self.fold_of, &self.dataset.outputs)
     }
 
     /// Scores of all combinations, by K, then spread, then penalty.
@@ -154,23 +154,21 @@ impl<'d> Judge<'d> {
             squares
         });
         let squares: Vec<Vec<Vec<f64>>> = squares.into_iter().collect::<Result<_>>()?;
-        let deviations = self.dataset.outputs.deviations();
+        let (deviations, counts) =
+            (self.dataset.outputs.deviations(), self.dataset.outputs.counts());
         let mut scored = Vec::new();
         for (k, of_folds) in centres.iter().zip(squares.chunks_exact(self.folds)) {
             let pairs = spreads.iter().flat_map(|s| penalties.iter().map(move |p| (*s, *p)));
             for (place, (spread, penalty)) in pairs.enumerate() {
                 let sum = |output: usize| of_folds.iter().map(|fold| fold[place][output]).sum();
+                let outputs = counts.iter().enumerate();
                 let rmse: Vec<f64> =
-                    (0..deviations.len()).map(|output| self.root_mean(sum(output))).collect();
+                    outputs.map(|(output, count)| root_mean(sum(output), *count)).collect();
                 let score = score(&rmse, &deviations);
                 scored.push(Scored { centres: *k, spread, penalty, rmse, score });
             }
         }
         Ok(scored)
-    }
-
-    fn root_mean(&self, squares: f64) -> f64 {
-        (squares / self.dataset.frames() as f64).sqrt()
     }
 
     /// Sums of squared errors on one fold, `[spread · penalty][output]`, after training on the others.
@@ -221,13 +219,18 @@ impl<'d> Judge<'d> {
             let squares = parallel::map(self.folds, &|fold| {
                 baseline_squares(baseline, self.dataset, self.fold_of, fold)
             });
-            let rmse =
-                |output: usize| self.root_mean(squares.iter().map(|fold| fold[output]).sum());
-            let outputs = self.dataset.outputs.names.len();
-            BaselineScore { decoder: baseline.name, rmse: (0..outputs).map(rmse).collect() }
+            let rmse = |(output, count): (usize, usize)| {
+                root_mean(squares.iter().map(|fold| fold[output]).sum(), count)
+            };
+            let outputs = self.dataset.outputs.counts().into_iter().enumerate();
+            BaselineScore { decoder: baseline.name, rmse: outputs.map(rmse).collect() }
         };
         BASELINES.iter().map(score).collect()
     }
+}
+
+fn root_mean(squares: f64, count: usize) -> f64 {
+    (squares / count as f64).sqrt()
 }
 
 /// Mean over the outputs of RMSE/standard deviation. Outputs that never change do not count.
