@@ -353,4 +353,31 @@ mod tests {
         assert_eq!(best_spread(&["y"]), 0.2);
         assert_eq!(best_spread(&["y", "constant"]), 0.2);
     }
+
+    #[test]
+    fn an_output_is_judged_on_the_frames_that_have_it() {
+        let mut both = dataset(&["y", "z"]);
+        for (number, line) in both.outputs.values.chunks_exact_mut(2).enumerate() {
+            line[0] = 1.0 + line[0];
+            line[1] = if number % 3 == 0 { f64::NAN } else { line[0] };
+        }
+        let folds = block_folds(both.frames(), 4);
+        let options = Options { centres: 1, spread: 1.0, ..Options::default() };
+        let (centres, spreads, penalties) = (vec![20], vec![0.5], vec![None]);
+        let candidates =
+            Candidates { centres, spreads, penalties, most_spreads: 0, most_penalties: 0 };
+        let select = |data: &Dataset| {
+            cross_validate(data, &folds, &candidates, &options, None, &Silent).unwrap()
+        };
+        let alone = Dataset { outputs: both.outputs.columns(0, 1), ..both.clone() };
+        let (of_both, of_one) = (select(&both), select(&alone));
+        assert_eq!(of_both.scored[0].rmse[0].to_bits(), of_one.scored[0].rmse[0].to_bits());
+        for (both, one) in of_both.baselines.iter().zip(&of_one.baselines) {
+            assert_eq!(both.rmse[0].to_bits(), one.rmse[0].to_bits());
+            // Two thirds of the same values have nearly the same error.
+            assert!((0.8..1.25).contains(&(both.rmse[1] / both.rmse[0])), "{both:?}");
+        }
+        let ratio = of_both.scored[0].rmse[1] / of_both.scored[0].rmse[0];
+        assert!((0.5..2.0).contains(&ratio), "{ratio}");
+    }
 }
