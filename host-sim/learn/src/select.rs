@@ -358,7 +358,7 @@ mod tests {
     fn an_output_is_judged_on_the_frames_that_have_it() {
         let mut both = dataset(&["y", "z"]);
         for (number, line) in both.outputs.values.chunks_exact_mut(2).enumerate() {
-            line[0] = 1.0 + line[0];
+            line[0] += 1.0;
             line[1] = if number % 3 == 0 { f64::NAN } else { line[0] };
         }
         let folds = block_folds(both.frames(), 4);

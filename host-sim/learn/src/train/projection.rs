@@ -200,7 +200,7 @@ fn standardised(table: &Table) -> Table {
 fn directions(inputs: &Table, outputs: &Table, features: usize) -> Result<DMatrix<f64>> {
     let readings = inputs.names.len();
     let all = Covariances::new(inputs, outputs, readings);
-    let (regression, predicted) = if !outputs.values.iter().any(|value| value.is_nan()) {
+    let (regression, predicted) = if outputs.values.iter().all(|value| !value.is_nan()) {
         let regression = all.regression()?;
         let predicted = all.with_outputs.tr_mul(&regression);
         (regression, predicted)
