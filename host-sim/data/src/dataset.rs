@@ -19,7 +19,7 @@ pub struct Dataset {
     /// ones).
     pub inputs: Table,
     /// Outputs that it should predict, `frames × outputs`, in the columns' own units (mm or N for
-    /// simulated ones).
+    /// simulated ones). NaN is missing.
     pub outputs: Table,
     /// Number of row tables: equal groups of consecutive columns, each with a network of its own.
     pub rows: usize,
@@ -47,6 +47,11 @@ impl Dataset {
         self.inputs.len()
     }
 
+    /// Number of values of the output that is missing most often.
+    pub fn fewest_values(&self) -> usize {
+        self.outputs.counts().into_iter().min().unwrap_or(0)
+    }
+
     /// Readings and outputs of row table number `row` (from 0).
     ///
     /// # Panics
@@ -61,8 +66,8 @@ impl Dataset {
     }
 
     /// Selects the columns that match the patterns `inputs` and `outputs` (see [`columns::select`]), by
-    /// default those with the project's own names. Frames with a missing value are skipped; [`Kept`]
-    /// counts them.
+    /// default those with the project's own names. Frames with a missing input, or without any output, are
+    /// skipped; [`Kept`] counts them.
     ///
     /// # Errors
     /// [`Error::File`] for a pattern without a column, a column that is input and output, a value that
@@ -93,8 +98,8 @@ impl Dataset {
         }
         let kept: Vec<usize> = (0..file.lines())
             .filter(|line| {
-                let complete = |c: &usize| !file.value(*line, *c).is_nan();
-                input_columns.iter().chain(&output_columns).all(complete)
+                let is_there = |c: &usize| !file.value(*line, *c).is_nan();
+                input_columns.iter().all(is_there) && output_columns.iter().any(is_there)
             })
             .collect();
         if kept.is_empty() {

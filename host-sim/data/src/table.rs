@@ -43,6 +43,59 @@ impl Table {
         ranges
     }
 
+    /// Number of values in each column that are not missing.
+    pub fn counts(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.names.len()];
+        for line in self.lines() {
+            counts.iter_mut().zip(line).for_each(|(count, v)| *count += usize::from(!v.is_nan()));
+        }
+        counts
+    }
+
+    /// Groups of columns that are missing in the same lines, by their first column: one of all columns if nothing is
+    /// missing.
+    pub fn missing_together(&self) -> Vec<Vec<usize>> {
+        if !self.values.iter().any(|value| value.is_nan()) {
+            return vec![(0..self.names.len()).collect()];
+        }
+        let together =
+            |a: usize, b: usize| self.lines().all(|line| line[a].is_nan() == line[b].is_nan());
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for column in 0..self.names.len() {
+            match groups.iter_mut().find(|group| together(group[0], column)) {
+                Some(group) => group.push(column),
+                None => groups.push(vec![column]),
+            }
+        }
+        groups
+    }
+
+    /// Indices of the lines that have all of these `columns`.
+    ///
+    /// # Panics
+    /// If the table has fewer columns.
+    pub fn lines_with(&self, columns: &[usize]) -> Vec<usize> {
+        let has = |line: &[f64]| columns.iter().all(|column| !line[*column].is_nan());
+        let lines = self.lines().enumerate().filter(|(_, line)| has(line));
+        lines.map(|(number, _)| number).collect()
+    }
+
+    /// Table of these `lines` and `columns`, in that order.
+    ///
+    /// # Panics
+    /// If there is no such line or column.
+    #[must_use]
+    pub fn part(&self, lines: &[usize], columns: &[usize]) -> Self {
+        let of_line = |line: &usize| {
+            let line = self.line(*line);
+            columns.iter().map(move |column| line[*column])
+        };
+        Self {
+            names: columns.iter().map(|column| self.names[*column].clone()).collect(),
+            values: lines.iter().flat_map(of_line).collect(),
+        }
+    }
+
     /// Mean of each column; NaN is skipped. Rounding moves it out of no column's range, so that the mean of equal values
     /// is that value.
     pub fn means(&self) -> Vec<f64> {
@@ -85,12 +138,15 @@ impl Table {
         deviations.zip(self.ranges()).map(|(d, range)| resolved(d, range)).collect()
     }
 
-    /// Sum Σ(estimate − value)² of each column, for `estimates` of the same shape, `lines × columns`.
+    /// Sum Σ(estimate − value)² of each column, for `estimates` of the same shape, `lines × columns`. Missing values
+    /// (NaN) are skipped; a missing estimate of a value is not.
     pub fn squared_errors(&self, estimates: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; self.names.len()];
         for (line, estimates) in self.lines().zip(estimates.chunks_exact(sums.len().max(1))) {
             for (sum, (value, estimate)) in sums.iter_mut().zip(line.iter().zip(estimates)) {
-                *sum += (estimate - value) * (estimate - value);
+                if !value.is_nan() {
+                    *sum += (estimate - value) * (estimate - value);
+                }
             }
         }
         sums
@@ -131,6 +187,22 @@ mod tests {
     }
 
     #[test]
+    fn columns_that_are_missing_in_the_same_lines_go_together() {
+        let names = ["x", "f", "y"].map(String::from).to_vec();
+        let values = vec![1.0, 2.0, 3.0, f64::NAN, 4.0, f64::NAN, 5.0, 6.0, 7.0];
+        let table = Table { names, values };
+        assert_eq!(table.missing_together(), [vec![0, 2], vec![1]]);
+        assert_eq!(table.lines_with(&[0, 2]), [0, 2]);
+        let part = table.part(&[0, 2], &[2, 0]);
+        assert_eq!(
+            (part.names, part.values),
+            (vec!["y".into(), "x".into()], vec![3.0, 1.0, 7.0, 5.0])
+        );
+        let complete = Table { names: table.names, values: vec![0.0; 6] };
+        assert_eq!(complete.missing_together(), [[0, 1, 2]]);
+    }
+
+    #[test]
     fn means_and_deviations_skip_missing_values() {
         let nan = f64::NAN;
         let names = ["a", "b", "c"].map(String::from).to_vec();
@@ -139,5 +211,8 @@ mod tests {
         assert_eq!(table.means()[..2], [2.0, 3.0]);
         assert!(table.means()[2].is_nan());
         assert_eq!(table.deviations(), [1.0, 1.0, 0.0]);
+        assert_eq!(table.counts(), [2, 2, 0]);
+        assert_eq!(table.missing_together(), [[0], [1], [2]]);
+        assert_eq!(table.squared_errors(&[0.0; 9]), [10.0, 20.0, 0.0]);
     }
 }

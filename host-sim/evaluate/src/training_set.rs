@@ -81,7 +81,7 @@ impl<'s> TrainingSet<'s> {
     pub fn blob(&self, options: &Options, progress: &dyn Progress) -> Result<ModelBlob> {
         if self.confidence {
             resolution::check_squares(&self.frames)?;
-            confidence::check(self.frames.frames(), self.frames.inputs.names.len())?;
+            confidence::check(self.frames.fewest_values(), self.frames.inputs.names.len())?;
         }
         if self.fill {
             fill::check(&self.frames)?;

@@ -100,7 +100,7 @@ impl Density {
 pub struct HeldOut {
     /// Inputs of the model: `frames × readings`.
     inputs: Vec<f64>,
-    /// Errors of its outputs, in their units: `frames × outputs`.
+    /// Errors of its outputs, in their units: `frames × outputs`. NaN for an output that is missing in the data.
     errors: Vec<f64>,
     /// −ln p of each frame.
     surprises: Vec<f64>,
@@ -165,39 +165,39 @@ fn variances(
 ) -> Vec<f64> {
     let points = features.apply(&held_out.inputs);
     let components = mixture.components.len();
-    let of_pieces: Vec<(Vec<f64>, Vec<f64>)> =
+    // Weights, and weighted squares, by component and output.
+    let of_pieces: Vec<Vec<[f64; 2]>> =
         parallel::map(held_out.errors.len().div_ceil(512 * outputs), &|index| {
             let points = parallel::piece(&points, 512 * features.count(), index);
             let errors = parallel::piece(&held_out.errors, 512 * outputs, index);
-            let (mut weights, mut squares) =
-                (vec![0.0; components], vec![0.0; components * outputs]);
+            let mut sums = vec![[0.0; 2]; components * outputs];
             for (point, errors) in
                 points.chunks_exact(features.count()).zip(errors.chunks_exact(outputs))
             {
                 let (probabilities, _) = mixture.probabilities(&point.to_vec().into());
-                for (component, probability) in probabilities.into_iter().enumerate() {
-                    weights[component] += probability;
-                    let squares = &mut squares[component * outputs..][..outputs];
-                    for (square, error) in squares.iter_mut().zip(errors) {
+                for (sums, probability) in sums.chunks_exact_mut(outputs).zip(probabilities) {
+                    let known = sums.iter_mut().zip(errors).filter(|(_, error)| !error.is_nan());
+                    for ([weight, square], error) in known {
+                        *weight += probability;
                         *square += probability * error * error;
                     }
                 }
             }
-            (weights, squares)
+            sums
         });
     // Every component counts one mean frame besides its own, so that it has a variance.
-    let frames = (held_out.errors.len() / outputs) as f64;
-    let mut mean = vec![0.0; outputs];
-    for errors in held_out.errors.chunks_exact(outputs) {
-        mean.iter_mut().zip(errors).for_each(|(mean, error)| *mean += error * error / frames);
+    let mean = |output: usize| {
+        let errors = held_out.errors.iter().skip(output).step_by(outputs).filter(|e| !e.is_nan());
+        let frames = errors.clone().count() as f64;
+        [1.0, errors.map(|error| error * error / frames).sum()]
+    };
+    let mut sums = (0..outputs).map(mean).collect::<Vec<[f64; 2]>>().repeat(components);
+    for of_piece in &of_pieces {
+        for ([weight, square], [of_weight, of_square]) in sums.iter_mut().zip(of_piece) {
+            (*weight, *square) = (*weight + of_weight, *square + of_square);
+        }
     }
-    let (mut weights, mut squares) = (vec![1.0; components], mean.repeat(components));
-    for (of_weights, of_squares) in &of_pieces {
-        weights.iter_mut().zip(of_weights).for_each(|(sum, weight)| *sum += weight);
-        squares.iter_mut().zip(of_squares).for_each(|(sum, square)| *sum += square);
-    }
-    let lines = squares.chunks_exact(outputs).zip(weights);
-    lines.flat_map(|(squares, weight)| squares.iter().map(move |s| s / weight)).collect()
+    sums.into_iter().map(|[weight, square]| square / weight).collect()
 }
 
 /// Ratios of each output's errors to its deviations that the [`SHARES`] of them are within; 1 where deviations are 0.

@@ -127,7 +127,8 @@ fn training_rmse(
             None => inferred,
         };
         let squares = table.outputs.squared_errors(&predicted);
-        rmse.extend(squares.iter().map(|s| (s / dataset.frames() as f64).sqrt()));
+        let counts = table.outputs.counts();
+        rmse.extend(squares.iter().zip(counts).map(|(s, count)| (s / count as f64).sqrt()));
     }
     rmse
 }

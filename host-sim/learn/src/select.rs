@@ -132,7 +132,7 @@ impl<'d> Judge<'d> {
     }
 
     fn smallest_training_part(&self) -> usize {
-        smallest_training_part(self.fold_of)
+        smallest_training_part(self.fold_of, &self.dataset.outputs)
     }
 
     /// Scores of all combinations, by K, then spread, then penalty.
@@ -154,23 +154,21 @@ impl<'d> Judge<'d> {
             squares
         });
         let squares: Vec<Vec<Vec<f64>>> = squares.into_iter().collect::<Result<_>>()?;
-        let deviations = self.dataset.outputs.deviations();
+        let (deviations, counts) =
+            (self.dataset.outputs.deviations(), self.dataset.outputs.counts());
         let mut scored = Vec::new();
         for (k, of_folds) in centres.iter().zip(squares.chunks_exact(self.folds)) {
             let pairs = spreads.iter().flat_map(|s| penalties.iter().map(move |p| (*s, *p)));
             for (place, (spread, penalty)) in pairs.enumerate() {
                 let sum = |output: usize| of_folds.iter().map(|fold| fold[place][output]).sum();
+                let outputs = counts.iter().enumerate();
                 let rmse: Vec<f64> =
-                    (0..deviations.len()).map(|output| self.root_mean(sum(output))).collect();
+                    outputs.map(|(output, count)| root_mean(sum(output), *count)).collect();
                 let score = score(&rmse, &deviations);
                 scored.push(Scored { centres: *k, spread, penalty, rmse, score });
             }
         }
         Ok(scored)
-    }
-
-    fn root_mean(&self, squares: f64) -> f64 {
-        (squares / self.dataset.frames() as f64).sqrt()
     }
 
     /// Sums of squared errors on one fold, `[spread · penalty][output]`, after training on the others.
@@ -221,13 +219,18 @@ impl<'d> Judge<'d> {
             let squares = parallel::map(self.folds, &|fold| {
                 baseline_squares(baseline, self.dataset, self.fold_of, fold)
             });
-            let rmse =
-                |output: usize| self.root_mean(squares.iter().map(|fold| fold[output]).sum());
-            let outputs = self.dataset.outputs.names.len();
-            BaselineScore { decoder: baseline.name, rmse: (0..outputs).map(rmse).collect() }
+            let rmse = |(output, count): (usize, usize)| {
+                root_mean(squares.iter().map(|fold| fold[output]).sum(), count)
+            };
+            let outputs = self.dataset.outputs.counts().into_iter().enumerate();
+            BaselineScore { decoder: baseline.name, rmse: outputs.map(rmse).collect() }
         };
         BASELINES.iter().map(score).collect()
     }
+}
+
+fn root_mean(squares: f64, count: usize) -> f64 {
+    (squares / count as f64).sqrt()
 }
 
 /// Mean over the outputs of RMSE/standard deviation. Outputs that never change do not count.
@@ -349,5 +352,32 @@ mod tests {
     fn the_better_spread_is_chosen_whatever_stands_beside() {
         assert_eq!(best_spread(&["y"]), 0.2);
         assert_eq!(best_spread(&["y", "constant"]), 0.2);
+    }
+
+    #[test]
+    fn an_output_is_judged_on_the_frames_that_have_it() {
+        let mut both = dataset(&["y", "z"]);
+        for (number, line) in both.outputs.values.chunks_exact_mut(2).enumerate() {
+            line[0] += 1.0;
+            line[1] = if number % 3 == 0 { f64::NAN } else { line[0] };
+        }
+        let folds = block_folds(both.frames(), 4);
+        let options = Options { centres: 1, spread: 1.0, ..Options::default() };
+        let (centres, spreads, penalties) = (vec![20], vec![0.5], vec![None]);
+        let candidates =
+            Candidates { centres, spreads, penalties, most_spreads: 0, most_penalties: 0 };
+        let select = |data: &Dataset| {
+            cross_validate(data, &folds, &candidates, &options, None, &Silent).unwrap()
+        };
+        let alone = Dataset { outputs: both.outputs.columns(0, 1), ..both.clone() };
+        let (of_both, of_one) = (select(&both), select(&alone));
+        assert_eq!(of_both.scored[0].rmse[0].to_bits(), of_one.scored[0].rmse[0].to_bits());
+        for (both, one) in of_both.baselines.iter().zip(&of_one.baselines) {
+            assert_eq!(both.rmse[0].to_bits(), one.rmse[0].to_bits());
+            // Two thirds of the same values have nearly the same error.
+            assert!((0.8..1.25).contains(&(both.rmse[1] / both.rmse[0])), "{both:?}");
+        }
+        let ratio = of_both.scored[0].rmse[1] / of_both.scored[0].rmse[0];
+        assert!((0.5..2.0).contains(&ratio), "{ratio}");
     }
 }

@@ -19,6 +19,7 @@ pub mod kmeans;
 pub mod hidden_layer;
 mod samples;
 pub mod least_squares;
+pub(crate) mod tasks;
 pub(crate) mod principal;
 pub mod format;
 pub mod projection;
@@ -105,10 +106,15 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Checks the rank against the number of a network's `outputs`.
-    fn check_rank(&self, outputs: usize) -> std::result::Result<(), BadValue> {
+    /// Checks the options against the frames of `dataset` and the outputs that these have.
+    ///
+    /// # Errors
+    /// [`BadValue`] for the first option that cannot be used.
+    pub fn check_for(&self, dataset: &Dataset) -> std::result::Result<(), BadValue> {
+        self.check(dataset.frames())?;
+        tasks::check(&dataset.outputs, self.centres)?;
         match self.output_rank {
-            Some(rank) if self.whole_array => output_rank::check(rank, outputs),
+            Some(rank) if self.whole_array => output_rank::check(rank, &dataset.outputs),
             _ => Ok(()),
         }
     }
@@ -213,7 +219,7 @@ impl Samples<'_> {
             let fit = |penalty| output_rank::fit(self, layer, rank, &with(penalty));
             return penalties.iter().map(fit).collect();
         }
-        let ridge = |penalty| self.ridge(layer, &with(penalty));
+        let ridge = |penalty| Ridge::new(layer, self.inputs(), &with(penalty));
         let ridges: Vec<Ridge> = penalties.iter().map(ridge).collect();
         format::fit(self, layer, options, &ridges)
     }
@@ -263,8 +269,7 @@ pub fn train_refined(
 
 /// Checks the options against the data, and the data against f32.
 fn check(dataset: &Dataset, options: &Options) -> Result<()> {
-    options.check(dataset.frames())?;
-    options.check_rank(dataset.outputs.names.len())?;
+    options.check_for(dataset)?;
     resolution::check(dataset)
 }
 

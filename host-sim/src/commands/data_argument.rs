@@ -212,7 +212,7 @@ impl DataArguments {
         });
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
         let inputs = training.inputs.names.len() / training.rows;
-        let centres = Warning::enough_frames_for(training.frames(), inputs);
+        let centres = Warning::enough_frames_for(training.fewest_values(), inputs);
         let centres = Options::default().centres.min(centres);
         let measurements = Measurements {
             name: name.into_owned(),

@@ -167,7 +167,8 @@ impl DataArguments {
         let training = stream.given(first);
         let frames = training.frames();
         let inputs = training.inputs.names.len() / training.rows;
-        let centres = Options::default().centres.min(Warning::enough_frames_for(frames, inputs));
+        let enough = Warning::enough_frames_for(training.fewest_values(), inputs);
+        let centres = Options::default().centres.min(enough);
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
         let measurements = Measurements {
             name: if path.as_os_str() == "standard input" { "data".into() } else { name.into() },

@@ -153,3 +153,59 @@ fn run_judges_a_csv_file_by_its_last_fifth_or_fold_or_another_file() {
     let other = folder.fail(&run("all.csv", &["--test", "m.bin"]), 2);
     assert!(other.contains("m.bin"), "{other}");
 }
+
+/// A sensor of four cells whose place of touch is empty while nothing touches, with an offset at rest.
+#[test]
+fn force_is_learnt_from_the_lines_at_rest_that_have_no_place() {
+    let folder = Folder::new("measured-rest");
+    let line = |i: usize| {
+        let unit = |factor: usize, prime: usize| (i * factor % prime) as f64 / prime as f64;
+        let (x, y) = (10.0 * unit(37, 101), 8.0 * unit(53, 97));
+        let touched = i % 20 < 14;
+        let force = if touched { 1.0 + 4.0 * unit(71, 89) } else { 0.0 };
+        let cell = |u: f64, v: f64| {
+            let share = (-((x - u).powi(2) + (y - v).powi(2)) / 40.0).exp();
+            100.0 + 30.0 * force * share / (1.0 + 0.1 * force)
+        };
+        let cells = [cell(2.0, 2.0), cell(8.0, 2.0), cell(2.0, 6.0), cell(8.0, 6.0)];
+        let cells = cells.map(|value| value.to_string()).join(",");
+        let place = if touched { format!("{x},{y}") } else { ",".into() };
+        format!("{cells},{place},{force}\n")
+    };
+    let header = "a,b,c,d,x_mm,y_mm,f_n\n";
+    let lines: Vec<String> = (0..2000).map(line).collect();
+    let touched: String = lines.iter().filter(|line| !line.contains(",,,")).cloned().collect();
+    let at_rest: String = lines.iter().filter(|line| line.contains(",,,")).cloned().collect();
+    for (name, lines) in [("all", &lines.concat()), ("touched", &touched), ("rest", &at_rest)] {
+        folder.write(&format!("{name}.csv"), format!("{header}{lines}"));
+    }
+    let usual = ["--inputs", "a,b,c,d", "--outputs", "x_mm,y_mm,f_n", "--centres", "24"];
+    let rmse = |model: &str, data: &str, group: usize| {
+        let evaluated = json(&folder.succeed(&["eval", model, data, "--json"]));
+        evaluated["decoders"][0]["errors"][group]["rmse"].as_f64()
+    };
+    for more in [&["--no-refine", "--confidence"][..], &["--solver", "rls", "--no-refine"], &[]] {
+        for name in ["all", "touched"] {
+            let (data, model) = (format!("{name}.csv"), format!("{name}.bin"));
+            folder.succeed(&[&["train", &data, "-o", &model], &usual[..], more].concat());
+        }
+        let [with_rest, without] =
+            ["all.bin", "touched.bin"].map(|it| rmse(it, "rest.csv", 2).unwrap());
+        assert!(with_rest < 0.1 && with_rest < 0.3 * without, "{more:?}: {with_rest} {without}");
+        for place in 0..2 {
+            let [all, alone] =
+                ["all.bin", "touched.bin"].map(|it| rmse(it, "touched.csv", place).unwrap());
+            assert!(all < 1.25 * alone, "{more:?}: {all} {alone}");
+        }
+    }
+    let selected = ["train", "all.csv", "--select", "--no-refine", "--spread", "0.5,0.8", "--json"];
+    let selected = json(&folder.succeed(&[&selected[..], &usual, &["-o", "s.bin"]].concat()));
+    let counts: Vec<_> = (selected["decoders"][0]["errors"].as_array().unwrap().iter())
+        .map(|errors| errors["count"].as_u64().unwrap())
+        .collect();
+    assert_eq!(counts, [1400, 1400, 2000]);
+    assert!(
+        selected["decoders"][1]["errors"][0]["rmse"].is_f64(),
+        "the linear decoder: {selected}"
+    );
+}

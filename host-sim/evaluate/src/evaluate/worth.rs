@@ -103,7 +103,7 @@ fn on_frames(
 
 /// Errors of the best candidate and of the baselines on folds that were held out.
 fn on_folds(selection: &Selection, set: &TrainingSet<'_>) -> Vec<DecoderErrors> {
-    let names = &set.frames.outputs.names;
+    let (names, counts) = (&set.frames.outputs.names, set.frames.outputs.counts());
     let mean = selection.baselines.iter().find(|it| it.decoder == mean::NAME);
     let of = |decoder: &str, rmse: &[f64]| {
         let errors = columns::groups(names).into_iter().map(|(group, members)| {
@@ -115,7 +115,7 @@ fn on_folds(selection: &Selection, set: &TrainingSet<'_>) -> Vec<DecoderErrors> 
             Errors {
                 group: group.into(),
                 unit: columns::unit_of(group).into(),
-                count: members.len() * set.frames.frames(),
+                count: members.iter().map(|column| counts[*column]).sum(),
                 rmse: (squares / members.len() as f64).sqrt(),
                 relative_l2_percent: None,
                 full_scale_percent: None,

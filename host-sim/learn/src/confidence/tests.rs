@@ -140,3 +140,24 @@ fn a_quantile_of_few_values_covers_its_share() {
     assert_eq!([of(0.1), of(0.34), of(0.5), of(0.67), of(1.0)], [1.0, 2.0, 2.0, 3.0, 3.0]);
     assert_eq!(super::quantile(&mut [], 0.5), 0.0);
 }
+
+#[test]
+fn deviations_of_an_output_are_those_of_the_frames_that_have_it() {
+    let (world, training, blob, _) = row_4();
+    let density = Density::fit(&training, &Settings { components: 8, ..Settings::default() });
+    let calibration = synthesise(&world, Stream::Calibration, 4000);
+    let mut partly = calibration.clone();
+    partly.outputs.values.iter_mut().step_by(36).for_each(|value| *value = f64::NAN);
+    let deviations = |calibration: &Dataset| {
+        let mut held_out = HeldOut::default();
+        held_out.add(&blob, &density, calibration);
+        let with = add(&blob, &density, &held_out).unwrap();
+        with.prepare(Exponential::default()).assess(&training.inputs.values).unwrap().0
+    };
+    let (all, partly) = (deviations(&calibration), deviations(&partly));
+    for (place, (all, partly)) in all.iter().zip(&partly).enumerate() {
+        // Half of the frames have the first output.
+        let most = if place % 18 == 0 { 0.25 } else { 0.0 };
+        assert!((partly / all - 1.0).abs() <= most, "{place}: {partly} {all}");
+    }
+}

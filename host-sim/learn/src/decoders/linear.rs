@@ -3,8 +3,9 @@
 use taxel_data::dataset::{Dataset, RowTable};
 
 use super::{RowDecoder, Rows};
-use crate::train::least_squares::{self, Regressors};
-use crate::train::{INITIAL_COVARIANCE, InputScale, Samples};
+use crate::train::least_squares::{Factor, Regressors};
+use crate::train::tasks::{Factors, Task};
+use crate::train::{INITIAL_COVARIANCE, InputScale};
 
 /// Name of the decoder in tables and results.
 pub const NAME: &str = "linear";
@@ -25,15 +26,19 @@ pub fn fit(training: &Dataset) -> Rows<LinearRow> {
 }
 
 impl LinearRow {
-    /// Fits the best linear decoder of `table` in the sense of least squares.
+    /// Fits the best linear decoder of `table` in the sense of least squares, each output on the lines that have it.
     pub fn fit(table: &RowTable) -> Self {
-        let samples = Samples::new(table);
-        let inputs = samples.inputs();
+        let (scale, inputs) = (InputScale::new(table), table.inputs.names.len());
         let regressors = Regressors { centres: &[], inputs, decays: &[1.0], affine_tail: true };
-        let mut slope =
-            least_squares::fit(&regressors, &samples.scaled, &table.outputs, INITIAL_COVARIANCE);
+        let factor = |task: Task<'_>| {
+            let design = regressors.of(scale.apply(&task.table.inputs.values));
+            let outputs = task.columns.len();
+            (task.columns, Factor::new(&design, &task.targets, outputs, INITIAL_COVARIANCE))
+        };
+        let tasks = Task::all(table, &table.outputs);
+        let mut slope = Factors(tasks.into_iter().map(factor).collect()).weights();
         let bias = slope.split_off(slope.len() - table.outputs.names.len());
-        Self { scale: samples.scale, inputs, slope, bias }
+        Self { scale, inputs, slope, bias }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Folds of measured frames, for cross-validation and for refinement.
 
 use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::table::Table;
 
 /// Assigns `frames` to `folds` at random, in equal numbers: the fold of each frame, from 0.
 pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
@@ -29,15 +30,16 @@ pub fn number_folds(values: &[f64]) -> Vec<usize> {
     values.iter().map(|value| distinct.partition_point(|d| d.total_cmp(value).is_lt())).collect()
 }
 
-/// Number of frames outside `fold`.
-fn training_part(fold_of: &[usize], fold: usize) -> usize {
-    fold_of.iter().filter(|f| **f != fold).count()
-}
-
-/// Number of training frames left by the largest fold.
-pub fn smallest_training_part(fold_of: &[usize]) -> usize {
+/// Number of training frames left by the largest fold: of those that have an output, for the output that has fewest.
+pub fn smallest_training_part(fold_of: &[usize], outputs: &Table) -> usize {
     let folds = fold_of.iter().max().map_or(0, |last| last + 1);
-    (0..folds).map(|fold| training_part(fold_of, fold)).min().unwrap_or(0)
+    let mut held_out = vec![vec![0; outputs.names.len()]; folds];
+    for (fold, line) in fold_of.iter().zip(outputs.lines()) {
+        held_out[*fold].iter_mut().zip(line).for_each(|(n, v)| *n += usize::from(!v.is_nan()));
+    }
+    let counts = outputs.counts();
+    let left = held_out.iter().flat_map(|fold| counts.iter().zip(fold).map(|(all, n)| all - n));
+    left.min().unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -58,7 +60,16 @@ mod tests {
     #[test]
     fn equal_values_share_a_fold() {
         assert_eq!(number_folds(&[7.0, -1.0, 7.0, 0.5]), [2, 0, 2, 1]);
-        assert_eq!(smallest_training_part(&[2, 0, 2, 1]), 2);
+    }
+
+    #[test]
+    fn the_output_with_fewest_frames_tells_how_many_there_are_to_train_on() {
+        let outputs = |y: f64| {
+            let values = vec![1.0, y, 2.0, y, 3.0, 4.0, 5.0, 6.0];
+            Table { names: ["f", "y"].map(String::from).to_vec(), values }
+        };
+        assert_eq!(smallest_training_part(&[2, 0, 2, 1], &outputs(7.0)), 2);
+        assert_eq!(smallest_training_part(&[2, 0, 2, 1], &outputs(f64::NAN)), 1);
     }
 
     #[test]

@@ -15,6 +15,7 @@ use taxel_data::table::Table;
 use super::hidden_layer::{HiddenLayer, not_held};
 use super::least_squares::{Decomposed, Design, Factor, Recursion, predict};
 use super::samples::{Ridge, Samples};
+use super::tasks::{Factors, Task};
 use super::{Options, Recursive, Solver};
 use crate::error::{Error, Result, parameter_not_held};
 use crate::infer::{Exponential, infer};
@@ -76,9 +77,11 @@ impl FittedNetwork {
         let found = outputs.squared_errors(&predicted);
         let totals = column_squares(&targets.deviations.values, targets.outputs());
         let errors = found.into_iter().zip(left).zip(totals).zip(&targets.means);
-        for (output, (((found, left), total), mean)) in errors.enumerate() {
+        for (output, ((((found, left), total), mean), count)) in
+            errors.zip(outputs.counts()).enumerate()
+        {
             let lost = (found - left) / total;
-            let rounding = outputs.len() as f64 * (4.0 * f64::EPSILON * mean).powi(2);
+            let rounding = count as f64 * (4.0 * f64::EPSILON * mean).powi(2);
             if total > rounding && lost > MOST_LOST && found > MOST_GROWTH * left {
                 let (format, output) = (self.format.name(), &outputs.names[output]);
                 return Err(Error::unfit(format!(
@@ -191,11 +194,11 @@ pub(super) trait Held: Send + Sync {
     /// Regressors that a device computes for the inputs of `table`, line after line.
     fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't>;
 
-    /// Network with the weights of `factor`, which was fitted to the deviations of `targets`.
+    /// Network with the weights of `factors`, which were fitted to the deviations of `targets`.
     ///
     /// # Errors
     /// [`Error`] if the format does not hold the network.
-    fn network(&self, factor: &Factor, targets: &Targets) -> Result<FittedNetwork>;
+    fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork>;
 }
 
 /// Gaussians of `layer`, held in the `format`. Where each centre has a width of its own, direct distances replace
@@ -231,23 +234,42 @@ struct Fit<'s, H: ?Sized> {
     targets: &'s Targets,
     solver: Solver,
     held: &'s H,
-    /// Decomposition that all penalties share.
-    decomposed: OnceCell<Decomposed>,
+    /// Number of frames that the penalties on each output's weights are counted over.
+    frames: &'s [usize],
+    tasks: Vec<Task<'s>>,
+    /// Decompositions of the tasks, which all penalties share.
+    decomposed: Vec<OnceCell<Decomposed>>,
 }
 
 impl<'s, H: Held + ?Sized> Fit<'s, H> {
-    fn new(held: &'s H, table: &'s RowTable, targets: &'s Targets, solver: Solver) -> Self {
-        Self { table, targets, solver, held, decomposed: OnceCell::new() }
+    fn new(
+        held: &'s H,
+        table: &'s RowTable,
+        targets: &'s Targets,
+        solver: Solver,
+        frames: &'s [usize],
+    ) -> Self {
+        let tasks = Task::all(table, &targets.deviations);
+        let decomposed = vec![OnceCell::new(); tasks.len()];
+        Self { table, targets, solver, held, frames, tasks, decomposed }
     }
 
-    /// Factor of all samples, with these penalties on squared weights.
-    fn factor(&self, ridge: Ridge) -> Factor {
-        let Ridge { initial_covariance, of_tail } = ridge;
-        let (targets, outputs) = (&self.targets.deviations.values, self.targets.outputs());
-        let design = self.held.design(self.table);
+    /// Factors of all samples, with these penalties on squared weights.
+    fn factors(&self, ridge: Ridge) -> Factors {
+        let of_task = |(task, decomposed): (&Task<'_>, &OnceCell<Decomposed>)| {
+            (task.columns.clone(), self.factor(task, decomposed, ridge))
+        };
+        Factors(self.tasks.iter().zip(&self.decomposed).map(of_task).collect())
+    }
+
+    fn factor(&self, task: &Task<'_>, decomposed: &OnceCell<Decomposed>, ridge: Ridge) -> Factor {
+        let frames = self.frames[task.columns[0]];
+        let (initial_covariance, of_tail) =
+            (ridge.initial_covariance(frames), ridge.of_tail(frames));
+        let (targets, outputs) = (&*task.targets, task.columns.len());
+        let design = self.held.design(&task.table);
         match self.solver {
-            Solver::Qr => self
-                .decomposed
+            Solver::Qr => decomposed
                 .get_or_init(|| Decomposed::new(&*design, targets, outputs))
                 .factor_with(|regressor| {
                     // Activations come first, then the inputs of the tail, then 1.
@@ -260,7 +282,7 @@ impl<'s, H: Held + ?Sized> Fit<'s, H> {
             Solver::Rls(settings) => {
                 let mut recursion =
                     Recursion::new(design.regressors(), outputs, initial_covariance, &settings);
-                recursion.absorb(&*design, targets, 0..self.table.inputs.len());
+                recursion.absorb(&*design, targets, 0..task.table.inputs.len());
                 recursion.factor()
             }
         }
@@ -268,22 +290,22 @@ impl<'s, H: Held + ?Sized> Fit<'s, H> {
 
     /// Network whose weights have these penalties.
     fn network(&self, ridge: Ridge) -> Result<FittedNetwork> {
-        let factor = self.factor(ridge);
-        let network = self.held.network(&factor, self.targets)?;
-        network.unless_lost(self.table, self.targets, &self.left(&factor))
+        let factors = self.factors(ridge);
+        let network = self.held.network(&factors, self.targets)?;
+        network.unless_lost(self.table, self.targets, &self.left(&factors))
     }
 
-    /// Squared error of each output that the solution of `factor` leaves.
-    fn left(&self, factor: &Factor) -> Vec<f64> {
+    /// Squared error of each output that the solution of `factors` leaves.
+    fn left(&self, factors: &Factors) -> Vec<f64> {
         match self.solver {
             Solver::Rls(Recursive { forgetting_factor, .. }) if forgetting_factor < 1.0 => {
-                left(self.held, self.table, self.targets, factor)
+                left(self.held, self.table, self.targets, factors)
             }
             // The squares of the targets without those along the regressors.
             _ => {
                 let squares = |values: &[f64]| column_squares(values, self.targets.outputs());
                 let all = squares(&self.targets.deviations.values).into_iter();
-                all.zip(squares(&factor.projection))
+                all.zip(squares(&factors.projection()))
                     .map(|(all, along)| (all - along).max(0.0))
                     .collect()
             }
@@ -291,21 +313,21 @@ impl<'s, H: Held + ?Sized> Fit<'s, H> {
     }
 }
 
-/// Sum of the squares of each of so many columns.
+/// Sum of the squares of each of so many columns; NaN is skipped.
 fn column_squares(values: &[f64], columns: usize) -> Vec<f64> {
-    let column = |column| values.iter().skip(column).step_by(columns).map(|v| v * v).sum();
-    (0..columns).map(column).collect()
+    let of = |column| values.iter().skip(column).step_by(columns).filter(|v| !v.is_nan());
+    (0..columns).map(|column| of(column).map(|v| v * v).sum()).collect()
 }
 
-/// Squared error of each output that the solution of `factor` leaves on `table`, wherever it was fitted.
+/// Squared error of each output that the solution of `factors` leaves on `table`, wherever it was fitted.
 pub(super) fn left(
     held: &(impl Held + ?Sized),
     table: &RowTable,
     targets: &Targets,
-    factor: &Factor,
+    factors: &Factors,
 ) -> Vec<f64> {
     let (lines, outputs) = (table.inputs.len(), targets.outputs());
-    let predicted = predict(&*held.design(table), 0..lines, &factor.weights(), outputs);
+    let predicted = predict(&*held.design(table), 0..lines, &factors.weights(), outputs);
     targets.deviations.squared_errors(&predicted)
 }
 
@@ -323,9 +345,10 @@ pub(super) fn fit(
 ) -> Result<Vec<FittedNetwork>> {
     let targets = Targets::new(&samples.table.outputs);
     let (table, solver) = (samples.table, options.solver);
+    let frames = table.outputs.counts();
     if options.format != Format::F32 || !layer.relative_widths.is_empty() {
         let held = held(samples, layer, options, options.format)?;
-        let fit = Fit::new(&*held, table, &targets, solver);
+        let fit = Fit::new(&*held, table, &targets, solver, &frames);
         return ridges.iter().map(|ridge| fit.network(*ridge)).collect();
     }
     let of_width = Options { spread: layer.spread, ..*options };
@@ -333,22 +356,24 @@ pub(super) fn fit(
     let few = expanded.few(table);
     let few_targets = few.as_ref().map(|few| targets.of_others(&few.outputs));
     let fit_few = few.as_ref().zip(few_targets.as_ref());
-    let fit_few = fit_few.map(|(few, targets)| Fit::new(&expanded, few, targets, solver));
-    let fit = Fit::new(&expanded, table, &targets, solver);
+    let fit_few = fit_few.map(|(few, targets)| Fit::new(&expanded, few, targets, solver, &frames));
+    let fit = Fit::new(&expanded, table, &targets, solver, &frames);
     let direct = direct_f32::Direct::new(samples, layer, options);
-    let direct = Fit::new(&direct, table, &targets, solver);
+    let direct = Fit::new(&direct, table, &targets, solver, &frames);
     let proved = |ridge: Ridge| {
         if let Some(few) = &fit_few {
-            let network = few.held.network(&few.factor(ridge), few.targets).ok()?;
+            let network = few.held.network(&few.factors(ridge), few.targets).ok()?;
             if expanded_f32::worst_share(&network, table) > expanded_f32::HOPELESS {
                 return None;
             }
         }
-        let factor = fit.factor(ridge);
-        let network = expanded.network(&factor, &targets).ok()?;
+        let factors = fit.factors(ridge);
+        let network = expanded.network(&factors, &targets).ok()?;
         let is_harmless = expanded_f32::worst_share(&network, table) <= expanded_f32::HARMLESS;
         // What this format loses, direct distances may hold.
-        is_harmless.then(|| network.unless_lost(table, &targets, &fit.left(&factor)).ok()).flatten()
+        is_harmless
+            .then(|| network.unless_lost(table, &targets, &fit.left(&factors)).ok())
+            .flatten()
     };
     ridges.iter().map(|ridge| proved(*ridge).map_or_else(|| direct.network(*ridge), Ok)).collect()
 }

@@ -8,8 +8,6 @@ use std::ops::Range;
 
 use model_core::rls;
 
-use taxel_data::table::Table;
-
 use crate::parallel;
 
 mod exp;
@@ -116,6 +114,14 @@ impl Factor {
         Decomposed::new(design, targets, outputs).factor(initial_covariance)
     }
 
+    /// Factor of these outputs alone.
+    pub(super) fn of_outputs(self, columns: &[usize]) -> Self {
+        let lines = self.projection.chunks_exact(self.outputs);
+        let projection =
+            lines.flat_map(|line| columns.iter().map(|column| line[*column])).collect();
+        Self { projection, outputs: columns.len(), ..self }
+    }
+
     /// Weights, `regressors × outputs`, by back substitution.
     pub fn weights(&self) -> Vec<f64> {
         let mut weights = vec![0.0; self.regressors * self.outputs];
@@ -183,20 +189,6 @@ fn decompose(
         triangle.absorb(&mut new_rows);
     }
     triangle
-}
-
-/// Fits weights (`regressors × outputs`) of Gaussian regressors of `scaled` inputs (`samples × inputs`).
-///
-/// # Panics
-/// If `initial_covariance` is not positive and finite, or there is no output.
-pub fn fit(
-    regressors: &Regressors<'_>,
-    scaled: &[f64],
-    outputs: &Table,
-    initial_covariance: f64,
-) -> Vec<f64> {
-    let design = regressors.of(scaled);
-    Factor::new(&design, &outputs.values, outputs.names.len(), initial_covariance).weights()
 }
 
 #[cfg(test)]

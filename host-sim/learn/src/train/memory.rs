@@ -32,12 +32,14 @@ pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -
     let weights = options.centres as f64 + 1.0 + if options.affine_tail { inputs } else { 0.0 };
     let at_once = networks.min(rayon::current_num_threads() as f64);
     let square = weights * (weights + outputs);
-    let fit = TRIANGLES * square * F64;
+    let tasks = dataset.outputs.missing_together().len() as f64;
+    let fit = TRIANGLES * tasks * square * F64;
     let of_refinement = pieces.map_or(0.0, |pieces| (pieces as f64 + 3.0) * square * F64);
     let projected = if options.whole_array { (readings + all_outputs).powi(2) } else { 0.0 };
     // The linear decoder that every model is judged beside.
     let linear = (readings / rows + 1.0).powi(2) * TRIANGLES * F64;
-    let samples = COPIES * frames * (readings + all_outputs) * F64;
+    // Where outputs are missing, each task has its own copy.
+    let samples = (COPIES + tasks - 1.0) * frames * (readings + all_outputs) * F64;
     let most = [at_once * fit, at_once * of_refinement, MATRICES * projected * F64, linear];
     (samples + most.into_iter().fold(0.0, f64::max)) as u64
 }

@@ -14,13 +14,14 @@ use model_core::expansion::Expansion;
 use nalgebra::DMatrix;
 use taxel_data::BadValue;
 use taxel_data::dataset::RowTable;
+use taxel_data::error::require;
 use taxel_data::table::Table;
 
 use super::format::{self, FittedNetwork, Targets};
 use super::hidden_layer::HiddenLayer;
 use super::least_squares::{Factor, Regressors};
-use super::principal;
-use super::{Options, Samples};
+use super::samples::Ridge;
+use super::{Options, Samples, principal, tasks};
 use crate::error::Result;
 use crate::parallel;
 
@@ -30,7 +31,7 @@ const LINES_AT_ONCE: usize = 256;
 /// Fits a network with the Gaussians of `layer` to the samples' outputs, by way of `rank` components.
 ///
 /// # Errors
-/// [`Error::Setting`](crate::Error::Setting) for a rank that is not below the number of outputs, or an
+/// [`Error::Setting`](crate::Error::Setting) for a rank that is not below the number of outputs, or missing outputs; an
 /// [`Error`](crate::Error) if the format does not hold the network.
 pub(super) fn fit(
     samples: &Samples<'_>,
@@ -39,8 +40,7 @@ pub(super) fn fit(
     options: &Options,
 ) -> Result<FittedNetwork> {
     let outputs = &samples.table.outputs;
-    let count = outputs.names.len();
-    check(rank, count)?;
+    check(rank, outputs)?;
     let expansion = expansion(samples, layer, rank, options);
     let table = RowTable {
         inputs: samples.table.inputs.clone(),
@@ -49,19 +49,19 @@ pub(super) fn fit(
     };
     let of_components =
         Samples { scale: samples.scale.clone(), scaled: samples.scaled.clone(), table: &table };
-    let ridge = of_components.ridge(layer, options);
+    let ridge = Ridge::new(layer, samples.inputs(), options);
     let mut networks = format::fit(&of_components, layer, options, &[ridge])?;
     let network = networks.pop().expect("one network");
     Ok(network.expanded_by(expansion))
 }
 
-/// Checks a rank against the number of `outputs`.
-pub(super) fn check(rank: usize, outputs: usize) -> std::result::Result<(), BadValue> {
-    if (1..outputs).contains(&rank) {
-        return Ok(());
-    }
-    let rule = format!("give from 1 to {}, fewer than there are outputs", outputs - 1);
-    Err(BadValue::new("output_rank", rank, rule))
+/// Checks a rank against the `outputs`: their number, and that none is missing.
+pub(super) fn check(rank: usize, outputs: &Table) -> std::result::Result<(), BadValue> {
+    let count = outputs.names.len();
+    require((1..count).contains(&rank), "output_rank", rank, || {
+        format!("give from 1 to {}, fewer than there are outputs", count - 1)
+    })?;
+    tasks::check_complete(outputs, "output_rank", rank)
 }
 
 /// Means of the outputs, then their parts of each component (`rank × outputs`), rounded.

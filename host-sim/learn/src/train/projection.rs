@@ -66,7 +66,7 @@ pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
     let targets = targets(&dataset.outputs, features);
     let features = features.min(targets.names.len());
     let means = dataset.inputs.means();
-    let parts = directions(&dataset.inputs, &targets, &means, features)?;
+    let parts = directions(&dataset.inputs, &targets, features)?;
     let parts: Vec<f64> = (0..readings)
         .flat_map(|reading| (0..features).map(move |feature| (reading, feature)))
         .map(|place| parts[place])
@@ -197,27 +197,32 @@ fn standardised(table: &Table) -> Table {
 }
 
 /// Each reading's part in every feature, one feature a column.
-fn directions(
-    inputs: &Table,
-    outputs: &Table,
-    means: &[f64],
-    features: usize,
-) -> Result<DMatrix<f64>> {
-    let readings = means.len();
-    let products = products(inputs, outputs, means);
-    let width = readings + outputs.names.len();
-    let mut of_readings =
-        DMatrix::from_fn(readings, readings, |i, j| products[i.min(j) * width + i.max(j)]);
-    for reading in 0..readings {
-        // A reading that never changes gets a part of 0, since it is 0 about its mean.
-        let own = of_readings[(reading, reading)];
-        of_readings[(reading, reading)] =
-            if own > 0.0 { own * (1.0 + NOISE_FLOOR * NOISE_FLOOR) } else { 1.0 };
-    }
-    let with_outputs =
-        DMatrix::from_fn(readings, width - readings, |i, o| products[i * width + readings + o]);
-    let regression = of_readings.cholesky().ok_or_else(no_regression)?.solve(&with_outputs);
-    let predicted = with_outputs.tr_mul(&regression);
+fn directions(inputs: &Table, outputs: &Table, features: usize) -> Result<DMatrix<f64>> {
+    let readings = inputs.names.len();
+    let all = Covariances::new(inputs, outputs, readings);
+    let (regression, predicted) = if outputs.values.iter().all(|value| !value.is_nan()) {
+        let regression = all.regression()?;
+        let predicted = all.with_outputs.tr_mul(&regression);
+        (regression, predicted)
+    } else {
+        // Outputs that are missing in some lines are regressed on the others.
+        let mut regression = DMatrix::zeros(readings, outputs.names.len());
+        for columns in outputs.missing_together() {
+            let lines = outputs.lines_with(&columns);
+            let all_inputs: Vec<usize> = (0..readings).collect();
+            let of_task = Covariances::new(
+                &inputs.part(&lines, &all_inputs),
+                &outputs.part(&lines, &columns),
+                readings,
+            );
+            let parts = of_task.regression()?;
+            for (column, part) in columns.iter().zip(parts.column_iter()) {
+                regression.column_mut(*column).copy_from(&part);
+            }
+        }
+        let predicted = regression.tr_mul(&(&all.of_readings * &regression));
+        (regression, predicted)
+    };
     let predicted = (&predicted + predicted.transpose()) * 0.5;
     let mut parts = DMatrix::zeros(readings, features);
     let directions = principal::directions(predicted, features);
@@ -225,6 +230,36 @@ fn directions(
         part.copy_from(&(&regression * direction));
     }
     Ok(parts)
+}
+
+/// Sums of products of readings, and of readings with outputs, all about their means.
+struct Covariances {
+    of_readings: DMatrix<f64>,
+    with_outputs: DMatrix<f64>,
+}
+
+impl Covariances {
+    fn new(inputs: &Table, outputs: &Table, readings: usize) -> Self {
+        let products = products(inputs, outputs, &inputs.means());
+        let width = readings + outputs.names.len();
+        let mut of_readings =
+            DMatrix::from_fn(readings, readings, |i, j| products[i.min(j) * width + i.max(j)]);
+        for reading in 0..readings {
+            // A reading that never changes gets a part of 0, since it is 0 about its mean.
+            let own = of_readings[(reading, reading)];
+            of_readings[(reading, reading)] =
+                if own > 0.0 { own * (1.0 + NOISE_FLOOR * NOISE_FLOOR) } else { 1.0 };
+        }
+        let with_outputs =
+            DMatrix::from_fn(readings, width - readings, |i, o| products[i * width + readings + o]);
+        Self { of_readings, with_outputs }
+    }
+
+    /// Regression of the outputs on the readings.
+    fn regression(&self) -> Result<DMatrix<f64>> {
+        let decomposed = self.of_readings.clone().cholesky().ok_or_else(no_regression)?;
+        Ok(decomposed.solve(&self.with_outputs))
+    }
 }
 
 /// Sums Σ zᵢ·zⱼ over all frames for every i ≤ j, with z the readings and then the outputs, about their

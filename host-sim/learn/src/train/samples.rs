@@ -93,13 +93,37 @@ impl CentredScale {
     }
 }
 
-/// Penalties on the squared weights of a network.
+/// Penalties on the squared weights of a network, by the number of frames that it is fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ridge {
+    options: Options,
+    /// Number of activations, inputs and 1.
+    regressors: usize,
+}
+
+impl Ridge {
+    /// Penalties that `options` ask for, of a network with this `layer`.
+    pub fn new(layer: &HiddenLayer, inputs: usize, options: &Options) -> Self {
+        let regressors = layer.centres.len() / inputs + inputs + 1;
+        Self { options: *options, regressors }
+    }
+
     /// One over the penalty on every weight: the initial covariance δ of a recursion.
-    pub initial_covariance: f64,
+    pub fn initial_covariance(&self, frames: usize) -> f64 {
+        self.options.initial_covariance(frames)
+    }
+
     /// What is added to the penalty on the weights of the affine tail. A recursion has none.
-    pub of_tail: f64,
+    ///
+    /// Where none is chosen and frames are few, the affine tail is fitted as if every reading had an error of a
+    /// [thousandth of its range](LEAST_ERROR). Readings of neighbouring wires hardly differ in some directions; a few
+    /// frames without noise are fitted best by large weights there, which ruin all others. With many frames, or noise,
+    /// it makes no difference.
+    pub fn of_tail(&self, frames: usize) -> f64 {
+        let is_few = frames < FEW_FRAMES * self.regressors;
+        let is_usual = self.options.affine_tail && self.options.penalty.is_none();
+        if is_few && is_usual { frames as f64 * LEAST_ERROR.powi(2) } else { 0.0 }
+    }
 }
 
 /// Samples of one network, with their inputs scaled to [0, 1].
@@ -139,22 +163,5 @@ impl<'b> Samples<'b> {
     pub fn layer(&self, centres: Vec<f64>, options: &Options) -> HiddenLayer {
         let relative_widths = options.widths.relative(&centres, self.inputs());
         HiddenLayer { centres, spread: options.spread, relative_widths }
-    }
-
-    /// Penalties on squared weights that `options` ask for.
-    ///
-    /// Where none is chosen and frames are few, the affine tail is fitted as if every reading had an error of a
-    /// [thousandth of its range](LEAST_ERROR). Readings of neighbouring wires hardly differ in some directions; a few
-    /// frames without noise are fitted best by large weights there, which ruin all others. With many frames, or noise,
-    /// it makes no difference.
-    pub(super) fn ridge(&self, layer: &HiddenLayer, options: &Options) -> Ridge {
-        let (frames, inputs) = (self.table.inputs.len(), self.inputs());
-        let regressors = layer.centres.len() / inputs + inputs + 1;
-        let is_few = frames < FEW_FRAMES * regressors;
-        let is_usual = options.affine_tail && options.penalty.is_none();
-        Ridge {
-            initial_covariance: options.initial_covariance(frames),
-            of_tail: if is_few && is_usual { frames as f64 * LEAST_ERROR.powi(2) } else { 0.0 },
-        }
     }
 }

@@ -15,9 +15,11 @@ use taxel_data::BadValue;
 use taxel_data::dataset::{Dataset, RowTable};
 use taxel_data::error::require;
 use taxel_data::progress::Progress;
+use taxel_data::table::Table;
 
 use super::format::{self, FittedNetwork, Held, Targets, expanded_f32};
-use super::least_squares::{Recursion, predict};
+use super::least_squares::{Design, Recursion, predict};
+use super::tasks::Factors;
 use super::{
     Examples, HiddenLayer, Layers, Options, Recursive, Refinement, Samples, Solver, Trained,
     output_rank, projection, refine,
@@ -54,7 +56,7 @@ pub struct Learned {
     pub frames: usize,
     /// Number of frames that the error was measured on.
     pub judged_frames: usize,
-    /// Root mean square error of each output, in its unit, with weights in f64.
+    /// Root mean square error of each output, in its unit, with weights in f64; NaN for one that these frames lack.
     pub rmse: Vec<f64>,
 }
 
@@ -117,7 +119,10 @@ fn fit(
         let (next, ()) = rayon::join(|| frames.rest.next(), absorb);
         count += current.frames();
         piece = next.transpose()?.map(Cow::Owned);
-        piece.as_deref().map_or(Ok(()), |next| same_columns(first, next))?;
+        if let Some(next) = &piece {
+            same_columns(first, next)?;
+            options.output_rank.map_or(Ok(()), |rank| output_rank::check(rank, &next.outputs))?;
+        }
         progress.step();
     }
     rows.iter_mut().for_each(|row| row.end(count));
@@ -144,9 +149,7 @@ fn curve(rows: &[Row]) -> Vec<Learned> {
         judged_frames: *judged,
         rmse: rows
             .iter()
-            .flat_map(|row| {
-                row.curve[point].2.iter().map(|square| (square / *judged as f64).sqrt())
-            })
+            .flat_map(|row| row.curve[point].2.iter().map(|mean_square| mean_square.sqrt()))
             .collect(),
     });
     of_rows.collect()
@@ -160,9 +163,11 @@ struct Row {
     targets: Targets,
     /// Expansion of the network's outputs, if these are components.
     expansion: Option<Vec<f32>>,
-    recursion: Recursion,
+    /// Recursion of the frames that have some columns, with these columns. All carry all outputs, so that one can be
+    /// continued as two where a piece has columns apart that were together so far.
+    recursions: Vec<(Vec<usize>, Recursion)>,
     test: Option<RowTable>,
-    /// Frames taken in, frames judged, and squared error of each output.
+    /// Frames taken in, frames judged, and mean squared error of each output.
     curve: Vec<(usize, usize, Vec<f64>)>,
 }
 
@@ -190,13 +195,15 @@ impl Row {
         let regressors = held.design(&table).regressors();
         let recursion =
             Recursion::new(regressors, targets.outputs(), initial_covariance, &settings);
-        Ok(Self { held, targets, expansion, recursion, test, curve: vec![], table })
+        let recursions = vec![((0..targets.outputs()).collect(), recursion)];
+        Ok(Self { held, targets, expansion, recursions, test, curve: vec![], table })
     }
 
     /// Takes in the frames of `table`, of which so many came `before`.
     fn absorb(&mut self, table: &RowTable, before: usize) {
         let of_network = given(self.expansion.as_deref(), Cow::Borrowed(table));
-        let targets = self.targets.of_others(&of_network.outputs).deviations.values;
+        let targets = self.targets.of_others(&of_network.outputs).deviations;
+        self.part_columns(&targets);
         let design = self.held.design(table);
         let frames = table.inputs.len();
         let mut start = 0;
@@ -204,10 +211,18 @@ impl Row {
             let end = frames.min(checkpoint_after(before + start) - before);
             if self.test.is_none() && is_checkpoint(before + start) {
                 let next = start..end.min(start + MOST_NEXT);
-                let squares = self.squares(table, next.clone());
+                let squares = self.mean_squares(table, next.clone());
                 self.curve.push((before + start, next.len(), squares));
             }
-            self.recursion.absorb(&*design, &targets, start..end);
+            for (columns, recursion) in &mut self.recursions {
+                absorb_part(
+                    recursion,
+                    (&*self.held, &*design),
+                    table,
+                    (&targets, columns),
+                    start..end,
+                );
+            }
             if is_checkpoint(before + end) {
                 let point = self.judged(before + end);
                 self.curve.extend(point);
@@ -216,11 +231,33 @@ impl Row {
         }
     }
 
+    /// Continues recursions as several, where columns of theirs are missing in different lines of `targets`.
+    fn part_columns(&mut self, targets: &Table) {
+        let groups = targets.missing_together();
+        let parted = self.recursions.drain(..).flat_map(|(columns, recursion)| {
+            let of_group = |group: &Vec<usize>| -> Vec<usize> {
+                columns.iter().copied().filter(|column| group.contains(column)).collect()
+            };
+            let parts: Vec<_> =
+                groups.iter().map(of_group).filter(|part| !part.is_empty()).collect();
+            parts.into_iter().map(move |part| (part, recursion.clone()))
+        });
+        self.recursions = parted.collect();
+    }
+
+    /// Factors of all frames so far.
+    fn factors(&self) -> Factors {
+        let of_columns = |(columns, recursion): &(Vec<usize>, Recursion)| {
+            (columns.clone(), recursion.factor().of_outputs(columns))
+        };
+        Factors(self.recursions.iter().map(of_columns).collect())
+    }
+
     /// Error on the test frames after so many frames, if there are any.
     fn judged(&self, frames: usize) -> Option<(usize, usize, Vec<f64>)> {
         let test = self.test.as_ref()?;
         let judged = test.inputs.len();
-        Some((frames, judged, self.squares(test, 0..judged)))
+        Some((frames, judged, self.mean_squares(test, 0..judged)))
     }
 
     /// Ends the learning curve after the last of all `frames`.
@@ -230,9 +267,9 @@ impl Row {
         }
     }
 
-    /// Squared error of each output on the `lines` of `table`, with the weights so far.
-    fn squares(&self, table: &RowTable, lines: Range<usize>) -> Vec<f64> {
-        let weights = self.recursion.factor().weights();
+    /// Mean squared error of each output on the `lines` of `table`, with the weights so far.
+    fn mean_squares(&self, table: &RowTable, lines: Range<usize>) -> Vec<f64> {
+        let weights = self.factors().weights();
         let computed = self.targets.outputs();
         let mut predicted = predict(&*self.held.design(table), lines.clone(), &weights, computed);
         for line in predicted.chunks_exact_mut(computed) {
@@ -243,22 +280,20 @@ impl Row {
             let expansion = Expansion::new(computed, outputs, block).expect("of these outputs");
             predicted = output_rank::expand(expansion, &predicted);
         }
-        let mut squares = vec![0.0; outputs];
-        let truth = table.outputs.lines().skip(lines.start);
-        for (truth, predicted) in truth.zip(predicted.chunks_exact(outputs)) {
-            for (square, (truth, predicted)) in squares.iter_mut().zip(truth.iter().zip(predicted))
-            {
-                *square += (predicted - truth) * (predicted - truth);
-            }
-        }
-        squares
+        let range = lines.start * outputs..lines.end * outputs;
+        let truth = Table {
+            names: table.outputs.names.clone(),
+            values: table.outputs.values[range].to_vec(),
+        };
+        let squares = truth.squared_errors(&predicted).into_iter().zip(truth.counts());
+        squares.map(|(square, count)| square / count as f64).collect()
     }
 
     /// Network with the weights of all frames.
     fn network(self, format: Format) -> Result<FittedNetwork> {
         let Self { held, table, targets, .. } = &self;
-        let factor = self.recursion.factor();
-        let network = held.network(&factor, targets)?;
+        let factors = self.factors();
+        let network = held.network(&factors, targets)?;
         if format == Format::F32
             && expanded_f32::worst_share(&network, table) > MARGIN * expanded_f32::HARMLESS
         {
@@ -269,13 +304,36 @@ impl Row {
             );
             return Err(BadValue::new("format", format.name(), rule).into());
         }
-        let left = format::left(&**held, table, targets, &factor);
+        let left = format::left(&**held, table, targets, &factors);
         let network = network.unless_lost(table, targets, &left)?;
         Ok(match self.expansion {
             Some(expansion) => network.expanded_by(expansion),
             None => network,
         })
     }
+}
+
+/// Takes those frames of a `range` of `table` into a recursion that have its columns.
+fn absorb_part(
+    recursion: &mut Recursion,
+    (held, design): (&dyn Held, &dyn Design),
+    table: &RowTable,
+    (targets, columns): (&Table, &[usize]),
+    range: Range<usize>,
+) {
+    let has = |line: &usize| columns.iter().all(|column| !targets.line(*line)[*column].is_nan());
+    let is_complete = |line: usize| targets.line(line).iter().all(|value| !value.is_nan());
+    if range.clone().all(is_complete) {
+        return recursion.absorb(design, &targets.values, range);
+    }
+    let lines: Vec<usize> = range.filter(has).collect();
+    let all = |table: &Table| (0..table.names.len()).collect::<Vec<_>>();
+    let mut targets = targets.part(&lines, &all(targets)).values;
+    // Columns of other recursions take no part.
+    targets.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = 0.0);
+    let inputs = table.inputs.part(&lines, &all(&table.inputs));
+    let part = RowTable { inputs, outputs: table.outputs.part(&lines, &[]), ..*table };
+    recursion.absorb(&*held.design(&part), &targets, 0..lines.len());
 }
 
 /// Table with the outputs that a network computes: components, if there is an expansion.

@@ -5,6 +5,7 @@ use taxel_data::table::Table;
 
 use super::*;
 use crate::decoders::RowDecoder;
+use crate::decoders::linear::LinearRow;
 use crate::decoders::standard::StandardNetwork;
 use crate::infer::{Exponential, infer};
 
@@ -177,4 +178,87 @@ fn training_that_takes_more_memory_than_is_allowed_is_refused_before_it_is_taken
     let fewest = Options { most_memory_bytes: 1_000_000, ..options };
     let refused = train(&Dataset::empty(names(4), names(1), 1, 50_000), &fewest, &Silent);
     assert!(refused.unwrap_err().to_string().contains("at most 1 MB"));
+}
+
+/// The usual table, whose first output is missing wherever the second one is below −0.3. The input's range is that of the
+/// lines that have all outputs.
+fn with_missing_outputs(frames: usize) -> RowTable {
+    let mut table = table(frames, 0.05);
+    table.inputs.values[..4].copy_from_slice(&[40.0, 95.0, 60.0, 100.0]);
+    for line in table.outputs.values.chunks_exact_mut(2).skip(2) {
+        line[0] = if line[1] < -0.3 { f64::NAN } else { line[0] };
+    }
+    assert!(
+        (500..frames - 500).contains(&table.outputs.counts()[0]),
+        "{:?}",
+        table.outputs.counts()
+    );
+    table
+}
+
+/// Lines of `table` that have the output number `column`, with that output alone.
+fn alone(table: &RowTable, column: usize) -> RowTable {
+    let lines = table.outputs.lines_with(&[column]);
+    let inputs = table.inputs.part(&lines, &[0, 1]);
+    RowTable { inputs, outputs: table.outputs.part(&lines, &[column]), ..*table }
+}
+
+#[test]
+fn each_output_has_the_network_that_the_lines_with_it_alone_would_give() {
+    let table = with_missing_outputs(3000);
+    let samples = Samples::new(&table);
+    let mut solvers = vec![(Format::F32, Solver::Rls(Recursive::default()))];
+    solvers.extend([Format::F32, Format::F32Direct, Format::Fixed16].map(|it| (it, Solver::Qr)));
+    for (format, solver) in solvers {
+        let usual = Options { centres: 20, spread: 0.4, format, solver, ..Options::default() };
+        let centres = samples.centres(&usual, 0);
+        for penalty in [None, Some(1e-6)] {
+            let options = Options { penalty, ..usual };
+            let predicted = |table: &RowTable| {
+                let fitted = Samples::new(table).fit(&centres, &options).unwrap();
+                (
+                    fitted.format(),
+                    infer(&fitted.network(), Exponential::Libm, &samples.table.inputs.values),
+                )
+            };
+            let (format, together) = predicted(&table);
+            for column in 0..2 {
+                let (of_one, expected) = predicted(&alone(&table, column));
+                let found = together.iter().skip(column).step_by(2).copied();
+                assert_eq!(format, of_one);
+                assert_eq!(found.collect::<Vec<_>>(), expected, "{format:?}, output {column}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_linear_decoder_fits_each_output_on_the_lines_that_have_it() {
+    let table = with_missing_outputs(2000);
+    let together = LinearRow::fit(&table).predict(&table.inputs.values);
+    for column in 0..2 {
+        let found: Vec<f64> = together.iter().skip(column).step_by(2).copied().collect();
+        assert_eq!(found, LinearRow::fit(&alone(&table, column)).predict(&table.inputs.values));
+    }
+}
+
+fn dataset(RowTable { inputs, outputs, common_span }: RowTable) -> Dataset {
+    Dataset { inputs, outputs, rows: 1, common_span, relative_inputs: false }
+}
+
+#[test]
+fn outputs_with_too_few_frames_and_a_rank_of_incomplete_ones_are_refused_by_name() {
+    let mut data = dataset(with_missing_outputs(3000));
+    let count = data.fewest_values();
+    let refused = |data: &Dataset, options: &Options| {
+        train(data, options, &Silent).expect_err("refused").to_string()
+    };
+    let options = Options { centres: count, ..Options::default() };
+    let message = refused(&data, &options);
+    assert!(message.contains("wave_mm") && message.contains(&format!("the {count} ")), "{message}");
+    let options = Options { whole_array: true, output_rank: Some(1), ..Options::default() };
+    let message = refused(&data, &options);
+    assert!(message.contains("output_rank = 1") && message.contains("wave_mm"), "{message}");
+    data.outputs.values.iter_mut().step_by(2).for_each(|value| *value = f64::NAN);
+    assert!(refused(&data, &Options { centres: 1, ..Options::default() }).contains("wave_mm"));
 }

@@ -9,7 +9,7 @@ use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::infer::infer;
-use taxel_learn::train::least_squares::{self, Regressors};
+use taxel_learn::train::least_squares::{Factor, Regressors};
 use taxel_learn::train::{InputScale, Samples, train};
 use taxel_learn::{Exponential, Options, Origin, pack};
 use taxel_simulate::{Synthesis, World, synthesise};
@@ -34,12 +34,13 @@ fn in_f64(training: &RowTable, centres: &[f64], options: &Options, test: &RowTab
         decays: &[1.0 / (2.0 * options.spread * options.spread)],
         affine_tail: options.affine_tail,
     };
-    let weights = least_squares::fit(
-        &regressors,
-        &scale.apply(&training.inputs.values),
-        &training.outputs,
+    let weights = Factor::new(
+        &regressors.of(scale.apply(&training.inputs.values)),
+        &training.outputs.values,
+        training.outputs.names.len(),
         options.initial_covariance(training.inputs.len()),
-    );
+    )
+    .weights();
     let mut values = vec![0.0; regressors.count()];
     let outputs = training.outputs.names.len();
     let answer = |scaled: &[f64]| {

@@ -4,6 +4,7 @@ use crate::commands::stderr;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use crate::{Error, Result};
+use taxel_data::table::Table;
 use taxel_learn::Options;
 use taxel_learn::select::{self, Candidates, Edge, Scored, Selection};
 use taxel_learn::train::Refinement;
@@ -27,7 +28,7 @@ pub fn choose(
 ) -> Result<Option<Selection>> {
     let usual = Options::default().centres;
     if arguments.centres.is_empty() && subject.scene().is_none() && options.centres < usual {
-        let (frames, centres) = (set.frames.frames(), options.centres);
+        let (frames, centres) = (set.frames.fewest_values(), options.centres);
         stderr::remark(format_args!(
             "note: {frames} lines are few for {usual} centres, so the default is {centres}; \
              choose with --centres"
@@ -46,7 +47,7 @@ pub fn choose(
     let selection = select::cross_validate(
         &set.frames,
         &fold_of,
-        &candidates(arguments, &fold_of, set.refine, options),
+        &candidates(arguments, (&fold_of, &set.frames.outputs), set.refine, options),
         options,
         set.refine.then(Refinement::default).as_ref(),
         &Terminal::new(),
@@ -70,13 +71,13 @@ fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T]) -> Result<Option<T>
 /// Candidates as given, and usual ones for the rest. Only grids of usual ones grow.
 fn candidates(
     arguments: &Arguments,
-    fold_of: &[usize],
+    (fold_of, outputs): (&[usize], &Table),
     refine: bool,
     options: &Options,
 ) -> Candidates {
     let centres = if arguments.centres.is_empty() {
         // K around the usual one, as far as the smallest training part allows.
-        let largest = select::smallest_training_part(fold_of).saturating_sub(1).max(1);
+        let largest = select::smallest_training_part(fold_of, outputs).saturating_sub(1).max(1);
         let usual = [options.centres / 2, options.centres, options.centres * 2];
         let mut candidates = usual.map(|k| k.clamp(1, largest)).to_vec();
         candidates.dedup();

@@ -186,7 +186,7 @@ fn fit(
     let (centres, output_rank) = (*centres, None);
     let mut options =
         Options { whole_array, features, output_rank, centres, spread, ..frames.options };
-    options.check(dataset.frames())?;
+    options.check_for(dataset)?;
     let [refining, fitting] = parts(ways).map(|steps| Part::new(progress, steps, weight(centres)));
     // Layers are shared by all formats and by networks with and without a tail.
     let mut layers = Layers::behind(inputs.projection.clone(), dataset, &options);

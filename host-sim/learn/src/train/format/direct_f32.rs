@@ -5,7 +5,8 @@ use model_core::rbf::{Format, Shape};
 use taxel_data::dataset::RowTable;
 
 use super::super::hidden_layer::HiddenLayer;
-use super::super::least_squares::{Design, Factor, Regressors};
+use super::super::least_squares::{Design, Regressors};
+use super::super::tasks::Factors;
 use super::super::{InputScale, Options, Samples};
 use super::{FittedNetwork, Held, Targets, Weights};
 use crate::error::Result;
@@ -46,10 +47,10 @@ impl Held for Direct {
         Box::new(self.regressors().of(self.scale.apply(&table.inputs.values)))
     }
 
-    fn network(&self, factor: &Factor, targets: &Targets) -> Result<FittedNetwork> {
+    fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork> {
         let inputs = self.scale.minimum.len();
         let count = self.centres.len() / inputs;
-        let weights = Weights::split(factor.weights(), count, targets);
+        let weights = Weights::split(factors.weights(), count, targets);
         let round = |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<_>>();
         let parameters = Parameters {
             input_minimum: &round(&self.scale.minimum),

@@ -7,8 +7,9 @@ use model_core::scale::{HALF_RANGE, UNITS};
 use taxel_data::dataset::RowTable;
 use taxel_data::table::Table;
 
-use super::super::least_squares::{Design, Factor, Regressors};
+use super::super::least_squares::{Design, Regressors};
 use super::super::samples::CentredScale;
+use super::super::tasks::Factors;
 use super::super::{Options, Samples};
 use super::{FittedNetwork, Held, Targets, Weights};
 use crate::error::Result;
@@ -102,10 +103,10 @@ impl Held for Expanded {
     }
 
     /// Network whose rounding is not proved harmless yet. It is refused if an exponent could leave its range.
-    fn network(&self, factor: &Factor, targets: &Targets) -> Result<FittedNetwork> {
+    fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork> {
         let (inputs, outputs) = (self.inputs, targets.outputs());
         let count = self.centres.len() / inputs;
-        let mut weights = Weights::split(factor.weights(), count, targets);
+        let mut weights = Weights::split(factors.weights(), count, targets);
         // The tail acts on inputs about their middle.
         for row in weights.affine.chunks_exact_mut(outputs) {
             weights.bias.iter_mut().zip(&*row).for_each(|(bias, a)| *bias += 0.5 * a);
@@ -133,10 +134,9 @@ impl Held for Expanded {
 pub(in crate::train) fn worst_share(fitted: &FittedNetwork, table: &RowTable) -> f64 {
     let predicted = infer(&fitted.network(), Exponential::default(), &table.inputs.values);
     let squares = table.outputs.squared_errors(&predicted);
-    let frames = table.outputs.len() as f64;
     let bounds = rounding_bounds(&fitted.network());
-    let shares =
-        squares.iter().zip(&bounds).map(|(square, bound)| bound / (square / frames).sqrt());
+    let shares = squares.iter().zip(table.outputs.counts()).zip(&bounds);
+    let shares = shares.map(|((square, count), bound)| bound / (square / count as f64).sqrt());
     shares.fold(0.0, f64::max)
 }
 
@@ -201,6 +201,7 @@ mod tests {
     use taxel_data::random::Stream;
     use taxel_simulate::{Synthesis, World};
 
+    use super::super::super::least_squares::Factor;
     use super::*;
     use crate::train;
 
@@ -291,7 +292,8 @@ mod tests {
                 let deviations = &part_targets.deviations.values;
                 let factor =
                     Factor::new(&*expanded.design(part), deviations, targets.outputs(), 1e6);
-                worst_share(&expanded.network(&factor, &targets).unwrap(), &table)
+                let factors = Factors(vec![((0..targets.outputs()).collect(), factor)]);
+                worst_share(&expanded.network(&factors, &targets).unwrap(), &table)
             };
             let few = share(&expanded.few(&table).expect("samples enough"));
             let ratio = few / share(&table);

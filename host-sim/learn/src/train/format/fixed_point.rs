@@ -19,6 +19,7 @@ use taxel_data::dataset::RowTable;
 
 use super::super::least_squares::{Design, Factor};
 use super::super::samples::CentredScale;
+use super::super::tasks::Factors;
 use super::super::{Options, Samples, squared_distance};
 use super::{FittedNetwork, Held, Targets};
 use crate::error::{Error, Result, parameter_not_held};
@@ -248,27 +249,27 @@ impl Held for Exponents {
         })
     }
 
-    fn network(&self, factor: &Factor, targets: &Targets) -> Result<FittedNetwork> {
-        let rounded = round(factor, self, targets, self.affine_tail)?;
+    fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork> {
+        let rounded = round(factors, self, targets, self.affine_tail)?;
         let words = self.words(Some(&rounded));
         FittedNetwork::try_new(self.shape, Format::Fixed16, self.affine_tail, words)
     }
 }
 
-/// Rounds the solution of `factor`, with the finest scale that each output's weights and sums fit.
+/// Rounds the solution of `factors`, with the finest scale that each output's weights and sums fit.
 fn round(
-    factor: &Factor,
+    factors: &Factors,
     exponents: &Exponents,
     targets: &Targets,
     affine: bool,
 ) -> Result<Rounded> {
     let Shape { inputs, centres, outputs } = exponents.shape;
     let tail = if affine { inputs } else { 0 };
-    let mut exact = factor.weights();
+    let mut exact = factors.weights();
     let mut scale = scales(exponents, &exact, targets, tail);
     // Compensation may make weights larger, which needs a coarser scale; each try is an eighth coarser.
     for _ in 0..40 {
-        let weights = rounded_solution(factor, &scale, targets);
+        let weights = factors.together(|factor, columns| rounded_solution(factor, columns, &scale));
         let needed = scales(exponents, &weights, targets, tail);
         if needed.iter().zip(&scale).all(|(needed, scale)| needed <= scale) {
             exact = weights;
@@ -299,17 +300,17 @@ fn round(
     ))
 }
 
-/// Solves for the weights from the last to the first, rounding each at once: `regressors × outputs`. The
-/// bias, which comes first, is not rounded: its grid is far finer than all others.
-fn rounded_solution(factor: &Factor, scale: &[f64], targets: &Targets) -> Vec<f64> {
-    let (n, outputs) = (factor.regressors, targets.outputs());
+/// Solves for the weights of a task's `columns` from the last to the first, rounding each at once: `regressors ×
+/// columns`. The bias, which comes first, is not rounded: its grid is far finer than all others.
+fn rounded_solution(factor: &Factor, columns: &[usize], scale: &[f64]) -> Vec<f64> {
+    let (n, outputs) = (factor.regressors, columns.len());
     let mut weights = vec![0.0; n * outputs];
     for i in (0..n).rev() {
         let root = &factor.root[i * n..(i + 1) * n];
-        for output in 0..outputs {
+        for (output, column) in columns.iter().enumerate() {
             let known: f64 = (i + 1..n).map(|j| root[j] * weights[j * outputs + output]).sum();
             let exact = (factor.projection[i * outputs + output] - known) / root[i];
-            let grid = ONE * scale[output];
+            let grid = ONE * scale[*column];
             weights[i * outputs + output] =
                 if i + 1 == n { exact } else { (exact / grid).round() * grid };
         }

@@ -3,6 +3,7 @@ use nalgebra::{DMatrix, DVector};
 use super::super::{Options, Recursive, Samples};
 use super::*;
 use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::table::Table;
 
 /// Oracle by batch: ridge regression with penalty 1/δ through nalgebra's QR decomposition of all samples
 /// at once.

@@ -2,6 +2,8 @@ use taxel_data::random::Stream;
 use taxel_simulate::{World, synthesise};
 
 use super::*;
+use crate::decoders::RowDecoder;
+use crate::decoders::linear::LinearRow;
 
 /// Data set of readings r1…r6 in two rows of three; the outputs are known sums of them.
 fn known(frames: usize, noise: f64) -> Dataset {
@@ -99,5 +101,24 @@ fn products_are_those_of_standardised_outputs() {
     for (line, product) in products.iter().enumerate() {
         let expected = (product - mean) / variance.sqrt();
         assert!((targets.values[5 * line + 3] - expected).abs() < 1e-12);
+    }
+}
+
+/// Outputs that are missing in half of the lines hardly change what the features tell.
+#[test]
+fn features_are_those_of_the_lines_that_have_an_output() {
+    let data = synthesise(&World::contact(), Stream::Training, 4000);
+    let mut partly = data.clone();
+    for line in partly.outputs.values.chunks_exact_mut(3).step_by(2) {
+        line[..2].fill(f64::NAN);
+    }
+    let left = |of: &Dataset| {
+        let seen = apply(projection(&data, &fit(of, None).unwrap()), &data);
+        let table = seen.row_table(0);
+        let predicted = LinearRow::fit(&table).predict(&table.inputs.values);
+        table.outputs.squared_errors(&predicted)
+    };
+    for (partly, all) in left(&partly).into_iter().zip(left(&data)) {
+        assert!((0.8..1.25).contains(&(partly / all)), "{partly} {all}");
     }
 }

@@ -53,28 +53,43 @@ impl Descent {
         }
     }
 
-    /// One step on samples whose weights are solved on themselves.
-    pub(super) fn step(&mut self, pieces: &[&Piece]) -> Result<()> {
-        let loss = loss::on_same(&self.movable, pieces, self.ridge)?;
-        self.descend(&loss, pieces);
+    /// One step on the samples of each task, whose weights are solved on themselves.
+    pub(super) fn step(&mut self, tasks: &[Vec<&Piece>]) -> Result<()> {
+        let losses = tasks.iter().map(|task| loss::on_same(&self.movable, task, self.ridge));
+        let loss = losses.reduce(|a, b| Ok(a?.plus(&b?)));
+        self.descend(loss, &tasks.concat())
+    }
+
+    /// One step on the samples of each task that are `held_out`, whose weights are solved on the `rest`.
+    pub(super) fn step_held_out(
+        &mut self,
+        rest: &[Vec<&Piece>],
+        held_out: &[Vec<&Piece>],
+    ) -> Result<()> {
+        let losses = in_both(rest, held_out)
+            .map(|(rest, held)| loss::on_held_out(&self.movable, rest, held, self.ridge));
+        let loss = losses.reduce(|a, b| Ok(a?.plus(&b?)));
+        self.descend(loss, &rest.concat())
+    }
+
+    /// Squared errors of the samples of each task that are `held_out`, whose weights are solved on the `rest`.
+    pub(super) fn errors(
+        &self,
+        rest: &[Vec<&Piece>],
+        held_out: &[Vec<&Piece>],
+    ) -> Result<Vec<Vec<f64>>> {
+        let errors = in_both(rest, held_out)
+            .map(|(rest, held)| loss::held_out_errors(&self.movable, rest, held, self.ridge));
+        errors.collect()
+    }
+
+    /// Descends on a loss; none where no task has samples on both sides.
+    fn descend(&mut self, loss: Option<Result<Loss>>, pieces: &[&Piece]) -> Result<()> {
+        if let Some(loss) = loss.transpose()? {
+            self.adam.descend(&mut self.movable.values, &loss.gradient);
+            self.hold(pieces);
+        }
         Ok(())
-    }
-
-    /// One step on samples `held_out`, whose weights are solved on the `rest`.
-    pub(super) fn step_held_out(&mut self, rest: &[&Piece], held_out: &[&Piece]) -> Result<()> {
-        let loss = loss::on_held_out(&self.movable, rest, held_out, self.ridge)?;
-        self.descend(&loss, rest);
-        Ok(())
-    }
-
-    /// Squared errors of samples `held_out`, whose weights are solved on the `rest`.
-    pub(super) fn errors(&self, rest: &[&Piece], held_out: &[&Piece]) -> Result<Vec<f64>> {
-        loss::held_out_errors(&self.movable, rest, held_out, self.ridge)
-    }
-
-    fn descend(&mut self, loss: &Loss, pieces: &[&Piece]) {
-        self.adam.descend(&mut self.movable.values, &loss.gradient);
-        self.hold(pieces);
     }
 
     /// Makes the widths so large that the format holds it.
@@ -103,4 +118,13 @@ impl Descent {
         let layer = HiddenLayer::with_widths(movable.centres().to_vec(), &movable.widths());
         (layer, movable.mix())
     }
+}
+
+/// Samples of each task that has some in the `rest` and some `held_out`: an output may be missing in a whole fold.
+fn in_both<'t, 'p>(
+    rest: &'t [Vec<&'p Piece>],
+    held_out: &'t [Vec<&'p Piece>],
+) -> impl Iterator<Item = (&'t Vec<&'p Piece>, &'t Vec<&'p Piece>)> {
+    let tasks = rest.iter().zip(held_out);
+    tasks.filter(|(rest, held_out)| !rest.is_empty() && !held_out.is_empty())
 }

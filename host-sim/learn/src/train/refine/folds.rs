@@ -15,18 +15,18 @@ const LEAST_SAMPLES: usize = 30;
 /// Descents in all: one to find the number of steps, one to take them.
 pub(super) const PASSES: usize = 2;
 
-/// Descends on `folds` from `start`, as many steps as a fold that is not looked at allows, at most so many `steps`.
+/// Descends on `folds`, each the samples of every task, from `start`: as many steps as a fold that is not looked at
+/// allows, at most so many `steps`.
 pub(super) fn descend(
     start: &Descent,
-    folds: &[Vec<Piece>],
+    folds: &[Vec<Vec<Piece>>],
     steps: usize,
     progress: &dyn Progress,
 ) -> Result<Descent> {
     let Some((watched, others)) = folds.split_last() else { return Ok(start.clone()) };
-    let (all_others, watched): (Vec<&Piece>, Vec<&Piece>) =
-        (others.iter().flatten().collect(), watched.iter().collect());
+    let (all_others, watched) = (together(others), together([watched]));
     let mut start = start.clone();
-    start.hold(&all_others);
+    start.hold(&all_others.concat());
     let mut trial = start.clone();
     let at_start = trial.errors(&all_others, &watched)?;
     let (mut best, mut best_gain) = (0, 0.0);
@@ -34,7 +34,8 @@ pub(super) fn descend(
         step_on(&mut trial, others, step)?;
         progress.step();
         if (step + 1) % LOOK_EVERY == 0 || step + 1 == steps {
-            let gain = certain_gain(&at_start, &trial.errors(&all_others, &watched)?);
+            let now = trial.errors(&all_others, &watched)?;
+            let gain = at_start.iter().zip(&now).map(|(a, b)| certain_gain(a, b)).sum();
             if gain > best_gain {
                 (best, best_gain) = (step + 1, gain);
             }
@@ -48,7 +49,17 @@ pub(super) fn descend(
     Ok(descent)
 }
 
-/// What the mean squared error has fallen by, less what may be chance: [`CERTAIN`] standard errors of the
+/// Samples of every task in all of these folds.
+fn together<'p>(folds: impl IntoIterator<Item = &'p Vec<Vec<Piece>>>) -> Vec<Vec<&'p Piece>> {
+    let mut tasks: Vec<Vec<&Piece>> = Vec::new();
+    for fold in folds {
+        tasks.resize(fold.len(), vec![]);
+        tasks.iter_mut().zip(fold).for_each(|(task, pieces)| task.extend(pieces));
+    }
+    tasks
+}
+
+/// What the mean squared error of a task has fallen by, less what may be chance: [`CERTAIN`] standard errors of the
 /// difference. Nothing is certain with few samples.
 fn certain_gain(before: &[f64], after: &[f64]) -> f64 {
     if before.len() < LEAST_SAMPLES {
@@ -62,11 +73,8 @@ fn certain_gain(before: &[f64], after: &[f64]) -> f64 {
 }
 
 /// Takes step number `step`: one fold is held out, weights are solved on the others.
-fn step_on(descent: &mut Descent, folds: &[Vec<Piece>], step: usize) -> Result<()> {
+fn step_on(descent: &mut Descent, folds: &[Vec<Vec<Piece>>], step: usize) -> Result<()> {
     let held = step % folds.len();
-    let (held_out, rest): (Vec<_>, Vec<_>) =
-        folds.iter().enumerate().partition(|(fold, _)| *fold == held);
-    let [rest, held_out]: [Vec<&Piece>; 2] =
-        [rest, held_out].map(|part| part.into_iter().flat_map(|(_, pieces)| pieces).collect());
-    descent.step_held_out(&rest, &held_out)
+    let rest = folds.iter().enumerate().filter(|(fold, _)| *fold != held).map(|(_, fold)| fold);
+    descent.step_held_out(&together(rest), &together([&folds[held]]))
 }

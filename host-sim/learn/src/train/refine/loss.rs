@@ -20,6 +20,15 @@ pub(super) struct Loss {
     pub(super) gradient: Vec<f64>,
 }
 
+impl Loss {
+    /// Sum of the losses of two tasks.
+    pub(super) fn plus(mut self, other: &Self) -> Self {
+        self.value += other.value;
+        add(&mut self.gradient, &other.gradient);
+        self
+    }
+}
+
 /// Output weights solved on a set of samples, and what a gradient through them needs.
 struct Solved {
     activated: Vec<Activated>,

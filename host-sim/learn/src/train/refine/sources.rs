@@ -24,8 +24,8 @@ const READING_SCALE: f64 = 4.0;
 pub(super) struct Sources {
     inputs: Inputs,
     targets: Targets,
-    /// Networks: one a row, or one in all.
-    networks: usize,
+    /// Columns of each network's tasks. Networks are one a row, or one in all.
+    tasks: Vec<Vec<Vec<usize>>>,
 }
 
 /// Where the descent of a network starts.
@@ -68,7 +68,10 @@ impl Sources {
             Inputs::Rows((0..dataset.rows).map(scale).collect())
         };
         let networks = layers.hidden.len();
-        Self { inputs, targets: Targets::new(dataset, networks), networks }
+        let width = dataset.outputs.names.len() / networks;
+        let tasks = |network| dataset.outputs.columns(network * width, width).missing_together();
+        let tasks = (0..networks).map(tasks).collect();
+        Self { inputs, targets: Targets::new(dataset, networks), tasks }
     }
 
     /// Start of the descent of network number `network` with this `layer`.
@@ -123,21 +126,26 @@ impl Sources {
         Ok(layers)
     }
 
-    /// Samples of network number `network`, side by side.
-    pub(super) fn pieces(&self, frames: &Dataset, network: usize) -> Vec<Piece> {
-        let (targets, outputs) = self.targets.of_network(&frames.outputs, network);
-        match &self.inputs {
+    /// Samples of each task of network number `network`, side by side: none of a task that `frames` lack.
+    pub(super) fn pieces(&self, frames: &Dataset, network: usize) -> Vec<Vec<Piece>> {
+        let targets = self.targets.of_network(&frames.outputs, network);
+        let (inputs, width) = match &self.inputs {
             Inputs::Rows(scales) => {
-                let width = frames.inputs.names.len() / self.networks;
+                let width = frames.inputs.names.len() / self.tasks.len();
                 let readings = frames.inputs.columns(network * width, width);
-                let scaled = scales[network].apply(&readings.values);
-                Piece::all(&scaled, width, &targets, outputs)
+                (scales[network].apply(&readings.values), width)
             }
             Inputs::Projected(projected) => {
-                let width = projected.features + projected.readings.len();
-                Piece::all(&projected.sources(frames), width, &targets, outputs)
+                (projected.sources(frames), projected.features + projected.readings.len())
             }
-        }
+        };
+        let of_task = |columns: &Vec<usize>| {
+            let lines = targets.lines_with(columns);
+            let inputs: Vec<f64> =
+                lines.iter().flat_map(|line| &inputs[line * width..][..width]).copied().collect();
+            Piece::all(&inputs, width, &targets.part(&lines, columns).values, columns.len())
+        };
+        self.tasks[network].iter().map(of_task).collect()
     }
 }
 

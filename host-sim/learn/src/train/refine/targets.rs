@@ -32,16 +32,16 @@ impl Targets {
         Self { means: dataset.outputs.means(), weights, networks }
     }
 
-    /// Targets of network number `network`, frame after frame, and their number in each.
-    pub(super) fn of_network(&self, outputs: &Table, network: usize) -> (Vec<f64>, usize) {
+    /// Targets of network number `network`, frame after frame.
+    pub(super) fn of_network(&self, outputs: &Table, network: usize) -> Table {
         let count = self.means.len() / self.networks;
         let first = network * count;
-        let scales = || self.means[first..].iter().zip(&self.weights[first..]).take(count);
-        let mut values = Vec::with_capacity(outputs.len() * count);
-        for line in outputs.lines() {
-            let scaled = line[first..].iter().zip(scales());
-            values.extend(scaled.map(|(value, (mean, weight))| (value - mean) * weight));
+        let scales = || self.means[first..].iter().zip(&self.weights[first..]);
+        let mut targets = outputs.columns(first, count);
+        for line in targets.values.chunks_exact_mut(count) {
+            let scaled = line.iter_mut().zip(scales());
+            scaled.for_each(|(value, (mean, weight))| *value = (*value - mean) * weight);
         }
-        (values, count)
+        targets
     }
 }

@@ -4,6 +4,8 @@ use taxel_simulate::{Synthesis, World};
 
 use super::super::Trained;
 use super::*;
+use crate::infer::{Exponential, infer};
+use crate::train::InputScale;
 
 fn world() -> World {
     let mut world = World::press();
@@ -95,4 +97,41 @@ fn a_piece_with_other_columns_is_refused() {
     let frames = Frames { first: &first, rest, count: None, test: None };
     let refused = train(frames, &options(), None, &Silent).unwrap_err().to_string();
     assert!(refused.starts_with("columns = "), "{refused}");
+}
+
+/// The first frames have all outputs; of later ones, some lack the first output and some all but that.
+#[test]
+fn a_recursion_learns_each_output_from_the_frames_that_have_it() {
+    let mut frames = Synthesis::new(&World { read_rows: vec![3], ..World::press() })
+        .frames(Stream::Training, 1500);
+    let width = frames.outputs.names.len();
+    for (number, line) in frames.outputs.values.chunks_exact_mut(width).enumerate().skip(400) {
+        match number % 3 {
+            0 => line[0] = f64::NAN,
+            1 if number > 1000 => line[1..].fill(f64::NAN),
+            _ => (),
+        }
+    }
+    let options = Options { format: Format::F32Direct, ..options() };
+    let part = |range: Range<usize>| frames.subset(&range.collect::<Vec<_>>());
+    let first = part(0..400);
+    let rest = (400..1500).step_by(130).map(|start| Ok(part(start..1500.min(start + 130))));
+    let count = Some(1500);
+    let given = Frames { first: &first, rest: Box::new(rest), count, test: None };
+    let (streamed, curve) = train(given, &options, None, &Silent).unwrap();
+    assert!(curve.iter().all(|point| point.rmse.iter().all(|rmse| rmse.is_finite())), "{curve:?}");
+    // The same layers, with weights of all frames at once.
+    let layers = Layers::start(&first, &options).unwrap();
+    let table = frames.row_table(0);
+    let samples = Samples { scale: InputScale::new(&first.row_table(0)), ..Samples::new(&table) };
+    let by_qr = Options { solver: Solver::Qr, ..options };
+    let at_once = samples.fit_layer(&layers.hidden[0], &by_qr).unwrap();
+    let [streamed, at_once] = [&streamed.networks[0], &at_once]
+        .map(|it| infer(&it.network(), Exponential::default(), &frames.inputs.values));
+    let deviations = frames.outputs.deviations();
+    for (column, deviation) in deviations.into_iter().enumerate() {
+        let pairs = streamed.iter().zip(&at_once).skip(column).step_by(width);
+        let most = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(most < 1e-3 * deviation, "{column}: {most} of {deviation}");
+    }
 }
