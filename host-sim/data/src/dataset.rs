@@ -47,6 +47,11 @@ impl Dataset {
         self.inputs.len()
     }
 
+    /// Names of all columns: the inputs', then the outputs'.
+    pub fn names(&self) -> Vec<&str> {
+        self.inputs.names.iter().chain(&self.outputs.names).map(String::as_str).collect()
+    }
+
     /// Readings and outputs of row table number `row` (from 0).
     ///
     /// # Panics
@@ -187,10 +192,19 @@ fn chosen(file: &DataFile, pattern: Option<&str>, role: Role) -> Result<Vec<usiz
         let problem = Problem::NoMatch { role, glob, pattern, known: known() };
         return Err(Error::file(&file.path, problem));
     }
+    if let (true, Some(pattern)) = (selected.is_empty(), pattern) {
+        let problem = if columns::only_leaves_out(&file.header, pattern) {
+            Problem::OnlyLeavesOut { role, pattern: pattern.into() }
+        } else {
+            Problem::LeavesAllOut { role, pattern: pattern.into() }
+        };
+        return Err(Error::file(&file.path, problem));
+    }
     if selected.is_empty() {
         let problem = Problem::NoUsualNames { role, pattern: usual.into(), known: known() };
         return Err(Error::file(&file.path, problem));
     }
+    file.check_numbers(&selected, Some(role))?;
     Ok(selected)
 }
 

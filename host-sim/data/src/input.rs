@@ -1,11 +1,13 @@
 //! Input files, read whole up to a size that is told when it is exceeded: not every path names a file that ends.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, Cursor, ErrorKind, Read};
 use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
+
+use flate2::read::MultiGzDecoder;
 
 use crate::error::{Error, Problem, Result};
 
@@ -80,6 +82,36 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
     file.take(most_bytes + 1).read_to_end(&mut bytes).map_err(error)?;
     if bytes.len() as u64 > most_bytes { Err(too_large()) } else { Ok(bytes) }
+}
+
+/// First bytes of what gzip packed.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// What gzip packed into the `bytes` of the file at `path`, if it did: at most [`MOST_DATA_BYTES`].
+pub(crate) fn unpacked(path: &Path, bytes: &[u8]) -> Result<Option<Vec<u8>>> {
+    if !bytes.starts_with(&GZIP) {
+        return Ok(None);
+    }
+    let mut unpacked = vec![];
+    let read = MultiGzDecoder::new(bytes).take(MOST_DATA_BYTES + 1).read_to_end(&mut unpacked);
+    read.map_err(|cause| Error::file(path, Problem::Packed { cause: cause.to_string() }))?;
+    if unpacked.len() as u64 > MOST_DATA_BYTES {
+        return Err(Error::file(path, Problem::UnpackedTooLarge { most_bytes: MOST_DATA_BYTES }));
+    }
+    Ok(Some(unpacked))
+}
+
+/// The same `source`, or what gzip packed into it.
+pub(crate) fn unpacking(
+    path: &Path,
+    mut source: Box<dyn Read + Send>,
+) -> Result<Box<dyn Read + Send>> {
+    let mut start = vec![];
+    let read = source.by_ref().take(GZIP.len() as u64).read_to_end(&mut start);
+    read.map_err(|cause| Error::read(path, cause))?;
+    let is_packed = start == GZIP;
+    let whole = Cursor::new(start).chain(source);
+    Ok(if is_packed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) })
 }
 
 /// Reads the text file at `path` whole, if it has at most [`MOST_TEXT_BYTES`].
