@@ -140,7 +140,7 @@ pub fn is_compression(group: &str) -> bool {
     group == "dz_mm"
 }
 
-/// Index of the column called `name`; a name that stands alone may leave out a unit in brackets.
+/// Index of the column called `name`. A unit in brackets may stand on one side alone, if no other column is meant.
 pub fn place(header: &[String], name: &str) -> Option<usize> {
     let exact = header.iter().position(|known| known == name);
     exact.or_else(|| {
@@ -149,9 +149,13 @@ pub fn place(header: &[String], name: &str) -> Option<usize> {
     })
 }
 
-/// Whether `known` is `name` with a unit in brackets.
+/// Whether `known` is `name` with a unit in brackets, or without.
 fn is_named(known: &str, name: &str) -> bool {
-    bracketed(known).is_some_and(|(bare, _)| bare == name)
+    match [known, name].map(bracketed) {
+        [Some((bare, _)), None] => bare == name,
+        [None, Some((bare, _))] => bare == known,
+        _ => false,
+    }
 }
 
 /// Indices of the columns of `header` that match `pattern`, in the header's order. A pattern is a
@@ -304,6 +308,7 @@ mod tests {
         assert!(only_leaves_out(&header, "!adc_1,!f2") && !only_leaves_out(&header, "!x,!f2"));
         let names = |name| place(&header, name);
         assert_eq!((names("f"), names("f (N)"), names("g")), (Some(4), Some(4), None));
+        assert_eq!((names("f2 (N)"), names("f (g)")), (Some(5), None));
         assert_eq!(place(&["f (N)", "f [g]"].map(String::from), "f"), None);
     }
 
