@@ -180,6 +180,9 @@ pub enum Problem {
     /// File with a header and nothing else.
     #[error("the file has a header but no line of data")]
     NoLines,
+    /// Folder where a file is expected.
+    #[error("it is a folder; give the path of a file in it")]
+    Folder,
     /// File larger than any that is read.
     #[error("it has more than {}; check the path", in_words(*most_bytes))]
     FileTooLarge {
@@ -224,7 +227,8 @@ pub enum Problem {
     },
     /// Field that is not a number.
     #[error(
-        "line {line}, column {}: {} is not a number; leave the field empty if the value is missing",
+        "line {line}, column {}: {} is not a number; leave the field empty if the value is missing, or use another \
+         column",
         quoted(column),
         quoted(field)
     )]

@@ -26,8 +26,11 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Opens the file at `path` for reading.
 ///
 /// # Errors
-/// [`Error::Read`] if it cannot be read, or is a named pipe that nobody writes to.
+/// [`Error::Read`] if it cannot be read, or is a named pipe that nobody writes to. [`Error::File`] for a folder.
 pub fn open(path: &Path) -> Result<File> {
+    if path.is_dir() {
+        return Err(Error::file(path, Problem::Folder));
+    }
     let opened = open_in_time(path, OpenOptions::new().read(true), "nobody writes to this pipe");
     opened.map_err(|cause| Error::read(path, cause))
 }
@@ -134,6 +137,8 @@ mod tests {
         let refused = read(&path, 4).unwrap_err().to_string();
         std::fs::remove_file(&path).unwrap();
         assert!(refused.ends_with("more than 4 bytes; check the path"), "{refused}");
+        let refused = read(&std::env::temp_dir(), 4).unwrap_err().to_string();
+        assert!(refused.contains("it is a folder; give the path of a file"), "{refused}");
     }
 
     #[cfg(unix)]

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::{Error, Problem, Result};
 
 /// What a file is, by the bytes it begins with, and the lines of Python that convert it: `IN` and `OUT` stand for names.
-const KINDS: [(&[u8], &str, &str); 14] = [
+const KINDS: [(&[u8], &str, &str); 16] = [
     (
         b"PAR1",
         "a Parquet file",
@@ -36,6 +36,12 @@ const KINDS: [(&[u8], &str, &str); 14] = [
     (b"BZh", "packed by bzip2", PANDAS),
     (b"\xfd7zXZ", "packed by xz", PANDAS),
     (b"\x28\xb5\x2f\xfd", "packed by zstd", PANDAS),
+    (
+        b"{\"",
+        "JSON",
+        "import pandas as pd\npd.read_json('IN', lines=True).to_csv('OUT', index=False)",
+    ),
+    (b"[{\"", "JSON", "import pandas as pd\npd.read_json('IN').to_csv('OUT', index=False)"),
 ];
 const PANDAS: &str = "import pandas as pd\npd.read_csv('IN').to_csv('OUT', index=False)";
 const PICKLE: &str = "import pandas as pd\npd.read_pickle('IN').to_csv('OUT', index=False)";

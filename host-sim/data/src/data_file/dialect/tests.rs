@@ -101,6 +101,7 @@ fn what_is_no_text_is_refused() {
         (b"PK\x03\x04.......log.csv", "a zip archive"),
         (b"#ROSBAG V2.0\n", "a ROS bag"),
         (b"\x80\x04\x95", "a pickle"),
+        (b"{\"a\": 1}\n", "lines=True"),
     ] {
         let refused = read(bytes, Stated::default()).unwrap_err().to_string();
         assert!(refused.contains(says) && refused.contains("Python"), "{refused}");
