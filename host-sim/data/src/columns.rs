@@ -3,7 +3,7 @@
 use crate::error::cut;
 
 /// Units, each with the ways in which names and units lines spell it. Upper and lower case differ where a prefix does.
-const UNITS: [(&str, &[&str]); 39] = [
+pub const UNITS: [(&str, &[&str]); 39] = [
     ("Ω", &["ohm", "Ohm", "Ω"]),
     ("kΩ", &["kohm", "kOhm", "kΩ"]),
     ("MΩ", &["Mohm", "MOhm", "MΩ"]),

@@ -151,8 +151,8 @@ pub enum Problem {
     /// What gzip packed, and cannot be unpacked.
     #[error("it cannot be unpacked: {cause}; pack it again with gzip")]
     Packed { cause: String },
-    /// What gzip packed, and is larger than any file that is read.
-    #[error("it has more than {} unpacked; take fewer lines", in_words(*most_bytes))]
+    /// What gzip packed, and is larger than any log of its size.
+    #[error("it has more than {} unpacked; unpack it yourself if it is a log", in_words(*most_bytes))]
     UnpackedTooLarge { most_bytes: u64 },
     /// Numbers in which a comma may stand for a point or part thousands.
     #[error(

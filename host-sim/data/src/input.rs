@@ -90,16 +90,23 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
 /// First bytes of what gzip packed.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// What gzip packed into the `bytes` of the file at `path`, if it did: at most [`MOST_DATA_BYTES`].
+/// Most bytes that a small file may unpack to, and most of a larger one for each of its bytes. Readings have noise: as
+/// text they pack tenfold.
+const FEW_UNPACKED_BYTES: u64 = 64_000_000;
+const MOST_UNPACKED_A_BYTE: u64 = 100;
+
+/// What gzip packed into the `bytes` of the file at `path`, if it did.
 pub(crate) fn unpacked(path: &Path, bytes: &[u8]) -> Result<Option<Vec<u8>>> {
     if !bytes.starts_with(&GZIP) {
         return Ok(None);
     }
+    let most_bytes = bytes.len() as u64 * MOST_UNPACKED_A_BYTE;
+    let most_bytes = most_bytes.clamp(FEW_UNPACKED_BYTES, MOST_DATA_BYTES);
     let mut unpacked = vec![];
-    let read = MultiGzDecoder::new(bytes).take(MOST_DATA_BYTES + 1).read_to_end(&mut unpacked);
+    let read = MultiGzDecoder::new(bytes).take(most_bytes + 1).read_to_end(&mut unpacked);
     read.map_err(|cause| Error::file(path, Problem::Packed { cause: cause.to_string() }))?;
-    if unpacked.len() as u64 > MOST_DATA_BYTES {
-        return Err(Error::file(path, Problem::UnpackedTooLarge { most_bytes: MOST_DATA_BYTES }));
+    if unpacked.len() as u64 > most_bytes {
+        return Err(Error::file(path, Problem::UnpackedTooLarge { most_bytes }));
     }
     Ok(Some(unpacked))
 }
@@ -139,6 +146,16 @@ mod tests {
         assert!(refused.ends_with("more than 4 bytes; check the path"), "{refused}");
         let refused = read(&std::env::temp_dir(), 4).unwrap_err().to_string();
         assert!(refused.contains("it is a folder; give the path of a file"), "{refused}");
+    }
+
+    #[test]
+    fn what_unpacks_to_far_more_than_readings_do_is_refused() {
+        let mut packed = flate2::write::GzEncoder::new(vec![], flate2::Compression::fast());
+        io::copy(&mut io::repeat(b'1').take(FEW_UNPACKED_BYTES + 1), &mut packed).unwrap();
+        let packed = packed.finish().unwrap();
+        let refused = unpacked(Path::new("log.csv.gz"), &packed).unwrap_err().to_string();
+        assert!(refused.contains("more than 64 MB unpacked"), "{refused}");
+        assert_eq!(unpacked(Path::new("log.csv"), b"a,b\n").unwrap(), None);
     }
 
     #[cfg(unix)]

@@ -4,6 +4,7 @@ use std::io::Write as _;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use taxel_data::columns;
 
 use crate::common::Folder;
 
@@ -88,8 +89,9 @@ fn named() -> Vec<File> {
     };
     let aligned = {
         let all = text("t,a,b,f\n", ",", "\n", "NaN", point);
-        let line =
-            |line: &str| line.split(',').map(|it| format!("{it:>12}")).collect::<String>() + "\n";
+        let line = |line: &str| {
+            line.split(',').map(|it| format!("{it:>12}")).collect::<Vec<_>>().concat() + "\n"
+        };
         all.lines().map(line).collect::<String>()
     };
     let quoted = plain.replace(',', "\",\"").replace('\n', "\"\n\"");
@@ -326,8 +328,8 @@ fn options_that_state_a_dialect_are_refused_where_there_is_none() {
 fn milliseconds_beside_seconds_are_told_and_joined_by_the_factor() {
     let folder = Folder::new("time-factor");
     let log = |name: &str, unit: f64| {
-        let lines: String =
-            (0..200).map(|i| format!("{},{i}\n", f64::from(i) * unit / 50.0)).collect();
+        let line = |i: i32| format!("{},{i}\n", f64::from(i) * unit / 50.0);
+        let lines = (0..200).map(line).collect::<Vec<_>>().concat();
         folder.write(name, format!("time,{name}\n{lines}").replace(".csv", ""));
     };
     log("sensor.csv", 1.0);
@@ -344,4 +346,31 @@ fn milliseconds_beside_seconds_are_told_and_joined_by_the_factor() {
     assert_eq!(std::fs::read_to_string(folder.path("j.csv")).unwrap().lines().count(), 201);
     let refused = folder.fail(&[&join[..], &["--time-factor", "0"]].concat(), 2);
     assert!(refused.contains("--time-factor 0: give a number above 0"), "{refused}");
+}
+
+#[test]
+fn every_unit_of_the_docs_is_known_by_its_spellings() {
+    let docs = include_str!("../../../docs/data-files.md");
+    let table = docs.split_once("| unit | spelled |\n|---|---|\n").unwrap().1;
+    let mut count = 0;
+    for row in table.lines().take_while(|line| line.starts_with('|')) {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let (units, spelled) = (cells[0].split(", "), cells[1].split(", "));
+        if cells[1].starts_with("in brackets") {
+            for unit in units {
+                assert_eq!(
+                    (columns::unit(unit), columns::unit_of(&format!("x_{unit}"))),
+                    (Some(unit), "")
+                );
+            }
+            continue;
+        }
+        for (unit, spelled) in units.zip(spelled) {
+            for spelling in spelled.split(' ').map(|spelling| spelling.trim_matches('`')) {
+                assert_eq!(columns::unit_of(&format!("x_{spelling}")), unit, "{spelling}");
+            }
+            count += 1;
+        }
+    }
+    assert_eq!(count, columns::UNITS.len(), "each unit has its place in the table");
 }

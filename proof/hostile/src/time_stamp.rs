@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use taxel_data::data_file::{DataFile, Reading};
+use taxel_data::data_file::{DataFile, Reading, Separator, Stated};
 
 /// Bytes of a time stamp, or of a plain number of seconds.
 pub fn check(bytes: &[u8]) -> bool {

@@ -19,7 +19,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Data
     let (dialect, text) = found.map_err(error)?;
     let plain = dialect.to_plain(&text, 0).map_err(error)?;
     let mut file = parse_plain(path, &plain, reading.has_header || dialect.has_names(), 0)?;
-    file.found = dialect.in_words();
+    file.found.clone_from(&dialect.found);
     if reading.keeps_text {
         file.texts = Some(texts(&file, &plain));
     }

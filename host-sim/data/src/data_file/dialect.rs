@@ -89,16 +89,19 @@ pub(super) struct Dialect {
     decimal_comma: bool,
     /// What comment lines begin with, if there are any.
     comments: Vec<String>,
-    /// Lines (from 0) of `sep=;`, of names in a comment, and of units, with these.
-    separator_line: Option<usize>,
-    names_in_comment: Option<usize>,
-    units: Option<(usize, Vec<String>)>,
-    /// Line (from 0) of the names, where there are units for them.
-    header_line: usize,
+    /// Line (from 0) that is written as these names, where it does not hold them as they are.
+    header: Option<(usize, Vec<String>)>,
+    /// Lines (from 0) of `sep=;` and of units, which are no lines of the table.
+    left_out: Vec<usize>,
     /// Number of columns, without one that a separator at the end of each line makes.
     columns: usize,
     ends_in_separator: bool,
+    /// What is not plain, in words.
+    pub(super) found: String,
 }
+
+/// Fields of a line of the table, and its number (from 0) in the file.
+type Line<'t> = (usize, Vec<Cow<'t, str>>);
 
 impl Dialect {
     /// Finds the dialect of a file of these `bytes`, and decodes them to UTF-8 without a byte order mark. The first line
@@ -123,128 +126,123 @@ impl Dialect {
         stated: &Stated,
         has_header: bool,
     ) -> Result<Self, Problem> {
-        let mut lines: Vec<(usize, &str)> =
-            lines(sample).map(|(line, _)| line).enumerate().collect();
-        lines.retain(|(_, line)| !line.trim().is_empty());
-        let of_line = lines.first().and_then(|(_, line)| separator_line(line));
-        let separator_line = of_line.map(|_| lines.remove(0).0);
         let known = stated.comment.as_deref().map_or_else(|| COMMENTS.to_vec(), |mark| vec![mark]);
         let mark_of = |line: &str| known.iter().copied().find(|mark| is_comment(line, mark));
-        let (comments, body): (Vec<(usize, &str)>, Vec<(usize, &str)>) =
-            lines.into_iter().partition(|(_, line)| mark_of(line).is_some());
-        let mut marks: Vec<String> =
-            comments.iter().filter_map(|(_, line)| mark_of(line)).map(str::to_owned).collect();
-        marks.extend(stated.comment.clone()); // there may be some later
-        marks.sort_unstable();
-        marks.dedup();
-        let separator = stated.separator.or(of_line);
+        let lines = lines(sample).map(|(line, _)| line).enumerate();
+        let (mut comments, mut body, mut left_out) = (vec![], vec![], vec![]);
+        let mut separator = None;
+        for (place, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
+            if let Some(mark) = mark_of(line) {
+                comments.push((place, mark, line));
+            } else if let (Some(stated), true) = (separator_line(line), body.is_empty()) {
+                separator = Some(stated);
+                left_out.push(place);
+            } else {
+                body.push((place, line));
+            }
+        }
+        let separator = stated.separator.or(separator);
         let separator = separator.unwrap_or_else(|| found_separator(&body, stated.decimal_comma));
-        let mut fields: Vec<Vec<Cow<'_, str>>> = body
+        let mut table: Vec<Line<'_>> = body
             .iter()
-            .map(|(_, line)| split(line, separator).unwrap_or_else(|| vec![(*line).into()]))
+            .map(|(place, line)| {
+                (*place, split(line, separator).unwrap_or_else(|| vec![(*line).into()]))
+            })
             .collect();
         let decimal_comma = match stated.decimal_comma {
             Some(stated) => stated,
-            None => found_decimal_comma(&body, &fields, separator)?,
+            None => found_decimal_comma(&table, separator, sample)?,
         };
-        let ends_in_separator = matches!(separator, Separator::Char(_)) && {
-            let lines = fields.get(1..).unwrap_or_default();
-            let columns = lines.first().map_or(0, Vec::len);
-            columns > 1
-                && lines.iter().all(|line| line.len() == columns && line[columns - 1].is_empty())
-                && (fields[0].len() + 1 == columns
-                    || fields[0].last().is_some_and(|it| it.is_empty()))
-        };
+        let ends_in_separator = ends_in_separator(&table, separator);
         if ends_in_separator {
-            let columns = fields[1].len();
-            fields.iter_mut().for_each(|line| line.truncate(columns - 1));
+            let columns = table[1].1.len() - 1;
+            table.iter_mut().for_each(|(_, fields)| fields.truncate(columns));
         }
         let value = |field: &str| match decimal_number(field, decimal_comma) {
             Some(number) => is_number(&number),
             None => is_number(field),
         };
-        let is_data = |line: &[Cow<'_, str>]| {
-            line.iter().all(|field| value(field).is_some())
-                && line.iter().any(|it| value(it) == Some(true))
+        let values = |fields: &[Cow<'_, str>]| -> Vec<Option<bool>> {
+            fields.iter().map(|field| value(field)).collect()
         };
-        let starts_with_data = fields.first().is_some_and(|line| is_data(line)) && !has_header;
-        let names_in_comment =
-            comments.iter().rev().find(|(at, _)| *at < body.first().map_or(0, |it| it.0));
-        let names_in_comment = names_in_comment.filter(|(_, line)| {
-            let names = mark_of(line).and_then(|mark| split(without_mark(line, mark), separator));
-            starts_with_data && names.is_some_and(|names| are_names(&names, fields[0].len()))
-        });
-        let units_place = (!starts_with_data && fields.len() > 1).then_some(1);
-        let units = units_place.filter(|_| {
-            let are_units = || match &fields[..] {
-                [header, units, data, ..] => {
-                    // What stands above numbers, and is none, is no value.
-                    let pairs = || units.iter().zip(data);
-                    units.len() == header.len()
-                        && data.len() == header.len()
-                        && !units.iter().any(|field| value(field) == Some(true))
-                        && units.iter().any(|field| value(field).is_none())
-                        && data.iter().any(|field| value(field) == Some(true))
-                        && pairs().all(|(unit, it)| value(unit).is_some() || value(it).is_some())
-                }
-                _ => false,
-            };
-            stated.units_line || are_units()
-        });
-        let units = units.map(|place| {
-            (body[place].0, fields[place].iter().map(|unit| unit.to_string()).collect())
-        });
+        let is_data = |of: &[Option<bool>]| !of.contains(&None) && of.contains(&Some(true));
+        let first = table.first().map_or(0, |line| line.0);
+        let starts_with_data =
+            !has_header && table.first().is_some_and(|(_, fields)| is_data(&values(fields)));
+        let (mut header, mut found_lines) = (None, vec![]);
+        if starts_with_data
+            && let Some((place, mark, line)) = comments.iter().rfind(|it| it.0 < first)
+            && let Some(names) = split(without_mark(line, mark), separator)
+            && are_names(&names, table[0].1.len())
+        {
+            header = Some((*place, names.iter().map(ToString::to_string).collect()));
+            found_lines.push(format!("names in line {}", place + 1));
+        } else if !starts_with_data && let [(_, names), (place, units), below @ ..] = &table[..] {
+            // What stands above numbers, and is none, is no value.
+            let are_units = below.first().is_some_and(|(_, below)| {
+                let (units, below) = (values(units), values(below));
+                let mut pairs = units.iter().zip(&below);
+                [units.len(), below.len()] == [names.len(); 2]
+                    && !units.contains(&Some(true))
+                    && units.contains(&None)
+                    && below.contains(&Some(true))
+                    && pairs.all(|(unit, below)| unit.is_some() || below.is_some())
+            });
+            if stated.units_line || are_units {
+                let names = names.iter().enumerate();
+                let with_unit = |(column, name): (usize, &Cow<'_, str>)| {
+                    with_unit(name, units.get(column).map_or("", |unit| unit))
+                };
+                header = Some((first, names.map(with_unit).collect()));
+                left_out.push(*place);
+                found_lines.push(format!("units in line {}", place + 1));
+            }
+        }
+        let mut marks: Vec<String> = comments.iter().map(|it| it.1.to_owned()).collect();
+        marks.extend(stated.comment.clone()); // there may be some later
+        marks.sort_unstable();
+        marks.dedup();
+        let words = [
+            (encoding == Encoding::Latin1, "latin-1"),
+            (matches!(encoding, Encoding::Utf16 { .. }), "UTF-16"),
+            (separator != Separator::Char(','), &separator.in_words()),
+            (decimal_comma, "decimal commas"),
+            (ends_in_separator, "a separator at the end of each line"),
+            (!found_lines.is_empty(), &found_lines.concat()),
+            (!comments.is_empty(), "comments"),
+        ];
+        let words = words.iter().filter(|(is_so, _)| *is_so).map(|(_, word)| *word);
         Ok(Self {
             encoding,
             separator,
             decimal_comma,
             comments: marks,
-            separator_line,
-            names_in_comment: names_in_comment.map(|(line, _)| *line),
-            units,
-            header_line: body.first().map_or(0, |it| it.0),
-            columns: fields.last().map_or(0, Vec::len),
+            header,
+            left_out,
+            columns: table.last().map_or(0, |(_, fields)| fields.len()),
             ends_in_separator,
+            found: words.collect::<Vec<_>>().join(", "),
         })
     }
 
     /// The same without the lines that only the beginning of a file has.
     pub(super) fn of_later_lines(&self) -> Self {
-        Self { separator_line: None, names_in_comment: None, units: None, ..self.clone() }
+        Self { header: None, left_out: vec![], ..self.clone() }
     }
 
     /// Whether a first line of the plain text is names whatever it holds.
     pub(super) fn has_names(&self) -> bool {
-        self.names_in_comment.is_some() || self.units.is_some()
+        self.header.is_some()
     }
 
     /// Whether the text is plain CSV already.
-    pub(super) fn is_plain(&self) -> bool {
+    fn is_plain(&self) -> bool {
         self.separator == Separator::Char(',')
             && !self.decimal_comma
             && self.comments.is_empty()
-            && self.separator_line.is_none()
-            && self.units.is_none()
+            && self.header.is_none()
+            && self.left_out.is_empty()
             && !self.ends_in_separator
-    }
-
-    /// What is not plain, in words; "" for a plain file.
-    pub(super) fn in_words(&self) -> String {
-        let line = |what: &str, line: Option<usize>| {
-            line.map(|line| format!("{what} in line {}", line + 1))
-        };
-        let word = |is_so: bool, word: &str| is_so.then(|| word.to_owned());
-        let words = [
-            word(matches!(self.encoding, Encoding::Utf16 { .. }), "UTF-16"),
-            word(self.encoding == Encoding::Latin1, "latin-1"),
-            (self.separator != Separator::Char(',')).then(|| self.separator.in_words()),
-            word(self.decimal_comma, "decimal commas"),
-            word(self.ends_in_separator, "a separator at the end of each line"),
-            line("names", self.names_in_comment),
-            line("units", self.units.as_ref().map(|(line, _)| *line)),
-            word(!self.comments.is_empty(), "comments"),
-        ];
-        words.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
     /// Text of later lines as UTF-8; `None` for UTF-16, which is not cut into lines by its bytes.
@@ -270,54 +268,47 @@ impl Dialect {
         let mut blank = None;
         for (index, (line, end)) in lines(&text).enumerate() {
             let number = before + index as u64 + 1;
-            let mark = self.comments.iter().find(|mark| is_comment(line, mark));
             if line.trim().is_empty() {
                 blank = blank.or(Some(number as usize));
             } else if let (Some(line), true) = (blank, self.columns == 1) {
                 return Err(Problem::BlankLine { line });
             }
-            let is_names = self.names_in_comment == Some(index);
-            let is_taken = mark.is_none()
-                && self.separator_line != Some(index)
-                && self.units.as_ref().is_none_or(|(line, _)| *line != index)
-                && !line.trim().is_empty();
-            if is_taken || is_names {
-                let line = mark.map_or(line, |mark| without_mark(line, mark));
-                let mut fields = split(line, self.separator).ok_or_else(|| {
-                    let cause = format!("line {number}: a quoted field does not end before a separator, or in its line");
-                    Problem::Line { cause }
-                })?;
-                if self.ends_in_separator
-                    && fields.len() == self.columns + 1
-                    && fields.last().is_some_and(|field| field.is_empty())
-                {
-                    fields.pop();
+            let is_left_out = line.trim().is_empty() || self.left_out.contains(&index);
+            match &self.header {
+                Some((place, names)) if *place == index => {
+                    names.iter().enumerate().for_each(|(column, name)| {
+                        plain.push_str(if column > 0 { "," } else { "" });
+                        push_field(&mut plain, name);
+                    });
                 }
-                let units = self.units.as_ref().filter(|_| index == self.header_line);
-                for (place, field) in fields.iter().enumerate() {
-                    if place > 0 {
-                        plain.push(',');
-                    }
-                    match units.and_then(|(_, units)| units.get(place)) {
-                        Some(unit) => push_field(&mut plain, &with_unit(field, unit)),
-                        None => self.push_value(&mut plain, field, number)?,
-                    }
-                }
+                _ if is_left_out || self.comments.iter().any(|mark| is_comment(line, mark)) => {}
+                _ => self.push_line(&mut plain, line, number)?,
             }
             plain.push_str(end);
         }
         Ok(plain.into_bytes().into())
     }
 
-    /// Appends a field, with a point in a number.
-    fn push_value(&self, plain: &mut String, field: &str, line: u64) -> Result<(), Problem> {
-        match decimal_number(field, self.decimal_comma) {
-            Some(number) => plain.push_str(&number),
-            None if self.decimal_comma && field.contains('.') && is_a_number(field) => {
-                let field = field.to_owned();
-                return Err(Problem::PointAmongCommas { line, field });
+    /// Appends a line of the table, of this number.
+    fn push_line(&self, plain: &mut String, line: &str, number: u64) -> Result<(), Problem> {
+        let mut fields = split(line, self.separator).ok_or_else(|| Problem::Line {
+            cause: format!(
+                "line {number}: a quoted field does not end before a separator, or in its line"
+            ),
+        })?;
+        if self.ends_in_separator && fields.len() > self.columns {
+            fields.pop_if(|field| field.is_empty());
+        }
+        for (column, field) in fields.iter().enumerate() {
+            plain.push_str(if column > 0 { "," } else { "" });
+            match decimal_number(field, self.decimal_comma) {
+                Some(number) => plain.push_str(&number),
+                None if self.decimal_comma && field.contains('.') && is_a_number(field) => {
+                    let (line, field) = (number, field.to_string());
+                    return Err(Problem::PointAmongCommas { line, field });
+                }
+                None => push_field(plain, field),
             }
-            None => push_field(plain, field),
         }
         Ok(())
     }
@@ -352,10 +343,8 @@ impl Encoding {
                 text.into_bytes().into()
             }
             Self::Utf16 { is_big_endian } => {
-                let units = bytes.as_chunks::<2>().0.iter().map(|bytes| match is_big_endian {
-                    true => u16::from_be_bytes(*bytes),
-                    false => u16::from_le_bytes(*bytes),
-                });
+                let unit = if is_big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+                let units = bytes.as_chunks::<2>().0.iter().map(|bytes| unit(*bytes));
                 let text = char::decode_utf16(units)
                     .map(|char| char.unwrap_or(char::REPLACEMENT_CHARACTER));
                 let text: String = text.collect();
@@ -438,11 +427,10 @@ fn found_separator(lines: &[(usize, &str)], decimal_comma: Option<bool>) -> Sepa
         let values = fields.iter().flatten().filter(|field| is_value(field)).count();
         let share = values as f64 / fields.iter().map(Vec::len).sum::<usize>() as f64;
         let names = header.and_then(|line| split(line, separator)).map_or(columns, |it| it.len());
-        match names == columns || names + 1 == columns && separator != Separator::Spaces {
-            true => Some(share),
-            // Names with spaces between them, or in them.
-            false => (share == 1.0).then_some(0.5),
+        if names == columns || names + 1 == columns && separator != Separator::Spaces {
+            return Some(share);
         }
+        (share == 1.0).then_some(0.5) // names with spaces in them, or of too few columns
     };
     let possible = &SEPARATORS[usize::from(decimal_comma == Some(true))..];
     let mut best = (possible[0], -1.0);
@@ -459,29 +447,40 @@ fn found_separator(lines: &[(usize, &str)], decimal_comma: Option<bool>) -> Sepa
     best.0
 }
 
+/// Whether a separator at the end of each line makes a column without a name or a value.
+fn ends_in_separator(table: &[Line<'_>], separator: Separator) -> bool {
+    let [(_, header), lines @ ..] = table else { return false };
+    let columns = lines.first().map_or(0, |(_, fields)| fields.len());
+    let ends = |fields: &[Cow<'_, str>]| fields.last().is_some_and(|field| field.is_empty());
+    separator != Separator::Spaces
+        && columns > 1
+        && lines.iter().all(|(_, fields)| fields.len() == columns && ends(fields))
+        && (header.len() + 1 == columns || header.len() == columns && ends(header))
+}
+
 /// Whether numbers have a decimal comma.
 ///
 /// # Errors
 /// [`Problem`] where commas may be decimal ones or not.
 fn found_decimal_comma(
-    lines: &[(usize, &str)],
-    fields: &[Vec<Cow<'_, str>>],
+    table: &[Line<'_>],
     separator: Separator,
+    sample: &str,
 ) -> Result<bool, Problem> {
     let is_comma = separator == Separator::Char(',');
-    if let (true, [header, data, ..]) = (is_comma, fields)
+    if let (true, [(_, header), (place, data), ..]) = (is_comma, table)
         && data.len() == 2 * header.len()
         && header.iter().all(|name| is_number(name).is_none())
         && data.iter().all(|field| is_number(field) == Some(true))
     {
-        let (line, fields, columns) = (lines[1].0 as u64 + 1, data.len(), header.len());
+        let (line, fields, columns) = (*place as u64 + 1, data.len(), header.len());
         return Err(Problem::CommasForBoth { line, fields, columns });
     }
-    if is_comma && !lines.iter().any(|(_, line)| line.contains('"')) {
+    if is_comma && !sample.contains('"') {
         return Ok(false);
     }
     let mut unclear = None;
-    for (line, fields) in lines.iter().zip(fields) {
+    for (place, fields) in table {
         for field in fields.iter().filter(|field| decimal_number(field, true).is_some()) {
             let (whole, decimals) =
                 field.trim_start_matches(['+', '-']).split_once(',').unwrap_or_default();
@@ -490,7 +489,7 @@ fn found_decimal_comma(
             if !may_be_thousands {
                 return Ok(true);
             }
-            unclear = unclear.or_else(|| Some((line.0 as u64 + 1, field.to_string())));
+            unclear = unclear.or_else(|| Some((*place as u64 + 1, field.to_string())));
         }
     }
     unclear.map_or(Ok(false), |(line, field)| Err(Problem::ThousandsOrDecimals { line, field }))
@@ -524,22 +523,18 @@ fn split(line: &str, separator: Separator) -> Option<Vec<Cow<'_, str>>> {
                 return Some(fields);
             }
         }
-        let behind = match rest.trim_start_matches(' ').strip_prefix('"') {
-            Some(quoted) => {
-                let (field, behind) = quoted_field(quoted)?;
-                fields.push(field);
-                let behind = behind.trim_start_matches(|c| c == ' ' && !is_end(c));
-                if !behind.is_empty() && !behind.starts_with(is_end) {
-                    return None;
-                }
-                behind
+        let (field, behind) = if let Some(text) = rest.trim_start_matches(' ').strip_prefix('"') {
+            let (field, behind) = quoted_field(text)?;
+            let behind = behind.trim_start_matches(|c| c == ' ' && !is_end(c));
+            if !behind.is_empty() && !behind.starts_with(is_end) {
+                return None;
             }
-            None => {
-                let (field, behind) = rest.split_at(rest.find(is_end).unwrap_or(rest.len()));
-                fields.push(field.trim().into());
-                behind
-            }
+            (field, behind)
+        } else {
+            let (field, behind) = rest.split_at(rest.find(is_end).unwrap_or(rest.len()));
+            (field.trim().into(), behind)
         };
+        fields.push(field);
         let Some(separator) = behind.chars().next() else { return Some(fields) };
         rest = &behind[separator.len_utf8()..];
     }

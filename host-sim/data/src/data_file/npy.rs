@@ -139,7 +139,7 @@ fn data_file(
     }
     let kept = 0..values.len() / header.len();
     let (path, line_numbers) = (path.into(), (1..=kept.len() as u64).collect());
-    Ok(DataFile { path, header, names_columns, values, line_numbers, kept, ..DataFile::default() })
+    Ok(DataFile { path, header, names_columns, kept, values, line_numbers, ..DataFile::default() })
 }
 
 #[cfg(test)]

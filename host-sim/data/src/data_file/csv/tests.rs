@@ -157,7 +157,7 @@ fn a_column_that_is_no_number_is_told_once_it_is_asked_for() {
         let refused = file.check_numbers(&[0, column], role).unwrap_err().to_string();
         assert!(refused.contains(says), "{refused}");
     }
-    let many: String = (0..=MOST_LABELS).map(|line| format!("note {line}\n")).collect();
+    let many = (0..=MOST_LABELS).map(|line| format!("note {line}\n")).collect::<Vec<_>>().concat();
     let file = parse(path, format!("a\n{many}").as_bytes(), false).unwrap();
     let refused = file.check_numbers(&[0], Some(Role::Outputs)).unwrap_err().to_string();
     assert!(refused.contains("\"note 0\" is not a number"), "{refused}");
