@@ -227,10 +227,14 @@ pub enum Problem {
     },
     /// Field that is not a number.
     #[error(
-        "line {line}, column {}: {} is not a number; leave the field empty if the value is missing, or use another \
-         column",
+        "line {line}, column {}: {} is not a number; {}",
         quoted(column),
-        quoted(field)
+        quoted(field),
+        if field.contains(',') && field.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
+            "state --decimal comma if it is one, or write it without thousands separators"
+        } else {
+            "leave the field empty if the value is missing, or use another column"
+        }
     )]
     NotANumber { line: u64, column: String, field: String },
     /// Output of few different texts.

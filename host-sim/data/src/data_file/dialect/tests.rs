@@ -47,7 +47,8 @@ fn text_that_can_be_read_in_two_ways_is_refused_with_the_option_that_settles_it(
     assert_eq!(read(b"force\n1,5\n2,5\n", comma()).unwrap().values, [1.5, 2.5]);
     let point = Stated { decimal_comma: Some(false), ..Stated::default() };
     let file = read(thousands.as_bytes(), point).unwrap();
-    assert!(file.column("a").is_err() && file.column("b").is_ok());
+    let refused = file.column("a").unwrap_err().to_string();
+    assert!(refused.contains("state --decimal comma") && file.column("b").is_ok(), "{refused}");
     let stated = Stated { separator: Some(Separator::Char(',')), ..comma() };
     assert_eq!(read(b"a,b\n\"1,5\",\"2\"\n", stated).unwrap().values, [1.5, 2.0]);
 }
@@ -72,6 +73,8 @@ fn a_comment_that_names_other_columns_is_no_header() {
 fn a_line_of_units_is_not_a_line_of_text() {
     // A column of text has text below, too.
     let file = found("id,f\nN,1\ns,2\n");
+    assert_eq!((file.found.as_str(), file.lines()), ("", 2));
+    let file = found("id,f\nN,-\ns,2\n");
     assert_eq!((file.found.as_str(), file.lines()), ("", 2));
     let file = found("t,f,n\ns,N,-\n1,2,3\n2,3,4\n");
     assert_eq!(file.header, ["t (s)", "f (N)", "n"]);
