@@ -12,8 +12,14 @@ pub fn check(bytes: &[u8]) -> bool {
     }
     let seconds = |text: &str| {
         let text = format!("t,x\n\"{text}\",1\n");
-        let file =
-            DataFile::parse(Path::new("f.csv"), text.as_bytes(), &Reading::default()).ok()?;
+        // A comma is one of the fraction of a second.
+        let stated = Stated {
+            separator: Some(Separator::Char(',')),
+            decimal_comma: Some(false),
+            ..Stated::default()
+        };
+        let reading = Reading { stated, ..Reading::default() };
+        let file = DataFile::parse(Path::new("f.csv"), text.as_bytes(), &reading).ok()?;
         file.column("t").ok().map(|column| file.value(0, column)).filter(|time| !time.is_nan())
     };
     let Some(time) = seconds(text) else { return false };
