@@ -192,16 +192,11 @@ fn chosen(file: &DataFile, pattern: Option<&str>, role: Role) -> Result<Vec<usiz
         let problem = Problem::NoMatch { role, glob, pattern, known: known() };
         return Err(Error::file(&file.path, problem));
     }
-    if let (true, Some(pattern)) = (selected.is_empty(), pattern) {
-        let problem = if columns::only_leaves_out(&file.header, pattern) {
-            Problem::OnlyLeavesOut { role, pattern: pattern.into() }
-        } else {
-            Problem::LeavesAllOut { role, pattern: pattern.into() }
-        };
-        return Err(Error::file(&file.path, problem));
-    }
     if selected.is_empty() {
-        let problem = Problem::NoUsualNames { role, pattern: usual.into(), known: known() };
+        let problem = match pattern {
+            Some(pattern) => Problem::AllLeftOut { role, pattern: pattern.into() },
+            None => Problem::NoUsualNames { role, pattern: usual.into(), known: known() },
+        };
         return Err(Error::file(&file.path, problem));
     }
     file.check_numbers(&selected, Some(role))?;

@@ -275,12 +275,14 @@ pub enum Problem {
         pattern: String,
         known: String,
     },
-    /// Pattern that leaves columns out, and chooses none.
-    #[error("the {} {pattern:?} only leave columns out; choose some too, as in '*,{pattern}'", role.name())]
-    OnlyLeavesOut { role: Role, pattern: String },
     /// Pattern whose parts leave out every column that others choose.
-    #[error("the {} {pattern:?} leave every column out that they choose", role.name())]
-    LeavesAllOut { role: Role, pattern: String },
+    #[error(
+        "the {} {pattern:?} choose no column: parts with ! leave columns out of those that other parts choose, as in \
+         '*,!{}'",
+        role.name(),
+        pattern.rsplit('!').next().unwrap_or_default()
+    )]
+    AllLeftOut { role: Role, pattern: String },
     /// File without any column of the project's own names, and no pattern given.
     #[error("no column is named like {pattern}; choose the {}; the file has: {known}", role.name())]
     NoUsualNames {

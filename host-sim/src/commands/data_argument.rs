@@ -299,8 +299,7 @@ pub fn with_options(error: taxel_data::Error) -> Error {
         taxel_data::Error::File { path, problem } => match problem {
             Problem::NoMatch { role, .. }
             | Problem::NoUsualNames { role, .. }
-            | Problem::OnlyLeavesOut { role, .. }
-            | Problem::LeavesAllOut { role, .. } => {
+            | Problem::AllLeftOut { role, .. } => {
                 Error::Unfit { path, message: format!("{problem} ({})", option(role)) }
             }
             Problem::InputAndOutput { .. } => {

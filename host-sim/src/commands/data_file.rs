@@ -7,7 +7,7 @@ use clap::Args;
 use taxel_data::data_file::{DataFile, Reading, Separator, Stated, is_array};
 
 /// Heading of options for data files.
-pub const DATA_FILES: &str = "Data files (text such as CSV, .npy, .npz)";
+pub const DATA_FILES: &str = "Data files (CSV, .npy, .npz)";
 
 /// How data files are read: text of any dialect (with or without a header), numpy's .npy and .npz.
 #[derive(Args, Default)]

@@ -16,9 +16,9 @@ use super::{Common, print};
 
 /// Join two logs by time: each line of one with the line of the other whose time stamp is nearest.
 ///
-/// Both may be text of any dialect, with a header or without, or numpy's .npy or .npz. Columns of the second that the first has
-/// too are called b.NAME. Time stamps may repeat, but not decrease. Fields are written as they are; whole numbers of any
-/// length, such as nanoseconds since 1970, are compared exactly. Time stamps by ISO 8601 count in seconds.
+/// Both may be text of any dialect, with a header or without, or numpy's .npy or .npz. Columns of the second that the
+/// first has too are called b.NAME. Time stamps may repeat, but not decrease. Fields are written as they are; whole numbers
+/// of any length, such as nanoseconds since 1970, are compared exactly. Time stamps by ISO 8601 count in seconds.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim join sensor.csv robot.csv --on time_s --tolerance 0.01 -o joined.csv

@@ -290,8 +290,8 @@ fn text_in_a_column_is_told_when_the_column_is_used_and_what_to_do_with_it() {
             ["\"object\" is a class label", "pen, cup, ball", "get_dummies", "take the largest"],
         ),
         ("state", ["line 2", "column \"state\"", "\"good\" is not a number", ""]),
-        ("f,!f", ["--outputs", "leave every column out", "", ""]),
-        ("!f", ["--outputs", "only leave columns out", "'*,!f'", ""]),
+        ("f,!f", ["--outputs", "choose no column", "'*,!f'", ""]),
+        ("!f", ["--outputs", "choose no column", "'*,!f'", ""]),
         ("f,!g", ["\"!g\"", "no column matches", "--outputs", ""]),
     ] {
         let refused = folder.fail(&train(outputs), 2);

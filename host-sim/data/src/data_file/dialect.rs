@@ -2,6 +2,7 @@
 //! beginning, or stated; a file that is not plain is rewritten once, line by line, as plain CSV text.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::str::FromStr;
 
 use super::csv::{is_number, number};
@@ -11,7 +12,7 @@ use crate::error::Problem;
 /// Beginning of a file in bytes that its dialect is found from, up to the end of a line.
 const SAMPLE: usize = 64_000;
 /// Lines that it has at least, however long they are.
-const SAMPLE_LINES: usize = 8;
+const SAMPLE_LINES: usize = 4;
 /// Lines by which separators are compared.
 const COMPARED: usize = 30;
 /// What comment lines begin with.
@@ -395,17 +396,16 @@ fn without_mark<'l>(line: &'l str, mark: &str) -> &'l str {
     line.trim_start().strip_prefix(mark).unwrap_or(line).trim_start_matches(mark).trim()
 }
 
-/// Whether these are `count` different names.
+/// Whether these are `count` different names. The first may lack its own, as that of an index.
 fn are_names(names: &[Cow<'_, str>], count: usize) -> bool {
-    let is_name = |(place, name): (usize, &Cow<'_, str>)| {
-        !name.is_empty() && number(name.as_bytes()).is_none() && !names[..place].contains(name)
-    };
-    // A nameless first column is an index.
+    let distinct: HashSet<&str> = names.iter().map(AsRef::as_ref).collect();
+    let is_name = |name: &Cow<'_, str>| !name.is_empty() && number(name.as_bytes()).is_none();
     names.len() == count
+        && distinct.len() == count
         && names
             .iter()
             .enumerate()
-            .all(|(place, name)| place == 0 && name.is_empty() || is_name((place, name)))
+            .all(|(place, name)| place == 0 && name.is_empty() || is_name(name))
 }
 
 /// Separator of the fields of these lines: the one that makes most of them numbers.
