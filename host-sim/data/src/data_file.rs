@@ -139,10 +139,15 @@ impl DataFile {
         foreign::check(path, bytes)?;
         let mut file = csv::parse(path, bytes, reading)?;
         if unpacked.is_some() {
-            let found = std::mem::take(&mut file.found);
-            file.found = if found.is_empty() { "gzip".into() } else { format!("gzip, {found}") };
+            file.add_found("gzip");
         }
         Ok(file)
+    }
+
+    /// Puts `what` is not plain before what was found.
+    fn add_found(&mut self, what: &str) {
+        let words = [what, &self.found].into_iter().filter(|words| !words.is_empty());
+        self.found = words.collect::<Vec<_>>().join(", ");
     }
 
     /// Turns every value equal to `code` into a missing one; returns how many there were.

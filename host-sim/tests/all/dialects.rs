@@ -104,7 +104,7 @@ fn named() -> Vec<File> {
         ("blank-lines.csv", plain.replacen("\n0.5", "\n\n0.5", 1).into(), ""),
         ("quoted.csv", format!("\"{}", quoted.trim_end_matches('"')).into(), ""),
         ("na.csv", text("t,a,b,f\n", ",", "\n", "#N/A", point).into(), ""),
-        ("pandas.csv", pandas(",", point).into(), ""),
+        ("pandas.csv", pandas(",", point).into(), "columns without a name are called c1"),
         ("iso.csv", iso.into(), ""),
         ("excel-german.csv", semicolons.clone().into(), "semicolons, decimal commas"),
         (
@@ -117,8 +117,16 @@ fn named() -> Vec<File> {
             [vec![0xff, 0xfe], utf_16].concat(),
             "UTF-16, semicolons, decimal commas",
         ),
-        ("pandas-german.csv", pandas(";", comma).into(), "semicolons, decimal commas"),
-        ("pandas.csv.gz", packed(&pandas(",", point)), "gzip"),
+        (
+            "pandas-german.csv",
+            pandas(";", comma).into(),
+            "semicolons, decimal commas, columns without a name are called c1",
+        ),
+        (
+            "pandas.csv.gz",
+            packed(&pandas(",", point)),
+            "gzip, columns without a name are called c1",
+        ),
         (
             "decimal-quoted.csv",
             text("t,a,b,f\n", ",", "\n", "\"\"", |it| format!("\"{}\"", comma(it))).into(),

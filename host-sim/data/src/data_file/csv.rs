@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::dialect::Dialect;
 use super::{DataFile, NotNumbers, Reading, Texts, numbered, time};
+use crate::columns::some_names;
 use crate::error::{Error, Problem, Result};
 
 mod body;
@@ -19,7 +20,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Data
     let (dialect, text) = found.map_err(error)?;
     let plain = dialect.to_plain(&text, 0).map_err(error)?;
     let mut file = parse_plain(path, &plain, reading.has_header || dialect.has_names(), 0)?;
-    file.found.clone_from(&dialect.found);
+    file.add_found(&dialect.found);
     if reading.keeps_text {
         file.texts = Some(texts(&file, &plain));
     }
@@ -47,8 +48,12 @@ pub(super) fn parse_plain(
         return Err(error(Problem::BlankLine { line: line + before as usize }));
     }
     let names_columns = has_header || !holds_numbers(&header);
+    let mut found = String::new();
     let (header, lines) = if names_columns {
-        name_columns(&mut header).map_err(error)?;
+        let nameless = name_columns(&mut header).map_err(error)?;
+        if !nameless.is_empty() {
+            found = format!("columns without a name are called {}", some_names(&nameless));
+        }
         let lines = lines_of_data(text, reader.position());
         (header, lines)
     } else {
@@ -70,6 +75,7 @@ pub(super) fn parse_plain(
         header,
         names_columns,
         lacks_last_line_end,
+        found,
         values,
         line_numbers,
         not_numbers,
@@ -119,11 +125,14 @@ pub(super) fn is_number(field: &str) -> Option<bool> {
     }
 }
 
-/// Names columns without a name by their place, as in files without a header, and checks the others.
-fn name_columns(header: &mut [String]) -> std::result::Result<(), Problem> {
+/// Names columns without a name by their place, as in files without a header, and checks the others. Returns the new
+/// names.
+fn name_columns(header: &mut [String]) -> std::result::Result<Vec<String>, Problem> {
+    let mut nameless = vec![];
     for (index, name) in header.iter_mut().enumerate() {
         if name.is_empty() {
             *name = format!("c{}", index + 1);
+            nameless.push(name.clone());
         }
     }
     let mut seen = HashSet::new();
@@ -136,7 +145,7 @@ fn name_columns(header: &mut [String]) -> std::result::Result<(), Problem> {
             return Err(Problem::RepeatedName { name: name.clone() });
         }
     }
-    Ok(())
+    Ok(nameless)
 }
 
 /// What the fields of one column were so far.

@@ -93,7 +93,7 @@ impl Pieces {
             let plain = dialect.to_plain(&text, 0).map_err(error)?;
             let has_header = *has_header || dialect.has_names();
             let mut piece = csv::parse_plain(&self.path, &plain, has_header, 0)?;
-            piece.found.clone_from(&dialect.found);
+            piece.add_found(&dialect.found);
             let quoted = |name: &String| format!("\"{}\"", name.replace('"', "\"\""));
             let names: Vec<String> = piece.header.iter().map(quoted).collect();
             self.header = (names.join(",") + "\n").into_bytes();
