@@ -2,20 +2,90 @@
 
 use crate::error::cut;
 
-/// Endings of column names that state a unit, each with the unit as it is written.
-const UNITS: [(&str, &str); 7] = [
-    ("_ohm", "Ω"),
-    ("_mm", "mm"),
-    ("_n", "N"),
-    ("_pa", "Pa"),
-    ("_s", "s"),
-    ("_hz", "Hz"),
-    ("_v", "V"),
+/// Units, each with the ways in which names and units lines spell it. Upper and lower case differ where a prefix does.
+pub const UNITS: [(&str, &[&str]); 39] = [
+    ("Ω", &["ohm", "Ohm", "Ω"]),
+    ("kΩ", &["kohm", "kOhm", "kΩ"]),
+    ("MΩ", &["Mohm", "MOhm", "MΩ"]),
+    ("N", &["n", "N"]),
+    ("mN", &["mN"]),
+    ("kN", &["kN"]),
+    ("N·m", &["Nm", "N·m", "N*m"]),
+    ("N·mm", &["Nmm", "N·mm", "N*mm"]),
+    ("mN·m", &["mNm", "mN·m", "mN*m"]),
+    ("g", &["g"]),
+    ("kg", &["kg"]),
+    ("mg", &["mg"]),
+    ("m", &["m"]),
+    ("cm", &["cm"]),
+    ("mm", &["mm"]),
+    ("µm", &["um", "µm", "μm"]),
+    ("Pa", &["pa", "Pa"]),
+    ("hPa", &["hPa"]),
+    ("kPa", &["kpa", "kPa"]),
+    ("MPa", &["MPa"]),
+    ("s", &["s", "sec"]),
+    ("ms", &["ms"]),
+    ("µs", &["us", "µs", "μs"]),
+    ("ns", &["ns"]),
+    ("Hz", &["hz", "Hz"]),
+    ("kHz", &["khz", "kHz"]),
+    ("V", &["v", "V"]),
+    ("mV", &["mV"]),
+    ("µV", &["uV", "µV", "μV"]),
+    ("mA", &["mA"]),
+    ("µA", &["uA", "µA", "μA"]),
+    ("mT", &["mT"]),
+    ("µT", &["uT", "µT", "μT"]),
+    ("pF", &["pF"]),
+    ("nF", &["nF"]),
+    ("°", &["deg", "°"]),
+    ("rad", &["rad"]),
+    ("°C", &["degC", "°C"]),
+    ("%", &["percent", "%"]),
 ];
+/// Units that brackets and units lines state, but no ending: `ch_A` and `x_bar` are names.
+const BRACKETED: [&str; 8] = ["A", "T", "K", "F", "bar", "mbar", "psi", "min"];
 
-/// Unit that a column's name states (`Ω` for `r4c17_ohm`), or "".
+/// The unit that `text` spells, if it is known.
+pub fn unit(text: &str) -> Option<&'static str> {
+    of_ending(text).or_else(|| BRACKETED.iter().find(|unit| **unit == text).copied())
+}
+
+fn of_ending(text: &str) -> Option<&'static str> {
+    UNITS.iter().find(|(_, spelled)| spelled.contains(&text)).map(|(unit, _)| *unit)
+}
+
+/// Unit that a column's name states (`Ω` for `r4c17_ohm`, `N` for `fz (N)`), or "".
 pub fn unit_of(name: &str) -> &'static str {
-    UNITS.iter().find(|(suffix, _)| name.ends_with(suffix)).map_or("", |(_, unit)| unit)
+    match bracketed(name) {
+        Some((_, unit)) => unit,
+        None => name.rsplit_once('_').and_then(|(_, ending)| of_ending(ending)).unwrap_or(""),
+    }
+}
+
+/// `name` without the unit that it states in brackets or by its ending.
+pub fn without_unit(name: &str) -> &str {
+    match bracketed(name) {
+        Some((name, _)) => name,
+        None if unit_of(name).is_empty() => name,
+        None => name.rsplit_once('_').map_or(name, |(name, _)| name),
+    }
+}
+
+/// Name and unit of a column called `fz (N)` or `fz [N]`.
+fn bracketed(name: &str) -> Option<(&str, &'static str)> {
+    let (rest, open) = match name.strip_suffix(')') {
+        Some(rest) => (rest, '('),
+        None => (name.strip_suffix(']')?, '['),
+    };
+    let (name, text) = rest.rsplit_once(open)?;
+    Some((name.trim_end(), unit(text.trim())?)).filter(|(name, _)| !name.is_empty())
+}
+
+/// Whether the column called `name` is a resistance in Ω that a device judges: `r4c17_ohm`.
+pub fn is_judged_in_ohm(name: &str) -> bool {
+    name.ends_with("_ohm")
 }
 
 /// Row-wire (from 1) that a name like `r4c17_ohm` or `r4e2_dz_mm` begins with.
@@ -70,26 +140,59 @@ pub fn is_compression(group: &str) -> bool {
     group == "dz_mm"
 }
 
+/// Index of the column called `name`. A unit in brackets may stand on one side alone, if no other column is meant.
+pub fn place(header: &[String], name: &str) -> Option<usize> {
+    let exact = header.iter().position(|known| known == name);
+    exact.or_else(|| {
+        let mut named = header.iter().enumerate().filter(|(_, known)| is_named(known, name));
+        named.next().filter(|_| named.next().is_none()).map(|(place, _)| place)
+    })
+}
+
+/// Whether `known` is `name` with a unit in brackets, or without.
+fn is_named(known: &str, name: &str) -> bool {
+    match [known, name].map(bracketed) {
+        [Some((bare, _)), None] => bare == name,
+        [None, Some((bare, _))] => bare == known,
+        _ => false,
+    }
+}
+
 /// Indices of the columns of `header` that match `pattern`, in the header's order. A pattern is a
 /// comma-separated list of names in which `*` stands for any characters and `?` for one, and of ranges: `c2..c16`
-/// stands for all columns from `c2` to `c16`.
+/// stands for all columns from `c2` to `c16`. `!` before a part leaves its columns out, and `fz` finds `fz (N)`, too.
 pub fn select(header: &[String], pattern: &str) -> Vec<usize> {
+    let parts = || pattern.split(',').map(|part| part_of(header, part));
     let mut selected: Vec<usize> =
-        pattern.split(',').flat_map(|part| part_of(header, part)).collect();
+        parts().filter(|(is_left_out, _)| !is_left_out).flat_map(|(_, columns)| columns).collect();
+    for (_, columns) in parts().filter(|(is_left_out, _)| *is_left_out) {
+        selected.retain(|column| !columns.contains(column));
+    }
     selected.sort_unstable();
     selected.dedup();
     selected
 }
 
-/// Indices of the columns of `header` that one part of a pattern stands for.
-fn part_of(header: &[String], part: &str) -> Vec<usize> {
-    let glob = part.trim();
-    let matching: Vec<usize> = (0..header.len()).filter(|i| matches(glob, &header[*i])).collect();
+/// Whether one part of a pattern leaves columns out, and the indices of the columns of `header` that it stands for.
+fn part_of(header: &[String], part: &str) -> (bool, Vec<usize>) {
+    let part = part.trim();
+    match part.strip_prefix('!') {
+        Some(left_out) if !header.iter().any(|name| name == part) => {
+            (true, columns_of(header, left_out.trim()))
+        }
+        _ => (false, columns_of(header, part)),
+    }
+}
+
+fn columns_of(header: &[String], glob: &str) -> Vec<usize> {
+    let is_meant = |name: &str| {
+        matches(glob, name) || bracketed(name).is_some_and(|(bare, _)| matches(glob, bare))
+    };
+    let matching: Vec<usize> = (0..header.len()).filter(|i| is_meant(&header[*i])).collect();
     if let Some((first, last)) = glob.split_once("..")
         && matching.is_empty()
     {
-        let place = |name: &str| header.iter().position(|known| known == name.trim());
-        return match (place(first), place(last)) {
+        return match (place(header, first.trim()), place(header, last.trim())) {
             (Some(first), Some(last)) => (first..=last).collect(),
             _ => vec![],
         };
@@ -99,7 +202,7 @@ fn part_of(header: &[String], part: &str) -> Vec<usize> {
 
 /// First part of a comma-separated `pattern` that no column of `header` matches.
 pub fn unmatched<'p>(header: &[String], pattern: &'p str) -> Option<&'p str> {
-    pattern.split(',').map(str::trim).find(|part| part_of(header, part).is_empty())
+    pattern.split(',').map(str::trim).find(|part| part_of(header, part).1.is_empty())
 }
 
 /// First names of a header, as a list for messages.
@@ -109,19 +212,30 @@ pub fn some_names(header: &[String]) -> String {
     if header.len() > SHOWN { format!("{shown}, … ({} columns)", header.len()) } else { shown }
 }
 
+/// Whether `name` is what `glob` stands for. It takes the product of their lengths at most.
 fn matches(glob: &str, name: &str) -> bool {
-    match glob.chars().next() {
-        None => name.is_empty(),
-        Some('*') => {
-            let rest = &glob[1..];
-            let mut ends = name.char_indices().map(|(i, _)| i).chain([name.len()]);
-            ends.any(|i| matches(rest, &name[i..]))
+    let (glob, name): (Vec<char>, Vec<char>) = (glob.chars().collect(), name.chars().collect());
+    let (mut at, mut star, mut place) = (0, None, 0);
+    while place < name.len() {
+        match glob.get(at) {
+            Some('*') => {
+                star = Some((at, place));
+                at += 1;
+                continue;
+            }
+            Some(wanted) if *wanted == '?' || *wanted == name[place] => at += 1,
+            // The last star takes a character more.
+            _ => match star {
+                Some((of_star, from)) => {
+                    star = Some((of_star, from + 1));
+                    (at, place) = (of_star + 1, from);
+                }
+                None => return false,
+            },
         }
-        Some(wanted) => name.chars().next().is_some_and(|c| {
-            (wanted == '?' || wanted == c)
-                && matches(&glob[wanted.len_utf8()..], &name[c.len_utf8()..])
-        }),
+        place += 1;
     }
+    glob[at..].iter().all(|rest| *rest == '*')
 }
 
 #[cfg(test)]
@@ -141,6 +255,26 @@ mod tests {
         assert_eq!(unit_of("r12c3_ohm"), "Ω");
         assert_eq!(unit_of("fx_n"), "N");
         assert_eq!(unit_of("ch1"), "");
+        for (name, unit, bare) in [
+            ("fz (N)", "N", "fz"),
+            ("fz[mN]", "mN", "fz"),
+            ("load_g", "g", "load"),
+            ("p_kPa", "kPa", "p"),
+            ("x_um", "µm", "x"),
+            ("T (°C)", "°C", "T"),
+            ("p (bar)", "bar", "p"),
+            ("r1 (ohm)", "Ω", "r1"),
+            ("x_bar", "", "x_bar"),
+            ("ch_A", "", "ch_A"),
+            ("n", "", "n"),
+            ("(N)", "", "(N)"),
+            ("x_min", "", "x_min"),
+            ("p (front)", "", "p (front)"),
+            ("f_MN", "", "f_MN"),
+        ] {
+            assert_eq!((unit_of(name), without_unit(name)), (unit, bare), "{name}");
+        }
+        assert!(is_judged_in_ohm("r4c17_ohm") && !is_judged_in_ohm("r1 (ohm)"));
         assert_eq!(quantity_of("contact_x_mm"), quantity_of("contact_y_mm"));
         assert_ne!(quantity_of("contact_x_mm"), quantity_of("contact_depth_mm"));
         assert_eq!(quantity_of("r4e2_dz_mm"), quantity_of("x_mm"));
@@ -154,6 +288,23 @@ mod tests {
         assert_eq!(select(&header, "ch?"), [0]);
         assert_eq!(unmatched(&header, "ch*,fy_n"), Some("fy_n"));
         assert_eq!(unmatched(&header, "ch*"), None);
+        let many = ["a".repeat(200), "*a".repeat(60) + "b", "*a".repeat(60)];
+        assert!(!matches(&many[1], &many[0]) && matches(&many[2], &many[0]));
+    }
+
+    #[test]
+    fn parts_with_an_exclamation_mark_leave_columns_out() {
+        let header = ["adc_1", "adc_2", "adc_3", "!x", "f (N)", "f2"].map(String::from);
+        assert_eq!(select(&header, "adc_*,!adc_2"), [0, 2]);
+        assert_eq!(select(&header, "!adc_2..adc_3, *"), [0, 3, 4, 5]);
+        assert_eq!(select(&header, "!x"), [3]);
+        assert_eq!(select(&header, "f"), [4]);
+        assert_eq!(unmatched(&header, "adc_*,!adc_7"), Some("!adc_7"));
+        assert_eq!(select(&header, "!adc_1,!f2"), [0; 0]);
+        let names = |name| place(&header, name);
+        assert_eq!((names("f"), names("f (N)"), names("g")), (Some(4), Some(4), None));
+        assert_eq!((names("f2 (N)"), names("f (g)")), (Some(5), None));
+        assert_eq!(place(&["f (N)", "f [g]"].map(String::from), "f"), None);
     }
 
     #[test]

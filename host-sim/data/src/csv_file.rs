@@ -42,8 +42,7 @@ impl<'n> Column<'n> {
         Self { name, fields: Fields::F32 }
     }
 
-    /// Column called `name` of these `texts`, which are written as they are and need no quotes: those of these `lines`, or
-    /// all in turn.
+    /// Column called `name` of these `texts`, which are written as they are: those of these `lines`, or all in turn.
     pub fn texts(name: &'n str, texts: FieldTexts<'n>, lines: Option<&'n [usize]>) -> Self {
         Self { name, fields: Fields::Texts(texts, lines) }
     }
@@ -141,7 +140,14 @@ impl Piece {
                     Fields::F32 => write_f32(&mut self.text, value()),
                     Fields::Texts(texts, lines) => {
                         let line = lines.map_or(line, |lines| lines[line]);
-                        self.text.extend_from_slice(texts.at(line).as_bytes());
+                        let field = texts.at(line);
+                        let needs_quotes = field.contains([',', '"', '\n', '\r']);
+                        let field = if needs_quotes {
+                            format!("\"{}\"", field.replace('"', "\"\"")).into()
+                        } else {
+                            field
+                        };
+                        self.text.extend_from_slice(field.as_bytes());
                     }
                 }
             }

@@ -1,24 +1,31 @@
-//! Data files, read whole: CSV, `.npy` and `.npz`.
+//! Data files, read whole: text of any dialect, `.npy` and `.npz`, packed by gzip or not.
 
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::columns;
-use crate::error::{Error, Problem, Result};
+use crate::digest::TableDigest;
+use crate::error::{Error, Problem, Result, Role};
 use crate::input;
 
+mod time;
 mod csv;
+mod dialect;
+mod foreign;
 mod npy;
 pub mod pieces;
+
+pub use dialect::{Separator, Stated};
 
 /// Largest magnitude up to which f64 holds every whole number: 2^53.
 pub(crate) const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// Data file that was read whole: named columns of numbers, one frame a line.
 ///
-/// Missing values are held as NaN: empty fields and NaN of a CSV file, NaN of an array.
-#[derive(Debug, Clone, PartialEq)]
+/// Missing values are held as NaN: empty fields, words such as N/A, and NaN of a text file, NaN of an array. Time stamps
+/// by ISO 8601 are seconds since 1970. Other text is NaN too, and an error once its column is asked for.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct DataFile {
     /// Path of the file, for messages.
     pub path: PathBuf,
@@ -27,15 +34,31 @@ pub struct DataFile {
     pub names_columns: bool,
     /// Whether it is a CSV file without an end of its last line, which may be cut off in a number.
     pub lacks_last_line_end: bool,
-    /// CRC-64/XZ of the file's bytes.
-    pub digest: u64,
+    /// What is not plain CSV in it, in words, such as "semicolons, decimal commas"; "" for a plain file or an array.
+    pub found: String,
+    /// Lines of data (from 0) that are kept.
+    pub(crate) kept: Range<usize>,
+    /// Values of all lines.
     pub(crate) values: Vec<f64>,
-    /// Line number in the file (from 1) of each line of data.
+    /// Line number in the file (from 1) of each line of data, of all.
     pub(crate) line_numbers: Vec<u64>,
     /// Fields of a CSV file, if they are wanted as they are written.
     pub(crate) texts: Option<Texts>,
     /// Columns of integer arrays with numbers from 2^53 on, of which f64 does not hold every digit.
     pub(crate) rounded: Vec<usize>,
+    /// Columns of a text file that hold other text than numbers.
+    pub(crate) not_numbers: Vec<NotNumbers>,
+}
+
+/// Fields of a column that are no numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct NotNumbers {
+    column: usize,
+    /// Number of the first line with one, and that field.
+    line: u64,
+    field: String,
+    /// All different fields of a column of text, if they are few.
+    labels: Vec<String>,
 }
 
 /// Fields as they are written, line after line, without spaces around.
@@ -60,10 +83,11 @@ impl<'f> FieldTexts<'f> {
     /// If the file has no such line.
     pub fn at(&self, line: usize) -> Cow<'f, str> {
         let value = self.file.value(line, self.column);
+        let is_text = || self.file.not_numbers.iter().any(|it| it.column == self.column);
         match &self.file.texts {
-            _ if value.is_nan() => Cow::Borrowed(""),
+            _ if value.is_nan() && !is_text() => Cow::Borrowed(""),
             Some(Texts { text, places }) => {
-                let field = line * self.file.header.len() + self.column;
+                let field = (self.file.kept.start + line) * self.file.header.len() + self.column;
                 Cow::Borrowed(&text[places[field]..places[field + 1]])
             }
             None => Cow::Owned(value.to_string()),
@@ -72,51 +96,58 @@ impl<'f> FieldTexts<'f> {
 }
 
 /// How a data file is read.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Reading {
     /// Whether the first line of a CSV file is a header even if it holds numbers alone.
     pub has_header: bool,
     /// Whether [`DataFile::texts`] gives the fields of a CSV file as they are written. This takes the memory of the file,
     /// and 8 bytes a field.
     pub keeps_text: bool,
+    /// What is stated of a text file, in place of what is found.
+    pub stated: Stated,
 }
 
 impl DataFile {
-    /// Reads the file at `path`: an array for the extension `.npy`, arrays side by side for `.npz`, else CSV.
+    /// Reads the file at `path`: an array for the extension `.npy`, arrays side by side for `.npz`, else text.
     ///
-    /// The first line of a CSV file is a header, unless it holds numbers alone: it is data then, and columns are called
-    /// `c1`, `c2`, …
+    /// Separator, decimal sign, encoding, comments and a line of units are found. The first line of a text file is a
+    /// header, unless it holds numbers alone: it is data then, and columns are called `c1`, `c2`, …
     ///
     /// # Errors
     /// [`Error::Read`] if the file cannot be read. [`Error::File`] for a file beyond
-    /// [`input::MOST_DATA_BYTES`], an empty file, a missing or
-    /// repeated column name, a line with too few or too many fields, or a field that is not a number. Also for arrays
+    /// [`input::MOST_DATA_BYTES`], packed or not, an empty file, a repeated column name, or a line with too few or too
+    /// many fields; for text that can be read in two ways, and for files of other programs. Also for arrays
     /// of more than two dimensions, of other elements than numbers, or of different lengths.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::read_as(path, Reading::default())
+        Self::read_as(path, &Reading::default())
     }
 
     /// Reads the file at `path` as [`read`](Self::read) does, but for what `reading` says.
-    pub fn read_as(path: &Path, reading: Reading) -> Result<Self> {
-        let bytes = input::read(path, input::MOST_DATA_BYTES)?;
-        let mut file = Self::parse(path, &bytes, reading.has_header)?;
-        let is_array = ["npy", "npz"].into_iter().any(|kind| has_extension(path, kind));
-        if reading.keeps_text && !is_array {
-            file.texts = Some(csv::texts(&file, &bytes));
+    pub fn read_as(path: &Path, reading: &Reading) -> Result<Self> {
+        Self::parse(path, &input::read(path, input::MOST_DATA_BYTES)?, reading)
+    }
+
+    /// Parses `bytes` as [`read_as`](Self::read_as) does those of the file at `path`, whose extension tells arrays.
+    pub fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Self> {
+        let unpacked = input::unpacked(path, bytes)?;
+        let bytes = unpacked.as_deref().unwrap_or(bytes);
+        if is_array(path) {
+            let parse =
+                if has_extension(path, "npy") { npy::parse_array } else { npy::parse_archive };
+            return parse(path, bytes);
+        }
+        foreign::check(path, bytes)?;
+        let mut file = csv::parse(path, bytes, reading)?;
+        if unpacked.is_some() {
+            file.add_found("gzip");
         }
         Ok(file)
     }
 
-    /// Parses `bytes` as [`read`](Self::read) does those of the file at `path`, whose extension tells what they are. The
-    /// first line of a CSV file is a header even if it holds numbers alone, if it `has_header`.
-    pub fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<Self> {
-        if has_extension(path, "npy") {
-            npy::parse_array(path, bytes)
-        } else if has_extension(path, "npz") {
-            npy::parse_archive(path, bytes)
-        } else {
-            csv::parse(path, bytes, has_header, 0)
-        }
+    /// Puts `what` is not plain before what was found.
+    fn add_found(&mut self, what: &str) {
+        let words = [what, &self.found].into_iter().filter(|words| !words.is_empty());
+        self.found = words.collect::<Vec<_>>().join(", ");
     }
 
     /// Turns every value equal to `code` into a missing one; returns how many there were.
@@ -134,18 +165,14 @@ impl DataFile {
     /// # Panics
     /// If there are no such lines.
     pub fn keep_lines(&mut self, range: Range<usize>) {
-        let columns = self.header.len();
-        let fields = range.start * columns..range.end * columns;
-        if let Some(texts) = &mut self.texts {
-            texts.places = texts.places[fields.start..=fields.end].to_vec();
-        }
-        self.values = self.values[fields].to_vec();
-        self.line_numbers = self.line_numbers[range].to_vec();
+        assert!(range.start <= range.end && range.end <= self.lines(), "{range:?}");
+        self.kept = self.kept.start + range.start..self.kept.start + range.end;
     }
 
     /// Lines of data in turn, each a slice of one value a column.
     pub fn rows(&self) -> std::slice::ChunksExact<'_, f64> {
-        self.values.chunks_exact(self.header.len())
+        let columns = self.header.len();
+        self.values[self.kept.start * columns..self.kept.end * columns].chunks_exact(columns)
     }
 
     /// Values at `line` (from 0, header not counted), one a column.
@@ -153,13 +180,13 @@ impl DataFile {
     /// # Panics
     /// If the file has no such line.
     pub fn row(&self, line: usize) -> &[f64] {
-        let columns = self.header.len();
+        let (line, columns) = (self.kept.start + line, self.header.len());
         &self.values[line * columns..(line + 1) * columns]
     }
 
     /// Number of lines of data.
     pub fn lines(&self) -> usize {
-        self.values.len() / self.header.len()
+        self.kept.len()
     }
 
     /// Value at `line` (from 0, header not counted) and `column` (from 0); NaN if missing.
@@ -167,7 +194,7 @@ impl DataFile {
     /// # Panics
     /// If the file has no such line.
     pub fn value(&self, line: usize, column: usize) -> f64 {
-        self.values[line * self.header.len() + column]
+        self.values[(self.kept.start + line) * self.header.len() + column]
     }
 
     /// Fields of this `column` (from 0): as they are written, without spaces around, in a CSV file that was read with its
@@ -185,21 +212,69 @@ impl DataFile {
 
     /// Number in the file (from 1, header included) of the line of data `line` (from 0), for messages.
     pub fn line_number(&self, line: usize) -> u64 {
-        self.line_numbers[line]
+        self.line_numbers[self.kept.start + line]
     }
 
-    /// Index (from 0) of the column called `name`.
+    /// Index (from 0) of the column of numbers called `name`, or so but for a unit in brackets.
     pub fn column(&self, name: &str) -> Result<usize> {
-        self.header.iter().position(|n| n == name).ok_or_else(|| {
+        let column = self.column_of_any(name)?;
+        self.check_numbers(&[column], None)?;
+        Ok(column)
+    }
+
+    /// Index (from 0) of the column called `name`, which may hold text.
+    pub fn column_of_any(&self, name: &str) -> Result<usize> {
+        columns::place(&self.header, name).ok_or_else(|| {
             let known = columns::some_names(&self.header);
             Error::file(&self.path, Problem::MissingColumn { name: name.into(), known })
         })
+    }
+
+    /// Digest of the numbers in the columns called `names`, of all lines of the file.
+    pub fn digest(&self, names: &[&str]) -> Result<u64> {
+        let mut digest = TableDigest::new(names.iter().copied());
+        self.add_to(&mut digest, names)?;
+        Ok(digest.sum())
+    }
+
+    /// Adds all lines of the columns called `names` to a digest.
+    pub fn add_to(&self, digest: &mut TableDigest, names: &[&str]) -> Result<()> {
+        let columns = self.columns(names.iter().copied())?;
+        for lines in self.values.chunks(self.header.len() * 1024) {
+            let lines = lines.chunks_exact(self.header.len());
+            digest.add(lines.flat_map(|line| columns.iter().map(|column| line[*column])));
+        }
+        Ok(())
+    }
+
+    /// Checks that these columns (from 0) hold nothing but numbers. Outputs of few different texts are classes.
+    pub fn check_numbers(&self, columns: &[usize], role: Option<Role>) -> Result<()> {
+        let Some(found) = self.not_numbers.iter().find(|it| columns.contains(&it.column)) else {
+            return Ok(());
+        };
+        let NotNumbers { line, field, labels, .. } = found.clone();
+        let column = self.header[found.column].clone();
+        let problem = if role == Some(Role::Outputs) && !labels.is_empty() {
+            Problem::ClassLabel {
+                column,
+                count: labels.len(),
+                labels: columns::some_names(&labels),
+            }
+        } else {
+            Problem::NotANumber { line, column, field }
+        };
+        Err(Error::file(&self.path, problem))
     }
 
     /// Indices (from 0) of the columns called `names`.
     pub fn columns<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<usize>> {
         names.into_iter().map(|name| self.column(name)).collect()
     }
+}
+
+/// Whether the file at `path` holds numpy's arrays, by its extension.
+pub fn is_array(path: &Path) -> bool {
+    ["npy", "npz"].into_iter().any(|kind| has_extension(path, kind))
 }
 
 fn has_extension(path: &Path, kind: &str) -> bool {

@@ -52,6 +52,11 @@ impl Dataset {
         self.outputs.counts().into_iter().min().unwrap_or(0)
     }
 
+    /// Names of all columns: the inputs', then the outputs'.
+    pub fn names(&self) -> Vec<&str> {
+        self.inputs.names.iter().chain(&self.outputs.names).map(String::as_str).collect()
+    }
+
     /// Readings and outputs of row table number `row` (from 0).
     ///
     /// # Panics
@@ -193,9 +198,13 @@ fn chosen(file: &DataFile, pattern: Option<&str>, role: Role) -> Result<Vec<usiz
         return Err(Error::file(&file.path, problem));
     }
     if selected.is_empty() {
-        let problem = Problem::NoUsualNames { role, pattern: usual.into(), known: known() };
+        let problem = match pattern {
+            Some(pattern) => Problem::AllLeftOut { role, pattern: pattern.into() },
+            None => Problem::NoUsualNames { role, pattern: usual.into(), known: known() },
+        };
         return Err(Error::file(&file.path, problem));
     }
+    file.check_numbers(&selected, Some(role))?;
     Ok(selected)
 }
 

@@ -1,4 +1,4 @@
-//! Digest of files: ties a model to the scene or data that it was trained on.
+//! Digests of files and tables: tie a model to the scene or data that it was trained on.
 
 /// CRC-64/XZ of `bytes`: tells versions of a file apart, but does not protect against forgery.
 pub fn digest(bytes: &[u8]) -> u64 {
@@ -7,9 +7,47 @@ pub fn digest(bytes: &[u8]) -> u64 {
     digest.sum64()
 }
 
+/// Digest of a table's names and numbers, line after line: that of the same numbers in any kind of file.
+#[derive(Clone)]
+pub struct TableDigest(crc64fast::Digest);
+
+impl TableDigest {
+    /// Digest of columns called `names`, without a line so far.
+    pub fn new<'n>(names: impl Iterator<Item = &'n str>) -> Self {
+        let mut digest = crc64fast::Digest::new();
+        names.for_each(|name| digest.write(format!("{name}\n").as_bytes()));
+        Self(digest)
+    }
+
+    /// Adds numbers; all NaN count alike, and so do 0 and −0.
+    pub fn add(&mut self, values: impl Iterator<Item = f64>) {
+        let bits = |value: f64| if value.is_nan() { f64::NAN } else { value + 0.0 }.to_bits();
+        let bytes: Vec<u8> = values.flat_map(|value| bits(value).to_le_bytes()).collect();
+        self.0.write(&bytes);
+    }
+
+    /// CRC-64/XZ of what was added.
+    pub fn sum(&self) -> u64 {
+        self.0.sum64()
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::digest;
+    use super::{TableDigest, digest};
+
+    #[test]
+    fn a_table_has_the_same_digest_however_its_lines_are_added() {
+        let of = |names: [&str; 2], lines: &[&[f64]]| {
+            let mut digest = TableDigest::new(names.into_iter());
+            lines.iter().for_each(|values| digest.add(values.iter().copied()));
+            digest.sum()
+        };
+        let whole = of(["a", "b"], &[&[1.0, f64::NAN, 0.0, 3.0]]);
+        assert_eq!(whole, of(["a", "b"], &[&[1.0, -f64::NAN], &[-0.0, 3.0]]));
+        assert_ne!(whole, of(["a", "b"], &[&[1.0, f64::NAN, 0.0, 4.0]]));
+        assert_ne!(whole, of(["a", "c"], &[&[1.0, f64::NAN, 0.0, 3.0]]));
+    }
 
     #[test]
     fn the_digest_is_crc_64_xz() {

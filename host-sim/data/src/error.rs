@@ -131,20 +131,58 @@ impl Role {
 /// Problem with a data file. Lines and columns count from 1; the header is line 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Problem {
-    /// Separator between fields that is no comma.
-    #[error(
-        "line 1: fields seem to be separated by {separator:?}; save the file with commas, and points in numbers"
-    )]
-    Separator { separator: char },
     /// Header that cannot be read.
-    #[error("line 1: {cause}; save as UTF-8")]
+    #[error("header: {cause}; save as UTF-8")]
     Header { cause: String },
+    /// File that holds bytes which no text has.
+    #[error("it is neither text nor an array of numpy's; save it as CSV")]
+    NoText,
+    /// File of another program, with what converts it.
+    #[error("it is {kind}, which is not read; convert it with Python:\n\n    {}\n", python.replace('\n', "\n    "))]
+    Foreign {
+        /// What it is, with its article.
+        kind: &'static str,
+        /// Lines of Python that convert it.
+        python: String,
+    },
+    /// UTF-16 where a file is read piece by piece.
+    #[error("UTF-16 is not read piece by piece; save it as UTF-8, or give --solver qr")]
+    Utf16InPieces,
+    /// What gzip packed, and cannot be unpacked.
+    #[error("it cannot be unpacked: {cause}; pack it again with gzip")]
+    Packed { cause: String },
+    /// What gzip packed, and is larger than any log of its size.
+    #[error("it has more than {} unpacked; unpack it yourself if it is a log", in_words(*most_bytes))]
+    UnpackedTooLarge { most_bytes: u64 },
+    /// Numbers in which a comma may stand for a point or part thousands.
+    #[error(
+        "line {line}: {} may be a fraction or a number above a thousand; state --decimal comma, or write numbers \
+         without thousands separators",
+        quoted(field)
+    )]
+    ThousandsOrDecimals { line: u64, field: String },
+    /// Number with a point in a file with decimal commas.
+    #[error(
+        "line {line}: {} has a point, and other numbers have decimal commas; write numbers without thousands \
+         separators, or state --decimal point",
+        quoted(field)
+    )]
+    PointAmongCommas { line: u64, field: String },
+    /// Commas between fields, and twice as many as the header has.
+    #[error(
+        "line {line} has {fields} fields, and the header {columns}: commas seem to be decimal ones; state --decimal \
+         comma for one column, else save with semicolons between fields"
+    )]
+    CommasForBoth { line: u64, fields: usize, columns: usize },
     /// File without content.
     #[error("the file is empty: write numbers into it, with names of the columns on line 1")]
     Empty,
     /// File with a header and nothing else.
     #[error("the file has a header but no line of data")]
     NoLines,
+    /// Folder where a file is expected.
+    #[error("it is a folder; give the path of a file in it")]
+    Folder,
     /// File larger than any that is read.
     #[error("it has more than {}; check the path", in_words(*most_bytes))]
     FileTooLarge {
@@ -162,11 +200,11 @@ pub enum Problem {
     /// Blank line in a file of one column, where it could be a missing value.
     #[error("line {line} is blank; in a file of one column write NaN for a missing value")]
     BlankLine { line: usize },
-    /// Column name that is empty or holds a control character.
-    #[error("line 1: column {column} has no usable name {}", quoted(name))]
+    /// Column name that holds a control character.
+    #[error("header: column {column} has no usable name {}", quoted(name))]
     UnusableName { column: usize, name: String },
     /// Name that two columns share.
-    #[error("line 1: column {} stands twice; rename one", quoted(name))]
+    #[error("header: column {} stands twice; rename one", quoted(name))]
     RepeatedName { name: String },
     /// Line that cannot be split into fields.
     #[error("{cause}; check quotes and line ends")]
@@ -189,11 +227,29 @@ pub enum Problem {
     },
     /// Field that is not a number.
     #[error(
-        "line {line}, column {}: {} is not a number; leave the field empty if the value is missing",
+        "line {line}, column {}: {} is not a number; {}",
         quoted(column),
-        quoted(field)
+        quoted(field),
+        if field.contains(',') && field.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
+            "state --decimal comma if it is one, or write it without thousands separators"
+        } else {
+            "leave the field empty if the value is missing, or use another column"
+        }
     )]
     NotANumber { line: u64, column: String, field: String },
+    /// Output of few different texts.
+    #[error(
+        "column {} is a class label: {count} texts such as {labels}; give each class a column of 0 and 1, in Python \
+         pandas.get_dummies(table, columns=[{}], dtype=int), train these columns as outputs, and take the largest",
+        quoted(column),
+        quoted(column)
+    )]
+    ClassLabel {
+        column: String,
+        /// Number of different texts, and some of them.
+        count: usize,
+        labels: String,
+    },
     /// Value of an array that is infinite.
     #[error(
         "line {line}, column {}: the value is infinite; write NaN if it is missing",
@@ -219,6 +275,14 @@ pub enum Problem {
         pattern: String,
         known: String,
     },
+    /// Pattern whose parts leave out every column that others choose.
+    #[error(
+        "the {} {pattern:?} choose no column: parts with ! leave columns out of those that other parts choose, as in \
+         '*,!{}'",
+        role.name(),
+        pattern.rsplit('!').next().unwrap_or_default()
+    )]
+    AllLeftOut { role: Role, pattern: String },
     /// File without any column of the project's own names, and no pattern given.
     #[error("no column is named like {pattern}; choose the {}; the file has: {known}", role.name())]
     NoUsualNames {
@@ -312,6 +376,25 @@ pub enum Problem {
         /// Smallest distance of two time stamps.
         distance: f64,
     },
+    /// Logs whose time stamps seem to count in different units.
+    #[error(
+        "its time stamps and those of {other} seem to count in different units: they span {} and {}; give --time-factor \
+         {} for the unit of the first log, or --time-factor 1 if they count in the same unit",
+        number(spans[0]), number(spans[1]), number(*factor)
+    )]
+    OtherUnit {
+        other: String,
+        /// Time between first and last stamp of each log.
+        spans: [f64; 2],
+        /// Factor that makes the second log's unit the first one's.
+        factor: f64,
+    },
+    /// Logs of which hardly any line has a partner.
+    #[error(
+        "{pairs} of {lines} lines have a partner in {other}, hardly any: raise the tolerance, set the lag between the \
+         clocks, or check that both count time in one unit; --time-factor 1 joins these lines all the same"
+    )]
+    FewPartners { other: String, pairs: usize, lines: usize },
     /// Logs of which one has no time stamp.
     #[error(
         "this file or {other} has no time stamp: the column is empty; check which columns hold the time"

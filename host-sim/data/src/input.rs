@@ -1,11 +1,13 @@
 //! Input files, read whole up to a size that is told when it is exceeded: not every path names a file that ends.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, Cursor, ErrorKind, Read};
 use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
+
+use flate2::read::MultiGzDecoder;
 
 use crate::error::{Error, Problem, Result};
 
@@ -24,8 +26,11 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Opens the file at `path` for reading.
 ///
 /// # Errors
-/// [`Error::Read`] if it cannot be read, or is a named pipe that nobody writes to.
+/// [`Error::Read`] if it cannot be read, or is a named pipe that nobody writes to. [`Error::File`] for a folder.
 pub fn open(path: &Path) -> Result<File> {
+    if path.is_dir() {
+        return Err(Error::file(path, Problem::Folder));
+    }
     let opened = open_in_time(path, OpenOptions::new().read(true), "nobody writes to this pipe");
     opened.map_err(|cause| Error::read(path, cause))
 }
@@ -82,6 +87,43 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
     if bytes.len() as u64 > most_bytes { Err(too_large()) } else { Ok(bytes) }
 }
 
+/// First bytes of what gzip packed.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// Most bytes that a small file may unpack to, and most of a larger one for each of its bytes. Readings have noise: as
+/// text they pack tenfold.
+const FEW_UNPACKED_BYTES: u64 = 64_000_000;
+const MOST_UNPACKED_A_BYTE: u64 = 100;
+
+/// What gzip packed into the `bytes` of the file at `path`, if it did.
+pub(crate) fn unpacked(path: &Path, bytes: &[u8]) -> Result<Option<Vec<u8>>> {
+    if !bytes.starts_with(&GZIP) {
+        return Ok(None);
+    }
+    let most_bytes = bytes.len() as u64 * MOST_UNPACKED_A_BYTE;
+    let most_bytes = most_bytes.clamp(FEW_UNPACKED_BYTES, MOST_DATA_BYTES);
+    let mut unpacked = vec![];
+    let read = MultiGzDecoder::new(bytes).take(most_bytes + 1).read_to_end(&mut unpacked);
+    read.map_err(|cause| Error::file(path, Problem::Packed { cause: cause.to_string() }))?;
+    if unpacked.len() as u64 > most_bytes {
+        return Err(Error::file(path, Problem::UnpackedTooLarge { most_bytes }));
+    }
+    Ok(Some(unpacked))
+}
+
+/// The same `source`, or what gzip packed into it.
+pub(crate) fn unpacking(
+    path: &Path,
+    mut source: Box<dyn Read + Send>,
+) -> Result<Box<dyn Read + Send>> {
+    let mut start = vec![];
+    let read = source.by_ref().take(GZIP.len() as u64).read_to_end(&mut start);
+    read.map_err(|cause| Error::read(path, cause))?;
+    let is_packed = start == GZIP;
+    let whole = Cursor::new(start).chain(source);
+    Ok(if is_packed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) })
+}
+
 /// Reads the text file at `path` whole, if it has at most [`MOST_TEXT_BYTES`].
 pub fn read_text(path: &Path) -> Result<String> {
     String::from_utf8(read(path, MOST_TEXT_BYTES)?).map_err(|cause| {
@@ -102,6 +144,18 @@ mod tests {
         let refused = read(&path, 4).unwrap_err().to_string();
         std::fs::remove_file(&path).unwrap();
         assert!(refused.ends_with("more than 4 bytes; check the path"), "{refused}");
+        let refused = read(&std::env::temp_dir(), 4).unwrap_err().to_string();
+        assert!(refused.contains("it is a folder; give the path of a file"), "{refused}");
+    }
+
+    #[test]
+    fn what_unpacks_to_far_more_than_readings_do_is_refused() {
+        let mut packed = flate2::write::GzEncoder::new(vec![], flate2::Compression::fast());
+        io::copy(&mut io::repeat(b'1').take(FEW_UNPACKED_BYTES + 1), &mut packed).unwrap();
+        let packed = packed.finish().unwrap();
+        let refused = unpacked(Path::new("log.csv.gz"), &packed).unwrap_err().to_string();
+        assert!(refused.contains("more than 64 MB unpacked"), "{refused}");
+        assert_eq!(unpacked(Path::new("log.csv"), b"a,b\n").unwrap(), None);
     }
 
     #[cfg(unix)]

@@ -69,6 +69,9 @@ pub struct Join {
     pub tolerance: Time,
     /// Time added to the time stamps of the second log before they are compared, in their unit.
     pub lag: Time,
+    /// Factor from the unit of the second log's time stamps to the first one's. Without it, logs are refused whose time
+    /// stamps seem to count in different units, or of which hardly any line has a partner.
+    pub time_factor: Option<f64>,
 }
 
 /// Which lines of two logs belong together.
@@ -84,6 +87,39 @@ pub struct Joined {
     pub largest_distance: f64,
 }
 
+/// Lines of the shorter log are hardly any joined if they are less than one of so many.
+const FEW: usize = 50;
+
+/// Lines of a log whose span tells its unit.
+const LEAST_STAMPS: usize = 10;
+
+/// Checks that the time stamps of two logs span times of one order: a factor of about a thousand, or of its powers, is
+/// that of two units.
+fn check_units(stamps: &[Vec<Option<f64>>; 2], logs: [&DataFile; 2]) -> Result<()> {
+    let spans = stamps.each_ref().map(|times| {
+        let mut times = times.iter().flatten().copied();
+        let first = times.next().unwrap_or(0.0);
+        times.last().map_or(0.0, |last| last - first)
+    });
+    if stamps.iter().any(|times| times.len() < LEAST_STAMPS) {
+        return Ok(());
+    }
+    let steps = [0, 1].map(|log| spans[log] / stamps[log].len() as f64);
+    // A time is given in s, ms, µs or ns.
+    for factor in [1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9] {
+        let is_near = |[of_first, of_second]: [f64; 2], most: f64| {
+            let ratio = of_first / (of_second * factor);
+            ratio.max(1.0 / ratio) < most
+        };
+        let differs = spans.iter().all(|span| *span > 0.0);
+        if differs && (is_near(spans, 1.5) || is_near(spans, 4.0) && is_near(steps, 1.5)) {
+            let other = logs[1].path.display().to_string();
+            return Err(Error::file(&logs[0].path, Problem::OtherUnit { other, spans, factor }));
+        }
+    }
+    Ok(())
+}
+
 impl Join {
     /// Checks tolerance and lag.
     pub fn check(&self) -> std::result::Result<(), BadValue> {
@@ -91,7 +127,10 @@ impl Join {
         let rule = || "give a time from 0, in the unit of the time stamps".into();
         require(is_tolerance, "tolerance", self.tolerance, rule)?;
         let rule = || "give a time in the unit of the time stamps, negative or not".into();
-        require(self.lag.as_f64().is_finite(), "lag", self.lag, rule)
+        require(self.lag.as_f64().is_finite(), "lag", self.lag, rule)?;
+        let factor = self.time_factor.unwrap_or(1.0);
+        let rule = || "give a number above 0, such as 0.001 for milliseconds beside seconds".into();
+        require(factor > 0.0 && factor.is_finite(), "time_factor", factor, rule)
     }
 
     /// Joins each line of `first` with the line of `second` whose time stamp, plus the lag, is nearest. Of two that are
@@ -107,11 +146,17 @@ impl Join {
         let logs = [(first, first.column(&self.on[0])?), (second, second.column(&self.on[1])?)];
         let sizes = logs.iter().flat_map(|(log, column)| log.rows().map(|row| row[*column].abs()));
         let (tolerance, lag) = (self.tolerance.as_f64(), self.lag.as_f64());
-        let found = if sizes.fold(0.0, f64::max) + lag.abs() < MOST_EXACT {
-            let stamps = logs.map(|(log, column)| {
-                let times = log.rows().map(|row| Some(row[column]).filter(|time| !time.is_nan()));
-                times.collect()
-            });
+        let factor = self.time_factor.unwrap_or(1.0);
+        let times = logs.map(|(log, column)| log.rows().map(move |row| row[column]));
+        let [times, others] =
+            times.map(|times| times.map(|time| Some(time).filter(|it| !it.is_nan())));
+        let others = others.map(|time| Some(factor * time?));
+        let stamps: [Vec<Option<f64>>; 2] = [times.collect(), others.collect()];
+        if self.time_factor.is_none() {
+            check_units(&stamps, [first, second])?;
+        }
+        // With a factor they are no whole numbers anyway.
+        let found = if sizes.fold(0.0, f64::max) + lag.abs() < MOST_EXACT || factor != 1.0 {
             // Decimal time stamps are rounded: one that is exactly as far must not be left out for that.
             let rounding = |time: f64| 2.0 * f64::EPSILON * (time.abs() + lag.abs() + tolerance);
             Found::new(logs, stamps, lag, |time, distance| distance <= tolerance + rounding(time))?
@@ -135,6 +180,11 @@ impl Join {
             };
             return Err(Error::file(&first.path, problem));
         };
+        let (pairs, lines) = (found.pairs.len(), first.lines().min(second.lines()));
+        if self.time_factor.is_none() && pairs < lines / FEW {
+            let (other, lines) = (second.path.display().to_string(), first.lines());
+            return Err(Error::file(&first.path, Problem::FewPartners { other, pairs, lines }));
+        }
         let mut header = first.header.clone();
         for name in &second.header {
             let mut name = name.clone();

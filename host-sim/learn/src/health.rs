@@ -31,7 +31,7 @@ impl ColumnHealth {
 /// Fault of a `reading` in a column of this `name`; `None` if it is sound. Only readings in Ω have limits: those of a
 /// column whose name says so.
 pub fn fault(name: &str, reading: f64, limits: Option<Limits>) -> Option<Fault> {
-    match limits.filter(|_| columns::unit_of(name) == "Ω") {
+    match limits.filter(|_| columns::is_judged_in_ohm(name)) {
         Some(limits) => limits.fault(reading as f32), // as a device holds it
         None => is_missing(reading).then_some(Fault::Missing),
     }

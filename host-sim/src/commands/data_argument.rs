@@ -6,7 +6,7 @@ use crate::measurements::{Judged, Measurements, Split, relative_to};
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::data_file::DataFile;
+use taxel_data::data_file::{DataFile, is_array};
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{Problem, Role};
 use taxel_data::table::Table;
@@ -22,8 +22,8 @@ use super::{data_notes, readings, refused_readings};
 #[derive(Args, Default)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct DataArguments {
-    /// Reading columns of a data file: names with * and ?, and ranges such as c2..c16, comma-separated [default:
-    /// r*c*_ohm].
+    /// Reading columns of a data file: names with * and ?, and ranges such as c2..c16, comma-separated; !NAME leaves
+    /// columns out [default: r*c*_ohm].
     #[arg(long, value_name = "GLOB")]
     inputs: Option<String>,
     /// Output columns of a data file, in the same way [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
@@ -125,14 +125,11 @@ impl DataArguments {
     /// Error if an option was given that needs all lines of the file at `path` at once.
     pub fn refuse_for_stream(&self, path: &Path, how: HowToTrain) -> Result<()> {
         self.check_baseline(how)?;
-        let is_array = path
-            .extension()
-            .is_some_and(|end| ["npy", "npz"].iter().any(|kind| end.eq_ignore_ascii_case(kind)));
         for (option, given) in [
             ("--fold-column", self.fold_column.is_some()),
             ("--first-share and --last-share", self.file.takes_a_share()),
             ("--confidence", how.confidence),
-            ("an array of numpy's", is_array),
+            ("an array of numpy's", is_array(path)),
         ] {
             if given {
                 let message = format!(
@@ -178,10 +175,11 @@ impl DataArguments {
         self.check_baseline(how)?;
         let file = self.file.read(path)?;
         let (frames, lines, outliers) = self.usual_frames(&file)?;
+        let digest = file.digest(&frames.names())?;
         let given_folds =
             self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
         let split =
-            Split::new(&frames, given_folds.as_deref(), self.judged(judged, &frames, file.digest)?);
+            Split::new(&frames, given_folds.as_deref(), self.judged(judged, &frames, digest)?);
         if split.training.is_empty() {
             let message = "holding out frames leaves none to train on: give more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
@@ -216,7 +214,7 @@ impl DataArguments {
         let centres = Options::default().centres.min(centres);
         let measurements = Measurements {
             name: name.into_owned(),
-            digest: file.digest,
+            digest,
             training,
             fold_of,
             test,
@@ -268,7 +266,7 @@ impl DataArguments {
         Ok((frames, kept.lines))
     }
 
-    /// Frames that the model trained on some of `frames` is judged by. `digest` is that of their file.
+    /// Frames that the model trained on some of `frames` is judged by. `digest` is that of their columns.
     fn judged(&self, judged: JudgedBy<'_>, frames: &Dataset, digest: u64) -> Result<Judged> {
         let path = match judged {
             JudgedBy::None => return Ok(Judged::None),
@@ -276,7 +274,7 @@ impl DataArguments {
             JudgedBy::File(path) => path,
         };
         let file = self.file.fields().read(path)?;
-        if file.digest == digest {
+        if file.digest(&frames.names()).is_ok_and(|of_file| of_file == digest) {
             let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
@@ -299,7 +297,9 @@ pub fn with_options(error: taxel_data::Error) -> Error {
     };
     match error {
         taxel_data::Error::File { path, problem } => match problem {
-            Problem::NoMatch { role, .. } | Problem::NoUsualNames { role, .. } => {
+            Problem::NoMatch { role, .. }
+            | Problem::NoUsualNames { role, .. }
+            | Problem::AllLeftOut { role, .. } => {
                 Error::Unfit { path, message: format!("{problem} ({})", option(role)) }
             }
             Problem::InputAndOutput { .. } => {

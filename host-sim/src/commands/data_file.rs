@@ -4,12 +4,12 @@ use std::path::Path;
 
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::data_file::{DataFile, Reading};
+use taxel_data::data_file::{DataFile, Reading, Separator, Stated, is_array};
 
 /// Heading of options for data files.
 pub const DATA_FILES: &str = "Data files (CSV, .npy, .npz)";
 
-/// How data files are read: CSV files (with or without a header), numpy's .npy and .npz.
+/// How data files are read: text of any dialect (with or without a header), numpy's .npy and .npz.
 #[derive(Args, Default)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct DataFileArguments {
@@ -38,6 +38,19 @@ pub struct FieldArguments {
     /// Numbers that stand for a missing value, such as -1.
     #[arg(long, value_name = "VALUE", value_delimiter = ',', allow_negative_numbers = true)]
     missing: Vec<f64>,
+    /// Separator between the fields of a text file, which is otherwise found: comma, semicolon, tab, space, or another
+    /// character.
+    #[arg(long, value_name = "NAME")]
+    separator: Option<Separator>,
+    /// Decimal sign of a text file, which is otherwise found.
+    #[arg(long, value_name = "SIGN", value_parser = ["point", "comma"])]
+    decimal: Option<String>,
+    /// What comment lines of a text file begin with; otherwise #, % and // are found.
+    #[arg(long, value_name = "MARK")]
+    comment: Option<String>,
+    /// Take the line behind the header for units; otherwise such a line is found.
+    #[arg(long)]
+    units_line: bool,
 }
 
 impl DataFileArguments {
@@ -82,12 +95,13 @@ impl DataFileArguments {
 
     /// Error if an option was given: they are for data files alone.
     pub fn refuse_for_scene(&self) -> Result<()> {
-        for (option, given) in [
+        let of_fields = [
             ("--header", self.fields.header),
             ("--missing", !self.fields.missing.is_empty()),
             ("--first-share", self.first_share.is_some()),
             ("--last-share", self.last_share.is_some()),
-        ] {
+        ];
+        for (option, given) in of_fields.into_iter().chain(self.fields.of_text()) {
             if given {
                 let message = format!("{option} is for data files; a scene has none: leave it out");
                 return Err(Error::Usage(message));
@@ -121,9 +135,30 @@ fn count(option: &str, share: f64, lines: usize, lines_of: impl Fn(u64) -> usize
 }
 
 impl FieldArguments {
-    /// Whether a CSV file has a header whatever its first line holds, and the numbers that stand for a missing value.
-    pub fn settings(&self) -> (bool, &[f64]) {
-        (self.header, &self.missing)
+    /// How a file is read.
+    pub fn reading(&self) -> Reading {
+        let stated = Stated {
+            separator: self.separator,
+            decimal_comma: self.decimal.as_ref().map(|sign| sign == "comma"),
+            comment: self.comment.clone(),
+            units_line: self.units_line,
+        };
+        Reading { has_header: self.header, stated, ..Reading::default() }
+    }
+
+    /// Numbers that stand for a missing value.
+    pub fn missing(&self) -> &[f64] {
+        &self.missing
+    }
+
+    /// Options that are for text files alone, and whether they were given.
+    fn of_text(&self) -> [(&'static str, bool); 4] {
+        [
+            ("--separator", self.separator.is_some()),
+            ("--decimal", self.decimal.is_some()),
+            ("--comment", self.comment.is_some()),
+            ("--units-line", self.units_line),
+        ]
     }
 
     /// Reads the file at `path`, and says on stderr what it made of it.
@@ -137,7 +172,15 @@ impl FieldArguments {
     }
 
     fn read_as(&self, path: &Path, keeps_text: bool) -> Result<DataFile> {
-        let mut file = DataFile::read_as(path, Reading { has_header: self.header, keeps_text })?;
+        if let (true, Some((option, _))) =
+            (is_array(path), self.of_text().into_iter().find(|(_, given)| *given))
+        {
+            let message =
+                format!("{option} is for text files; {} is none: leave it out", path.display());
+            return Err(Error::Usage(message));
+        }
+        let mut file = DataFile::read_as(path, &Reading { keeps_text, ..self.reading() })?;
+        note_found(&file);
         let name = path.display();
         if !file.names_columns {
             eprintln!(
@@ -159,6 +202,13 @@ impl FieldArguments {
     }
 }
 
+/// Says on stderr what is not plain CSV in a `file`.
+pub fn note_found(file: &DataFile) {
+    if !file.found.is_empty() {
+        eprintln!("note: {}: {}", file.path.display(), file.found);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,7 +217,8 @@ mod tests {
     fn shares_that_make_the_whole_have_each_line_once() {
         for count in [7, 10, 11, 13, 25, 50, 101, 150] {
             let text = (0..count).map(|line| line.to_string()).collect::<Vec<_>>().join("\n");
-            let file = DataFile::parse(Path::new("d.csv"), text.as_bytes(), false).unwrap();
+            let file =
+                DataFile::parse(Path::new("d.csv"), text.as_bytes(), &Reading::default()).unwrap();
             let lines = |first_share, last_share| {
                 let cut = DataFileArguments { first_share, last_share, ..Default::default() };
                 cut.cut(file.clone()).map_or(vec![], |file| file.rows().map(|r| r[0]).collect())

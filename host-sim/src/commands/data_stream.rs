@@ -7,6 +7,7 @@ use crate::verdict::Warning;
 use crate::{Error, Result};
 use taxel_data::data_file::pieces::Pieces;
 use taxel_data::dataset::Dataset;
+use taxel_data::digest::TableDigest;
 use taxel_data::error::Problem;
 use taxel_data::table::Table;
 use taxel_learn::Options;
@@ -14,7 +15,7 @@ use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::resolution;
 
 use super::data_argument::{DataArguments, HowToTrain, with_options};
-use super::{data_notes, refused_readings};
+use super::{data_file, data_notes, refused_readings};
 
 /// Most values far from all others that are kept to be told.
 const MOST_OUTLIERS: usize = 1000;
@@ -39,6 +40,8 @@ pub struct DataStream {
     lines: usize,
     incomplete: usize,
     outliers: Outliers,
+    /// Digest of the columns that are used, once there was a line of them.
+    digest: Option<TableDigest>,
 }
 
 impl DataStream {
@@ -46,6 +49,7 @@ impl DataStream {
     fn next_frames(&mut self) -> taxel_data::Result<Option<Dataset>> {
         while let Some(mut file) = self.pieces.next_piece()? {
             self.selection.missing.iter().for_each(|code| _ = file.mark_missing(*code));
+            data_file::note_found(&file);
             self.lines += file.lines();
             let Selection { inputs, outputs, keep_outliers, .. } = &self.selection;
             let found = Dataset::from_file(&file, inputs.as_deref(), outputs.as_deref());
@@ -56,6 +60,9 @@ impl DataStream {
                 }
                 found => found?,
             };
+            let names = frames.names();
+            let new = || TableDigest::new(names.iter().copied());
+            file.add_to(self.digest.get_or_insert_with(new), &names)?;
             self.incomplete += kept.of - kept.lines.len();
             let found = outliers::find(&frames, |frame| file.line_number(kept.lines[frame]));
             let leave_out = found.left_out && !keep_outliers;
@@ -76,9 +83,9 @@ impl DataStream {
         }
     }
 
-    /// CRC-64/XZ of all bytes that were read.
+    /// Digest of the columns that are used, as far as they were read.
     pub fn digest(&self) -> u64 {
-        self.pieces.digest()
+        self.digest.as_ref().map_or(0, TableDigest::sum)
     }
 
     /// Values far from all others of their piece.
@@ -123,15 +130,15 @@ impl DataArguments {
         first_frames: usize,
     ) -> Result<(Measurements, DataStream)> {
         self.refuse_for_stream(path, how)?;
-        let (header, missing) = self.file.fields().settings();
+        let fields = self.file.fields();
         let [inputs, outputs] = self.patterns().map(|pattern| pattern.map(str::to_owned));
         let no_outliers = Outliers { found: vec![], lines: 0, left_out: false, kept: vec![] };
         let mut stream = DataStream {
-            pieces: Pieces::open(path, header)?,
+            pieces: Pieces::open(path, fields.reading())?,
             selection: Selection {
                 inputs,
                 outputs,
-                missing: missing.to_vec(),
+                missing: fields.missing().to_vec(),
                 keep_outliers: self.keeps_outliers(),
             },
             rest: None,
@@ -139,6 +146,7 @@ impl DataArguments {
             lines: 0,
             incomplete: 0,
             outliers: no_outliers.clone(),
+            digest: None,
         };
         let next = |stream: &mut DataStream| stream.next_frames().map_err(with_options);
         let path = stream.pieces.path().to_path_buf();

@@ -246,7 +246,7 @@ fn kept<'k>(
     if let Some(place) = (0..keep.len()).find(|place| repeated(*place)) {
         return Err(Error::Usage(format!("--keep {}: name each column once", keep[place])));
     }
-    let column = |name| Ok((name, file.texts(file.column(name)?)?));
+    let column = |name| Ok((name, file.texts(file.column_of_any(name)?)?));
     names().map(column).collect::<taxel_data::Result<_>>().map_err(|error| match error {
         taxel_data::Error::File { path, problem } => {
             Error::Unfit { path, message: format!("{problem} (--keep)") }

@@ -129,7 +129,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let frames_evaluated =
         truth.lines().zip(estimate.lines()).filter(|(a, b)| counts((a, b))).count();
-    let same_file = metadata.scene_digest == file.digest && !arguments.file.takes_a_share();
+    let names: Vec<&str> =
+        metadata.input_names.iter().chain(metadata.output_names.iter()).collect();
+    let same_file =
+        metadata.scene_digest == file.digest(&names)? && !arguments.file.takes_a_share();
     let values_evaluated = errors.iter().map(|group| group.count).sum();
     let of = |decoder: &str, errors| DecoderErrors { decoder: decoder.into(), errors };
     let mean_errors = metrics::by_group(&truth, &means, &measure);

@@ -16,9 +16,9 @@ use super::{Common, print};
 
 /// Join two logs by time: each line of one with the line of the other whose time stamp is nearest.
 ///
-/// Both may be CSV files, with a header or without, or numpy's .npy or .npz. Columns of the second that the first has
-/// too are called b.NAME. Time stamps may repeat, but not decrease. Fields are written as they are; whole numbers of any
-/// length, such as nanoseconds since 1970, are compared exactly.
+/// Both may be text of any dialect, with a header or without, or numpy's .npy or .npz. Columns of the second that the
+/// first has too are called b.NAME. Time stamps may repeat, but not decrease. Fields are written as they are; whole numbers
+/// of any length, such as nanoseconds since 1970, are compared exactly. Time stamps by ISO 8601 count in seconds.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim join sensor.csv robot.csv --on time_s --tolerance 0.01 -o joined.csv
@@ -50,6 +50,10 @@ struct JoinArguments {
     /// Time to add to the second file's time stamps.
     #[arg(long, value_name = "TIME", default_value = "0", allow_negative_numbers = true)]
     lag: Time,
+    /// Factor from the unit of the second file's time stamps to the first one's, such as 0.001 where they count ms and
+    /// s. 1 says that both count in one unit, however few lines have a partner.
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    time_factor: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -122,8 +126,9 @@ impl JoinArguments {
             }
         }
         let (on, tolerance, lag) = (on.map(str::to_owned), self.tolerance, self.lag);
-        let join = Join { on, tolerance, lag };
-        let options = [("tolerance", "--tolerance"), ("lag", "--lag")];
+        let join = Join { on, tolerance, lag, time_factor: self.time_factor };
+        let options =
+            [("tolerance", "--tolerance"), ("lag", "--lag"), ("time_factor", "--time-factor")];
         join.check().map_err(|bad| of_option(bad, &options))?;
         let joined = join.join(first, second)?;
         let pairs = joined.pairs.len();

@@ -81,7 +81,7 @@ fn notes(readings: &Table, source: &str) -> Vec<String> {
 /// Columns of `readings` in Ω with values outside of the `limits`.
 fn refused(readings: &Table, limits: Limits) -> Vec<Refused<'_>> {
     let names = readings.names.iter().enumerate();
-    let in_ohm = names.filter(|(_, name)| columns::unit_of(name) == "Ω");
+    let in_ohm = names.filter(|(_, name)| columns::is_judged_in_ohm(name));
     let mut refused: Vec<(usize, Refused<'_>)> =
         in_ohm.map(|(place, name)| (place, Refused { name, shorted: 0, open: 0 })).collect();
     for line in readings.lines() {

@@ -1,6 +1,6 @@
 //! Numbers and names as people read them.
 
-use taxel_data::columns::unit_of;
+use taxel_data::columns::without_unit;
 
 /// Text for a value that is not defined.
 pub const UNDEFINED: &str = "–";
@@ -54,10 +54,7 @@ pub fn symbol(group: &str) -> String {
     match axis(group) {
         Some(axis) if group.starts_with('d') => format!("Δ{axis}"),
         Some(axis) => format!("F{axis}"),
-        None => {
-            let ending = if unit_of(group).is_empty() { None } else { group.rsplit_once('_') };
-            ending.map_or(group, |(name, _)| name).replace('_', " ")
-        }
+        None => without_unit(group).replace('_', " "),
     }
 }
 
@@ -100,8 +97,8 @@ mod tests {
 
     #[test]
     fn groups_are_written_by_their_symbols() {
-        let names = ["dz_mm", "fx_n", "contact_depth_mm", "x_mm", "ch1", "b"];
-        let symbols = ["Δz", "Fx", "contact depth", "x", "ch1", "b"];
+        let names = ["dz_mm", "fx_n", "contact_depth_mm", "x_mm", "ch1", "b", "f_z (N)"];
+        let symbols = ["Δz", "Fx", "contact depth", "x", "ch1", "b", "f z"];
         assert_eq!(names.map(symbol), symbols);
     }
 }

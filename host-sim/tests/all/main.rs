@@ -9,6 +9,7 @@ mod calibrate;
 mod contact;
 mod data_files;
 mod device;
+mod dialects;
 mod directions;
 mod drift;
 mod export;

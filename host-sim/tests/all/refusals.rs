@@ -109,9 +109,9 @@ fn options_replace_a_scenes_numbers_before_these_are_checked() {
 #[test]
 fn what_is_not_text_or_damaged_is_refused() {
     let folder = Folder::new("damaged");
-    folder.write("data.csv", b"ch\xff,f_n\n1,2\n");
+    folder.write("data.csv", b"ch1,f_n\n1,\x002\n");
     let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
-    refused(&folder, &train, &["data.csv", "line 1: it is no UTF-8 text", "save as UTF-8"]);
+    refused(&folder, &train, &["data.csv", "neither text nor an array", "save it as CSV"]);
     folder.write("scene.toml", small_scene());
     folder.succeed(&["train", "scene.toml", "-n", "100", "-o", "m.bin"]);
     folder.succeed(&["synth", "scene.toml", "-n", "10", "-o", "data.csv"]);

@@ -15,6 +15,9 @@ mod packet;
 mod settings;
 mod link;
 mod csv_file;
+mod gzip;
+mod pattern;
+mod time_stamp;
 mod npy;
 mod scene;
 
@@ -34,6 +37,9 @@ pub const TARGETS: &[Target] = &[
     Target { name: "settings", check: settings::check },
     Target { name: "link", check: link::check },
     Target { name: "csv", check: csv_file::check },
+    Target { name: "gzip", check: gzip::check },
+    Target { name: "pattern", check: pattern::check },
+    Target { name: "time", check: time_stamp::check },
     Target { name: "npy", check: npy::check },
     Target { name: "scene", check: scene::check },
 ];

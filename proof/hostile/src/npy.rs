@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use taxel_data::data_file::DataFile;
+use taxel_data::data_file::{DataFile, Reading};
 
 /// Largest factor by which an archive may pack what it holds.
 const PACKED: usize = 1100;
@@ -14,7 +14,9 @@ pub fn check(bytes: &[u8]) -> bool {
         0 => ("f.npy", bytes.len()),
         _ => ("f.npz", PACKED * bytes.len()),
     };
-    let Ok(file) = DataFile::parse(Path::new(name), bytes, false) else { return false };
+    let Ok(file) = DataFile::parse(Path::new(name), bytes, &Reading::default()) else {
+        return false;
+    };
     let (lines, columns) = (file.lines(), file.header.len());
     assert!(lines > 0 && columns > 0, "nothing was read, and accepted");
     // An element takes a byte at least.

@@ -1,28 +1,46 @@
-//! CSV files: a header of names, then one frame a line. Files without a header are recognised.
+//! Text files: a header of names, then one frame a line. Files without a header are recognised.
 
 use std::collections::HashSet;
 use std::path::Path;
 
-use super::{DataFile, Texts, numbered};
+use super::dialect::Dialect;
+use super::{DataFile, NotNumbers, Reading, Texts, numbered, time};
+use crate::columns::some_names;
 use crate::error::{Error, Problem, Result};
 
 mod body;
 
-/// Parses the bytes of a CSV file; `path` names it in messages. The first line is a header even if it holds numbers
-/// alone, if it `has_header`. Lines are numbered as if so many came `before`.
-pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool, before: u64) -> Result<DataFile> {
+/// Most different texts of a column that are kept, to be named as classes.
+const MOST_LABELS: usize = 20;
+
+/// Parses the bytes of a text file of any dialect; `path` names it in messages.
+pub(super) fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<DataFile> {
     let error = |problem| Error::file(path, problem);
-    let text = without_mark(bytes);
+    let found = Dialect::find(bytes, &reading.stated, reading.has_header);
+    let (dialect, text) = found.map_err(error)?;
+    let plain = dialect.to_plain(&text, 0).map_err(error)?;
+    let mut file = parse_plain(path, &plain, reading.has_header || dialect.has_names(), 0)?;
+    file.add_found(&dialect.found);
+    if reading.keeps_text {
+        file.texts = Some(texts(&file, &plain));
+    }
+    Ok(file)
+}
+
+/// Parses plain CSV `text`. The first line is a header even if it holds numbers alone, if it `has_header`. Lines are
+/// numbered as if so many came `before`.
+pub(super) fn parse_plain(
+    path: &Path,
+    text: &[u8],
+    has_header: bool,
+    before: u64,
+) -> Result<DataFile> {
+    let error = |problem| Error::file(path, problem);
     let mut reader = reader(text, true);
     let header = reader.headers().map_err(|e| error(Problem::Header { cause: cause_of(&e) }))?;
-    let header: Vec<String> = header.iter().map(|name| name.trim().to_owned()).collect();
+    let mut header: Vec<String> = header.iter().map(|name| name.trim().to_owned()).collect();
     if header.is_empty() {
         return Err(error(Problem::Empty));
-    }
-    if let [only] = &header[..]
-        && let Some(separator) = only.chars().find(|c| matches!(c, ';' | '\t'))
-    {
-        return Err(error(Problem::Separator { separator }));
     }
     if header.len() == 1
         && let Some(line) = blank_line(text)
@@ -30,55 +48,51 @@ pub(super) fn parse(path: &Path, bytes: &[u8], has_header: bool, before: u64) ->
         return Err(error(Problem::BlankLine { line: line + before as usize }));
     }
     let names_columns = has_header || !holds_numbers(&header);
+    let mut found = String::new();
     let (header, lines) = if names_columns {
-        check_names(&header).map_err(error)?;
+        let nameless = name_columns(&mut header).map_err(error)?;
+        if !nameless.is_empty() {
+            found = format!("columns without a name are called {}", some_names(&nameless));
+        }
         let lines = lines_of_data(text, reader.position());
         (header, lines)
     } else {
         reader = self::reader(text, false);
         (numbered(header.len()), Some((1, text)))
     };
-    let (digest, values) = rayon::join(
-        || crate::digest::digest(bytes),
-        || lines.and_then(|(_, lines)| body::read(lines, header.len())),
-    );
-    let (values, line_numbers) = match (lines, values) {
+    let values = lines.and_then(|(_, lines)| body::read(lines, header.len()));
+    let (values, line_numbers, not_numbers) = match (lines, values) {
         (Some((first, _)), Some(values)) if !values.is_empty() => {
             let line_numbers = (before + first..).take(values.len() / header.len()).collect();
-            (values, line_numbers)
+            (values, line_numbers, vec![])
         }
         _ => read_carefully(path, text, &mut reader, &header, before)?,
     };
     let lacks_last_line_end = !matches!(text, [.., b'\n' | b'\r']);
-    let path = path.into();
     Ok(DataFile {
-        path,
+        kept: 0..line_numbers.len(),
+        path: path.into(),
         header,
         names_columns,
         lacks_last_line_end,
-        digest,
+        found,
         values,
         line_numbers,
-        texts: None,
-        rounded: vec![],
+        not_numbers,
+        ..DataFile::default()
     })
 }
 
-/// `bytes` without a byte order mark.
-fn without_mark(bytes: &[u8]) -> &[u8] {
-    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
-}
-
-/// Fields of `file`, which was parsed from `bytes`, as they are written.
-pub(super) fn texts(file: &DataFile, bytes: &[u8]) -> Texts {
-    let mut reader = reader(without_mark(bytes), file.names_columns);
-    let (mut text, mut record) = (String::new(), csv::StringRecord::new());
+/// Fields of `file`, which was parsed from plain `text`, as they are written there.
+fn texts(file: &DataFile, plain: &[u8]) -> Texts {
+    let mut reader = reader(plain, file.names_columns);
+    let (mut text, mut record) = (String::new(), csv::ByteRecord::new());
     let mut places = Vec::with_capacity(file.values.len() + 1);
     places.push(0);
     // What was parsed has no error.
-    while reader.read_record(&mut record).unwrap_or(false) {
+    while reader.read_byte_record(&mut record).unwrap_or(false) {
         for field in &record {
-            text += field.trim();
+            text += String::from_utf8_lossy(field).trim();
             places.push(text.len());
         }
     }
@@ -97,40 +111,97 @@ fn cause_of(error: &::csv::Error) -> String {
     }
 }
 
-/// Whether the fields of a first line are numbers, or empty, with a number among them: no header.
+/// Whether the fields of a first line are numbers, times, or missing, with a number among them: no header.
 fn holds_numbers(fields: &[String]) -> bool {
-    let numbers = || fields.iter().map(|field| number(field.as_bytes()));
-    numbers().all(|number| number.is_some())
-        && numbers().any(|number| number.is_some_and(|number| !number.is_nan()))
+    let numbers = || fields.iter().map(|field| is_number(field));
+    numbers().all(|number| number.is_some()) && numbers().any(|number| number == Some(true))
 }
 
-fn check_names(header: &[String]) -> std::result::Result<(), Problem> {
+/// Whether a field is a number or a time, and not a missing value; `None` for other text.
+pub(super) fn is_number(field: &str) -> Option<bool> {
+    match number(field.as_bytes()) {
+        Some(value) => Some(!value.is_nan()),
+        None => time::seconds(field.trim()).map(|_| true),
+    }
+}
+
+/// Names columns without a name by their place, as in files without a header, and checks the others. Returns the new
+/// names.
+fn name_columns(header: &mut [String]) -> std::result::Result<Vec<String>, Problem> {
+    let mut nameless = vec![];
+    for (index, name) in header.iter_mut().enumerate() {
+        if name.is_empty() {
+            *name = format!("c{}", index + 1);
+            nameless.push(name.clone());
+        }
+    }
     let mut seen = HashSet::new();
     for (index, name) in header.iter().enumerate() {
         let column = index + 1;
-        if name.is_empty() || name.contains(char::is_control) {
+        if name.contains(char::is_control) {
             return Err(Problem::UnusableName { column, name: name.clone() });
         }
         if !seen.insert(name) {
             return Err(Problem::RepeatedName { name: name.clone() });
         }
     }
-    Ok(())
+    Ok(nameless)
 }
 
-/// Reads the lines of data one by one, quotes and blank lines included.
+/// What the fields of one column were so far.
+#[derive(Default)]
+struct Seen {
+    number: bool,
+    time: bool,
+    not_numbers: Option<NotNumbers>,
+}
+
+impl Seen {
+    /// Value of a field of this column (from 0) on a line of this number: NaN for what is no number. Times count in
+    /// seconds, if there is nothing else in the column.
+    fn value(&mut self, field: &[u8], line: u64, column: usize) -> f64 {
+        let found = number(field);
+        let text = || String::from_utf8_lossy(field).trim().to_owned();
+        let time = if found.is_none() { time::seconds(&text()) } else { None };
+        self.number |= found.is_some_and(|value| !value.is_nan());
+        self.time |= time.is_some();
+        if found.is_none() && time.is_none() || self.number && self.time {
+            let first = || NotNumbers { column, line, field: text(), labels: vec![] };
+            let not_numbers = self.not_numbers.get_or_insert_with(first);
+            let labels = &mut not_numbers.labels;
+            if labels.len() <= MOST_LABELS
+                && !labels.iter().any(|label| label.as_bytes() == field.trim_ascii())
+            {
+                labels.push(text());
+            }
+        }
+        found.or(time).unwrap_or(f64::NAN)
+    }
+
+    /// Its fields that are no numbers, if there are any. Few different texts are the names of classes.
+    fn end(self) -> Option<NotNumbers> {
+        let is_class = |it: &NotNumbers| {
+            (2..=MOST_LABELS).contains(&it.labels.len()) && !self.number && !self.time
+        };
+        self.not_numbers
+            .map(|it| if is_class(&it) { it } else { NotNumbers { labels: vec![], ..it } })
+    }
+}
+
+/// Reads the lines of data one by one, quotes, blank lines, text and times included.
 fn read_carefully(
     path: &Path,
     bytes: &[u8],
     reader: &mut csv::Reader<&[u8]>,
     header: &[String],
     before: u64,
-) -> Result<(Vec<f64>, Vec<u64>)> {
+) -> Result<(Vec<f64>, Vec<u64>, Vec<NotNumbers>)> {
     let error = |problem| Error::file(path, problem);
     let mut values = Vec::new();
     let mut line_numbers = Vec::new();
     let mut lines = LineCount { bytes, at: 0, line: 1 };
     let mut record = csv::ByteRecord::new();
+    let mut seen: Vec<Seen> = header.iter().map(|_| Seen::default()).collect();
     let read_error = |e: csv::Error| error(Problem::Line { cause: cause_of(&e) });
     while reader.read_byte_record(&mut record).map_err(read_error)? {
         let line = before + lines.of_record_at(record.position().map_or(0, csv::Position::byte));
@@ -142,19 +213,15 @@ fn read_carefully(
                 Problem::UnevenLine { line, fields, columns }
             }));
         }
-        for (field, name) in record.iter().zip(header) {
-            let value = number(field).ok_or_else(|| {
-                let field = String::from_utf8_lossy(field).into_owned();
-                error(Problem::NotANumber { line, column: name.clone(), field })
-            })?;
-            values.push(value);
+        for (column, (field, seen)) in record.iter().zip(&mut seen).enumerate() {
+            values.push(seen.value(field, line, column));
         }
         line_numbers.push(line);
     }
     if values.is_empty() {
         return Err(error(Problem::NoLines));
     }
-    Ok((values, line_numbers))
+    Ok((values, line_numbers, seen.into_iter().filter_map(Seen::end).collect()))
 }
 
 /// Count of lines; the CSV reader's own count is one short where lines end in CR LF.
@@ -189,6 +256,9 @@ fn lines_of_data<'b>(bytes: &'b [u8], position: &csv::Position) -> Option<(u64, 
         (b'\r', Some(lines)) => lines,
         _ => return None,
     };
+    // Lines that were no lines of the table are blank.
+    let blank = lines.iter().position(|byte| !matches!(byte, b'\n' | b'\r')).unwrap_or(0);
+    let lines = &lines[blank..];
     Some((LineCount { bytes, at: 0, line: 1 }.of_record_at(position.byte()), lines))
 }
 
@@ -200,13 +270,22 @@ fn blank_line(bytes: &[u8]) -> Option<usize> {
     lines[..last].iter().position(|line| is_blank(line)).map(|index| index + 1)
 }
 
-/// Number in a field; NaN if it is empty or NaN. `None` for text and infinities.
-fn number(field: &[u8]) -> Option<f64> {
+/// Words for a missing value, but for NaN and an empty field. Letters may be upper or lower case.
+const MISSING: [&str; 16] = [
+    "NA", "N/A", "n.a.", "null", "none", "missing", "<NA>", "NaT", "#N/A", "#NV", "#DIV/0!",
+    "#VALUE!", "-", "--", "?", ".",
+];
+
+/// Number in a field; NaN if it is empty, NaN or a word for a missing value. `None` for text and infinities.
+pub(super) fn number(field: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(field).ok()?.trim();
     if text.is_empty() {
         return Some(f64::NAN);
     }
-    text.parse::<f64>().ok().filter(|value| !value.is_infinite())
+    match text.parse::<f64>() {
+        Ok(value) => Some(value).filter(|value| !value.is_infinite()),
+        Err(_) => MISSING.iter().any(|word| word.eq_ignore_ascii_case(text)).then_some(f64::NAN),
+    }
 }
 
 #[cfg(test)]

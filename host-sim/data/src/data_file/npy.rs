@@ -34,7 +34,7 @@ pub(super) fn parse_array(path: &Path, bytes: &[u8]) -> Result<DataFile> {
     let mut values = vec![0.0; count];
     let rounded =
         array.read_into(&mut values, columns, 0).map_err(|cause| unusable(path, cause))?;
-    Ok(DataFile { rounded, ..data_file(path, bytes, numbered(columns), false, values)? })
+    Ok(DataFile { rounded, ..data_file(path, numbered(columns), false, values)? })
 }
 
 /// Parses arrays of equally many lines, set side by side. The columns of `NAME` are called `NAME1`, `NAME2`, …; an
@@ -57,7 +57,7 @@ pub(super) fn parse_archive(path: &Path, bytes: &[u8]) -> Result<DataFile> {
         rounded.extend(array.read_into(&mut values, width, first).map_err(of_array)?);
         first += columns;
     }
-    Ok(DataFile { rounded, ..data_file(path, bytes, outline.header, true, values)? })
+    Ok(DataFile { rounded, ..data_file(path, outline.header, true, values)? })
 }
 
 /// What an archive holds, as its arrays' headers tell.
@@ -125,7 +125,6 @@ fn unusable(path: &Path, cause: String) -> Error {
 
 fn data_file(
     path: &Path,
-    bytes: &[u8],
     header: Vec<String>,
     names_columns: bool,
     values: Vec<f64>,
@@ -138,21 +137,9 @@ fn data_file(
         let problem = Problem::Infinite { line: line as u64 + 1, column: header[column].clone() };
         return Err(Error::file(path, problem));
     }
-    let line_numbers = (1..).take(values.len() / header.len()).collect();
-    let digest = crate::digest::digest(bytes);
-    let path = path.into();
-    let lacks_last_line_end = false;
-    Ok(DataFile {
-        path,
-        header,
-        names_columns,
-        lacks_last_line_end,
-        digest,
-        values,
-        line_numbers,
-        texts: None,
-        rounded: vec![],
-    })
+    let kept = 0..values.len() / header.len();
+    let (path, line_numbers) = (path.into(), (1..=kept.len() as u64).collect());
+    Ok(DataFile { path, header, names_columns, kept, values, line_numbers, ..DataFile::default() })
 }
 
 #[cfg(test)]

@@ -8,12 +8,10 @@ fn log(path: &str, header: &[&str], lines: &[&[f64]]) -> DataFile {
         path: Path::new(path).into(),
         header: header.iter().map(|name| (*name).to_owned()).collect(),
         names_columns: true,
-        lacks_last_line_end: false,
-        digest: 1,
         values: lines.concat(),
         line_numbers: (2..).take(lines.len()).collect(),
-        texts: None,
-        rounded: vec![],
+        kept: 0..lines.len(),
+        ..DataFile::default()
     }
 }
 
@@ -21,11 +19,16 @@ fn log(path: &str, header: &[&str], lines: &[&[f64]]) -> DataFile {
 fn read(text: &str) -> DataFile {
     let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
     std::fs::write(file.path(), text).unwrap();
-    DataFile::read_as(file.path(), Reading { keeps_text: true, ..Reading::default() }).unwrap()
+    DataFile::read_as(file.path(), &Reading { keeps_text: true, ..Reading::default() }).unwrap()
 }
 
 fn on_time(tolerance: f64, lag: f64) -> Join {
-    Join { on: ["t".into(), "t".into()], tolerance: tolerance.into(), lag: lag.into() }
+    Join {
+        on: ["t".into(), "t".into()],
+        tolerance: tolerance.into(),
+        lag: lag.into(),
+        time_factor: None,
+    }
 }
 
 /// The joined lines, with the columns of both logs.
@@ -95,7 +98,12 @@ fn a_clock_that_was_set_back_is_refused() {
 fn names_that_exist_already_get_a_prefix_as_often_as_needed() {
     let first = log("a.csv", &["c1", "b.c1"], &[&[0.0, 1.0]]);
     let second = log("b.csv", &["c1", "c2"], &[&[0.0, 2.0]]);
-    let join = Join { on: ["c1".into(), "c1".into()], tolerance: 0.0.into(), lag: 0.0.into() };
+    let join = Join {
+        on: ["c1".into(), "c1".into()],
+        tolerance: 0.0.into(),
+        lag: 0.0.into(),
+        time_factor: None,
+    };
     assert_eq!(join.join(&first, &second).unwrap().header, ["c1", "b.c1", "b.b.c1", "c2"]);
 }
 
@@ -203,4 +211,42 @@ fn texts_are_those_of_the_lines_that_are_left_and_missing_ones_are_empty() {
     assert_eq!([0, 1].map(|column| texts(&file, column)), [["2e3"], ["7"]]);
     file.texts = None;
     assert_eq!(texts(&file, 0), ["2000"]);
+}
+
+#[test]
+fn logs_that_count_time_in_two_units_are_refused_until_the_factor_is_told() {
+    let lines =
+        |unit: f64| (0..200).map(|line| vec![unit * f64::from(line) / 20.0]).collect::<Vec<_>>();
+    let of = |unit: f64, path| {
+        let lines = lines(unit);
+        log(path, &["t"], &lines.iter().map(Vec::as_slice).collect::<Vec<_>>())
+    };
+    for (unit, factor) in [(1e3, 1e-3), (1e6, 1e-6), (1e9, 1e-9), (1e-3, 1e3)] {
+        let (first, second) = (of(1.0, "a.csv"), of(unit, "b.csv"));
+        let refused = on_time(0.01, 0.0).join(&first, &second).unwrap_err().to_string();
+        assert!(refused.contains(&format!("--time-factor {factor} ")), "{refused}");
+        let told = Join { time_factor: Some(factor), ..on_time(0.01, 0.0) };
+        assert_eq!(told.join(&first, &second).unwrap().pairs.len(), 200);
+        let same = Join { time_factor: Some(1.0), ..on_time(0.01, 0.0) };
+        assert!(same.join(&first, &second).unwrap().pairs.len() < 200);
+    }
+    let other = of(20.0, "b.csv"); // a log may be longer
+    assert!(on_time(0.5, 0.0).join(&of(1.0, "a.csv"), &other).is_ok());
+}
+
+#[test]
+fn logs_of_which_hardly_any_line_has_a_partner_are_refused() {
+    let lines: Vec<[f64; 1]> = (0..300).map(|line| [f64::from(line)]).collect();
+    let late: Vec<[f64; 1]> = (0..300).map(|line| [f64::from(line) + 297.0]).collect();
+    let of = |lines: &[[f64; 1]], path| {
+        log(path, &["t"], &lines.iter().map(|line| &line[..]).collect::<Vec<_>>())
+    };
+    let (first, second) = (of(&lines, "a.csv"), of(&late, "b.csv"));
+    let refused = on_time(0.5, 0.0).join(&first, &second).unwrap_err().to_string();
+    assert!(refused.contains("3 of 300 lines have a partner in b.csv, hardly any"), "{refused}");
+    let meant = Join { time_factor: Some(1.0), ..on_time(0.5, 0.0) };
+    assert_eq!(meant.join(&first, &second).unwrap().pairs.len(), 3);
+    // Few lines of a slow log are all of its lines.
+    let slow: Vec<[f64; 1]> = (0..3).map(|line| [f64::from(line) * 100.0]).collect();
+    assert_eq!(on_time(0.5, 0.0).join(&first, &of(&slow, "b.csv")).unwrap().pairs.len(), 3);
 }

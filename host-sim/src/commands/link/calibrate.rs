@@ -175,6 +175,7 @@ fn read_known(path: &Path, names: &[String], wires: Wires) -> Result<Vec<Vec<f64
             "column {name} is no reading that the device scans: r1c1_ohm to r{rows}c{columns}_ohm"
         )));
     }
+    file.columns(file.header.iter().map(String::as_str))?;
     let line = |line: usize| -> Result<Vec<f64>> {
         let mut known = vec![f64::NAN; names.len()];
         for (column, name) in file.header.iter().enumerate() {

@@ -1,10 +1,17 @@
 use super::*;
+use crate::error::Role;
+
+/// The text as it is parsed, of any dialect.
+fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataFile> {
+    super::parse(path, bytes, &Reading { has_header, ..Reading::default() })
+}
 
 /// Values and line numbers that the careful reader finds in a file.
 fn carefully(bytes: &[u8]) -> Result<(Vec<f64>, Vec<u64>)> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
-    read_carefully(Path::new("test.csv"), bytes, &mut reader, &header, 0)
+    let read = read_carefully(Path::new("test.csv"), bytes, &mut reader, &header, 0);
+    read.map(|(values, line_numbers, _)| (values, line_numbers))
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {
@@ -33,7 +40,7 @@ fn the_quick_reader_reads_what_the_careful_one_reads() {
         ("\u{feff}a,b\n1,2\n", true),
         ("a,b\n\u{a0}1,2\n", true),
     ] {
-        let file = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap();
+        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
         let (values, line_numbers) = carefully(text.as_bytes()).unwrap();
         assert_eq!(bits(&file.values), bits(&values), "{text:?}");
         assert_eq!(file.line_numbers, line_numbers, "{text:?}");
@@ -57,24 +64,21 @@ fn lines_are_counted_as_an_editor_counts_them() {
         ("\r\n\ra,b\r\n1,2\r\n3,x\r\n", 5),
         ("\u{feff}a,b\n1,2\n3,x\n", 3),
     ] {
-        let message = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err();
+        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
+        let message = file.column("b").unwrap_err();
         assert!(message.to_string().contains(&format!("line {line}")), "{text:?}: {message}");
     }
 }
 
 #[test]
 fn what_is_wrong_is_left_to_the_careful_reader() {
-    for text in [
-        "a,b\n1,2\n3\n",
-        "a,b\n1,2,3\n",
-        "a,b\n1,x\n",
-        "a,b\n1,inf\n",
-        "a,b\n1,1e999\n",
-        "a,b\n1,2e\n",
-        "a,b\n1,2 3\n",
-        "a,b\n1,\u{ff12}\n",
-    ] {
-        let message = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err();
+    for field in ["x", "inf", "1e999", "2e", "2 3", "\u{ff12}", "1.5.2", "0x10"] {
+        let file = parse(Path::new("test.csv"), format!("a,b\n1,{field}\n").as_bytes(), false);
+        let refused = file.unwrap().column("b").unwrap_err().to_string();
+        assert!(refused.contains(&format!("{field:?} is not a number")), "{refused}");
+    }
+    for text in ["a,b\n1,2\n3\n", "a,b\n1,2,3\n4,5,6\n"] {
+        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
         let careful = carefully(text.as_bytes()).unwrap_err();
         assert_eq!(message.to_string(), careful.to_string(), "{text:?}");
     }
@@ -89,7 +93,7 @@ fn files_of_many_pieces_are_read_whole_and_faults_in_them_found() {
         text += &[value, -value * 1e-7, f64::from(line)].map(|v| v.to_string()).join(",");
         text += "\n";
     }
-    let file = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap();
+    let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
     assert_eq!(file.lines(), lines as usize);
     for line in 0..lines {
         let value = f64::from(line).sqrt();
@@ -98,7 +102,8 @@ fn files_of_many_pieces_are_read_whole_and_faults_in_them_found() {
         assert_eq!(file.line_number(line as usize), line as u64 + 2);
     }
     text += "1,2,three\n";
-    let message = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err().to_string();
+    let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
+    let message = file.column("c").unwrap_err().to_string();
     assert!(message.contains("line 60002, column \"c\": \"three\" is not a number"), "{message}");
 }
 
@@ -114,45 +119,77 @@ fn a_first_line_of_numbers_is_data() {
         (" 1 , NaN\n3,4\n", vec!["c1", "c2"], 2, 1),
         ("7\n8\n", vec!["c1"], 2, 1),
     ] {
-        let file = parse(path, text.as_bytes(), false, 0).unwrap();
+        let file = parse(path, text.as_bytes(), false).unwrap();
         assert_eq!(file.header, header, "{text:?}");
         assert!(!file.names_columns, "{text:?}");
         assert_eq!((file.lines(), file.line_number(0)), (lines, first_line), "{text:?}");
     }
-    let named = parse(path, b"1,2\n3,4\n", true, 0).unwrap();
+    let named = parse(path, b"1,2\n3,4\n", true).unwrap();
     assert_eq!((&*named.header, named.lines()), (&["1".into(), "2".into()][..], 1));
     for text in ["a,2\n3,4\n", "nan,inf\n1,2\n", "1,inf\n1,2\n"] {
-        assert!(parse(path, text.as_bytes(), false, 0).unwrap().names_columns, "{text:?}");
+        assert!(parse(path, text.as_bytes(), false).unwrap().names_columns, "{text:?}");
     }
 }
 
 #[test]
 fn lines_of_a_file_without_a_header_are_counted_from_its_first() {
     for (text, says) in [
-        ("1,2\n3,x\n", "line 2, column \"c2\": \"x\" is not a number"),
         ("1,2\n3,4\n5\n", "line 3 has 1 fields; the first line has 2"),
         ("1\n\n2\n", "line 2 is blank"),
     ] {
-        let message =
-            parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err().to_string();
+        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err().to_string();
         assert!(message.contains(says), "{message}");
     }
 }
 
 #[test]
-fn other_separators_are_named() {
-    for (text, separator) in [("a;b\n1;2\n", ';'), ("a\tb\n1\t2\n", '\t')] {
-        let refused = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap_err();
-        let named = matches!(&refused, Error::File { problem: Problem::Separator { separator: s }, .. } if *s == separator);
-        assert!(named, "{text:?}: {refused}");
+fn a_column_that_is_no_number_is_told_once_it_is_asked_for() {
+    let path = Path::new("test.csv");
+    let file = parse(path, b"t,label,f\n1,pen,2\n2, cup,x\n3,pen,4\n", false).unwrap();
+    assert!(file.column("t").is_ok() && file.value(1, 1).is_nan() && file.value(2, 2) == 4.0);
+    for (column, role, says) in [
+        ("f", None, "line 3, column \"f\": \"x\" is not a number"),
+        ("label", Some(Role::Inputs), "line 2, column \"label\": \"pen\" is not a number"),
+        ("label", Some(Role::Outputs), "class label: 2 texts such as pen, cup; give each class"),
+        ("f", Some(Role::Outputs), "\"x\" is not a number"),
+    ] {
+        let column = file.column_of_any(column).unwrap();
+        let refused = file.check_numbers(&[0, column], role).unwrap_err().to_string();
+        assert!(refused.contains(says), "{refused}");
     }
-    assert!(parse(Path::new("test.csv"), b"a\n1\n", false, 0).is_ok());
+    let many = (0..=MOST_LABELS).map(|line| format!("note {line}\n")).collect::<Vec<_>>().concat();
+    let file = parse(path, format!("a\n{many}").as_bytes(), false).unwrap();
+    let refused = file.check_numbers(&[0], Some(Role::Outputs)).unwrap_err().to_string();
+    assert!(refused.contains("\"note 0\" is not a number"), "{refused}");
+}
+
+#[test]
+fn time_stamps_count_in_seconds_where_a_column_has_nothing_else() {
+    let path = Path::new("test.csv");
+    let file = parse(path, b"2026-11-01T00:00:00Z,1\nNaT,2\n2026-11-01 00:00:01.5,3\n", false);
+    let file = file.unwrap();
+    assert!(!file.names_columns && file.column("c1").is_ok());
+    assert_eq!((file.value(2, 0) - file.value(0, 0), file.value(1, 0).is_nan()), (1.5, true));
+    for text in ["t\n2026-11-01 00:00\n5\n", "t\n5\n2026-11-01 00:00\n"] {
+        let refused = parse(path, text.as_bytes(), false).unwrap().column("t").unwrap_err();
+        assert!(refused.to_string().contains("line 3"), "{refused}");
+    }
+}
+
+#[test]
+fn words_for_missing_values_and_columns_without_a_name_are_known() {
+    let path = Path::new("test.csv");
+    let file = parse(path, b",a,\n0,N/A,1\n1,na,null\n2,-,?\n", false).unwrap();
+    assert_eq!(file.header, ["c1", "a", "c3"]);
+    assert!(file.rows().all(|row| row[1].is_nan()) && file.not_numbers.is_empty());
+    let refused = parse(path, b",c1\n1,2\n", false).unwrap_err().to_string();
+    assert!(refused.contains("header: column \"c1\" stands twice"), "{refused}");
 }
 
 #[test]
 fn a_lone_cr_before_the_header_is_a_line_of_its_own() {
     for text in ["\r\ra,b\n1,2\n3,4\n", "\r\n\ra,b\r\n1,2\r\n3,4\r\n", "\n\ra,b\n1,2\n3,4\n"] {
-        let file = parse(Path::new("test.csv"), text.as_bytes(), false, 0).unwrap();
+        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
         assert_eq!(file.line_numbers, [4, 5], "{text:?}");
     }
 }

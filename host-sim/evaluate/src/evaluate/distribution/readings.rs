@@ -46,7 +46,7 @@ pub(super) fn changes(
     frames: &[ShownFrame],
 ) -> (ShownReadings, Vec<Vec<f64>>) {
     let count = readings.names.len();
-    let resistances = readings.names.iter().all(|name| columns::unit_of(name) == "Ω");
+    let resistances = readings.names.iter().all(|name| columns::is_judged_in_ohm(name));
     let (relative_to, references, units): (_, Vec<f64>, Vec<f64>) = match reference {
         Reference::Rest(rest) => (RelativeTo::Rest, rest.to_vec(), rest.to_vec()),
         Reference::Relative => (RelativeTo::Rest, vec![1.0; count], vec![1.0; count]),
