@@ -188,9 +188,12 @@ impl DataFile {
         self.line_numbers[line]
     }
 
-    /// Index (from 0) of the column called `name`.
+    /// Index (from 0) of the column called `name`. A cell of a [mat](crate::mat), `r2c1_adc_16`, is also found by the
+    /// file's own name for it, `adc_16`.
     pub fn column(&self, name: &str) -> Result<usize> {
-        self.header.iter().position(|n| n == name).ok_or_else(|| {
+        let place = |name: &str| self.header.iter().position(|n| n == name);
+        let own = || columns::cell_of(name).filter(|(_, own)| *own != "ohm");
+        place(name).or_else(|| place(own()?.1)).ok_or_else(|| {
             let known = columns::some_names(&self.header);
             Error::file(&self.path, Problem::MissingColumn { name: name.into(), known })
         })

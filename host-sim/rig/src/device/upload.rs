@@ -88,11 +88,6 @@ pub fn start_trial<W: Wire>(
 ) -> Result<DeviceIdentity> {
     let identity = device.identify()?;
     let capacity = identity.capacity();
-    if let Some((_, shape)) = Model::declared(blob)
-        && !capacity.has_room_for(shape)
-    {
-        return Err(Error::no_room(capacity, shape));
-    }
     if let Ok(model) = Model::decode(blob) {
         check_room(capacity, &model)?;
     }

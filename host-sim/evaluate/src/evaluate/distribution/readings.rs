@@ -5,7 +5,6 @@ use taxel_data::columns;
 use taxel_data::table::Table;
 
 use super::frames::ShownFrame;
-use super::wires;
 
 /// What is known of the sensor at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +66,7 @@ pub(super) fn changes(
     };
     let changes = frames.iter().map(of_frame).collect();
     let wires: Option<Vec<[usize; 2]>> =
-        readings.names.iter().map(|name| wires(name, 'c')).collect();
+        readings.names.iter().map(|name| Some(columns::cell_of(name)?.0)).collect();
     let names = readings.names.clone();
     (ShownReadings { relative_to, names, wires: wires.unwrap_or_default() }, changes)
 }
