@@ -225,13 +225,13 @@ fn why_not_trusted(fault: SealFault) -> String {
 
 /// Checks that a device of this `capacity` has room for `model`, and its board the wires of all inputs.
 pub(crate) fn check_room(capacity: Capacity, model: &Model<'_>) -> Result<()> {
-    let Some(needed) = image::needed(model, capacity) else { return Ok(()) };
+    image::needed(model, capacity).map_or(Ok(()), |needed| Err(no_room(capacity, &needed)))
+}
+
+/// Error for a model that a device of this `capacity` cannot decode, and `why` or what to do.
+pub(crate) fn no_room(capacity: Capacity, why: &str) -> Error {
     let Capacity { rows, columns, outputs } = capacity;
-    Err(Error::unfit_for(
-        "",
-        format!(
-            "the device has room for {rows} rows of {columns} readings and {outputs} outputs, and cannot decode the model: \
-             {needed}"
-        ),
-    ))
+    let has =
+        format!("the device has room for {rows} rows of {columns} readings and {outputs} outputs");
+    Error::unfit_for("", format!("{has}, and cannot decode the model: {why}"))
 }

@@ -241,7 +241,11 @@ impl DataArguments {
             refine: how.refine,
             confidence: how.confidence,
         };
-        data_notes::print_constant(&measurements.constant_inputs(), path);
+        let constant = measurements.constant_inputs();
+        for wire in mat::whole_wires(&measurements.training.inputs.names, &constant) {
+            eprintln!("note: {wire}: every reading is constant");
+        }
+        data_notes::print_constant(&constant, path);
         Ok(measurements)
     }
 

@@ -18,6 +18,7 @@ mod health;
 mod interruption;
 mod json_schema;
 mod limit;
+mod mat;
 mod measured;
 #[cfg(unix)]
 mod output;

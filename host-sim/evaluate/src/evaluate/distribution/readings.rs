@@ -55,7 +55,8 @@ pub(super) fn changes(
         }
         Reference::Median => {
             let deviations = readings.deviations();
-            let units = deviations.iter().map(|it| if *it > 0.0 { 100.0 * it } else { 100.0 });
+            // A reading that never changes, of a dead cell, has nothing to show.
+            let units = deviations.iter().map(|it| if *it > 0.0 { 100.0 * it } else { f64::NAN });
             (RelativeTo::MedianInDeviations, medians(readings), units.collect())
         }
     };
