@@ -205,7 +205,7 @@ fn smaller(bytes: usize, design: &Design) -> Vec<String> {
         smaller
     };
     let centres = |most: usize| with(&|it| it.shape.centres = it.shape.centres.min(most));
-    let most = (1..first.shape.centres / 8 + 1).rev().map(|eighths| 8 * eighths);
+    let most = (1..=first.shape.centres / 8).rev().map(|eighths| 8 * eighths);
     let mut fixes = Vec::new();
     if first.format != Format::Fixed16 && fits(&with(&|it| it.format = Format::Fixed16)) {
         fixes.push("--format fixed16".to_owned());
