@@ -8,9 +8,10 @@ use model_core::{ColumnWire, RowWire, Wires};
 /// its slot.
 pub const WEIGHT_RAM_BYTES: usize = 96 * 1024;
 
-/// Most rows, and most outputs a row, that an image can be built for.
-const MOST_ROWS: usize = 255;
-const MOST_OUTPUTS: usize = 255;
+/// Most rows that an image can be built for.
+pub const MOST_ROWS: usize = 255;
+/// Most outputs a row that an image can be built for.
+pub const MOST_OUTPUTS: usize = 255;
 
 /// Largest sensor and model that an image has room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,24 +98,14 @@ impl Capacity {
         longest
     }
 
-    /// This capacity, enlarged for models of this `shape`; `None` if no image can be built for them.
-    ///
-    /// ```
-    /// use firmware::capacity::Capacity;
-    /// use model_core::blob::ModelShape;
-    /// let enlarged = |rows, inputs| {
-    ///     Capacity::PAPER.enlarged_for(ModelShape { rows, inputs, outputs: 6 })
-    /// };
-    /// assert_eq!(enlarged(16, 4), Some(Capacity { rows: 16, columns: 18, outputs: 18 }));
-    /// assert_eq!(enlarged(1, 33), None);
-    /// ```
-    #[must_use]
-    pub fn enlarged_for(self, shape: ModelShape) -> Option<Self> {
-        let rows = self.rows.max(shape.rows);
-        let columns = self.columns.max(shape.inputs);
-        let outputs = self.outputs.max(shape.outputs);
-        let possible = rows <= MOST_ROWS && columns <= MOST_COLUMNS && outputs <= MOST_OUTPUTS;
-        possible.then_some(Self { rows, columns, outputs })
+    /// About the bytes of RAM that an image's buffers take, a little too many.
+    pub const fn buffer_bytes(self) -> usize {
+        let (readings, outputs) = (self.rows * self.columns, self.all_outputs());
+        // The frame, its baseline with the reciprocals, working space, places; two estimates, deviations, and statuses.
+        let frames = readings * (4 * size_of::<f32>() + size_of::<u16>())
+            + 4 * self.scratch_floats()
+            - 4 * readings;
+        frames + 3 * outputs * size_of::<f32>() + 2 * self.rows + 2 * self.message_bytes()
     }
 
     /// Whether there is room for the readings and outputs of a model of this `shape`.
@@ -187,9 +178,10 @@ impl Capacity {
     }
 }
 
-/// The wires of a reading called `r{m}c{k}_ohm`, which counts both from 1.
+/// The wires of a reading whose name begins with `r{m}c{k}_`, which counts both from 1.
 fn cell_of(name: &str) -> Option<(RowWire, ColumnWire)> {
-    let (row, column) = name.strip_prefix('r')?.strip_suffix("_ohm")?.split_once('c')?;
+    let (row, rest) = name.strip_prefix('r')?.split_once('c')?;
+    let (column, _) = rest.split_once('_')?;
     let wire = |number: &str| number.parse::<usize>().ok()?.checked_sub(1);
     Some((RowWire(wire(row)?), ColumnWire(wire(column)?)))
 }
@@ -231,6 +223,7 @@ mod tests {
         let cell = |row, column| Some((RowWire(row), ColumnWire(column)));
         assert_eq!(cell_of("r1c1_ohm"), cell(0, 0));
         assert_eq!(cell_of("r16c32_ohm"), cell(15, 31));
+        assert_eq!(cell_of("r2c1_adc_16"), cell(1, 0));
         let others = ["r0c1_ohm", "r1c0_ohm", "rc1_ohm", "r1c_ohm", "ch1", "", "r-1c1_ohm", "r1c1"];
         for other in others {
             assert_eq!(cell_of(other), None, "{other}");

@@ -20,6 +20,9 @@ type Packages = &'static [&'static str];
 /// Packages of the emulator's programs.
 pub const QEMU: Packages = &["--package", "qemu-image", "--features", "programs"];
 
+/// The application among the emulator's programs.
+pub const APPLICATION: &str = "qemu-app";
+
 /// The image that `cargo xtask cycles` measures: one of the emulator's programs, built as the others are.
 pub const BENCH: Packages =
     &["--package", "qemu-image", "--features", "programs", "--bin", "qemu-bench"];
@@ -41,11 +44,18 @@ pub const NUCLEO_FIXED16: &str = "nucleo-f446re-fixed16";
 const LIBRARIES: Packages =
     &["--package", "model-core", "--package", "firmware", "--package", "link-check"];
 
-/// Builds and lints everything that runs on a device. Links the link check, and once more with a panic in it,
+/// Builds one `image` for people. Without one, builds and lints everything that runs on a device. Links the link check, and once more with a panic in it,
 /// which must fail. The board's image may hold panics of others alone, as they are listed.
-pub fn run() -> Outcome {
+pub fn run(image: Option<&str>) -> Outcome {
     let toolchain = Toolchain::find()?;
     println!("toolchain: {toolchain}");
+    if let Some(image) = image {
+        let package = if image == APPLICATION { QEMU } else { NUCLEO };
+        let package = package.iter().copied().chain(["--bin", image]);
+        run_command(toolchain.build().args(PROFILE).args(package))?;
+        println!("{}", elf(image).display());
+        return Ok(());
+    }
     link_check(&toolchain)?;
     build_image(&toolchain, QEMU)?;
     panics::check(&build_other(&toolchain, SEAL)?)?;

@@ -55,7 +55,11 @@ enum Command {
     /// Print the lines of Rust of each crate: all, source code (no comments, blank lines and tests), test code.
     Lines,
     /// Build and lint all code for a device (thumbv7em-none-eabihf), and prove by linking that it cannot panic.
-    Firmware,
+    Firmware {
+        /// Build this image alone: the emulator's `qemu-app`, or the board's `nucleo-f446re`.
+        #[arg(value_parser = [images::APPLICATION, images::NUCLEO[1]])]
+        image: Option<String>,
+    },
     /// Build model-core and firmware for other cores: thumbv6m, thumbv7m, thumbv8m.main-hf, riscv32imac; model-core for
     /// wasm32 too.
     Cores,
@@ -129,7 +133,7 @@ fn main() -> ExitCode {
         Command::Ci => ci::run().map(success),
         Command::Structure => structure::run().map(success),
         Command::Lines => lines::run().map(success),
-        Command::Firmware => images::run().map(success),
+        Command::Firmware { image } => images::run(image.as_deref()).map(success),
         Command::Cores => cores::run().map(success),
         Command::Emulate(options) => emulate::run(&options).map(success),
         Command::Board(options) => board::run(&options).map(success),

@@ -97,6 +97,15 @@ pub fn row_of(name: &str) -> Option<usize> {
     place.starts_with(|c: char| c.is_ascii_digit()).then(|| row.parse().ok())?
 }
 
+/// Row-wire and column-wire (from 1) of a reading whose name begins with `r{m}c{k}_`, and the rest of the name: `ohm` for
+/// `r4c17_ohm`, the file's own name for a cell of a [mat](crate::mat).
+pub fn cell_of(name: &str) -> Option<([usize; 2], &str)> {
+    let (row, rest) = name.strip_prefix('r')?.split_once('c')?;
+    let (column, own) = rest.split_once('_')?;
+    let wires = [row.parse().ok()?, column.parse().ok()?];
+    wires.iter().all(|wire| *wire > 0).then_some((wires, own))
+}
+
 /// Group of readings where they are outputs, of models that predict them.
 pub const READINGS: &str = "reading_ohm";
 

@@ -215,7 +215,8 @@ impl DataFile {
         self.line_numbers[self.kept.start + line]
     }
 
-    /// Index (from 0) of the column of numbers called `name`, or so but for a unit in brackets.
+    /// Index (from 0) of the column of numbers called `name`, or so but for a unit in brackets. A cell of a
+    /// [mat](crate::mat), `r2c1_adc_16`, is also found by the file's own name for it, `adc_16`.
     pub fn column(&self, name: &str) -> Result<usize> {
         let column = self.column_of_any(name)?;
         self.check_numbers(&[column], None)?;
@@ -224,7 +225,9 @@ impl DataFile {
 
     /// Index (from 0) of the column called `name`, which may hold text.
     pub fn column_of_any(&self, name: &str) -> Result<usize> {
-        columns::place(&self.header, name).ok_or_else(|| {
+        let place = |name: &str| columns::place(&self.header, name);
+        let own = || columns::cell_of(name).filter(|(_, own)| *own != "ohm");
+        place(name).or_else(|| place(own()?.1)).ok_or_else(|| {
             let known = columns::some_names(&self.header);
             Error::file(&self.path, Problem::MissingColumn { name: name.into(), known })
         })

@@ -9,6 +9,9 @@ use crate::table::Table;
 /// spans stay inside f32.
 const LARGEST: f64 = 1e30;
 
+/// Pattern of the project's own names of readings.
+pub const USUAL_INPUTS: &str = "r*c*_ohm";
+
 /// Readings and outputs for training or evaluation, one frame a line.
 ///
 /// Columns are ordered by row-wire if each names one, so that every row-wire has its own [`RowTable`];
@@ -186,7 +189,7 @@ impl RowTable {
 /// Indices of the columns of `file` that match `pattern`, or that have the project's own names.
 fn chosen(file: &DataFile, pattern: Option<&str>, role: Role) -> Result<Vec<usize>> {
     let usual = match role {
-        Role::Inputs => "r*c*_ohm",
+        Role::Inputs => USUAL_INPUTS,
         Role::Outputs => "r*e*_d?_mm,r*e*_f?_n,contact_*",
     };
     let known = || columns::some_names(&file.header);

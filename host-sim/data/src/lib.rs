@@ -13,6 +13,7 @@ pub mod progress;
 pub mod input;
 pub mod output;
 pub mod columns;
+pub mod mat;
 pub mod data_file;
 pub mod csv_file;
 pub mod join;

@@ -4,6 +4,7 @@ use model_core::rbf::{Format, Shape, expanded, fixed16};
 use serde::Serialize;
 use taxel_data::columns::READINGS;
 use taxel_learn::ModelBlob;
+use taxel_learn::cost::Design;
 use taxel_learn::decoders::{linear, mean};
 use taxel_learn::outliers::Outliers;
 
@@ -108,10 +109,11 @@ impl Verdict {
         };
         let (used, inputs) = (of_networks(|it| it.centres), of_networks(|it| it.inputs));
         let stored = model.networks().map(|network| stored_centres(network.format(), used)).max();
-        self.with(Warning::few_frames(frames, used, inputs))
+        self.with(Warning::other_image(&model))
+            .with(Warning::few_frames(frames, used, inputs))
             .with(Warning::padded_centres(used, stored.unwrap_or(used)))
             .with(Warning::few_frames_for_confidence(frames, model.confidence().is_some()))
-            .with(Warning::larger_than_slot(blob.bytes().len()))
+            .with(Warning::larger_than_slot(blob.bytes().len(), &Design::new(blob)))
     }
 
     /// Adds a warning, if there is one.

@@ -48,8 +48,8 @@ const START: Duration = Duration::from_millis(100);
 const ATTEMPTS: u32 = 6;
 /// Longest time that sending a request may take.
 const SLOWEST_WRITE: Duration = Duration::from_secs(10);
-/// Largest size of a request.
-const MOST_REQUEST_BYTES: usize = 4096;
+/// Largest size of a request: a frame of 32 × 32 readings takes more than half of it.
+const MOST_REQUEST_BYTES: usize = 8192;
 /// Largest size of a report: that of a sensor of 255 rows, 32 columns and 255 outputs a row would be larger.
 const MOST_REPORT_BYTES: usize = 64 * 1024;
 /// Time that one look for bytes waits.

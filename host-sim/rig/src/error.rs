@@ -9,8 +9,9 @@ use firmware::link::message::{
 };
 use firmware::link::packet::PROTOCOL_VERSION;
 use firmware::readout::ScanSettings;
-use model_core::blob::{Model, ModelShape};
-use model_core::{ColumnWire, RowWire};
+use model_core::blob::Model;
+
+use crate::image;
 
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -115,24 +116,6 @@ impl Error {
     /// Error for something that cannot be used for the setting `field`, and the `reason`.
     pub(crate) fn unfit_for(field: &'static str, reason: impl Into<String>) -> Self {
         taxel_data::Error::unfit_for(field, reason).into()
-    }
-
-    /// Error for a model of this `shape` that a device of this `capacity` has no room for.
-    pub(crate) fn no_room(capacity: Capacity, shape: ModelShape) -> Self {
-        Self::unfit_for(
-            "",
-            format!(
-                "the model has {} rows of {} readings and {} outputs; the device has room for {} rows of {} readings \
-                 and {} outputs: {}",
-                shape.rows,
-                shape.inputs,
-                shape.outputs,
-                capacity.rows,
-                capacity.columns,
-                capacity.outputs,
-                image_for(capacity, shape)
-            ),
-        )
     }
 
     /// Whether the device goes on, and must be told to leave the model that it got.
@@ -242,48 +225,13 @@ fn why_not_trusted(fault: SealFault) -> String {
 
 /// Checks that a device of this `capacity` has room for `model`, and its board the wires of all inputs.
 pub(crate) fn check_room(capacity: Capacity, model: &Model<'_>) -> Result<()> {
-    if !capacity.has_room_for(model.shape()) {
-        return Err(Error::no_room(capacity, model.shape()));
-    }
-    unscannable(capacity, model).map_or(Ok(()), |reason| Err(Error::unfit_for("", reason)))
+    image::needed(model, capacity).map_or(Ok(()), |needed| Err(no_room(capacity, &needed)))
 }
 
-/// Reason why a board of this `capacity` cannot scan all inputs of `model`, and the fix; `None` if it can.
-pub fn unscannable(capacity: Capacity, model: &Model<'_>) -> Option<String> {
-    let (names, shape) = (model.metadata().input_names, model.shape());
-    let first = capacity.cells(names, shape).find_map(std::result::Result::err)?;
-    let name = names.iter().nth(first).unwrap_or_default();
-    let Capacity { rows, columns, .. } = capacity;
-    let any = Capacity { rows: usize::MAX, columns: usize::MAX, ..capacity };
-    let named: std::result::Result<Vec<_>, _> = any.cells(names, shape).collect();
-    let of_names = |cells: Vec<(RowWire, ColumnWire)>| {
-        let enlarged = cells.iter().fold(shape, |shape, (row, column)| ModelShape {
-            rows: shape.rows.max(row.0 + 1),
-            inputs: shape.inputs.min(capacity.columns).max(column.0 + 1),
-            ..shape
-        });
-        format!("{}, or train without it (--inputs)", image_for(capacity, enlarged))
-    };
-    let fix = named.map_or_else(
-        |_| "name every input after its wires, such as r4c17_ohm, or none and no more than a row has".into(),
-        of_names,
-    );
-    Some(format!(
-        "input {name} cannot be scanned: the board has {rows} row-wires and {columns} column-wires; {fix}"
-    ))
-}
-
-/// What image a model of this `shape` needs, if those of this `capacity` have no room for it.
-pub fn image_for(capacity: Capacity, shape: ModelShape) -> String {
-    match capacity.enlarged_for(shape) {
-        Some(Capacity { rows, columns, outputs }) => {
-            format!(
-                "build its image with TAXEL_CAPACITY={rows}x{columns}x{outputs} (docs/board.md)"
-            )
-        }
-        None => {
-            "no image can be built for it: 255 rows of 32 readings and 255 outputs are the most"
-                .to_owned()
-        }
-    }
+/// Error for a model that a device of this `capacity` cannot decode, and `why` or what to do.
+pub(crate) fn no_room(capacity: Capacity, why: &str) -> Error {
+    let Capacity { rows, columns, outputs } = capacity;
+    let has =
+        format!("the device has room for {rows} rows of {columns} readings and {outputs} outputs");
+    Error::unfit_for("", format!("{has}, and cannot decode the model: {why}"))
 }

@@ -5,6 +5,7 @@
 
 #![allow(missing_docs, clippy::missing_errors_doc)] // a name that says all needs no more
 
+pub mod image;
 pub mod error;
 pub mod calibration;
 pub mod device;

@@ -1,14 +1,17 @@
 //! Measurements from a CSV file: which columns are used, and which frames are held out.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::measurements::{Judged, Measurements, Split, relative_to};
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
+use taxel_data::columns;
 use taxel_data::data_file::{DataFile, is_array};
-use taxel_data::dataset::Dataset;
+use taxel_data::dataset::{Dataset, USUAL_INPUTS};
 use taxel_data::error::{Problem, Role};
+use taxel_data::mat::{self, Mat};
 use taxel_data::table::Table;
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::refine::LEAST_FOLDS;
@@ -29,6 +32,10 @@ pub struct DataArguments {
     /// Output columns of a data file, in the same way [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
     #[arg(long, value_name = "GLOB")]
     outputs: Option<String>,
+    /// Rows and columns of a mat whose cells are the inputs, row by row, such as 16x16. It is found without this option where
+    /// names say so: r1c1 and so on, or numbers that fill a square of 8x8 or more, from which dead cells may be missing.
+    #[arg(long, value_name = "ROWSxCOLUMNS")]
+    grid: Option<Mat>,
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
     #[arg(long, value_name = "NAME", conflicts_with = "folds")]
     fold_column: Option<String>,
@@ -80,6 +87,7 @@ impl DataArguments {
         for (option, picked, given) in [
             ("--inputs", "columns", self.inputs.is_some()),
             ("--outputs", "columns", self.outputs.is_some()),
+            ("--grid", "columns", self.grid.is_some()),
             ("--fold-column", "columns", self.fold_column.is_some()),
             ("--fold-blocks", "lines", self.fold_blocks.is_some()),
             ("--keep-outliers", "lines", self.keep_outliers),
@@ -94,6 +102,11 @@ impl DataArguments {
             return Err(Error::Usage(message.into()));
         }
         self.file.refuse_for_scene()
+    }
+
+    /// Mat whose cells the inputs are, if it was given.
+    pub fn grid(&self) -> Option<Mat> {
+        self.grid
     }
 
     /// Number of random folds, if it was given.
@@ -226,7 +239,11 @@ impl DataArguments {
             refine: how.refine,
             confidence: how.confidence,
         };
-        data_notes::print_constant(&measurements.constant_inputs(), path);
+        let constant = measurements.constant_inputs();
+        for wire in mat::whole_wires(&measurements.training.inputs.names, &constant) {
+            eprintln!("note: {wire}: every reading is constant");
+        }
+        data_notes::print_constant(&constant, path);
         Ok(measurements)
     }
 
@@ -254,7 +271,8 @@ impl DataArguments {
     /// Frames of `file`, and the indices of their lines.
     fn frames(&self, file: &DataFile) -> Result<(Dataset, Vec<usize>)> {
         let (inputs, outputs) = (self.inputs.as_deref(), self.outputs.as_deref());
-        let (frames, kept) = Dataset::from_file(file, inputs, outputs).map_err(with_options)?;
+        let (mut frames, kept) = Dataset::from_file(file, inputs, outputs).map_err(with_options)?;
+        name_cells(&mut frames.inputs, file, inputs, self.grid)?;
         if kept.lines.len() < kept.of {
             let left_out = kept.of - kept.lines.len();
             let name = file.path.display();
@@ -287,6 +305,25 @@ impl DataArguments {
         }
         Ok(Judged::File { frames: own, name: path.display().to_string() })
     }
+}
+
+/// Names `inputs` after the cells of a mat, if that is what the columns of `file` that a `pattern` chose are.
+pub fn name_cells(
+    inputs: &mut Table,
+    file: &DataFile,
+    pattern: Option<&str>,
+    grid: Option<Mat>,
+) -> taxel_data::Result<()> {
+    let chosen = columns::select(&file.header, pattern.unwrap_or(USUAL_INPUTS));
+    let cells = mat::cell_names(&file.header, &chosen, grid).map_err(taxel_data::Error::unfit)?;
+    let own = chosen.iter().map(|column| &file.header[*column]);
+    let cell_of: HashMap<&String, String> = own.zip(cells).collect();
+    for name in &mut inputs.names {
+        if let Some(cell) = cell_of.get(name) {
+            name.clone_from(cell);
+        }
+    }
+    Ok(())
 }
 
 /// Error that names the options which choose columns.

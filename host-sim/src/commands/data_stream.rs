@@ -9,12 +9,13 @@ use taxel_data::data_file::pieces::Pieces;
 use taxel_data::dataset::Dataset;
 use taxel_data::digest::TableDigest;
 use taxel_data::error::Problem;
+use taxel_data::mat::Mat;
 use taxel_data::table::Table;
 use taxel_learn::Options;
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::resolution;
 
-use super::data_argument::{DataArguments, HowToTrain, with_options};
+use super::data_argument::{DataArguments, HowToTrain, name_cells, with_options};
 use super::{data_file, data_notes, refused_readings};
 
 /// Most values far from all others that are kept to be told.
@@ -24,6 +25,7 @@ const MOST_OUTLIERS: usize = 1000;
 struct Selection {
     inputs: Option<String>,
     outputs: Option<String>,
+    grid: Option<Mat>,
     missing: Vec<f64>,
     keep_outliers: bool,
 }
@@ -53,13 +55,14 @@ impl DataStream {
             self.lines += file.lines();
             let Selection { inputs, outputs, keep_outliers, .. } = &self.selection;
             let found = Dataset::from_file(&file, inputs.as_deref(), outputs.as_deref());
-            let (frames, kept) = match found {
+            let (mut frames, kept) = match found {
                 Err(taxel_data::Error::File { problem: Problem::NoCompleteLine, .. }) => {
                     self.incomplete += file.lines();
                     continue;
                 }
                 found => found?,
             };
+            name_cells(&mut frames.inputs, &file, inputs.as_deref(), self.selection.grid)?;
             let names = frames.names();
             let new = || TableDigest::new(names.iter().copied());
             file.add_to(self.digest.get_or_insert_with(new), &names)?;
@@ -138,6 +141,7 @@ impl DataArguments {
             selection: Selection {
                 inputs,
                 outputs,
+                grid: self.grid(),
                 missing: fields.missing().to_vec(),
                 keep_outliers: self.keeps_outliers(),
             },

@@ -4,16 +4,15 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use crate::Result;
-use crate::evaluate::trade::SLOT_BYTES;
+use crate::verdict::Warning;
 use clap::Args;
 use firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
 use firmware::timing::ScanPlan;
-use model_core::blob::Model;
-use model_core::scratch_floats;
+use model_core::blob::{Metadata, Model};
 use serde::Serialize;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_rig::error::{image_for, unscannable};
+use taxel_rig::image;
 
 use super::model_outputs::{self, ModelOutput};
 use super::{Common, print};
@@ -167,7 +166,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         ram_bytes: ram.bytes(),
         ram_parts_bytes: ram,
         weights_in_ram: design.weights_in_ram,
-        needs: needs(&model, blob.bytes().len()),
+        needs: needs(&model, &design, blob.bytes().len()),
         scan: scan(&model),
         frame_costs: Prices::accepted()?.frames(&design, Exponential::default())?,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
@@ -175,32 +174,33 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
     })
 }
 
-/// Why the images as they are cannot decode a `model`, with a blob of so many bytes.
-fn needs(model: &Model<'_>, bytes: usize) -> Vec<String> {
-    let (room, shape) = (Capacity::PAPER, model.shape());
-    let too_large = (bytes > SLOT_BYTES)
-        .then(|| format!("no device takes it: a slot of the images holds {SLOT_BYTES} bytes"));
-    let other_image = if room.has_room_for(shape) {
-        unscannable(room, model)
-    } else {
-        Some(image_for(room, shape))
-    };
-    let (needed, most) = (scratch_floats(model), room.scratch_floats());
-    let too_many = (other_image.is_none() && needed > most).then(|| {
-        let spare = needed - most;
-        let fewer = if model.components() > spare {
-            format!("{spare} components fewer are the most there is room for")
-        } else {
-            format!("it needs room for {spare} numbers too many: give fewer features")
-        };
-        format!("no device takes it: {fewer}")
-    });
-    too_large.into_iter().chain(other_image).chain(too_many).collect()
+/// Why the images as they are cannot decode a `model`, with a blob of so many bytes, or not as it was trained.
+fn needs(model: &Model<'_>, design: &Design, bytes: usize) -> Vec<String> {
+    let too_large = Warning::larger_than_slot(bytes, design);
+    let too_large = too_large.map(|warning| format!("no device takes it: {}", warning.text));
+    too_large
+        .into_iter()
+        .chain(image::needed(model, Capacity::PAPER))
+        .chain(other_unit(model))
+        .collect()
+}
+
+/// Says so if the readings are not in Ω, in which a board measures.
+fn other_unit(model: &Model<'_>) -> Option<String> {
+    let Metadata { input_names, input_units, .. } = model.metadata();
+    let in_ohm = input_names.iter().all(|name| name.ends_with("_ohm"))
+        || input_units.iter().any(|unit| unit == "Ω");
+    (!in_ohm).then(|| {
+        "a board measures Ω, and this model was trained on other readings: send it those (docs/link.md), or train on what \
+         the board records"
+            .into()
+    })
 }
 
 /// Scan for a `model`, with one sample a reading.
 fn scan(model: &Model<'_>) -> Option<ScanSummary> {
-    let cells = Capacity::PAPER.cells(model.metadata().input_names, model.shape());
+    let room = image::capacity_for(model, Capacity::PAPER).ok()?;
+    let cells = room.cells(model.metadata().input_names, model.shape());
     let cells: Vec<_> = cells.collect::<std::result::Result<_, _>>().ok()?;
     let rows = cells.iter().map(|(row, _)| row).collect::<BTreeSet<_>>().len();
     let columns = cells.iter().map(|(_, column)| column).collect::<BTreeSet<_>>().len();

@@ -131,12 +131,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         latency_ms: arguments.max_latency_ms,
     };
     bounds.check().map_err(|bad| of_option(bad, &OPTIONS))?;
-    let refused = |cause: &NoPoint| match wider_step(cause, &subject, &plan) {
-        Some(step) => Error::Usage(format!(
-            "{}; fewer columns are faster: try --column-step {step}",
-            cause.text(option)
-        )),
-        None => Error::Usage(cause.text(option)),
+    let is_timed = arguments.frame_rate.is_some() || arguments.max_latency_ms.is_some();
+    if is_timed && plan.device.scan_ms(wires(&subject, 1), 1).is_none() {
+        let message = "--frame-rate and --max-latency-ms count the scan, whose time is not known: the readings name no \
+                       wires; give --scan-ms MS, or --grid ROWSxCOLUMNS for the board's own scan";
+        return Err(Error::Usage(message.into()));
+    }
+    let refused = |cause: &NoPoint| {
+        let way =
+            in_the_way(cause, &subject, &plan).map_or(String::new(), |way| format!("; {way}"));
+        Error::Usage(format!("{}{way}", cause.text(option)))
     };
     let folder = arguments.output.join(subject.name());
     files::FILES.check(&folder, &arguments.subject.paths())?;
@@ -293,24 +297,63 @@ fn column_steps(arguments: &Arguments, subject: &Subject) -> Result<Vec<usize>> 
     }
 }
 
-/// Least step of columns beyond those of the plan, into equal parts, whose scan is shorter than bounds on time that no point meets.
-fn wider_step(cause: &NoPoint, subject: &Subject, plan: &Plan) -> Option<usize> {
+/// What stands in the way of bounds on time that no point meets, and what each remedy gives.
+fn in_the_way(cause: &NoPoint, subject: &Subject, plan: &Plan) -> Option<String> {
     let NoPoint::Each { unmet, .. } = cause else { return None };
-    let Subject::Scene(scene) = subject else { return None };
     let most_ms = unmet.iter().filter_map(|unmet| match unmet.bounded {
         Bounded::FrameRate => Some(1000.0 / unmet.bound),
         Bounded::Latency => Some(unmet.bound),
         _ => None,
     });
-    let most_ms = most_ms.reduce(f64::min).filter(|_| plan.device.scan_ms.is_none())?;
-    let (tried, samples) = (plan.column_steps.last()?, plan.samples_averaged.first()?);
-    let all = scene.world.sensor.column_wires;
-    (tried + 1..=all).filter(|step| all.is_multiple_of(*step)).find(|step| {
-        let subject = subject.with_every_column(*step);
-        let columns = subject.scene().map_or(0, |scene| scene.world.sensor.column_wires);
-        let wires = Wires { rows: scene.world.read_rows.len(), columns };
-        plan.device.scan_ms(Some(wires), *samples).is_some_and(|scan_ms| scan_ms < most_ms)
-    })
+    let most_ms = most_ms.reduce(f64::min)?;
+    let (tried, samples) = (*plan.column_steps.last()?, *plan.samples_averaged.first()?);
+    let wires = wires(subject, tried);
+    let scan_ms = |wires| plan.device.scan_ms(wires, samples);
+    let now_ms = scan_ms(wires)?;
+    let mut said =
+        vec![format!("a frame may take {most_ms:.3} ms, of which the scan takes {now_ms:.3} ms")];
+    if now_ms < most_ms {
+        said.push("fewer --centres decode faster".into());
+    }
+    let is_faster = |wires| scan_ms(Some(wires)).is_some_and(|ms| ms < most_ms.min(now_ms));
+    let took = |wires| format!("{:.3} ms", scan_ms(Some(wires)).unwrap_or(now_ms));
+    match subject {
+        _ if plan.device.scan_ms.is_some() => {}
+        Subject::Scene(scene) => {
+            let all = scene.world.sensor.column_wires;
+            let wider = (tried + 1..=all).filter(|step| all.is_multiple_of(*step));
+            let mut wider = wider.filter_map(|step| Some((step, self::wires(subject, step)?)));
+            said.extend(wider.find(|(_, wires)| is_faster(*wires)).map(|(step, wires)| {
+                let (columns, took) = (wires.columns, took(wires));
+                format!(
+                    "fewer columns are faster: try --column-step {step} ({columns} columns, {took})"
+                )
+            }));
+        }
+        Subject::Measured(_) => {
+            let Wires { rows, columns } = wires?;
+            let mut fewer = (1..columns).rev().map(|columns| Wires { rows, columns });
+            said.extend(fewer.find(|wires| is_faster(*wires)).map(|wires| {
+                let took = took(wires);
+                format!("the readings of {} columns (--inputs) take {took}", wires.columns)
+            }));
+        }
+    }
+    said.push(format!(
+        "for a converter with a scan below {most_ms:.3} ms give its time with --scan-ms"
+    ));
+    Some(said.join("; "))
+}
+
+/// Wires that are read if only every `step`th column of a scene is; `None` where names of readings tell none.
+fn wires(subject: &Subject, step: usize) -> Option<Wires> {
+    match &*subject.with_every_column(step) {
+        Subject::Scene(scene) => {
+            let columns = scene.world.sensor.column_wires;
+            Some(Wires { rows: scene.world.read_rows.len(), columns })
+        }
+        Subject::Measured(data) => Wires::named(&data.training.inputs.names),
+    }
 }
 
 /// Ranks that are asked for, in order; networks that compute all outputs there are always.

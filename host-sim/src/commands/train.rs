@@ -12,11 +12,13 @@ use crate::{Error, Result, report};
 use clap::Args;
 use model_core::rbf::Format;
 use serde::Serialize;
+use taxel_data::dataset::Dataset;
+use taxel_data::progress::Silent;
 use taxel_data::{columns, output};
-use taxel_learn::fill;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
 use taxel_learn::train::Widths;
+use taxel_learn::{Options, fill};
 
 use super::data_argument::JudgedBy;
 use super::model_argument::ModelArguments;
@@ -181,7 +183,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if options.format == Format::F32
         && model.networks().any(|network| network.format() == Format::F32Direct)
     {
-        stderr::remark(format_args!("note: {}", why_direct(options.widths)));
+        stderr::remark(format_args!("note: {}", why_direct(&options, &set.frames)));
     }
     let summary = Summary {
         subject: subject.name().into(),
@@ -221,19 +223,28 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     page_of(&summary, options.centres).print()
 }
 
-/// Reason for direct distances in a model that was to be in f32.
-fn why_direct(widths: Widths) -> &'static str {
-    match widths {
-        Widths::Common => {
-            "the fast formula for distances could lose accuracy in f32 with this model (little noise, many \
-             centres or a large spread), so the exact one is used, which takes a device more than twice as long; \
-             use --format fixed16, or try a smaller --spread"
-        }
-        Widths::Neighbours => {
-            "only the exact formula for distances (f32-direct) has a width for each centre; it takes a device more than \
-             twice as long as one width in f32 (docs/formats.md)"
-        }
+/// Reason for direct distances in a model that was to be in f32, and what is faster. Whether fixed16 holds such a network is
+/// tried on some of the `frames`.
+fn why_direct(options: &Options, frames: &Dataset) -> String {
+    /// Frames that tell whether centres and widths fit a format.
+    const TRIED: usize = 1000;
+    if options.widths == Widths::Neighbours {
+        return "only the exact formula for distances (f32-direct) has a width for each centre; it takes a device more than \
+                twice as long as one width in f32 (docs/formats.md)"
+            .into();
     }
+    let few: Vec<usize> = (0..frames.frames()).step_by(frames.frames().div_ceil(TRIED)).collect();
+    let fixed = Options { format: Format::Fixed16, ..*options };
+    let fix = match taxel_learn::train::train(&frames.subset(&few), &fixed, &Silent) {
+        Ok(_) => "use --format fixed16".to_owned(),
+        Err(_) => "--format fixed16 does not hold it either at this --spread; --whole-array --features 16 gives the network \
+                   fewer inputs"
+            .into(),
+    };
+    format!(
+        "the fast formula for distances could lose accuracy in f32 with this model (little noise, many centres or a large \
+         spread), so the exact one is used, which takes a device more than twice as long; {fix}"
+    )
 }
 
 /// Scene or CSV file that is trained on: all frames of a file, or so many of a scene.

@@ -1,5 +1,7 @@
 //! Faces: where values are drawn in maps, over the sensor or over its wires.
 
+use std::collections::BTreeSet;
+
 use taxel_evaluate::evaluate::distribution::{Distribution, ShownReadings};
 use taxel_evaluate::run::SensorSketch;
 
@@ -59,8 +61,14 @@ impl Face {
     /// Face for readings, row-wire over column-wire. `None` if their names do not tell wires.
     pub fn of_readings(readings: &ShownReadings) -> Option<Self> {
         let name = |[row, column]: [usize; 2]| format!("row-wire {row}, column-wire {column}");
-        (!readings.wires.is_empty())
-            .then(|| Self::of_grid(readings.wires.clone(), "column-wire", name))
+        let [rows, columns] = [0, 1].map(|of| readings.wires.iter().map(move |wire| wire[of]));
+        let columns: BTreeSet<usize> = columns.collect();
+        let rows: BTreeSet<usize> = rows.collect();
+        // Cells that are not read come last: they have no value.
+        let mut wires = readings.wires.clone();
+        let all = rows.iter().flat_map(|row| columns.iter().map(|column| [*row, *column]));
+        wires.extend(all.filter(|cell| !readings.wires.contains(cell)));
+        (!wires.is_empty()).then(|| Self::of_grid(wires, "column-wire", name))
     }
 
     /// Face without places of values, in mm, for marks that lie anywhere.

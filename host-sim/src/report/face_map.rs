@@ -27,7 +27,7 @@ pub struct Map<'f> {
 /// Values over a face.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values<'v> {
-    /// Value of each cell; one that is not finite leaves its cell empty.
+    /// Value of each cell; one that is not finite, or missing at the end, leaves its cell empty.
     pub of_cells: &'v [f64],
     pub scale: &'v ColourScale,
     /// Quantity with its unit, for the bar below the map.
@@ -67,7 +67,8 @@ impl<'f> Map<'f> {
     pub fn values(mut self, values: &Values<'_>) -> String {
         let decimals = values.scale.decimals();
         let hover = self.face.cells.len() <= MOST_HOVERS;
-        for (cell, value) in self.face.cells.iter().zip(values.of_cells) {
+        let of_cells = values.of_cells.iter().chain(std::iter::repeat(&f64::NAN));
+        for (cell, value) in self.face.cells.iter().zip(of_cells) {
             let outline: Vec<[f64; 2]> = cell.outline.iter().map(|p| self.place(*p)).collect();
             let middle = self.place(cell.middle);
             let title = if hover {

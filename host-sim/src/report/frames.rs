@@ -93,11 +93,13 @@ fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
     let frames = &view.distribution.frames;
     let all = || frames.iter().flat_map(|frame| frame.change.iter().copied());
     let short = count <= 16 && shown.names.iter().all(|name| name.chars().count() <= 5);
-    let names = shown.names.iter().enumerate();
+    // Numbers are marked as far apart as a reader can tell them.
+    let step = if short { 1 } else { count.div_ceil(16).next_power_of_two() };
+    let names = shown.names.iter().enumerate().filter(|(i, _)| (i + 1) % step == 0 || *i == 0);
     let at = names
         .map(|(i, name)| (i as f64 + 1.0, if short { name.clone() } else { (i + 1).to_string() }));
     let at: Vec<(f64, String)> = at.collect();
-    let axis = if short { "reading" } else { "reading, in the order of the model's inputs" };
+    let axis = if short { "reading" } else { "reading, as the model's inputs" };
     let panel = |frame: &ShownFrame| {
         let points = frame.change.iter().enumerate().map(|(i, y)| [i as f64 + 1.0, *y]).collect();
         Chart {

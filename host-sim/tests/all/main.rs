@@ -20,6 +20,7 @@ mod interruption;
 mod json_schema;
 mod limit;
 mod manners;
+mod mat;
 mod measured;
 #[cfg(unix)]
 mod output;

@@ -4,11 +4,12 @@ use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::path::PathBuf;
 
+use crate::images::APPLICATION;
 use crate::process::{Outcome, Said, capture, cargo, run, target_dir};
 use crate::toolchain::elf;
 
 /// Name of the application's image.
-pub const IMAGE: &str = "qemu-app";
+pub const IMAGE: &str = APPLICATION;
 
 /// Limits in bytes: flash without a model, and RAM with the stack at its deepest.
 const LIMITS: [&str; 2] = ["--flash-limit=98304", "--ram-limit=14336"];

@@ -144,16 +144,16 @@ fn outputs(truth: &Table, estimate: &Table) -> Vec<OutputError> {
             name: name.clone(),
             group: columns::group_of(name).into(),
             unit: columns::unit_of(name).into(),
-            electrode: wires(name, 'e'),
+            electrode: electrode(name),
             rmse: f64::sqrt(squares / count),
         }
     };
     truth.names.iter().enumerate().map(of_column).collect()
 }
 
-/// The two numbers of a name such as `r4e2_dz_mm` (`kind` e) or `r4c17_ohm` (`kind` c), both from 1.
-fn wires(name: &str, kind: char) -> Option<[usize; 2]> {
-    let (row, rest) = name.strip_prefix('r')?.split_once(kind)?;
+/// Row-wire and electrode of a name such as `r4e2_dz_mm`, both from 1.
+fn electrode(name: &str) -> Option<[usize; 2]> {
+    let (row, rest) = name.strip_prefix('r')?.split_once('e')?;
     let (number, _) = rest.split_once('_')?;
     let [row, number] = [row.parse().ok()?, number.parse().ok()?];
     (row > 0 && number > 0).then_some([row, number])
@@ -224,11 +224,10 @@ mod tests {
     }
 
     #[test]
-    fn names_tell_wires() {
-        assert_eq!(wires("r12e3_dz_mm", 'e'), Some([12, 3]));
-        assert_eq!(wires("r4c17_ohm", 'c'), Some([4, 17]));
+    fn names_tell_electrodes() {
+        assert_eq!(electrode("r12e3_dz_mm"), Some([12, 3]));
         for other in ["r4c17_ohm", "fx_n", "reel_2", "r0e1_dz_mm", "re_x", "r1e2"] {
-            assert_eq!(wires(other, 'e'), None, "{other}");
+            assert_eq!(electrode(other), None, "{other}");
         }
     }
 }

@@ -134,23 +134,27 @@ impl Trade {
         front.into_iter().find(|i| rmse(i) <= SAME_ERROR * least)
     }
 
-    /// Verdict on a point by the errors of the chosen group, with what its blob gives reason to beware of.
+    /// Verdict on a point by the errors of the chosen group, with what its blob gives reason to beware of, and outputs of
+    /// any group without a gain over the mean or the linear decoder.
     ///
     /// # Panics
     /// If there is no such point.
     pub fn verdict_on(&self, point: usize) -> Verdict {
-        let of_group = |errors: &[Errors]| -> Vec<Errors> {
-            errors.iter().filter(|errors| errors.group == self.group).cloned().collect()
-        };
         let Point { errors, readings, .. } = &self.points[point];
         let Readings { decoders, limit, .. } = &self.readings[*readings];
-        let network = DecoderErrors { decoder: "network".into(), errors: of_group(errors) };
-        let baselines = decoders.iter().map(|baseline| DecoderErrors {
-            decoder: baseline.decoder.clone(),
-            errors: of_group(&baseline.errors),
-        });
-        let decoders: Vec<DecoderErrors> = std::iter::once(network).chain(baselines).collect();
-        let verdict = Verdict::new(&decoders, limit);
+        let of_groups = |is_wanted: &dyn Fn(&Errors) -> bool| {
+            let of = |decoder: &str, errors: &[Errors]| DecoderErrors {
+                decoder: decoder.into(),
+                errors: errors.iter().filter(|errors| is_wanted(errors)).cloned().collect(),
+            };
+            let baselines = decoders.iter().map(|baseline| of(&baseline.decoder, &baseline.errors));
+            let all: Vec<_> = std::iter::once(of("network", errors)).chain(baselines).collect();
+            Verdict::new(&all, limit)
+        };
+        let verdict = Verdict {
+            warnings: of_groups(&|_| true).warnings,
+            ..of_groups(&|errors| errors.group == self.group)
+        };
         match ModelBlob::of_bytes(self.blob(point)) {
             Ok(blob) => verdict.of_blob(&blob, self.training_frames),
             Err(_) => verdict,

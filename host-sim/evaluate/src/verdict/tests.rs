@@ -1,6 +1,8 @@
 use taxel_learn::outliers::Outliers;
 use taxel_limit::reference::GroupLimit;
 
+use model_core::blob::ModelShape;
+
 use super::*;
 
 fn group(name: &str, rmse: f64, ratio_to_limit: Option<f64>) -> Errors {
@@ -121,7 +123,7 @@ fn every_warning_is_raised_and_left_out() {
         (Warning::few_test_frames(29), "few-test-frames"),
         (Warning::trained_on(true), "judged-by-training-data"),
         (Warning::out_of_range(0.0101), "readings-out-of-range"),
-        (Warning::larger_than_slot(131_073), "larger-than-slot"),
+        (Warning::larger_than_slot(131_073, &mat(64)), "larger-than-slot"),
         (Warning::padded_centres(8, 16), "padded-centres"),
         (Warning::outliers(&outliers(1)), "outliers"),
         (Warning::costly_gate(101.0, 100.0), "gate-costs-more"),
@@ -137,7 +139,7 @@ fn every_warning_is_raised_and_left_out() {
         Warning::few_test_frames(30),
         Warning::trained_on(false),
         Warning::out_of_range(0.0099),
-        Warning::larger_than_slot(131_072),
+        Warning::larger_than_slot(131_072, &mat(64)),
         Warning::padded_centres(16, 16),
         Warning::outliers(&outliers(0)),
         Warning::costly_gate(99.0, 100.0),
@@ -182,4 +184,25 @@ fn centres_are_as_many_as_frames_allow_without_a_warning() {
         let few = Warning::few_frames(frames, centres, inputs);
         assert_eq!(few.is_some(), centres <= 4, "{frames}");
     }
+}
+
+/// One network for a mat of 16 × 16, with three outputs.
+fn mat(centres: usize) -> Design {
+    let shape = ModelShape { rows: 1, inputs: 256, outputs: 3 };
+    Design::of_rows(shape, Format::F32, centres, true)
+}
+
+#[test]
+fn what_makes_a_blob_fit_into_a_slot_is_computed() {
+    let message = |design: &Design| {
+        let bytes = design.parameter_bytes() + 3000;
+        Warning::larger_than_slot(bytes, design).unwrap().text
+    };
+    let found = message(&mat(160));
+    let fixes =
+        "it fits with --format fixed16, or with --centres 112, or with --whole-array --features 16";
+    assert!(found.ends_with(fixes), "{found}");
+    // Half of that is still too much: no format helps.
+    let found = message(&mat(320));
+    assert!(!found.contains("fixed16") && found.contains("--centres 112"), "{found}");
 }

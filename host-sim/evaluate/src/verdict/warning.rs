@@ -1,8 +1,13 @@
 //! Warnings, each by a name of its own.
 
+use firmware::capacity::Capacity;
+use model_core::blob::Model;
+use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::table::Table;
+use taxel_learn::cost::{Design, NetworkDesign};
 use taxel_learn::outliers::Outliers;
+use taxel_rig::image;
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB.
 pub const SLOT_BYTES: usize = 131_072;
@@ -149,14 +154,23 @@ impl Warning {
         })
     }
 
-    /// Blob of more `bytes` than a slot holds.
-    pub fn larger_than_slot(bytes: usize) -> Option<Self> {
+    /// Blob of more `bytes` than a slot holds, of a model of this `design`, and what makes it fit.
+    pub fn larger_than_slot(bytes: usize, design: &Design) -> Option<Self> {
         Self::when(bytes > SLOT_BYTES, "larger-than-slot", || {
+            let fix = match smaller(bytes, design).as_slice() {
+                [] => "choose fewer readings (--inputs)".to_owned(),
+                fixes => format!("it fits with {}", fixes.join(", or with ")),
+            };
             format!(
-                "the blob takes {bytes} bytes, and a slot of the firmware's images holds {SLOT_BYTES}: lower \
-                 --centres, or use --format fixed16"
+                "the blob takes {bytes} bytes, and a slot of the firmware's images holds {SLOT_BYTES}: {fix}"
             )
         })
+    }
+
+    /// Model that the images as they are have no room for, or whose readings they do not scan.
+    pub fn other_image(model: &Model<'_>) -> Option<Self> {
+        let needed = image::needed(model, Capacity::PAPER);
+        needed.and_then(|needed| Self::when(true, "other-image", || needed))
     }
 
     /// Number of `centres` that was asked for, and the larger one that the number format `stored`.
@@ -175,4 +189,40 @@ impl Warning {
             )
         })
     }
+}
+
+/// Features that are proposed for one network behind a projection: what most sensors need.
+const PROPOSED_FEATURES: usize = 16;
+
+/// Options with which a blob of so many `bytes`, of a model of this `design`, fits into a slot.
+fn smaller(bytes: usize, design: &Design) -> Vec<String> {
+    let besides = bytes.saturating_sub(design.parameter_bytes());
+    let fits = |design: &Design| besides + design.parameter_bytes() <= SLOT_BYTES;
+    let Some(first) = design.networks.first() else { return vec![] };
+    let with = |change: &dyn Fn(&mut NetworkDesign)| {
+        let mut smaller = design.clone();
+        smaller.networks.iter_mut().for_each(change);
+        smaller
+    };
+    let centres = |most: usize| with(&|it| it.shape.centres = it.shape.centres.min(most));
+    let most = (1..=first.shape.centres / 8).rev().map(|eighths| 8 * eighths);
+    let mut fixes = Vec::new();
+    if first.format != Format::Fixed16 && fits(&with(&|it| it.format = Format::Fixed16)) {
+        fixes.push("--format fixed16".to_owned());
+    }
+    fixes.extend(
+        most.filter(|most| *most < first.shape.centres)
+            .find(|most| fits(&centres(*most)))
+            .map(|most| format!("--centres {most}")),
+    );
+    let readings = design.shape.rows * design.shape.inputs;
+    if !design.projection && readings > PROPOSED_FEATURES {
+        let mut array =
+            Design::of_array(design.shape, first.format, first.shape.centres, first.affine_tail);
+        array.networks.iter_mut().for_each(|it| it.shape.inputs = PROPOSED_FEATURES);
+        if fits(&array) {
+            fixes.push(format!("--whole-array --features {PROPOSED_FEATURES}"));
+        }
+    }
+    fixes
 }

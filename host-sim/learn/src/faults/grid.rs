@@ -1,5 +1,7 @@
 //! Grid of wires whose readings are the columns of a table.
 
+use taxel_data::columns;
+
 use super::Place;
 
 /// Numbers of the row-wires and column-wires that a table has readings of, row after row.
@@ -105,7 +107,7 @@ impl Grid {
 
     /// Wires of a column called `r4c5_ohm`.
     pub fn wires_of_name(name: &str) -> Option<(usize, usize)> {
-        let (row, column) = name.strip_prefix('r')?.strip_suffix("_ohm")?.split_once('c')?;
-        Some((row.parse().ok()?, column.parse().ok()?))
+        let ([row, column], own) = columns::cell_of(name)?;
+        (own == "ohm").then_some((row, column))
     }
 }

@@ -3,11 +3,11 @@
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{EstimateReport, Refusal, Report, Request, UploadState, UploadStep};
-use model_core::blob::{Floats, Model};
+use model_core::blob::{Floats, Model, ModelShape};
 use taxel_data::progress::Progress;
 
 use super::{Device, DeviceIdentity, WRITING, Wire};
-use crate::error::{Error, Result, check_room};
+use crate::error::{Error, Result, check_room, no_room};
 
 /// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
 const ERASE: Duration = Duration::from_secs(6);
@@ -88,13 +88,13 @@ pub fn start_trial<W: Wire>(
 ) -> Result<DeviceIdentity> {
     let identity = device.identify()?;
     let capacity = identity.capacity();
-    if let Some((_, shape)) = Model::declared(blob)
-        && !capacity.has_room_for(shape)
-    {
-        return Err(Error::no_room(capacity, shape));
-    }
     if let Ok(model) = Model::decode(blob) {
         check_room(capacity, &model)?;
+    } else if let Some((_, ModelShape { rows, inputs, outputs })) = Model::declared(blob)
+        && !capacity.has_room_for(ModelShape { rows, inputs, outputs })
+    {
+        let needs = format!("{rows} rows of {inputs} readings and {outputs} outputs");
+        return Err(no_room(capacity, &format!("which says that it has {needs}: check its file")));
     }
     device.check_key(&identity)?;
     or_abort(device, |device| {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::evaluate::trade::{Memory, Point, Trade, Wires};
+use crate::verdict::Verdict;
 
 use crate::commands::print::{Page, wrapped};
 
@@ -216,8 +217,9 @@ fn no_choice(page: &mut Page, trade: &Trade) {
     let (Some(fastest), Some(best)) = (front.first(), trade.most_accurate()) else { return };
     for (end, i) in [("The fastest", *fastest), ("The most accurate", best)] {
         let point = &trade.points[i];
-        let sentence = trade.verdict_on(i).sentence;
+        let Verdict { sentence, warnings } = trade.verdict_on(i);
         wrapped(page, &format!("{end}: {}. {sentence} {}", point.name(), cost(point)));
+        warnings.iter().for_each(|warning| wrapped(page, &warning.to_string()));
     }
     if !trade.bounds.any() {
         page.line("To choose one, give a bound: --max-error, --frame-rate, --max-latency-ms, --max-cycles or --max-flash");

@@ -5,7 +5,6 @@ use taxel_data::columns;
 use taxel_data::table::Table;
 
 use super::frames::ShownFrame;
-use super::wires;
 
 /// What is known of the sensor at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +55,8 @@ pub(super) fn changes(
         }
         Reference::Median => {
             let deviations = readings.deviations();
-            let units = deviations.iter().map(|it| if *it > 0.0 { 100.0 * it } else { 100.0 });
+            // A reading that never changes, of a dead cell, has nothing to show.
+            let units = deviations.iter().map(|it| if *it > 0.0 { 100.0 * it } else { f64::NAN });
             (RelativeTo::MedianInDeviations, medians(readings), units.collect())
         }
     };
@@ -67,7 +67,7 @@ pub(super) fn changes(
     };
     let changes = frames.iter().map(of_frame).collect();
     let wires: Option<Vec<[usize; 2]>> =
-        readings.names.iter().map(|name| wires(name, 'c')).collect();
+        readings.names.iter().map(|name| Some(columns::cell_of(name)?.0)).collect();
     let names = readings.names.clone();
     (ShownReadings { relative_to, names, wires: wires.unwrap_or_default() }, changes)
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use firmware::timing::ScanPlan;
 use serde::Serialize;
-use taxel_data::BadValue;
+use taxel_data::{BadValue, columns};
 use taxel_learn::cost::Cost;
 
 /// Clock of the NUCLEO-F446RE in MHz.
@@ -48,15 +48,10 @@ pub struct Wires {
 impl Wires {
     /// Wires that readings are named after, such as `r4c17_ohm`; `None` if any has another name.
     pub fn named(readings: &[String]) -> Option<Self> {
-        let wires = readings.iter().map(|name| {
-            let (row, column) = name.strip_suffix("_ohm")?.strip_prefix('r')?.split_once('c')?;
-            Some((row.parse::<usize>().ok()?, column.parse::<usize>().ok()?))
-        });
-        let wires: Vec<(usize, usize)> = wires.collect::<Option<_>>()?;
-        let count =
-            |of: fn(&(usize, usize)) -> usize| wires.iter().map(of).collect::<BTreeSet<_>>().len();
-        (!wires.is_empty())
-            .then(|| Self { rows: count(|wire| wire.0), columns: count(|wire| wire.1) })
+        let wires = readings.iter().map(|name| Some(columns::cell_of(name)?.0));
+        let wires: Vec<[usize; 2]> = wires.collect::<Option<_>>()?;
+        let count = |of: usize| wires.iter().map(|wire| wire[of]).collect::<BTreeSet<_>>().len();
+        (!wires.is_empty()).then(|| Self { rows: count(0), columns: count(1) })
     }
 }
 

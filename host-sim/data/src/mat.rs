@@ -1,0 +1,214 @@
+//! Mats: readings of a grid of cells, each between a row-wire and a column-wire.
+//!
+//! A model calls the reading at row-wire m and column-wire k `r{m}c{k}_` and the file's own name. So the model alone tells
+//! the wires of its readings, also where dead cells are left out.
+
+use std::collections::BTreeSet;
+use std::str::FromStr;
+
+use crate::columns::{self, cell_of};
+
+/// Fewest cells that make a square mat unless a user says so.
+const FEWEST: usize = 64;
+
+/// Numbers of row-wires and column-wires.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Mat {
+    pub rows: usize,
+    pub columns: usize,
+}
+
+impl FromStr for Mat {
+    type Err = String;
+
+    /// Parses `ROWSxCOLUMNS`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.parse().ok().filter(|count| (1..=1000).contains(count));
+        let wires = text.split_once('x').and_then(|(m, k)| Some((number(m)?, number(k)?)));
+        let (rows, columns) = wires.ok_or("give ROWSxCOLUMNS, such as 16x16")?;
+        Ok(Self { rows, columns })
+    }
+}
+
+impl Mat {
+    fn cells(self) -> usize {
+        self.rows * self.columns
+    }
+
+    /// Name of the reading at `cell`, row by row from 0, that a file calls `own`.
+    fn name(self, cell: usize, own: &str) -> String {
+        format!("r{}c{}_{own}", cell / self.columns + 1, cell % self.columns + 1)
+    }
+}
+
+/// Name of each of the `chosen` columns of a `header` in a model: of a cell, if they are a mat.
+///
+/// They are one if they are named after their wires (`r0c0`, `m_r1c1` are not, `r3c4` is); if their names differ in a number
+/// alone, and these numbers run over a square of at least 8 × 8 cells, from which some may be missing; or if `given` says
+/// so. Then numbers count the cells row by row; without numbers the columns are in that order.
+///
+/// # Errors
+/// Reason why the columns are not the cells of the `given` mat.
+pub fn cell_names(
+    header: &[String],
+    chosen: &[usize],
+    given: Option<Mat>,
+) -> Result<Vec<String>, String> {
+    let own: Vec<&str> = chosen.iter().map(|column| header[*column].as_str()).collect();
+    let as_they_are = || own.iter().map(ToString::to_string).collect();
+    if own.iter().all(|name| cell_of(name).is_some()) {
+        return Ok(as_they_are());
+    }
+    if let (None, Some(names)) = (given, named_after_wires(&own)) {
+        return Ok(names);
+    }
+    let found = numbers(&own).and_then(|(stem, numbers)| {
+        let of_file: Vec<usize> = header.iter().filter_map(|name| number(name, stem)).collect();
+        let (mat, first) = numbered(&numbers, &of_file, given)?;
+        let named = own.iter().zip(&numbers).map(|(own, number)| mat.name(number - first, own));
+        Some(named.collect())
+    });
+    match (found, given) {
+        (Some(names), _) => Ok(names),
+        (None, None) => Ok(as_they_are()),
+        (None, Some(mat)) if mat.cells() == own.len() => {
+            Ok(own.iter().enumerate().map(|(cell, own)| mat.name(cell, own)).collect())
+        }
+        (None, Some(Mat { rows, columns })) => Err(format!(
+            "--grid {rows}x{columns} has {} cells, and {} columns are inputs: choose as many (--inputs), or number them",
+            rows * columns,
+            own.len()
+        )),
+    }
+}
+
+/// Names of cells for columns called `r0c0`, `r1c1` or `r1c1x`.
+fn named_after_wires(own: &[&str]) -> Option<Vec<String>> {
+    let wires_of = |name: &&str| -> Option<[usize; 2]> {
+        let (row, rest) = name.strip_prefix('r')?.split_once('c')?;
+        let end = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+        Some([row.parse().ok()?, rest[..end].parse().ok()?])
+    };
+    let wires: Vec<[usize; 2]> = own.iter().map(wires_of).collect::<Option<_>>()?;
+    let shift = usize::from(wires.as_flattened().contains(&0));
+    let named = own.iter().zip(wires);
+    Some(named.map(|(own, [m, k])| format!("r{}c{}_{own}", m + shift, k + shift)).collect())
+}
+
+/// What stands before and behind the last number of a name.
+type Stem<'n> = (&'n str, &'n str);
+
+/// Last number of `name`, if this `stem` is around it.
+fn number(name: &str, (before, behind): Stem<'_>) -> Option<usize> {
+    let digits = name.strip_prefix(before)?.strip_suffix(behind)?;
+    digits.bytes().all(|digit| digit.is_ascii_digit()).then(|| digits.parse().ok())?
+}
+
+/// Number in each name, if names differ in it alone.
+fn numbers<'n>(own: &[&'n str]) -> Option<(Stem<'n>, Vec<usize>)> {
+    let first: &'n str = own.first()?;
+    let end = first.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let start = first[..end].rfind(|c: char| !c.is_ascii_digit());
+    let start = start.map_or(0, |at| at + first[at..].chars().next().map_or(1, char::len_utf8));
+    let stem = (&first[..start], &first[end..]);
+    let numbers: Vec<usize> = own.iter().map(|name| number(name, stem)).collect::<Option<_>>()?;
+    let distinct: BTreeSet<&usize> = numbers.iter().collect();
+    (distinct.len() == numbers.len()).then_some((stem, numbers))
+}
+
+/// The mat whose cells have these `numbers`, and the number of its first cell. The cells that were not chosen count as
+/// well, by their numbers in the file.
+fn numbered(numbers: &[usize], of_file: &[usize], given: Option<Mat>) -> Option<(Mat, usize)> {
+    let (low, high) = (*numbers.iter().min()?, *numbers.iter().max()?);
+    let of_file = (of_file.iter().min().copied()?, of_file.iter().max().copied()?);
+    let mut spans = [(low, high), of_file, (0, high), (1, high)].into_iter();
+    let fits = |(first, last): (usize, usize)| {
+        let cells = (first <= low).then(|| last + 1 - first)?;
+        let side = cells.isqrt();
+        let square = (cells >= FEWEST && side * side == cells && 2 * numbers.len() > cells)
+            .then_some(Mat { rows: side, columns: side });
+        Some((
+            given.filter(|mat| mat.cells() == cells).or(square.filter(|_| given.is_none()))?,
+            first,
+        ))
+    };
+    spans.find_map(fits)
+}
+
+/// Row-wires and column-wires, such as `row-wire 5`, of which at least two readings are called by `names` and all are
+/// among the `faulty` ones.
+pub fn whole_wires(names: &[String], faulty: &[String]) -> Vec<String> {
+    let of = |names: &[String], kind: usize, wire: usize| {
+        names.iter().filter(|name| cell_of(name).is_some_and(|(at, _)| at[kind] == wire)).count()
+    };
+    let wires = [("row-wire", 0), ("column-wire", 1)].into_iter().flat_map(|(called, kind)| {
+        let wires = faulty.iter().filter_map(|name| Some(columns::cell_of(name)?.0[kind]));
+        wires.collect::<BTreeSet<usize>>().into_iter().map(move |wire| (called, kind, wire))
+    });
+    let whole = wires.filter(|(_, kind, wire)| {
+        let count = of(faulty, *kind, *wire);
+        count >= 2 && count == of(names, *kind, *wire)
+    });
+    whole.map(|(called, _, wire)| format!("{called} {wire}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header(names: impl IntoIterator<Item = String>) -> Vec<String> {
+        let outputs = ["x_mm", "force_N"].map(String::from);
+        ["time_s".to_owned()].into_iter().chain(names).chain(outputs).collect()
+    }
+
+    fn named(header: &[String], pattern: &str, given: Option<&str>) -> Result<Vec<String>, String> {
+        let given = given.map(|text| text.parse().unwrap());
+        cell_names(header, &columns::select(header, pattern), given)
+    }
+
+    #[test]
+    fn numbered_columns_that_fill_a_square_are_cells_row_by_row() {
+        let header = header((0..256).map(|cell| format!("adc_{cell}")));
+        let names = named(&header, "adc_*", None).unwrap();
+        assert_eq!((names[0].as_str(), names[16].as_str()), ("r1c1_adc_0", "r2c1_adc_16"));
+        assert_eq!(names[255], "r16c16_adc_255");
+        // Dead cells, the first and the last among them, move no other.
+        let names = named(&header, "adc_1..adc_36,adc_38..adc_254", None).unwrap();
+        assert_eq!((names[0].as_str(), names[36].as_str()), ("r1c2_adc_1", "r3c7_adc_38"));
+    }
+
+    #[test]
+    fn other_columns_keep_their_names_unless_a_grid_is_given() {
+        let header = header((1..=64).map(|cell| format!("ch{cell}")));
+        let plain = |pattern| named(&header, pattern, None).unwrap()[0].clone();
+        assert_eq!((plain("ch*"), plain("ch1..ch12")), ("r1c1_ch1".into(), "ch1".into()));
+        assert_eq!(plain("ch*,time_s"), "time_s");
+        let names = named(&header, "ch*", Some("4x16")).unwrap();
+        assert_eq!((names[15].as_str(), names[16].as_str()), ("r1c16_ch16", "r2c1_ch17"));
+        let refused = named(&header, "ch*", Some("4x17")).unwrap_err();
+        assert!(
+            refused.contains("--grid 4x17 has 68 cells, and 64 columns are inputs"),
+            "{refused}"
+        );
+        assert_eq!(named(&header, "time_s,x_mm", Some("1x2")).unwrap()[1], "r1c2_x_mm");
+    }
+
+    #[test]
+    fn columns_named_after_their_wires_are_cells_from_one() {
+        let names = |names: &[&str]| {
+            let header = header(names.iter().map(ToString::to_string));
+            named(&header, "r*", None).unwrap()
+        };
+        assert_eq!(names(&["r1c1_ohm", "r1c2_ohm"]), ["r1c1_ohm", "r1c2_ohm"]);
+        assert_eq!(names(&["r0c0", "r0c1"]), ["r1c1_r0c0", "r1c2_r0c1"]);
+        assert_eq!(names(&["r1c1_adc", "r2c7_adc"]), ["r1c1_adc", "r2c7_adc"]);
+    }
+
+    #[test]
+    fn a_wire_is_named_if_all_its_readings_are_faulty() {
+        let names: Vec<String> =
+            (1..=3).flat_map(|m| (1..=3).map(move |k| format!("r{m}c{k}_a"))).collect();
+        let faulty = [&names[3..6], &names[..1]].concat();
+        assert_eq!(whole_wires(&names, &faulty), ["row-wire 2"]);
+    }
+}

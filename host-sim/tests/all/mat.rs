@@ -1,0 +1,108 @@
+//! Mats in CSV files: cells are named after their wires, and every command agrees on the image that a model needs.
+
+use std::fmt::Write as _;
+
+use crate::common::Folder;
+
+/// Log of a mat of so many rows and columns, a press a line, of which one cell is dead and one column-wire is broken.
+fn log([rows, columns]: [usize; 2], lines: usize) -> String {
+    let cells = rows * columns;
+    let names: Vec<String> = (0..cells).map(|cell| format!("adc_{cell}")).collect();
+    let mut csv = format!("{},x_mm,y_mm,force_n\n", names.join(","));
+    for line in 0..lines {
+        let at = |step: usize, most: usize| (line * step % 97) as f64 / 97.0 * (most - 1) as f64;
+        let (x, y, force) = (at(31, columns), at(57, rows), 1.0 + (line * 13 % 89) as f64 / 10.0);
+        for cell in 0..cells {
+            let (m, k) = ((cell / columns) as f64, (cell % columns) as f64);
+            let near = f64::exp(-((m - y).powi(2) + (k - x).powi(2)) / 4.0);
+            let noise = (line * 7 + cell * 3) % 5;
+            let counts = 400.0 + (cell % 50) as f64 + 30.0 * force * near + noise as f64;
+            let counts = if cell == 5 || cell % columns == 2 { 0.0 } else { counts.round() };
+            let _ = write!(csv, "{counts},");
+        }
+        let _ = writeln!(csv, "{x:.3},{y:.3},{force:.3}");
+    }
+    csv
+}
+
+const TRAIN: [&str; 9] = [
+    "train",
+    "mat.csv",
+    "--inputs",
+    "adc_*",
+    "--outputs",
+    "x_mm,y_mm,force_n",
+    "--no-refine",
+    "-o",
+    "m.bin",
+];
+
+#[test]
+fn a_mat_of_numbered_columns_is_named_after_its_wires_and_told_its_image() {
+    let folder = Folder::new("mat");
+    folder.write("mat.csv", log([16, 16], 200));
+    let output = folder.run(&[&TRAIN[..], &["--centres", "8"]].concat());
+    let notes = String::from_utf8(output.stderr).unwrap();
+    assert!(notes.contains("note: column-wire 3: every reading is constant"), "{notes}");
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(told.contains("TAXEL_CAPACITY=16x16x18"), "{told}");
+    let inspected = folder.succeed(&["inspect", "m.bin"]);
+    for words in [
+        "r1c1_adc_0 … r16c16_adc_255 (256)",
+        "TAXEL_CAPACITY=16x16x18",
+        "measures Ω",
+        "16 × 16 wires",
+    ] {
+        assert!(inspected.contains(words), "{words}: {inspected}");
+    }
+    // The file calls its columns otherwise, and counts are not judged as Ω.
+    let judged = folder.succeed(&["eval", "m.bin", "mat.csv", "--html", "eval.html"]);
+    assert!(judged.contains("decodes"), "{judged}");
+    let page = std::fs::read_to_string(folder.path("eval.html")).unwrap();
+    assert!(
+        page.contains("row-wire 16, column-wire 16") && page.contains("column-wire 3: missing"),
+        "{page}"
+    );
+}
+
+#[test]
+fn a_grid_names_the_cells_of_a_mat_that_is_no_square() {
+    let folder = Folder::new("mat-grid");
+    folder.write("mat.csv", log([4, 16], 200));
+    folder.succeed(&[&TRAIN[..], &["--centres", "8", "--grid", "4x16"]].concat());
+    let inspected = folder.succeed(&["inspect", "m.bin"]);
+    assert!(inspected.contains("r1c1_adc_0 … r4c16_adc_63 (64)"), "{inspected}");
+    assert!(!inspected.contains("TAXEL_CAPACITY"), "{inspected}");
+    let refused = folder.fail(&[&TRAIN[..], &["--grid", "4x17"]].concat(), 2);
+    assert!(refused.contains("--grid 4x17 has 68 cells, and 64 columns are inputs"), "{refused}");
+}
+
+#[test]
+fn a_trade_says_what_stands_in_the_way_of_a_rate_and_asks_for_a_scan_that_it_does_not_know() {
+    let folder = Folder::new("mat-trade");
+    folder.write("mat.csv", log([16, 16], 120));
+    let ask = [
+        "trade",
+        "mat.csv",
+        "--outputs",
+        "x_mm,force_n",
+        "--no-refine",
+        "--centres",
+        "8",
+        "--frame-rate",
+        "400",
+    ];
+    let refused = folder.fail(&[&ask[..], &["--inputs", "adc_*"]].concat(), 2);
+    for words in [
+        "a frame may take 2.500 ms, of which the scan takes 9.945 ms",
+        "columns (--inputs) take",
+        "--scan-ms",
+    ] {
+        assert!(refused.contains(words), "{words}: {refused}");
+    }
+    let refused = folder.fail(&[&ask[..], &["--inputs", "adc_0..adc_11"]].concat(), 2);
+    assert!(
+        refused.contains("whose time is not known") && refused.contains("--scan-ms MS"),
+        "{refused}"
+    );
+}
