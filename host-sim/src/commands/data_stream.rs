@@ -6,7 +6,7 @@ use crate::measurements::{Measurements, relative_to};
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use taxel_data::data_file::pieces::Pieces;
-use taxel_data::dataset::Dataset;
+use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::error::Problem;
 use taxel_data::table::Table;
 use taxel_learn::Options;
@@ -48,7 +48,7 @@ impl DataStream {
             self.selection.missing.iter().for_each(|code| _ = file.mark_missing(*code));
             self.lines += file.lines();
             let Selection { inputs, outputs, keep_outliers, .. } = &self.selection;
-            let found = Dataset::from_file(&file, inputs.as_deref(), outputs.as_deref());
+            let found = Dataset::from_file(&file, inputs.as_deref(), outputs.as_deref(), &[]);
             let (frames, kept) = match found {
                 Err(taxel_data::Error::File { problem: Problem::NoCompleteLine, .. }) => {
                     self.incomplete += file.lines();
@@ -177,6 +177,8 @@ impl DataArguments {
             test_readings: training.inputs.clone(),
             test_choice: "none".into(),
             outliers: no_outliers,
+            left_out: LeftOut::default(),
+            unused: UnusedInputs::default(),
             rest,
             options: Options { seed: how.seed, centres, ..Options::default() },
             refine: how.refine,
