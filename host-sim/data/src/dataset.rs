@@ -1,5 +1,10 @@
 //! Data sets: tables of readings and of the outputs that a decoder should predict from them.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use serde::Serialize;
+
 use crate::columns;
 use crate::data_file::DataFile;
 use crate::error::{Error, Problem, Result, Role};
@@ -74,7 +79,8 @@ impl Dataset {
     }
 
     /// Selects the columns that match the patterns `inputs` and `outputs` (see [`columns::select`]), by
-    /// default those with the project's own names. Frames with a missing input, or without any output, are
+    /// default those with the project's own names, but for the inputs called `unused`. Frames with a missing input, or
+    /// without any output, are
     /// skipped; [`Kept`] counts them.
     ///
     /// # Errors
@@ -84,8 +90,10 @@ impl Dataset {
         file: &DataFile,
         inputs: Option<&str>,
         outputs: Option<&str>,
+        unused: &[String],
     ) -> Result<(Self, Kept)> {
-        let input_columns = chosen(file, inputs, Role::Inputs)?;
+        let mut input_columns = chosen(file, inputs, Role::Inputs)?;
+        input_columns.retain(|column| !unused.contains(&file.header[*column]));
         let output_columns = chosen(file, outputs, Role::Outputs)?;
         if let Some(both) = input_columns.iter().find(|c| output_columns.contains(c)) {
             let name = file.header[*both].clone();
@@ -104,22 +112,27 @@ impl Dataset {
                 return Err(Error::file(&file.path, problem));
             }
         }
-        let kept: Vec<usize> = (0..file.lines())
-            .filter(|line| {
-                let is_there = |c: &usize| !file.value(*line, *c).is_nan();
-                input_columns.iter().all(is_there) && output_columns.iter().any(is_there)
-            })
-            .collect();
+        let is_missing = |line: usize, column: &usize| file.value(line, *column).is_nan();
+        let (without_reading, rest): (Vec<usize>, Vec<usize>) = (0..file.lines())
+            .partition(|line| input_columns.iter().any(|column| is_missing(*line, column)));
+        let (without_output, kept): (Vec<usize>, Vec<usize>) = rest
+            .into_iter()
+            .partition(|line| output_columns.iter().all(|column| is_missing(*line, column)));
         if kept.is_empty() {
             return Err(Error::file(&file.path, Problem::NoCompleteLine));
         }
+        let left_out = LeftOut {
+            without_reading: without_reading.len(),
+            without_output: without_output.len(),
+            missing_most: missing_most(file, &input_columns, &output_columns),
+        };
         let take = |columns: &[usize]| Table {
             names: columns.iter().map(|c| file.header[*c].clone()).collect(),
             values: kept.iter().flat_map(|l| columns.iter().map(|c| file.value(*l, *c))).collect(),
         };
         let (inputs, outputs) = (take(&input_columns), take(&output_columns));
         let dataset = Self { inputs, outputs, rows, common_span: false, relative_inputs: false };
-        Ok((dataset, Kept { lines: kept, of: file.lines() }))
+        Ok((dataset, Kept { lines: kept, of: file.lines(), left_out }))
     }
 
     /// Frames at `indices` (from 0), in that order.
@@ -144,6 +157,81 @@ pub struct Kept {
     pub lines: Vec<usize>,
     /// Number of lines in the file.
     pub of: usize,
+    /// Lines that are not used.
+    pub left_out: LeftOut,
+}
+
+/// Lines of a file that lack a value, by reason.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct LeftOut {
+    /// Number of lines that lack a reading.
+    pub without_reading: usize,
+    /// Number of lines that have all readings and lack an output.
+    pub without_output: usize,
+    /// The three columns that lack the most values, with how many they lack.
+    pub missing_most: Vec<(String, usize)>,
+}
+
+impl LeftOut {
+    /// Number of all lines that are left out.
+    pub fn lines(&self) -> usize {
+        self.without_reading + self.without_output
+    }
+}
+
+/// Inputs that can tell nothing, and are left out of a model.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct UnusedInputs {
+    /// Columns without a value in more than half of the lines.
+    pub dead: Vec<String>,
+    /// Columns that never change.
+    pub constant: Vec<String>,
+    /// Columns whose every value is that of another one, with the name of that one.
+    pub duplicated: Vec<(String, String)>,
+}
+
+impl UnusedInputs {
+    /// Inputs of `file` that can tell nothing, among those that match the pattern. There are none if no other input
+    /// would be left, or if there is a network for each row-wire: rows have equally many readings.
+    ///
+    /// # Errors
+    /// As [`Dataset::from_file`].
+    pub fn find(file: &DataFile, inputs: Option<&str>, outputs: Option<&str>) -> Result<Self> {
+        let columns = chosen(file, inputs, Role::Inputs)?;
+        let (columns, _, rows) =
+            by_rows(&file.header, columns, chosen(file, outputs, Role::Outputs)?);
+        if rows > 1 {
+            return Ok(Self::default());
+        }
+        let mut unused = Self::default();
+        // Readings as bits, so that equal columns are found by looking each one up.
+        let mut known: HashMap<Vec<u64>, &str> = HashMap::new();
+        for column in columns {
+            let name = &file.header[column];
+            let values = (0..file.lines()).map(|line| file.value(line, column));
+            let mut told = values.clone().filter(|value| !value.is_nan());
+            let first = told.next();
+            if 2 * values.clone().filter(|value| value.is_nan()).count() > file.lines() {
+                unused.dead.push(name.clone());
+            } else if told.all(|value| first.is_none_or(|first| value.total_cmp(&first).is_eq())) {
+                unused.constant.push(name.clone());
+            } else {
+                match known.entry(values.map(f64::to_bits).collect()) {
+                    Entry::Occupied(other) => {
+                        unused.duplicated.push((name.clone(), (*other.get()).to_owned()));
+                    }
+                    Entry::Vacant(place) => _ = place.insert(name),
+                }
+            }
+        }
+        Ok(if known.is_empty() { Self::default() } else { unused })
+    }
+
+    /// Names of all of them.
+    pub fn names(&self) -> Vec<String> {
+        let duplicated = self.duplicated.iter().map(|(name, _)| name);
+        self.dead.iter().chain(&self.constant).chain(duplicated).cloned().collect()
+    }
 }
 
 /// Readings and outputs of one network: those of one row-wire, or of the whole data set.
@@ -209,6 +297,19 @@ fn chosen(file: &DataFile, pattern: Option<&str>, role: Role) -> Result<Vec<usiz
     }
     file.check_numbers(&selected, Some(role))?;
     Ok(selected)
+}
+
+/// The three columns of `file` that lack the most values, of inputs and outputs.
+fn missing_most(file: &DataFile, inputs: &[usize], outputs: &[usize]) -> Vec<(String, usize)> {
+    let count = |column: &usize| {
+        let missing = (0..file.lines()).filter(|line| file.value(*line, *column).is_nan()).count();
+        (file.header[*column].clone(), missing)
+    };
+    let mut counts: Vec<_> = inputs.iter().chain(outputs).map(count).collect();
+    counts.retain(|(_, missing)| *missing > 0);
+    counts.sort_by_key(|(_, missing)| std::cmp::Reverse(*missing));
+    counts.truncate(3);
+    counts
 }
 
 /// Orders columns by row-wire and counts the rows, if every column names one and all rows have equally

@@ -1,6 +1,6 @@
 //! Measurements of a real sensor: frames to train on, and frames to judge by.
 
-use taxel_data::dataset::Dataset;
+use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::table::Table;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Options, Origin, relative};
@@ -26,6 +26,10 @@ pub struct Measurements {
     /// Values of the file that are far from all others in their column. Training frames are without them, unless they
     /// are to be kept.
     pub outliers: Outliers,
+    /// Lines of the file that lack a value.
+    pub left_out: LeftOut,
+    /// Inputs that were chosen and can tell nothing.
+    pub unused: UnusedInputs,
     /// Readings of the untouched sensor, in the readings' columns, if they are known.
     pub rest: Option<Table>,
     pub options: Options,

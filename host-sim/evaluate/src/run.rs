@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use taxel_data::columns::READINGS;
-use taxel_data::dataset::Dataset;
+use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
@@ -66,7 +66,11 @@ pub struct DataSummary {
     pub test_choice: String,
     /// Values far from all others in their column.
     pub outliers: Outliers,
-    /// Inputs that never change in training; a network cannot use them.
+    /// Lines that lack a value.
+    pub lines_left_out: LeftOut,
+    /// Inputs that can tell nothing, and are left out.
+    pub unused_inputs: UnusedInputs,
+    /// Inputs that are left in and never change in training; a network cannot use them.
     pub constant_inputs: Vec<String>,
 }
 
@@ -200,6 +204,8 @@ pub fn run(
             result.data = Some(DataSummary {
                 test_choice: data.test_choice.clone(),
                 outliers: data.outliers.clone(),
+                lines_left_out: data.left_out.clone(),
+                unused_inputs: data.unused.clone(),
                 constant_inputs: data.constant_inputs(),
             });
         }

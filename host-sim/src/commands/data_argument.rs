@@ -9,7 +9,7 @@ use crate::{Error, Result};
 use clap::Args;
 use taxel_data::columns;
 use taxel_data::data_file::{DataFile, is_array};
-use taxel_data::dataset::{Dataset, USUAL_INPUTS};
+use taxel_data::dataset::{Dataset, LeftOut, USUAL_INPUTS, UnusedInputs};
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::{self, Mat};
 use taxel_data::table::Table;
@@ -114,6 +114,29 @@ impl DataArguments {
         self.folds
     }
 
+    /// Whether a column gives the folds.
+    pub fn has_fold_column(&self) -> bool {
+        self.fold_column.is_some()
+    }
+
+    /// Error if folds were asked for: nothing uses them.
+    pub fn refuse_folds(&self) -> Result<()> {
+        for (option, given) in [
+            ("--folds", self.folds.is_some()),
+            ("--fold-blocks", self.fold_blocks.is_some()),
+            ("--fold-column", self.fold_column.is_some()),
+        ] {
+            if given {
+                let message = format!(
+                    "{option} has no effect without refinement, --select or --confidence: leave it out, or \
+                     leave out --no-refine"
+                );
+                return Err(Error::Usage(message));
+            }
+        }
+        Ok(())
+    }
+
     /// File with frames of the untouched sensor, if it was given.
     pub fn baseline(&self) -> Option<&Path> {
         self.baseline.as_deref()
@@ -187,12 +210,16 @@ impl DataArguments {
     pub fn load(&self, path: &Path, how: HowToTrain, judged: JudgedBy<'_>) -> Result<Measurements> {
         self.check_baseline(how)?;
         let file = self.file.read(path)?;
-        let (frames, lines, outliers) = self.usual_frames(&file)?;
-        let digest = file.digest(&frames.names())?;
+        let [inputs, outputs] = self.patterns();
+        let unused = UnusedInputs::find(&file, inputs, outputs).map_err(with_options)?;
+        data_notes::print_unused(&unused, path);
+        let (frames, lines, outliers, left_out) = self.usual_frames(&file, &unused)?;
+        data_notes::print_classes(&frames.outputs);
         let given_folds =
             self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
-        let split =
-            Split::new(&frames, given_folds.as_deref(), self.judged(judged, &frames, digest)?);
+        let digest = file.digest(&frames.names())?;
+        let judged_by = self.judged(judged, &frames, &unused, digest)?;
+        let split = Split::new(&frames, given_folds.as_deref(), judged_by);
         if split.training.is_empty() {
             let message = "holding out frames leaves none to train on: give more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
@@ -234,6 +261,8 @@ impl DataArguments {
             test_readings,
             test_choice: split.choice,
             outliers,
+            left_out,
+            unused,
             rest,
             options: Options { seed: how.seed, centres, ..Options::default() },
             refine: how.refine,
@@ -256,36 +285,45 @@ impl DataArguments {
         Outliers { left_out: false, kept: (0..frames.frames()).collect(), ..outliers }
     }
 
-    /// Frames of `file` without outliers, the indices of their lines, and the outliers.
-    fn usual_frames(&self, file: &DataFile) -> Result<(Dataset, Vec<usize>, Outliers)> {
-        let (frames, lines) = self.frames(file)?;
+    /// Frames of `file` without outliers and without the `unused` inputs, the indices of their lines, the outliers, and
+    /// the lines that lack a value.
+    fn usual_frames(
+        &self,
+        file: &DataFile,
+        unused: &UnusedInputs,
+    ) -> Result<(Dataset, Vec<usize>, Outliers, LeftOut)> {
+        let (frames, lines, missing) = self.frames(file, unused)?;
         let outliers = self.outliers(&frames, |frame| file.line_number(lines[frame]));
         let left_out = "training and judging (--keep-outliers keeps them)";
         data_notes::print_outliers(&outliers, &file.path, frames.frames(), left_out);
         let lines = outliers.kept.iter().map(|frame| lines[*frame]).collect();
         let frames = frames.subset(&outliers.kept);
         refused_readings::note(&frames.inputs, &file.path.display().to_string());
-        Ok((frames, lines, outliers))
+        Ok((frames, lines, outliers, missing))
     }
 
-    /// Frames of `file`, and the indices of their lines.
-    fn frames(&self, file: &DataFile) -> Result<(Dataset, Vec<usize>)> {
-        let (inputs, outputs) = (self.inputs.as_deref(), self.outputs.as_deref());
-        let (mut frames, kept) = Dataset::from_file(file, inputs, outputs).map_err(with_options)?;
+    /// Frames of `file` without the `unused` inputs, the indices of their lines, and the lines that lack a value.
+    fn frames(
+        &self,
+        file: &DataFile,
+        unused: &UnusedInputs,
+    ) -> Result<(Dataset, Vec<usize>, LeftOut)> {
+        let [inputs, outputs] = self.patterns();
+        let (mut frames, kept) =
+            Dataset::from_file(file, inputs, outputs, &unused.names()).map_err(with_options)?;
         name_cells(&mut frames.inputs, file, inputs, self.grid)?;
-        if kept.lines.len() < kept.of {
-            let left_out = kept.of - kept.lines.len();
-            let name = file.path.display();
-            eprintln!(
-                "note: {left_out} of {} lines of {name} have a missing value and are skipped",
-                kept.of
-            );
-        }
-        Ok((frames, kept.lines))
+        data_notes::print_left_out(&kept.left_out, &file.path, kept.of);
+        Ok((frames, kept.lines, kept.left_out))
     }
 
     /// Frames that the model trained on some of `frames` is judged by. `digest` is that of their columns.
-    fn judged(&self, judged: JudgedBy<'_>, frames: &Dataset, digest: u64) -> Result<Judged> {
+    fn judged(
+        &self,
+        judged: JudgedBy<'_>,
+        frames: &Dataset,
+        unused: &UnusedInputs,
+        digest: u64,
+    ) -> Result<Judged> {
         let path = match judged {
             JudgedBy::None => return Ok(Judged::None),
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
@@ -296,7 +334,7 @@ impl DataArguments {
             let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
-        let (own, _, _) = self.usual_frames(&file)?;
+        let (own, ..) = self.usual_frames(&file, unused)?;
         let names = |frames: &Dataset| (frames.inputs.names.clone(), frames.outputs.names.clone());
         if names(&own) != names(frames) {
             let message = "its columns are not those of the frames to train on: give a file with the same columns, \

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use taxel_data::columns;
+use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::error::{cut, number};
+use taxel_data::table::Table;
 use taxel_learn::outliers::{Outlier, Outliers};
 
 use super::stderr;
@@ -23,6 +25,97 @@ pub fn print_constant(columns: &[String], path: &Path) {
     if let Some(note) = note_on_constant(columns, &path.display().to_string()) {
         stderr::remark(note);
     }
+}
+
+/// Counts the lines of the file at `path`, which has `of` lines, that lack a value.
+pub fn print_left_out(left_out: &LeftOut, path: &Path, of: usize) {
+    if let Some(note) = note_on_left_out(left_out, &path.display().to_string(), of) {
+        eprintln!("{note}");
+    }
+}
+
+/// Names the inputs of the file at `path` that can tell nothing.
+pub fn print_unused(unused: &UnusedInputs, path: &Path) {
+    notes_on_unused(unused, &path.display().to_string())
+        .iter()
+        .for_each(|note| eprintln!("{note}"));
+}
+
+/// Names the outputs that look like the label of a class.
+pub fn print_classes(outputs: &Table) {
+    for (column, name) in outputs.names.iter().enumerate() {
+        let values = outputs.lines().map(|line| line[column]).filter(|value| !value.is_nan());
+        if let Some(classes) = classes(name, values.collect()) {
+            eprintln!(
+                "note: {} has {classes} different whole numbers and no unit, as the label of a class has: a decoder would \
+                 take 3 for something between 2 and 4; give one column of 0 and 1 for each class, and the largest \
+                 output tells the class",
+                cut(name)
+            );
+        }
+    }
+}
+
+/// Most different numbers of an output that may be the label of a class.
+const MOST_CLASSES: usize = 20;
+/// Least number of lines that tell it.
+const LINES_FOR_CLASSES: usize = 50;
+
+/// Number of classes, if the values of the output called `name` look like labels. Two values may be a switch.
+fn classes(name: &str, mut values: Vec<f64>) -> Option<usize> {
+    let whole = values.iter().all(|value| value.fract() == 0.0);
+    if !whole || values.len() < LINES_FOR_CLASSES || !columns::unit_of(name).is_empty() {
+        return None;
+    }
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    // Labels are counted from 0 or 1; places on a grid and steps of a weight are further apart.
+    let counted = values.windows(2).all(|pair| pair[1] - pair[0] <= 1.0);
+    let first = values.first().copied()?;
+    let is_label = counted && (0.0..=1.0).contains(&first);
+    (is_label && (3..=MOST_CLASSES).contains(&values.len())).then_some(values.len())
+}
+
+fn note_on_left_out(left_out: &LeftOut, name: &str, of: usize) -> Option<String> {
+    if left_out.lines() == 0 {
+        return None;
+    }
+    let reasons = [(left_out.without_reading, "a reading"), (left_out.without_output, "an output")];
+    let reasons = reasons.iter().filter(|(lines, _)| *lines > 0);
+    let reasons: Vec<String> =
+        reasons.map(|(lines, what)| format!("{lines} lack {what}")).collect();
+    let columns = left_out.missing_most.iter();
+    let columns: Vec<String> =
+        columns.map(|(column, count)| format!("{} {count}", cut(column))).collect();
+    Some(format!(
+        "note: {} of {of} lines of {name} have a missing value and are skipped: {} (most often missing: {})",
+        left_out.lines(),
+        reasons.join(", "),
+        columns.join(", ")
+    ))
+}
+
+fn notes_on_unused(unused: &UnusedInputs, name: &str) -> Vec<String> {
+    let note = |names: &[String], one: &str, more: &str| {
+        let which = match names {
+            [] => return None,
+            [only] => format!("{} {one}", cut(only)),
+            names => format!("{} inputs {more}: {}", names.len(), columns::some_names(names)),
+        };
+        Some(format!("note: {which} in {name}; left out of the model"))
+    };
+    let pairs = unused.duplicated.iter();
+    let pairs: Vec<String> = pairs.map(|(name, of)| format!("{name} = {of}")).collect();
+    let notes = [
+        note(
+            &unused.dead,
+            "has no value in more than half of the lines",
+            "have no value in more than half of the lines",
+        ),
+        note(&unused.constant, "never changes", "never change"),
+        note(&pairs, "in every line", "are the same as another in every line"),
+    ];
+    notes.into_iter().flatten().collect()
 }
 
 fn notes_on_outliers(outliers: &Outliers, name: &str, lines: usize, left_out: &str) -> Vec<String> {

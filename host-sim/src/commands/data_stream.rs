@@ -6,7 +6,7 @@ use crate::measurements::{Measurements, relative_to};
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use taxel_data::data_file::pieces::Pieces;
-use taxel_data::dataset::Dataset;
+use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::digest::TableDigest;
 use taxel_data::error::Problem;
 use taxel_data::mat::Mat;
@@ -54,7 +54,7 @@ impl DataStream {
             data_file::note_found(&file);
             self.lines += file.lines();
             let Selection { inputs, outputs, keep_outliers, .. } = &self.selection;
-            let found = Dataset::from_file(&file, inputs.as_deref(), outputs.as_deref());
+            let found = Dataset::from_file(&file, inputs.as_deref(), outputs.as_deref(), &[]);
             let (mut frames, kept) = match found {
                 Err(taxel_data::Error::File { problem: Problem::NoCompleteLine, .. }) => {
                     self.incomplete += file.lines();
@@ -190,6 +190,8 @@ impl DataArguments {
             test_readings: training.inputs.clone(),
             test_choice: "none".into(),
             outliers: no_outliers,
+            left_out: LeftOut::default(),
+            unused: UnusedInputs::default(),
             rest,
             options: Options { seed: how.seed, centres, ..Options::default() },
             refine: how.refine,

@@ -85,6 +85,14 @@ impl SubjectArgument {
         Ok(subject)
     }
 
+    /// Error if folds were asked for that nothing uses. A fold column may tell which frames to judge by.
+    pub fn refuse_idle_folds(&self) -> Result<()> {
+        if self.options.data.has_fold_column() && self.test.is_none() {
+            return Ok(());
+        }
+        self.options.data.refuse_folds()
+    }
+
     /// Paths of all files that are read, which must not be replaced.
     pub fn paths(&self) -> Vec<&Path> {
         let source = Path::new(self.source.as_deref().unwrap_or(DEFAULT_SCENE));

@@ -12,7 +12,7 @@ use crate::{Error, Result, report};
 use clap::Args;
 use model_core::rbf::Format;
 use serde::Serialize;
-use taxel_data::dataset::Dataset;
+use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::progress::Silent;
 use taxel_data::{columns, output};
 use taxel_learn::outliers::Outliers;
@@ -128,7 +128,11 @@ struct Summary {
     worth: Worth,
     /// Values far from all others in their column; `None` for a scene.
     outliers: Option<Outliers>,
-    /// Inputs that never change in training; a network cannot use them.
+    /// Lines that lack a value; `None` for a scene.
+    lines_left_out: Option<LeftOut>,
+    /// Inputs that can tell nothing, and are left out; `None` for a scene.
+    unused_inputs: Option<UnusedInputs>,
+    /// Inputs that are left in and never change in training; a network cannot use them.
     constant_inputs: Vec<String>,
 }
 
@@ -212,6 +216,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             Some(plan) => plan.outliers(),
             None => subject.measurements().map(|data| data.outliers.clone()),
         },
+        lines_left_out: subject.measurements().map(|data| data.left_out.clone()),
+        unused_inputs: subject.measurements().map(|data| data.unused.clone()),
         constant_inputs: subject
             .measurements()
             .map(Measurements::constant_inputs)
@@ -265,6 +271,9 @@ fn load(arguments: &Arguments, common: &Common, frames: Option<usize>) -> Result
         }
         Subject::Measured(_) if arguments.frames.is_some() => {
             return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
+        }
+        Subject::Measured(data) if !(data.refine || data.confidence || arguments.select) => {
+            options.data.refuse_folds()?;
         }
         Subject::Scene(_) | Subject::Measured(_) => {}
     }

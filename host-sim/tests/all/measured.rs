@@ -86,9 +86,100 @@ fn a_column_that_never_changes_is_named() {
     write(&folder, "changing.csv", &lines(60));
     let (printed, notes) = train(&folder, "constant.csv", &["--json"]);
     assert!(notes.contains("note: b never changes in constant.csv"), "{notes}");
-    assert_eq!(json(&printed)["constant_inputs"], serde_json::json!(["b"]));
+    assert_eq!(json(&printed)["unused_inputs"]["constant"], serde_json::json!(["b"]));
     let (_, notes) = train(&folder, "changing.csv", &[]);
     assert!(!notes.contains("never changes"), "{notes}");
+}
+
+#[test]
+fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing() {
+    let folder = Folder::new("measured-unused");
+    let mut text = String::from("a,b,dead,flat,twin,y\n");
+    for (i, [a, b, y]) in lines(200).into_iter().enumerate() {
+        let dead = if i % 3 == 0 { "1.5" } else { "" };
+        text += &format!("{a},{b},{dead},7,{a},{y}\n");
+    }
+    folder.write("all.csv", &text);
+    // The file to judge by has them all, and follows the columns of the file to train on.
+    let lively: String = text.replace(",7,", ",8,");
+    folder.write("test.csv", lively);
+    let usual =
+        ["--inputs", "a,b,dead,flat,twin", "--outputs", "y", "--no-refine", "--centres", "8"];
+    let run = [&["run", "all.csv", "--test", "test.csv", "--json"], &usual[..]].concat();
+    let output = folder.run(&run);
+    let [printed, notes] = [output.stdout, output.stderr].map(|b| String::from_utf8(b).unwrap());
+    assert!(output.status.success(), "{notes}");
+    for note in [
+        "note: dead has no value in more than half of the lines in all.csv; left out of the model",
+        "note: flat never changes in all.csv; left out of the model",
+        "note: twin = a in every line in all.csv; left out of the model",
+    ] {
+        assert!(notes.contains(note), "{notes}");
+    }
+    let result = json(&printed);
+    assert_eq!(result["model"]["inputs_per_network"], 2);
+    assert_eq!(result["model"]["training_frames"], 200);
+    let unused = &result["data"]["unused_inputs"];
+    assert_eq!(unused["duplicated"], serde_json::json!([["twin", "a"]]));
+    // No baseline is needed for what is left out.
+    folder.write("rest.csv", "a,b,dead,flat,twin\n45,58,,7,45\n46,57,,7,46\n");
+    let relative = ["--relative-inputs", "--baseline", "rest.csv", "-o", "m.bin"];
+    folder.succeed(&[&["train", "all.csv"], &usual[..], &relative[..]].concat());
+}
+
+#[test]
+fn lines_left_out_are_counted_by_reason() {
+    let folder = Folder::new("measured-left-out");
+    let mut text = String::from("a,b,y,z\n");
+    for (i, [a, b, y]) in lines(100).into_iter().enumerate() {
+        let b = if i % 10 == 0 { String::new() } else { b.to_string() };
+        let z = if i % 20 == 1 { String::new() } else { y.to_string() };
+        text += &format!("{a},{b},{y},{z}\n");
+    }
+    folder.write("gaps.csv", text);
+    let (printed, notes) = train(&folder, "gaps.csv", &["--json"]);
+    let note = "note: 10 of 100 lines of gaps.csv have a missing value and are skipped: 10 lack a reading (most often \
+                missing: b 10)";
+    assert!(notes.contains(note), "{notes}");
+    let left_out = &json(&printed)["lines_left_out"];
+    assert_eq!(left_out["without_reading"], 10);
+    assert_eq!(left_out["missing_most"], serde_json::json!([["b", 10]]));
+}
+
+#[test]
+fn an_output_that_looks_like_the_label_of_a_class_is_noticed() {
+    let folder = Folder::new("measured-classes");
+    let notes_on = |name: &str, step: usize| {
+        let line = |(i, [a, b, _]): (usize, [f64; 3])| format!("{a},{b},{}\n", i % 5 * step);
+        let body: String = lines(60).into_iter().enumerate().map(line).collect();
+        folder.write("log.csv", format!("a,b,{name}\n{body}"));
+        let usual = ["train", "log.csv", "--inputs", "a,b", "--no-refine", "-o", "m.bin"];
+        let output = folder.run(&[&usual[..], &["--outputs", name]].concat());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let notes = notes_on("label", 1);
+    assert!(notes.contains("note: label has 5 different whole numbers and no unit"), "{notes}");
+    // A unit, or steps of more than one, are no label.
+    for notes in [notes_on("x_mm", 1), notes_on("load", 50)] {
+        assert!(!notes.contains("label of a class"), "{notes}");
+    }
+}
+
+#[test]
+fn folds_that_nothing_uses_are_refused() {
+    let folder = Folder::new("measured-folds");
+    write(&folder, "log.csv", &lines(100));
+    let usual = ["--inputs", "a,b", "--outputs", "y", "--no-refine"];
+    for option in ["--folds", "--fold-blocks"] {
+        for command in [&["train", "log.csv", "-o", "m.bin"][..], &["run", "log.csv"]] {
+            let output = folder.run(&[command, &usual[..], &[option, "4"]].concat());
+            let notes = String::from_utf8(output.stderr).unwrap();
+            assert!(!output.status.success(), "{notes}");
+            let why =
+                format!("{option} has no effect without refinement, --select or --confidence");
+            assert!(notes.contains(&why), "{notes}");
+        }
+    }
 }
 
 #[test]

@@ -332,7 +332,7 @@ fn inspect_says_what_image_a_model_needs() {
         let names: Vec<String> = (1..=readings).map(|i| format!("ch{i}")).collect();
         let mut csv = format!("{},f_n\n", names.join(","));
         for line in 0..60 {
-            let values: Vec<usize> = (0..readings).map(|i| 50 + (line * (i + 3)) % 17).collect();
+            let values: Vec<usize> = (0..readings).map(|i| 50 + (line * (i + 3)) % 101).collect();
             let sum: usize = values.iter().sum();
             let values: Vec<String> = values.iter().map(usize::to_string).collect();
             let _ = writeln!(csv, "{},{sum}", values.join(","));
