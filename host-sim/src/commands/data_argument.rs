@@ -19,7 +19,7 @@ use taxel_learn::train::resolution;
 use taxel_learn::{Options, select};
 
 use super::data_file::{DATA_FILES, DataFileArguments};
-use super::{data_notes, readings, refused_readings};
+use super::{data_notes, readings, refused_readings, stderr};
 
 /// What a CSV file's columns are.
 #[derive(Args, Default)]
@@ -270,7 +270,7 @@ impl DataArguments {
         };
         let constant = measurements.constant_inputs();
         for wire in mat::whole_wires(&measurements.training.inputs.names, &constant) {
-            eprintln!("note: {wire}: every reading is constant");
+            stderr::remark(format_args!("note: {wire}: every reading is constant"));
         }
         data_notes::print_constant(&constant, path);
         Ok(measurements)

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::stderr;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_data::data_file::{DataFile, Reading, Separator, Stated, is_array};
@@ -183,20 +184,22 @@ impl FieldArguments {
         note_found(&file);
         let name = path.display();
         if !file.names_columns {
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: {name} names no columns: they are called c1 to c{} (c2..c5 stands for four of them)",
                 file.header.len()
-            );
+            ));
         }
         if file.lacks_last_line_end {
             let last = file.line_number(file.lines() - 1);
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: {name} ends without a line end: if it is not whole, the last number of line {last} may be wrong"
-            );
+            ));
         }
         for code in &self.missing {
             let marked = file.mark_missing(*code);
-            eprintln!("note: {marked} values of {name} are {code}, and count as missing");
+            stderr::remark(format_args!(
+                "note: {marked} values of {name} are {code}, and count as missing"
+            ));
         }
         Ok(file)
     }
@@ -205,7 +208,7 @@ impl FieldArguments {
 /// Says on stderr what is not plain CSV in a `file`.
 pub fn note_found(file: &DataFile) {
     if !file.found.is_empty() {
-        eprintln!("note: {}: {}", file.path.display(), file.found);
+        stderr::remark(format_args!("note: {}: {}", file.path.display(), file.found));
     }
 }
 

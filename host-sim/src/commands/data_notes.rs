@@ -30,15 +30,13 @@ pub fn print_constant(columns: &[String], path: &Path) {
 /// Counts the lines of the file at `path`, which has `of` lines, that lack a value.
 pub fn print_left_out(left_out: &LeftOut, path: &Path, of: usize) {
     if let Some(note) = note_on_left_out(left_out, &path.display().to_string(), of) {
-        eprintln!("{note}");
+        stderr::remark(note);
     }
 }
 
 /// Names the inputs of the file at `path` that can tell nothing.
 pub fn print_unused(unused: &UnusedInputs, path: &Path) {
-    notes_on_unused(unused, &path.display().to_string())
-        .iter()
-        .for_each(|note| eprintln!("{note}"));
+    notes_on_unused(unused, &path.display().to_string()).iter().for_each(stderr::remark);
 }
 
 /// Names the outputs that look like the label of a class.
@@ -46,12 +44,12 @@ pub fn print_classes(outputs: &Table) {
     for (column, name) in outputs.names.iter().enumerate() {
         let values = outputs.lines().map(|line| line[column]).filter(|value| !value.is_nan());
         if let Some(classes) = classes(name, values.collect()) {
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: {} has {classes} different whole numbers and no unit, as the label of a class has: a decoder would \
                  take 3 for something between 2 and 4; give one column of 0 and 1 for each class, and the largest \
                  output tells the class",
                 cut(name)
-            );
+            ));
         }
     }
 }

@@ -16,7 +16,7 @@ use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::resolution;
 
 use super::data_argument::{DataArguments, HowToTrain, name_cells, with_options};
-use super::{data_file, data_notes, refused_readings};
+use super::{data_file, data_notes, refused_readings, stderr};
 
 /// Most values far from all others that are kept to be told.
 const MOST_OUTLIERS: usize = 1000;
@@ -101,9 +101,9 @@ impl DataStream {
         let name = self.pieces.path().display();
         if self.incomplete > 0 {
             let (left_out, lines) = (self.incomplete, self.lines);
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: {left_out} of {lines} lines of {name} have a missing value and are skipped"
-            );
+            ));
         }
         let lines = self.lines - self.incomplete;
         let left_out = "training (--keep-outliers keeps them)";

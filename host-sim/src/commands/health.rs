@@ -1,5 +1,6 @@
 //! Faulty readings of data files: what is believed, what is filled, and notes on both.
 
+use super::stderr;
 use crate::{Error, Result};
 use clap::Args;
 use model_core::fill::MOST_MISSING;
@@ -80,21 +81,23 @@ impl HealthArguments {
             None => vec![],
         };
         if lines >= FEWEST_FOR_NOISE && stand_still(&readings.values, readings.names.len()) {
-            eprintln!("note: all {lines} lines are the same: do the readings stand still?");
+            stderr::remark(format_args!(
+                "note: all {lines} lines are the same: do the readings stand still?"
+            ));
         }
         let left_out = self.leave_out(readings)?;
         let columns = judge(readings, self.limits.0);
         let told = told(&columns, &faults, &readings.names, &left_out);
-        notes(&told.0, &told.1, lines).iter().for_each(|note| eprintln!("{note}"));
+        notes(&told.0, &told.1, lines).iter().for_each(stderr::remark);
         if let Some(limits) = self.limits.0
             && columns.len() == readings.names.len()
             && columns.iter().all(|column| column.shorted + column.open == lines)
         {
             let Limits { shorted_below_ohm, open_above_ohm } = limits;
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: no reading lies within {shorted_below_ohm} to {open_above_ohm} Ω; are they in Ω? --limits gives \
                  other limits"
-            );
+            ));
         }
         let is_faulty =
             readings.lines().map(|line| line.iter().any(|reading| reading.is_nan())).collect();
@@ -115,10 +118,10 @@ impl HealthArguments {
             is_faulty,
         };
         if health.frames_filled > 0 {
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: missing readings of {} were filled from the others (docs/reliability.md tells what that costs)",
                 of_lines(health.frames_filled, lines)
-            );
+            ));
         }
         let faulty = health.is_faulty.iter().filter(|is_faulty| **is_faulty).count();
         if faulty > health.frames_filled && model.model().fill().is_some() {
@@ -128,7 +131,9 @@ impl HealthArguments {
                 format!("more than 1 in {MOST_MISSING} of a frame")
             };
             let count = of_lines(faulty - health.frames_filled, lines);
-            eprintln!("note: missing readings of {count} were not filled: {why}");
+            stderr::remark(format_args!(
+                "note: missing readings of {count} were not filled: {why}"
+            ));
         }
         Ok(health)
     }
@@ -163,7 +168,7 @@ impl HealthArguments {
 /// Notes on stderr which wires of a device are open or shorted, by the `readings` that it scanned.
 pub fn note_faults(readings: &Table) {
     let faults = diagnose(readings, Limits::USUAL, None);
-    notes(&[], &faults, readings.len()).iter().for_each(|note| eprintln!("{note}"));
+    notes(&[], &faults, readings.len()).iter().for_each(stderr::remark);
 }
 
 /// Faulty `columns` and `faults` that are worth a note: all but those of columns `left_out` of the ones called `names`.

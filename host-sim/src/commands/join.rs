@@ -12,7 +12,7 @@ use taxel_data::join::{Join, Joined, Time};
 
 use super::arguments::of_option;
 use super::data_file::FieldArguments;
-use super::{Common, print};
+use super::{Common, print, stderr};
 
 /// Join two logs by time: each line of one with the line of the other whose time stamp is nearest.
 ///
@@ -132,7 +132,7 @@ impl JoinArguments {
         join.check().map_err(|bad| of_option(bad, &options))?;
         let joined = join.join(first, second)?;
         let pairs = joined.pairs.len();
-        eprintln!(
+        stderr::remark(format_args!(
             "note: {pairs} of {} lines of {} have a partner in {}, at most {} away;\n      {} are left out; the partner's columns are {}",
             first.lines(),
             first.path.display(),
@@ -140,13 +140,13 @@ impl JoinArguments {
             significant(joined.largest_distance),
             first.lines() - pairs,
             columns::some_names(&joined.header[first.header.len()..])
-        );
+        ));
         if joined.repeated > 0 {
-            eprintln!(
+            stderr::remark(format_args!(
                 "note: {} lines of {} repeat the time stamp before them and are not used",
                 joined.repeated,
                 second.path.display()
-            );
+            ));
         }
         Ok(joined)
     }

@@ -14,7 +14,7 @@ use taxel_rig::device::{Device, DeviceIdentity, LEASE, Wire, key_of, serial, upl
 
 use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
-use super::{Common, interruption};
+use super::{Common, interruption, stderr};
 
 /// Talk to a device on a serial port: identify, upload, record, calibrate, recalibrate.
 #[derive(Args)]
@@ -165,7 +165,10 @@ fn note_readers(path: &Path) {
         use std::os::unix::fs::PermissionsExt;
         let mode = std::fs::metadata(path).map_or(0, |metadata| metadata.permissions().mode());
         if mode & 0o077 != 0 {
-            eprintln!("note: others may read {0}: chmod 600 {0}", path.display());
+            stderr::remark(format_args!(
+                "note: others may read {0}: chmod 600 {0}",
+                path.display()
+            ));
         }
     }
 }
@@ -254,11 +257,11 @@ fn note_another_sensor(before: &DeviceIdentity, after: &DeviceIdentity) {
         differences.push("it was trained on another scene or data set");
     }
     if !differences.is_empty() {
-        eprintln!(
+        stderr::remark(format_args!(
             "note: the previous model was {:?}, this one is {:?}: {}",
             before.model_name,
             after.model_name,
             differences.join("; ")
-        );
+        ));
     }
 }

@@ -14,6 +14,7 @@ use taxel_learn::health::judge;
 use taxel_learn::{PreparedModel, outliers, relative};
 
 use super::data_notes;
+use super::stderr;
 
 use super::data_file::FieldArguments;
 
@@ -67,12 +68,12 @@ impl BaselineArgument {
                 let baseline = baseline(&fields.read(file)?, names, limits)?;
                 let missing = unusable(&baseline);
                 if !missing.is_empty() {
-                    eprintln!(
+                    stderr::remark(format_args!(
                         "note: {} has no baseline for {}: a mean that is missing or zero, or no reading within the \
                          limits; these readings count as missing",
                         file.display(),
                         columns::some_names(&missing)
-                    );
+                    ));
                 }
                 Ok(Some(baseline.values))
             }

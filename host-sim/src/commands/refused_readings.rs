@@ -1,5 +1,6 @@
 //! Note on readings that a model is trained on, and that a device would take for missing.
 
+use super::stderr;
 use crate::subject::Subject;
 use model_core::health::{Fault, Limits};
 use taxel_data::columns;
@@ -26,7 +27,7 @@ pub fn note_scene(subject: &Subject) {
 
 /// Notes on stderr which `readings` of a `source` a device would take for missing, by its usual limits.
 pub fn note(readings: &Table, source: &str) {
-    notes(readings, source).iter().for_each(|note| eprintln!("{note}"));
+    notes(readings, source).iter().for_each(stderr::remark);
 }
 
 /// Column with readings outside of the limits, and in how many frames.

@@ -15,7 +15,7 @@ use taxel_data::columns;
 use super::arguments::{self, of_option};
 use super::progress::Terminal;
 use super::subject_argument::SubjectArgument;
-use super::{Common, print};
+use super::{Common, print, stderr};
 
 mod files;
 mod page;
@@ -277,9 +277,9 @@ fn centres(given: &[usize], subject: &Subject) -> Result<Vec<usize>> {
     if !too_many.is_empty() {
         let names: Vec<String> = too_many.iter().map(ToString::to_string).collect();
         let names = names.join(", ");
-        eprintln!(
+        stderr::remark(format_args!(
             "note: K = {names} is not tried: there must be fewer centres than the {frames} training frames"
-        );
+        ));
     }
     Ok(fit)
 }
@@ -373,7 +373,7 @@ fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
         return Ok(match usual {
             Ok(()) => vec![RECOMMENDED_K],
             Err(cause) => {
-                eprintln!("note: no points behind a gate: {cause}");
+                stderr::remark(format_args!("note: no points behind a gate: {cause}"));
                 vec![]
             }
         });
