@@ -80,8 +80,7 @@ impl Dataset {
 
     /// Selects the columns that match the patterns `inputs` and `outputs` (see [`columns::select`]), by
     /// default those with the project's own names, but for the inputs called `unused`. Frames with a missing input, or
-    /// without any output, are
-    /// skipped; [`Kept`] counts them.
+    /// without any output, are skipped; [`Kept`] counts them.
     ///
     /// # Errors
     /// [`Error::File`] for a pattern without a column, a column that is input and output, a value that
@@ -166,7 +165,7 @@ pub struct Kept {
 pub struct LeftOut {
     /// Number of lines that lack a reading.
     pub without_reading: usize,
-    /// Number of lines that have all readings and lack an output.
+    /// Number of lines that have all readings and no output.
     pub without_output: usize,
     /// The three columns that lack the most values, with how many they lack.
     pub missing_most: Vec<(String, usize)>,

@@ -213,6 +213,9 @@ impl DataArguments {
         let [inputs, outputs] = self.patterns();
         let unused = UnusedInputs::find(&file, inputs, outputs).map_err(with_options)?;
         data_notes::print_unused(&unused, path);
+        for wire in silent_wires(&file, inputs, self.grid, &unused.names())? {
+            stderr::remark(format_args!("note: {wire}: none of its readings tells anything"));
+        }
         let (frames, lines, outliers, left_out) = self.usual_frames(&file, &unused)?;
         data_notes::print_classes(&frames.outputs);
         let given_folds =
@@ -269,9 +272,6 @@ impl DataArguments {
             confidence: how.confidence,
         };
         let constant = measurements.constant_inputs();
-        for wire in mat::whole_wires(&measurements.training.inputs.names, &constant) {
-            stderr::remark(format_args!("note: {wire}: every reading is constant"));
-        }
         data_notes::print_constant(&constant, path);
         Ok(measurements)
     }
@@ -352,16 +352,39 @@ pub fn name_cells(
     pattern: Option<&str>,
     grid: Option<Mat>,
 ) -> taxel_data::Result<()> {
-    let chosen = columns::select(&file.header, pattern.unwrap_or(USUAL_INPUTS));
-    let cells = mat::cell_names(&file.header, &chosen, grid).map_err(taxel_data::Error::unfit)?;
-    let own = chosen.iter().map(|column| &file.header[*column]);
-    let cell_of: HashMap<&String, String> = own.zip(cells).collect();
+    let cell_of: HashMap<String, String> = cells_of(file, pattern, grid)?.into_iter().collect();
     for name in &mut inputs.names {
         if let Some(cell) = cell_of.get(name) {
             name.clone_from(cell);
         }
     }
     Ok(())
+}
+
+/// Columns of `file` that match the `pattern`, each with its name in a model.
+fn cells_of(
+    file: &DataFile,
+    pattern: Option<&str>,
+    grid: Option<Mat>,
+) -> taxel_data::Result<Vec<(String, String)>> {
+    let chosen = columns::select(&file.header, pattern.unwrap_or(USUAL_INPUTS));
+    let cells = mat::cell_names(&file.header, &chosen, grid).map_err(taxel_data::Error::unfit)?;
+    let own = chosen.iter().map(|column| file.header[*column].clone());
+    Ok(own.zip(cells).collect())
+}
+
+/// Wires of a mat of which every reading is among the `unused` columns.
+fn silent_wires(
+    file: &DataFile,
+    pattern: Option<&str>,
+    grid: Option<Mat>,
+    unused: &[String],
+) -> taxel_data::Result<Vec<String>> {
+    let (own, cells): (Vec<String>, Vec<String>) =
+        cells_of(file, pattern, grid)?.into_iter().unzip();
+    let silent = own.iter().zip(&cells).filter(|(own, _)| unused.contains(own));
+    let silent: Vec<String> = silent.map(|(_, cell)| cell.clone()).collect();
+    Ok(mat::whole_wires(&cells, &silent))
 }
 
 /// Error that names the options which choose columns.

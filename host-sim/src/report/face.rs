@@ -61,9 +61,8 @@ impl Face {
     /// Face for readings, row-wire over column-wire. `None` if their names do not tell wires.
     pub fn of_readings(readings: &ShownReadings) -> Option<Self> {
         let name = |[row, column]: [usize; 2]| format!("row-wire {row}, column-wire {column}");
-        let [rows, columns] = [0, 1].map(|of| readings.wires.iter().map(move |wire| wire[of]));
-        let columns: BTreeSet<usize> = columns.collect();
-        let rows: BTreeSet<usize> = rows.collect();
+        let [rows, columns] =
+            [0, 1].map(|of| with_gaps(readings.wires.iter().map(|wire| wire[of]).collect()));
         // Cells that are not read come last: they have no value.
         let mut wires = readings.wires.clone();
         let all = rows.iter().flat_map(|row| columns.iter().map(|column| [*row, *column]));
@@ -227,6 +226,16 @@ pub fn extent(sensor: &SensorSketch) -> ([f64; 2], [f64; 2]) {
 pub fn axes_mm(low: [f64; 2], high: [f64; 2]) -> [Axis; 2] {
     [("x (mm)", 0), ("y (mm)", 1)]
         .map(|(label, axis)| Axis::linear(label, ticks::within(low[axis], high[axis], 4)))
+}
+
+/// These wires, and those between them that are not read if they are the fewer ones: dead, and not left out by choice.
+fn with_gaps(wires: BTreeSet<usize>) -> BTreeSet<usize> {
+    match (wires.first(), wires.last()) {
+        (Some(first), Some(last)) if 2 * wires.len() > last + 1 - first => {
+            (*first..=*last).collect()
+        }
+        _ => wires,
+    }
 }
 
 /// Row-wires that are read, each at the y of its electrode farthest to the right. None if they do not lie one above

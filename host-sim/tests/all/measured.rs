@@ -1,6 +1,7 @@
 //! What `train` makes of measured data as they are: outliers, few lines, columns that never change.
 
 use crate::common::Folder;
+use std::fmt::Write as _;
 
 fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
@@ -97,11 +98,19 @@ fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing()
     let mut text = String::from("a,b,dead,flat,twin,y\n");
     for (i, [a, b, y]) in lines(200).into_iter().enumerate() {
         let dead = if i % 3 == 0 { "1.5" } else { "" };
-        text += &format!("{a},{b},{dead},7,{a},{y}\n");
+        let _ = writeln!(text, "{a},{b},{dead},7,{a},{y}");
     }
     folder.write("all.csv", &text);
     // The file to judge by has them all, and follows the columns of the file to train on.
-    folder.write("test.csv", text.replace(",7,", ",8,").replacen("1.5", "2.5", 1).replace('\n', "0\n"));
+    let others: Vec<String> = text
+        .lines()
+        .map(|line| {
+            line.replace(",7,", ",8,")
+                + "
+"
+        })
+        .collect();
+    folder.write("test.csv", [&others[..1], &others[2..]].concat().concat());
     let usual =
         ["--inputs", "a,b,dead,flat,twin", "--outputs", "y", "--no-refine", "--centres", "8"];
     let run = [&["run", "all.csv", "--test", "test.csv", "--json"], &usual[..]].concat();
@@ -133,7 +142,7 @@ fn lines_left_out_are_counted_by_reason() {
     for (i, [a, b, y]) in lines(100).into_iter().enumerate() {
         let b = if i % 10 == 0 { String::new() } else { b.to_string() };
         let z = if i % 20 == 1 { String::new() } else { y.to_string() };
-        text += &format!("{a},{b},{y},{z}\n");
+        let _ = writeln!(text, "{a},{b},{y},{z}");
     }
     folder.write("gaps.csv", text);
     let (printed, notes) = train(&folder, "gaps.csv", &["--json"]);
