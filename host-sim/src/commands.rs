@@ -44,7 +44,7 @@ use firmware::link::message::Refusal;
 use crate::{Error, Result};
 
 /// Options of every command.
-#[derive(clap::Args)]
+#[derive(clap::Args, Default)]
 pub struct Common {
     /// Seed of every random draw, instead of the scene's or 1 (no effect where nothing is drawn).
     #[arg(long, global = true)]
@@ -54,10 +54,10 @@ pub struct Common {
     pub json: bool,
     /// Say nothing on stderr but errors: no notes, no progress.
     #[arg(short, long, global = true)]
-    quiet: bool,
+    pub quiet: bool,
     /// Say how long each stage took, and how far a long one is.
     #[arg(short, long, global = true, conflicts_with = "quiet")]
-    verbose: bool,
+    pub verbose: bool,
 }
 
 /// Runs the `work` of the command of this `name`, prints its error, and returns the program's exit status.

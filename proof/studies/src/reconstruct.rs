@@ -207,7 +207,7 @@ mod tests {
         let _ = std::fs::remove_file(&saved);
         let search = |seed| {
             let arguments = Arguments { setups: 1, saved: saved.clone(), svg: None };
-            answer(&arguments, &Common { seed: Some(seed), json: true })
+            answer(&arguments, &Common { seed: Some(seed), json: true, ..Common::default() })
         };
         search(1).unwrap();
         let bytes = std::fs::read(&saved).unwrap();
