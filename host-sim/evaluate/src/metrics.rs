@@ -52,6 +52,25 @@ pub struct Errors {
     pub ratio_standard_error: Option<f64>,
 }
 
+/// Name under which all groups are judged together.
+pub const ALL: &str = "all";
+
+/// RMSE of a `group`, in its unit. Of [`ALL`] it is the mean over the groups of RMSE/standard deviation, √(1 − R²): 1 for
+/// always predicting the mean of these frames. `None` for a group without errors.
+pub fn rmse_of(errors: &[Errors], group: &str) -> Option<f64> {
+    if group != ALL {
+        return errors.iter().find(|errors| errors.group == group).map(|errors| errors.rmse);
+    }
+    let shares = errors.iter().filter_map(|errors| errors.r_squared);
+    let shares: Vec<f64> = shares.map(|r_squared| (1.0 - r_squared).sqrt()).collect();
+    (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
+}
+
+/// Unit of the RMSE of a `group`; "σ", an output's standard deviation, for [`ALL`].
+pub fn unit_of_rmse(group: &str) -> &str {
+    if group == ALL { "σ" } else { columns::unit_of(group) }
+}
+
 /// Name of the trained network in results.
 pub const NETWORK: &str = "network";
 
@@ -304,6 +323,28 @@ fn of_columns(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn all_groups_together_are_judged_by_their_shares_of_the_deviation() {
+        let of = |group: &str, rmse: f64, r_squared: f64| Errors {
+            group: group.into(),
+            unit: String::new(),
+            count: 10,
+            rmse,
+            relative_l2_percent: None,
+            full_scale_percent: None,
+            positional_percent: None,
+            r_squared: Some(r_squared),
+            mean_relative_percent: None,
+            ratio_to_limit: None,
+            ratio_standard_error: None,
+        };
+        // Deviations of 10 mm and 2 N.
+        let errors = [of("x_mm", 5.0, 0.75), of("force_n", 0.4, 0.96)];
+        assert!((rmse_of(&errors, ALL).unwrap() - (0.5 + 0.2) / 2.0).abs() < 1e-12);
+        assert_eq!(rmse_of(&errors, "x_mm"), Some(5.0));
+        assert_eq!((rmse_of(&errors, "y_mm"), rmse_of(&[], ALL)), (None, None));
+    }
 
     #[test]
     fn every_definition_by_hand() {

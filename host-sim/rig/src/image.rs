@@ -90,7 +90,7 @@ pub fn needed(model: &Model<'_>, has: Capacity) -> Option<String> {
         Ok(capacity) if capacity == has => None,
         Ok(Capacity { rows, columns, outputs }) => Some(format!(
             "it needs an image with room for {rows} × {columns} wires: TAXEL_CAPACITY={rows}x{columns}x{outputs} \
-             cargo nucleo builds the board's, and … cargo xtask firmware qemu-app the emulator's (docs/board.md)"
+             cargo nucleo builds the board's; put the same before `cargo xtask firmware qemu-app` for the emulator (docs/board.md)"
         )),
         Err(reason) => Some(reason),
     }

@@ -7,6 +7,7 @@ use std::str::FromStr;
 use crate::error::{Bounded, NoPoint};
 use crate::evaluate::gate::{self, RECOMMENDED_K};
 use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan, Wires};
+use crate::metrics;
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::{Args, ValueEnum};
@@ -60,7 +61,8 @@ pub struct Arguments {
     /// gate [default: 3.5 if the scene's noise is relative, or a CSV file has a --baseline].
     #[arg(long, value_name = "K,…", value_delimiter = ',', allow_negative_numbers = true)]
     gate: Vec<GateOption>,
-    /// Outputs that determine the front and the choice, such as dz_mm [default: the last].
+    /// Outputs that determine the front and the choice, such as dz_mm; or all, by the mean of RMSE/standard deviation
+    /// [default: the last of a scene, all of a data file].
     #[arg(long, value_name = "GROUP")]
     group: Option<String>,
     /// Choose the cheapest point with an RMSE of at most this, in the group's unit.
@@ -102,11 +104,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let group = match &arguments.group {
-        Some(group) if groups.contains(&group.as_str()) => group.as_str(),
+        Some(group) if group == metrics::ALL || groups.contains(&group.as_str()) => group.as_str(),
         Some(group) => {
-            let message = format!("--group {group}: the outputs are {}", groups.join(", "));
+            let message = format!("--group {group}: the outputs are {}; or all", groups.join(", "));
             return Err(Error::Usage(message));
         }
+        None if subject.scene().is_none() && groups.len() > 1 => metrics::ALL,
         None => groups.last().copied().unwrap_or_default(),
     };
     let device = Device {

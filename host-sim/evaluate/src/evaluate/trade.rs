@@ -7,15 +7,15 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use taxel_data::BadValue;
 use taxel_data::progress::Progress;
-use taxel_data::{BadValue, columns};
 use taxel_learn::cost::Prices;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{ModelBlob, Options};
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
-use crate::metrics::{DecoderErrors, Errors, LimitSummary, Measure};
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 use crate::subject::Subject;
 use crate::verdict::Verdict;
 
@@ -82,7 +82,7 @@ pub struct Trade {
     pub compiler: String,
     pub device: Device,
     pub line: Line,
-    /// Group of outputs by which front and choice are determined.
+    /// Group of outputs by which front and choice are determined, or [`metrics::ALL`].
     pub group: String,
     pub unit: String,
     /// Readings that points decode, for each choice of columns and number of samples.
@@ -153,7 +153,7 @@ impl Trade {
         };
         let verdict = Verdict {
             warnings: of_groups(&|_| true).warnings,
-            ..of_groups(&|errors| errors.group == self.group)
+            ..of_groups(&|errors| self.group == metrics::ALL || errors.group == self.group)
         };
         match ModelBlob::of_bytes(self.blob(point)) {
             Ok(blob) => verdict.of_blob(&blob, self.training_frames),
@@ -244,7 +244,7 @@ pub fn compute(
     let ways: Vec<Vec<Ways<'_>>> =
         frames.iter().map(|frames| Ways::all(frames, plan).collect()).collect();
     // What nothing can meet is refused at once: costs first, then errors, since the limit takes some seconds.
-    let unit = columns::unit_of(group);
+    let unit = metrics::unit_of_rmse(group);
     let mut offers = Vec::new();
     for (place, ways) in ways.iter().enumerate() {
         for ways in ways {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::evaluate::trade::{Memory, Point, Trade, Wires};
+use crate::metrics;
 use crate::verdict::Verdict;
 
 use crate::commands::print::{Page, wrapped};
@@ -111,6 +112,9 @@ fn legend(trade: &Trade, all: bool) -> String {
         "× limit: RMSE relative to the least possible one with as many samples a reading and the same columns".into(),
         "avg: samples a reading; frames/s: computed on the device, the serial line may carry fewer".into(),
     ];
+    if trade.group == metrics::ALL {
+        lines.push("RMSE of all: mean over the outputs of RMSE/standard deviation σ; always predicting the mean has 1".into());
+    }
     if wires.is_some() {
         lines.push("cols: column-wires that are read".into());
     }

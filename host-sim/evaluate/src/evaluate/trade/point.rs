@@ -8,7 +8,7 @@ use taxel_learn::cost::{Cost, kernel_name};
 use super::choice::Offer;
 use super::device::Times;
 use super::readings::in_words;
-use crate::metrics::Errors;
+use crate::metrics::{self, Errors};
 
 /// Number format and exponential with which networks are decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,9 +88,9 @@ pub struct Point {
 }
 
 impl Point {
-    /// RMSE of a group, in its unit.
+    /// RMSE of a group, in its unit, or of [all](metrics::rmse_of) of them.
     pub fn rmse(&self, group: &str) -> f64 {
-        self.errors.iter().find(|e| e.group == group).map_or(f64::NAN, |e| e.rmse)
+        metrics::rmse_of(&self.errors, group).unwrap_or(f64::NAN)
     }
 
     /// Ratio of the RMSE of a group to the limit, where that is known.

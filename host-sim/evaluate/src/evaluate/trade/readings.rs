@@ -53,7 +53,7 @@ impl Readings {
     pub fn references(&self, group: &str) -> impl Iterator<Item = (&'static str, f64)> {
         let of = |name| {
             let decoder = self.decoders.iter().find(|baseline| baseline.decoder == name)?;
-            decoder.errors.iter().find(|errors| errors.group == group).map(|errors| errors.rmse)
+            metrics::rmse_of(&decoder.errors, group)
         };
         let least = self.limit.groups.iter().find(|limit| limit.group == group);
         let references = [
