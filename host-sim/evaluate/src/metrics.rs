@@ -341,7 +341,7 @@ mod tests {
         };
         // Deviations of 10 mm and 2 N.
         let errors = [of("x_mm", 5.0, 0.75), of("force_n", 0.4, 0.96)];
-        assert!((rmse_of(&errors, ALL).unwrap() - (0.5 + 0.2) / 2.0).abs() < 1e-12);
+        assert!((rmse_of(&errors, ALL).unwrap() - 0.35).abs() < 1e-12);
         assert_eq!(rmse_of(&errors, "x_mm"), Some(5.0));
         assert_eq!((rmse_of(&errors, "y_mm"), rmse_of(&[], ALL)), (None, None));
     }

@@ -102,14 +102,8 @@ fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing()
     }
     folder.write("all.csv", &text);
     // The file to judge by has them all, and follows the columns of the file to train on.
-    let others: Vec<String> = text
-        .lines()
-        .map(|line| {
-            line.replace(",7,", ",8,")
-                + "
-"
-        })
-        .collect();
+    let others: Vec<String> =
+        text.lines().map(|line| format!("{}\n", line.replace(",7,", ",8,"))).collect();
     folder.write("test.csv", [&others[..1], &others[2..]].concat().concat());
     let usual =
         ["--inputs", "a,b,dead,flat,twin", "--outputs", "y", "--no-refine", "--centres", "8"];
