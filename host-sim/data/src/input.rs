@@ -111,7 +111,7 @@ pub(crate) fn unpacked(path: &Path, bytes: &[u8]) -> Result<Option<Vec<u8>>> {
     Ok(Some(unpacked))
 }
 
-/// The same `source`, or what gzip packed into it.
+/// Reader of the `source`, or of what gzip packed into it.
 pub(crate) fn unpacking(
     path: &Path,
     mut source: Box<dyn Read + Send>,

@@ -226,7 +226,7 @@ impl Dialect {
         })
     }
 
-    /// The same without the lines that only the beginning of a file has.
+    /// Dialect of later lines: without those that only the beginning of a file has.
     pub(super) fn of_later_lines(&self) -> Self {
         Self { header: None, left_out: vec![], ..self.clone() }
     }
@@ -254,7 +254,7 @@ impl Dialect {
         }
     }
 
-    /// The same table as plain CSV text: commas, points in numbers. Lines keep their numbers: what is no line of the
+    /// Plain CSV text of the same table: commas, points in numbers. Lines keep their numbers: what is no line of the
     /// table becomes a blank one. Lines of `text` are numbered as if so many came `before`.
     pub(super) fn to_plain<'b>(
         &self,

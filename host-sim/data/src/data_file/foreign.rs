@@ -4,23 +4,18 @@ use std::path::Path;
 
 use crate::error::{Error, Problem, Result};
 
+/// Lines of Python that read a table by this call of pandas, and write it as CSV.
+macro_rules! by_pandas {
+    ($read:literal) => {
+        concat!("import pandas as pd\npd.", $read, ".to_csv('OUT', index=False)")
+    };
+}
+
 /// What a file is, by the bytes it begins with, and the lines of Python that convert it: `IN` and `OUT` stand for names.
 const KINDS: [(&[u8], &str, &str); 16] = [
-    (
-        b"PAR1",
-        "a Parquet file",
-        "import pandas as pd\npd.read_parquet('IN').to_csv('OUT', index=False)",
-    ),
-    (
-        b"ARROW1",
-        "a Feather file",
-        "import pandas as pd\npd.read_feather('IN').to_csv('OUT', index=False)",
-    ),
-    (
-        b"FEA1",
-        "a Feather file",
-        "import pandas as pd\npd.read_feather('IN').to_csv('OUT', index=False)",
-    ),
+    (b"PAR1", "a Parquet file", by_pandas!("read_parquet('IN')")),
+    (b"ARROW1", "a Feather file", by_pandas!("read_feather('IN')")),
+    (b"FEA1", "a Feather file", by_pandas!("read_feather('IN')")),
     (b"MATLAB 5.0", "a MATLAB file", MATLAB_5),
     (b"MATLAB 7.3", "a MATLAB file of version 7.3", HDF5),
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file", HDF5),
@@ -36,16 +31,12 @@ const KINDS: [(&[u8], &str, &str); 16] = [
     (b"BZh", "packed by bzip2", PANDAS),
     (b"\xfd7zXZ", "packed by xz", PANDAS),
     (b"\x28\xb5\x2f\xfd", "packed by zstd", PANDAS),
-    (
-        b"{\"",
-        "JSON",
-        "import pandas as pd\npd.read_json('IN', lines=True).to_csv('OUT', index=False)",
-    ),
-    (b"[{\"", "JSON", "import pandas as pd\npd.read_json('IN').to_csv('OUT', index=False)"),
+    (b"{\"", "JSON", by_pandas!("read_json('IN', lines=True)")),
+    (b"[{\"", "JSON", by_pandas!("read_json('IN')")),
 ];
-const PANDAS: &str = "import pandas as pd\npd.read_csv('IN').to_csv('OUT', index=False)";
-const PICKLE: &str = "import pandas as pd\npd.read_pickle('IN').to_csv('OUT', index=False)";
-const EXCEL: &str = "import pandas as pd\npd.read_excel('IN').to_csv('OUT', index=False)";
+const PANDAS: &str = by_pandas!("read_csv('IN')");
+const PICKLE: &str = by_pandas!("read_pickle('IN')");
+const EXCEL: &str = by_pandas!("read_excel('IN')");
 const MATLAB_5: &str = "import numpy, scipy.io  # NAME is a variable of lines × columns\n\
                         numpy.savetxt('OUT', scipy.io.loadmat('IN')['NAME'], delimiter=',')";
 const HDF5: &str = "import h5py, numpy  # NAME is an array of lines × columns; MATLAB's need .T behind [:]\n\
@@ -56,10 +47,9 @@ pub(super) fn check(path: &Path, bytes: &[u8]) -> Result<()> {
     let of_bytes = KINDS.iter().find(|(start, ..)| bytes.starts_with(start));
     let found = of_bytes.map(|(_, kind, python)| (*kind, *python)).or_else(|| in_zip(bytes));
     let Some((kind, python)) = found else { return Ok(()) };
-    let python_text = |name: &str| name.replace('\\', "\\\\").replace('\'', "\\'");
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let table = Path::new(&*name).with_extension("csv");
-    let quoted = |name: &str| format!("'{}'", python_text(name));
+    let quoted = |name: &str| format!("'{}'", name.replace('\\', "\\\\").replace('\'', "\\'"));
     let python = python.replace("'OUT'", &quoted(&table.to_string_lossy()));
     let python = python.replace("'IN'", &quoted(&name));
     Err(Error::file(path, Problem::Foreign { kind, python }))

@@ -90,9 +90,10 @@ pub fn start_trial<W: Wire>(
     let capacity = identity.capacity();
     if let Ok(model) = Model::decode(blob) {
         check_room(capacity, &model)?;
-    } else if let Some((_, ModelShape { rows, inputs, outputs })) = Model::declared(blob)
-        && !capacity.has_room_for(ModelShape { rows, inputs, outputs })
+    } else if let Some((_, shape)) = Model::declared(blob)
+        && !capacity.has_room_for(shape)
     {
+        let ModelShape { rows, inputs, outputs } = shape;
         let needs = format!("{rows} rows of {inputs} readings and {outputs} outputs");
         return Err(no_room(capacity, &format!("which says that it has {needs}: check its file")));
     }
