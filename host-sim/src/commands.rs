@@ -14,6 +14,7 @@ mod data_notes;
 mod refused_readings;
 mod data_file;
 mod readings;
+mod rest_argument;
 mod health;
 mod data_argument;
 mod data_stream;

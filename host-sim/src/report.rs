@@ -26,6 +26,7 @@ mod frames;
 mod sketch;
 mod tables;
 mod sweep;
+mod over_time;
 mod html;
 mod printed;
 mod trade;

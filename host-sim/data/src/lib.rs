@@ -19,6 +19,8 @@ pub mod csv_file;
 pub mod join;
 pub mod table;
 pub mod dataset;
+pub mod clock;
+pub mod rest;
 
 pub use elementary::{exp, ln, normal_share_below, sin_cos};
 pub use error::{BadValue, Error, Result};

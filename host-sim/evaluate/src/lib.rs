@@ -27,10 +27,11 @@
 pub mod error;
 pub mod metrics;
 pub mod by_depth;
+pub mod measurements;
+pub mod over_time;
 pub mod verdict;
 pub mod experiment;
 pub mod training_set;
-pub mod measurements;
 pub mod subject;
 pub mod evaluate;
 pub mod run;

@@ -1,9 +1,11 @@
 //! Measurements of a real sensor: frames to train on, and frames to judge by.
 
+use taxel_data::clock::Clock;
 use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
+use taxel_data::rest::Rest;
 use taxel_data::table::Table;
 use taxel_learn::outliers::Outliers;
-use taxel_learn::{Options, Origin, relative};
+use taxel_learn::{Options, Origin};
 
 use crate::metrics::Measure;
 
@@ -15,12 +17,20 @@ pub struct Measurements {
     /// CRC-64/XZ of the file.
     pub digest: u64,
     pub training: Dataset,
+    /// When these frames were measured.
+    pub log: Log,
     /// Fold of each training frame, numbered from 0.
     pub fold_of: Vec<usize>,
+    /// Whether folds are drawn at random though successive lines resemble each other, which flatters a model.
+    pub folds_flatter: bool,
     /// Frames to judge by, which nothing is trained on.
     pub test: Dataset,
+    /// When these were measured.
+    pub test_log: Log,
     /// Readings of the test frames as they were measured, whatever the model's inputs are.
     pub test_readings: Table,
+    /// Baseline of the test frames, on one line or one for each, if the sensor at rest is known.
+    pub test_baselines: Option<Table>,
     /// How the test frames were chosen, in words.
     pub test_choice: String,
     /// Values of the file that are far from all others in their column. Training frames are without them, unless they
@@ -31,12 +41,60 @@ pub struct Measurements {
     /// Inputs that were chosen and can tell nothing.
     pub unused: UnusedInputs,
     /// Readings of the untouched sensor, in the readings' columns, if they are known.
-    pub rest: Option<Table>,
+    pub rest: Option<Rest>,
     pub options: Options,
     /// Whether centres, widths and the projection are refined after K-means.
     pub refine: bool,
     /// Whether the model tells how far off its outputs may be, and how novel a frame is.
     pub confidence: bool,
+}
+
+/// When the frames of a data set were measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    pub clock: Clock,
+    /// Line of each frame in the file (from 0), which the clock tells the time of.
+    pub lines: Vec<usize>,
+}
+
+impl Log {
+    /// Log of the frames at `indices` (from 0).
+    #[must_use]
+    pub fn subset(&self, indices: &[usize]) -> Self {
+        let lines = indices.iter().map(|index| self.lines[*index]).collect();
+        Self { clock: self.clock.clone(), lines }
+    }
+
+    /// Time of each frame.
+    pub fn times(&self) -> Vec<f64> {
+        self.lines.iter().map(|line| self.clock.at[*line]).collect()
+    }
+}
+
+/// Measured frames of one file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    pub frames: Dataset,
+    pub log: Log,
+    /// Readings of the untouched sensor, in the readings' columns, if they are known.
+    pub rest: Option<Rest>,
+}
+
+impl Frames {
+    /// Baseline of these frames, on one line or one for each, if the sensor at rest is known.
+    pub fn baselines(&self) -> Option<Table> {
+        self.rest.as_ref().map(|rest| rest.baselines(&self.log.lines))
+    }
+
+    /// Frames at `indices` (from 0), in that order.
+    #[must_use]
+    pub fn subset(&self, indices: &[usize]) -> Self {
+        Self {
+            frames: self.frames.subset(indices),
+            log: self.log.subset(indices),
+            rest: self.rest.clone(),
+        }
+    }
 }
 
 /// Frames that a model is judged by.
@@ -50,7 +108,7 @@ pub enum Judged {
     /// Frames of a file of its own.
     File {
         /// Its frames, with the columns of the frames to train on.
-        frames: Dataset,
+        frames: Box<Frames>,
         /// Its name, for people.
         name: String,
     },
@@ -65,7 +123,7 @@ pub struct Split {
     /// Indices of the frames to train on.
     pub training: Vec<usize>,
     /// Frames to judge by.
-    pub test: Dataset,
+    pub test: Frames,
     /// How these were chosen, in words.
     pub choice: String,
 }
@@ -73,21 +131,22 @@ pub struct Split {
 impl Split {
     /// Splits `frames` into those to train on and those to judge by. `fold_of` gives the fold of each frame, if its
     /// user told it.
-    pub fn new(frames: &Dataset, fold_of: Option<&[usize]>, judged: Judged) -> Self {
-        let all = 0..frames.frames();
+    pub fn new(frames: &Frames, fold_of: Option<&[usize]>, judged: Judged) -> Self {
+        let count = frames.frames.frames();
+        let all = 0..count;
         let last_fold = fold_of.and_then(|folds| folds.iter().max());
         let (training, test): (Vec<usize>, Vec<usize>) = match (&judged, last_fold, fold_of) {
             (Judged::HeldOut, Some(last), Some(folds)) => {
                 all.partition(|frame| folds[*frame] != *last)
             }
             (Judged::HeldOut, ..) => {
-                let kept = frames.frames() - frames.frames() / HELD_OUT;
+                let kept = count - count / HELD_OUT;
                 all.partition(|frame| *frame < kept)
             }
             _ => (all.collect(), vec![]),
         };
         let (test, choice) = match (judged, last_fold) {
-            (Judged::File { frames, name }, _) => (frames, format!("all of {name}")),
+            (Judged::File { frames, name }, _) => (*frames, format!("all of {name}")),
             (Judged::HeldOut, Some(_)) => (frames.subset(&test), "the last fold".into()),
             (Judged::HeldOut, None) => (frames.subset(&test), "the last fifth".into()),
             (Judged::None, _) => (frames.subset(&test), "none".into()),
@@ -110,18 +169,21 @@ impl Measurements {
     }
 
     /// Relative noise of a reading at rest, as a fraction: the root of the mean over columns of (standard
-    /// deviation/mean)². `None` if the sensor at rest is not known, or a column's mean is zero.
+    /// deviation/mean)². In a log the standard deviation is that of differences between successive lines, over √2, which
+    /// a drift does not raise. `None` if the sensor at rest is not known, or a column's mean is zero.
     pub fn noise_level(&self) -> Option<f64> {
         let rest = self.rest.as_ref()?;
-        let columns = rest.names.len();
-        let relative = rest.deviations().into_iter().zip(rest.means());
+        let columns = rest.readings.names.len();
+        let relative = rest.noise().into_iter().zip(rest.readings.means());
         let squares: f64 = relative.map(|(deviation, mean)| (deviation / mean).powi(2)).sum();
         Some((squares / columns as f64).sqrt()).filter(|level| level.is_finite())
     }
 
-    /// Mean of the readings at rest on one line, if they are known.
+    /// Mean of the test frames' baselines, on one line, if the sensor at rest is known and its readings are
+    /// [far from zero](far_from_zero) there.
     pub fn baseline(&self) -> Option<Table> {
-        self.rest.as_ref().map(Table::mean_line)
+        let baseline = self.test_baselines.as_ref()?.mean_line();
+        far_from_zero(&baseline.values, &self.test_readings.deviations()).then_some(baseline)
     }
 
     /// Measure for errors on the test frames.
@@ -130,9 +192,11 @@ impl Measurements {
     }
 }
 
-/// Makes the inputs of `frames` relative to the mean of `rest`, the readings of the untouched sensor.
-pub fn relative_to(frames: Dataset, rest: &Table) -> Dataset {
-    relative::dataset(frames, &rest.mean_line())
+/// Whether readings at rest are levels that changes can be told in per cent of: in nine of ten columns their mean is larger
+/// than the standard deviation of all readings. It is not where a baseline was subtracted.
+pub fn far_from_zero(at_rest: &[f64], deviations: &[f64]) -> bool {
+    let far = at_rest.iter().zip(deviations).filter(|(mean, deviation)| mean.abs() > **deviation);
+    10 * far.count() >= 9 * at_rest.len()
 }
 
 #[cfg(test)]
@@ -140,12 +204,14 @@ mod tests {
     use super::*;
 
     /// Frames numbered from 0 in their one reading.
-    fn numbered(frames: usize) -> Dataset {
-        let mut numbered = Dataset::empty(vec!["ch1".into()], vec!["f_n".into()], 1, frames);
-        for (value, number) in numbered.inputs.values.iter_mut().zip(0..) {
+    fn numbered(count: usize) -> Frames {
+        let mut frames = Dataset::empty(vec!["ch1".into()], vec!["f_n".into()], 1, count);
+        for (value, number) in frames.inputs.values.iter_mut().zip(0..) {
             *value = f64::from(number);
         }
-        numbered
+        let at = (0..count).map(|line| line as f64).collect();
+        let clock = Clock { column: None, unit: "", at };
+        Frames { frames, log: Log { clock, lines: (0..count).collect() }, rest: None }
     }
 
     #[test]
@@ -153,9 +219,10 @@ mod tests {
         let split = Split::new(&numbered(11), None, Judged::HeldOut);
         assert_eq!(split.training, (0..9).collect::<Vec<_>>());
         assert_eq!(
-            (split.test.inputs.values, split.choice.as_str()),
+            (split.test.frames.inputs.values, split.choice.as_str()),
             (vec![9.0, 10.0], "the last fifth")
         );
+        assert_eq!(split.test.log.times(), [9.0, 10.0]);
     }
 
     #[test]
@@ -163,17 +230,17 @@ mod tests {
         let split = Split::new(&numbered(5), Some(&[2, 0, 1, 2, 0]), Judged::HeldOut);
         assert_eq!(split.training, [1, 2, 4]);
         assert_eq!(
-            (split.test.inputs.values, split.choice.as_str()),
+            (split.test.frames.inputs.values, split.choice.as_str()),
             (vec![0.0, 3.0], "the last fold")
         );
     }
 
     #[test]
     fn a_file_of_its_own_leaves_all_frames_to_train_on() {
-        let judged = Judged::File { frames: numbered(3), name: "test.csv".into() };
+        let judged = Judged::File { frames: Box::new(numbered(3)), name: "test.csv".into() };
         let split = Split::new(&numbered(5), None, judged);
-        assert_eq!((split.training.len(), split.test.frames()), (5, 3));
+        assert_eq!((split.training.len(), split.test.frames.frames()), (5, 3));
         assert_eq!(split.choice, "all of test.csv");
-        assert_eq!(Split::new(&numbered(5), None, Judged::None).test.frames(), 0);
+        assert_eq!(Split::new(&numbered(5), None, Judged::None).test.frames.frames(), 0);
     }
 }

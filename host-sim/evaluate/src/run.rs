@@ -18,7 +18,9 @@ use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
 use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
+use crate::measurements::Measurements;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::over_time::{Decoded, OverTime, RestOverTime};
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use crate::verdict::{Verdict, Warning};
@@ -72,6 +74,8 @@ pub struct DataSummary {
     pub unused_inputs: UnusedInputs,
     /// Inputs that are left in and never change in training; a network cannot use them.
     pub constant_inputs: Vec<String>,
+    /// Errors and readings at rest by time; `None` if lines are in no order of time.
+    pub over_time: Option<OverTime>,
 }
 
 /// Summary of the scene that was run.
@@ -172,11 +176,21 @@ pub fn run(
         None => Reference::Median,
     };
     let distribution = Distribution::new(&test.outputs, &estimate, &test.inputs, reference);
-    let verdict = Verdict::new(&decoders, &limit)
+    let mut verdict = Verdict::new(&decoders, &limit)
         .of_blob(&blob, training.frames.frames())
         .of_frames(subject.measurements().map(|data| &data.outliers), test.frames())
         .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)))
         .with(decoding(subject).and_then(|_| Warning::not_positive(&test.inputs)));
+    let mut over_time = None;
+    if let Subject::Measured(data) = subject {
+        let at_rest = RestOverTime::of_data(data, options);
+        verdict = verdict.of_data(data, at_rest.as_ref());
+        over_time = of_log(data, &network, &estimate, at_rest);
+        let last_lines = data.log.lines.last() < data.test_log.lines.first();
+        if over_time.is_some() && last_lines && data.log.clock == data.test_log.clock {
+            verdict = verdict.at_the_end_of_a_log();
+        }
+    }
     let mut result = RunResult {
         verdict,
         subject: subject.name().into(),
@@ -207,11 +221,26 @@ pub fn run(
                 lines_left_out: data.left_out.clone(),
                 unused_inputs: data.unused.clone(),
                 constant_inputs: data.constant_inputs(),
+                over_time,
             });
         }
     }
-    drop(network);
     Ok((result, blob))
+}
+
+/// Errors of the `network` on the frames of `data` by time, of which it has the test frames' `estimate`.
+fn of_log(
+    data: &Measurements,
+    network: &PreparedModel<'_>,
+    estimate: &Table,
+    at_rest: Option<RestOverTime>,
+) -> Option<OverTime> {
+    let of_training = network.decode_table(&data.training.inputs).values;
+    let trained =
+        Decoded { log: &data.log, outputs: &data.training.outputs, estimates: &of_training };
+    let judged =
+        Decoded { log: &data.test_log, outputs: &data.test.outputs, estimates: &estimate.values };
+    OverTime::new(Some(&trained), &judged, at_rest)
 }
 
 /// Scene whose models decode readings, if it is one.

@@ -8,7 +8,9 @@ use taxel_learn::cost::Design;
 use taxel_learn::decoders::{linear, mean};
 use taxel_learn::outliers::Outliers;
 
+use crate::measurements::Measurements;
 use crate::metrics::{DecoderErrors, Errors, LimitSummary};
+use crate::over_time::RestOverTime;
 
 mod warning;
 
@@ -97,6 +99,21 @@ impl Verdict {
     #[must_use]
     pub fn of_frames(self, outliers: Option<&Outliers>, test_frames: usize) -> Self {
         self.with(Warning::few_test_frames(test_frames)).with(outliers.and_then(Warning::outliers))
+    }
+
+    /// Adds what measurements give reason to beware of: folds that flatter, and readings `at_rest` that drift where a model
+    /// is given readings as they are.
+    #[must_use]
+    pub fn of_data(self, data: &Measurements, at_rest: Option<&RestOverTime>) -> Self {
+        let drift = at_rest.filter(|_| !data.training.relative_inputs).and_then(Warning::drift);
+        self.with(Warning::folds_flatter(data.folds_flatter)).with(drift)
+    }
+
+    /// Adds that the frames to judge by are the end of a log.
+    #[must_use]
+    pub fn at_the_end_of_a_log(mut self) -> Self {
+        self.sentence += " These are errors at the end of the log, later than all that the model was trained on.";
+        self
     }
 
     /// Adds what a blob, trained on so many `frames`, gives reason to beware of: too few frames, centres that the format

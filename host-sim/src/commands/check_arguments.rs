@@ -8,6 +8,7 @@ use firmware::link::message::Memory;
 use model_core::blob::Metadata;
 use taxel_data::data_file::DataFile;
 use taxel_data::random::Stream;
+use taxel_data::rest::Rest;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::check::{Findings, Frames, Plan};
 use taxel_simulate::sensor::Precision;
@@ -16,7 +17,8 @@ use taxel_simulate::{Synthesis, synthesise};
 
 use super::data_file::FieldArguments;
 use super::progress::Terminal;
-use super::readings::{BaselineArgument, model_inputs};
+use super::readings::model_inputs;
+use super::rest_argument::UntouchedArguments;
 use super::scene_argument::{DEFAULT_SCENE, SceneArgument, Sizes};
 use super::{Common, arguments, print, stderr};
 
@@ -33,7 +35,7 @@ pub struct CheckArguments {
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     #[command(flatten)]
-    baseline: BaselineArgument,
+    untouched: UntouchedArguments,
     /// Frames that the device decodes. Lines of a CSV file are repeated.
     #[arg(
         short = 'n',
@@ -111,19 +113,31 @@ impl CheckArguments {
         let model = ModelBlob::read(path)?;
         let file = DataFile::read(Path::new(&self.source))?;
         let readings = model_inputs(&model.prepare(Exponential::default()), &file)?;
-        let baseline_ohm = self.baseline_ohm(model.parse().metadata(), path)?;
+        let parsed = model.parse();
+        let metadata = parsed.metadata();
+        let rest = self.untouched.rest_if_relative(&file, metadata, None)?;
+        let baseline_ohm = self.baseline_ohm(metadata, path, rest.as_ref())?;
         let frames = Frames { readings: readings.cycled(self.frames.max(1)), baseline_ohm };
         Ok(Checked { frames, model })
     }
 
-    /// Baseline of which all readings are believed: the device is given the same one.
-    fn baseline_ohm(&self, metadata: &Metadata<'_>, path: &Path) -> Result<Option<Vec<f64>>> {
-        self.baseline.values(metadata, path, &FieldArguments::default(), None)
+    /// Baseline of which all readings are believed: the device is given the same one for all frames. It is that of the
+    /// first lines at `rest`, unless a file was given for it.
+    fn baseline_ohm(
+        &self,
+        metadata: &Metadata<'_>,
+        path: &Path,
+        rest: Option<&Rest>,
+    ) -> Result<Option<Vec<f64>>> {
+        let fields = FieldArguments::default();
+        let baseline = self.untouched.baselines(metadata, path, (rest, 1), &fields, None)?;
+        Ok(baseline.map(|baseline| baseline.values))
     }
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
         let scene = SceneArgument::new(&self.source, self.precision).load_world(common)?;
         scene.require_inverse("a check of a device")?;
+        self.untouched.refuse("a scene makes its own baseline")?;
         scene.world.check_frames("-n", self.frames)?;
         let model = match &self.model {
             Some(path) => ModelBlob::read(path)?,
@@ -147,12 +161,12 @@ impl CheckArguments {
             )));
         }
         let path = self.model.as_deref().unwrap_or(Path::new(&self.source));
-        let baseline_ohm = if metadata.relative_inputs && self.baseline.baseline.is_none() {
+        let baseline_ohm = if metadata.relative_inputs && self.untouched.path().is_none() {
             // All frames are of one session, which does not drift.
             let session = Synthesis::new(&scene.world).drift(None);
             Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values)
         } else {
-            self.baseline_ohm(metadata, path)?
+            self.baseline_ohm(metadata, path, None)?
         };
         let readings = synthesise(&scene.world, Stream::Test, self.frames.max(1)).inputs;
         let frames = Frames { readings, baseline_ohm };

@@ -3,22 +3,25 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use crate::measurements::{Judged, Measurements, Split, relative_to};
+use crate::measurements::{Frames, Judged, Log, Measurements, Split};
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
+use taxel_data::clock::{Clock, neighbours_alike};
 use taxel_data::columns;
 use taxel_data::data_file::{DataFile, is_array};
 use taxel_data::dataset::{Dataset, LeftOut, USUAL_INPUTS, UnusedInputs};
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::{self, Mat};
+use taxel_data::rest::Rest;
 use taxel_data::table::Table;
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::refine::LEAST_FOLDS;
 use taxel_learn::train::resolution;
-use taxel_learn::{Options, select};
+use taxel_learn::{Options, relative, select};
 
 use super::data_file::{DATA_FILES, DataFileArguments};
+use super::rest_argument::RestArgument;
 use super::{data_notes, readings, refused_readings, stderr};
 
 /// What a CSV file's columns are.
@@ -39,20 +42,26 @@ pub struct DataArguments {
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
     #[arg(long, value_name = "NAME", conflicts_with = "folds")]
     fold_column: Option<String>,
-    /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5].
+    /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5 where neighbouring lines
+    /// do not resemble each other].
     #[arg(long, value_name = "N")]
     folds: Option<usize>,
-    /// Folds of successive lines of a CSV file, instead of random ones. Use them for a log: neighbouring lines resemble
-    /// each other, and random folds would judge a model by frames that it nearly knows.
+    /// Folds of successive lines of a CSV file, instead of random ones [default: 5 where neighbouring lines resemble each
+    /// other, as in a log: random folds would judge a model by frames that it nearly knows].
     #[arg(long, value_name = "N", conflicts_with_all = ["folds", "fold_column"])]
     fold_blocks: Option<usize>,
     /// Train on the lines of a CSV file that hold an outlier, too: a value far from all others in its column.
     #[arg(long)]
     keep_outliers: bool,
-    /// CSV file with frames of the untouched sensor, whose mean is the baseline; a CSV file's --relative-inputs
-    /// needs it.
+    /// CSV file with frames of the untouched sensor, whose mean is the baseline, instead of lines at rest.
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
+    #[command(flatten)]
+    rest: RestArgument,
+    /// Column of a log with the time of each line [default: one called time, t, timestamp, …; without one lines are
+    /// counted].
+    #[arg(long, value_name = "NAME")]
+    time: Option<String>,
     #[command(flatten)]
     pub file: DataFileArguments,
 }
@@ -91,6 +100,8 @@ impl DataArguments {
             ("--fold-column", "columns", self.fold_column.is_some()),
             ("--fold-blocks", "lines", self.fold_blocks.is_some()),
             ("--keep-outliers", "lines", self.keep_outliers),
+            ("--rest", "lines", self.rest.is_given()),
+            ("--time", "columns", self.time.is_some()),
         ] {
             if given {
                 let message = format!("{option} picks {picked} of a CSV file; a scene has its own");
@@ -153,16 +164,43 @@ impl DataArguments {
     }
 
     /// Readings of the untouched sensor in the columns of `inputs`, if a file with them was given.
-    pub fn rest(&self, inputs: &Table) -> Result<Option<Table>> {
+    pub fn rest_of_file(&self, inputs: &Table) -> Result<Option<Rest>> {
         let read = |path| readings::at_rest(&self.file.fields().read(path)?, inputs);
-        self.baseline.as_deref().map(read).transpose()
+        let of_file = self.baseline.as_deref().map(read).transpose()?;
+        Ok(of_file.map(|readings| Rest { readings, lines: None }))
+    }
+
+    /// Readings of the untouched sensor in the columns of `frames`: from a file of their own, or lines of the log `file`.
+    /// Inputs relative to the baseline need them.
+    fn rest(&self, file: &DataFile, frames: &Dataset, how: HowToTrain) -> Result<Option<Rest>> {
+        if let Some(rest) = self.rest_of_file(&frames.inputs)? {
+            return Ok(Some(rest));
+        }
+        let outputs = frames.outputs.names.iter().map(String::as_str);
+        let rest = self.rest.find(file, &frames.inputs.names, outputs)?;
+        if how.relative_inputs {
+            let Some(rest) = &rest else {
+                let message = "--relative-inputs: no line is known to be at rest: name columns that are zero there (--rest), \
+                               or give --baseline FILE, with frames of the untouched sensor";
+                return Err(Error::Unfit { path: file.path.clone(), message: message.into() });
+            };
+            readings::check_baseline(&rest.readings, &file.path)?;
+        }
+        Ok(rest)
     }
 
     /// Error if an option was given that needs all lines of the file at `path` at once.
     pub fn refuse_for_stream(&self, path: &Path, how: HowToTrain) -> Result<()> {
-        self.check_baseline(how)?;
+        if how.relative_inputs && self.baseline.is_none() {
+            return Err(Error::Usage(
+                "--relative-inputs: a recursion reads lines once; give --baseline FILE, with frames of the untouched sensor"
+                    .into(),
+            ));
+        }
         for (option, given) in [
             ("--fold-column", self.fold_column.is_some()),
+            ("--rest", self.rest.is_given()),
+            ("--time", self.time.is_some()),
             ("--first-share and --last-share", self.file.takes_a_share()),
             ("--confidence", how.confidence),
             ("an array of numpy's", is_array(path)),
@@ -178,37 +216,30 @@ impl DataArguments {
         Ok(())
     }
 
-    fn check_baseline(&self, how: HowToTrain) -> Result<()> {
-        if how.relative_inputs && self.baseline.is_none() {
-            return Err(Error::Usage(
-                "--relative-inputs: a CSV file does not tell the baseline; give --baseline FILE, with frames of the \
-                 untouched sensor"
-                    .into(),
-            ));
-        }
-        Ok(())
-    }
-
-    /// Folds of `frames`, as many as were asked for: of successive frames, or drawn at random.
-    pub fn folds_of(&self, frames: usize, seed: u64) -> Result<Vec<usize>> {
-        if let Some(folds) = self.fold_blocks {
-            if !(2..=frames).contains(&folds) {
-                return Err(Error::Usage(format!(
-                    "--fold-blocks {folds}: give from 2 to {frames}"
-                )));
-            }
-            return Ok(select::block_folds(frames, folds));
-        }
-        let folds = self.folds.unwrap_or(frames.min(5));
+    /// Folds of frames with these `outputs`, as many as were asked for: of successive frames, or drawn at random. Unless a
+    /// user says which, they are of successive frames if neighbours resemble each other.
+    pub fn folds_of(&self, outputs: &Table, seed: u64) -> Result<Vec<usize>> {
+        const USUAL: usize = 5;
+        let frames = outputs.len();
+        let (option, folds) = match (self.fold_blocks, self.folds) {
+            (Some(folds), _) => ("--fold-blocks", folds),
+            (None, Some(folds)) => ("--folds", folds),
+            (None, None) => ("--folds", frames.min(USUAL)),
+        };
         if !(2..=frames).contains(&folds) {
-            return Err(Error::Usage(format!("--folds {folds}: give from 2 to {frames}")));
+            return Err(Error::Usage(format!("{option} {folds}: give from 2 to {frames}")));
         }
-        Ok(select::random_folds(frames, folds, seed))
+        let in_blocks =
+            self.fold_blocks.is_some() || self.folds.is_none() && neighbours_alike(outputs);
+        Ok(if in_blocks {
+            select::block_folds(frames, folds)
+        } else {
+            select::random_folds(frames, folds, seed)
+        })
     }
 
     /// Measurements in the CSV file at `path`.
     pub fn load(&self, path: &Path, how: HowToTrain, judged: JudgedBy<'_>) -> Result<Measurements> {
-        self.check_baseline(how)?;
         let file = self.file.read(path)?;
         let [inputs, outputs] = self.patterns();
         let unused = UnusedInputs::find(&file, inputs, outputs).map_err(with_options)?;
@@ -216,41 +247,49 @@ impl DataArguments {
         for wire in silent_wires(&file, inputs, self.grid, &unused.names())? {
             stderr::remark(format_args!("note: {wire}: none of its readings tells anything"));
         }
-        let (frames, lines, outliers, left_out) = self.usual_frames(&file, &unused)?;
-        data_notes::print_classes(&frames.outputs);
-        let given_folds =
-            self.fold_column.as_ref().map(|name| folds_from(&file, name, &lines)).transpose()?;
-        let digest = file.digest(&frames.names())?;
-        let judged_by = self.judged(judged, &frames, &unused, digest)?;
-        let split = Split::new(&frames, given_folds.as_deref(), judged_by);
-        if split.training.is_empty() {
+        let (all, outliers, left_out) = self.usual_frames(&file, &unused, how)?;
+        data_notes::print_classes(&all.frames.outputs);
+        let given_folds = self
+            .fold_column
+            .as_ref()
+            .map(|name| folds_from(&file, name, &all.log.lines))
+            .transpose()?;
+        let digest = file.digest(&all.frames.names())?;
+        let judged_by = self.judged(judged, &all.frames, &unused, digest, how)?;
+        let Split { training: kept, test, choice } =
+            Split::new(&all, given_folds.as_deref(), judged_by);
+        if kept.is_empty() {
             let message = "holding out frames leaves none to train on: give more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
-        if split.test.frames() == 0 && !matches!(judged, JudgedBy::None) {
+        if test.frames.frames() == 0 && !matches!(judged, JudgedBy::None) {
             let message = "there is no frame to judge by: give five lines or more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
-        let training = frames.subset(&split.training);
-        let fold_of = match given_folds {
+        let training = all.subset(&kept);
+        let count = kept.len();
+        let fold_of = match &given_folds {
             Some(folds) => {
-                let rest: Vec<usize> = split.training.iter().map(|frame| folds[*frame]).collect();
+                let rest: Vec<usize> = kept.iter().map(|frame| folds[*frame]).collect();
                 let held_out = !matches!(judged, JudgedBy::None);
                 check_folds(&rest, held_out && how.refine)?;
                 rest
             }
-            None if training.frames() < 2 && self.folds.is_none() => vec![0; training.frames()],
-            None => self.folds_of(training.frames(), how.seed)?,
+            None if count < 2 && self.folds.is_none() => vec![0; count],
+            None => self.folds_of(&training.frames.outputs, how.seed)?,
         };
         // Readings themselves, even if the model is given their ratios to the baseline.
-        resolution::check(&training)
+        resolution::check(&training.frames)
             .map_err(|refusal| Error::Unfit { path: path.into(), message: refusal.to_string() })?;
-        let rest = self.rest(&training.inputs)?;
-        let test_readings = split.test.inputs.clone();
-        let [training, test] = [training, split.test].map(|frames| match &rest {
-            Some(rest) if how.relative_inputs => relative_to(frames, rest),
+        let test_readings = test.frames.inputs.clone();
+        let test_baselines = test.baselines();
+        let given = |frames: Dataset, baselines: Option<Table>| match baselines {
+            Some(baselines) if how.relative_inputs => relative::dataset(frames, &baselines),
             _ => frames,
-        });
+        };
+        let baselines = training.baselines();
+        let (log, rest) = (training.log, training.rest);
+        let training = given(training.frames, baselines);
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
         let inputs = training.inputs.names.len() / training.rows;
         let centres = Warning::enough_frames_for(training.fewest_values(), inputs);
@@ -258,11 +297,15 @@ impl DataArguments {
         let measurements = Measurements {
             name: name.into_owned(),
             digest,
+            log,
+            folds_flatter: self.folds.is_some() && neighbours_alike(&training.outputs),
             training,
             fold_of,
-            test,
+            test: given(test.frames, test_baselines.clone()),
+            test_log: test.log,
             test_readings,
-            test_choice: split.choice,
+            test_baselines,
+            test_choice: choice,
             outliers,
             left_out,
             unused,
@@ -285,13 +328,13 @@ impl DataArguments {
         Outliers { left_out: false, kept: (0..frames.frames()).collect(), ..outliers }
     }
 
-    /// Frames of `file` without outliers and without the `unused` inputs, the indices of their lines, the outliers, and
-    /// the lines that lack a value.
+    /// Frames of `file` without outliers and without the `unused` inputs, the outliers, and the lines that lack a value.
     fn usual_frames(
         &self,
         file: &DataFile,
         unused: &UnusedInputs,
-    ) -> Result<(Dataset, Vec<usize>, Outliers, LeftOut)> {
+        how: HowToTrain,
+    ) -> Result<(Frames, Outliers, LeftOut)> {
         let (frames, lines, missing) = self.frames(file, unused)?;
         let outliers = self.outliers(&frames, |frame| file.line_number(lines[frame]));
         let left_out = "training and judging (--keep-outliers keeps them)";
@@ -299,7 +342,9 @@ impl DataArguments {
         let lines = outliers.kept.iter().map(|frame| lines[*frame]).collect();
         let frames = frames.subset(&outliers.kept);
         refused_readings::note(&frames.inputs, &file.path.display().to_string());
-        Ok((frames, lines, outliers, missing))
+        let log = Log { clock: Clock::of(file, self.time.as_deref())?, lines };
+        let rest = self.rest(file, &frames, how)?;
+        Ok((Frames { frames, log, rest }, outliers, missing))
     }
 
     /// Frames of `file` without the `unused` inputs, the indices of their lines, and the lines that lack a value.
@@ -323,6 +368,7 @@ impl DataArguments {
         frames: &Dataset,
         unused: &UnusedInputs,
         digest: u64,
+        how: HowToTrain,
     ) -> Result<Judged> {
         let path = match judged {
             JudgedBy::None => return Ok(Judged::None),
@@ -334,14 +380,13 @@ impl DataArguments {
             let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
-        let (own, ..) = self.usual_frames(&file, unused)?;
-        let names = |frames: &Dataset| (frames.inputs.names.clone(), frames.outputs.names.clone());
-        if names(&own) != names(frames) {
+        let (own, ..) = self.usual_frames(&file, unused, how)?;
+        if own.frames.names() != frames.names() {
             let message = "its columns are not those of the frames to train on: give a file with the same columns, \
                            in the same order (--test)";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
-        Ok(Judged::File { frames: own, name: path.display().to_string() })
+        Ok(Judged::File { frames: Box::new(own), name: path.display().to_string() })
     }
 }
 

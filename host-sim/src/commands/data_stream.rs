@@ -2,18 +2,19 @@
 
 use std::path::Path;
 
-use crate::measurements::{Measurements, relative_to};
+use crate::measurements::{Log, Measurements};
 use crate::verdict::Warning;
 use crate::{Error, Result};
+use taxel_data::clock::Clock;
 use taxel_data::data_file::pieces::Pieces;
 use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::digest::TableDigest;
 use taxel_data::error::Problem;
 use taxel_data::mat::Mat;
-use taxel_data::table::Table;
-use taxel_learn::Options;
+use taxel_data::rest::Rest;
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::resolution;
+use taxel_learn::{Options, relative};
 
 use super::data_argument::{DataArguments, HowToTrain, name_cells, with_options};
 use super::{data_file, data_notes, refused_readings, stderr};
@@ -35,7 +36,7 @@ pub struct DataStream {
     pieces: Pieces,
     selection: Selection,
     /// Readings of the untouched sensor, if inputs are relative to their mean.
-    rest: Option<Table>,
+    rest: Option<Rest>,
     /// Frames that were read after the first ones.
     held: Option<Dataset>,
     /// Lines that were read, and those with a missing value.
@@ -81,7 +82,7 @@ impl DataStream {
     /// Frames as a network is given them.
     fn given(&self, frames: Dataset) -> Dataset {
         match &self.rest {
-            Some(rest) => relative_to(frames, rest),
+            Some(rest) => relative::dataset(frames, &rest.baselines(&[])),
             None => frames,
         }
     }
@@ -174,7 +175,7 @@ impl DataArguments {
         refused_readings::note(&first.inputs, &path.display().to_string());
         resolution::check(&first)
             .map_err(|refusal| Error::Unfit { path: path.clone(), message: refusal.to_string() })?;
-        let rest = self.rest(&first.inputs)?;
+        let rest = self.rest_of_file(&first.inputs)?;
         stream.rest = rest.clone().filter(|_| how.relative_inputs);
         let training = stream.given(first);
         let frames = training.frames();
@@ -182,10 +183,20 @@ impl DataArguments {
         let enough = Warning::enough_frames_for(training.fewest_values(), inputs);
         let centres = Options::default().centres.min(enough);
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
+        // Lines are not kept, so their times are not known.
+        let log = Log { clock: Clock { column: None, unit: "", at: vec![] }, lines: vec![] };
         let measurements = Measurements {
             name: if path.as_os_str() == "standard input" { "data".into() } else { name.into() },
             digest: 0,
-            fold_of: if how.refine { self.folds_of(frames, how.seed)? } else { vec![0; frames] },
+            fold_of: if how.refine {
+                self.folds_of(&training.outputs, how.seed)?
+            } else {
+                vec![0; frames]
+            },
+            folds_flatter: false,
+            log: log.clone(),
+            test_log: log,
+            test_baselines: None,
             test: training.subset(&[]),
             test_readings: training.inputs.clone(),
             test_choice: "none".into(),

@@ -16,7 +16,8 @@ use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 use super::arguments::exponential;
 use super::data_file::DataFileArguments;
 use super::health::{Health, HealthArguments};
-use super::readings::{BaselineArgument, model_inputs};
+use super::readings::{model_inputs, related};
+use super::rest_argument::UntouchedArguments;
 use super::{Common, print, stderr};
 
 /// Decode readings from a data file, one line of estimates a line.
@@ -50,7 +51,7 @@ pub struct Arguments {
     #[arg(long)]
     confidence: bool,
     #[command(flatten)]
-    baseline: BaselineArgument,
+    untouched: UntouchedArguments,
     #[command(flatten)]
     health: HealthArguments,
     /// Exponential of the activations.
@@ -76,20 +77,26 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let baseline = arguments.baseline.baseline.as_ref().unwrap_or(&arguments.readings);
+    let baseline = arguments.untouched.path().unwrap_or(&arguments.readings);
     let read = [&*arguments.model, &arguments.readings, baseline];
     print::check_output(&arguments.output, &read)?;
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
-    let model = arguments.baseline.apply(model, &arguments.model, fields, limits)?;
     let file = if arguments.keep.is_empty() {
         arguments.file.read(&arguments.readings)?
     } else {
         arguments.file.read_with_text(&arguments.readings)?
     };
+    let parsed = blob.parse();
+    let metadata = parsed.metadata();
+    let rest = arguments.untouched.rest_if_relative(&file, metadata, limits)?;
+    let log = (rest.as_ref(), file.lines());
+    let baselines =
+        arguments.untouched.baselines(metadata, &arguments.model, log, fields, limits)?;
     let mut readings = model_inputs(&model, &file)?;
     let health = arguments.health.apply(&model, &mut readings)?;
+    let (model, readings) = related(model, readings, baselines.as_ref());
     remark_on_range(&model, &readings);
     let estimate = model.decode_table(&readings);
     let keep = kept(arguments, &file, &estimate)?;

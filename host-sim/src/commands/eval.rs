@@ -6,21 +6,25 @@ use crate::by_depth::{DepthErrors, by_depth};
 use crate::evaluate::confidence::{Coverage, coverage};
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
+use crate::measurements::Log;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::over_time::{self, Decoded, OverTime, RestOverTime};
 use crate::report::{self, Made, View};
 use crate::verdict::{Verdict, Warning};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
+use taxel_data::clock::Clock;
 use taxel_data::output;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
 use super::arguments::exponential;
 use super::coverage_page;
-use super::data_file::DataFileArguments;
+use super::data_file::{DATA_FILES, DataFileArguments};
 use super::health::{Health, HealthArguments};
-use super::readings::{BaselineArgument, model_inputs, table_of};
+use super::readings::{model_inputs, related, table_of};
+use super::rest_argument::UntouchedArguments;
 use super::{Common, command_line, print};
 
 /// Evaluate a model on a CSV file of readings and true outputs.
@@ -39,9 +43,12 @@ pub struct Arguments {
     /// CSV file, .npy or .npz with the model's reading and output columns.
     data: PathBuf,
     #[command(flatten)]
-    baseline: BaselineArgument,
+    untouched: UntouchedArguments,
     #[command(flatten)]
     health: HealthArguments,
+    /// Column with the time of each line [default: one called time, t, timestamp, …; without one lines are counted].
+    #[arg(long, value_name = "NAME", help_heading = DATA_FILES)]
+    time: Option<String>,
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
@@ -73,6 +80,8 @@ struct Summary {
     decoders: Vec<DecoderErrors>,
     /// Errors of the model by the depth of the contact, if that is an output.
     by_depth: Vec<DepthErrors>,
+    /// Errors and readings at rest by time; `None` if lines are in no order of time.
+    over_time: Option<OverTime>,
     /// What the intervals of a model with a confidence cover; empty without one.
     coverage: Vec<Coverage>,
     /// Share of the frames without missing readings that a model with a confidence finds novel.
@@ -83,19 +92,31 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(html) = &arguments.html {
         let inputs: Vec<&Path> = [arguments.model.as_path(), arguments.data.as_path()]
             .into_iter()
-            .chain(arguments.baseline.baseline.as_deref())
+            .chain(arguments.untouched.path())
             .collect();
         print::check_output(html, &inputs)?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
-    let model = arguments.baseline.apply(model, &arguments.model, fields, limits)?;
     let file = arguments.file.read(&arguments.data)?;
+    let parsed = blob.parse();
+    let metadata = parsed.metadata();
     let mut readings = model_inputs(&model, &file)?;
-    let health = arguments.health.apply(&model, &mut readings)?;
-    let metadata = model.model().metadata();
     let mut truth = table_of(&file, metadata.output_names.iter())?;
+    let clock = Clock::of(&file, arguments.time.as_deref())?;
+    let log = Log { clock, lines: (0..file.lines()).collect() };
+    let rest = if over_time::is_log(&log, &truth) {
+        arguments.untouched.rest(&file, metadata, limits)?
+    } else {
+        arguments.untouched.rest_if_relative(&file, metadata, limits)?
+    };
+    let of_lines = (rest.as_ref(), file.lines());
+    let baselines =
+        arguments.untouched.baselines(metadata, &arguments.model, of_lines, fields, limits)?;
+    let health = arguments.health.apply(&model, &mut readings)?;
+    let at_rest = rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &readings));
+    let (model, readings) = related(model, readings, baselines.as_ref());
     let estimate = model.decode_table(&readings);
     let thickness_mm = f64::from(metadata.thickness_mm);
     let measure = Measure {
@@ -108,6 +129,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         *truth = if estimate.is_nan() { f64::NAN } else { *truth };
     }
     let means = truth.means().repeat(truth.len());
+    let judged = Decoded { log: &log, outputs: &truth, estimates: &estimate.values };
+    let over_time = OverTime::new(None, &judged, at_rest);
     let errors = metrics::by_group(&truth, &estimate.values, &measure);
     if errors.iter().all(|group| group.count == 0) {
         return Err(Error::Unfit {
@@ -119,16 +142,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let (deviations, novelty) = model.assess(&readings.values).unzip();
     let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
-    let percent_novel = novelty.as_deref().map(|novelty: &[f64]| {
-        let told = novelty.iter().filter(|novelty| !novelty.is_nan()).count();
-        100.0 * novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / told.max(1) as f64
-    });
-    // A frame counts if any of its values does.
-    let counts = |(truth, estimate): (&[f64], &[f64])| {
-        truth.iter().zip(estimate).any(|(a, b)| !(a - b).is_nan())
-    };
+    let percent_novel = novelty.map(|novelty| percent_novel(&novelty));
+    // A frame counts if any of its values does; what could not be decoded is missing in both.
     let frames_evaluated =
-        truth.lines().zip(estimate.lines()).filter(|(a, b)| counts((a, b))).count();
+        truth.lines().filter(|line| line.iter().any(|value| !value.is_nan())).count();
     let names: Vec<&str> =
         metadata.input_names.iter().chain(metadata.output_names.iter()).collect();
     let same_file =
@@ -136,11 +153,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let values_evaluated = errors.iter().map(|group| group.count).sum();
     let of = |decoder: &str, errors| DecoderErrors { decoder: decoder.into(), errors };
     let mean_errors = metrics::by_group(&truth, &means, &measure);
+    let at_rest = over_time.as_ref().and_then(|log| log.rest.as_ref());
+    let drift = at_rest.filter(|_| !metadata.relative_inputs);
     let decoders = vec![of("network", errors), of("mean", mean_errors)];
     let verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
-        .with(Warning::out_of_range(model.share_out_of_range(&readings.values)));
+        .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
+        .with(drift.and_then(Warning::drift));
     let summary = Summary {
         model_file: arguments.model.clone(),
         model_crc: format!("{:08x}", model.model().crc()),
@@ -158,10 +178,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         exponential: arguments.exponential,
         health,
         by_depth: by_depth(&truth, &estimate.values, &measure),
+        over_time,
     };
     if let Some(html) = &arguments.html {
-        let at_rest = arguments.baseline.values(metadata, &arguments.model, fields, limits)?;
-        let reference = at_rest.as_deref().map_or(Reference::Median, Reference::Rest);
+        let reference =
+            if metadata.relative_inputs { Reference::Relative } else { Reference::Median };
         let distribution = Distribution::new(&truth, &estimate, &readings, reference);
         let page = page_of(arguments, &blob, &summary, &distribution)?;
         output::write_bytes(html, page.as_bytes())?;
@@ -170,6 +191,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return print::json(&summary);
     }
     text_of(&summary).print()
+}
+
+/// Share of the frames that are novel, in per cent of those of which it can be told.
+fn percent_novel(novelty: &[f64]) -> f64 {
+    let told = novelty.iter().filter(|novelty| !novelty.is_nan()).count();
+    100.0 * novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / told.max(1) as f64
 }
 
 /// Result for people.
@@ -233,6 +260,7 @@ fn page_of(
         decoders: &summary.decoders,
         limit: &limit,
         by_depth: &summary.by_depth,
+        over_time: summary.over_time.as_ref(),
         distribution,
         frames: summary.frames_evaluated,
         sensor: None,

@@ -58,7 +58,7 @@ impl BaselineArgument {
             (None, false) => Ok(None),
             (None, true) => unfit(
                 "its inputs are readings relative to the baseline: give --baseline FILE, with frames of the \
-                 untouched sensor",
+                 untouched sensor, or a log with columns that are zero while nothing touches it (--rest)",
             ),
             (Some(_), false) => unfit(
                 "its inputs are readings as they are: leave --baseline out, or train with --relative-inputs",
@@ -84,16 +84,22 @@ impl BaselineArgument {
 /// Readings of the untouched sensor in `file`, in the columns of `inputs`, of which every one has a mean to divide by.
 pub fn at_rest(file: &DataFile, inputs: &Table) -> Result<Table> {
     let rest = usual_lines(file, inputs.names.iter().map(String::as_str))?;
+    check_baseline(&rest, &file.path)?;
+    Ok(rest)
+}
+
+/// Error unless every column of the readings at `rest`, from the file at `path`, has a mean to divide by.
+pub fn check_baseline(rest: &Table, path: &Path) -> Result<()> {
     let missing = unusable(&rest.mean_line());
     if missing.is_empty() {
-        return Ok(rest);
+        return Ok(());
     }
     let names = columns::some_names(&missing);
     let message = format!(
         "no baseline for {names}: a mean that is missing or zero; give frames in which every input has a reading, \
          or choose others with --inputs"
     );
-    Err(Error::Unfit { path: file.path.clone(), message })
+    Err(Error::Unfit { path: path.into(), message })
 }
 
 /// One line: the mean of each of the columns called `names` in `file`, of readings within the `limits`.
@@ -122,6 +128,18 @@ fn unusable(baseline: &Table) -> Vec<String> {
     let ratios = relative::inputs(baseline, baseline);
     let columns = ratios.values.iter().zip(&baseline.names);
     columns.filter(|(ratio, _)| ratio.is_nan()).map(|(_, name)| name.clone()).collect()
+}
+
+/// Model and what it is given of `readings`: their ratios to the `baselines`, if it has any.
+pub fn related<'b>(
+    model: PreparedModel<'b>,
+    readings: Table,
+    baselines: Option<&Table>,
+) -> (PreparedModel<'b>, Table) {
+    match baselines {
+        Some(baselines) => (model.of_inputs(), relative::inputs(&readings, baselines)),
+        None => (model, readings),
+    }
 }
 
 /// Columns of `file` with the model's readings.

@@ -209,7 +209,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         fill: model.fill().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: model_outputs::of(&model),
-        worth: Worth::new(&subject, &set, &blob, selection.as_ref()),
+        worth: Worth::new(&subject, &set, &blob, selection.as_ref(), &options),
         selection,
         learning_curve,
         outliers: match recursion {

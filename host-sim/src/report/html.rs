@@ -7,7 +7,7 @@ use super::figures::Figure;
 use super::format::{grouped, significant, symbol};
 use super::svg::escape;
 use super::view::View;
-use super::{errors, frames, sketch, sweep, tables};
+use super::{errors, frames, over_time, sketch, sweep, tables};
 
 /// Body of a page, which numbers its figures and tables, and lists its headings.
 #[derive(Default)]
@@ -56,6 +56,13 @@ pub fn page(view: &View<'_>) -> String {
     let mut body = Body::default();
     let face = Face::of_electrodes(view.distribution, view.sensor);
     error_section(&mut body, view, face.as_ref());
+    if let Some(log) = view.over_time {
+        body.heading("time", "Over time");
+        body.figure(&over_time::errors(log));
+        if let Some(rest) = &log.rest {
+            body.figure(&over_time::at_rest(log, rest));
+        }
+    }
     frame_section(&mut body, view, face.as_ref());
     if let Some(sensor) = view.sensor {
         body.heading("sensor", "The sensor");

@@ -1,11 +1,13 @@
 //! What the page of a model shows, whichever result it is from.
 
+use taxel_data::columns;
 use taxel_evaluate::by_depth::DepthErrors;
 use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::distribution::Distribution;
 use taxel_evaluate::evaluate::table1::Table1;
 use taxel_evaluate::metrics::{DecoderErrors, LimitSummary};
-use taxel_evaluate::run::{RunResult, SensorSketch};
+use taxel_evaluate::over_time::OverTime;
+use taxel_evaluate::run::{DataSummary, RunResult, SensorSketch};
 use taxel_evaluate::verdict::Verdict;
 
 use super::format::{grouped, percent};
@@ -35,6 +37,8 @@ pub struct View<'a> {
     pub limit: &'a LimitSummary,
     /// Errors by the depth of the contact; empty for other outputs.
     pub by_depth: &'a [DepthErrors],
+    /// Errors and readings at rest by time, of a log.
+    pub over_time: Option<&'a OverTime>,
     /// Distribution of the model's errors.
     pub distribution: &'a Distribution,
     /// Number of frames that were decoded.
@@ -65,6 +69,7 @@ impl<'a> View<'a> {
             decoders: &result.decoders,
             limit: &result.limit,
             by_depth: &result.by_depth,
+            over_time: result.data.as_ref().and_then(|data| data.over_time.as_ref()),
             distribution: &result.distribution,
             frames: result.model.test_frames,
             sensor: scene.and_then(|scene| scene.sensor.as_ref()),
@@ -96,7 +101,7 @@ fn facts(result: &RunResult, noise: Option<&str>) -> Vec<(&'static str, String)>
     let others = result.data.as_ref().map_or("new ones", |data| data.test_choice.as_str());
     let refined = if model.refined { " (refined)" } else { "" };
     let plural = if model.networks == 1 { "" } else { "s" };
-    vec![
+    let mut facts = vec![
         (kind, format!("{}, digest {}, seed {}", result.subject, result.scene_digest, result.seed)),
         ("Readings", format!("{}{drift}", noise.unwrap_or("as measured"))),
         (
@@ -117,5 +122,37 @@ fn facts(result: &RunResult, noise: Option<&str>) -> Vec<(&'static str, String)>
             ),
         ),
         ("Blob", format!("{} bytes, CRC-32 {}", grouped(model.blob_bytes), model.model_crc)),
-    ]
+    ];
+    facts.extend(result.data.iter().flat_map(left_out));
+    facts
+}
+
+/// Lines and inputs of a data file that a model was not trained on.
+fn left_out(data: &DataSummary) -> Vec<(&'static str, String)> {
+    let (missing, unused) = (&data.lines_left_out, &data.unused_inputs);
+    let outliers = if data.outliers.left_out { data.outliers.lines } else { 0 };
+    let lines = [
+        (missing.without_reading, "lack a reading"),
+        (missing.without_output, "lack all outputs"),
+        (outliers, "hold a value far from all others"),
+    ];
+    let lines = lines.iter().filter(|(count, _)| *count > 0);
+    let lines: Vec<String> =
+        lines.map(|(count, why)| format!("{} {why}", grouped(*count))).collect();
+    let twins: Vec<String> =
+        unused.duplicated.iter().map(|(name, of)| format!("{name} = {of}")).collect();
+    let inputs = [
+        (&unused.dead, "without values"),
+        (&unused.constant, "never change"),
+        (&twins, "are copies"),
+    ];
+    let inputs = inputs.iter().filter(|(names, _)| !names.is_empty());
+    let inputs: Vec<String> =
+        inputs.map(|(names, why)| format!("{} ({why})", columns::some_names(names))).collect();
+    let facts = [("Lines left out", lines), ("Inputs left out", inputs)];
+    facts
+        .into_iter()
+        .filter(|(_, of)| !of.is_empty())
+        .map(|(what, of)| (what, of.join("; ")))
+        .collect()
 }

@@ -129,8 +129,13 @@ fn a_csv_file_with_frames_at_rest_has_a_gate() {
     folder.write("rest.csv", format!("ch1,ch2,f_n\n{rest}"));
     let gate =
         ["gate", "touched.csv", "--inputs", "ch*", "--outputs", "f_n", "--no-refine", "--k", "3.5"];
-    let missing = folder.fail(&gate, 2);
+    let missing = folder.fail(&[&gate[..], &["--rest", "none"]].concat(), 2);
     assert!(missing.contains("--baseline FILE"), "{missing}");
+    // Lines at rest do as well.
+    let own: serde_json::Value =
+        serde_json::from_str(&folder.succeed(&[&gate[..], &["--json"]].concat())).unwrap();
+    let noise = own["noise_level"].as_f64().unwrap();
+    assert!((0.0045..0.0055).contains(&noise), "{noise}");
     let both = [&gate[..], &["--baseline", "rest.csv"]].concat();
     let result: serde_json::Value =
         serde_json::from_str(&folder.succeed(&[&both[..], &["--json"]].concat())).unwrap();

@@ -21,6 +21,7 @@ mod json_schema;
 mod limit;
 mod manners;
 mod mat;
+mod log;
 mod measured;
 #[cfg(unix)]
 mod output;

@@ -35,7 +35,7 @@ fn shells_learn_every_command_and_manuals_every_option() {
     let folder = Folder::new("shells");
     for shell in ["bash", "zsh", "fish"] {
         let script = folder.succeed(&["completions", shell]);
-        let known = ["--relative-inputs", "inspect", "fixed16"];
+        let known = ["relative-inputs", "inspect", "fixed16"];
         assert!(known.iter().all(|word| script.contains(word)), "{shell}");
     }
     let page = folder.succeed(&["man"]);

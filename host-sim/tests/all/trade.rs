@@ -489,8 +489,8 @@ fn measurements_are_traded_as_they_are() {
         assert!(stderr.contains(&format!("{option} {value}: ")), "{stderr}");
         assert_eq!(stderr.contains("choose --inputs"), option == "--column-step", "{stderr}");
     }
-    let gated = folder.fail(&[&other[..], &["--gate", "3"]].concat(), 2);
-    assert!(gated.contains("--baseline FILE"), "{gated}");
+    let gated = folder.fail(&[&other[..], &["--gate", "3", "--rest", "none"]].concat(), 2);
+    assert!(gated.contains("--baseline FILE") && gated.contains("--rest"), "{gated}");
 }
 
 #[test]

@@ -6,11 +6,12 @@ use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
 use taxel_learn::decoders::{BASELINES, mean};
 use taxel_learn::select::Selection;
-use taxel_learn::{Exponential, ModelBlob};
+use taxel_learn::{Exponential, ModelBlob, Options};
 use taxel_limit::Refusal;
 use taxel_simulate::Synthesis;
 
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::over_time::RestOverTime;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use crate::verdict::{Verdict, Warning};
@@ -54,13 +55,14 @@ pub struct Worth {
 }
 
 impl Worth {
-    /// Worth of the model in `blob`, trained on `set` of `subject`. A `selection` of
-    /// its options has errors on held-out folds.
+    /// Worth of the model in `blob`, trained with `options` on `set` of `subject`. A `selection` of
+    /// these has errors on held-out folds.
     pub fn new(
         subject: &Subject,
         set: &TrainingSet<'_>,
         blob: &ModelBlob,
         selection: Option<&Selection>,
+        options: &Options,
     ) -> Self {
         let (judged_on, decoders) = match (selection, subject) {
             (Some(selection), _) => (JudgedOn::HeldOutFolds, on_folds(selection, set)),
@@ -83,6 +85,12 @@ impl Worth {
                     .filter(|scene| !scene.is_forward())
                     .and_then(|_| Warning::not_positive(&set.frames.inputs)),
             );
+        let verdict = match subject {
+            Subject::Measured(data) => {
+                verdict.of_data(data, RestOverTime::of_data(data, options).as_ref())
+            }
+            Subject::Scene(_) => verdict,
+        };
         Self { judged_on, decoders, verdict }
     }
 }

@@ -4,10 +4,13 @@ use firmware::capacity::Capacity;
 use model_core::blob::Model;
 use model_core::rbf::Format;
 use serde::Serialize;
+use taxel_data::error::cut;
 use taxel_data::table::Table;
 use taxel_learn::cost::{Design, NetworkDesign};
 use taxel_learn::outliers::Outliers;
 use taxel_rig::image;
+
+use crate::over_time::{PercentOf, RelativeTrial, RestOverTime};
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB.
 pub const SLOT_BYTES: usize = 131_072;
@@ -154,6 +157,37 @@ impl Warning {
         })
     }
 
+    /// Readings at rest that drift, and whether relative inputs help, if they were tried.
+    pub fn drift(rest: &RestOverTime) -> Option<Self> {
+        /// Most columns that are named.
+        const NAMED: usize = 3;
+        Self::when(!rest.drifts.is_empty(), "drift-at-rest", || {
+            let of = match rest.percent_of {
+                PercentOf::Rest => "",
+                PercentOf::Range => " of its range",
+            };
+            let named = rest.drifts.iter().take(NAMED);
+            let named: Vec<String> = named
+                .map(|drift| format!("{} by {:.1} %{of}", cut(&drift.column), drift.percent))
+                .collect();
+            let count = match rest.drifts.len() {
+                1 => "an input drifts".to_owned(),
+                count => format!("{count} of {} inputs drift", rest.readings),
+            };
+            let tried = tried(rest.relative_trial.as_ref());
+            format!("at rest, {count} {}: {}{tried}", rest.span, named.join(", "))
+        })
+    }
+
+    /// Folds that were drawn at random from a log.
+    pub fn folds_flatter(due: bool) -> Option<Self> {
+        Self::when(due, "random-folds-of-a-log", || {
+            "successive lines resemble each other, so that random folds flatter every candidate: leave --folds out for blocks of \
+             lines, or give --fold-column"
+                .into()
+        })
+    }
+
     /// Blob of more `bytes` than a slot holds, of a model of this `design`, and what makes it fit.
     pub fn larger_than_slot(bytes: usize, design: &Design) -> Option<Self> {
         Self::when(bytes > SLOT_BYTES, "larger-than-slot", || {
@@ -189,6 +223,27 @@ impl Warning {
             )
         })
     }
+}
+
+/// What the trial of relative inputs says to do.
+fn tried(trial: Option<&RelativeTrial>) -> String {
+    /// Share of the error below which relative inputs are proposed.
+    const WORTH: f64 = 0.95;
+    let Some(trial) = trial else { return String::new() };
+    let errors = |rmse: &[f64]| {
+        let errors = rmse.iter().map(|rmse| format!("{rmse:.3}"));
+        errors.collect::<Vec<_>>().join(", ")
+    };
+    if trial.ratio >= WORTH {
+        return "; --relative-inputs was tried, and does not help".into();
+    }
+    let gain = 100.0 * (1.0 - trial.ratio);
+    format!(
+        "; use --relative-inputs: in a trial it lowered errors by {gain:.0} % (RMSE of {}: {} instead of {})",
+        trial.groups.join(", "),
+        errors(&trial.relative_rmse),
+        errors(&trial.rmse)
+    )
 }
 
 /// Features that are proposed for one network behind a projection: what most sensors need.

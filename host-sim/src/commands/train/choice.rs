@@ -42,7 +42,7 @@ pub fn choose(
     }
     let fold_of = match subject {
         Subject::Measured(data) => data.fold_of.clone(),
-        Subject::Scene(_) => arguments.subject.data.folds_of(set.frames.frames(), options.seed)?,
+        Subject::Scene(_) => arguments.subject.data.folds_of(&set.frames.outputs, options.seed)?,
     };
     let selection = select::cross_validate(
         &set.frames,

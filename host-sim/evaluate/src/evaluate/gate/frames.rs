@@ -114,11 +114,12 @@ impl Rest {
     /// [`BadValue`] for a sensor that is not known at rest, has no noise there or readings near zero, or the first
     /// tolerance that makes no gate.
     pub fn new(data: &Measurements, k: &[f64]) -> Result<Self, BadValue> {
-        let rule = "a gate compares readings with those at rest: give --baseline FILE, with two frames of the \
-                    untouched sensor or more without a missing reading, and no channel that is zero at rest";
-        let at_rest = data.rest.as_ref().map(complete).filter(|rest| rest.len() > 1);
+        let rule = "a gate compares readings with those at rest: name columns that are zero there (--rest), or give \
+                    --baseline FILE, with two frames of the untouched sensor or more without a missing reading, and no channel that is zero at rest";
+        let at_rest =
+            data.rest.as_ref().map(|rest| complete(&rest.readings)).filter(|rest| rest.len() > 1);
         let (Some(rest), Some(noise_level)) = (&at_rest, data.noise_level()) else {
-            let frames = data.rest.as_ref().map_or(0, |rest| complete(rest).len());
+            let frames = data.rest.as_ref().map_or(0, |rest| complete(&rest.readings).len());
             return Err(BadValue::new("complete frames at rest", frames, rule));
         };
         if noise_level <= 0.0 {

@@ -1,0 +1,187 @@
+//! Time in a log: when each line was written, and whether lines resemble their neighbours.
+
+use crate::columns;
+use crate::data_file::DataFile;
+use crate::error::{Error, Problem, Result};
+use crate::table::Table;
+
+/// Names of columns that hold the time, without a unit and in lower case.
+const NAMES: [&str; 8] =
+    ["time", "t", "timestamp", "time_stamp", "stamp", "datetime", "date_time", "clock"];
+
+/// Units of time, with their length in seconds.
+const UNITS: [(&str, f64); 5] =
+    [("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("min", 60.0)];
+
+/// Least numbers of a clock that counts from 1970, with the length of its unit in seconds: those of September 2001.
+const SINCE_1970: [(f64, f64); 4] = [(1e18, 1e-9), (1e15, 1e-6), (1e12, 1e-3), (1e9, 1.0)];
+
+/// Share of what shuffled lines would change by, below which neighbours are alike.
+const ALIKE: f64 = 0.5;
+
+/// When each line of a log was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clock {
+    /// Column with the time; `None` if the log has none, and lines are counted.
+    pub column: Option<String>,
+    /// Unit of the times: `s` since the first line; "" for a column of which it is not known, and for numbers of lines.
+    pub unit: &'static str,
+    /// Time of each line of the file; of a log without times the line's number, header included.
+    pub at: Vec<f64>,
+}
+
+impl Clock {
+    /// Clock of `file`: the column called `name`, or one that is called so (`time_s`, `timestamp`) and never decreases, or
+    /// the numbers of the lines.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a `name` without a column, and for times that are missing or decrease.
+    pub fn of(file: &DataFile, name: Option<&str>) -> Result<Self> {
+        if let Some(name) = name {
+            let column = file.column(name)?;
+            let times = times(file, column);
+            if let Some(at) = first_wrong(&times) {
+                return Err(Error::file(&file.path, wrong(name, &times, at, file.line_number(at))));
+            }
+            return Ok(Self::of_column(file, column, times));
+        }
+        let is_time = |name: &str| {
+            let bare = columns::without_unit(name).to_lowercase();
+            let unit = columns::unit_of(name);
+            NAMES.contains(&bare.as_str())
+                && (unit.is_empty() || UNITS.iter().any(|(known, _)| *known == unit))
+        };
+        let named = file.header.iter().enumerate().filter(|(_, name)| is_time(name));
+        for (column, _) in named {
+            let times = times(file, column);
+            if first_wrong(&times).is_none() && times.first() < times.last() {
+                return Ok(Self::of_column(file, column, times));
+            }
+        }
+        let at = (0..file.lines()).map(|line| file.line_number(line) as f64).collect();
+        Ok(Self { column: None, unit: "", at })
+    }
+
+    fn of_column(file: &DataFile, column: usize, mut at: Vec<f64>) -> Self {
+        let name = &file.header[column];
+        let first = at.first().copied().unwrap_or(0.0);
+        let unit = columns::unit_of(name);
+        let stated = UNITS.iter().find(|(known, _)| *known == unit).map(|(_, seconds)| *seconds);
+        let since_1970 = || SINCE_1970.iter().find(|(least, _)| first >= *least);
+        let seconds = stated.or_else(|| since_1970().map(|(_, seconds)| *seconds));
+        if let Some(seconds) = seconds {
+            at.iter_mut().for_each(|time| *time = (*time - first) * seconds);
+        }
+        Self { column: Some(name.clone()), unit: if seconds.is_some() { "s" } else { "" }, at }
+    }
+
+    /// What lies between two times, in words: `in 9.6 minutes`, or from where to where.
+    pub fn span(&self, from: f64, to: f64) -> String {
+        match (&self.column, self.unit) {
+            (_, "s") if to - from >= 90.0 => format!("in {:.1} minutes", (to - from) / 60.0),
+            (_, "s") => format!("in {:.3} s", to - from),
+            (Some(column), _) => format!("from {column} {from} to {to}"),
+            (None, _) => format!("from line {from} to line {to}"),
+        }
+    }
+}
+
+fn times(file: &DataFile, column: usize) -> Vec<f64> {
+    (0..file.lines()).map(|line| file.value(line, column)).collect()
+}
+
+/// First line whose time is missing, or before that of the line above.
+fn first_wrong(times: &[f64]) -> Option<usize> {
+    let mut last = f64::NEG_INFINITY;
+    times.iter().position(|time| {
+        let is_wrong = time.is_nan() || *time < last;
+        last = *time;
+        is_wrong
+    })
+}
+
+/// What is wrong with the time in this `line` of the column called `name`.
+fn wrong(name: &str, times: &[f64], at: usize, line: u64) -> Problem {
+    if times[at].is_nan() {
+        let rule = format!("column {name:?}: every line needs a time; fill it in");
+        return Problem::MissingValue { line, rule };
+    }
+    let [value, before] = [at, at - 1].map(|at| times[at].to_string());
+    Problem::ClockSetBack { line, column: name.into(), value, before }
+}
+
+/// Whether successive lines of `outputs` resemble each other, as those of a log do and those in random order do not: the
+/// mean squared difference of neighbours is below half of what it is for shuffled lines, twice the variance (von Neumann,
+/// Ann. Math. Stat. 12, 1941), in the mean over the columns.
+pub fn neighbours_alike(outputs: &Table) -> bool {
+    let ratios: Vec<f64> = (0..outputs.names.len())
+        .filter_map(|column| {
+            let values = outputs.lines().map(|line| line[column]).filter(|value| !value.is_nan());
+            let values: Vec<f64> = values.collect();
+            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+            let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+            let steps: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+            (squares > 0.0).then(|| steps / (2.0 * squares))
+        })
+        .collect();
+    !ratios.is_empty() && ratios.iter().sum::<f64>() / (ratios.len() as f64) < ALIKE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data_file::Reading;
+    use std::path::Path;
+
+    fn clock(text: &str, name: Option<&str>) -> Result<Clock> {
+        let file = DataFile::parse(Path::new("log.csv"), text.as_bytes(), &Reading::default())?;
+        Clock::of(&file, name)
+    }
+
+    #[test]
+    fn times_are_seconds_since_the_first_line_where_their_unit_is_known() {
+        for text in [
+            "time_ms,a\n500,1\n1500,2\n2500,3\n",
+            "a,Timestamp\n1,2026-11-01 00:00:00.0\n2,2026-11-01 00:00:01.0\n3,2026-11-01 00:00:02.0\n",
+            "stamp,a\n1700000000000,1\n1700000001000,2\n1700000002000,3\n",
+            "t (s),a\n7,1\n8,2\n9,3\n",
+        ] {
+            let clock = clock(text, None).unwrap();
+            assert_eq!((clock.unit, &clock.at[..]), ("s", &[0.0, 1.0, 2.0][..]), "{text}");
+            assert_eq!(clock.span(0.0, 2.0), "in 2.000 s");
+            assert_eq!(clock.span(0.0, 120.0), "in 2.0 minutes");
+        }
+    }
+
+    #[test]
+    fn a_log_without_times_counts_its_lines() {
+        // A temperature, times that go back, and one that stands still.
+        for text in ["t_degC,a\n1,1\n2,2\n", "time,a\n2,1\n1,2\n", "time,a\n1,1\n1,2\n"] {
+            let clock = clock(text, None).unwrap();
+            assert_eq!((clock.column.as_deref(), &clock.at[..]), (None, &[2.0, 3.0][..]), "{text}");
+            assert_eq!(clock.span(2.0, 3.0), "from line 2 to line 3");
+        }
+        let unknown = clock("time,a\n5,1\n7,2\n", None).unwrap();
+        assert_eq!((unknown.unit, unknown.span(5.0, 7.0).as_str()), ("", "from time 5 to 7"));
+    }
+
+    #[test]
+    fn a_column_that_is_named_must_hold_times() {
+        assert_eq!(clock("n,a\n5,1\n7,2\n", Some("n")).unwrap().at, [5.0, 7.0]);
+        let refused = clock("n,a\n5,1\n4,2\n", Some("n")).unwrap_err().to_string();
+        assert!(refused.contains("line 3") && refused.contains("4 is earlier than 5"), "{refused}");
+        let refused = clock("n,a\n,1\n5,2\n", Some("n")).unwrap_err().to_string();
+        assert!(refused.contains("line 2: column \"n\": every line needs a time"), "{refused}");
+    }
+
+    #[test]
+    fn neighbours_are_alike_in_a_log_and_not_in_shuffled_lines() {
+        let table = |values: Vec<f64>| Table { names: vec!["f_n".into()], values };
+        assert!(neighbours_alike(&table((0..200).map(|i| (f64::from(i) / 9.0).sin()).collect())));
+        assert!(!neighbours_alike(&table((0..200).map(|i| f64::from(i * 37 % 101)).collect())));
+        // Pauses without a value do not count.
+        let gaps = |i: i32| if i % 3 == 0 { (f64::from(i) / 20.0).sin() } else { f64::NAN };
+        assert!(neighbours_alike(&table((0..300).map(gaps).collect())));
+        assert!(!neighbours_alike(&table(vec![1.0; 9])));
+    }
+}

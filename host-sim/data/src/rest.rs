@@ -1,0 +1,188 @@
+//! Lines of a log at which nothing touches the sensor, and the baseline that they make.
+
+use crate::columns;
+use crate::data_file::DataFile;
+use crate::table::Table;
+
+/// Lines at rest whose mean is the baseline: as many as the untouched frames that a device averages.
+pub const BASELINE_LINES: usize = 100;
+/// Share of its largest values below which an output counts as zero.
+const ZERO: f64 = 0.01;
+/// One of so many values is larger than the largest one that counts, since it may be wrong.
+const LARGEST_ONE_IN: usize = 100;
+/// Fewest lines that are taken for the sensor at rest.
+const FEWEST: usize = 10;
+
+/// Units of outputs that are zero while nothing touches the sensor.
+const LOADS: [&str; 16] = [
+    "N", "mN", "kN", "N·m", "N·mm", "mN·m", "g", "kg", "mg", "Pa", "hPa", "kPa", "MPa", "bar",
+    "mbar", "psi",
+];
+/// How names of such outputs begin if they state no unit.
+const LOAD_NAMES: [&str; 7] = ["force", "load", "weight", "pressure", "fx", "fy", "fz"];
+
+/// Whether the output called `name` is zero while nothing touches the sensor: a force, weight or pressure, or how far an
+/// electrode is displaced.
+pub fn is_zero_at_rest(name: &str) -> bool {
+    let unit = columns::unit_of(name);
+    let named = || {
+        let name = name.to_lowercase();
+        LOAD_NAMES.iter().any(|start| name.starts_with(start))
+    };
+    let displaced = columns::row_of(name).is_some() || name.starts_with("contact_depth");
+    LOADS.contains(&unit) || unit == "mm" && displaced || unit.is_empty() && named()
+}
+
+/// Lines of `file` (from 0) at which nothing touches the sensor: all of the `columns`, which are zero there, have a value
+/// within 1 % of their largest, and so have the lines before and after. Without such neighbours in at least ten lines,
+/// lines count by themselves; fewer than ten are none.
+pub fn lines_at_rest(file: &DataFile, columns: &[usize]) -> Vec<usize> {
+    let largest = |column: &usize| {
+        let values = (0..file.lines()).map(|line| file.value(line, *column).abs());
+        let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        values.len().checked_sub(1 + values.len() / LARGEST_ONE_IN).map_or(0.0, |at| values[at])
+    };
+    let bounds: Vec<f64> = columns.iter().map(|column| ZERO * largest(column)).collect();
+    if bounds.is_empty() || bounds.contains(&0.0) {
+        return vec![];
+    }
+    let is_zero = |line: usize| {
+        let mut values = columns.iter().zip(&bounds);
+        values.all(|(column, bound)| file.value(line, *column).abs() <= *bound)
+    };
+    let zero: Vec<bool> = (0..file.lines()).map(is_zero).collect();
+    let at_rest = |reach: usize| -> Vec<usize> {
+        let around = |line: usize| line.saturating_sub(reach)..(line + reach + 1).min(zero.len());
+        (0..zero.len()).filter(|line| zero[around(*line)].iter().all(|zero| *zero)).collect()
+    };
+    let found = [1, 0].into_iter().map(at_rest).find(|lines| lines.len() >= FEWEST);
+    found.unwrap_or_default()
+}
+
+/// Readings of the untouched sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rest {
+    pub readings: Table,
+    /// Lines of the log (from 0, ascending) that they are from; `None` for frames of a file of their own, which serve all
+    /// lines.
+    pub lines: Option<Vec<usize>>,
+}
+
+impl Rest {
+    /// Standard deviation of the noise on each column. Of a log it is told by the differences of successive lines, so that
+    /// a drift does not count.
+    pub fn noise(&self) -> Vec<f64> {
+        let successive = |of_log: &&Vec<usize>| of_log.windows(2).any(|it| it[1] == it[0] + 1);
+        let Some(of_log) = self.lines.as_ref().filter(successive) else {
+            return self.readings.deviations();
+        };
+        let mut sums = vec![(0.0, 0.0); self.readings.names.len()];
+        let pairs = self.readings.lines().zip(self.readings.lines().skip(1));
+        for ((a, b), lines) in pairs.zip(of_log.windows(2)) {
+            if lines[1] == lines[0] + 1 {
+                for ((sum, count), (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+                    (*sum, *count) = (*sum + (b - a) * (b - a), *count + 1.0);
+                }
+            }
+        }
+        sums.into_iter().map(|(sum, count): (f64, f64)| (sum / (2.0 * count)).sqrt()).collect()
+    }
+
+    /// Baseline of each of these `lines` of the log, or one for all of them. It is the mean of the last 100 lines at rest
+    /// before the line, as a device has it that takes a new baseline in every pause. As long as there were fewer, it is the mean
+    /// of the first 100. A missing reading does not count; a column without any has the baseline NaN.
+    pub fn baselines(&self, lines: &[usize]) -> Table {
+        let Some(of_log) = &self.lines else { return self.readings.mean_line() };
+        let columns = self.readings.names.len();
+        // Sums and numbers of values up to each line, so that every mean takes one difference.
+        let mut sums = vec![(0.0, 0_u32); columns];
+        for line in self.readings.lines() {
+            let last = sums.len() - columns;
+            sums.extend_from_within(last..);
+            for ((sum, count), value) in sums[last + columns..].iter_mut().zip(line) {
+                if !value.is_nan() {
+                    (*sum, *count) = (*sum + value, *count + 1);
+                }
+            }
+        }
+        let mean = |line: &usize| {
+            let before = of_log.partition_point(|rest| rest < line);
+            let end = before.max(BASELINE_LINES.min(of_log.len()));
+            let start = end.saturating_sub(BASELINE_LINES);
+            let [from, to] = [start, end].map(|at| &sums[at * columns..(at + 1) * columns]);
+            from.iter().zip(to).map(|((a, before), (b, all))| (b - a) / f64::from(all - before))
+        };
+        let values = lines.iter().flat_map(mean).collect();
+        Table { names: self.readings.names.clone(), values }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data_file::Reading;
+    use std::path::Path;
+
+    fn file(lines: &[[f64; 2]]) -> DataFile {
+        let lines: Vec<String> = lines.iter().map(|[a, f]| format!("{a},{f}\n")).collect();
+        let text = format!("a,f_n\n{}", lines.concat());
+        DataFile::parse(Path::new("log.csv"), text.as_bytes(), &Reading::default()).unwrap()
+    }
+
+    #[test]
+    fn forces_weights_and_deformations_are_zero_at_rest_and_places_are_not() {
+        for name in ["fz_n", "force (N)", "load_g", "p_kPa", "Fz", "weight", "r4e2_dz_mm"] {
+            assert!(is_zero_at_rest(name), "{name}");
+        }
+        for name in ["x_mm", "contact_x_mm", "c5", "temp_degC", "class", "time_s"] {
+            assert!(!is_zero_at_rest(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn lines_at_rest_have_neighbours_at_rest() {
+        let force = |line: usize| match line % 40 {
+            0..20 => 0.001,
+            20 => 0.04,
+            _ => 5.0,
+        };
+        let log = file(&(0..200).map(|line| [1.0, force(line)]).collect::<Vec<_>>());
+        let at_rest = lines_at_rest(&log, &[1]);
+        // 20 is still near zero, and the line before a press is left out.
+        let of_press = at_rest.iter().filter(|line| (40..80).contains(*line)).copied();
+        assert_eq!(of_press.collect::<Vec<_>>(), (41..60).collect::<Vec<_>>());
+        // Lines in random order count by themselves.
+        let force = |line: usize| if line.is_multiple_of(3) { 0.0 } else { 5.0 };
+        let shuffled = file(&(0..90).map(|line| [1.0, force(line)]).collect::<Vec<_>>());
+        assert_eq!(lines_at_rest(&shuffled, &[1]).len(), 30);
+        for none in [vec![[1.0, 0.0]; 50], vec![[1.0, f64::NAN]; 50], vec![[1.0, 5.0]; 50]] {
+            assert_eq!(lines_at_rest(&file(&none), &[1]), [0; 0]);
+        }
+        assert_eq!(lines_at_rest(&log, &[]), [0; 0]);
+    }
+
+    #[test]
+    fn the_baseline_is_that_of_the_pauses_before_a_line() {
+        // 300 lines at rest, of which every one reads its own number.
+        let readings = Table { names: vec!["a".into()], values: (0..300).map(f64::from).collect() };
+        let lines = Some((0..300).map(|line| 2 * line).collect());
+        let log = Rest { readings: readings.clone(), lines };
+        // The first hundred serve all lines among them; line 401 has lines 0 to 400 before it, 201 at rest.
+        assert_eq!(log.baselines(&[0, 50, 401, 900]).values, [49.5, 49.5, 150.5, 249.5]);
+        let apart = Rest { readings, lines: None };
+        assert_eq!(apart.baselines(&[3, 4]).values, [149.5]);
+    }
+
+    #[test]
+    fn a_drift_is_no_noise() {
+        let noise = |line: i32| f64::from(line * 37 % 101) / 101.0;
+        let value = |line: i32| 50.0 * f64::from(line / 100) + noise(line);
+        let readings = Table { names: vec!["a".into()], values: (0..1000).map(value).collect() };
+        // A pause between two drifts: its ends are no successive lines.
+        let lines = (0..1000).map(|line| line + 50 * (line / 100)).collect();
+        let told = |lines| Rest { readings: readings.clone(), lines }.noise()[0];
+        assert!((0.2..0.4).contains(&told(Some(lines))), "{}", told(None));
+        assert!(told(None) > 100.0);
+    }
+}

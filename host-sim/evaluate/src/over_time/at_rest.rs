@@ -1,0 +1,199 @@
+//! Readings of the untouched sensor over time, and which of them drift.
+
+use serde::Serialize;
+use taxel_data::clock::Clock;
+use taxel_data::rest::Rest;
+use taxel_data::table::Table;
+use taxel_learn::Options;
+
+use super::relative_trial::RelativeTrial;
+use super::{cut, is_log};
+use crate::measurements::{Measurements, far_from_zero};
+
+/// Fewest lines of a stretch at rest.
+const LINES_A_STRETCH: usize = 10;
+/// Standard errors by which a reading's means at rest must differ to have drifted.
+const CERTAIN: f64 = 6.0;
+/// Share of a reading's standard deviation over the log that a drift must exceed to be told.
+const NOTICEABLE: f64 = 0.1;
+
+/// What changes of readings at rest are told in per cent of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PercentOf {
+    /// Value of the reading at rest.
+    Rest,
+    /// Range of the reading in the log, where readings are near zero at rest.
+    Range,
+}
+
+/// Readings of the untouched sensor, by time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RestOverTime {
+    /// Number of lines at rest.
+    pub lines: usize,
+    pub percent_of: PercentOf,
+    /// Mean change since the first stretch, in the order of time.
+    pub stretches: Vec<RestStretch>,
+    /// Reading that changes most.
+    pub most: String,
+    /// Readings that drift noticeably, the largest drift first.
+    pub drifts: Vec<ColumnDrift>,
+    /// Number of all readings.
+    pub readings: usize,
+    /// Time between the first stretch and the last, in words: `in 9.6 minutes`.
+    pub span: String,
+    /// What relative inputs would change; `None` if it was not tried.
+    pub relative_trial: Option<RelativeTrial>,
+}
+
+/// Changes of readings at rest in a stretch of time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RestStretch {
+    /// Time of its first and of its last line.
+    pub from: f64,
+    pub to: f64,
+    /// Percentiles 10, 50 and 90 of all readings' changes.
+    pub percentiles_percent: [f64; 3],
+    /// Change of the reading that changes most.
+    pub most_percent: f64,
+}
+
+/// Drift of a reading at rest: the largest difference between means of two stretches.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ColumnDrift {
+    pub column: String,
+    pub percent: f64,
+    /// Times of these stretches, the earlier one first.
+    pub from: f64,
+    pub to: f64,
+}
+
+impl RestOverTime {
+    /// Readings at rest of the log in `data`, by time. If they drift, and a model with `options` is given readings as they
+    /// are, relative inputs are tried. `None` if lines are in no order of time, or none is at rest.
+    pub fn of_data(data: &Measurements, options: &Options) -> Option<Self> {
+        let rest = data.rest.as_ref().filter(|_| is_log(&data.log, &data.training.outputs))?;
+        let inputs =
+            if data.test.frames() > 0 { &data.test_readings } else { &data.training.inputs };
+        let mut found = Self::new(rest, &data.log.clock, inputs)?;
+        if !found.drifts.is_empty() {
+            found.relative_trial = RelativeTrial::new(data, options);
+        }
+        Some(found)
+    }
+
+    /// Readings at `rest` by time; `None` if they are of another file, or too few. `inputs` are readings of the log, at rest
+    /// or not.
+    pub fn new(rest: &Rest, clock: &Clock, inputs: &Table) -> Option<Self> {
+        let lines = rest.lines.as_ref()?;
+        let all: Vec<usize> = (0..rest.readings.names.len()).collect();
+        let ranges: Vec<_> = cut(lines.len(), LINES_A_STRETCH).collect();
+        if ranges.len() < 2 {
+            return None;
+        }
+        let means_of = |range: &std::ops::Range<usize>| {
+            rest.readings.part(&range.clone().collect::<Vec<_>>(), &all).means()
+        };
+        let means: Vec<Vec<f64>> = ranges.iter().map(means_of).collect();
+        let (at_rest, deviations) = (rest.readings.means(), inputs.deviations());
+        let percent_of =
+            if far_from_zero(&at_rest, &deviations) { PercentOf::Rest } else { PercentOf::Range };
+        let whole = |column: usize| match percent_of {
+            PercentOf::Rest => at_rest[column].abs(),
+            PercentOf::Range => {
+                let [low, high] = inputs.ranges()[column];
+                high - low
+            }
+        };
+        let whole: Vec<f64> = all.iter().map(|column| whole(*column)).collect();
+        let time = |at: usize| {
+            let range = &ranges[at];
+            [clock.at[lines[range.start]], clock.at[lines[range.end - 1]]]
+        };
+        let drift = |column: usize| {
+            let of_column = |(at, means): (usize, &Vec<f64>)| (means[column], at);
+            let by_mean = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0);
+            let stretches = || means.iter().enumerate().map(of_column);
+            let (low, high) = (stretches().min_by(by_mean)?, stretches().max_by(by_mean)?);
+            let [first, last] = [low.1.min(high.1), low.1.max(high.1)];
+            let percent = 100.0 * (high.0 - low.0) / whole[column];
+            let name = rest.readings.names[column].clone();
+            let (from, to) = (time(first)[0], time(last)[1]);
+            Some((high.0 - low.0, ColumnDrift { column: name, percent, from, to }))
+        };
+        let drifts: Vec<(f64, ColumnDrift)> = all.iter().filter_map(|it| drift(*it)).collect();
+        let most = drifts.iter().enumerate().filter(|(_, (_, it))| it.percent.is_finite());
+        let (most, _) = most.max_by(|(_, a), (_, b)| a.1.percent.total_cmp(&b.1.percent))?;
+        let fewest = ranges.iter().map(ExactSizeIterator::len).min()? as f64;
+        let noise = rest.noise();
+        let mut noticeable: Vec<ColumnDrift> = Vec::new();
+        for (column, (by, drift)) in drifts.into_iter().enumerate() {
+            let certain = CERTAIN * noise[column] / fewest.sqrt();
+            if by > certain && by > NOTICEABLE * deviations[column] && drift.percent.is_finite() {
+                noticeable.push(drift);
+            }
+        }
+        noticeable.sort_by(|a, b| b.percent.total_cmp(&a.percent));
+        let stretch = |(at, now): (usize, &Vec<f64>)| {
+            let change = |column: usize| 100.0 * (now[column] - means[0][column]) / whole[column];
+            let mut changes: Vec<f64> = all.iter().map(|column| change(*column)).collect();
+            changes.retain(|change| change.is_finite());
+            changes.sort_unstable_by(f64::total_cmp);
+            let percentile =
+                |share: usize| changes.get(share * changes.len().saturating_sub(1) / 100).copied();
+            let [from, to] = time(at);
+            RestStretch {
+                from,
+                to,
+                percentiles_percent: [10, 50, 90].map(|it| percentile(it).unwrap_or(f64::NAN)),
+                most_percent: change(most),
+            }
+        };
+        Some(Self {
+            lines: lines.len(),
+            percent_of,
+            stretches: means.iter().enumerate().map(stretch).collect(),
+            most: rest.readings.names[most].clone(),
+            drifts: noticeable,
+            readings: all.len(),
+            span: clock.span(time(0)[0], time(ranges.len() - 1)[1]),
+            relative_trial: None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drift_at_rest_is_told_from_noise() {
+        let clock = Clock {
+            column: Some("time_s".into()),
+            unit: "s",
+            at: (0..400).map(|line| 2.0 * f64::from(line)).collect(),
+        };
+        let lines = || Some((0..400).collect());
+        let noise = |line: usize| (line * 37 % 101) as f64 / 101.0;
+        let names = ["still", "drifts"].map(String::from).to_vec();
+        let line = |line: usize| [500.0 + noise(line), 500.0 + noise(line) + line as f64 / 10.0];
+        let readings = Table { names, values: (0..400).flat_map(line).collect() };
+        let rest = Rest { readings: readings.clone(), lines: lines() };
+        let found = RestOverTime::new(&rest, &clock, &readings).unwrap();
+        assert_eq!((found.percent_of, found.most.as_str()), (PercentOf::Rest, "drifts"));
+        let [drift] = found.drifts.as_slice() else { panic!("{:?}", found.drifts) };
+        // Between means of stretches, of a twentieth each: 38 of 520.
+        assert!((7.2..7.4).contains(&drift.percent), "{}", drift.percent);
+        assert_eq!((drift.from, drift.to), (0.0, 798.0));
+        assert_eq!(found.stretches[0].most_percent, 0.0);
+        // Where a baseline was subtracted, changes are told in per cent of the range.
+        let means = readings.means().into_iter().cycle();
+        let values = readings.values.iter().zip(means).map(|(value, mean)| value - mean).collect();
+        let about_zero = Table { values, ..readings };
+        let rest = Rest { readings: about_zero.clone(), lines: lines() };
+        let found = RestOverTime::new(&rest, &clock, &about_zero).unwrap();
+        assert_eq!(found.percent_of, PercentOf::Range);
+        assert!((90.0..100.0).contains(&found.drifts[0].percent));
+    }
+}

@@ -1,0 +1,168 @@
+//! What the untouched sensor reads: in lines of a log, or in a file of its own.
+
+use std::path::Path;
+
+use crate::{Error, Result};
+use clap::Args;
+use model_core::blob::Metadata;
+use model_core::health::Limits;
+use taxel_data::columns;
+use taxel_data::data_file::DataFile;
+use taxel_data::dataset::Dataset;
+use taxel_data::rest::{self, Rest};
+use taxel_data::table::Table;
+use taxel_learn::health::judge;
+use taxel_learn::outliers;
+
+use super::data_file::{DATA_FILES, FieldArguments};
+use super::readings::{BaselineArgument, table_of};
+use super::stderr;
+
+/// Which lines of a log are those of the untouched sensor.
+#[derive(Args, Default)]
+#[command(next_help_heading = DATA_FILES)]
+pub struct RestArgument {
+    /// Columns of a log that are zero while nothing touches the sensor; lines at which all of them are make the baseline of the
+    /// lines that follow. `none`: no line does [default: outputs of force, weight, pressure and deformation].
+    #[arg(long, value_name = "GLOB", conflicts_with = "baseline")]
+    rest: Option<String>,
+}
+
+impl RestArgument {
+    /// Whether the option was given.
+    pub fn is_given(&self) -> bool {
+        self.rest.is_some()
+    }
+
+    /// Readings of the untouched sensor in `file`, in the columns called `inputs`, if it was at rest in some lines. Unless
+    /// a user named columns, those among the `outputs` tell it. Lines with an outlier do not count.
+    pub fn find<'n>(
+        &self,
+        file: &DataFile,
+        inputs: &[String],
+        outputs: impl Iterator<Item = &'n str>,
+    ) -> Result<Option<Rest>> {
+        let columns = match self.rest.as_deref() {
+            Some("none") => return Ok(None),
+            Some(pattern) => {
+                let columns = columns::select(&file.header, pattern);
+                if let Some(part) = columns::unmatched(&file.header, pattern) {
+                    let known = columns::some_names(&file.header);
+                    let message = format!("--rest: no column matches {part}; there are {known}");
+                    return Err(unfit(&file.path, message));
+                }
+                file.check_numbers(&columns, None)?;
+                columns
+            }
+            None => {
+                let tells =
+                    |name: &&str| rest::is_zero_at_rest(name) && file.column_of_any(name).is_ok();
+                file.columns(outputs.filter(tells))?
+            }
+        };
+        let readings = table_of(file, inputs.iter().map(String::as_str))?;
+        let all: Vec<usize> = (0..inputs.len()).collect();
+        let mut lines = rest::lines_at_rest(file, &columns);
+        lines.retain(|line| !readings.line(*line).iter().any(|reading| reading.is_nan()));
+        let untouched =
+            Dataset { inputs: readings.part(&lines, &all), ..Dataset::empty(vec![], vec![], 1, 0) };
+        let usual = outliers::find(&untouched, |_| 0).kept;
+        let lines: Vec<usize> = usual.into_iter().map(|index| lines[index]).collect();
+        if lines.is_empty() {
+            if self.is_given() {
+                let message = "--rest: no ten lines are within 1 % of zero there, with all readings; name other columns, or \
+                               leave it out";
+                return Err(unfit(&file.path, message.into()));
+            }
+            return Ok(None);
+        }
+        let names: Vec<String> = columns.iter().map(|it| file.header[*it].clone()).collect();
+        stderr::remark(format_args!(
+            "note: {} of {} lines of {} are at rest ({} {} about 0)",
+            lines.len(),
+            file.lines(),
+            file.path.display(),
+            columns::some_names(&names),
+            if names.len() == 1 { "is" } else { "are" },
+        ));
+        let readings = readings.part(&lines, &all);
+        Ok(Some(Rest { readings, lines: Some(lines) }))
+    }
+}
+
+/// What the untouched sensor reads, for a model that decodes a log.
+#[derive(Args)]
+pub struct UntouchedArguments {
+    #[command(flatten)]
+    baseline: BaselineArgument,
+    #[command(flatten)]
+    rest: RestArgument,
+}
+
+impl UntouchedArguments {
+    /// File with frames of the untouched sensor, if it was given.
+    pub fn path(&self) -> Option<&Path> {
+        self.baseline.baseline.as_deref()
+    }
+
+    /// Readings of the untouched sensor as [`rest`](Self::rest) finds them, for nothing but relative inputs.
+    pub fn rest_if_relative(
+        &self,
+        file: &DataFile,
+        metadata: &Metadata<'_>,
+        limits: Option<Limits>,
+    ) -> Result<Option<Rest>> {
+        if metadata.relative_inputs {
+            return self.rest(file, metadata, limits);
+        }
+        self.refuse("the model takes readings as they are")?;
+        Ok(None)
+    }
+
+    /// Error if lines at rest were asked for, which nothing needs: it says `why`.
+    pub fn refuse(&self, why: &str) -> Result<()> {
+        if self.rest.is_given() {
+            return Err(Error::Usage(format!("--rest has no effect: {why}; leave it out")));
+        }
+        Ok(())
+    }
+
+    /// Readings of the untouched sensor in the log `file`, in the columns of a model with this `metadata`. Those outside of
+    /// the `limits` count as missing.
+    pub fn rest(
+        &self,
+        file: &DataFile,
+        metadata: &Metadata<'_>,
+        limits: Option<Limits>,
+    ) -> Result<Option<Rest>> {
+        let inputs: Vec<String> = metadata.input_names.iter().map(String::from).collect();
+        let mut rest = self.rest.find(file, &inputs, metadata.output_names.iter())?;
+        if let Some(rest) = &mut rest {
+            judge(&mut rest.readings, limits);
+        }
+        Ok(rest)
+    }
+
+    /// Baseline of each of so many `lines` of a log, or one for all of them, for the model with this `metadata`, which was
+    /// read from `path`; `None` for a model that needs none. Unless a file was given for it, it is that of the log's own lines
+    /// at `rest`.
+    pub fn baselines(
+        &self,
+        metadata: &Metadata<'_>,
+        path: &Path,
+        (rest, lines): (Option<&Rest>, usize),
+        fields: &FieldArguments,
+        limits: Option<Limits>,
+    ) -> Result<Option<Table>> {
+        if let (Some(rest), true, None) = (rest, metadata.relative_inputs, self.path()) {
+            return Ok(Some(rest.baselines(&(0..lines).collect::<Vec<_>>())));
+        }
+        let names = || metadata.input_names.iter().map(String::from).collect();
+        let baseline = self.baseline.values(metadata, path, fields, limits)?;
+        Ok(baseline.map(|values| Table { names: names(), values }))
+    }
+}
+
+fn unfit(path: &Path, message: String) -> Error {
+    Error::Unfit { path: path.into(), message }
+}

@@ -1,0 +1,175 @@
+//! Logs: lines at rest, readings that drift, and errors over time.
+
+use std::fmt::Write as _;
+
+use serde_json::Value;
+
+use crate::common::Folder;
+use crate::json_schema::{checked, schema};
+
+/// Log of four channels whose gains drift by 5 to 20 % in ten minutes: presses of one second with pauses of one second, ten
+/// lines a second, in which the place is missing.
+fn log(drift: f64) -> String {
+    let mut csv = String::from("time_s,ch1,ch2,ch3,ch4,x_mm,f_n\n");
+    for line in 0..3000_u32 {
+        let (time, press) = (f64::from(line) / 10.0, line / 20);
+        let along = f64::from(line % 20) / 10.0;
+        let x = f64::from(press * 37 % 101) / 101.0;
+        let most = 1.0 + f64::from(press * 53 % 97) / 40.0;
+        let force = if along < 1.0 { most * (std::f64::consts::PI * along).sin() } else { 0.0 };
+        let _ = write!(csv, "{time}");
+        for channel in 0..4 {
+            let near = (-(4.0 * x - f64::from(channel)).powi(2)).exp();
+            let gain = 1.0 + drift * f64::from(channel + 1) / 4.0 * time / 300.0;
+            let noise = f64::from((line * 31 + channel * 17) % 23) / 230.0;
+            let _ = write!(csv, ",{:.3}", gain * (50.0 + 8.0 * force * near + noise));
+        }
+        let place = if force > 0.0 { format!("{x:.4}") } else { String::new() };
+        let _ = writeln!(csv, ",{place},{force:.4}");
+    }
+    csv
+}
+
+const COLUMNS: [&str; 7] =
+    ["--inputs", "ch*", "--outputs", "x_mm,f_n", "--no-refine", "--centres", "32"];
+
+/// RMSE of the force in the first decoder's errors.
+fn force_rmse(document: &Value) -> f64 {
+    let errors = document["decoders"][0]["errors"].as_array().unwrap();
+    errors.iter().find(|it| it["group"] == "f_n").unwrap()["rmse"].as_f64().unwrap()
+}
+
+fn warnings(document: &Value) -> Vec<&str> {
+    let warnings = document["verdict"]["warnings"].as_array().unwrap();
+    warnings.iter().map(|it| it["name"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
+    let folder = Folder::new("log-drift");
+    folder.write("log.csv", log(0.2));
+    let run = [&["run", "log.csv"], &COLUMNS[..]].concat();
+    let plain = checked(&folder, &schema(), &run);
+    assert_eq!(warnings(&plain), ["drift-at-rest"]);
+    let rest = &plain["data"]["over_time"]["rest"];
+    // Eleven lines without force in each of 150 pauses, less the first and the last.
+    assert_eq!((&rest["lines"], &rest["percent_of"]), (&Value::from(1350), &Value::from("rest")));
+    assert_eq!(
+        (&rest["most"], &rest["span"]),
+        (&Value::from("ch4"), &Value::from("in 5.0 minutes"))
+    );
+    let most = rest["drifts"][0]["percent"].as_f64().unwrap();
+    assert!((16.0..18.0).contains(&most), "{most}");
+    let ratio = rest["relative_trial"]["ratio"].as_f64().unwrap();
+    let relative = checked(&folder, &schema(), &[&run[..], &["--relative-inputs"]].concat());
+    let gained = force_rmse(&relative) / force_rmse(&plain);
+    assert!(ratio < 0.7 && gained < 0.7, "{ratio} {gained}");
+    assert_eq!(warnings(&relative), [""; 0]);
+    let words = relative["verdict"]["sentence"].as_str().unwrap();
+    assert!(words.contains("errors at the end of the log"), "{words}");
+    let page = std::fs::read_to_string(folder.path("out/log/report.html")).unwrap();
+    assert!(
+        page.contains("Over time")
+            && page.contains("time in min")
+            && page.contains("ch4 changes most")
+    );
+
+    // A sensor that stays as it was is not warned of.
+    folder.write("still.csv", log(0.0));
+    let still = checked(&folder, &schema(), &[&["run", "still.csv"], &COLUMNS[..]].concat());
+    assert_eq!(warnings(&still), [""; 0]);
+    assert_eq!(still["data"]["over_time"]["rest"]["drifts"], serde_json::json!([]));
+}
+
+#[test]
+fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes() {
+    let folder = Folder::new("log-relative");
+    folder.write("log.csv", log(0.2));
+    let train =
+        [&["train", "log.csv", "--first-share", "0.8", "-o", "m.bin"], &COLUMNS[..]].concat();
+    folder.succeed(&[&train[..], &["--relative-inputs"]].concat());
+    let eval = ["eval", "m.bin", "log.csv", "--last-share", "0.2", "--html", "eval.html"];
+    let judged = checked(&folder, &schema(), &eval);
+    let run = [&["run", "log.csv", "--relative-inputs", "--json"], &COLUMNS[..]].concat();
+    let run: Value = serde_json::from_str(&folder.succeed(&run)).unwrap();
+    let ratio = force_rmse(&judged) / force_rmse(&run);
+    assert!((0.8..1.25).contains(&ratio), "{ratio}");
+    assert!(std::fs::read_to_string(folder.path("eval.html")).unwrap().contains("Over time"));
+    // `decode` has the same baseline, and a file without the force has none.
+    folder.succeed(&["decode", "m.bin", "log.csv", "-o", "estimates.csv"]);
+    let of_force = |name: &str, column: usize| -> Vec<f64> {
+        let text = std::fs::read_to_string(folder.path(name)).unwrap();
+        let fields = text.lines().skip(1).map(|line| line.split(',').nth(column).unwrap().parse());
+        fields.map(Result::unwrap).collect()
+    };
+    let squares: f64 = of_force("log.csv", 6)
+        .iter()
+        .zip(of_force("estimates.csv", 1))
+        .map(|(truth, estimate)| (truth - estimate).powi(2))
+        .sum();
+    assert!((squares / 3000.0).sqrt() < 1.25 * force_rmse(&judged));
+    let text = log(0.2);
+    let without: Vec<&str> = text.lines().map(|line| line.rsplit_once(',').unwrap().0).collect();
+    folder.write("readings.csv", without.join("\n") + "\n");
+    let refused = folder.fail(&["decode", "m.bin", "readings.csv", "-o", "e.csv"], 2);
+    assert!(refused.contains("--baseline FILE") && refused.contains("--rest"), "{refused}");
+    // Another column may tell it.
+    folder.succeed(&["decode", "m.bin", "log.csv", "--rest", "f_n", "-o", "e.csv"]);
+    assert_eq!(of_force("e.csv", 1), of_force("estimates.csv", 1));
+}
+
+#[test]
+fn folds_of_a_log_are_blocks_and_those_of_shuffled_lines_are_not() {
+    let folder = Folder::new("log-folds");
+    let text = log(0.0);
+    folder.write("log.csv", &text);
+    let mut lines: Vec<&str> = text.lines().collect();
+    let mut shuffled: Vec<&str> = (0..3000).map(|i| lines[1 + i * 1237 % 3000]).collect();
+    shuffled.insert(0, lines[0]);
+    lines.clear();
+    folder.write("shuffled.csv", shuffled.join("\n") + "\n");
+    let train = |name: &str, more: &[&str]| -> Vec<u8> {
+        let columns = ["--inputs", "ch*", "--outputs", "f_n", "--centres", "4", "-o", "m.bin"];
+        folder.succeed(&[&["train", name], &columns[..], more].concat());
+        std::fs::read(folder.path("m.bin")).unwrap()
+    };
+    let blocks = train("log.csv", &["--fold-blocks", "5"]);
+    assert_eq!(train("log.csv", &[]), blocks);
+    assert_ne!(train("log.csv", &["--folds", "5"]), blocks);
+    assert_eq!(train("shuffled.csv", &[]), train("shuffled.csv", &["--folds", "5"]));
+    let flattered = folder.succeed(&[
+        "train",
+        "log.csv",
+        "--inputs",
+        "ch*",
+        "--outputs",
+        "f_n",
+        "--centres",
+        "4",
+        "--folds",
+        "5",
+        "--json",
+        "-o",
+        "m.bin",
+    ]);
+    let flattered: Value = serde_json::from_str(&flattered).unwrap();
+    assert_eq!(warnings(&flattered), ["random-folds-of-a-log"]);
+}
+
+#[test]
+fn lines_at_rest_that_are_not_there_are_asked_for() {
+    let folder = Folder::new("log-no-rest");
+    folder.write("log.csv", log(0.0));
+    let train = [&["train", "log.csv", "--relative-inputs", "-o", "m.bin"], &COLUMNS[..]].concat();
+    for (rest, words) in [
+        ("none", "no line is known to be at rest"),
+        ("ch1", "no ten lines are within 1 % of zero"),
+        ("touch", "no column matches touch"),
+    ] {
+        let refused = folder.fail(&[&train[..], &["--rest", rest]].concat(), 2);
+        assert!(refused.contains(words) && refused.contains("--rest"), "{refused}");
+    }
+    let run = [&["run", "log.csv", "--time", "ch2"], &COLUMNS[..]].concat();
+    let refused = folder.fail(&run, 2);
+    assert!(refused.contains("is earlier than"), "{refused}");
+}
