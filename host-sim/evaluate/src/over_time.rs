@@ -73,8 +73,11 @@ impl OverTime {
         let groups = columns::groups(names);
         // Times of another file say nothing beside these.
         let trained = trained.filter(|trained| trained.log.clock == judged.log.clock);
-        let mut errors = trained.map_or(vec![], |it| stretches(it, &groups, false));
-        errors.extend(stretches(judged, &groups, true));
+        // Beside those of training, few fit on a picture.
+        let most = if trained.is_some() { MOST_STRETCHES / 2 } else { MOST_STRETCHES };
+        let mut errors =
+            trained.map_or(vec![], |it| stretches(it, &groups, (false, MOST_STRETCHES)));
+        errors.extend(stretches(judged, &groups, (true, most)));
         Some(Self {
             column: clock.column.clone(),
             unit: clock.unit,
@@ -91,8 +94,12 @@ pub fn is_log(log: &Log, outputs: &Table) -> bool {
     log.clock.column.is_some() || neighbours_alike(outputs)
 }
 
-/// Errors of `decoded` frames by stretches of equally many.
-fn stretches(decoded: &Decoded<'_>, groups: &[(&str, Vec<usize>)], held_out: bool) -> Vec<Stretch> {
+/// Errors of `decoded` frames by stretches of equally many, so many at `most`.
+fn stretches(
+    decoded: &Decoded<'_>,
+    groups: &[(&str, Vec<usize>)],
+    (held_out, most): (bool, usize),
+) -> Vec<Stretch> {
     let times = decoded.log.times();
     let width = decoded.outputs.names.len();
     let of = |range: std::ops::Range<usize>| {
@@ -115,12 +122,13 @@ fn stretches(decoded: &Decoded<'_>, groups: &[(&str, Vec<usize>)], held_out: boo
             rmse: groups.iter().map(rmse).collect(),
         }
     };
-    cut(times.len(), FRAMES_A_STRETCH).map(of).collect()
+    cut(times.len(), FRAMES_A_STRETCH, most).map(of).collect()
 }
 
-/// Cuts so many lines into stretches of equally many, at least so many in each if there are two or more.
-fn cut(lines: usize, least: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
-    let count = (lines / least).clamp(usize::from(lines > 0), MOST_STRETCHES);
+/// Cuts so many lines into stretches of equally many: at `most` so many, of at least so many lines if there are two or
+/// more.
+fn cut(lines: usize, least: usize, most: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
+    let count = (lines / least).clamp(usize::from(lines > 0), most);
     (0..count).map(move |at| at * lines / count..(at + 1) * lines / count)
 }
 

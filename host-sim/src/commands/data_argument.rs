@@ -130,6 +130,15 @@ impl DataArguments {
         self.fold_column.is_some()
     }
 
+    /// Error if a column of times was named: `command` tells nothing over time.
+    pub fn refuse_time(&self, command: &str) -> Result<()> {
+        if self.time.is_some() {
+            let message = format!("--time has no effect in {command}: leave it out");
+            return Err(Error::Usage(message));
+        }
+        Ok(())
+    }
+
     /// Error if folds were asked for: nothing uses them.
     pub fn refuse_folds(&self) -> Result<()> {
         for (option, given) in [

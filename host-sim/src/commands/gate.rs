@@ -57,6 +57,7 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    arguments.subject.refuse_time("gate")?;
     let subject = arguments.subject.load(common)?;
     subject.require_inverse("gate")?;
     let frames = arguments.frames.unwrap_or(FRAMES);

@@ -85,6 +85,11 @@ impl SubjectArgument {
         Ok(subject)
     }
 
+    /// Error if a column of times was named: `command` tells nothing over time.
+    pub fn refuse_time(&self, command: &str) -> Result<()> {
+        self.options.data.refuse_time(command)
+    }
+
     /// Error if folds were asked for that nothing uses. A fold column may tell which frames to judge by.
     pub fn refuse_idle_folds(&self) -> Result<()> {
         if self.options.data.has_fold_column() && self.test.is_none() {

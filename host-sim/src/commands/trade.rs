@@ -99,6 +99,7 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    arguments.subject.refuse_time("trade")?;
     let subject = arguments.subject.load(common)?;
     subject.require_inverse("trade")?;
     let names = subject.output_names();

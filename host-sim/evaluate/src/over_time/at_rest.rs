@@ -7,7 +7,7 @@ use taxel_data::table::Table;
 use taxel_learn::Options;
 
 use super::relative_trial::RelativeTrial;
-use super::{cut, is_log};
+use super::{MOST_STRETCHES, cut, is_log};
 use crate::measurements::{Measurements, far_from_zero};
 
 /// Fewest lines of a stretch at rest.
@@ -88,7 +88,7 @@ impl RestOverTime {
     pub fn new(rest: &Rest, clock: &Clock, inputs: &Table) -> Option<Self> {
         let lines = rest.lines.as_ref()?;
         let all: Vec<usize> = (0..rest.readings.names.len()).collect();
-        let ranges: Vec<_> = cut(lines.len(), LINES_A_STRETCH).collect();
+        let ranges: Vec<_> = cut(lines.len(), LINES_A_STRETCH, MOST_STRETCHES).collect();
         if ranges.len() < 2 {
             return None;
         }
