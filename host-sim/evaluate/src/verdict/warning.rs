@@ -239,7 +239,7 @@ fn tried(trial: Option<&RelativeTrial>) -> String {
     }
     let gain = 100.0 * (1.0 - trial.ratio);
     format!(
-        "; use --relative-inputs: in a trial it lowered errors by {gain:.0} % (RMSE of {}: {} instead of {})",
+        "; use --relative-inputs: a trial without refinement lowered errors by {gain:.0} % (RMSE of {}: {} instead of {})",
         trial.groups.join(", "),
         errors(&trial.relative_rmse),
         errors(&trial.rmse)
