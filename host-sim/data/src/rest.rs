@@ -8,8 +8,8 @@ use crate::table::Table;
 pub const BASELINE_LINES: usize = 100;
 /// Share of its largest values below which an output counts as zero.
 const ZERO: f64 = 0.01;
-/// One of so many values is larger than the largest one that counts, since it may be wrong.
-const LARGEST_ONE_IN: usize = 100;
+/// One of so many values may be an outlier, and three in any case: the largest one that counts is the next.
+const WRONG_ONE_IN: usize = 200;
 /// Fewest lines that are taken for the sensor at rest.
 const FEWEST: usize = 10;
 
@@ -41,10 +41,11 @@ pub fn lines_at_rest(file: &DataFile, columns: &[usize]) -> Vec<usize> {
         let values = (0..file.lines()).map(|line| file.value(line, *column).abs());
         let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
         values.sort_unstable_by(f64::total_cmp);
-        values.len().checked_sub(1 + values.len() / LARGEST_ONE_IN).map_or(0.0, |at| values[at])
+        let wrong = (values.len() / WRONG_ONE_IN).max(3);
+        values.len().checked_sub(1 + wrong).map_or(0.0, |at| values[at])
     };
     let bounds: Vec<f64> = columns.iter().map(|column| ZERO * largest(column)).collect();
-    if bounds.is_empty() || bounds.contains(&0.0) {
+    if bounds.iter().all(|bound| *bound == 0.0) {
         return vec![];
     }
     let is_zero = |line: usize| {
@@ -160,6 +161,12 @@ mod tests {
             assert_eq!(lines_at_rest(&file(&none), &[1]), [0; 0]);
         }
         assert_eq!(lines_at_rest(&log, &[]), [0; 0]);
+        // A wild value is no measure for zero.
+        let mut wild: Vec<[f64; 2]> =
+            (0..200).map(|line| [1.0, f64::from(line % 40 / 20)]).collect();
+        let sound = lines_at_rest(&file(&wild), &[1]);
+        wild[30][1] = 1e6;
+        assert_eq!((sound.len(), lines_at_rest(&file(&wild), &[1])), (91, sound));
     }
 
     #[test]

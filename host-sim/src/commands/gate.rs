@@ -28,7 +28,7 @@ use super::{Common, print, stderr};
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim gate press --k 3,3.5,4 --noise 0.01
-  host-sim gate measured.csv --inputs 'ch*' --outputs 'f?_n' --baseline rest.csv")]
+  host-sim gate log.csv --inputs 'ch*' --outputs 'f?_n'")]
 pub struct Arguments {
     /// Frames of a scene, and as many of the untouched sensor [default: 4000].
     #[arg(short = 'n', long, value_name = "N")]

@@ -58,7 +58,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1")]
     average: Vec<usize>,
     /// Gates to try besides none: tolerances in standard deviations of the averaged noise; `none` for no
-    /// gate [default: 3.5 if the scene's noise is relative, or a CSV file has a --baseline].
+    /// gate [default: 3.5 if the scene's noise is relative, or the sensor at rest is known].
     #[arg(long, value_name = "K,…", value_delimiter = ',', allow_negative_numbers = true)]
     gate: Vec<GateOption>,
     /// Outputs that determine the front and the choice, such as dz_mm; or all, by the mean of RMSE/standard deviation

@@ -40,7 +40,7 @@ mod recursion;
   host-sim train press --whole-array --centres 256 --output-rank 24 --format fixed16 -o press.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
-  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs --baseline rest.csv -o m.bin
+  host-sim train log.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs -o m.bin
   host-sim train press --no-refine -n 10000000 --solver rls --curve curve.svg -o m.bin
   zcat log.csv.gz | host-sim train - --inputs 'ch*' --outputs 'f?_n' --solver rls -o m.bin
   host-sim train joined.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs b.c5 --fold-blocks 10 -o m.bin")]
