@@ -17,8 +17,8 @@ pub struct ModelArguments {
     /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
     #[arg(long)]
     whole_array: bool,
-    /// Features that --whole-array projects all readings to [default: as many as a row has readings, or 18 for outputs
-    /// that belong to no row].
+    /// Features that --whole-array projects all readings to: no more than outputs and products of two or three of these
+    /// [default: as many as a row has readings, or 18 for outputs that belong to no row].
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     features: Option<usize>,
     /// Let the network of --whole-array compute R components, which are expanded to all outputs once a frame. With many

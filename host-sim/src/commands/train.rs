@@ -17,7 +17,7 @@ use taxel_data::progress::Silent;
 use taxel_data::{columns, output};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
-use taxel_learn::train::Widths;
+use taxel_learn::train::{Widths, projection};
 use taxel_learn::{Options, fill};
 
 use super::data_argument::JudgedBy;
@@ -243,9 +243,11 @@ fn why_direct(options: &Options, frames: &Dataset) -> String {
     let fixed = Options { format: Format::Fixed16, ..*options };
     let fix = match taxel_learn::train::train(&frames.subset(&few), &fixed, &Silent) {
         Ok(_) => "use --format fixed16".to_owned(),
-        Err(_) => "--format fixed16 does not hold it either at this --spread; --whole-array --features 16 gives the network \
-                   fewer inputs"
-            .into(),
+        Err(_) => format!(
+            "--format fixed16 does not hold it either at this --spread; --whole-array --features {} gives the network \
+             fewer inputs",
+            projection::features_at_most(frames, 16)
+        ),
     };
     format!(
         "the fast formula for distances could lose accuracy in f32 with this model (little noise, many centres or a large \

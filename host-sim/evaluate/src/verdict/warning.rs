@@ -8,6 +8,7 @@ use taxel_data::error::cut;
 use taxel_data::table::Table;
 use taxel_learn::cost::{Design, NetworkDesign};
 use taxel_learn::outliers::Outliers;
+use taxel_learn::train::projection;
 use taxel_rig::image;
 
 use crate::over_time::{PercentOf, RelativeTrial, RestOverTime};
@@ -246,9 +247,6 @@ fn tried(trial: Option<&RelativeTrial>) -> String {
     )
 }
 
-/// Features that are proposed for one network behind a projection: what most sensors need.
-const PROPOSED_FEATURES: usize = 16;
-
 /// Options with which a blob of so many `bytes`, of a model of this `design`, fits into a slot.
 fn smaller(bytes: usize, design: &Design) -> Vec<String> {
     let besides = bytes.saturating_sub(design.parameter_bytes());
@@ -271,12 +269,13 @@ fn smaller(bytes: usize, design: &Design) -> Vec<String> {
             .map(|most| format!("--centres {most}")),
     );
     let readings = design.shape.rows * design.shape.inputs;
-    if !design.projection && readings > PROPOSED_FEATURES {
+    let features = projection::usual_features(design.shape.rows, readings);
+    if !design.projection && features < readings {
         let mut array =
             Design::of_array(design.shape, first.format, first.shape.centres, first.affine_tail);
-        array.networks.iter_mut().for_each(|it| it.shape.inputs = PROPOSED_FEATURES);
+        array.networks.iter_mut().for_each(|it| it.shape.inputs = features);
         if fits(&array) {
-            fixes.push(format!("--whole-array --features {PROPOSED_FEATURES}"));
+            fixes.push("--whole-array".to_owned());
         }
     }
     fixes

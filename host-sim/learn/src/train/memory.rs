@@ -5,8 +5,7 @@ use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::error::{in_words, require};
 
-use super::Options;
-use super::projection::USUAL_FEATURES;
+use super::{Options, projection};
 
 /// Copies of the samples that are held at once: as read, by row-wire, scaled, and as features.
 const COPIES: f64 = 4.0;
@@ -24,8 +23,8 @@ pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -
     let [frames, readings, all_outputs, rows] =
         [dataset.frames(), dataset.inputs.names.len(), dataset.outputs.names.len(), dataset.rows]
             .map(|count| count as f64);
-    let usual = if dataset.rows == 1 { USUAL_FEATURES as f64 } else { readings / rows };
-    let features = options.features.map_or(usual, |features| features as f64);
+    let usual = projection::usual_features(dataset.rows, dataset.inputs.names.len());
+    let features = options.features.unwrap_or(usual) as f64;
     let (networks, inputs) =
         if options.whole_array { (1.0, features) } else { (rows, readings / rows) };
     let outputs = all_outputs / networks;

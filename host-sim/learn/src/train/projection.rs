@@ -35,34 +35,46 @@ pub const USUAL_FEATURES: usize = 18;
 /// Largest degree of the products of outputs.
 const MOST_FACTORS: usize = 3;
 
-/// Fits the projection of `dataset`'s readings to so many `features`. By default they are as many as one of its rows
-/// has readings, or [`USUAL_FEATURES`] for data of a single row table.
+/// Number of features for so many `readings` of so many `rows`, unless a user says otherwise: as many as one row has
+/// readings, or [`USUAL_FEATURES`] for a single row table.
+pub fn usual_features(rows: usize, readings: usize) -> usize {
+    if rows > 1 { readings / rows } else { USUAL_FEATURES }
+}
+
+/// Number of features that [`fit`] can give for `dataset`, if so many are `wanted`: fewer than the readings, and no more
+/// than the outputs and their products.
+pub fn features_at_most(dataset: &Dataset, wanted: usize) -> usize {
+    let readings = dataset.inputs.names.len();
+    wanted.min(readings.saturating_sub(1)).min(factors(&dataset.outputs, wanted).len())
+}
+
+/// Fits the projection of `dataset`'s readings to so many `features`; by default to the [usual](usual_features) number,
+/// or to fewer if there are [no more](features_at_most).
 ///
-/// There are never more features than outputs and products of these. Returns f₀, then each reading's part in every
-/// feature (`readings × features`), as [`Projection::new`] takes them.
+/// Returns f₀, then each reading's part in every feature (`readings × features`), as [`Projection::new`] takes them.
 ///
 /// # Errors
-/// [`Error`] for a number of features that is not below that of the readings, for data without a regression, or with a
-/// projection beyond f32.
+/// [`Error`] for a number of features that cannot be had, for data without a regression, or with a projection beyond f32.
 pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
     let readings = dataset.inputs.names.len();
-    let features = match features {
-        Some(features) => {
-            require((1..readings).contains(&features), "features", features, || {
-                format!("give from 1 to {}, fewer than the {readings} readings", readings - 1)
-            })?;
-            features
-        }
-        None if dataset.rows > 1 => readings / dataset.rows,
-        None if readings > USUAL_FEATURES => USUAL_FEATURES,
-        None => {
-            let reason = format!(
-                "whole-array input needs the readings of two row-wires or more, or more than {USUAL_FEATURES} readings; \
-                 the data has {readings} of one: leave it out"
-            );
-            return Err(Error::unfit_for("whole_array", reason));
-        }
-    };
+    let usual = usual_features(dataset.rows, readings);
+    if let Some(features) = features {
+        let possible = (1..=features_at_most(dataset, features)).contains(&features);
+        require(possible, "features", features, || {
+            format!(
+                "give from 1 to {}, fewer than the {readings} readings and no more than the {} outputs and their products",
+                features_at_most(dataset, readings),
+                dataset.outputs.names.len()
+            )
+        })?;
+    } else if usual >= readings {
+        let reason = format!(
+            "whole-array input needs the readings of two row-wires or more, or more than {USUAL_FEATURES} readings; \
+             the data has {readings} of one: leave it out"
+        );
+        return Err(Error::unfit_for("whole_array", reason));
+    }
+    let features = features.unwrap_or(usual);
     let targets = targets(&dataset.outputs, features);
     let features = features.min(targets.names.len());
     let means = dataset.inputs.means();
@@ -157,23 +169,9 @@ pub fn features(
 /// What the projection has to tell: the `outputs`, and where these are fewer than `features`, their products of two
 /// or three factors. Then all are about their means and have a standard deviation of 1.
 fn targets(outputs: &Table, features: usize) -> Cow<'_, Table> {
-    let count = outputs.names.len();
-    if count >= features {
+    let all = factors(outputs, features);
+    if all.len() == outputs.names.len() {
         return Cow::Borrowed(outputs);
-    }
-    let mut products: Vec<Vec<usize>> = vec![vec![]];
-    let mut all: Vec<Vec<usize>> = Vec::new();
-    for factors in 1..=MOST_FACTORS {
-        // Every product once: its factors in ascending order.
-        let longer = products.iter().flat_map(|product| {
-            let least = product.last().copied().unwrap_or(0);
-            (least..count).map(|factor| [product.as_slice(), &[factor]].concat())
-        });
-        products = longer.collect();
-        all.extend_from_slice(&products);
-        if factors > 1 && all.len() >= features {
-            break;
-        }
     }
     let outputs = standardised(outputs);
     let of_line = |line: &[f64]| -> Vec<f64> {
@@ -183,6 +181,27 @@ fn targets(outputs: &Table, features: usize) -> Cow<'_, Table> {
     let values = outputs.lines().flat_map(of_line).collect();
     let names = (1..=all.len()).map(|product| format!("product{product}")).collect();
     Cow::Owned(standardised(&Table { names, values }))
+}
+
+/// Factors of each target: the columns of `outputs`, and of their products if these are needed for so many `features`.
+/// Products of outputs that no line has together tell nothing.
+fn factors(outputs: &Table, features: usize) -> Vec<Vec<usize>> {
+    let count = outputs.names.len();
+    let mut products: Vec<Vec<usize>> = (0..count).map(|output| vec![output]).collect();
+    let mut all = products.clone();
+    for _ in 1..MOST_FACTORS {
+        if all.len() >= features {
+            break;
+        }
+        // Every product once: its factors in ascending order.
+        let longer = products.iter().flat_map(|product| {
+            let least = product.last().copied().unwrap_or(0);
+            (least..count).map(|factor| [product.as_slice(), &[factor]].concat())
+        });
+        products = longer.filter(|product| !outputs.lines_with(product).is_empty()).collect();
+        all.extend_from_slice(&products);
+    }
+    all
 }
 
 /// Columns of `table` about their means, with standard deviations of 1; those that never change are 0.

@@ -85,6 +85,32 @@ fn few_outputs_are_told_by_features_of_their_products() {
     let depth = Dataset { outputs: data.outputs.columns(2, 1), ..data.clone() };
     assert_eq!(fit(&depth, None).unwrap().len(), MOST_FACTORS * 145);
     assert_eq!(fit(&data, Some(5)).unwrap().len(), 5 * 145);
+    // A number that a user asks for is given or refused.
+    for (data, outputs, most) in [(&data, 4, 34), (&depth, 1, 3)] {
+        assert_eq!(fit(data, Some(most)).unwrap().len(), most * 145);
+        let message = fit(data, Some(most + 1)).unwrap_err().to_string();
+        let rule = format!(
+            "features = {}: give from 1 to {most}, fewer than the 144 readings and no more than the {outputs} outputs",
+            most + 1
+        );
+        assert!(message.contains(&rule), "{message}");
+        assert_eq!(features_at_most(data, 144), most);
+    }
+}
+
+/// Of two outputs that no line has together, each has its powers, and there is no product of both.
+#[test]
+fn outputs_that_are_never_together_have_no_products() {
+    let mut data = known(400, 0.01);
+    data.outputs = data.outputs.columns(0, 2);
+    for (number, line) in data.outputs.values.chunks_exact_mut(2).enumerate() {
+        line[number % 2] = f64::NAN;
+    }
+    assert_eq!(
+        factors(&data.outputs, 9),
+        [&[0][..], &[1], &[0, 0], &[1, 1], &[0, 0, 0], &[1, 1, 1]]
+    );
+    assert_eq!(fit(&data, Some(5)).unwrap().len(), 5 * 7);
 }
 
 #[test]
@@ -109,7 +135,7 @@ fn products_are_those_of_standardised_outputs() {
 fn features_are_those_of_the_lines_that_have_an_output() {
     let data = synthesise(&World::contact(), Stream::Training, 4000);
     let mut partly = data.clone();
-    for line in partly.outputs.values.chunks_exact_mut(3).step_by(2) {
+    for line in partly.outputs.values.chunks_exact_mut(4).step_by(2) {
         line[..2].fill(f64::NAN);
     }
     let left = |of: &Dataset| {
