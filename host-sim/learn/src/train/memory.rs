@@ -33,7 +33,7 @@ pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -
     let square = weights * (weights + outputs);
     let tasks = dataset.outputs.missing_together().len() as f64;
     let fit = TRIANGLES * tasks * square * F64;
-    let of_refinement = pieces.map_or(0.0, |pieces| (pieces as f64 + 3.0) * square * F64);
+    let of_refinement = pieces.map_or(0.0, |pieces| (pieces as f64 + 2.0 + tasks) * square * F64);
     let projected = if options.whole_array { (readings + all_outputs).powi(2) } else { 0.0 };
     // The linear decoder that every model is judged beside.
     let linear = (readings / rows + 1.0).powi(2) * TRIANGLES * F64;

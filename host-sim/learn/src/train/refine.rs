@@ -154,9 +154,7 @@ pub fn refine<'d>(
                 let frames = fresh.frames(step, count);
                 let networks = descents.par_iter_mut().enumerate();
                 networks.try_for_each(|(network, descent)| {
-                    let tasks = sources.pieces(&frames, network);
-                    descent
-                        .step(&tasks.iter().map(|task| task.iter().collect()).collect::<Vec<_>>())
+                    descent.step(&sources.pieces(&frames, network).iter().collect::<Vec<_>>())
                 })?;
                 progress.step();
             }
@@ -167,7 +165,7 @@ pub fn refine<'d>(
             let networks = descents.par_iter_mut().enumerate();
             networks.try_for_each(|(network, descent)| {
                 let pieces = |part| sources.pieces(part, network);
-                let folds: Vec<Vec<Vec<Piece>>> = parts.iter().map(pieces).collect();
+                let folds: Vec<Vec<Piece>> = parts.iter().map(pieces).collect();
                 *descent = folds::descend(descent, &folds, settings.steps, progress)?;
                 Result::Ok(())
             })?;

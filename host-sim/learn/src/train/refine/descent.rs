@@ -18,6 +18,8 @@ const UNSEEN_RANGE: f64 = 1.1;
 #[derive(Clone)]
 pub(super) struct Descent {
     movable: Movable,
+    /// Outputs of each task.
+    tasks: Vec<Vec<usize>>,
     adam: Adam,
     /// Largest floor that the widths are kept above.
     floor_at_most: f64,
@@ -30,7 +32,7 @@ pub(super) struct Descent {
 impl Descent {
     /// Descent of one network from its `start`.
     pub(super) fn new(start: Start, options: &Options, settings: &Refinement) -> Self {
-        let Start { layer, mix, ranges } = start;
+        let Start { layer, mix, ranges, tasks } = start;
         let inputs = ranges.len();
         let sizes = Sizes {
             inputs,
@@ -45,6 +47,7 @@ impl Descent {
         let adam = Adam::new(settings.rate, settings.steps, movable.values.len());
         Self {
             movable,
+            tasks,
             adam,
             floor_at_most: width::floor_at_most(format, layer.spread),
             format,
@@ -53,43 +56,31 @@ impl Descent {
         }
     }
 
-    /// One step on the samples of each task, whose weights are solved on themselves.
-    pub(super) fn step(&mut self, tasks: &[Vec<&Piece>]) -> Result<()> {
-        let losses = tasks.iter().map(|task| loss::on_same(&self.movable, task, self.ridge));
-        let loss = losses.reduce(|a, b| Ok(a?.plus(&b?)));
-        self.descend(loss, &tasks.concat())
+    /// One step on samples whose weights are solved on themselves.
+    pub(super) fn step(&mut self, pieces: &[&Piece]) -> Result<()> {
+        let loss = loss::on_same(&self.movable, &self.tasks, pieces, self.ridge)?;
+        self.descend(loss, pieces);
+        Ok(())
     }
 
-    /// One step on the samples of each task that are `held_out`, whose weights are solved on the `rest`.
-    pub(super) fn step_held_out(
-        &mut self,
-        rest: &[Vec<&Piece>],
-        held_out: &[Vec<&Piece>],
-    ) -> Result<()> {
-        let losses = in_both(rest, held_out)
-            .map(|(rest, held)| loss::on_held_out(&self.movable, rest, held, self.ridge));
-        let loss = losses.reduce(|a, b| Ok(a?.plus(&b?)));
-        self.descend(loss, &rest.concat())
+    /// One step on the samples that are `held_out`, whose weights are solved on the `rest`.
+    pub(super) fn step_held_out(&mut self, rest: &[&Piece], held_out: &[&Piece]) -> Result<()> {
+        let loss = loss::on_held_out(&self.movable, &self.tasks, rest, held_out, self.ridge)?;
+        self.descend(loss, rest);
+        Ok(())
     }
 
     /// Squared errors of the samples of each task that are `held_out`, whose weights are solved on the `rest`.
-    pub(super) fn errors(
-        &self,
-        rest: &[Vec<&Piece>],
-        held_out: &[Vec<&Piece>],
-    ) -> Result<Vec<Vec<f64>>> {
-        let errors = in_both(rest, held_out)
-            .map(|(rest, held)| loss::held_out_errors(&self.movable, rest, held, self.ridge));
-        errors.collect()
+    pub(super) fn errors(&self, rest: &[&Piece], held_out: &[&Piece]) -> Result<Vec<Vec<f64>>> {
+        loss::held_out_errors(&self.movable, &self.tasks, rest, held_out, self.ridge)
     }
 
-    /// Descends on a loss; none where no task has samples on both sides.
-    fn descend(&mut self, loss: Option<Result<Loss>>, pieces: &[&Piece]) -> Result<()> {
-        if let Some(loss) = loss.transpose()? {
+    /// Descends on a loss, if there is one.
+    fn descend(&mut self, loss: Option<Loss>, pieces: &[&Piece]) {
+        if let Some(loss) = loss {
             self.adam.descend(&mut self.movable.values, &loss.gradient);
             self.hold(pieces);
         }
-        Ok(())
     }
 
     /// Makes the widths so large that the format holds it.
@@ -118,13 +109,4 @@ impl Descent {
         let layer = HiddenLayer::with_widths(movable.centres().to_vec(), &movable.widths());
         (layer, movable.mix())
     }
-}
-
-/// Samples of each task that has some in the `rest` and some `held_out`: an output may be missing in a whole fold.
-fn in_both<'t, 'p>(
-    rest: &'t [Vec<&'p Piece>],
-    held_out: &'t [Vec<&'p Piece>],
-) -> impl Iterator<Item = (&'t Vec<&'p Piece>, &'t Vec<&'p Piece>)> {
-    let tasks = rest.iter().zip(held_out);
-    tasks.filter(|(rest, held_out)| !rest.is_empty() && !held_out.is_empty())
 }

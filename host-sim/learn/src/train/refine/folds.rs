@@ -15,18 +15,18 @@ const LEAST_SAMPLES: usize = 30;
 /// Descents in all: one to find the number of steps, one to take them.
 pub(super) const PASSES: usize = 2;
 
-/// Descends on `folds`, each the samples of every task, from `start`: as many steps as a fold that is not looked at
+/// Descends on the samples of `folds` from `start`: as many steps as a fold that is not looked at
 /// allows, at most so many `steps`.
 pub(super) fn descend(
     start: &Descent,
-    folds: &[Vec<Vec<Piece>>],
+    folds: &[Vec<Piece>],
     steps: usize,
     progress: &dyn Progress,
 ) -> Result<Descent> {
     let Some((watched, others)) = folds.split_last() else { return Ok(start.clone()) };
     let (all_others, watched) = (together(others), together([watched]));
     let mut start = start.clone();
-    start.hold(&all_others.concat());
+    start.hold(&all_others);
     let mut trial = start.clone();
     let at_start = trial.errors(&all_others, &watched)?;
     let (mut best, mut best_gain) = (0, 0.0);
@@ -49,14 +49,9 @@ pub(super) fn descend(
     Ok(descent)
 }
 
-/// Samples of every task in all of these folds.
-fn together<'p>(folds: impl IntoIterator<Item = &'p Vec<Vec<Piece>>>) -> Vec<Vec<&'p Piece>> {
-    let mut tasks: Vec<Vec<&Piece>> = Vec::new();
-    for fold in folds {
-        tasks.resize(fold.len(), vec![]);
-        tasks.iter_mut().zip(fold).for_each(|(task, pieces)| task.extend(pieces));
-    }
-    tasks
+/// Samples of all of these folds.
+fn together<'p>(folds: impl IntoIterator<Item = &'p Vec<Piece>>) -> Vec<&'p Piece> {
+    folds.into_iter().flatten().collect()
 }
 
 /// What the mean squared error of a task has fallen by, less what may be chance: [`CERTAIN`] standard errors of the
@@ -73,7 +68,7 @@ fn certain_gain(before: &[f64], after: &[f64]) -> f64 {
 }
 
 /// Takes step number `step`: one fold is held out, weights are solved on the others.
-fn step_on(descent: &mut Descent, folds: &[Vec<Vec<Piece>>], step: usize) -> Result<()> {
+fn step_on(descent: &mut Descent, folds: &[Vec<Piece>], step: usize) -> Result<()> {
     let held = step % folds.len();
     let rest = folds.iter().enumerate().filter(|(fold, _)| *fold != held).map(|(_, fold)| fold);
     descent.step_held_out(&together(rest), &together([&folds[held]]))

@@ -7,98 +7,176 @@
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
 use super::movable::{Activated, Movable, Piece};
-use super::products::{
-    Line, SIDE, add_combinations, add_normal_equations, add_products, transposed,
-};
+use super::products::{Line, SIDE, add_combinations, add_products, normal_equations, transposed};
 use crate::error::{Result, no_regression};
 use crate::parallel;
 
-/// Mean squared error of one set of samples, and its gradient by what moves.
+/// Mean squared error of each task's samples, summed over tasks, and its gradient by what moves.
 #[derive(Debug, Clone)]
 pub(super) struct Loss {
     pub(super) value: f64,
     pub(super) gradient: Vec<f64>,
 }
 
-impl Loss {
-    /// Sum of the losses of two tasks.
-    pub(super) fn plus(mut self, other: &Self) -> Self {
-        self.value += other.value;
-        add(&mut self.gradient, &other.gradient);
-        self
-    }
-}
-
 /// Output weights solved on a set of samples, and what a gradient through them needs.
-struct Solved {
+struct Solved<'t> {
     activated: Vec<Activated>,
-    /// Decomposition of the normal equations.
-    normal: Cholesky<f64, Dyn>,
-    /// Weights, `regressors × outputs`, row-major.
+    /// Outputs of each task that has samples, and the decomposition of its normal equations.
+    tasks: Vec<(&'t [usize], Cholesky<f64, Dyn>)>,
+    /// Weights, `regressors × outputs`, row-major; 0 for outputs without samples.
     weights: Vec<f64>,
 }
 
-impl Solved {
-    /// Solves for the weights of `movable` on `pieces`, with the penalty `ridge` times the number of samples on
+impl<'t> Solved<'t> {
+    /// Solves for the weights of `movable` on `pieces`, with the penalty `ridge` times the number of a task's samples on
     /// squared weights.
-    fn new(movable: &Movable, pieces: &[&Piece], ridge: f64) -> Result<Self> {
+    fn new(
+        movable: &Movable,
+        tasks: &'t [Vec<usize>],
+        pieces: &[&Piece],
+        ridge: f64,
+    ) -> Result<Self> {
         let (n, outputs) = (movable.sizes.regressors(), pieces[0].targets.len());
         let parts = parallel::map(pieces.len(), &|index| {
-            let activated = movable.activate(pieces[index]);
-            let (mut squares, mut products) = (vec![0.0; n * n], vec![0.0; n * outputs]);
-            let (a, b) = (&activated.regressors, &pieces[index].targets);
-            add_normal_equations(a, b, &mut squares, &mut products);
-            (activated, squares, products)
+            let piece = pieces[index];
+            let activated = movable.activate(piece);
+            let (masks, groups): (Vec<_>, Vec<_>) = piece.together(tasks).into_iter().unzip();
+            let targets = piece.known(piece.targets.clone());
+            let (squares, products) = normal_equations(&activated.regressors, &targets, &masks);
+            (activated, groups, squares, products)
         });
-        let (mut squares, mut products) = (vec![0.0; n * n], vec![0.0; n * outputs]);
+        let mut squares = vec![vec![0.0; n * n]; tasks.len()];
+        let mut products = vec![0.0; n * outputs];
         let mut activated = Vec::with_capacity(parts.len());
-        for (of_piece, s, p) in parts {
-            add(&mut squares, &s);
+        for (of_piece, groups, s, p) in parts {
+            for (group, s) in groups.iter().zip(&s) {
+                group.iter().for_each(|task| add(&mut squares[*task], s));
+            }
             add(&mut products, &p);
             activated.push(of_piece);
         }
-        let penalty = ridge * samples(pieces) as f64;
-        // Columns of a symmetric matrix are its rows: the upper triangle stands where nalgebra reads the lower.
-        let mut normal = DMatrix::from_column_slice(n, n, &squares);
-        (0..n).for_each(|i| normal[(i, i)] += penalty);
-        let normal = Cholesky::new(normal).ok_or_else(no_regression)?;
-        let weights = solve(&normal, &products, outputs);
-        Ok(Self { activated, normal, weights })
+        let mut solved = Self { activated, tasks: vec![], weights: vec![] };
+        for (columns, squares) in tasks.iter().zip(squares) {
+            let samples = samples(columns, pieces);
+            if samples > 0 {
+                // Columns of a symmetric matrix are its rows: the upper triangle stands where nalgebra reads the lower.
+                let mut normal = DMatrix::from_vec(n, n, squares);
+                (0..n).for_each(|i| normal[(i, i)] += ridge * samples as f64);
+                let normal = Cholesky::new(normal).ok_or_else(no_regression)?;
+                solved.tasks.push((columns, normal));
+            }
+        }
+        solved.weights = solved.solve(&products, outputs);
+        Ok(solved)
+    }
+
+    /// Solves the normal equations of all tasks for right sides (`regressors × outputs`, row-major), in that layout.
+    fn solve(&self, right: &[f64], outputs: usize) -> Vec<f64> {
+        let n = right.len() / outputs;
+        let mut solved = vec![0.0; right.len()];
+        for (columns, normal) in &self.tasks {
+            let of_task =
+                DMatrix::from_fn(n, columns.len(), |i, o| right[i * outputs + columns[o]]);
+            for (column, solution) in columns.iter().zip(normal.solve(&of_task).column_iter()) {
+                let places = solved.iter_mut().skip(*column).step_by(outputs);
+                places.zip(&solution).for_each(|(place, weight)| *place = *weight);
+            }
+        }
+        solved
     }
 }
 
-/// Mean squared error on `pieces` with the weights solved on the same samples.
+/// What the errors of each output are multiplied by, so that one mean serves the samples of all tasks.
+struct Weighing {
+    factors: Vec<f64>,
+    mean: f64,
+}
+
+impl Weighing {
+    /// Weighing of the samples of `tasks` that are `held_out`; none of a task without any on either side, for an output
+    /// may be missing in a whole fold. Nothing if there is no other task.
+    fn new(tasks: &[Vec<usize>], rest: &[&Piece], held_out: &[&Piece]) -> Option<Self> {
+        let count = |columns: &Vec<usize>| match samples(columns, rest) {
+            0 => 0,
+            _ => samples(columns, held_out),
+        };
+        let counts: Vec<usize> = tasks.iter().map(count).collect();
+        let first = *counts.iter().find(|count| **count > 0)? as f64;
+        let mut factors = vec![0.0; held_out[0].targets.len()];
+        for (columns, count) in tasks.iter().zip(counts).filter(|(_, count)| *count > 0) {
+            columns.iter().for_each(|column| factors[*column] = first / count as f64);
+        }
+        Some(Self { factors, mean: 1.0 / first })
+    }
+
+    /// Weighed `errors`, and the weighed sum of their squares.
+    fn weighed(&self, mut errors: Vec<Line>) -> (Vec<Line>, f64) {
+        let mut square = 0.0;
+        for (line, factor) in errors.iter_mut().zip(&self.factors) {
+            for error in line {
+                square += factor * *error * *error;
+                *error *= factor;
+            }
+        }
+        (errors, square)
+    }
+
+    /// Mean of squared errors and of halves of their gradients, which are summed in order.
+    fn mean<'g>(
+        &self,
+        movable: &Movable,
+        squares: impl Iterator<Item = f64>,
+        gradients: impl Iterator<Item = &'g Vec<f64>>,
+    ) -> Loss {
+        let mut loss = Loss { value: 0.0, gradient: vec![0.0; movable.values.len()] };
+        squares.for_each(|square| loss.value += square * self.mean);
+        gradients.for_each(|gradient| add(&mut loss.gradient, gradient));
+        loss.gradient.iter_mut().for_each(|slope| *slope *= 2.0 * self.mean);
+        loss
+    }
+}
+
+/// Mean squared error of `tasks` on `pieces` with the weights solved on the same samples; none without samples.
 ///
 /// By the weights the derivative is 0, but for the penalty's small part, so they count as constants.
-pub(super) fn on_same(movable: &Movable, pieces: &[&Piece], ridge: f64) -> Result<Loss> {
-    let solved = Solved::new(movable, pieces, ridge)?;
+pub(super) fn on_same(
+    movable: &Movable,
+    tasks: &[Vec<usize>],
+    pieces: &[&Piece],
+    ridge: f64,
+) -> Result<Option<Loss>> {
+    let Some(weighing) = Weighing::new(tasks, pieces, pieces) else { return Ok(None) };
+    let solved = Solved::new(movable, tasks, pieces, ridge)?;
     let back = transposed(&solved.weights, pieces[0].targets.len());
     let parts = parallel::map(pieces.len(), &|index| {
         let (piece, activated) = (pieces[index], &solved.activated[index]);
-        let (errors, square) = errors(&solved.weights, activated, piece);
+        let (errors, square) = weighing.weighed(errors(&solved.weights, activated, piece));
         (square, through(movable, piece, activated, &back, &errors))
     });
     let squares = parts.iter().map(|(square, _)| *square);
-    Ok(mean(movable, pieces, squares, parts.iter().map(|(_, gradient)| gradient)))
+    Ok(Some(weighing.mean(movable, squares, parts.iter().map(|(_, gradient)| gradient))))
 }
 
-/// Mean squared error on the pieces `held_out`, with the weights solved on the `rest`.
+/// Mean squared error of `tasks` on the pieces `held_out`, with the weights solved on the `rest`; none where no task has
+/// samples in both.
 ///
 /// With A and Y the regressors and targets of the rest, W = G⁻¹AᵀY with G = AᵀA + penalty, V the derivative of
 /// the loss by W, and Z = G⁻¹V, the derivative by A is (Y − AW)·Zᵀ − A·Z·Wᵀ.
 pub(super) fn on_held_out(
     movable: &Movable,
+    tasks: &[Vec<usize>],
     rest: &[&Piece],
     held_out: &[&Piece],
     ridge: f64,
-) -> Result<Loss> {
-    let solved = Solved::new(movable, rest, ridge)?;
+) -> Result<Option<Loss>> {
+    let Some(weighing) = Weighing::new(tasks, rest, held_out) else { return Ok(None) };
+    let solved = Solved::new(movable, tasks, rest, ridge)?;
     let (n, outputs) = (movable.sizes.regressors(), held_out[0].targets.len());
     let back = transposed(&solved.weights, outputs);
     let parts = parallel::map(held_out.len(), &|index| {
         let piece = held_out[index];
         let activated = movable.activate(piece);
-        let (errors, square) = errors(&solved.weights, &activated, piece);
+        let (errors, square) = weighing.weighed(errors(&solved.weights, &activated, piece));
         let mut by_weights = vec![0.0; n * outputs];
         add_products(&activated.regressors, &errors, &mut by_weights);
         let gradient = through(movable, piece, &activated, &back, &errors);
@@ -106,39 +184,53 @@ pub(super) fn on_held_out(
     });
     let mut by_weights = vec![0.0; n * outputs];
     parts.iter().for_each(|(_, _, part)| add(&mut by_weights, part));
-    let adjoint = solve(&solved.normal, &by_weights, outputs);
+    let adjoint = solved.solve(&by_weights, outputs);
     let adjoint_back = transposed(&adjoint, outputs);
     let minus_back: Vec<f64> = back.iter().map(|w| -w).collect();
     let through_rest = parallel::map(rest.len(), &|index| {
         let (piece, activated) = (rest[index], &solved.activated[index]);
-        let (errors, _) = errors(&solved.weights, activated, piece);
+        let errors = errors(&solved.weights, activated, piece);
         let left: Vec<Line> = errors.into_iter().map(|line| line.map(|e| -e)).collect();
         let mut of_adjoint = vec![[0.0; SIDE]; outputs];
         add_combinations(&adjoint, &activated.regressors, &mut of_adjoint);
+        let of_adjoint = piece.known(of_adjoint);
         let mut gradient = through(movable, piece, activated, &adjoint_back, &left);
         add(&mut gradient, &through(movable, piece, activated, &minus_back, &of_adjoint));
         gradient
     });
     let squares = parts.iter().map(|(square, ..)| *square);
     let gradients = parts.iter().map(|(_, gradient, _)| gradient).chain(&through_rest);
-    Ok(mean(movable, held_out, squares, gradients))
+    Ok(Some(weighing.mean(movable, squares, gradients)))
 }
 
-/// Squared error of every sample in the pieces `held_out`, with the weights solved on the `rest`.
+/// Squared errors of the samples of each task in the pieces `held_out`, with the weights solved on the `rest`: none of a
+/// task without samples there.
 pub(super) fn held_out_errors(
     movable: &Movable,
+    tasks: &[Vec<usize>],
     rest: &[&Piece],
     held_out: &[&Piece],
     ridge: f64,
-) -> Result<Vec<f64>> {
-    let solved = Solved::new(movable, rest, ridge)?;
-    let of_piece = |index: usize| -> Vec<f64> {
+) -> Result<Vec<Vec<f64>>> {
+    if rest.is_empty() {
+        return Ok(vec![]);
+    }
+    let solved = Solved::new(movable, tasks, rest, ridge)?;
+    let of_piece = |index: usize| {
         let piece = held_out[index];
-        let (errors, _) = errors(&solved.weights, &movable.activate(piece), piece);
-        let of_sample = |s: usize| errors.iter().map(|line| line[s] * line[s]).sum();
-        (0..piece.samples).map(of_sample).collect()
+        errors(&solved.weights, &movable.activate(piece), piece)
     };
-    Ok(parallel::map(held_out.len(), &of_piece).concat())
+    let errors = parallel::map(held_out.len(), &of_piece);
+    let of_task = |(columns, _): &(&[usize], _)| -> Vec<f64> {
+        let pieces = held_out.iter().zip(&errors);
+        let of_piece = |(piece, errors): (&&'_ Piece, &Vec<Line>)| -> Vec<f64> {
+            let samples = (0..piece.samples).filter(|s| !piece.targets[columns[0]][*s].is_nan());
+            let square = |s: usize| columns.iter().map(|column| errors[*column][s].powi(2)).sum();
+            samples.map(square).collect()
+        };
+        pieces.flat_map(of_piece).collect()
+    };
+    Ok(solved.tasks.iter().map(of_task).collect())
 }
 
 /// Gradient by what moves, where the derivative by the regressors is Σ_outputs factor·line.
@@ -158,40 +250,18 @@ fn through(
     gradient
 }
 
-/// Mean over the samples of `pieces`, of squared errors and of halves of their gradients, which are summed in order.
-fn mean<'g>(
-    movable: &Movable,
-    pieces: &[&Piece],
-    squares: impl Iterator<Item = f64>,
-    gradients: impl Iterator<Item = &'g Vec<f64>>,
-) -> Loss {
-    let mean = 1.0 / samples(pieces) as f64;
-    let mut loss = Loss { value: 0.0, gradient: vec![0.0; movable.values.len()] };
-    squares.for_each(|square| loss.value += square * mean);
-    gradients.for_each(|gradient| add(&mut loss.gradient, gradient));
-    loss.gradient.iter_mut().for_each(|slope| *slope *= 2.0 * mean);
-    loss
-}
-
-/// Errors of a piece's outputs, a line each, and the sum of their squares.
-fn errors(weights: &[f64], activated: &Activated, piece: &Piece) -> (Vec<Line>, f64) {
+/// Errors of a piece's outputs, a line each; 0 where one is missing.
+fn errors(weights: &[f64], activated: &Activated, piece: &Piece) -> Vec<Line> {
     let mut errors: Vec<Line> = piece.targets.iter().map(|line| line.map(|y| -y)).collect();
     add_combinations(weights, &activated.regressors, &mut errors);
-    let square = errors.iter().flatten().map(|e| e * e).sum();
-    (errors, square)
+    piece.known(errors)
 }
 
-fn samples(pieces: &[&Piece]) -> usize {
-    pieces.iter().map(|piece| piece.samples).sum()
+/// Number of samples of the task with these outputs.
+fn samples(columns: &[usize], pieces: &[&Piece]) -> usize {
+    pieces.iter().map(|piece| piece.samples_with(columns[0])).sum()
 }
 
 fn add(sums: &mut [f64], values: &[f64]) {
     sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-}
-
-/// Solves the normal equations for right sides (`n × columns`, row-major), in that layout.
-fn solve(normal: &Cholesky<f64, Dyn>, right: &[f64], columns: usize) -> Vec<f64> {
-    let n = right.len() / columns;
-    let solution = normal.solve(&DMatrix::from_row_slice(n, columns, right));
-    transposed(solution.as_slice(), n)
 }

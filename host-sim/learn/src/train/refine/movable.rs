@@ -201,7 +201,7 @@ fn exponents_of(inputs: &[Line], centre: &[f64], decay: f64) -> Line {
 pub(super) struct Piece {
     /// Scaled inputs, a line each.
     pub(super) inputs: Vec<Line>,
-    /// What the outputs should be, a line each.
+    /// What the outputs should be, a line each; NaN where one is missing.
     pub(super) targets: Vec<Line>,
     /// Number of samples, at most [`SIDE`].
     pub(super) samples: usize,
@@ -218,6 +218,37 @@ impl Piece {
                 targets: side_by_side(targets, outputs),
             })
             .collect()
+    }
+
+    /// Number of samples that have output number `output`.
+    pub(super) fn samples_with(&self, output: usize) -> usize {
+        self.targets[output][..self.samples].iter().filter(|target| !target.is_nan()).count()
+    }
+
+    /// Tasks that have samples here, by the samples that they have: the targets of one output, and the tasks.
+    pub(super) fn together(&self, tasks: &[Vec<usize>]) -> Vec<(&Line, Vec<usize>)> {
+        let mut groups: Vec<(&Line, Vec<usize>)> = Vec::new();
+        for (task, columns) in tasks.iter().enumerate() {
+            let targets = &self.targets[columns[0]];
+            let same =
+                |other: &Line| other.iter().zip(targets).all(|(a, b)| a.is_nan() == b.is_nan());
+            match groups.iter_mut().find(|(other, _)| same(other)) {
+                Some((_, group)) => group.push(task),
+                None if self.samples_with(columns[0]) > 0 => groups.push((targets, vec![task])),
+                None => (),
+            }
+        }
+        groups
+    }
+
+    /// `lines` of all outputs, with 0 where an output is missing.
+    pub(super) fn known(&self, mut lines: Vec<Line>) -> Vec<Line> {
+        for (value, target) in lines.iter_mut().flatten().zip(self.targets.iter().flatten()) {
+            if target.is_nan() {
+                *value = 0.0;
+            }
+        }
+        lines
     }
 }
 

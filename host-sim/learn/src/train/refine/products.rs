@@ -3,6 +3,8 @@
 //! Own code: a library that fuses operations where the machine can would make trained models depend on the
 //! machine. All sums are taken in an order that depends on the shapes alone.
 
+use std::borrow::Cow;
+
 use taxel_data::simd::widest;
 
 /// Samples that lie side by side; every line is so long.
@@ -24,17 +26,26 @@ pub(super) fn add_products(a: &[Line], b: &[Line], sums: &mut [f64]) {
     add_blocks((&by_samples(a), a.len()), b, |_| a.len(), sums);
 }
 
-/// Adds the products Σ_samples a_i·a_j with j ≥ i to `squares` (`a.len() × a.len()`, row-major), and those of
-/// [`add_products`] to `products`. What stands in `squares` below the diagonal has no meaning.
-pub(super) fn add_normal_equations(
+/// The products Σ_samples a_i·a_j with j ≥ i (`a.len() × a.len()`, row-major) without the samples for which one of `masks`
+/// is NaN, for each mask; and those of [`add_products`]. What stands in squares below the diagonal has no meaning.
+pub(super) fn normal_equations(
     a: &[Line],
     b: &[Line],
-    squares: &mut [f64],
-    products: &mut [f64],
-) {
+    masks: &[&Line],
+) -> (Vec<Vec<f64>>, Vec<f64>) {
     let factors = by_samples(a);
-    add_blocks((&factors, a.len()), a, |end| end, squares);
-    add_blocks((&factors, a.len()), b, |_| a.len(), products);
+    let squares = |mask: &&Line| {
+        let mut factors = Cow::Borrowed(&factors);
+        for (s, _) in mask.iter().enumerate().filter(|(_, mask)| mask.is_nan()) {
+            factors.to_mut()[s * a.len()..][..a.len()].fill(0.0);
+        }
+        let mut squares = vec![0.0; a.len() * a.len()];
+        add_blocks((&factors, a.len()), a, |end| end, &mut squares);
+        squares
+    };
+    let mut products = vec![0.0; a.len() * b.len()];
+    add_blocks((&factors, a.len()), b, |_| a.len(), &mut products);
+    (masks.iter().map(squares).collect(), products)
 }
 
 /// Adds the products of so many lines a_i, whose samples are `factors`, and lines b_j, block by block of j. Of a block that

@@ -36,6 +36,8 @@ pub(super) struct Start {
     pub(super) mix: Vec<f64>,
     /// Ranges that inputs are scaled by.
     pub(super) ranges: Vec<[f64; 2]>,
+    /// Outputs of each task.
+    pub(super) tasks: Vec<Vec<usize>>,
 }
 
 enum Inputs {
@@ -80,7 +82,7 @@ impl Sources {
             Inputs::Projected(projected) => (projected.among_features(layer), projected.start()),
             Inputs::Rows(_) => (layer.clone(), vec![]),
         };
-        Start { layer, mix, ranges: self.ranges(network) }
+        Start { layer, mix, ranges: self.ranges(network), tasks: self.tasks[network].clone() }
     }
 
     /// Ranges of the inputs that layers are scaled by.
@@ -126,8 +128,9 @@ impl Sources {
         Ok(layers)
     }
 
-    /// Samples of each task of network number `network`, side by side: none of a task that `frames` lack.
-    pub(super) fn pieces(&self, frames: &Dataset, network: usize) -> Vec<Vec<Piece>> {
+    /// Samples of network number `network`, side by side. Those of the same tasks stand together, for what most pieces
+    /// have then serves all of their tasks.
+    pub(super) fn pieces(&self, frames: &Dataset, network: usize) -> Vec<Piece> {
         let targets = self.targets.of_network(&frames.outputs, network);
         let (inputs, width) = match &self.inputs {
             Inputs::Rows(scales) => {
@@ -139,13 +142,16 @@ impl Sources {
                 (projected.sources(frames), projected.features + projected.readings.len())
             }
         };
-        let of_task = |columns: &Vec<usize>| {
-            let lines = targets.lines_with(columns);
-            let inputs: Vec<f64> =
-                lines.iter().flat_map(|line| &inputs[line * width..][..width]).copied().collect();
-            Piece::all(&inputs, width, &targets.part(&lines, columns).values, columns.len())
+        let outputs: Vec<usize> = (0..targets.names.len()).collect();
+        let missing = |line: &usize| -> Vec<bool> {
+            targets.line(*line).iter().map(|target| target.is_nan()).collect()
         };
-        self.tasks[network].iter().map(of_task).collect()
+        let mut lines: Vec<usize> =
+            (0..targets.len()).filter(|line| missing(line).contains(&false)).collect();
+        lines.sort_by_cached_key(missing);
+        let inputs: Vec<f64> =
+            lines.iter().flat_map(|line| &inputs[line * width..][..width]).copied().collect();
+        Piece::all(&inputs, width, &targets.part(&lines, &outputs).values, outputs.len())
     }
 }
 

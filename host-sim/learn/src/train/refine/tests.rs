@@ -6,9 +6,9 @@ use taxel_data::progress::Silent;
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_simulate::{Synthesis, World};
 
-use super::loss::{Loss, on_held_out, on_same};
+use super::loss::{Loss, held_out_errors, on_held_out, on_same};
 use super::movable::{Movable, Piece, Sizes};
-use super::products::{Line, SIDE, add_combinations, add_normal_equations, add_products};
+use super::products::{Line, SIDE, add_combinations, add_products, normal_equations};
 use super::*;
 use crate::infer::{Exponential, infer};
 use crate::train::{train, train_refined};
@@ -35,11 +35,17 @@ fn products_are_those_of_plain_loops() {
                 close(products[i * n + j], 1.0 + dot(a, b));
             }
         }
-        let (mut squares, mut again) = (vec![0.0; m * m], vec![1.0; m * n]);
-        add_normal_equations(&a, &b, &mut squares, &mut again);
-        assert_eq!(again, products);
+        // All samples, and those but the first.
+        let mut masks = [[0.0; SIDE]; 2];
+        masks[1][0] = f64::NAN;
+        let (squares, again) = normal_equations(&a, &b, &masks.each_ref());
+        again.iter().zip(&products).for_each(|(again, product)| close(1.0 + again, *product));
         for i in 0..m {
-            (i..m).for_each(|j| close(squares[i * m + j], dot(&a[i], &a[j])));
+            for j in i..m {
+                let square = dot(&a[i], &a[j]);
+                close(squares[0][i * m + j], square);
+                close(squares[1][i * m + j], square - a[i][0] * a[j][0]);
+            }
         }
         let mut combined = vec![[2.0; SIDE]; n];
         add_combinations(&products, &a, &mut combined);
@@ -52,8 +58,8 @@ fn products_are_those_of_plain_loops() {
     }
 }
 
-/// Pieces of random samples; the second one is not full.
-fn pieces(inputs: usize, outputs: usize, samples: usize, purpose: u64) -> Vec<Piece> {
+/// Random samples: their inputs, and their outputs.
+fn samples(inputs: usize, outputs: usize, samples: usize, purpose: u64) -> (Vec<f64>, Vec<f64>) {
     let mut draw = draws(purpose);
     let x: Vec<f64> = (0..samples * inputs).map(|_| draw()).collect();
     let lines = x.chunks_exact(inputs);
@@ -63,7 +69,7 @@ fn pieces(inputs: usize, outputs: usize, samples: usize, purpose: u64) -> Vec<Pi
         })
         .map(|y| y + 0.1 * draw())
         .collect();
-    Piece::all(&x, inputs, &y, outputs)
+    (x, y)
 }
 
 /// Compares every part of the gradient with a difference of losses.
@@ -117,32 +123,100 @@ fn gradients_are_slopes_of_the_loss() {
     {
         let sizes = Sizes { inputs: 3, centres: 6, widths, sources, affine_tail };
         let given = if sources > 0 { sources } else { 3 };
-        let (rest, held) = (pieces(given, 2, 300, 1), pieces(given, 2, 100, 2));
+        // The second piece of the rest is not full.
+        let [rest, held] = [(300, 1), (100, 2)].map(|(count, purpose)| {
+            let (x, y) = samples(given, 2, count, purpose);
+            Piece::all(&x, given, &y, 2)
+        });
         let [rest, held] = [&rest, &held].map(|pieces| pieces.iter().collect::<Vec<_>>());
-        gradient_is_the_slope(sizes, &|movable| on_same(movable, &rest, 1e-9).unwrap());
+        let tasks = [vec![0, 1]];
+        gradient_is_the_slope(sizes, &|movable| {
+            on_same(movable, &tasks, &rest, 1e-9).unwrap().unwrap()
+        });
         // The penalty has a part in the weights here, and all of it is derived.
-        gradient_is_the_slope(sizes, &|movable| on_held_out(movable, &rest, &held, 1e-3).unwrap());
+        gradient_is_the_slope(sizes, &|movable| {
+            on_held_out(movable, &tasks, &rest, &held, 1e-3).unwrap().unwrap()
+        });
     }
 }
 
-/// Two tasks: two outputs on some samples, and one on others.
-#[test]
-fn the_gradient_of_several_tasks_is_the_slope_of_their_sum() {
-    let sizes = Sizes { inputs: 3, centres: 6, widths: 1, sources: 0, affine_tail: true };
-    let tasks = [(2, 150, 40), (1, 300, 100)]
-        .map(|(outputs, rest, held)| [pieces(3, outputs, rest, 1), pieces(3, outputs, held, 2)]);
-    let loss = |movable: &Movable| -> Vec<Loss> {
-        let of_task = |[rest, held]: &[Vec<Piece>; 2]| {
-            let [rest, held] = [rest, held].map(|pieces| pieces.iter().collect::<Vec<_>>());
-            on_held_out(movable, &rest, &held, 1e-3).unwrap()
-        };
-        tasks.iter().map(of_task).collect()
-    };
-    gradient_is_the_slope(sizes, &|movable| {
-        let [first, second] = loss(movable).try_into().unwrap_or_else(|_| panic!("two"));
-        assert!(first.value > 0.0 && second.value > 0.0);
-        first.plus(&second)
+/// Samples of two tasks side by side, and those of each task by itself: two outputs of the first 150 samples, and one of
+/// all but every seventh.
+fn of_two_tasks(tasks: &[Vec<usize>; 2], count: usize, purpose: u64) -> [Vec<Piece>; 3] {
+    let (x, mut y) = samples(3, 3, count, purpose);
+    let has = |task: usize, s: usize| if task == 0 { s < 150 } else { !s.is_multiple_of(7) };
+    let alone = [0, 1].map(|task| {
+        let lines = || (0..count).filter(|s| has(task, *s));
+        let x: Vec<f64> = lines().flat_map(|s| x[3 * s..][..3].to_vec()).collect();
+        let y: Vec<f64> = lines()
+            .flat_map(|s| tasks[task].iter().map(|c| y[3 * s + c]).collect::<Vec<_>>())
+            .collect();
+        Piece::all(&x, 3, &y, tasks[task].len())
     });
+    for (s, line) in y.chunks_exact_mut(3).enumerate() {
+        let missing = (0..2).filter(|task| !has(*task, s)).flat_map(|task| &tasks[task]);
+        missing.for_each(|column| line[*column] = f64::NAN);
+    }
+    let [first, second] = alone;
+    [Piece::all(&x, 3, &y, 3), first, second]
+}
+
+#[test]
+fn tasks_that_share_activations_have_the_sum_of_their_losses_and_of_its_slopes() {
+    let sizes = Sizes { inputs: 3, centres: 6, widths: 1, sources: 0, affine_tail: true };
+    let tasks = [vec![0, 2], vec![1]];
+    let (rest, held) = (of_two_tasks(&tasks, 300, 1), of_two_tasks(&tasks, 200, 2));
+    let [rest, held] =
+        [&rest, &held].map(|all| all.each_ref().map(|it| it.iter().collect::<Vec<_>>()));
+    let together = |movable: &Movable| {
+        on_held_out(movable, &tasks, &rest[0], &held[0], 1e-3).unwrap().unwrap()
+    };
+    gradient_is_the_slope(sizes, &together);
+
+    let mut draw = draws(5);
+    let centres: Vec<f64> = (0..18).map(|_| draw()).collect();
+    let movable = Movable::new(sizes, &centres, &[0.8], &[]);
+    let alone = [1, 2].map(|task| {
+        let only = [(0..tasks[task - 1].len()).collect()];
+        let loss = on_held_out(&movable, &only, &rest[task], &held[task], 1e-3).unwrap().unwrap();
+        (loss, held_out_errors(&movable, &only, &rest[task], &held[task], 1e-3).unwrap().concat())
+    });
+    let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-10 * b.abs().max(1e-3), "{a:e} {b:e}");
+    let together = together(&movable);
+    close(together.value, alone[0].0.value + alone[1].0.value);
+    for (place, slope) in together.gradient.iter().enumerate() {
+        close(*slope, alone[0].0.gradient[place] + alone[1].0.gradient[place]);
+    }
+    let errors = held_out_errors(&movable, &tasks, &rest[0], &held[0], 1e-3).unwrap();
+    for (errors, (_, alone)) in errors.iter().zip(&alone) {
+        assert_eq!(errors.len(), alone.len());
+        errors.iter().zip(alone).for_each(|(a, b)| close(*a, *b));
+    }
+}
+
+/// An output that no sample on one side has takes no part, and none is left if there is no other.
+#[test]
+fn a_task_without_samples_on_both_sides_has_no_loss() {
+    let sizes = Sizes { inputs: 3, centres: 6, widths: 1, sources: 0, affine_tail: true };
+    let mut draw = draws(5);
+    let centres: Vec<f64> = (0..18).map(|_| draw()).collect();
+    let movable = Movable::new(sizes, &centres, &[0.8], &[]);
+    let without = |output: Option<usize>, count: usize, purpose: u64| {
+        let (x, mut y) = samples(3, 2, count, purpose);
+        y.chunks_exact_mut(2).for_each(|line| output.into_iter().for_each(|o| line[o] = f64::NAN));
+        Piece::all(&x, 3, &y, 2)
+    };
+    let loss = |rest: Option<usize>, held: Option<usize>| {
+        let (rest, held) = (without(rest, 300, 1), without(held, 100, 2));
+        let [rest, held] = [&rest, &held].map(|pieces| pieces.iter().collect::<Vec<_>>());
+        on_held_out(&movable, &[vec![0], vec![1]], &rest, &held, 1e-3).unwrap()
+    };
+    let of_second = loss(Some(0), Some(0)).unwrap();
+    for other in [loss(None, Some(0)), loss(Some(0), None)].map(Option::unwrap) {
+        assert_eq!((other.value, &other.gradient), (of_second.value, &of_second.gradient));
+    }
+    assert!(loss(None, None).unwrap().value > of_second.value);
+    assert!(loss(Some(0), Some(1)).is_none());
 }
 
 struct Fresh<'w>(Synthesis<'w>);
