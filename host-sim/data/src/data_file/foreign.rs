@@ -48,7 +48,10 @@ pub(super) fn check(path: &Path, bytes: &[u8]) -> Result<()> {
     let found = of_bytes.map(|(_, kind, python)| (*kind, *python)).or_else(|| in_zip(bytes));
     let Some((kind, python)) = found else { return Ok(()) };
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    let table = Path::new(&*name).with_extension("csv");
+    let name_of = |ending| Path::new(&*name).with_extension(ending);
+    // Never the file itself, nor one that a file system takes for it.
+    let is_itself = name_of("csv").to_string_lossy().eq_ignore_ascii_case(&name);
+    let table = name_of(if is_itself { "converted.csv" } else { "csv" });
     let quoted = |name: &str| format!("'{}'", name.replace('\\', "\\\\").replace('\'', "\\'"));
     let python = python.replace("'OUT'", &quoted(&table.to_string_lossy()));
     let python = python.replace("'IN'", &quoted(&name));

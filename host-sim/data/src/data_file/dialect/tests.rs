@@ -112,6 +112,21 @@ fn what_is_no_text_is_refused() {
 }
 
 #[test]
+fn no_file_is_told_to_be_converted_to_itself() {
+    for (name, converted) in [
+        ("log.json", "log.csv"),
+        ("log", "log.csv"),
+        ("log.csv", "log.converted.csv"),
+        ("LOG.CSV", "LOG.converted.csv"),
+    ] {
+        let found = DataFile::parse(Path::new(name), b"{\"a\": 1}\n", &Reading::default());
+        let refused = found.unwrap_err().to_string();
+        let python = format!("pd.read_json('{name}', lines=True).to_csv('{converted}', index");
+        assert!(refused.contains(&python), "{refused}");
+    }
+}
+
+#[test]
 fn an_encoding_is_found_by_its_mark_or_its_bytes() {
     let text = "t_s;Kraft µ\n1,5;2\n2,5;3\n";
     let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
