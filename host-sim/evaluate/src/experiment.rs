@@ -44,8 +44,13 @@ pub const EMBEDDED: [(&str, &str); 4] = [
     ("paper-as-printed", include_str!("../../../scenes/paper-as-printed.toml")),
 ];
 
-/// Extensions of files that hold measurements, and no scene.
-const DATA_FILES: [&str; 6] = ["csv", "tsv", "dat", "gz", "npy", "npz"];
+/// Whether `name_or_path` is a scene, or otherwise a data file: a built-in one, a file called .toml, or a name without an
+/// extension and a file, which is a mistyped scene.
+pub fn names_a_scene(name_or_path: &str) -> bool {
+    let path = Path::new(name_or_path);
+    EMBEDDED.iter().any(|(name, _)| *name == name_or_path)
+        || path.extension().map_or(!path.exists(), |end| end.eq_ignore_ascii_case("toml"))
+}
 
 /// Experiment of a scene, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -181,16 +186,14 @@ impl Experiment {
         if let Some((_, text)) = EMBEDDED.iter().find(|(name, _)| *name == name_or_path) {
             return Self::parse_open(name_or_path, text);
         }
-        let path = Path::new(name_or_path);
-        let kind = path.extension().unwrap_or_default();
-        if DATA_FILES.iter().any(|of| kind.eq_ignore_ascii_case(of)) {
+        if !names_a_scene(name_or_path) {
             let known = EMBEDDED.map(|(name, _)| name).join(", ");
             return Err(Error::Usage(format!(
-                "{name_or_path} is a data file, and a scene is wanted here: {known}, or a scene file (.toml). Measured data \
+                "{name_or_path} is a data file by its name, and a scene is wanted here: {known}, or a scene file (.toml). Measured data \
                  tells neither the sensor nor what may happen to it; `train`, `run`, `trade` and `gate` take it"
             )));
         }
-        let text = input::read_text(path).map_err(|error| match error {
+        let text = input::read_text(Path::new(name_or_path)).map_err(|error| match error {
             taxel_data::Error::Read { path, cause } => {
                 let names: Vec<_> = EMBEDDED.iter().map(|(name, _)| *name).collect();
                 let known = names.join(", ");

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::experiment::names_a_scene;
 use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::Memory;
@@ -96,11 +97,7 @@ impl Limits {
 impl CheckArguments {
     /// Loads readings and model, which is trained if none was given.
     pub fn load(&self, common: &Common) -> Result<Checked> {
-        if Path::new(&self.source).extension().is_some_and(|end| end.eq_ignore_ascii_case("csv")) {
-            self.load_csv()
-        } else {
-            self.load_scene(common)
-        }
+        if names_a_scene(&self.source) { self.load_scene(common) } else { self.load_csv() }
     }
 
     fn load_csv(&self) -> Result<Checked> {

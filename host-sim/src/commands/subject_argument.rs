@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::experiment::{EMBEDDED, Experiment};
+use crate::experiment::{Experiment, names_a_scene};
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::Args;
@@ -45,14 +45,6 @@ pub struct SubjectOptions {
     // Last, since options behind it would stand under its heading.
     #[command(flatten)]
     pub data: DataArguments,
-}
-
-/// Whether `source` is a scene, or otherwise a CSV file. A name without a file and an extension is a
-/// mistyped scene.
-fn names_a_scene(source: &str) -> bool {
-    let path = Path::new(source);
-    EMBEDDED.iter().any(|(name, _)| *name == source)
-        || path.extension().map_or(!path.exists(), |extension| extension == "toml")
 }
 
 impl SubjectArgument {
