@@ -13,6 +13,7 @@ pub mod coverage_page;
 mod data_notes;
 mod refused_readings;
 mod data_file;
+mod mat_cells;
 mod readings;
 mod rest_argument;
 mod health;

@@ -16,7 +16,8 @@ use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::resolution;
 use taxel_learn::{Options, relative};
 
-use super::data_argument::{DataArguments, HowToTrain, name_cells, with_options};
+use super::data_argument::{DataArguments, HowToTrain, with_options};
+use super::mat_cells::MatCells;
 use super::{data_file, data_notes, refused_readings, stderr};
 
 /// Most values far from all others that are kept to be told.
@@ -63,7 +64,7 @@ impl DataStream {
                 }
                 found => found?,
             };
-            name_cells(&mut frames.inputs, &file, inputs.as_deref(), self.selection.grid)?;
+            MatCells::of(&file, inputs.as_deref(), self.selection.grid)?.name(&mut frames.inputs);
             let names = frames.names();
             let new = || TableDigest::new(names.iter().copied());
             file.add_to(self.digest.get_or_insert_with(new), &names)?;

@@ -1,0 +1,199 @@
+//! Measurements out of a data file: its usable lines, split into those to train on and those to judge by.
+
+use std::path::Path;
+
+use super::{DataArguments, HowToTrain, JudgedBy, with_options};
+use crate::commands::mat_cells::MatCells;
+use crate::commands::{data_notes, refused_readings, stderr};
+use crate::measurements::{Frames, Judged, Log, Measurements, Split};
+use crate::verdict::Warning;
+use crate::{Error, Result};
+use taxel_data::clock::{Clock, neighbours_alike};
+use taxel_data::data_file::DataFile;
+use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
+use taxel_data::error::Problem;
+use taxel_data::table::Table;
+use taxel_learn::outliers::{self, Outliers};
+use taxel_learn::train::refine::LEAST_FOLDS;
+use taxel_learn::train::resolution;
+use taxel_learn::{Options, relative, select};
+
+impl DataArguments {
+    /// Measurements in the CSV file at `path`.
+    pub fn load(&self, path: &Path, how: HowToTrain, judged: JudgedBy<'_>) -> Result<Measurements> {
+        let file = self.file.read(path)?;
+        let [inputs, outputs] = self.patterns();
+        let unused = UnusedInputs::find(&file, inputs, outputs).map_err(with_options)?;
+        data_notes::print_unused(&unused, path);
+        let cells = MatCells::of(&file, inputs, self.grid)?;
+        for wire in cells.silent_wires(&unused.names()) {
+            stderr::remark(format_args!("note: {wire}: none of its readings tells anything"));
+        }
+        let (all, outliers, left_out) = self.usual_frames(&file, (&unused, &cells), how)?;
+        data_notes::print_classes(&all.frames.outputs);
+        let given_folds = self
+            .fold_column
+            .as_ref()
+            .map(|name| folds_from(&file, name, &all.log.lines))
+            .transpose()?;
+        let digest = file.digest(&all.frames.names())?;
+        let judged_by = self.judged(judged, &all.frames, &unused, digest, how)?;
+        let Split { training: kept, test, choice } =
+            Split::new(&all, given_folds.as_deref(), judged_by);
+        if kept.is_empty() {
+            let message = "holding out frames leaves none to train on: give more, or --test FILE";
+            return Err(Error::Unfit { path: path.into(), message: message.into() });
+        }
+        if test.frames.frames() == 0 && !matches!(judged, JudgedBy::None) {
+            let message = "there is no frame to judge by: give five lines or more, or --test FILE";
+            return Err(Error::Unfit { path: path.into(), message: message.into() });
+        }
+        let training = all.subset(&kept);
+        let count = kept.len();
+        let fold_of = match &given_folds {
+            Some(folds) => {
+                let rest: Vec<usize> = kept.iter().map(|frame| folds[*frame]).collect();
+                let held_out = !matches!(judged, JudgedBy::None);
+                check_folds(&rest, held_out && how.refine)?;
+                rest
+            }
+            None if count < 2 && self.folds.is_none() => vec![0; count],
+            None => self.folds_of(&training.frames.outputs, how.seed)?,
+        };
+        // Readings themselves, even if the model is given their ratios to the baseline.
+        resolution::check(&training.frames)
+            .map_err(|refusal| Error::Unfit { path: path.into(), message: refusal.to_string() })?;
+        let test_readings = test.frames.inputs.clone();
+        let test_baselines = test.baselines();
+        let given = |frames: Dataset, baselines: Option<Table>| match baselines {
+            Some(baselines) if how.relative_inputs => relative::dataset(frames, &baselines),
+            _ => frames,
+        };
+        let baselines = training.baselines();
+        let (log, rest) = (training.log, training.rest);
+        let training = given(training.frames, baselines);
+        let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
+        let inputs = training.inputs.names.len() / training.rows;
+        let centres = Warning::enough_frames_for(training.fewest_values(), inputs);
+        let centres = Options::default().centres.min(centres);
+        let measurements = Measurements {
+            name: name.into_owned(),
+            digest,
+            log,
+            folds_flatter: self.folds.is_some() && neighbours_alike(&training.outputs),
+            training,
+            fold_of,
+            test: given(test.frames, test_baselines.clone()),
+            test_log: test.log,
+            test_readings,
+            test_baselines,
+            test_choice: choice,
+            outliers,
+            left_out,
+            unused,
+            rest,
+            options: Options { seed: how.seed, centres, ..Options::default() },
+            refine: how.refine,
+            confidence: how.confidence,
+        };
+        let constant = measurements.constant_inputs();
+        data_notes::print_constant(&constant, path);
+        Ok(measurements)
+    }
+
+    /// Outliers of `frames`, which are left out unless they are to be kept.
+    fn outliers(&self, frames: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
+        let outliers = outliers::find(frames, line_number);
+        if !self.keep_outliers {
+            return outliers;
+        }
+        Outliers { left_out: false, kept: (0..frames.frames()).collect(), ..outliers }
+    }
+
+    /// Frames of `file` without outliers and without unused inputs, the outliers, and the lines that lack a value.
+    fn usual_frames(
+        &self,
+        file: &DataFile,
+        inputs: (&UnusedInputs, &MatCells),
+        how: HowToTrain,
+    ) -> Result<(Frames, Outliers, LeftOut)> {
+        let (frames, lines, missing) = self.frames(file, inputs)?;
+        let outliers = self.outliers(&frames, |frame| file.line_number(lines[frame]));
+        let left_out = "training and judging (--keep-outliers keeps them)";
+        data_notes::print_outliers(&outliers, &file.path, frames.frames(), left_out);
+        let lines = outliers.kept.iter().map(|frame| lines[*frame]).collect();
+        let frames = frames.subset(&outliers.kept);
+        refused_readings::note(&frames.inputs, &file.path.display().to_string());
+        let log = Log { clock: Clock::of(file, self.time.as_deref())?, lines };
+        let rest = self.rest(file, &frames, how)?;
+        Ok((Frames { frames, log, rest }, outliers, missing))
+    }
+
+    /// Frames of `file` without the `unused` inputs, which are named after their `cells`; the indices of their lines, and the
+    /// lines that lack a value.
+    fn frames(
+        &self,
+        file: &DataFile,
+        (unused, cells): (&UnusedInputs, &MatCells),
+    ) -> Result<(Dataset, Vec<usize>, LeftOut)> {
+        let [inputs, outputs] = self.patterns();
+        let (mut frames, kept) =
+            Dataset::from_file(file, inputs, outputs, &unused.names()).map_err(with_options)?;
+        cells.name(&mut frames.inputs);
+        data_notes::print_left_out(&kept.left_out, &file.path, kept.of);
+        Ok((frames, kept.lines, kept.left_out))
+    }
+
+    /// Frames that the model trained on some of `frames` is judged by. `digest` is that of their columns.
+    fn judged(
+        &self,
+        judged: JudgedBy<'_>,
+        frames: &Dataset,
+        unused: &UnusedInputs,
+        digest: u64,
+        how: HowToTrain,
+    ) -> Result<Judged> {
+        let path = match judged {
+            JudgedBy::None => return Ok(Judged::None),
+            JudgedBy::HeldOut => return Ok(Judged::HeldOut),
+            JudgedBy::File(path) => path,
+        };
+        let file = self.file.fields().read(path)?;
+        if file.digest(&frames.names()).is_ok_and(|of_file| of_file == digest) {
+            let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
+            return Err(Error::Unfit { path: path.into(), message: message.into() });
+        }
+        let cells = MatCells::of(&file, self.inputs.as_deref(), self.grid)?;
+        let (own, ..) = self.usual_frames(&file, (unused, &cells), how)?;
+        if own.frames.names() != frames.names() {
+            let message = "its columns are not those of the frames to train on: give a file with the same columns, \
+                           in the same order (--test)";
+            return Err(Error::Unfit { path: path.into(), message: message.into() });
+        }
+        Ok(Judged::File { frames: Box::new(own), name: path.display().to_string() })
+    }
+}
+
+/// Checks the folds that are left for refinement, `if_refined` after one of them was held out to judge by.
+fn check_folds(folds: &[usize], if_refined: bool) -> Result<()> {
+    let count = folds.iter().max().map_or(0, |last| last + 1);
+    if !if_refined || count >= LEAST_FOLDS {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "--fold-column: the last fold is held out to judge by, which leaves {count}, and refinement needs {LEAST_FOLDS}: \
+         give --test FILE, a column with more folds, or --no-refine"
+    )))
+}
+
+/// Folds from column `name`, numbered from 0.
+fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
+    let column = file.column(name)?;
+    let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
+    if let Some(place) = values.iter().position(|value| value.is_nan()) {
+        let rule = format!("column {name:?}: every line needs a fold; fill it in");
+        let problem = Problem::MissingValue { line: file.line_number(lines[place]), rule };
+        return Err(taxel_data::Error::file(&file.path, problem).into());
+    }
+    Ok(select::number_folds(&values))
+}

@@ -1,0 +1,42 @@
+//! Columns of a data file that are the cells of a mat, with their names in a model.
+
+use taxel_data::columns;
+use taxel_data::data_file::DataFile;
+use taxel_data::dataset::USUAL_INPUTS;
+use taxel_data::mat::{self, Mat};
+use taxel_data::table::Table;
+
+/// Input columns of a file, each with its name in a model: that of a cell, if they are a mat.
+pub struct MatCells(Vec<(String, String)>);
+
+impl MatCells {
+    /// Columns of `file` that match the `pattern`, and whose `grid` may be given.
+    pub fn of(
+        file: &DataFile,
+        pattern: Option<&str>,
+        grid: Option<Mat>,
+    ) -> taxel_data::Result<Self> {
+        let chosen = columns::select(&file.header, pattern.unwrap_or(USUAL_INPUTS));
+        let cells =
+            mat::cell_names(&file.header, &chosen, grid).map_err(taxel_data::Error::unfit)?;
+        let own = chosen.iter().map(|column| file.header[*column].clone());
+        Ok(Self(own.zip(cells).collect()))
+    }
+
+    /// Names `inputs`, which are among these columns, after their cells.
+    pub fn name(&self, inputs: &mut Table) {
+        for name in &mut inputs.names {
+            if let Some((_, cell)) = self.0.iter().find(|(own, _)| own == name) {
+                name.clone_from(cell);
+            }
+        }
+    }
+
+    /// Wires of which every reading is among the `unused` columns.
+    pub fn silent_wires(&self, unused: &[String]) -> Vec<String> {
+        let silent = self.0.iter().filter(|(own, _)| unused.contains(own));
+        let silent: Vec<String> = silent.map(|(_, cell)| cell.clone()).collect();
+        let cells: Vec<String> = self.0.iter().map(|(_, cell)| cell.clone()).collect();
+        mat::whole_wires(&cells, &silent)
+    }
+}
