@@ -8,18 +8,19 @@
 
 /// Reciprocal 1/R₀ of a channel's `baseline`, in one over the reading's unit.
 ///
-/// NaN for a baseline that is missing (NaN), zero or infinite, or so small that 1/R₀ is beyond `f32`. The channel
-/// is missing then: [`relative`] is NaN whatever its reading is.
+/// NaN for a baseline that is missing (NaN), zero, negative or infinite, or so small that 1/R₀ is beyond `f32`. The
+/// channel is missing then: [`relative`] is NaN whatever its reading is.
 ///
 /// ```
 /// use model_core::relative::reciprocal;
 /// assert_eq!(reciprocal(64.0), 0.015625);
-/// assert!([f32::NAN, 0.0, f32::INFINITY, 1e-45].into_iter().all(|baseline| reciprocal(baseline).is_nan()));
+/// assert!([f32::NAN, 0.0, -64.0, f32::INFINITY, 1e-45].into_iter().all(|baseline| reciprocal(baseline).is_nan()));
 /// ```
 #[inline]
 pub fn reciprocal(baseline: f32) -> f32 {
     let reciprocal = 1.0 / baseline;
-    if baseline.is_finite() && reciprocal.is_finite() { reciprocal } else { f32::NAN }
+    let is_level = baseline > 0.0 && baseline.is_finite();
+    if is_level && reciprocal.is_finite() { reciprocal } else { f32::NAN }
 }
 
 /// Reading relative to its baseline, R/R₀, from the `reading` R and the [`reciprocal`] of its baseline.

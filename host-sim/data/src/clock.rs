@@ -6,8 +6,19 @@ use crate::error::{Error, Problem, Result};
 use crate::table::Table;
 
 /// Names of columns that hold the time, without a unit and in lower case.
-const NAMES: [&str; 8] =
-    ["time", "t", "timestamp", "time_stamp", "stamp", "datetime", "date_time", "clock"];
+const NAMES: [&str; 11] = [
+    "time",
+    "t",
+    "timestamp",
+    "time_stamp",
+    "stamp",
+    "datetime",
+    "date_time",
+    "clock",
+    "zeit",
+    "zeitstempel",
+    "uhrzeit",
+];
 
 /// Units of time, with their length in seconds.
 const UNITS: [(&str, f64); 5] =
@@ -45,14 +56,7 @@ impl Clock {
             }
             return Ok(Self::of_column(file, column, times));
         }
-        let is_time = |name: &str| {
-            let bare = columns::without_unit(name).to_lowercase();
-            let unit = columns::unit_of(name);
-            NAMES.contains(&bare.as_str())
-                && (unit.is_empty() || UNITS.iter().any(|(known, _)| *known == unit))
-        };
-        let named = file.header.iter().enumerate().filter(|(_, name)| is_time(name));
-        for (column, _) in named {
+        for column in time_columns(file) {
             let times = times(file, column);
             if first_wrong(&times).is_none() && times.first() < times.last() {
                 return Ok(Self::of_column(file, column, times));
@@ -60,6 +64,20 @@ impl Clock {
         }
         let at = (0..file.lines()).map(|line| file.line_number(line) as f64).collect();
         Ok(Self { column: None, unit: "", at })
+    }
+
+    /// Why lines are counted though a column is called as times are; `None` if there is no such column, or it tells the time.
+    pub fn why_counted(&self, file: &DataFile) -> Option<String> {
+        let column = time_columns(file).next().filter(|_| self.column.is_none())?;
+        let (name, times) = (&file.header[column], times(file, column));
+        Some(match first_wrong(&times) {
+            Some(at) => {
+                let what =
+                    if times[at].is_nan() { "holds no time" } else { "is before the one above" };
+                format!("{name} is not taken for the time: line {} {what}", file.line_number(at))
+            }
+            None => format!("{name} is not taken for the time: it never changes"),
+        })
     }
 
     fn of_column(file: &DataFile, column: usize, mut at: Vec<f64>) -> Self {
@@ -86,6 +104,17 @@ impl Clock {
     }
 }
 
+/// Columns that are called as times are.
+fn time_columns(file: &DataFile) -> impl Iterator<Item = usize> {
+    let is_time = |name: &str| {
+        let bare = columns::without_unit(name).to_lowercase();
+        let unit = columns::unit_of(name);
+        NAMES.contains(&bare.as_str())
+            && (unit.is_empty() || UNITS.iter().any(|(known, _)| *known == unit))
+    };
+    (0..file.header.len()).filter(move |column| is_time(&file.header[*column]))
+}
+
 fn times(file: &DataFile, column: usize) -> Vec<f64> {
     (0..file.lines()).map(|line| file.value(line, column)).collect()
 }
@@ -102,12 +131,14 @@ fn first_wrong(times: &[f64]) -> Option<usize> {
 
 /// What is wrong with the time in this `line` of the column called `name`.
 fn wrong(name: &str, times: &[f64], at: usize, line: u64) -> Problem {
-    if times[at].is_nan() {
-        let rule = format!("column {name:?}: every line needs a time; fill it in");
-        return Problem::MissingValue { line, rule };
-    }
-    let [value, before] = [at, at - 1].map(|at| times[at].to_string());
-    Problem::ClockSetBack { line, column: name.into(), value, before }
+    let why = match (times[at].is_nan(), at.checked_sub(1)) {
+        (false, Some(before)) => {
+            format!("{} is earlier than {} before it", times[at], times[before])
+        }
+        _ => "no time stands there".into(),
+    };
+    let rule = format!("column {name:?}: {why}; mend the line, or name another column (--time)");
+    Problem::MissingValue { line, rule }
 }
 
 /// Whether successive lines of `outputs` resemble each other, as those of a log do and those in random order do not: the
@@ -161,6 +192,21 @@ mod tests {
             assert_eq!((clock.column.as_deref(), &clock.at[..]), (None, &[2.0, 3.0][..]), "{text}");
             assert_eq!(clock.span(2.0, 3.0), "from line 2 to line 3");
         }
+        let file = |text: &str| {
+            DataFile::parse(Path::new("log.csv"), text.as_bytes(), &Reading::default()).unwrap()
+        };
+        for (text, why) in [
+            ("time,a\n2,1\n1,2\n", Some("line 3 is before the one above")),
+            ("Zeit,a\n1,1\n25.11.2026,2\n", Some("line 3 holds no time")),
+            ("t,a\n1,1\n1,2\n", Some("it never changes")),
+            ("t,a\n1,1\n2,2\n", None),
+            ("b,a\n1,1\n1,2\n", None),
+        ] {
+            let file = file(text);
+            let said = Clock::of(&file, None).unwrap().why_counted(&file);
+            assert_eq!(said.is_some(), why.is_some(), "{text}");
+            assert!(said.unwrap_or_default().contains(why.unwrap_or_default()), "{text}");
+        }
         let unknown = clock("time,a\n5,1\n7,2\n", None).unwrap();
         assert_eq!((unknown.unit, unknown.span(5.0, 7.0).as_str()), ("", "from time 5 to 7"));
     }
@@ -171,7 +217,7 @@ mod tests {
         let refused = clock("n,a\n5,1\n4,2\n", Some("n")).unwrap_err().to_string();
         assert!(refused.contains("line 3") && refused.contains("4 is earlier than 5"), "{refused}");
         let refused = clock("n,a\n,1\n5,2\n", Some("n")).unwrap_err().to_string();
-        assert!(refused.contains("line 2: column \"n\": every line needs a time"), "{refused}");
+        assert!(refused.contains("line 2: column \"n\": no time stands there"), "{refused}");
     }
 
     #[test]

@@ -214,11 +214,37 @@ pub fn unmatched<'p>(header: &[String], pattern: &'p str) -> Option<&'p str> {
     pattern.split(',').map(str::trim).find(|part| part_of(header, part).1.is_empty())
 }
 
-/// First names of a header, as a list for messages.
+/// First and last names of a header, as a list for messages.
 pub fn some_names(header: &[String]) -> String {
-    const SHOWN: usize = 8;
-    let shown = header.iter().take(SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
-    if header.len() > SHOWN { format!("{shown}, … ({} columns)", header.len()) } else { shown }
+    const ALL: usize = 8;
+    const ENDS: [usize; 2] = [5, 3];
+    let listed = |names: &[String]| names.iter().map(|it| cut(it)).collect::<Vec<_>>().join(", ");
+    if header.len() <= ALL {
+        return listed(header);
+    }
+    let (first, last) = (&header[..ENDS[0]], &header[header.len() - ENDS[1]..]);
+    format!("{}, …, {} ({} columns)", listed(first), listed(last), header.len())
+}
+
+/// Names of a header as a list for messages, and the one that is most like the `wanted` name, if any is: the same but for
+/// case, unit and signs, or a part of it.
+pub fn known_names(header: &[String], wanted: &str) -> String {
+    let bare = |name: &str| -> String {
+        let bare = without_unit(name).chars().filter(|c| c.is_alphanumeric());
+        bare.flat_map(char::to_lowercase).collect()
+    };
+    let wanted = bare(wanted);
+    let is_alike = |name: &&String| {
+        let name = bare(name);
+        let short = name.len().min(wanted.len());
+        short > 1 && (name.contains(&wanted) || wanted.contains(&name))
+    };
+    let same = header.iter().find(|name| bare(name) == wanted && !wanted.is_empty());
+    let known = some_names(header);
+    match same.or_else(|| header.iter().find(is_alike)) {
+        Some(name) => format!("{known}; did you mean {:?}?", cut(name)),
+        None => known,
+    }
 }
 
 /// Whether `name` is what `glob` stands for. It takes the product of their lengths at most.

@@ -184,6 +184,12 @@ impl DataFile {
         &self.values[line * columns..(line + 1) * columns]
     }
 
+    /// Lines of data that are not kept, each a slice of one value a column.
+    pub fn lines_left_out(&self) -> impl Iterator<Item = &[f64]> {
+        let lines = self.values.chunks_exact(self.header.len()).enumerate();
+        lines.filter(|(line, _)| !self.kept.contains(line)).map(|(_, values)| values)
+    }
+
     /// Number of lines of data.
     pub fn lines(&self) -> usize {
         self.kept.len()
@@ -228,7 +234,7 @@ impl DataFile {
         let place = |name: &str| columns::place(&self.header, name);
         let own = || columns::cell_of(name).filter(|(_, own)| *own != "ohm");
         place(name).or_else(|| place(own()?.1)).ok_or_else(|| {
-            let known = columns::some_names(&self.header);
+            let known = columns::known_names(&self.header, name);
             Error::file(&self.path, Problem::MissingColumn { name: name.into(), known })
         })
     }

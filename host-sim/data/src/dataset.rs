@@ -279,18 +279,19 @@ fn chosen(file: &DataFile, pattern: Option<&str>, role: Role) -> Result<Vec<usiz
         Role::Inputs => USUAL_INPUTS,
         Role::Outputs => "r*e*_d?_mm,r*e*_f?_n,contact_*",
     };
-    let known = || columns::some_names(&file.header);
     let selected = columns::select(&file.header, pattern.unwrap_or(usual));
     let unmatched = pattern.and_then(|pattern| columns::unmatched(&file.header, pattern));
     if let (Some(glob), Some(pattern)) = (unmatched, pattern) {
+        let known = columns::known_names(&file.header, glob);
         let (glob, pattern) = (glob.into(), pattern.into());
-        let problem = Problem::NoMatch { role, glob, pattern, known: known() };
+        let problem = Problem::NoMatch { role, glob, pattern, known };
         return Err(Error::file(&file.path, problem));
     }
     if selected.is_empty() {
+        let known = columns::some_names(&file.header);
         let problem = match pattern {
             Some(pattern) => Problem::AllLeftOut { role, pattern: pattern.into() },
-            None => Problem::NoUsualNames { role, pattern: usual.into(), known: known() },
+            None => Problem::NoUsualNames { role, pattern: usual.into(), known },
         };
         return Err(Error::file(&file.path, problem));
     }

@@ -230,7 +230,9 @@ pub enum Problem {
         "line {line}, column {}: {} is not a number; {}",
         quoted(column),
         quoted(field),
-        if field.contains(',') && field.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
+        if field.contains(',') && field.contains('.') {
+            "write numbers without thousands separators, and times as 2026-11-25 09:59:00"
+        } else if field.contains(',') && field.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
             "state --decimal comma if it is one, or write it without thousands separators"
         } else {
             "leave the field empty if the value is missing, or use another column"

@@ -4,6 +4,7 @@
 //! the wires of its readings, also where dead cells are left out.
 
 use std::collections::BTreeSet;
+use std::fmt::{self, Display};
 use std::str::FromStr;
 
 use crate::columns::{self, cell_of};
@@ -24,9 +25,15 @@ impl FromStr for Mat {
     /// Parses `ROWSxCOLUMNS`.
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |text: &str| text.parse().ok().filter(|count| (1..=1000).contains(count));
-        let wires = text.split_once('x').and_then(|(m, k)| Some((number(m)?, number(k)?)));
+        let wires = text.split_once(['x', 'X']).and_then(|(m, k)| Some((number(m)?, number(k)?)));
         let (rows, columns) = wires.ok_or("give ROWSxCOLUMNS, such as 16x16")?;
         Ok(Self { rows, columns })
+    }
+}
+
+impl Display for Mat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} × {}", self.rows, self.columns)
     }
 }
 
@@ -45,7 +52,8 @@ impl Mat {
 ///
 /// They are one if they are named after their wires (`r0c0`, `m_r1c1` are not, `r3c4` is); if their names differ in a number
 /// alone, and these numbers run over a square of at least 8 × 8 cells, from which some may be missing; or if `given` says
-/// so. Then numbers count the cells row by row; without numbers the columns are in that order.
+/// so. Then numbers count the cells row by row; without numbers the columns are in that order. The mat is returned if
+/// numbers told it.
 ///
 /// # Errors
 /// Reason why the columns are not the cells of the `given` mat.
@@ -53,29 +61,30 @@ pub fn cell_names(
     header: &[String],
     chosen: &[usize],
     given: Option<Mat>,
-) -> Result<Vec<String>, String> {
+) -> Result<(Vec<String>, Option<Mat>), String> {
     let own: Vec<&str> = chosen.iter().map(|column| header[*column].as_str()).collect();
     let as_they_are = || own.iter().map(ToString::to_string).collect();
     if own.iter().all(|name| cell_of(name).is_some()) {
-        return Ok(as_they_are());
+        return Ok((as_they_are(), None));
     }
     if let (None, Some(names)) = (given, named_after_wires(&own)) {
-        return Ok(names);
+        return Ok((names, None));
     }
     let found = numbers(&own).and_then(|(stem, numbers)| {
         let of_file: Vec<usize> = header.iter().filter_map(|name| number(name, stem)).collect();
         let (mat, first) = numbered(&numbers, &of_file, given)?;
         let named = own.iter().zip(&numbers).map(|(own, number)| mat.name(number - first, own));
-        Some(named.collect())
+        Some((named.collect(), Some(mat)))
     });
     match (found, given) {
-        (Some(names), _) => Ok(names),
-        (None, None) => Ok(as_they_are()),
+        (Some(found), _) => Ok(found),
+        (None, None) => Ok((as_they_are(), None)),
         (None, Some(mat)) if mat.cells() == own.len() => {
-            Ok(own.iter().enumerate().map(|(cell, own)| mat.name(cell, own)).collect())
+            Ok((own.iter().enumerate().map(|(cell, own)| mat.name(cell, own)).collect(), None))
         }
         (None, Some(Mat { rows, columns })) => Err(format!(
-            "--grid {rows}x{columns} has {} cells, and {} columns are inputs: choose as many (--inputs), or number them",
+            "--grid {rows}x{columns} has {} cells, and {} columns are inputs: choose as many (--inputs); dead cells may be left \
+             out only if names carry the cells' numbers",
             rows * columns,
             own.len()
         )),
@@ -163,7 +172,7 @@ mod tests {
 
     fn named(header: &[String], pattern: &str, given: Option<&str>) -> Result<Vec<String>, String> {
         let given = given.map(|text| text.parse().unwrap());
-        cell_names(header, &columns::select(header, pattern), given)
+        cell_names(header, &columns::select(header, pattern), given).map(|(names, _)| names)
     }
 
     #[test]

@@ -123,8 +123,8 @@ impl Table {
         let means = self.means();
         let mut sums = vec![(0.0, 0.0); means.len()];
         for line in self.lines() {
-            let values = line.iter().zip(&means).filter(|(value, _)| !value.is_nan());
-            for ((square, count), (value, mean)) in sums.iter_mut().zip(values) {
+            let columns = sums.iter_mut().zip(line.iter().zip(&means));
+            for ((square, count), (value, mean)) in columns.filter(|(_, (v, _))| !v.is_nan()) {
                 *square += (value - mean) * (value - mean);
                 *count += 1.0;
             }
@@ -214,5 +214,10 @@ mod tests {
         assert_eq!(table.counts(), [2, 2, 0]);
         assert_eq!(table.missing_together(), [[0], [1], [2]]);
         assert_eq!(table.squared_errors(&[0.0; 9]), [10.0, 20.0, 0.0]);
+        let values = vec![nan, 10.0, 1.0, 20.0, 3.0, nan, 5.0, 40.0];
+        let table = Table { names: ["a", "b"].map(String::from).to_vec(), values };
+        // Missing values move none of the others into another column.
+        let of = |squares: f64| (squares / 3.0).sqrt();
+        assert_eq!(table.deviations(), [of(8.0), of(4200.0 / 9.0)]);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::measurements::far_from_zero;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_data::clock::neighbours_alike;
@@ -189,6 +190,7 @@ impl DataArguments {
                 return Err(Error::Unfit { path: file.path.clone(), message: message.into() });
             };
             readings::check_baseline(&rest.readings, &file.path)?;
+            check_level(&rest.readings, &frames.inputs, &file.path)?;
         }
         Ok(rest)
     }
@@ -241,6 +243,16 @@ impl DataArguments {
             select::random_folds(frames, folds, seed)
         })
     }
+}
+
+/// Error if readings at `rest` are about zero, so that `inputs` over them mean nothing; `path` is the log's.
+fn check_level(rest: &Table, inputs: &Table, path: &Path) -> Result<()> {
+    if far_from_zero(&rest.means(), &inputs.deviations()) {
+        return Ok(());
+    }
+    let message = "--relative-inputs: readings are about zero at rest, where R/R₀ means nothing: leave it out, or give readings \
+                   from which no baseline was subtracted";
+    Err(Error::Unfit { path: path.into(), message: message.into() })
 }
 
 /// Error that names the options which choose columns.

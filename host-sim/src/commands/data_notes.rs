@@ -5,6 +5,7 @@ use std::path::Path;
 use taxel_data::columns;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::error::{cut, number};
+use taxel_data::rest::is_zero_at_rest;
 use taxel_data::table::Table;
 use taxel_learn::outliers::{Outlier, Outliers};
 
@@ -37,6 +38,21 @@ pub fn print_left_out(left_out: &LeftOut, path: &Path, of: usize) {
 /// Names the inputs of the file at `path` that can tell nothing.
 pub fn print_unused(unused: &UnusedInputs, path: &Path) {
     notes_on_unused(unused, &path.display().to_string()).iter().for_each(stderr::remark);
+}
+
+/// Says that no line of the log at `path`, which has these `outputs`, is known to be at rest.
+pub fn print_no_rest(outputs: &Table, path: &Path) {
+    let told = outputs.names.iter().filter(|name| is_zero_at_rest(name)).cloned();
+    let told: Vec<String> = told.collect();
+    let why = match told.as_slice() {
+        [] => "no output is a force, weight or pressure;".to_owned(),
+        names => format!("{} is never zero; has it an offset?", columns::some_names(names)),
+    };
+    stderr::remark(format_args!(
+        "note: no line of {} is known to be at rest, so drift is not looked for: {why} --rest NAME names a column that is 0 \
+         while nothing touches the sensor",
+        path.display()
+    ));
 }
 
 /// Names the outputs that look like the label of a class.

@@ -7,7 +7,11 @@ use taxel_data::mat::{self, Mat};
 use taxel_data::table::Table;
 
 /// Input columns of a file, each with its name in a model: that of a cell, if they are a mat.
-pub struct MatCells(Vec<(String, String)>);
+pub struct MatCells {
+    names: Vec<(String, String)>,
+    /// Mat that the numbers in the columns' names were found to fill.
+    pub found: Option<Mat>,
+}
 
 impl MatCells {
     /// Columns of `file` that match the `pattern`, and whose `grid` may be given.
@@ -17,16 +21,16 @@ impl MatCells {
         grid: Option<Mat>,
     ) -> taxel_data::Result<Self> {
         let chosen = columns::select(&file.header, pattern.unwrap_or(USUAL_INPUTS));
-        let cells =
+        let (cells, found) =
             mat::cell_names(&file.header, &chosen, grid).map_err(taxel_data::Error::unfit)?;
         let own = chosen.iter().map(|column| file.header[*column].clone());
-        Ok(Self(own.zip(cells).collect()))
+        Ok(Self { names: own.zip(cells).collect(), found })
     }
 
     /// Names `inputs`, which are among these columns, after their cells.
     pub fn name(&self, inputs: &mut Table) {
         for name in &mut inputs.names {
-            if let Some((_, cell)) = self.0.iter().find(|(own, _)| own == name) {
+            if let Some((_, cell)) = self.names.iter().find(|(own, _)| own == name) {
                 name.clone_from(cell);
             }
         }
@@ -34,9 +38,9 @@ impl MatCells {
 
     /// Wires of which every reading is among the `unused` columns.
     pub fn silent_wires(&self, unused: &[String]) -> Vec<String> {
-        let silent = self.0.iter().filter(|(own, _)| unused.contains(own));
+        let silent = self.names.iter().filter(|(own, _)| unused.contains(own));
         let silent: Vec<String> = silent.map(|(_, cell)| cell.clone()).collect();
-        let cells: Vec<String> = self.0.iter().map(|(_, cell)| cell.clone()).collect();
+        let cells: Vec<String> = self.names.iter().map(|(_, cell)| cell.clone()).collect();
         mat::whole_wires(&cells, &silent)
     }
 }

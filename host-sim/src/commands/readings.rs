@@ -22,7 +22,7 @@ use super::data_file::FieldArguments;
 #[derive(Args)]
 pub struct BaselineArgument {
     /// CSV file with frames of the untouched sensor, in columns of the same names as the readings. A model with
-    /// relative inputs needs it: the mean of its lines is the baseline.
+    /// relative inputs takes the mean of its lines for the baseline.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
 }
@@ -69,7 +69,7 @@ impl BaselineArgument {
                 let missing = unusable(&baseline);
                 if !missing.is_empty() {
                     stderr::remark(format_args!(
-                        "note: {} has no baseline for {}: a mean that is missing or zero, or no reading within the \
+                        "note: {} has no baseline for {}: a mean that is missing, zero or negative, or no reading within the \
                          limits; these readings count as missing",
                         file.display(),
                         columns::some_names(&missing)
@@ -96,8 +96,8 @@ pub fn check_baseline(rest: &Table, path: &Path) -> Result<()> {
     }
     let names = columns::some_names(&missing);
     let message = format!(
-        "no baseline for {names}: a mean that is missing or zero; give frames in which every input has a reading, \
-         or choose others with --inputs"
+        "no baseline for {names}: a mean that is missing, zero or negative; give frames in which every input has a reading, \
+         choose others with --inputs, or leave --relative-inputs out"
     );
     Err(Error::Unfit { path: path.into(), message })
 }

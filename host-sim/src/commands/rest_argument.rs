@@ -47,8 +47,9 @@ impl RestArgument {
             Some(pattern) => {
                 let columns = columns::select(&file.header, pattern);
                 if let Some(part) = columns::unmatched(&file.header, pattern) {
-                    let known = columns::some_names(&file.header);
-                    let message = format!("--rest: no column matches {part}; there are {known}");
+                    let known = columns::known_names(&file.header, part);
+                    let message =
+                        format!("no column matches {part:?}; the file has: {known} (--rest)");
                     return Err(unfit(&file.path, message));
                 }
                 file.check_numbers(&columns, None)?;

@@ -85,7 +85,9 @@ impl Chart {
         };
         // Charts that stand above each other are aligned unless a label is long.
         let left = label_width(&self.y.ticks).max(5.0 * text_width("0")) + 10.0;
-        let right = width - if self.end_labels { end_width } else { 10.0 };
+        // The last label of the level axis needs half its width.
+        let last = self.x.ticks.at.last().map_or(0.0, |(_, label)| text_width(label));
+        let right = width - if self.end_labels { end_width } else { (0.5 * last).max(10.0) };
         let (x, y) = (self.x.clone(), self.y.clone());
         let panel = Panel { x, y, left, right, top, bottom: height - BELOW_PX };
         panel.draw_axes(&mut svg, Upright::Grid);

@@ -158,7 +158,7 @@ fn header(view: &View<'_>) -> String {
     if !view.verdict.warnings.is_empty() {
         html += "<ul class=\"warnings\">\n";
         for warning in &view.verdict.warnings {
-            let _ = writeln!(html, "<li>{}</li>", escape(&named(view, &warning.text)));
+            let _ = writeln!(html, "<li>{}</li>", with_code(&escape(&named(view, &warning.text))));
         }
         html += "</ul>\n";
     }
@@ -186,8 +186,18 @@ fn header(view: &View<'_>) -> String {
 /// Sentence in which groups of outputs have their symbols.
 fn named(view: &View<'_>, sentence: &str) -> String {
     let groups = view.distribution.groups.iter();
-    groups
-        .fold(sentence.to_owned(), |text, group| text.replace(&group.group, &symbol(&group.group)))
+    let text = groups
+        .fold(sentence.to_owned(), |text, group| text.replace(&group.group, &symbol(&group.group)));
+    // A number and its sign stay on one line.
+    text.replace(" %", "\u{a0}%")
+}
+
+/// HTML in which commands between backticks are code.
+fn with_code(html: &str) -> String {
+    let parts = html.split('`').enumerate();
+    parts
+        .map(|(i, part)| if i % 2 == 0 { part.into() } else { format!("<code>{part}</code>") })
+        .collect()
 }
 
 /// What decoding costs a device.

@@ -17,6 +17,9 @@ const STYLES: [(&str, Shape); 4] =
 /// Errors beyond so many times that of the mean are arrows at the edge.
 const MOST: f64 = 3.0;
 
+/// Least change in per cent that the axis of readings at rest covers, up and down.
+const LEAST_PERCENT: f64 = 1.0;
+
 /// Axis of time, and the factor that its numbers have to those of the log.
 fn time_axis(log: &OverTime) -> (Axis, f64) {
     let last = log.errors.iter().map(|it| it.to).fold(f64::NEG_INFINITY, f64::max);
@@ -76,7 +79,8 @@ pub fn errors(log: &OverTime) -> Figure {
     Figure {
         caption: format!(
             "Errors over time, in stretches of equally many lines: RMSE as a share of that of always predicting the mean. \
-             An error that rises from left to right comes from a sensor that changes.{dashed}{more}"
+             An error that rises steadily comes from a sensor that changes, a single peak from presses that training \
+             lacks.{dashed}{more}"
         ),
         drawing: chart.draw_responsive(WIDE, NARROW),
     }
@@ -98,7 +102,8 @@ pub fn at_rest(log: &OverTime, rest: &RestOverTime) -> Figure {
     let most = points(&|it| it.most_percent);
     series.push(Series::new(&rest.most, "c2", Mark::LineAnd(Shape::Square), most));
     let heights = series.iter().flat_map(|it| it.points.iter().map(|[_, y]| *y));
-    let y: Ticks = ticks::linear(heights.chain([0.0]), 4);
+    // Noise is not to fill the picture.
+    let y: Ticks = ticks::linear(heights.chain([-LEAST_PERCENT, LEAST_PERCENT]), 4);
     let of = match rest.percent_of {
         PercentOf::Rest => "their value at rest",
         PercentOf::Range => "their range in the log",
@@ -113,10 +118,18 @@ pub fn at_rest(log: &OverTime, rest: &RestOverTime) -> Figure {
     Figure {
         caption: format!(
             "Readings of the untouched sensor over time: change since the first stretch, in per cent of {of}, in the mean \
-             over stretches of the {} lines at rest. {} changes most. Readings that stay where they are need no new \
-             baseline.",
+             over stretches of the {} lines at rest. {} changes most. {}",
             grouped(rest.lines),
-            rest.most
+            rest.most,
+            if rest.drifts.is_empty() {
+                "No reading drifts beyond its noise.".to_owned()
+            } else {
+                format!(
+                    "{} of {} readings drift beyond their noise.",
+                    rest.drifts.len(),
+                    rest.readings
+                )
+            }
         ),
         drawing: chart.draw_responsive(WIDE, NARROW),
     }

@@ -95,6 +95,12 @@ fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes(
     let ratio = force_rmse(&judged) / force_rmse(&run);
     assert!((0.8..1.25).contains(&ratio), "{ratio}");
     assert!(std::fs::read_to_string(folder.path("eval.html")).unwrap().contains("Over time"));
+    // The model knows the first lines, and all of them together.
+    for share in [&["--first-share", "0.8"][..], &["--last-share", "0.5"], &[]] {
+        let flattered = checked(&folder, &schema(), &[&eval[..3], share].concat());
+        assert_eq!(warnings(&flattered), ["judged-by-training-data"], "{share:?}");
+    }
+    assert_eq!(warnings(&judged), [""; 0]);
     // `decode` has the same baseline, and a file without the force has none.
     folder.succeed(&["decode", "m.bin", "log.csv", "-o", "estimates.csv"]);
     let of_force = |name: &str, column: usize| -> Vec<f64> {
@@ -164,12 +170,81 @@ fn lines_at_rest_that_are_not_there_are_asked_for() {
     for (rest, words) in [
         ("none", "no line is known to be at rest"),
         ("ch1", "no ten lines are within 1 % of zero"),
-        ("touch", "no column matches touch"),
+        ("touch", "no column matches \"touch\""),
     ] {
         let refused = folder.fail(&[&train[..], &["--rest", rest]].concat(), 2);
         assert!(refused.contains(words) && refused.contains("--rest"), "{refused}");
     }
     let run = [&["run", "log.csv", "--time", "ch2"], &COLUMNS[..]].concat();
     let refused = folder.fail(&run, 2);
-    assert!(refused.contains("is earlier than"), "{refused}");
+    assert!(refused.contains("is earlier than") && refused.contains("(--time)"), "{refused}");
+    // Readings from which a baseline was subtracted are no levels.
+    let about_zero = |line: &str| {
+        let fields = line.split(',').enumerate().map(|(i, field)| match field.parse::<f64>() {
+            Ok(value) if (1..=4).contains(&i) => format!("{:.3}", value - 50.2),
+            _ => field.to_owned(),
+        });
+        fields.collect::<Vec<_>>().join(",") + "\n"
+    };
+    folder.write("zero.csv", log(0.2).lines().map(about_zero).collect::<Vec<_>>().concat());
+    let run = [&["run", "zero.csv"], &COLUMNS[..]].concat();
+    let refused = folder.fail(&[&run[..], &["--relative-inputs"]].concat(), 2);
+    assert!(
+        refused.contains("no baseline for ch1") || refused.contains("about zero at rest"),
+        "{refused}"
+    );
+    let document = checked(&folder, &schema(), &run);
+    let warning = document["verdict"]["warnings"][0]["text"].as_str().unwrap();
+    assert!(
+        warning.contains("% of its range") && warning.contains("subtract the mean of each pause"),
+        "{warning}"
+    );
+    // An offset of the force, and a time that goes back.
+    let offset = |line: &str| match line
+        .rsplit_once(',')
+        .map(|(rest, force)| (rest, force.parse::<f64>()))
+    {
+        Some((rest, Ok(force))) => format!("{rest},{}\n", force + 0.3),
+        _ => format!("{line}\n"),
+    };
+    let text = log(0.0).replace("\n4.5,", "\n1.5,");
+    folder.write("offset.csv", text.lines().map(offset).collect::<Vec<_>>().concat());
+    let output = folder.run(&[&["run", "offset.csv"], &COLUMNS[..]].concat());
+    let notes = String::from_utf8(output.stderr).unwrap();
+    for words in [
+        "f_n is never zero; has it an offset?",
+        "time_s is not taken for the time: line 47 is before",
+    ] {
+        assert!(notes.contains(words), "{words}: {notes}");
+    }
+}
+
+#[test]
+fn the_unit_of_an_output_that_is_there_in_pauses_changes_no_other() {
+    let folder = Folder::new("log-units");
+    folder.write("n.csv", log(0.1));
+    let in_mn = |line: &str| {
+        let (rest, force) = line.rsplit_once(',').unwrap();
+        format!("{rest},{}\n", 1000.0 * force.parse::<f64>().unwrap())
+    };
+    let text = log(0.1);
+    let lines: Vec<String> = text.lines().skip(1).map(in_mn).collect();
+    folder.write(
+        "mn.csv",
+        format!("{}\n{}", text.lines().next().unwrap().replace("f_n", "f_mN"), lines.concat()),
+    );
+    let place = |file: &str, outputs: &str| {
+        let run =
+            ["run", file, "--inputs", "ch*", "--outputs", outputs, "--centres", "8", "--json"];
+        let document: Value = serde_json::from_str(&folder.succeed(&run)).unwrap();
+        let over_time = document["data"]["over_time"]["mean_rmse"][0].as_f64().unwrap();
+        (document["decoders"][0]["errors"][0]["rmse"].as_f64().unwrap(), over_time)
+    };
+    let ((n, mean), (mn, mean_mn)) = (place("n.csv", "x_mm,f_n"), place("mn.csv", "x_mm,f_mN"));
+    assert!(
+        (n / mn - 1.0).abs() < 0.01 && (mean / mean_mn - 1.0).abs() < 1e-9,
+        "{n} {mn} {mean} {mean_mn}"
+    );
+    // The place is uniform on 0 to 1.
+    assert!((0.2..0.4).contains(&mean), "{mean}");
 }

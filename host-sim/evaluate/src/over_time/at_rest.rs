@@ -77,7 +77,7 @@ impl RestOverTime {
         let inputs =
             if data.test.frames() > 0 { &data.test_readings } else { &data.training.inputs };
         let mut found = Self::new(rest, &data.log.clock, inputs)?;
-        if !found.drifts.is_empty() {
+        if !found.drifts.is_empty() && found.percent_of == PercentOf::Rest {
             found.relative_trial = RelativeTrial::new(data, options);
         }
         Some(found)

@@ -6,6 +6,7 @@ use super::{DataArguments, HowToTrain, JudgedBy, with_options};
 use crate::commands::mat_cells::MatCells;
 use crate::commands::{data_notes, refused_readings, stderr};
 use crate::measurements::{Frames, Judged, Log, Measurements, Split};
+use crate::over_time::is_log;
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use taxel_data::clock::{Clock, neighbours_alike};
@@ -26,6 +27,11 @@ impl DataArguments {
         let unused = UnusedInputs::find(&file, inputs, outputs).map_err(with_options)?;
         data_notes::print_unused(&unused, path);
         let cells = MatCells::of(&file, inputs, self.grid)?;
+        if let Some(mat) = cells.found.filter(|_| self.grid.is_none()) {
+            stderr::remark(format_args!(
+                "note: inputs are taken for a mat of {mat} wires, row by row (--grid)"
+            ));
+        }
         for wire in cells.silent_wires(&unused.names()) {
             stderr::remark(format_args!("note: {wire}: none of its readings tells anything"));
         }
@@ -125,7 +131,13 @@ impl DataArguments {
         let frames = frames.subset(&outliers.kept);
         refused_readings::note(&frames.inputs, &file.path.display().to_string());
         let log = Log { clock: Clock::of(file, self.time.as_deref())?, lines };
+        if let Some(why) = log.clock.why_counted(file) {
+            stderr::remark(format_args!("note: {why}; lines are counted instead (--time)"));
+        }
         let rest = self.rest(file, &frames, how)?;
+        if rest.is_none() && !self.rest.is_given() && is_log(&log, &frames.outputs) {
+            data_notes::print_no_rest(&frames.outputs, &file.path);
+        }
         Ok((Frames { frames, log, rest }, outliers, missing))
     }
 
