@@ -189,8 +189,8 @@ impl DataArguments {
                                or give --baseline FILE, with frames of the untouched sensor";
                 return Err(Error::Unfit { path: file.path.clone(), message: message.into() });
             };
-            readings::check_baseline(&rest.readings, &file.path)?;
             check_level(&rest.readings, &frames.inputs, &file.path)?;
+            readings::check_baseline(&rest.readings, &file.path)?;
         }
         Ok(rest)
     }
