@@ -24,11 +24,15 @@ const NAMES: [&str; 11] = [
 const UNITS: [(&str, f64); 5] =
     [("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("min", 60.0)];
 
-/// Least numbers of a clock that counts from 1970, with the length of its unit in seconds: those of September 2001.
-const SINCE_1970: [(f64, f64); 4] = [(1e18, 1e-9), (1e15, 1e-6), (1e12, 1e-3), (1e9, 1.0)];
+/// Least numbers of a clock that counts from 1970, with the length of its unit in seconds: those of September 2001. Beyond
+/// five times as much lies another unit's time.
+const SINCE_1970: [(f64, f64); 4] = [(1e9, 1.0), (1e12, 1e-3), (1e15, 1e-6), (1e18, 1e-9)];
 
 /// Share of what shuffled lines would change by, below which neighbours are alike.
 const ALIKE: f64 = 0.5;
+
+/// Fewest lines that tell whether neighbours are alike.
+const FEWEST_LINES: usize = 20;
 
 /// When each line of a log was written.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,7 +89,7 @@ impl Clock {
         let first = at.first().copied().unwrap_or(0.0);
         let unit = columns::unit_of(name);
         let stated = UNITS.iter().find(|(known, _)| *known == unit).map(|(_, seconds)| *seconds);
-        let since_1970 = || SINCE_1970.iter().find(|(least, _)| first >= *least);
+        let since_1970 = || SINCE_1970.iter().find(|(least, _)| (*least..5.0 * least).contains(&first));
         let seconds = stated.or_else(|| since_1970().map(|(_, seconds)| *seconds));
         if let Some(seconds) = seconds {
             at.iter_mut().for_each(|time| *time = (*time - first) * seconds);
@@ -145,16 +149,18 @@ fn wrong(name: &str, times: &[f64], at: usize, line: u64) -> Problem {
 /// mean squared difference of neighbours is below half of what it is for shuffled lines, twice the variance (von Neumann,
 /// Ann. Math. Stat. 12, 1941), in the mean over the columns.
 pub fn neighbours_alike(outputs: &Table) -> bool {
-    let ratios: Vec<f64> = (0..outputs.names.len())
-        .filter_map(|column| {
-            let values = outputs.lines().map(|line| line[column]).filter(|value| !value.is_nan());
-            let values: Vec<f64> = values.collect();
-            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-            let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-            let steps: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
-            (squares > 0.0).then(|| steps / (2.0 * squares))
-        })
-        .collect();
+    if outputs.len() < FEWEST_LINES {
+        return false;
+    }
+    let (means, deviations) = (outputs.means(), outputs.deviations());
+    let ratio = |column: usize| {
+        let values = outputs.lines().map(|line| line[column]).filter(|value| !value.is_nan());
+        let values: Vec<f64> = values.collect();
+        let squares: f64 = values.iter().map(|value| (value - means[column]).powi(2)).sum();
+        let steps: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+        (deviations[column] > 0.0).then(|| steps / (2.0 * squares))
+    };
+    let ratios: Vec<f64> = (0..outputs.names.len()).filter_map(ratio).collect();
     !ratios.is_empty() && ratios.iter().sum::<f64>() / (ratios.len() as f64) < ALIKE
 }
 
@@ -207,6 +213,8 @@ mod tests {
             assert_eq!(said.is_some(), why.is_some(), "{text}");
             assert!(said.unwrap_or_default().contains(why.unwrap_or_default()), "{text}");
         }
+        let monotonic = clock("t,a\n12000000000000,1\n12300000000000,2\n", None).unwrap();
+        assert_eq!(monotonic.unit, "", "nanoseconds since a start");
         let unknown = clock("time,a\n5,1\n7,2\n", None).unwrap();
         assert_eq!((unknown.unit, unknown.span(5.0, 7.0).as_str()), ("", "from time 5 to 7"));
     }
@@ -228,6 +236,8 @@ mod tests {
         // Pauses without a value do not count.
         let gaps = |i: i32| if i % 3 == 0 { (f64::from(i) / 20.0).sin() } else { f64::NAN };
         assert!(neighbours_alike(&table((0..300).map(gaps).collect())));
-        assert!(!neighbours_alike(&table(vec![1.0; 9])));
+        // What never changes tells nothing, however its mean is rounded, and few lines tell little.
+        assert!(!neighbours_alike(&table(vec![0.1; 2400])));
+        assert!(!neighbours_alike(&table((0..9).map(f64::from).collect())));
     }
 }

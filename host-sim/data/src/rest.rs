@@ -83,7 +83,9 @@ impl Rest {
         for ((a, b), lines) in pairs.zip(of_log.windows(2)) {
             if lines[1] == lines[0] + 1 {
                 for ((sum, count), (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-                    (*sum, *count) = (*sum + (b - a) * (b - a), *count + 1.0);
+                    if !(b - a).is_nan() {
+                        (*sum, *count) = (*sum + (b - a) * (b - a), *count + 1.0);
+                    }
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! Measurements of a real sensor: frames to train on, and frames to judge by.
 
+use std::sync::Arc;
+
 use taxel_data::clock::Clock;
 use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::rest::Rest;
@@ -11,6 +13,7 @@ use crate::metrics::Measure;
 
 /// Measured frames, and how a model is trained on them.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each says one thing of its own")]
 pub struct Measurements {
     /// Name of the data, which names the output folder and the model.
     pub name: String,
@@ -29,8 +32,12 @@ pub struct Measurements {
     pub test_log: Log,
     /// Readings of the test frames as they were measured, whatever the model's inputs are.
     pub test_readings: Table,
-    /// Baseline of the test frames, on one line or one for each, if the sensor at rest is known.
-    pub test_baselines: Option<Table>,
+    /// Readings of the untouched sensor for these, if they are known.
+    pub test_rest: Option<Arc<Rest>>,
+    /// Whether these are of the same file as the frames to train on.
+    pub is_one_log: bool,
+    /// How much the readings of the file to train on vary, at rest or not, as they were measured.
+    pub spread: Spread,
     /// How the test frames were chosen, in words.
     pub test_choice: String,
     /// Values of the file that are far from all others in their column. Training frames are without them, unless they
@@ -41,7 +48,7 @@ pub struct Measurements {
     /// Inputs that were chosen and can tell nothing.
     pub unused: UnusedInputs,
     /// Readings of the untouched sensor, in the readings' columns, if they are known.
-    pub rest: Option<Rest>,
+    pub rest: Option<Arc<Rest>>,
     pub options: Options,
     /// Whether centres, widths and the projection are refined after K-means.
     pub refine: bool,
@@ -71,13 +78,27 @@ impl Log {
     }
 }
 
+/// How much each column of a table varies, in its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spread {
+    pub deviations: Vec<f64>,
+    /// Smallest and largest value.
+    pub ranges: Vec<[f64; 2]>,
+}
+
+impl Spread {
+    pub fn of(table: &Table) -> Self {
+        Self { deviations: table.deviations(), ranges: table.ranges() }
+    }
+}
+
 /// Measured frames of one file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
     pub frames: Dataset,
     pub log: Log,
     /// Readings of the untouched sensor, in the readings' columns, if they are known.
-    pub rest: Option<Rest>,
+    pub rest: Option<Arc<Rest>>,
 }
 
 impl Frames {
@@ -179,11 +200,13 @@ impl Measurements {
         Some((squares / columns as f64).sqrt()).filter(|level| level.is_finite())
     }
 
-    /// Mean of the test frames' baselines, on one line, if the sensor at rest is known and its readings are
+    /// Baseline of the test frame in the middle, on one line, if the sensor at rest is known and its readings are
     /// [far from zero](far_from_zero) there.
     pub fn baseline(&self) -> Option<Table> {
-        let baseline = self.test_baselines.as_ref()?.mean_line();
-        far_from_zero(&baseline.values, &self.test_readings.deviations()).then_some(baseline)
+        let lines = &self.test_log.lines;
+        let middle = lines.get(lines.len() / 2)?;
+        let baseline = self.test_rest.as_ref()?.baselines(&[*middle]);
+        far_from_zero(&baseline.values, &self.spread.deviations).then_some(baseline)
     }
 
     /// Measure for errors on the test frames.

@@ -58,8 +58,8 @@ pub struct Decoded<'d> {
 }
 
 impl OverTime {
-    /// Errors of the frames that were `trained` on, if any, and of those to be `judged` by; and readings at `rest`.
-    /// `None` if lines are in no order of time.
+    /// Errors of the frames of the same log that were `trained` on, if any, and of those to be `judged` by; and the log's
+    /// readings at `rest`. `None` if lines are in no order of time.
     pub fn new(
         trained: Option<&Decoded<'_>>,
         judged: &Decoded<'_>,
@@ -71,8 +71,6 @@ impl OverTime {
         }
         let names = &judged.outputs.names;
         let groups = columns::groups(names);
-        // Times of another file say nothing beside these.
-        let trained = trained.filter(|trained| trained.log.clock == judged.log.clock);
         // Beside those of training, few fit on a picture.
         let most = if trained.is_some() { MOST_STRETCHES / 2 } else { MOST_STRETCHES };
         let mut errors =

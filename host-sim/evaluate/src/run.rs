@@ -20,7 +20,7 @@ use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
-use crate::over_time::{Decoded, OverTime, RestOverTime};
+use crate::over_time::{Decoded, OverTime, RestOverTime, is_log};
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use crate::verdict::{Verdict, Warning};
@@ -187,7 +187,7 @@ pub fn run(
         verdict = verdict.of_data(data, at_rest.as_ref());
         over_time = of_log(data, &network, &estimate, at_rest);
         let last_lines = data.log.lines.last() < data.test_log.lines.first();
-        if over_time.is_some() && last_lines && data.log.clock == data.test_log.clock {
+        if over_time.is_some() && last_lines && data.is_one_log {
             verdict = verdict.at_the_end_of_a_log();
         }
     }
@@ -235,12 +235,20 @@ fn of_log(
     estimate: &Table,
     at_rest: Option<RestOverTime>,
 ) -> Option<OverTime> {
+    if !is_log(&data.test_log, &data.test.outputs) {
+        return None;
+    }
     let of_training = network.decode_table(&data.training.inputs).values;
     let trained =
         Decoded { log: &data.log, outputs: &data.training.outputs, estimates: &of_training };
     let judged =
         Decoded { log: &data.test_log, outputs: &data.test.outputs, estimates: &estimate.values };
-    OverTime::new(Some(&trained), &judged, at_rest)
+    // Times of another file say nothing beside those of the frames to judge by.
+    if data.is_one_log {
+        OverTime::new(Some(&trained), &judged, at_rest)
+    } else {
+        OverTime::new(None, &judged, None)
+    }
 }
 
 /// Scene whose models decode readings, if it is one.

@@ -68,7 +68,7 @@ impl<'b> PreparedModel<'b> {
     /// Model that decodes readings relative to `baseline`: the mean of each reading of the untouched sensor, in the
     /// readings' units. It changes nothing in a model that takes readings as they are.
     ///
-    /// A channel whose baseline is missing (NaN), zero or infinite is missing in every frame.
+    /// A channel whose baseline is missing (NaN), zero, negative or infinite is missing in every frame.
     ///
     /// # Panics
     /// If the baseline does not have one value for each of the model's readings.

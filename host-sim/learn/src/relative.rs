@@ -22,7 +22,7 @@ pub(crate) fn ratios<'l>(
 
 /// Divides `readings` by `baselines` of the same columns: one line for all frames, or a line for each.
 ///
-/// A ratio is NaN where a reading is missing, or its baseline missing or zero.
+/// A ratio is NaN where a reading is missing, or its baseline missing, zero or negative.
 ///
 /// # Panics
 /// If the columns differ in number, or the baselines are neither one nor as many as the readings' lines.

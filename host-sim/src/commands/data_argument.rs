@@ -182,7 +182,7 @@ impl DataArguments {
             return Ok(Some(rest));
         }
         let outputs = frames.outputs.names.iter().map(String::as_str);
-        let rest = self.rest.find(file, &frames.inputs.names, outputs)?;
+        let rest = self.rest.find(file, (&frames.inputs.names, true), outputs)?;
         if how.relative_inputs {
             let Some(rest) = &rest else {
                 let message = "--relative-inputs: no line is known to be at rest: name columns that are zero there (--rest), \

@@ -46,7 +46,13 @@ pub fn print_no_rest(outputs: &Table, path: &Path) {
     let told: Vec<String> = told.collect();
     let why = match told.as_slice() {
         [] => "no output is a force, weight or pressure;".to_owned(),
-        names => format!("{} is never zero; has it an offset?", columns::some_names(names)),
+        names => format!(
+            "in fewer than ten lines {} within 1 % of zero; has it an offset?",
+            match names {
+                [name] => format!("{name} is"),
+                names => format!("all of {} are", columns::some_names(names)),
+            }
+        ),
     };
     stderr::remark(format_args!(
         "note: no line of {} is known to be at rest, so drift is not looked for: {why} --rest NAME names a column that is 0 \

@@ -1,11 +1,12 @@
 //! Frames of a CSV file, or of standard input, that are read once and piece by piece.
 
 use std::path::Path;
+use std::sync::Arc;
 
-use crate::measurements::{Log, Measurements};
+use crate::measurements::{Log, Measurements, Spread};
 use crate::verdict::Warning;
 use crate::{Error, Result};
-use taxel_data::clock::Clock;
+use taxel_data::clock::{Clock, neighbours_alike};
 use taxel_data::data_file::pieces::Pieces;
 use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::digest::TableDigest;
@@ -194,17 +195,19 @@ impl DataArguments {
             } else {
                 vec![0; frames]
             },
-            folds_flatter: false,
+            folds_flatter: self.folds().is_some() && neighbours_alike(&training.outputs),
             log: log.clone(),
             test_log: log,
-            test_baselines: None,
+            test_rest: None,
+            is_one_log: false,
+            spread: Spread { deviations: vec![], ranges: vec![] },
             test: training.subset(&[]),
             test_readings: training.inputs.clone(),
             test_choice: "none".into(),
             outliers: no_outliers,
             left_out: LeftOut::default(),
             unused: UnusedInputs::default(),
-            rest,
+            rest: rest.map(Arc::new),
             options: Options { seed: how.seed, centres, ..Options::default() },
             refine: how.refine,
             confidence: false,

@@ -6,7 +6,7 @@ use crate::by_depth::{DepthErrors, by_depth};
 use crate::evaluate::confidence::{Coverage, coverage};
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
-use crate::measurements::Log;
+use crate::measurements::{Log, Spread};
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 use crate::over_time::{self, Decoded, OverTime, RestOverTime};
 use crate::report::{self, Made, View};
@@ -117,7 +117,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baselines =
         arguments.untouched.baselines(metadata, &arguments.model, of_lines, fields, limits)?;
     let health = arguments.health.apply(&model, &mut readings)?;
-    let at_rest = rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &readings));
+    let at_rest =
+        rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &Spread::of(&readings)));
     let (model, readings) = related(model, readings, baselines.as_ref());
     let estimate = model.decode_table(&readings);
     let thickness_mm = f64::from(metadata.thickness_mm);

@@ -128,7 +128,7 @@ fn check(arguments: &Arguments, subject: &Subject, numbers: [usize; 2]) -> Resul
                     return Err(Error::Usage(message));
                 }
             }
-            gate::Rest::new(data, &arguments.k).map_err(|bad| of_option(bad, &OPTIONS))?;
+            gate::GateRest::new(data, &arguments.k).map_err(|bad| of_option(bad, &OPTIONS))?;
             Ok(())
         }
     }

@@ -37,18 +37,18 @@ impl BaselineArgument {
         fields: &FieldArguments,
         limits: Option<Limits>,
     ) -> Result<PreparedModel<'b>> {
-        Ok(match self.values(model.model().metadata(), path, fields, limits)? {
+        Ok(match self.values(model.model().metadata(), (path, ""), fields, limits)? {
             Some(baseline) => model.with_baseline(&baseline),
             None => model,
         })
     }
 
     /// Baseline in the readings' units, for the model with this `metadata`, which was read from `path`; `None` for a
-    /// model that needs none. `fields` says how its file is read, and readings outside the `limits` count as missing.
+    /// model that needs none. `or` says what else could tell it. `fields` says how its file is read, and readings outside the `limits` count as missing.
     pub fn values(
         &self,
         metadata: &Metadata<'_>,
-        path: &Path,
+        (path, or): (&Path, &str),
         fields: &FieldArguments,
         limits: Option<Limits>,
     ) -> Result<Option<Vec<f64>>> {
@@ -56,10 +56,10 @@ impl BaselineArgument {
             |message: &str| Err(Error::Unfit { path: path.into(), message: message.into() });
         match (&self.baseline, metadata.relative_inputs) {
             (None, false) => Ok(None),
-            (None, true) => unfit(
+            (None, true) => unfit(&format!(
                 "its inputs are readings relative to the baseline: give --baseline FILE, with frames of the \
-                 untouched sensor, or a log with columns that are zero while nothing touches it (--rest)",
-            ),
+                 untouched sensor{or}"
+            )),
             (Some(_), false) => unfit(
                 "its inputs are readings as they are: leave --baseline out, or train with --relative-inputs",
             ),

@@ -15,7 +15,7 @@ use taxel_learn::health::judge;
 use taxel_learn::outliers;
 
 use super::data_file::{DATA_FILES, FieldArguments};
-use super::readings::{BaselineArgument, table_of};
+use super::readings::BaselineArgument;
 use super::stderr;
 
 /// Which lines of a log are those of the untouched sensor.
@@ -35,11 +35,12 @@ impl RestArgument {
     }
 
     /// Readings of the untouched sensor in `file`, in the columns called `inputs`, if it was at rest in some lines. Unless
-    /// a user named columns, those among the `outputs` tell it. Lines with an outlier do not count.
+    /// a user named columns, those among the `outputs` tell it. Lines with an outlier do not count, nor, if `complete` says
+    /// so, do those that lack a reading.
     pub fn find<'n>(
         &self,
         file: &DataFile,
-        inputs: &[String],
+        (inputs, complete): (&[String], bool),
         outputs: impl Iterator<Item = &'n str>,
     ) -> Result<Option<Rest>> {
         let columns = match self.rest.as_deref() {
@@ -61,18 +62,19 @@ impl RestArgument {
                 file.columns(outputs.filter(tells))?
             }
         };
-        let readings = table_of(file, inputs.iter().map(String::as_str))?;
-        let all: Vec<usize> = (0..inputs.len()).collect();
+        let of_readings = file.columns(inputs.iter().map(String::as_str))?;
         let mut lines = rest::lines_at_rest(file, &columns);
-        lines.retain(|line| !readings.line(*line).iter().any(|reading| reading.is_nan()));
-        let untouched =
-            Dataset { inputs: readings.part(&lines, &all), ..Dataset::empty(vec![], vec![], 1, 0) };
+        let is_missing = |line: usize, column: &usize| file.value(line, *column).is_nan();
+        lines.retain(|line| !complete || !of_readings.iter().any(|it| is_missing(*line, it)));
+        let values = lines.iter().flat_map(|l| of_readings.iter().map(|c| file.value(*l, *c)));
+        let readings = Table { names: inputs.to_vec(), values: values.collect() };
+        let untouched = Dataset { inputs: readings, ..Dataset::empty(vec![], vec![], 1, 0) };
         let usual = outliers::find(&untouched, |_| 0).kept;
+        let readings = untouched.subset(&usual).inputs;
         let lines: Vec<usize> = usual.into_iter().map(|index| lines[index]).collect();
         if lines.is_empty() {
             if self.is_given() {
-                let message = "--rest: no ten lines are within 1 % of zero there, with all readings; name other columns, or \
-                               leave it out";
+                let message = "--rest: no ten lines are within 1 % of zero there; name other columns, or leave it out";
                 return Err(unfit(&file.path, message.into()));
             }
             return Ok(None);
@@ -86,7 +88,6 @@ impl RestArgument {
             columns::some_names(&names),
             if names.len() == 1 { "is" } else { "are" },
         ));
-        let readings = readings.part(&lines, &all);
         Ok(Some(Rest { readings, lines: Some(lines) }))
     }
 }
@@ -113,10 +114,12 @@ impl UntouchedArguments {
         metadata: &Metadata<'_>,
         limits: Option<Limits>,
     ) -> Result<Option<Rest>> {
-        if metadata.relative_inputs {
+        if metadata.relative_inputs && self.path().is_none() {
             return self.rest(file, metadata, limits);
         }
-        self.refuse("the model takes readings as they are")?;
+        if !metadata.relative_inputs {
+            self.refuse("the model takes readings as they are")?;
+        }
         Ok(None)
     }
 
@@ -137,7 +140,8 @@ impl UntouchedArguments {
         limits: Option<Limits>,
     ) -> Result<Option<Rest>> {
         let inputs: Vec<String> = metadata.input_names.iter().map(String::from).collect();
-        let mut rest = self.rest.find(file, &inputs, metadata.output_names.iter())?;
+        let outputs = metadata.output_names.iter();
+        let mut rest = self.rest.find(file, (&inputs, false), outputs)?;
         if let Some(rest) = &mut rest {
             judge(&mut rest.readings, limits);
         }
@@ -159,7 +163,8 @@ impl UntouchedArguments {
             return Ok(Some(rest.baselines(&(0..lines).collect::<Vec<_>>())));
         }
         let names = || metadata.input_names.iter().map(String::from).collect();
-        let baseline = self.baseline.values(metadata, path, fields, limits)?;
+        let or = ", or a log with columns that are zero while nothing touches it (--rest)";
+        let baseline = self.baseline.values(metadata, (path, or), fields, limits)?;
         Ok(baseline.map(|values| Table { names: names(), values }))
     }
 }

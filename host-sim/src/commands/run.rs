@@ -65,9 +65,6 @@ impl Default for Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let subject = arguments.subject.load_with(common, arguments.centres)?;
-    if subject.measurements().is_some_and(|data| !data.refine && !data.confidence) {
-        arguments.subject.refuse_idle_folds()?;
-    }
     let mut options = arguments.model.over(subject.options());
     options.centres = arguments.centres.unwrap_or(options.centres);
     options.spread = arguments.spread.unwrap_or(options.spread);

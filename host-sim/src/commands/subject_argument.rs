@@ -72,6 +72,12 @@ impl SubjectArgument {
                 let message = "--precision is for a scene; a CSV file's readings are as they are: leave it out";
                 return Err(Error::Usage(message.into()));
             }
+            // A fold column may tell which frames to judge by.
+            Subject::Measured(data)
+                if !(data.refine || self.options.data.has_fold_column() && self.test.is_none()) =>
+            {
+                self.options.data.refuse_folds()?;
+            }
             Subject::Measured(_) => {}
         }
         Ok(subject)
@@ -80,14 +86,6 @@ impl SubjectArgument {
     /// Error if a column of times was named: `command` tells nothing over time.
     pub fn refuse_time(&self, command: &str) -> Result<()> {
         self.options.data.refuse_time(command)
-    }
-
-    /// Error if folds were asked for that nothing uses. A fold column may tell which frames to judge by.
-    pub fn refuse_idle_folds(&self) -> Result<()> {
-        if self.options.data.has_fold_column() && self.test.is_none() {
-            return Ok(());
-        }
-        self.options.data.refuse_folds()
     }
 
     /// Paths of all files that are read, which must not be replaced.

@@ -372,7 +372,7 @@ fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
         let usual = match subject {
             Subject::Scene(scene) => gate::check_noise(&scene.world),
             Subject::Measured(data) if data.rest.is_none() => return Ok(vec![]),
-            Subject::Measured(data) => gate::Rest::new(data, &[RECOMMENDED_K]).map(|_| ()),
+            Subject::Measured(data) => gate::GateRest::new(data, &[RECOMMENDED_K]).map(|_| ()),
         };
         return Ok(match usual {
             Ok(()) => vec![RECOMMENDED_K],
@@ -388,7 +388,7 @@ fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
         .collect();
     if k.len() == given.len() {
         if let Subject::Measured(data) = subject
-            && let Err(bad) = gate::Rest::new(data, &k)
+            && let Err(bad) = gate::GateRest::new(data, &k)
             && bad.field != "k"
         {
             let k: Vec<String> = k.iter().map(ToString::to_string).collect();

@@ -277,6 +277,9 @@ fn load(arguments: &Arguments, common: &Common, frames: Option<usize>) -> Result
         Subject::Measured(data) if !(data.refine || data.confidence || arguments.select) => {
             options.data.refuse_folds()?;
         }
+        Subject::Measured(data) if data.training.relative_inputs => {
+            options.data.refuse_time("train --relative-inputs")?;
+        }
         Subject::Scene(_) | Subject::Measured(_) => {}
     }
     Ok(subject)

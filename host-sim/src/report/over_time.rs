@@ -57,7 +57,8 @@ pub fn errors(log: &OverTime) -> Figure {
             });
         }
     }
-    let heights = series.iter().flat_map(|it| it.points.iter().map(|[_, y]| y.min(MOST)));
+    let heights = series.iter().flat_map(|it| it.points.iter().map(|[_, y]| *y));
+    let heights = heights.filter(|y| y.is_finite()).map(|y| y.min(MOST));
     let y = ticks::linear(heights.chain([0.0]), 4);
     let shown = STYLES.len().min(log.groups.len());
     let more = match log.groups.len() - shown {

@@ -215,7 +215,7 @@ fn lines_at_rest_that_are_not_there_are_asked_for() {
     let output = folder.run(&[&["run", "offset.csv"], &COLUMNS[..]].concat());
     let notes = String::from_utf8(output.stderr).unwrap();
     for words in [
-        "f_n is never zero; has it an offset?",
+        "f_n is within 1 % of zero; has it an offset?",
         "time_s is not taken for the time: line 47 is before",
     ] {
         assert!(notes.contains(words), "{words}: {notes}");
@@ -250,4 +250,59 @@ fn the_unit_of_an_output_that_is_there_in_pauses_changes_no_other() {
     );
     // The place is uniform on 0 to 1.
     assert!((0.2..0.4).contains(&mean), "{mean}");
+}
+
+#[test]
+fn a_gate_on_a_log_that_drifts_has_the_baseline_of_each_pause() {
+    let folder = Folder::new("log-gate");
+    // A drift that a baseline of all pauses would take for touch.
+    folder.write("log.csv", log(0.02));
+    folder.write("still.csv", log(0.0));
+    let skipped = |file: &str, key: &str| {
+        let gate = [&["gate", file, "--k", "5"], &COLUMNS[..5]].concat();
+        checked(&folder, &schema(), &gate)["lines"][0][key].as_f64().unwrap()
+    };
+    let [drifting, still] = ["log.csv", "still.csv"].map(|file| skipped(file, "skipped"));
+    assert!((still - drifting).abs() < 0.05 && still > 0.4, "{still} {drifting}");
+    assert!(skipped("log.csv", "woken") < 0.05);
+    let refused =
+        folder.fail(&[&["gate", "log.csv", "--fold-blocks", "5"], &COLUMNS[..5]].concat(), 2);
+    assert!(refused.contains("--fold-blocks has no effect"), "{refused}");
+}
+
+#[test]
+fn a_reading_that_dies_in_a_log_takes_no_baseline_from_the_others() {
+    let folder = Folder::new("log-dead");
+    folder.write("log.csv", log(0.0));
+    let train = [&["train", "log.csv", "--relative-inputs", "-o", "m.bin"], &COLUMNS[..]].concat();
+    folder.succeed(&train);
+    let without = |line: &str| {
+        let fields = line.split(',').enumerate();
+        let kept = fields.map(|(i, field)| if i == 3 && field != "ch3" { "" } else { field });
+        kept.collect::<Vec<_>>().join(",") + "\n"
+    };
+    folder.write("dead.csv", log(0.0).lines().map(without).collect::<Vec<_>>().concat());
+    let output = folder.run(&["decode", "m.bin", "dead.csv", "-o", "e.csv"]);
+    let notes = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && notes.contains("are at rest"), "{notes}");
+    // With a file for it, lines at rest are not looked for.
+    folder.write("rest.csv", log(0.0).lines().take(10).collect::<Vec<_>>().join("\n") + "\n");
+    let output =
+        folder.run(&["decode", "m.bin", "log.csv", "--baseline", "rest.csv", "-o", "e.csv"]);
+    let notes = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && !notes.contains("are at rest"), "{notes}");
+}
+
+#[test]
+fn a_file_to_judge_by_has_a_clock_of_its_own() {
+    let folder = Folder::new("log-two");
+    folder.write("log.csv", log(0.2));
+    let without_time = |line: &str| format!("{}\n", line.split_once(',').unwrap().1);
+    folder.write("other.csv", log(0.1).lines().map(without_time).collect::<Vec<_>>().concat());
+    let run = [&["run", "log.csv", "--test", "other.csv"], &COLUMNS[..]].concat();
+    let document = checked(&folder, &schema(), &run);
+    let over_time = &document["data"]["over_time"];
+    assert_eq!((&over_time["column"], &over_time["rest"]), (&Value::Null, &Value::Null));
+    assert!(over_time["errors"].as_array().unwrap().iter().all(|it| it["held_out"] == true));
+    assert_eq!(warnings(&document), ["drift-at-rest"]);
 }

@@ -20,7 +20,7 @@ use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, NETWORK};
 mod frames;
 
 use frames::GateFrames;
-pub use frames::Rest;
+pub use frames::GateRest;
 
 /// Deformations in mm beyond which a row that is skipped counts as missed.
 pub const MISSED_OVER_MM: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
@@ -315,7 +315,7 @@ impl Gate {
         Self { baseline, readings, whole_array }
     }
 
-    /// Gate of measured frames of so many `rows`, with this `baseline` on one line.
+    /// Gate of measured frames of so many `rows`, with this `baseline` on one line, or on one for each test frame.
     pub fn at(baseline: Table, rows: usize, whole_array: bool) -> Self {
         Self { readings: baseline.names.len() / rows, baseline, whole_array }
     }

@@ -359,7 +359,7 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
     let gates = match subject {
         // Averaging only lowers the noise.
         Subject::Scene(scene) => gate::check(&scene.world, &plan.gate_k),
-        Subject::Measured(data) => gate::Rest::new(data, &plan.gate_k).map(|_| ()),
+        Subject::Measured(data) => gate::GateRest::new(data, &plan.gate_k).map(|_| ()),
     };
     gates.map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })
 }

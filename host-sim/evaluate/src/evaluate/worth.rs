@@ -87,7 +87,10 @@ impl Worth {
             );
         let verdict = match subject {
             Subject::Measured(data) => {
-                verdict.of_data(data, RestOverTime::of_data(data, options).as_ref())
+                let at_rest = (!data.training.relative_inputs)
+                    .then(|| RestOverTime::of_data(data, options))
+                    .flatten();
+                verdict.of_data(data, at_rest.as_ref())
             }
             Subject::Scene(_) => verdict,
         };

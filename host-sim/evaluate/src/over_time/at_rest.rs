@@ -3,12 +3,11 @@
 use serde::Serialize;
 use taxel_data::clock::Clock;
 use taxel_data::rest::Rest;
-use taxel_data::table::Table;
 use taxel_learn::Options;
 
 use super::relative_trial::RelativeTrial;
 use super::{MOST_STRETCHES, cut, is_log};
-use crate::measurements::{Measurements, far_from_zero};
+use crate::measurements::{Measurements, Spread, far_from_zero};
 
 /// Fewest lines of a stretch at rest.
 const LINES_A_STRETCH: usize = 10;
@@ -74,18 +73,16 @@ impl RestOverTime {
     /// are, relative inputs are tried. `None` if lines are in no order of time, or none is at rest.
     pub fn of_data(data: &Measurements, options: &Options) -> Option<Self> {
         let rest = data.rest.as_ref().filter(|_| is_log(&data.log, &data.training.outputs))?;
-        let inputs =
-            if data.test.frames() > 0 { &data.test_readings } else { &data.training.inputs };
-        let mut found = Self::new(rest, &data.log.clock, inputs)?;
+        let mut found = Self::new(rest, &data.log.clock, &data.spread)?;
         if !found.drifts.is_empty() && found.percent_of == PercentOf::Rest {
             found.relative_trial = RelativeTrial::new(data, options);
         }
         Some(found)
     }
 
-    /// Readings at `rest` by time; `None` if they are of another file, or too few. `inputs` are readings of the log, at rest
-    /// or not.
-    pub fn new(rest: &Rest, clock: &Clock, inputs: &Table) -> Option<Self> {
+    /// Readings at `rest` by time; `None` if they are of another file, or too few. `spread` is that of the log's
+    /// readings, at rest or not.
+    pub fn new(rest: &Rest, clock: &Clock, spread: &Spread) -> Option<Self> {
         let lines = rest.lines.as_ref()?;
         let all: Vec<usize> = (0..rest.readings.names.len()).collect();
         let ranges: Vec<_> = cut(lines.len(), LINES_A_STRETCH, MOST_STRETCHES).collect();
@@ -96,17 +93,13 @@ impl RestOverTime {
             rest.readings.part(&range.clone().collect::<Vec<_>>(), &all).means()
         };
         let means: Vec<Vec<f64>> = ranges.iter().map(means_of).collect();
-        let (at_rest, deviations) = (rest.readings.means(), inputs.deviations());
+        let (at_rest, deviations) = (rest.readings.means(), &spread.deviations);
         let percent_of =
-            if far_from_zero(&at_rest, &deviations) { PercentOf::Rest } else { PercentOf::Range };
-        let whole = |column: usize| match percent_of {
-            PercentOf::Rest => at_rest[column].abs(),
-            PercentOf::Range => {
-                let [low, high] = inputs.ranges()[column];
-                high - low
-            }
+            if far_from_zero(&at_rest, deviations) { PercentOf::Rest } else { PercentOf::Range };
+        let whole: Vec<f64> = match percent_of {
+            PercentOf::Rest => at_rest.iter().map(|mean| mean.abs()).collect(),
+            PercentOf::Range => spread.ranges.iter().map(|[low, high]| high - low).collect(),
         };
-        let whole: Vec<f64> = all.iter().map(|column| whole(*column)).collect();
         let time = |at: usize| {
             let range = &ranges[at];
             [clock.at[lines[range.start]], clock.at[lines[range.end - 1]]]
@@ -166,6 +159,7 @@ impl RestOverTime {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taxel_data::table::Table;
 
     #[test]
     fn a_drift_at_rest_is_told_from_noise() {
@@ -180,7 +174,7 @@ mod tests {
         let line = |line: usize| [500.0 + noise(line), 500.0 + noise(line) + line as f64 / 10.0];
         let readings = Table { names, values: (0..400).flat_map(line).collect() };
         let rest = Rest { readings: readings.clone(), lines: lines() };
-        let found = RestOverTime::new(&rest, &clock, &readings).unwrap();
+        let found = RestOverTime::new(&rest, &clock, &Spread::of(&readings)).unwrap();
         assert_eq!((found.percent_of, found.most.as_str()), (PercentOf::Rest, "drifts"));
         let [drift] = found.drifts.as_slice() else { panic!("{:?}", found.drifts) };
         // Between means of stretches, of a twentieth each: 38 of 520.
@@ -192,7 +186,7 @@ mod tests {
         let values = readings.values.iter().zip(means).map(|(value, mean)| value - mean).collect();
         let about_zero = Table { values, ..readings };
         let rest = Rest { readings: about_zero.clone(), lines: lines() };
-        let found = RestOverTime::new(&rest, &clock, &about_zero).unwrap();
+        let found = RestOverTime::new(&rest, &clock, &Spread::of(&about_zero)).unwrap();
         assert_eq!(found.percent_of, PercentOf::Range);
         assert!((90.0..100.0).contains(&found.drifts[0].percent));
     }

@@ -11,6 +11,7 @@ use taxel_learn::outliers::Outliers;
 use taxel_learn::train::projection;
 use taxel_rig::image;
 
+use super::significant;
 use crate::over_time::{PercentOf, RestOverTime};
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB.
@@ -160,14 +161,12 @@ impl Warning {
 
     /// Readings at rest that drift, and whether relative inputs help, if they were tried.
     pub fn drift(rest: &RestOverTime) -> Option<Self> {
-        /// Most columns that are named.
-        const NAMED: usize = 3;
         Self::when(!rest.drifts.is_empty(), "drift-at-rest", || {
             let of = match rest.percent_of {
                 PercentOf::Rest => "",
                 PercentOf::Range => " of its range",
             };
-            let named = rest.drifts.iter().take(NAMED);
+            let named = rest.drifts.iter().take(MOST_NAMED);
             let named: Vec<String> = named
                 .map(|drift| format!("{} by {:.1} %{of}", cut(&drift.column), drift.percent))
                 .collect();
@@ -226,6 +225,9 @@ impl Warning {
     }
 }
 
+/// Most columns, and most outputs, that are named in a warning of drift.
+const MOST_NAMED: usize = 3;
+
 /// What the trial of relative inputs says to do.
 fn tried(rest: &RestOverTime) -> String {
     /// Share of the error below which relative inputs are proposed.
@@ -242,7 +244,7 @@ fn tried(rest: &RestOverTime) -> String {
         };
     };
     let errors = |rmse: &[f64]| {
-        let errors = rmse.iter().map(|rmse| format!("{rmse:.3}"));
+        let errors = rmse.iter().take(MOST_NAMED).map(|rmse| significant(*rmse));
         errors.collect::<Vec<_>>().join(", ")
     };
     if trial.ratio >= WORTH {
@@ -252,7 +254,7 @@ fn tried(rest: &RestOverTime) -> String {
     format!(
         "; try --relative-inputs: without refinement, on the last fifth of the training lines, it lowered errors by {gain:.0} % \
          (RMSE of {}: {} instead of {})",
-        trial.groups.join(", "),
+        trial.groups[..trial.groups.len().min(MOST_NAMED)].join(", "),
         errors(&trial.relative_rmse),
         errors(&trial.rmse)
     )

@@ -69,6 +69,9 @@ fn factor(size: f64) -> String {
 
 /// Why a column cannot be used and what to do, from its `range` and what `rounding` adds to it.
 fn refused([low, high]: [f64; 2], rounding: f64, role: Role) -> Option<String> {
+    if low > high {
+        return Some("has no value in the lines that are trained on: leave it out".into());
+    }
     let (span, largest) = (high - low, low.abs().max(high.abs()));
     let leave = match role {
         Role::Inputs => ", or leave it out of the inputs",
@@ -80,7 +83,6 @@ fn refused([low, high]: [f64; 2], rounding: f64, role: Role) -> Option<String> {
             factor(largest)
         ));
     }
-    // A column without a value has a negative span.
     if span <= CONSTANT * largest {
         return None;
     }

@@ -1,11 +1,12 @@
 //! Measurements out of a data file: its usable lines, split into those to train on and those to judge by.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::{DataArguments, HowToTrain, JudgedBy, with_options};
 use crate::commands::mat_cells::MatCells;
 use crate::commands::{data_notes, refused_readings, stderr};
-use crate::measurements::{Frames, Judged, Log, Measurements, Split};
+use crate::measurements::{Frames, Judged, Log, Measurements, Split, Spread};
 use crate::over_time::is_log;
 use crate::verdict::Warning;
 use crate::{Error, Result};
@@ -13,7 +14,6 @@ use taxel_data::clock::{Clock, neighbours_alike};
 use taxel_data::data_file::DataFile;
 use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
 use taxel_data::error::Problem;
-use taxel_data::table::Table;
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::refine::LEAST_FOLDS;
 use taxel_learn::train::resolution;
@@ -70,14 +70,14 @@ impl DataArguments {
         resolution::check(&training.frames)
             .map_err(|refusal| Error::Unfit { path: path.into(), message: refusal.to_string() })?;
         let test_readings = test.frames.inputs.clone();
-        let test_baselines = test.baselines();
-        let given = |frames: Dataset, baselines: Option<Table>| match baselines {
-            Some(baselines) if how.relative_inputs => relative::dataset(frames, &baselines),
-            _ => frames,
+        let given = |frames: Frames| match how.relative_inputs.then(|| frames.baselines()) {
+            Some(Some(baselines)) => relative::dataset(frames.frames, &baselines),
+            _ => frames.frames,
         };
-        let baselines = training.baselines();
-        let (log, rest) = (training.log, training.rest);
-        let training = given(training.frames, baselines);
+        let spread = Spread::of(&all.frames.inputs);
+        let [(log, rest), (test_log, test_rest)] =
+            [&training, &test].map(|it| (it.log.clone(), it.rest.clone()));
+        let training = given(training);
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
         let inputs = training.inputs.names.len() / training.rows;
         let centres = Warning::enough_frames_for(training.fewest_values(), inputs);
@@ -89,10 +89,12 @@ impl DataArguments {
             folds_flatter: self.folds.is_some() && neighbours_alike(&training.outputs),
             training,
             fold_of,
-            test: given(test.frames, test_baselines.clone()),
-            test_log: test.log,
+            test: given(test),
+            test_log,
             test_readings,
-            test_baselines,
+            test_rest,
+            is_one_log: matches!(judged, JudgedBy::HeldOut),
+            spread,
             test_choice: choice,
             outliers,
             left_out,
@@ -134,7 +136,7 @@ impl DataArguments {
         if let Some(why) = log.clock.why_counted(file) {
             stderr::remark(format_args!("note: {why}; lines are counted instead (--time)"));
         }
-        let rest = self.rest(file, &frames, how)?;
+        let rest = self.rest(file, &frames, how)?.map(Arc::new);
         if rest.is_none() && !self.rest.is_given() && is_log(&log, &frames.outputs) {
             data_notes::print_no_rest(&frames.outputs, &file.path);
         }

@@ -3,6 +3,7 @@
 use taxel_data::BadValue;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
+use taxel_data::rest::{BASELINE_LINES, Rest};
 use taxel_data::table::Table;
 use taxel_learn::PreparedModel;
 use taxel_limit::Refusal;
@@ -68,14 +69,13 @@ impl GateFrames {
         })
     }
 
-    /// Measured test frames. The first half of the frames at rest makes the baseline, the second half tells how often
-    /// noise wakes a row.
+    /// Measured test frames, and those at rest, which tell how often noise wakes a row.
     pub fn of_measurements(
         data: &Measurements,
         model: &PreparedModel<'_>,
         settings: &Settings,
     ) -> Result<Self, BadValue> {
-        let rest = Rest::new(data, &settings.k)?;
+        let rest = GateRest::new(data, &settings.k)?;
         let rows = data.test.rows;
         Ok(Self {
             name: data.name.clone(),
@@ -95,31 +95,30 @@ impl GateFrames {
 }
 
 /// What measured frames of the untouched sensor tell.
-pub struct Rest {
+pub struct GateRest {
     /// Relative noise of a reading, as a fraction.
     pub noise_level: f64,
-    /// Mean of the first half of the frames, on one line.
+    /// Baseline of the test frames: on one line, or of a log on one for each, since a device takes a new one in each pause.
     pub(in super::super) baseline: Table,
-    /// Number of frames of that half.
+    /// Number of frames whose mean a baseline is.
     pub(super) baseline_frames: usize,
-    /// Readings of the second half.
+    /// Readings that no baseline contains, as they are beside the baseline on the line of the same number.
     pub(super) untouched: Table,
 }
 
-impl Rest {
-    /// Complete frames of `data` at rest, which must allow gates with tolerances `k` in standard deviations of the
-    /// noise.
+impl GateRest {
+    /// Frames of `data` at rest, which must allow gates with tolerances `k` in standard deviations of the noise.
     ///
     /// # Errors
     /// [`BadValue`] for a sensor that is not known at rest, has no noise there or readings near zero, or the first
     /// tolerance that makes no gate.
     pub fn new(data: &Measurements, k: &[f64]) -> Result<Self, BadValue> {
         let rule = "a gate compares readings with those at rest: name columns that are zero there (--rest), or give \
-                    --baseline FILE, with two frames of the untouched sensor or more without a missing reading, and no channel that is zero at rest";
-        let at_rest =
-            data.rest.as_ref().map(|rest| complete(&rest.readings)).filter(|rest| rest.len() > 1);
-        let (Some(rest), Some(noise_level)) = (&at_rest, data.noise_level()) else {
-            let frames = data.rest.as_ref().map_or(0, |rest| complete(&rest.readings).len());
+                    --baseline FILE, with two frames of the untouched sensor or more without a missing reading, and no \
+                    channel that is zero at rest";
+        let frames = data.test_rest.as_ref().map_or(0, |rest| complete(&rest.readings).len());
+        let known = data.test_rest.as_ref().filter(|_| frames > 1).zip(data.noise_level());
+        let Some((rest, noise_level)) = known else {
             return Err(BadValue::new("complete frames at rest", frames, rule));
         };
         if noise_level <= 0.0 {
@@ -134,12 +133,35 @@ impl Rest {
             return Err(BadValue::new("noise relative to the readings at rest", percent, rule));
         }
         check_tolerances(noise_level, k)?;
+        Ok(match &rest.lines {
+            Some(lines) => Self::of_log(rest, lines, data, noise_level),
+            None => Self::of_file(&complete(&rest.readings), noise_level),
+        })
+    }
+
+    /// The first half of the frames makes the baseline.
+    fn of_file(rest: &Table, noise_level: f64) -> Self {
         let baseline_frames = rest.len() / 2;
-        let (first, second) = rest.values.split_at(baseline_frames * rest.names.len());
-        let table = |values: &[f64]| Table { names: rest.names.clone(), values: values.to_vec() };
-        let first = table(first);
-        let baseline = Table { values: first.means(), names: first.names };
-        Ok(Self { noise_level, baseline, baseline_frames, untouched: table(second) })
+        let all: Vec<usize> = (0..rest.names.len()).collect();
+        let part = |from: usize, to: usize| rest.part(&(from..to).collect::<Vec<_>>(), &all);
+        let baseline = part(0, baseline_frames).mean_line();
+        Self { noise_level, baseline, baseline_frames, untouched: part(baseline_frames, rest.len()) }
+    }
+
+    /// Each line has the baseline of the pauses before it. Lines that are in the first baseline do not count as untouched.
+    fn of_log(rest: &Rest, lines: &[usize], data: &Measurements, noise_level: f64) -> Self {
+        let baseline = rest.baselines(&data.test_log.lines);
+        let baseline_frames = BASELINE_LINES.min(lines.len() / 2);
+        let later: Vec<usize> = (baseline_frames..lines.len()).collect();
+        let all: Vec<usize> = (0..rest.readings.names.len()).collect();
+        let own = rest.baselines(&later.iter().map(|at| lines[*at]).collect::<Vec<_>>());
+        // Each by its own baseline, and times the one that it is compared with.
+        let mut untouched = rest.readings.part(&later, &all);
+        let beside = untouched.values.iter_mut().zip(&own.values);
+        for ((value, own), shown) in beside.zip(baseline.values.iter().cycle()) {
+            *value *= shown / own;
+        }
+        Self { noise_level, baseline, baseline_frames, untouched }
     }
 }
 

@@ -9,7 +9,7 @@ use taxel_data::table::Table;
 use taxel_learn::relative;
 use taxel_simulate::Synthesis;
 
-use super::super::gate::{BASELINE_FRAMES, Gate, Rest, gated, has_sessions, share};
+use super::super::gate::{BASELINE_FRAMES, Gate, GateRest, gated, has_sessions, share};
 use crate::subject::Subject;
 
 /// Untouched rows of the test frames for every k. They depend on the readings alone, not on the decoder.
@@ -56,7 +56,7 @@ impl Gates {
                 (gate, noise_level, readings)
             }
             Subject::Measured(data) => {
-                let rest = Rest::new(data, k)?;
+                let rest = GateRest::new(data, k)?;
                 let gate = Gate::at(rest.baseline, test.rows, whole_array);
                 (gate, rest.noise_level, Cow::Borrowed(&data.test_readings))
             }
