@@ -89,7 +89,8 @@ impl Clock {
         let first = at.first().copied().unwrap_or(0.0);
         let unit = columns::unit_of(name);
         let stated = UNITS.iter().find(|(known, _)| *known == unit).map(|(_, seconds)| *seconds);
-        let since_1970 = || SINCE_1970.iter().find(|(least, _)| (*least..5.0 * least).contains(&first));
+        let since_1970 =
+            || SINCE_1970.iter().find(|(least, _)| (*least..5.0 * least).contains(&first));
         let seconds = stated.or_else(|| since_1970().map(|(_, seconds)| *seconds));
         if let Some(seconds) = seconds {
             at.iter_mut().for_each(|time| *time = (*time - first) * seconds);

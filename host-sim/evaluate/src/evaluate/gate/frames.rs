@@ -145,7 +145,12 @@ impl GateRest {
         let all: Vec<usize> = (0..rest.names.len()).collect();
         let part = |from: usize, to: usize| rest.part(&(from..to).collect::<Vec<_>>(), &all);
         let baseline = part(0, baseline_frames).mean_line();
-        Self { noise_level, baseline, baseline_frames, untouched: part(baseline_frames, rest.len()) }
+        Self {
+            noise_level,
+            baseline,
+            baseline_frames,
+            untouched: part(baseline_frames, rest.len()),
+        }
     }
 
     /// Each line has the baseline of the pauses before it. Lines that are in the first baseline do not count as untouched.
