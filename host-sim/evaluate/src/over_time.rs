@@ -18,6 +18,7 @@ pub use relative_trial::RelativeTrial;
 const MOST_STRETCHES: usize = 20;
 /// Fewest frames of a stretch that errors are told of.
 const FRAMES_A_STRETCH: usize = 30;
+
 /// Errors and readings at rest of a log, by time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OverTime {

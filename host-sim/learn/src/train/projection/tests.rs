@@ -98,7 +98,7 @@ fn few_outputs_are_told_by_features_of_their_products() {
     }
 }
 
-/// Of two outputs that no line has together, each has its powers, and there is no product of both.
+/// Outputs that no line has together have their own powers, and no product of both.
 #[test]
 fn outputs_that_are_never_together_have_no_products() {
     let mut data = known(400, 0.01);
