@@ -47,6 +47,8 @@ pub enum Purpose {
     Anomaly = 13,
     /// Set-ups of a search.
     Setup = 14,
+    /// The path of a contact.
+    Path = 15,
 }
 
 /// Set of frames that draws are for. Training and test frames are independent.

@@ -37,10 +37,11 @@ use direction::noise_ohm;
 type Check = std::result::Result<(), BadValue>;
 
 /// Names and texts of the scenes that are part of the program.
-pub const EMBEDDED: [(&str, &str); 4] = [
+pub const EMBEDDED: [(&str, &str); 5] = [
     ("paper", include_str!("../../../scenes/paper.toml")),
     ("press", include_str!("../../../scenes/press.toml")),
     ("contact", include_str!("../../../scenes/contact.toml")),
+    ("moving", include_str!("../../../scenes/moving.toml")),
     ("paper-as-printed", include_str!("../../../scenes/paper-as-printed.toml")),
 ];
 

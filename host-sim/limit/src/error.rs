@@ -9,9 +9,6 @@ pub enum Refusal {
     /// World without noise, in which nothing limits a decoder but the sensor itself.
     #[error("there is no noise, so there is no posterior to sample")]
     NoNoise,
-    /// Motion whose frames follow one another in time.
-    #[error("frames that follow one another in time are not modelled")]
-    Steps,
     /// Motion with more latents than the sampler can handle.
     #[error("{latents} unknowns at once are more than the {most} that the sampler is made for")]
     TooManyLatents {

@@ -73,9 +73,6 @@ impl Limit {
         if world.noise.level <= 0.0 {
             return Err(Refusal::NoNoise);
         }
-        if motion.steps() > 1 {
-            return Err(Refusal::Steps);
-        }
         let together = if motion.has_independent_rows() { 1 } else { world.read_rows.len() };
         let latents = motion.latents(together * world.sensor.electrodes_per_row_wire);
         if latents > MOST_LATENTS {

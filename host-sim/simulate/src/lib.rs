@@ -21,6 +21,8 @@ mod kinds;
 pub mod sensor;
 pub mod contact;
 pub mod motion;
+pub mod path;
+pub mod timetable;
 pub mod rubber;
 pub mod noise;
 pub mod drift;

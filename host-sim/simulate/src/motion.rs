@@ -1,7 +1,7 @@
 //! Motions of the electrodes: one file a kind of motion, each an implementation of [`Motion`].
 //!
-//! A lane of the synthesis is a *trajectory* of [`Motion::steps`] steps, and a frame is read at each
-//! step. The present kinds draw every frame independently: their trajectories have one step.
+//! A lane of the synthesis is a *trajectory*. A motion draws what it starts with; a [`Path`](crate::path::Path) then moves
+//! its contact from scan to scan. Without one, a trajectory is one still frame.
 
 use std::fmt::Debug;
 
@@ -27,18 +27,8 @@ pub trait Motion: Debug + Send + Sync {
     /// Checks the motion's settings.
     fn check(&self) -> Result<(), BadValue>;
 
-    /// Number of frames in a trajectory.
-    fn steps(&self) -> usize {
-        1
-    }
-
-    /// Time between two steps, in s; trajectories of one step do not depend on it.
-    fn step_s(&self) -> f64 {
-        0.0
-    }
-
-    /// Number of independent standard normal numbers that fix a frame of so many `electrodes`: the *latents*
-    /// of the motion. Only for trajectories of one step.
+    /// Number of independent standard normal numbers that fix a still frame of so many `electrodes`: the *latents*
+    /// of the motion.
     fn latents(&self, electrodes: usize) -> usize;
 
     /// Whether rows move independently, so that [`place`](Self::place) needs only the latents of one row's
@@ -74,29 +64,24 @@ pub trait Motion: Debug + Send + Sync {
         None
     }
 
-    /// Draws the quantities that all rows and steps of a trajectory share, for
+    /// Draws the quantities that all rows and scans of a trajectory share, for
     /// [`LANES`](taxel_data::simd::LANES) trajectories of `sensor`.
     fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm>;
 }
 
 /// Trajectories that have been drawn, one a lane.
 pub trait Trajectories {
-    /// Writes the deformation in mm of the electrodes of row-wire `row` (from 0) at `step`, by electrode
-    /// and axis.
-    ///
-    /// Callers take steps in ascending order, and at each step rows in ascending order.
-    fn deform(
-        &mut self,
-        row: usize,
-        step: usize,
-        draws: &mut Draws,
-        deformation_mm: &mut [[Lanes; 3]],
-    );
+    /// Writes the deformation in mm of the electrodes of row-wire `row` (from 0), by electrode and axis.
+    fn deform(&mut self, row: usize, draws: &mut Draws, deformation_mm: &mut [[Lanes; 3]]);
 
-    /// Contact at `step`; `None` where nothing touches, or for a motion that is no single contact.
-    fn contact(&self, _step: usize) -> Option<&Contact> {
+    /// Contact, which keeps its shape wherever it goes; `None` where nothing touches, or for a motion that is no single
+    /// contact.
+    fn contact(&self) -> Option<&Contact> {
         None
     }
+
+    /// Moves the contact to this centre and depth. Nothing changes for a motion that is no single contact.
+    fn move_to(&mut self, _centre_mm: [Lanes; 2], _depth_mm: Lanes) {}
 }
 
 /// Random sources of consecutive trajectories, one a lane.

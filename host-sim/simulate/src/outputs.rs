@@ -186,7 +186,16 @@ impl ContactOutput {
             return vec![[nothing; LANES]; self.names().len()];
         };
         match self {
-            Self::Centre => contact.centre_mm.to_vec(),
+            // A contact that is lifted is nowhere.
+            Self::Centre => contact
+                .centre_mm
+                .map(|mut along| {
+                    for (place, depth_mm) in along.iter_mut().zip(&contact.dent_depth_mm) {
+                        *place = if *depth_mm == 0.0 { f64::NAN } else { *place };
+                    }
+                    along
+                })
+                .to_vec(),
             Self::Depth => vec![contact.dent_depth_mm],
             Self::Shear => contact.shear_mm().to_vec(),
             Self::Force => vec![contact.force_n(sensor)],

@@ -12,6 +12,8 @@ use crate::drift::Drift;
 use crate::motion::{self, Independent};
 use crate::noise::{Noise, NoiseKind};
 use crate::outputs::Outputs;
+use crate::path::Path;
+use crate::timetable::Timetable;
 use crate::world::World;
 
 mod lanes;
@@ -32,6 +34,9 @@ pub struct Synthesis<'w> {
     noise_purpose: Purpose,
     drift: Option<Drift>,
     motion: Cow<'w, motion::Kind>,
+    path: Option<&'w Path>,
+    /// When each scan of a trajectory reads.
+    timetable: Timetable,
     read_rows: Cow<'w, [usize]>,
     outputs: Cow<'w, Outputs>,
 }
@@ -51,6 +56,8 @@ impl<'w> Synthesis<'w> {
             noise_purpose: Purpose::Noise,
             drift: world.drift,
             motion: Cow::Borrowed(&world.motion),
+            path: None,
+            timetable: Timetable::still(),
             read_rows: Cow::Borrowed(&world.read_rows),
             outputs: Cow::Borrowed(&world.outputs),
         }
@@ -81,9 +88,24 @@ impl<'w> Synthesis<'w> {
         self
     }
 
+    /// Scans trajectories at these times, one frame a scan, instead of still frames. Noise is that of single scans.
+    #[must_use]
+    pub fn timed(mut self, timetable: Timetable) -> Self {
+        self.timetable = timetable;
+        self
+    }
+
+    /// Moves contacts along `path`, and scans them at these times.
+    #[must_use]
+    pub fn along(mut self, path: &'w Path, timetable: Timetable) -> Self {
+        self.path = Some(path);
+        self.timed(timetable)
+    }
+
     /// Leaves the sensor untouched: nothing moves.
     #[must_use]
     pub fn untouched(mut self) -> Self {
+        self.path = None;
         self.motion = Cow::Owned(Independent::default().into());
         self
     }
@@ -104,13 +126,14 @@ impl<'w> Synthesis<'w> {
 
     /// Number of frames of a trajectory.
     pub fn steps(&self) -> usize {
-        self.motion.steps()
+        self.timetable.scans()
     }
 
     /// Synthesises the first `frames` of `stream`: readings in Ω, and their true outputs.
     ///
-    /// Frame n is the same however many frames are asked for. It is step n mod S of trajectory n div S,
-    /// where S is the motion's number of steps.
+    /// Frame n is the same however many frames are asked for. It is scan n mod S of trajectory n div S, where S is the
+    /// number of [`steps`](Self::steps). Outputs of a row are those at the time when the row is read; those of a contact
+    /// are from the middle of the scan.
     pub fn frames(&self, stream: Stream, frames: usize) -> Dataset {
         self.frames_from(stream, 0, frames)
     }
@@ -125,7 +148,7 @@ impl<'w> Synthesis<'w> {
             frames,
         );
         let (n, o) = (dataset.inputs.names.len(), dataset.outputs.names.len());
-        let of_lanes = LANES * self.motion.steps();
+        let of_lanes = LANES * self.steps();
         let synthesis = LaneSynthesis::new(self, stream, self.noise_span_ohm());
         let readings = dataset.inputs.values.par_chunks_mut(of_lanes * n);
         let pieces = readings.zip(dataset.outputs.values.par_chunks_mut(of_lanes * o)).enumerate();
@@ -136,6 +159,22 @@ impl<'w> Synthesis<'w> {
             },
         );
         dataset
+    }
+
+    /// Synthesises the true outputs of the first `frames` of `stream` alone, as [`frames`](Self::frames) does.
+    pub fn true_outputs(&self, stream: Stream, frames: usize) -> Table {
+        let sensor = &self.world.sensor;
+        let names = self.outputs.names(sensor, &self.read_rows);
+        let mut values = vec![0.0; names.len() * frames];
+        let pieces = values.par_chunks_mut(LANES * self.steps() * names.len()).enumerate();
+        let synthesis = LaneSynthesis::new(self, stream, Vec::new());
+        pieces.for_each_init(
+            || synthesis.workspace(),
+            |workspace, (piece, outputs)| {
+                synthesis.fill(workspace, piece * LANES, &mut [], outputs);
+            },
+        );
+        Table { names, values }
     }
 
     /// Synthesises the baseline of the session that each of the first `frames` of `stream` belongs to: one line a
@@ -157,8 +196,8 @@ impl<'w> Synthesis<'w> {
         frames: usize,
         averaged: usize,
     ) -> Table {
-        let steps = self.motion.steps();
-        let mut at_rest = self.clone().untouched();
+        let steps = self.steps();
+        let mut at_rest = self.clone().untouched().timed(Timetable::still());
         at_rest.noise.level /= (averaged as f64).sqrt();
         at_rest.noise_purpose = Purpose::Baseline;
         let sessions = at_rest.frames_from(stream, first, frames.div_ceil(steps)).inputs;
@@ -170,8 +209,7 @@ impl<'w> Synthesis<'w> {
         Table { names: sessions.names, values }
     }
 
-    /// Synthesises the readings in Ω of one `frame` of `stream`, for motions whose trajectories have one
-    /// step.
+    /// Synthesises the readings in Ω of one still `frame` of `stream`.
     pub fn readings_of(&self, stream: Stream, frame: usize) -> Vec<f64> {
         let sensor = &self.world.sensor;
         let mut readings = vec![0.0; self.read_rows.len() * sensor.column_wires];
@@ -187,7 +225,8 @@ impl<'w> Synthesis<'w> {
             return Vec::new();
         }
         let motion = Cow::Borrowed(&self.world.motion);
-        let moved = Self { motion, drift: None, ..self.clone() };
+        let moved = Self { motion, path: None, drift: None, ..self.clone() };
+        let moved = moved.timed(Timetable::still());
         let ideal = moved.ideal().frames(Stream::Span, SPAN_FRAMES);
         ideal.inputs.ranges().into_iter().map(|[low, high]| high - low).collect()
     }

@@ -9,6 +9,7 @@ use crate::drift::Drift;
 use crate::motion::{self, Independent, Press};
 use crate::noise::{Noise, NoiseKind};
 use crate::outputs::{ContactOutput, ElectrodeOutputs, Outputs};
+use crate::path::Path;
 use crate::readout::Readout;
 use crate::rubber;
 use crate::sensor::{Precision, Sensor};
@@ -28,6 +29,8 @@ pub struct World {
     /// Geometry and material of the sensor.
     pub sensor: Sensor,
     pub motion: motion::Kind,
+    /// Path of the contact, if it moves. Models are trained on still frames all the same.
+    pub path: Option<Path>,
     /// Rubber, and how it follows the motion.
     pub rubber: rubber::Kind,
     pub noise: Noise,
@@ -49,6 +52,7 @@ impl World {
             seed: 1,
             precision: Precision::default(),
             motion: motion.into(),
+            path: None,
             rubber: rubber::Kind::default(),
             noise: Noise { kind: NoiseKind::Relative, level: 0.005 },
             drift: None,
@@ -126,6 +130,7 @@ impl World {
     pub fn check(&self) -> Check {
         sensor(&self.sensor)?;
         motion(self)?;
+        self.path.as_ref().map_or(Ok(()), |path| self.check_path(path))?;
         check_noise_level("noise.level", self.noise.level)?;
         self.drift.map_or(Ok(()), |drift| check_gain("drift.gain", drift.gain))?;
         rows(self)?;
@@ -134,6 +139,14 @@ impl World {
             Outputs::Electrodes(wanted) => outputs_of_electrodes(wanted),
             Outputs::Contact(wanted) => outputs_of_contact(wanted, self),
         }
+    }
+
+    /// Checks that a contact of this world can move along `path`.
+    pub fn check_path(&self, path: &Path) -> Check {
+        require(self.motion.largest_contact(&self.sensor).is_some(), "motion", "[motion]", || {
+            "electrodes that move on their own have no contact that could slide; set deformation.kind = \"press\"".into()
+        })?;
+        path.check(&self.sensor, self.motion.range_mm()[2][1])
     }
 
     /// Checks that so many `frames` fit in memory; `field` names them in the message.

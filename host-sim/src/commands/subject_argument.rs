@@ -20,7 +20,7 @@ use super::{Common, arguments};
 /// Scene or CSV file to train and to judge on.
 #[derive(Args, Default)]
 pub struct SubjectArgument {
-    /// A built-in scene (paper, press, contact), a scene file (.toml) or a CSV file [default: press].
+    /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a CSV file [default: press].
     source: Option<String>,
     /// CSV file with frames to judge by, in the same columns [default: the last fifth of the lines is held out, or the
     /// last fold of --fold-column].

@@ -9,15 +9,23 @@ use serde::Serialize;
 use taxel_data::csv_file;
 use taxel_data::random::Stream;
 use taxel_simulate::Synthesis;
+use taxel_simulate::timetable::Timetable;
 
 use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print, stderr};
+use crate::evaluate::trade::{Device, Wires};
+use crate::experiment::Experiment;
 
 /// Synthesise frames of a scene as CSV: noisy readings, true outputs.
+///
+/// A scene whose contacts move ([motion]) is written as a log: time_s and trajectory come first, and each row is read at its
+/// own time, as the board scans.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim synth press -n 5000 --seed 2 -o test.csv
   host-sim synth press -n 100 --seed 2 --untouched -o rest.csv
+  host-sim synth moving -n 6000 --frame-rate 1000 --scan-ms 0.9 -o touches.csv
+  host-sim synth press -n 6000 --untouched --frame-rate 500 -o rest.csv
 
 A scene's own seed gives the very frames that `train` and `run` train on: evaluate on another.")]
 pub struct Arguments {
@@ -31,6 +39,16 @@ pub struct Arguments {
     /// Leave the sensor untouched: frames of which a baseline is made.
     #[arg(long)]
     untouched: bool,
+    /// Write still contacts of a scene whose contacts move: what its model is trained on.
+    #[arg(long)]
+    still: bool,
+    /// Scan so many frames a second, which gives the frames a time: of moving contacts, or of the untouched sensor
+    /// [default of moving contacts: as many as the board scans].
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    frame_rate: Option<f64>,
+    /// Time of a scan in ms, in which rows are read one after the other [default: what the board's takes].
+    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    scan_ms: Option<f64>,
     /// Multiply all readings by this, as a sensor does whose gain has drifted: 1.02 is 2 % more.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
@@ -49,6 +67,43 @@ struct Summary {
     file: PathBuf,
 }
 
+impl Arguments {
+    /// Times of the scans of a trajectory, if the frames follow one another in time.
+    fn timetable(&self, scene: &Experiment) -> Result<Option<Timetable>> {
+        let path = scene.world.path.as_ref().filter(|_| !self.still && !self.untouched);
+        if path.is_none() && (!self.untouched || self.frame_rate.is_none()) {
+            if self.frame_rate.is_some() || self.scan_ms.is_some() {
+                let message = "--frame-rate and --scan-ms give frames a time, and still frames have none: take a scene with \
+                               [motion], or --untouched with --frame-rate";
+                return Err(Error::Usage(message.into()));
+            }
+            return Ok(None);
+        }
+        for (option, value) in [("--frame-rate", self.frame_rate), ("--scan-ms", self.scan_ms)] {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(Error::Usage(format!("{option} {value}: give a positive number")));
+            }
+        }
+        let device = Device { scan_ms: self.scan_ms, ..Device::default() };
+        let world = &scene.world;
+        let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
+        let scan_s = device.scan_ms(Some(wires), 1).unwrap_or_default() / 1000.0;
+        let period_s = self.frame_rate.map_or(scan_s, |rate| 1.0 / rate);
+        if period_s < scan_s * (1.0 - 1e-9) {
+            let most = 1.0 / scan_s;
+            let message = format!(
+                "--frame-rate {}: a scan takes {:.3} ms; give at most {most:.1}, or a shorter --scan-ms",
+                1.0 / period_s,
+                scan_s * 1000.0
+            );
+            return Err(Error::Usage(message));
+        }
+        let frames = self.frames as f64;
+        let duration_s = path.map_or(frames * period_s, |path| path.duration_s);
+        Ok(Some(Timetable::every(period_s, scan_s, duration_s)?))
+    }
+}
+
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load_world(common)?;
     arguments.noise.apply(&mut scene)?;
@@ -62,12 +117,35 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if arguments.untouched {
         synthesis = synthesis.untouched();
     }
+    let timetable = arguments.timetable(&scene)?;
+    if let Some(timetable) = &timetable {
+        let path = scene.world.path.as_ref().filter(|_| !arguments.untouched);
+        synthesis = match path {
+            Some(path) => synthesis.along(path, timetable.clone()),
+            None => synthesis.timed(timetable.clone()),
+        };
+    }
     let mut dataset = synthesis.frames(Stream::Training, arguments.frames);
     dataset.inputs.values.iter_mut().for_each(|reading| *reading *= arguments.scale);
     let names = dataset.inputs.names.iter().chain(&dataset.outputs.names).map(String::as_str);
     let lines = dataset.inputs.lines().zip(dataset.outputs.lines());
     let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
-    csv_file::write(&arguments.output, names, lines)?;
+    match &timetable {
+        None => csv_file::write(&arguments.output, names, lines)?,
+        Some(timetable) => {
+            let names = ["time_s", "trajectory"].into_iter().chain(names);
+            let duration_s = scene.world.path.as_ref().map_or(0.0, |path| path.duration_s);
+            let of_frame = |frame: usize| {
+                let (trajectory, scan) = (frame / timetable.scans(), frame % timetable.scans());
+                let start_s = trajectory as f64 * duration_s + timetable.starts_s[scan];
+                // To the nanosecond: a sum of binary fractions has more digits than it means.
+                [(start_s * 1e9).round() / 1e9, (trajectory + 1) as f64]
+            };
+            let lines =
+                lines.enumerate().map(|(frame, line)| of_frame(frame).into_iter().chain(line));
+            csv_file::write(&arguments.output, names, lines)?;
+        }
+    }
     if let Some(warning) = Warning::not_positive(&dataset.inputs) {
         stderr::remark(warning);
     }

@@ -45,7 +45,7 @@ mod recursion;
   zcat log.csv.gz | host-sim train - --inputs 'ch*' --outputs 'f?_n' --solver rls -o m.bin
   host-sim train joined.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs b.c5 --fold-blocks 10 -o m.bin")]
 pub struct Arguments {
-    /// A built-in scene (paper, press, contact), a scene file (.toml) or a data file (CSV, .npy, .npz); with --solver rls
+    /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a data file (CSV, .npy, .npz); with --solver rls
     /// also `-`, a CSV file on standard input.
     source: String,
     /// Blob to write.

@@ -46,6 +46,32 @@ fn a_csv_file_trains_decodes_and_evaluates() {
 }
 
 #[test]
+fn moving_contacts_are_written_as_a_log_and_still_ones_as_a_model_is_trained_on() {
+    let folder = Folder::new("moving");
+    let motion = "[motion]\nspeed_mm_per_s = [10.0, 100.0]\npress_rate_hz = [1.0, 5.0]\nduration_s = 0.1\n[noise]";
+    let scene = small_scene();
+    folder.write("moving.toml", scene.replace("[noise]", motion));
+    folder.write("still.toml", scene);
+    let synth = |arguments: &str| {
+        let of = ["synth"].into_iter().chain(arguments.split(' ')).chain(["-o", "f.csv"]);
+        folder.succeed(&of.collect::<Vec<_>>());
+        std::fs::read_to_string(folder.path("f.csv")).unwrap()
+    };
+    let fields = |text: &str, line: usize| {
+        text.lines().nth(line).unwrap().split(',').take(3).map(String::from).collect::<Vec<_>>()
+    };
+    let log = synth("moving.toml -n 250 --frame-rate 1000 --scan-ms 0.9");
+    assert_eq!(fields(&log, 0), ["time_s", "trajectory", "r4c1_ohm"]);
+    assert_eq!(fields(&log, 100)[..2], ["0.099", "1"]);
+    assert_eq!(fields(&log, 101)[..2], ["0.1", "2"]);
+    assert_eq!(synth("moving.toml -n 20 --still"), synth("still.toml -n 20"));
+    // The untouched sensor over time: the draws of one trajectory.
+    let rest = synth("still.toml -n 30 --untouched --frame-rate 50 --scan-ms 5");
+    assert_eq!(fields(&rest, 30)[..2], ["0.58", "1"]);
+    assert_ne!(fields(&rest, 30)[2], fields(&rest, 29)[2]);
+}
+
+#[test]
 fn columns_with_any_names_train_one_network() {
     let folder = Folder::new("any-names");
     let mut data = String::from("left,right,load_n,place_mm,day\n");

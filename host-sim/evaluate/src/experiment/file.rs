@@ -8,6 +8,7 @@ use taxel_simulate::drift::Drift;
 use taxel_simulate::motion;
 use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
+use taxel_simulate::path::Path;
 use taxel_simulate::readout::Readout;
 use taxel_simulate::rubber;
 use taxel_simulate::sensor::{self, Precision, Sensor, Vector3};
@@ -25,6 +26,7 @@ pub(super) struct SceneFile {
     precision: Precision,
     sensor: SensorFile,
     deformation: motion::Kind,
+    motion: Option<Path>,
     noise: Noise,
     drift: Option<Drift>,
     #[serde(default)]
@@ -150,6 +152,7 @@ impl SceneFile {
                 precision: self.precision,
                 sensor,
                 motion: self.deformation,
+                path: self.motion,
                 rubber: rubber::Kind::default(),
                 noise: self.noise,
                 drift: self.drift,

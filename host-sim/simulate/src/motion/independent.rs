@@ -61,13 +61,7 @@ impl Motion for Independent {
 }
 
 impl Trajectories for Independent {
-    fn deform(
-        &mut self,
-        row: usize,
-        _step: usize,
-        draws: &mut Draws,
-        deformation_mm: &mut [[Lanes; 3]],
-    ) {
+    fn deform(&mut self, row: usize, draws: &mut Draws, deformation_mm: &mut [[Lanes; 3]]) {
         let ranges_mm = self.range_mm();
         simd::widest(
             #[inline(always)]

@@ -124,13 +124,7 @@ struct Contacts<'m> {
 }
 
 impl Trajectories for Contacts<'_> {
-    fn deform(
-        &mut self,
-        row: usize,
-        _step: usize,
-        _: &mut Draws,
-        deformation_mm: &mut [[Lanes; 3]],
-    ) {
+    fn deform(&mut self, row: usize, _: &mut Draws, deformation_mm: &mut [[Lanes; 3]]) {
         let electrodes_mm = self.sensor.row_electrodes_mm(row);
         simd::widest(
             #[inline(always)]
@@ -142,8 +136,13 @@ impl Trajectories for Contacts<'_> {
         );
     }
 
-    fn contact(&self, _step: usize) -> Option<&Contact> {
+    fn contact(&self) -> Option<&Contact> {
         Some(&self.contact)
+    }
+
+    fn move_to(&mut self, centre_mm: [Lanes; 2], depth_mm: Lanes) {
+        self.contact.centre_mm = centre_mm;
+        self.contact.dent_depth_mm = depth_mm;
     }
 }
 

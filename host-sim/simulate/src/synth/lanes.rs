@@ -6,7 +6,7 @@ use taxel_data::simd::{self, LANES, Lanes};
 
 use super::Synthesis;
 use crate::contact::Contact;
-use crate::motion::Draws;
+use crate::motion::{Draws, Trajectories};
 use crate::outputs::{ContactOutput, Outputs};
 use crate::rubber::Response;
 use crate::sensor::{LaneModel, Scratch};
@@ -69,7 +69,8 @@ impl<'s> LaneSynthesis<'s> {
     }
 
     /// Fills `readings` and `outputs` with the frames of the trajectories from number `first` on. There
-    /// are at most [`LANES`] trajectories, the last of which may be cut short.
+    /// are at most [`LANES`] trajectories, the last of which may be cut short. Without room for readings, these are not
+    /// computed.
     pub(super) fn fill(
         &self,
         workspace: &mut Workspace,
@@ -77,24 +78,41 @@ impl<'s> LaneSynthesis<'s> {
         readings: &mut [f64],
         outputs: &mut [f64],
     ) {
-        let Synthesis { world, motion, read_rows, .. } = self.synthesis;
+        let Synthesis { world, motion, path, timetable, read_rows, .. } = self.synthesis;
         let mut draws = Draws::new(world.seed, self.stream, first);
         workspace.gain = self.synthesis.drift.map(|drift| drift.factors(&mut draws));
         let mut trajectories = motion.start(&world.sensor, &mut draws);
+        let deepest_mm = motion.range_mm()[2][1];
+        let paths = path.map(|path| path.start(&world.sensor, deepest_mm, &mut draws));
         let electrodes = world.sensor.electrodes_per_row_wire;
         let mut rubber: Vec<Box<dyn Response>> =
             read_rows.iter().map(|_| world.rubber.at_rest(electrodes)).collect();
-        for step in 0..motion.steps() {
+        for (step, start_s) in timetable.starts_s.iter().enumerate() {
+            let move_to = |trajectories: &mut dyn Trajectories, offset_s: f64| {
+                if let Some(paths) = &paths {
+                    let (centre_mm, depth_mm) = paths.at(start_s + offset_s);
+                    trajectories.move_to(centre_mm, depth_mm);
+                }
+            };
             for (place, &row) in read_rows.iter().enumerate() {
                 let deformation_mm = &mut workspace.deformation_mm;
-                trajectories.deform(row, step, &mut draws, deformation_mm);
-                rubber[place].respond(motion.step_s(), deformation_mm);
+                move_to(&mut *trajectories, timetable.row_offset_s(place, read_rows.len()));
+                trajectories.deform(row, &mut draws, deformation_mm);
+                rubber[place].respond(timetable.since_last_s(step), deformation_mm);
                 simd::widest(
                     #[inline(always)]
-                    || self.read_row(workspace, (first, step), (place, row), readings, outputs),
+                    || {
+                        if !readings.is_empty() {
+                            self.read_row(workspace, (first, step), (place, row), readings);
+                        }
+                        self.write_row(&workspace.deformation_mm, step, place, outputs);
+                    },
                 );
             }
-            self.write_contact(trajectories.contact(step), step, outputs);
+            if !self.of_contact.is_empty() {
+                move_to(&mut *trajectories, 0.5 * timetable.scan_s);
+                self.write_contact(trajectories.contact(), step, outputs);
+            }
         }
     }
 
@@ -106,10 +124,10 @@ impl<'s> LaneSynthesis<'s> {
         (first, step): (usize, usize),
         (place, row): (usize, usize),
         readings: &mut [f64],
-        outputs: &mut [f64],
     ) {
-        let Synthesis { world, motion, read_rows, .. } = self.synthesis;
-        let (steps, rows, columns) = (motion.steps(), read_rows.len(), world.sensor.column_wires);
+        let Synthesis { world, read_rows, .. } = self.synthesis;
+        let (steps, rows) = (self.synthesis.steps(), read_rows.len());
+        let columns = world.sensor.column_wires;
         let Workspace { deformation_mm, resistance_ohm, gain, scratch } = workspace;
         let precision = world.precision;
         self.model.row_column_resistance_ohm(
@@ -132,9 +150,21 @@ impl<'s> LaneSynthesis<'s> {
                 *place = lanes[lane];
             }
         }
+    }
+
+    /// Lays out the outputs of one row at one step, if they are wanted.
+    #[inline(always)]
+    fn write_row(
+        &self,
+        deformation_mm: &[[Lanes; 3]],
+        step: usize,
+        place: usize,
+        outputs: &mut [f64],
+    ) {
         if self.outputs.is_empty() {
             return;
         }
+        let (steps, rows) = (self.synthesis.steps(), self.synthesis.read_rows.len());
         let (width, of_electrodes) = (self.outputs.len(), deformation_mm.as_flattened());
         let lines = outputs.chunks_exact_mut(width);
         let line_of_lanes = lines.skip(step * rows + place).step_by(steps * rows);
@@ -145,16 +175,13 @@ impl<'s> LaneSynthesis<'s> {
         }
     }
 
-    /// Lays out the quantities of the contact at one step, if they are wanted.
+    /// Lays out the quantities of the contact at one step.
     fn write_contact(&self, contact: Option<&Contact>, step: usize, outputs: &mut [f64]) {
         let sensor = &self.synthesis.world.sensor;
         let columns: Vec<Lanes> =
             self.of_contact.iter().flat_map(|quantity| quantity.of(contact, sensor)).collect();
-        if columns.is_empty() {
-            return;
-        }
         let lines = outputs.chunks_exact_mut(columns.len());
-        let line_of_lanes = lines.skip(step).step_by(self.synthesis.motion.steps());
+        let line_of_lanes = lines.skip(step).step_by(self.synthesis.steps());
         for (lane, outputs) in line_of_lanes.enumerate() {
             for (output, lanes) in outputs.iter_mut().zip(&columns) {
                 *output = lanes[lane];
@@ -170,13 +197,13 @@ impl<'s> LaneSynthesis<'s> {
         (first, step): (usize, usize),
         resistance_ohm: &mut [Lanes],
     ) {
-        let Synthesis { world, noise, noise_purpose, motion, .. } = self.synthesis;
+        let Synthesis { world, noise, noise_purpose, .. } = self.synthesis;
         let (level, columns) = (noise.level, world.sensor.column_wires);
         if level == 0.0 {
             return;
         }
         // Noise is drawn by frame, whichever trajectory the frame belongs to.
-        let steps = motion.steps();
+        let steps = self.synthesis.steps();
         let mut random = RandomLanes::every(first * steps + step, steps);
         random.start(world.seed, self.stream, *noise_purpose, row as u64);
         let mut normals = [[0.0; LANES]; 2];

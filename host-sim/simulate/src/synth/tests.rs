@@ -300,3 +300,86 @@ fn synthesised_numbers_are_fixed_for_all_time() {
         assert_eq!(digest(&bytes), pinned, "{name}");
     }
 }
+
+/// Contacts of `press` along a path.
+fn moving(speed_mm_per_s: f64, press_rate_hz: f64) -> World {
+    World { path: Some(Path::at(speed_mm_per_s, press_rate_hz)), ..World::press() }
+}
+
+#[test]
+fn a_moving_contact_is_read_row_by_row_at_its_own_times() {
+    let world = moving(80.0, 4.0);
+    let path = world.path.as_ref().unwrap();
+    world.check_path(path).unwrap();
+    let timetable = Timetable::every(0.006, 0.004, 0.06).unwrap();
+    let synthesis = Synthesis::new(&world).ideal().along(path, timetable.clone());
+    assert_eq!(synthesis.steps(), 10);
+    let scanned = synthesis.frames(Stream::Test, 70 * 10);
+    // What rows are given is what a scan of that instant gives all of them.
+    for place in [0, 3, 7] {
+        let offset_s = timetable.row_offset_s(place, 8);
+        let at = timetable.starts_s.iter().map(|start_s| start_s + offset_s).collect();
+        let instants = synthesis.clone().timed(Timetable::instants(at));
+        let seen = instants.frames(Stream::Test, 70 * 10);
+        assert_eq!(scanned.row_table(place), seen.row_table(place));
+        assert_eq!(instants.true_outputs(Stream::Test, 70 * 10), seen.outputs);
+        assert_ne!(scanned.row_table(5), seen.row_table(5));
+    }
+    // A trajectory is the same however many are asked for.
+    assert_eq!(synthesis.frames(Stream::Test, 25).inputs.values, scanned.inputs.values[..25 * 144]);
+}
+
+#[test]
+fn noise_and_drift_of_a_trajectory_are_those_of_its_frames_and_its_session() {
+    let world = World { drift: Some(Drift { gain: 0.02 }), ..moving(30.0, 2.0) };
+    let path = world.path.as_ref().unwrap();
+    let timetable = Timetable::every(0.001, 0.0005, 0.02).unwrap();
+    let noisy = Synthesis::new(&world).along(path, timetable.clone());
+    let ideal = noisy.clone().ideal();
+    let frames = 40 * 20;
+    let [noisy, ideal] = [noisy, ideal].map(|it| it.frames(Stream::Test, frames).inputs);
+    let (mut sum, mut squares) = (0.0, 0.0);
+    let of_noise: Vec<f64> =
+        ratios(&noisy, &ideal).flatten().map(|ratio| (ratio - 1.0) / 0.005).collect();
+    for n in &of_noise {
+        sum += n;
+        squares += n * n;
+    }
+    let count = of_noise.len() as f64;
+    assert!((sum / count).abs() < 5.0 / count.sqrt(), "{}", sum / count);
+    assert!((squares / count - 1.0).abs() < 5.0 * (2.0 / count).sqrt(), "{}", squares / count);
+    // No two frames share their noise.
+    let products = of_noise.windows(145).map(|of| of[0] * of[144]).sum::<f64>();
+    assert!((products / count).abs() < 5.0 / count.sqrt(), "{}", products / count);
+    // The gain drifts from one trajectory to the next, and not within one.
+    let undrifted = World { drift: None, ..world.clone() };
+    let undrifted = Synthesis::new(&undrifted).ideal().along(path, timetable);
+    let undrifted = undrifted.frames(Stream::Test, frames).inputs;
+    let gains: Vec<f64> = ratios(&ideal, &undrifted).map(|line| line[77]).collect();
+    for trajectory in gains.chunks(20) {
+        assert!(trajectory.iter().all(|gain| (gain / trajectory[0] - 1.0).abs() < 1e-14));
+    }
+    assert!((gains[0] / gains[20] - 1.0).abs() > 1e-6);
+    let baselines = Synthesis::new(&world).along(path, Timetable::still());
+    assert_eq!(baselines.baselines(Stream::Test, 3, 100).len(), 3);
+}
+
+#[test]
+fn the_centre_of_a_contact_that_is_lifted_is_missing() {
+    let mut world = World { path: moving(40.0, 5.0).path, ..World::contact() };
+    world.read_rows = vec![2, 3];
+    let path = world.path.as_ref().unwrap();
+    let timetable = Timetable::every(0.002, 0.001, 0.6).unwrap();
+    let synthesis = Synthesis::new(&world).ideal().along(path, timetable.clone());
+    let outputs = synthesis.frames(Stream::Test, 300 * 8).outputs;
+    let depth = outputs.names.iter().position(|name| name == "contact_depth_mm").unwrap();
+    let lifted = outputs.lines().filter(|line| line[depth] == 0.0).count();
+    assert!((400..900).contains(&lifted), "{lifted} of 2400");
+    assert!(outputs.lines().all(|line| line[0].is_nan() == (line[depth] == 0.0)));
+    // The contact of a scan is the one in its middle.
+    let middle = timetable.starts_s.iter().map(|start_s| start_s + 0.0005).collect();
+    let middle = synthesis.clone().timed(Timetable::instants(middle));
+    let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+    let there = middle.true_outputs(Stream::Test, 300 * 8);
+    assert!(outputs.values.iter().zip(&there.values).all(same));
+}
