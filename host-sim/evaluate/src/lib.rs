@@ -31,6 +31,7 @@ pub mod measurements;
 pub mod over_time;
 pub mod verdict;
 pub mod experiment;
+pub mod moving;
 pub mod training_set;
 pub mod subject;
 pub mod evaluate;

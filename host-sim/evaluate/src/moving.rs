@@ -1,0 +1,161 @@
+//! Errors on contacts that move, as a robot meets them: at every moment, the newest estimate that is finished against the
+//! truth at that moment. So they include how long a scan and its decoding take, and how long an estimate is held until the
+//! next.
+
+use serde::Serialize;
+use taxel_data::BadValue;
+use taxel_data::dataset::Dataset;
+use taxel_data::random::Stream;
+use taxel_data::table::Table;
+use taxel_simulate::Synthesis;
+use taxel_simulate::path::Path;
+use taxel_simulate::timetable::Timetable;
+
+use crate::experiment::Experiment;
+use crate::metrics::{self, Errors, Measure};
+
+/// Time between two moments at which estimates are compared with the truth, in s.
+const GRID_S: f64 = 0.001;
+/// Time in s, and share of a trajectory, in which a filter may find its feet: the shorter of both is not judged.
+const WARM_UP: (f64, f64) = (0.15, 0.25);
+
+/// Times of a device's frames.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pace {
+    /// Time of a scan.
+    pub scan_ms: f64,
+    /// Time from the end of the scan until its estimate is finished.
+    pub decode_ms: f64,
+    /// Time from the start of one scan to the start of the next.
+    pub period_ms: f64,
+}
+
+impl Pace {
+    /// Mean age of the newest finished estimate in ms: the time since the middle of its scan, half a scan and the decoding
+    /// when it is finished, and a period more before the next one is.
+    pub fn age_ms(self) -> f64 {
+        0.5 * self.scan_ms + self.decode_ms + 0.5 * self.period_ms
+    }
+}
+
+/// Frames of contacts that move, scanned at a device's pace, and the truth that its estimates are compared with.
+#[derive(Debug, Clone)]
+pub struct Moving {
+    /// Frames of one trajectory after the other: what a decoder sees of them.
+    pub frames: Dataset,
+    /// When each scan of a trajectory reads.
+    pub timetable: Timetable,
+    /// Moments of a trajectory in s at which the truth is known.
+    pub moments_s: Vec<f64>,
+    /// True outputs at these moments, of one trajectory after the other.
+    pub truth: Table,
+    pub pace: Pace,
+}
+
+impl Moving {
+    /// Frames of `scene`, whose contacts move along `path`, from a `synthesis` of its world.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a pace at which a trajectory has too many frames, or none that is finished.
+    pub fn new(
+        scene: &Experiment,
+        synthesis: &Synthesis<'_>,
+        path: &Path,
+        pace: Pace,
+    ) -> Result<Self, BadValue> {
+        let [scan_s, decode_s, period_s] =
+            [pace.scan_ms, pace.decode_ms, pace.period_ms].map(|ms| ms / 1000.0);
+        let timetable = Timetable::every(period_s, scan_s, path.duration_s)?;
+        let from_s = WARM_UP.0.min(WARM_UP.1 * path.duration_s).max(scan_s + decode_s);
+        let (first, last) = ((from_s / GRID_S).ceil(), (path.duration_s / GRID_S).floor());
+        if first > last {
+            let (value, least) = (format!("{} s", path.duration_s), 2.0 * (scan_s + decode_s));
+            let rule = format!("no frame is finished by then; give more than {least:.3} s");
+            return Err(BadValue::new("motion.duration_s", value, rule));
+        }
+        let moments_s: Vec<f64> =
+            (first as usize..=last as usize).map(|moment| moment as f64 * GRID_S).collect();
+        let trajectories = path.trajectories;
+        let moved = synthesis.clone().along(path, timetable.clone());
+        let frames = scene.dataset(&moved, Stream::Test, trajectories * timetable.scans());
+        let instants = synthesis.clone().along(path, Timetable::instants(moments_s.clone()));
+        let truth = instants.true_outputs(Stream::Test, trajectories * moments_s.len());
+        Ok(Self { frames, timetable, moments_s, truth, pace })
+    }
+
+    /// Newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`).
+    pub fn held(&self, estimates: &[f64]) -> Vec<f64> {
+        let outputs = self.truth.names.len();
+        let scans = self.timetable.scans();
+        let finished_s = (self.pace.scan_ms + self.pace.decode_ms) / 1000.0;
+        let newest = |moment_s: &f64| {
+            let is_finished = |start_s: &f64| start_s + finished_s <= moment_s + 1e-9;
+            // At the first moment at least one is.
+            self.timetable.starts_s.partition_point(is_finished).saturating_sub(1)
+        };
+        let newest: Vec<usize> = self.moments_s.iter().map(newest).collect();
+        let of_trajectory = |estimates: &[f64]| {
+            let of = |scan: &usize| estimates[scan * outputs..][..outputs].to_vec();
+            newest.iter().flat_map(of).collect::<Vec<f64>>()
+        };
+        estimates.chunks_exact(scans * outputs).flat_map(of_trajectory).collect()
+    }
+
+    /// Errors of the newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`).
+    /// There is no ratio to the limit, which is that of single frames.
+    pub fn errors(&self, estimates: &[f64], measure: &Measure) -> Vec<Errors> {
+        let measure = Measure { limit: None, ..measure.clone() };
+        metrics::by_group(&self.truth, &self.held(estimates), &measure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moving(pace: Pace) -> Moving {
+        let mut scene = Experiment::load("moving").unwrap();
+        scene.world.path.as_mut().unwrap().trajectories = 3;
+        let path = scene.world.path.unwrap();
+        Moving::new(&scene, &Synthesis::new(&scene.world), &path, pace).unwrap()
+    }
+
+    #[test]
+    fn the_newest_finished_estimate_is_held_until_the_next_one() {
+        let moving = moving(Pace { scan_ms: 3.0, decode_ms: 1.0, period_ms: 5.0 });
+        assert_eq!((moving.timetable.scans(), moving.frames.frames()), (120, 360));
+        assert_eq!((moving.moments_s[0], moving.moments_s.len()), (0.15, 451));
+        // Each estimate is the number of its frame.
+        let numbers: Vec<f64> = (0..360).flat_map(|frame| [f64::from(frame); 48]).collect();
+        let held: Vec<f64> = moving.held(&numbers).iter().copied().step_by(48).collect();
+        // Frame 29 starts at 145 ms and is finished at 149, frame 30 at 154, frame 31 at 159.
+        assert_eq!(held[..10], [29.0, 29.0, 29.0, 29.0, 30.0, 30.0, 30.0, 30.0, 30.0, 31.0]);
+        assert_eq!((held[450], held[451]), (119.0, 120.0 + 29.0));
+        assert_eq!(moving.pace.age_ms(), 5.0);
+    }
+
+    #[test]
+    fn an_estimate_without_error_when_it_is_read_has_one_when_it_is_used() {
+        let measure = Experiment::load("moving").unwrap().measure();
+        let rmse = |pace| {
+            let moving = moving(pace);
+            moving.errors(&moving.frames.outputs.values, &measure)[0].rmse
+        };
+        let soon = rmse(Pace { scan_ms: 0.01, decode_ms: 0.0, period_ms: 1.0 });
+        let late = rmse(Pace { scan_ms: 0.01, decode_ms: 4.0, period_ms: 1.0 });
+        let slow = rmse(Pace { scan_ms: 6.0, decode_ms: 0.0, period_ms: 6.0 });
+        // At a moment the newest estimates are 1 ms and 5 ms old; those of rows read over 6 ms are 3 to 9 ms old.
+        assert!((0.001..0.003).contains(&soon), "{soon} mm");
+        assert!((late / soon - 5.0).abs() < 0.2 && slow > 1.1 * late, "{soon} {late} {slow}");
+    }
+
+    #[test]
+    fn a_trajectory_shorter_than_a_frame_is_refused() {
+        let scene = Experiment::load("moving").unwrap();
+        let path = Path { duration_s: 0.01, ..scene.world.path.unwrap() };
+        let pace = Pace { scan_ms: 23.0, decode_ms: 1.0, period_ms: 24.0 };
+        let refused = Moving::new(&scene, &Synthesis::new(&scene.world), &path, pace);
+        let refused = refused.unwrap_err().to_string();
+        assert!(refused.contains("motion.duration_s") && refused.contains("0.048"), "{refused}");
+    }
+}
