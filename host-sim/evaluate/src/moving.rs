@@ -2,7 +2,6 @@
 //! truth at that moment. So they include how long a scan and its decoding take, and how long an estimate is held until the
 //! next.
 
-use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
@@ -19,26 +18,13 @@ const GRID_S: f64 = 0.001;
 /// Time in s, and share of a trajectory, in which a filter may find its feet: the shorter of both is not judged.
 const WARM_UP: (f64, f64) = (0.15, 0.25);
 
-/// Times of a device's frames.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Pace {
-    /// Time of a scan.
-    pub scan_ms: f64,
-    /// Time from the end of the scan until its estimate is finished.
-    pub decode_ms: f64,
-    /// Time from the start of one scan to the start of the next.
-    pub period_ms: f64,
+/// Mean age of the newest finished estimate in ms: the time since the middle of its scan. It is finished `finished_ms` after
+/// the start of that scan, and held until the next one is, a period later.
+pub fn age_ms(scan_ms: f64, finished_ms: f64, period_ms: f64) -> f64 {
+    finished_ms - 0.5 * scan_ms + 0.5 * period_ms
 }
 
-impl Pace {
-    /// Mean age of the newest finished estimate in ms: the time since the middle of its scan, half a scan and the decoding
-    /// when it is finished, and a period more before the next one is.
-    pub fn age_ms(self) -> f64 {
-        0.5 * self.scan_ms + self.decode_ms + 0.5 * self.period_ms
-    }
-}
-
-/// Frames of contacts that move, scanned at a device's pace, and the truth that its estimates are compared with.
+/// Frames of contacts that move, and the truth that estimates are compared with.
 #[derive(Debug, Clone)]
 pub struct Moving {
     /// Frames of one trajectory after the other: what a decoder sees of them.
@@ -49,30 +35,30 @@ pub struct Moving {
     pub moments_s: Vec<f64>,
     /// True outputs at these moments, of one trajectory after the other.
     pub truth: Table,
-    pub pace: Pace,
 }
 
 impl Moving {
-    /// Frames of `scene`, whose contacts move along `path`, from a `synthesis` of its world.
+    /// Frames of `scene`, whose contacts move along `path`, from a `synthesis` of its world. A scan takes `scan_ms`, and one
+    /// starts every `period_ms`.
     ///
     /// # Errors
-    /// [`BadValue`] for a pace at which a trajectory has too many frames, or none that is finished.
+    /// [`BadValue`] for a period at which a trajectory has too many frames, or not even four.
     pub fn new(
         scene: &Experiment,
         synthesis: &Synthesis<'_>,
-        path: &Path,
-        pace: Pace,
+        path: Path,
+        [scan_ms, period_ms]: [f64; 2],
     ) -> Result<Self, BadValue> {
-        let [scan_s, decode_s, period_s] =
-            [pace.scan_ms, pace.decode_ms, pace.period_ms].map(|ms| ms / 1000.0);
-        let timetable = Timetable::every(period_s, scan_s, path.duration_s)?;
-        let from_s = WARM_UP.0.min(WARM_UP.1 * path.duration_s).max(scan_s + decode_s);
-        let (first, last) = ((from_s / GRID_S).ceil(), (path.duration_s / GRID_S).floor());
-        if first > last {
-            let (value, least) = (format!("{} s", path.duration_s), 2.0 * (scan_s + decode_s));
-            let rule = format!("no frame is finished by then; give more than {least:.3} s");
+        let period_s = period_ms / 1000.0;
+        let timetable = Timetable::every(period_s, scan_ms / 1000.0, path.duration_s)?;
+        if path.duration_s < 4.0 * period_s {
+            let (value, least) = (format!("{} s", path.duration_s), 4.0 * period_s);
+            let rule = format!("frames are {period_s:.4} s apart; give at least {least:.3} s");
             return Err(BadValue::new("motion.duration_s", value, rule));
         }
+        // Estimates of two periods before are finished, whether or not scans and decoding overlap.
+        let from_s = WARM_UP.0.min(WARM_UP.1 * path.duration_s).max(2.0 * period_s);
+        let (first, last) = ((from_s / GRID_S).ceil(), (path.duration_s / GRID_S).floor());
         let moments_s: Vec<f64> =
             (first as usize..=last as usize).map(|moment| moment as f64 * GRID_S).collect();
         let trajectories = path.trajectories;
@@ -80,17 +66,15 @@ impl Moving {
         let frames = scene.dataset(&moved, Stream::Test, trajectories * timetable.scans());
         let instants = synthesis.clone().along(path, Timetable::instants(moments_s.clone()));
         let truth = instants.true_outputs(Stream::Test, trajectories * moments_s.len());
-        Ok(Self { frames, timetable, moments_s, truth, pace })
+        Ok(Self { frames, timetable, moments_s, truth })
     }
 
-    /// Newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`).
-    pub fn held(&self, estimates: &[f64]) -> Vec<f64> {
-        let outputs = self.truth.names.len();
-        let scans = self.timetable.scans();
-        let finished_s = (self.pace.scan_ms + self.pace.decode_ms) / 1000.0;
+    /// Newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`): an estimate is
+    /// finished `finished_ms` after the start of its scan.
+    pub fn held(&self, estimates: &[f64], finished_ms: f64) -> Vec<f64> {
+        let (outputs, scans) = (self.truth.names.len(), self.timetable.scans());
         let newest = |moment_s: &f64| {
-            let is_finished = |start_s: &f64| start_s + finished_s <= moment_s + 1e-9;
-            // At the first moment at least one is.
+            let is_finished = |start_s: &f64| start_s + finished_ms / 1000.0 <= moment_s + 1e-9;
             self.timetable.starts_s.partition_point(is_finished).saturating_sub(1)
         };
         let newest: Vec<usize> = self.moments_s.iter().map(newest).collect();
@@ -101,11 +85,11 @@ impl Moving {
         estimates.chunks_exact(scans * outputs).flat_map(of_trajectory).collect()
     }
 
-    /// Errors of the newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`).
-    /// There is no ratio to the limit, which is that of single frames.
-    pub fn errors(&self, estimates: &[f64], measure: &Measure) -> Vec<Errors> {
+    /// Errors of the newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`). There
+    /// is no ratio to the limit, which is that of single frames.
+    pub fn errors(&self, estimates: &[f64], finished_ms: f64, measure: &Measure) -> Vec<Errors> {
         let measure = Measure { limit: None, ..measure.clone() };
-        metrics::by_group(&self.truth, &self.held(estimates), &measure)
+        metrics::by_group(&self.truth, &self.held(estimates, finished_ms), &measure)
     }
 }
 
@@ -113,49 +97,47 @@ impl Moving {
 mod tests {
     use super::*;
 
-    fn moving(pace: Pace) -> Moving {
+    fn moving(scan_ms: f64, period_ms: f64) -> Moving {
         let mut scene = Experiment::load("moving").unwrap();
         scene.world.path.as_mut().unwrap().trajectories = 3;
-        let path = scene.world.path.unwrap();
-        Moving::new(&scene, &Synthesis::new(&scene.world), &path, pace).unwrap()
+        let (path, synthesis) = (scene.world.path.unwrap(), Synthesis::new(&scene.world));
+        Moving::new(&scene, &synthesis, path, [scan_ms, period_ms]).unwrap()
     }
 
     #[test]
     fn the_newest_finished_estimate_is_held_until_the_next_one() {
-        let moving = moving(Pace { scan_ms: 3.0, decode_ms: 1.0, period_ms: 5.0 });
+        let moving = moving(3.0, 5.0);
         assert_eq!((moving.timetable.scans(), moving.frames.frames()), (120, 360));
         assert_eq!((moving.moments_s[0], moving.moments_s.len()), (0.15, 451));
         // Each estimate is the number of its frame.
         let numbers: Vec<f64> = (0..360).flat_map(|frame| [f64::from(frame); 48]).collect();
-        let held: Vec<f64> = moving.held(&numbers).iter().copied().step_by(48).collect();
+        let held: Vec<f64> = moving.held(&numbers, 4.0).iter().copied().step_by(48).collect();
         // Frame 29 starts at 145 ms and is finished at 149, frame 30 at 154, frame 31 at 159.
         assert_eq!(held[..10], [29.0, 29.0, 29.0, 29.0, 30.0, 30.0, 30.0, 30.0, 30.0, 31.0]);
         assert_eq!((held[450], held[451]), (119.0, 120.0 + 29.0));
-        assert_eq!(moving.pace.age_ms(), 5.0);
+        assert_eq!(age_ms(3.0, 4.0, 5.0), 5.0);
     }
 
     #[test]
     fn an_estimate_without_error_when_it_is_read_has_one_when_it_is_used() {
         let measure = Experiment::load("moving").unwrap().measure();
-        let rmse = |pace| {
-            let moving = moving(pace);
-            moving.errors(&moving.frames.outputs.values, &measure)[0].rmse
+        let rmse = |scan_ms, period_ms, finished_ms| {
+            let moving = moving(scan_ms, period_ms);
+            moving.errors(&moving.frames.outputs.values, finished_ms, &measure)[0].rmse
         };
-        let soon = rmse(Pace { scan_ms: 0.01, decode_ms: 0.0, period_ms: 1.0 });
-        let late = rmse(Pace { scan_ms: 0.01, decode_ms: 4.0, period_ms: 1.0 });
-        let slow = rmse(Pace { scan_ms: 6.0, decode_ms: 0.0, period_ms: 6.0 });
+        let (soon, late) = (rmse(0.01, 1.0, 0.01), rmse(0.01, 1.0, 4.01));
+        let slow = rmse(6.0, 6.0, 6.0);
         // At a moment the newest estimates are 1 ms and 5 ms old; those of rows read over 6 ms are 3 to 9 ms old.
         assert!((0.001..0.003).contains(&soon), "{soon} mm");
         assert!((late / soon - 5.0).abs() < 0.2 && slow > 1.1 * late, "{soon} {late} {slow}");
     }
 
     #[test]
-    fn a_trajectory_shorter_than_a_frame_is_refused() {
+    fn a_trajectory_of_few_frames_is_refused() {
         let scene = Experiment::load("moving").unwrap();
-        let path = Path { duration_s: 0.01, ..scene.world.path.unwrap() };
-        let pace = Pace { scan_ms: 23.0, decode_ms: 1.0, period_ms: 24.0 };
-        let refused = Moving::new(&scene, &Synthesis::new(&scene.world), &path, pace);
+        let path = Path { duration_s: 0.05, ..scene.world.path.unwrap() };
+        let refused = Moving::new(&scene, &Synthesis::new(&scene.world), path, [23.0, 24.0]);
         let refused = refused.unwrap_err().to_string();
-        assert!(refused.contains("motion.duration_s") && refused.contains("0.048"), "{refused}");
+        assert!(refused.contains("motion.duration_s") && refused.contains("0.096"), "{refused}");
     }
 }

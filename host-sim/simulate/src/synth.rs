@@ -34,7 +34,7 @@ pub struct Synthesis<'w> {
     noise_purpose: Purpose,
     drift: Option<Drift>,
     motion: Cow<'w, motion::Kind>,
-    path: Option<&'w Path>,
+    path: Option<Path>,
     /// When each scan of a trajectory reads.
     timetable: Timetable,
     read_rows: Cow<'w, [usize]>,
@@ -95,9 +95,9 @@ impl<'w> Synthesis<'w> {
         self
     }
 
-    /// Moves contacts along `path`, and scans them at these times.
+    /// Moves contacts along this path, and scans them at these times.
     #[must_use]
-    pub fn along(mut self, path: &'w Path, timetable: Timetable) -> Self {
+    pub fn along(mut self, path: Path, timetable: Timetable) -> Self {
         self.path = Some(path);
         self.timed(timetable)
     }

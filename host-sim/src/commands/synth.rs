@@ -119,7 +119,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let timetable = arguments.timetable(&scene)?;
     if let Some(timetable) = &timetable {
-        let path = scene.world.path.as_ref().filter(|_| !arguments.untouched);
+        let path = scene.world.path.filter(|_| !arguments.untouched);
         synthesis = match path {
             Some(path) => synthesis.along(path, timetable.clone()),
             None => synthesis.timed(timetable.clone()),

@@ -309,8 +309,8 @@ fn moving(speed_mm_per_s: f64, press_rate_hz: f64) -> World {
 #[test]
 fn a_moving_contact_is_read_row_by_row_at_its_own_times() {
     let world = moving(80.0, 4.0);
-    let path = world.path.as_ref().unwrap();
-    world.check_path(path).unwrap();
+    let path = world.path.unwrap();
+    world.check_path(&path).unwrap();
     let timetable = Timetable::every(0.006, 0.004, 0.06).unwrap();
     let synthesis = Synthesis::new(&world).ideal().along(path, timetable.clone());
     assert_eq!(synthesis.steps(), 10);
@@ -332,7 +332,7 @@ fn a_moving_contact_is_read_row_by_row_at_its_own_times() {
 #[test]
 fn noise_and_drift_of_a_trajectory_are_those_of_its_frames_and_its_session() {
     let world = World { drift: Some(Drift { gain: 0.02 }), ..moving(30.0, 2.0) };
-    let path = world.path.as_ref().unwrap();
+    let path = world.path.unwrap();
     let timetable = Timetable::every(0.001, 0.0005, 0.02).unwrap();
     let noisy = Synthesis::new(&world).along(path, timetable.clone());
     let ideal = noisy.clone().ideal();
@@ -368,7 +368,7 @@ fn noise_and_drift_of_a_trajectory_are_those_of_its_frames_and_its_session() {
 fn the_centre_of_a_contact_that_is_lifted_is_missing() {
     let mut world = World { path: moving(40.0, 5.0).path, ..World::contact() };
     world.read_rows = vec![2, 3];
-    let path = world.path.as_ref().unwrap();
+    let path = world.path.unwrap();
     let timetable = Timetable::every(0.002, 0.001, 0.6).unwrap();
     let synthesis = Synthesis::new(&world).ideal().along(path, timetable.clone());
     let outputs = synthesis.frames(Stream::Test, 300 * 8).outputs;
