@@ -1,7 +1,7 @@
 //! Inference for resistive tactile sensors: from row–column resistances to deformation.
 //!
 //! Readings travel one way: frame (Ω, a slice) → [`health`] → ([`fill`] →) [`gate`] → ([`relative`] →) ([`projection`] →)
-//! [`scale`] → [`rbf`] (and its affine tail) → [`Estimate`]. The network's weights are read where the [`blob`] lies, in flash or in a
+//! [`scale`] → [`rbf`] (and its affine tail) → [`Estimate`] (→ [`filter`]). The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
 //! [`rls`] is recursive least squares, by which the paper trains.
 //!
@@ -32,6 +32,7 @@ mod estimate;
 mod cortex_m4;
 pub mod health;
 pub mod gate;
+pub mod filter;
 pub mod rbf;
 pub mod projection;
 pub mod expansion;

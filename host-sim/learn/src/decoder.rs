@@ -2,7 +2,8 @@
 //!
 //! Configuration (the decoder itself, immutable) is kept apart from state (what a filter remembers
 //! between the frames of a trajectory), like in idsp's `SplitProcess`. A new kind of decoder implements
-//! [`FrameDecoder`]; every [`FrameDecoder`] is a [`Decoder`], of which programs hold lists.
+//! [`FrameDecoder`]; every [`FrameDecoder`] is a [`Decoder`], of which programs hold lists. Both take [`Frames`], which
+//! tell when each reading was taken if that is known.
 
 use crate::parallel;
 
@@ -37,6 +38,41 @@ impl Estimates {
     }
 }
 
+/// Frames of readings, and when they were taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frames<'a> {
+    /// Readings, `frames × inputs`, frame after frame, in Ω (or the data's unit).
+    pub readings: &'a [f64],
+    /// Times of the frames; `None` if they are not known.
+    pub timing: Option<Timing<'a>>,
+}
+
+/// Times of frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing<'a> {
+    /// Start of each frame in µs, by a clock that goes on through a trajectory.
+    pub start_us: &'a [u64],
+    /// Time in µs from the start of a frame until each of its readings is taken, the same in every frame; none at all
+    /// if it is not known. Readings of a row are one after the other on some boards, and at once on others.
+    pub reading_offset_us: &'a [f64],
+}
+
+impl<'a> Frames<'a> {
+    /// Frames whose times are not known.
+    pub fn untimed(readings: &'a [f64]) -> Self {
+        Self { readings, timing: None }
+    }
+
+    /// Trajectory number `index` of these frames, of `steps` frames of so many `inputs`; the last one may have fewer.
+    fn trajectory(self, index: usize, steps: usize, inputs: usize) -> Self {
+        let timing = self.timing.map(|Timing { start_us, reading_offset_us }| Timing {
+            start_us: parallel::piece(start_us, steps, index),
+            reading_offset_us,
+        });
+        Self { readings: parallel::piece(self.readings, steps * inputs, index), timing }
+    }
+}
+
 /// Decoder of frames, with its configuration in `self` and its memory in a state.
 pub trait FrameDecoder: Sync {
     /// Memory between the frames of a trajectory; its default is the start of one. `()` for no memory.
@@ -48,11 +84,9 @@ pub trait FrameDecoder: Sync {
     /// Number of readings in a frame.
     fn inputs(&self) -> usize;
 
-    /// Decodes consecutive frames of one trajectory.
-    ///
-    /// `readings` are `frames × inputs`, frame after frame, in Ω (or the data's unit). A decoder without
-    /// memory is given frames of any number of trajectories at once.
-    fn decode(&self, state: &mut Self::State, readings: &[f64]) -> Estimates;
+    /// Decodes consecutive frames of one trajectory. A decoder without memory is given frames of any number of
+    /// trajectories at once.
+    fn decode(&self, state: &mut Self::State, frames: Frames<'_>) -> Estimates;
 }
 
 /// Decoder of any kind, for lists of decoders.
@@ -60,9 +94,17 @@ pub trait Decoder: Sync {
     /// Name of the decoder in tables and results.
     fn name(&self) -> &str;
 
-    /// Decodes all of `readings` (`frames × inputs`, in the data's unit), in trajectories of `steps`
-    /// frames each.
-    fn decode_all(&self, readings: &[f64], steps: usize) -> Estimates;
+    /// Decodes all of `frames`, in trajectories of `steps` frames each.
+    ///
+    /// # Panics
+    /// If there are times, and not one for each frame.
+    fn decode_frames(&self, frames: Frames<'_>, steps: usize) -> Estimates;
+
+    /// Decodes all of `readings` (`frames × inputs`, in the data's unit), whose times are not known, in trajectories of
+    /// `steps` frames each.
+    fn decode_all(&self, readings: &[f64], steps: usize) -> Estimates {
+        self.decode_frames(Frames::untimed(readings), steps)
+    }
 }
 
 impl<D: FrameDecoder> Decoder for D {
@@ -70,13 +112,18 @@ impl<D: FrameDecoder> Decoder for D {
         FrameDecoder::name(self)
     }
 
-    fn decode_all(&self, readings: &[f64], steps: usize) -> Estimates {
-        if size_of::<D::State>() == 0 {
-            return self.decode(&mut D::State::default(), readings);
+    fn decode_frames(&self, frames: Frames<'_>, steps: usize) -> Estimates {
+        let (inputs, steps) = (self.inputs().max(1), steps.max(1));
+        if let Some(Timing { start_us, .. }) = frames.timing {
+            assert_eq!(start_us.len(), frames.readings.len() / inputs, "a time for each frame");
         }
-        let decode = |readings: &[f64]| self.decode(&mut D::State::default(), readings);
-        let trajectory = steps.max(1) * self.inputs().max(1);
-        let mut decoded = parallel::pieces(readings, trajectory, &decode).into_iter();
+        if size_of::<D::State>() == 0 {
+            return self.decode(&mut D::State::default(), frames);
+        }
+        let decode =
+            |index| self.decode(&mut D::State::default(), frames.trajectory(index, steps, inputs));
+        let trajectories = frames.readings.len().div_ceil(steps * inputs);
+        let mut decoded = parallel::map(trajectories, &decode).into_iter();
         let mut all = decoded.next().unwrap_or_default();
         decoded.for_each(|next| all.append(next));
         all
@@ -102,9 +149,9 @@ mod tests {
             1
         }
 
-        fn decode(&self, (sum, count): &mut (f64, f64), readings: &[f64]) -> Estimates {
+        fn decode(&self, (sum, count): &mut (f64, f64), frames: Frames<'_>) -> Estimates {
             let mut estimates = Estimates { novelty: Some(vec![]), ..Estimates::default() };
-            for reading in readings {
+            for reading in frames.readings {
                 (*sum, *count) = (*sum + reading, *count + 1.0);
                 estimates.values.push(*sum / *count);
                 estimates.novelty.as_mut().unwrap().push((reading - *sum / *count).abs());

@@ -2,7 +2,7 @@
 
 use taxel_data::dataset::{Dataset, RowTable};
 
-use crate::decoder::{Decoder, Estimates, FrameDecoder};
+use crate::decoder::{Decoder, Estimates, FrameDecoder, Frames};
 use crate::infer::{Exponential, infer};
 use crate::parallel;
 use crate::train::FittedNetwork;
@@ -81,8 +81,8 @@ impl<D: RowDecoder + Send> FrameDecoder for Rows<D> {
         self.decoders.len() * self.inputs
     }
 
-    fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
-        let frames = readings.chunks_exact(FrameDecoder::inputs(self).max(1));
+    fn decode(&self, (): &mut (), frames: Frames<'_>) -> Estimates {
+        let frames = frames.readings.chunks_exact(FrameDecoder::inputs(self).max(1));
         let of_row = |row: usize| {
             let places = row * self.inputs..(row + 1) * self.inputs;
             let readings: Vec<f64> =

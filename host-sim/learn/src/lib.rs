@@ -33,6 +33,7 @@ pub mod train;
 pub mod packing;
 pub mod export;
 pub mod prepared;
+pub mod filtered;
 pub mod confidence;
 pub mod fill;
 pub mod recalibration;
@@ -41,9 +42,15 @@ pub mod decoders;
 pub mod select;
 pub mod cost;
 
-pub use decoder::{Decoder, Estimates, FrameDecoder};
+pub use decoder::{Decoder, Estimates, FrameDecoder, Frames, Timing};
+pub use filtered::Filtered;
 pub use infer::Exponential;
 pub use packing::{ModelBlob, Origin, pack};
 pub use prepared::PreparedModel;
 pub use taxel_data::error::{Error, Result};
 pub use train::{Options, Trained};
+
+/// The page's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/filter.md")]
+struct FilterPage;

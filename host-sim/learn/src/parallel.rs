@@ -17,7 +17,7 @@ pub(crate) fn map<T: Send + Sync>(count: usize, of: &(dyn Fn(usize) -> T + Sync)
 }
 
 /// Piece number `index` of `values`, of so many values each; the last one may have fewer.
-pub(crate) fn piece(values: &[f64], size: usize, index: usize) -> &[f64] {
+pub(crate) fn piece<T>(values: &[T], size: usize, index: usize) -> &[T] {
     &values[index * size..values.len().min((index + 1) * size)]
 }
 

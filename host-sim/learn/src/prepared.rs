@@ -8,7 +8,7 @@ use model_core::rbf::Network;
 use model_core::scale::CLAMP;
 use taxel_data::table::Table;
 
-use crate::decoder::{Estimates, FrameDecoder};
+use crate::decoder::{Estimates, FrameDecoder, Frames};
 use crate::infer::{Exponential, assess_lines, infer_in_turn, is_missing};
 use crate::packing::ModelBlob;
 use crate::parallel;
@@ -236,8 +236,8 @@ impl FrameDecoder for PreparedModel<'_> {
         shape.rows * shape.inputs
     }
 
-    fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
+    fn decode(&self, (): &mut (), frames: Frames<'_>) -> Estimates {
         // What a confidence tells is asked for apart (`assess`): tables of errors do not need it.
-        Estimates::of_values(self.decode_lines(readings))
+        Estimates::of_values(self.decode_lines(frames.readings))
     }
 }

@@ -5,7 +5,7 @@ use taxel_data::digest::digest;
 use taxel_data::progress::{Progress, Silent};
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::simd::{LANES, Lanes};
-use taxel_learn::{Estimates, FrameDecoder};
+use taxel_learn::{Estimates, FrameDecoder, Frames};
 use taxel_simulate::sensor::LaneModel;
 use taxel_simulate::{Synthesis, World, rubber};
 
@@ -197,8 +197,8 @@ impl FrameDecoder for Limit {
         self.world.read_rows.len() * self.world.sensor.column_wires
     }
 
-    fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
-        let posteriors = self.posteriors(readings, &Silent);
+    fn decode(&self, (): &mut (), frames: Frames<'_>) -> Estimates {
+        let posteriors = self.posteriors(frames.readings, &Silent);
         let (mut values, mut deviation) = (Vec::new(), Vec::new());
         for posterior in posteriors {
             values.extend(posterior.mean);

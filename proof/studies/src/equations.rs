@@ -7,7 +7,7 @@
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use taxel_learn::{Estimates, FrameDecoder};
+use taxel_learn::{Estimates, FrameDecoder, Frames};
 use taxel_simulate::sensor::Vector3;
 use taxel_simulate::{Synthesis, World};
 
@@ -199,8 +199,8 @@ impl FrameDecoder for Equations<'_> {
         self.world.read_rows.len() * self.world.sensor.column_wires
     }
 
-    fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
-        let solved = self.solve_all(readings);
+    fn decode(&self, (): &mut (), frames: Frames<'_>) -> Estimates {
+        let solved = self.solve_all(frames.readings);
         Estimates::of_values(solved.into_iter().flat_map(|solution| solution.place).collect())
     }
 }
@@ -236,7 +236,7 @@ mod tests {
         let world = World { read_rows: vec![3], ..World::press() };
         let frames = Synthesis::new(&world).frames(Stream::Test, 60);
         let rmse = |decoder: &Equations<'_>| {
-            let estimates = decoder.decode(&mut (), &frames.inputs.values).values;
+            let estimates = decoder.decode_all(&frames.inputs.values, 1).values;
             let squares = frames.outputs.squared_errors(&estimates);
             let z: f64 = squares.iter().skip(2).step_by(3).sum();
             (z / (6.0 * 60.0)).sqrt()

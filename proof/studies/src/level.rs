@@ -7,7 +7,7 @@ use taxel_data::error::require;
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::decoders::BASELINES;
-use taxel_learn::{Decoder, Estimates, Exponential, FrameDecoder, ModelBlob};
+use taxel_learn::{Decoder, Estimates, Exponential, FrameDecoder, Frames, ModelBlob};
 use taxel_limit::solve::Solution;
 use taxel_simulate::Synthesis;
 use taxel_simulate::outputs::Outputs;
@@ -127,7 +127,7 @@ impl Decoder for Solved<'_> {
         FrameDecoder::name(self.0)
     }
 
-    fn decode_all(&self, _: &[f64], _: usize) -> Estimates {
+    fn decode_frames(&self, _: Frames<'_>, _: usize) -> Estimates {
         Estimates::of_values(self.1.iter().flat_map(|solution| &solution.place).copied().collect())
     }
 }

@@ -2,7 +2,7 @@
 
 use taxel_data::dataset::Dataset;
 
-use crate::decoder::{Estimates, FrameDecoder};
+use crate::decoder::{Estimates, FrameDecoder, Frames};
 
 /// Name of the decoder in tables and results.
 pub const NAME: &str = "mean";
@@ -32,7 +32,7 @@ impl FrameDecoder for Mean {
         self.inputs
     }
 
-    fn decode(&self, (): &mut (), readings: &[f64]) -> Estimates {
-        Estimates::of_values(self.outputs.repeat(readings.len() / self.inputs.max(1)))
+    fn decode(&self, (): &mut (), frames: Frames<'_>) -> Estimates {
+        Estimates::of_values(self.outputs.repeat(frames.readings.len() / self.inputs.max(1)))
     }
 }
