@@ -2,10 +2,13 @@
 //! truth at that moment. So they include how long a scan and its decoding take, and how long an estimate is held until the
 //! next.
 
+use model_core::filter::{Settings, State};
+use rayon::prelude::*;
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
+use taxel_learn::filtered::filter_frames;
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 use taxel_simulate::timetable::Timetable;
@@ -67,6 +70,19 @@ impl Moving {
         let instants = synthesis.clone().along(path, Timetable::instants(moments_s.clone()));
         let truth = instants.true_outputs(Stream::Test, trajectories * moments_s.len());
         Ok(Self { frames, timetable, moments_s, truth })
+    }
+
+    /// What a filter with these `settings` makes of the `estimates` of all frames (`frames × outputs`). It starts anew with
+    /// each trajectory.
+    pub fn filtered(&self, estimates: &[f64], settings: Settings) -> Vec<f64> {
+        let start_us = self.timetable.starts_s.iter().map(|start_s| (start_s * 1e6).round() as u64);
+        let (start_us, outputs) = (start_us.collect::<Vec<u64>>(), self.truth.names.len());
+        let mut filtered = estimates.to_vec();
+        filtered.par_chunks_exact_mut(start_us.len() * outputs).for_each(|trajectory| {
+            let mut state = State::new(vec![[0.0; 2]; outputs]);
+            filter_frames(&mut state, settings, &start_us, trajectory);
+        });
+        filtered
     }
 
     /// Newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`): an estimate is

@@ -10,6 +10,7 @@ use taxel_learn::{Options, Origin};
 use taxel_limit::Refusal;
 use taxel_simulate::Synthesis;
 use taxel_simulate::outputs::Outputs;
+use taxel_simulate::path::Path;
 
 use crate::error::Result;
 use crate::experiment::Experiment;
@@ -54,6 +55,12 @@ impl Subject {
             Self::Scene(scene) => Some(scene),
             Self::Measured(_) => None,
         }
+    }
+
+    /// Scene whose contacts move, and their path, if it is one.
+    pub fn moving_scene(&self) -> Option<(&Experiment, Path)> {
+        let scene = self.scene()?;
+        Some((scene, scene.world.path?))
     }
 
     /// Measurements, if it is not a scene.

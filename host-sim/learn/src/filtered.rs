@@ -2,16 +2,17 @@
 //!
 //! # Rule
 //!
-//! An output with white noise of standard deviation σ and acceleration a is read each dt, and extrapolated by the lead
-//! L. Behind a [filter](model_core::filter) with θ = e^(−dt/τ), value and rate have these variances, and the estimate
+//! An output with white noise of standard deviation σ, rate v and acceleration a is read each dt, extrapolated by the lead
+//! L, and used when it is A old. Behind a [filter](model_core::filter) with θ = e^(−dt/τ), value and rate have these variances, and the estimate
 //! lags behind the truth (Brookner, Tracking and Kalman Filtering Made Easy, 1998, ch. 1):
 //!
 //! - value: σ²·(1 − θ)·(1 + 4θ + 5θ²)/(1 + θ)³; rate: σ²·2(1 − θ)³/(1 + θ)³/dt²; both together:
 //!   σ²·(1 − θ)²·(1 + 3θ)/(1 + θ)³/dt;
-//! - lag of the value: a·dt²·θ²/(1 − θ)²; of the rate: a·dt·(1 + 3θ)/(2(1 − θ)); of a line that goes on for L: a·L²/2.
+//! - lag of the value: a·dt²·θ²/(1 − θ)²; of the rate: a·dt·(1 + 3θ)/(2(1 − θ)); of a line that goes on for A: a·A²/2;
+//! - what a lead shorter than A leaves out: v·(A − L).
 //!
-//! [`settings_for`] takes the τ with the least sum of variance and squared lag. Without a lead, and for a τ far above dt,
-//! the sum is σ²·1.25·dt/τ + a²·τ⁴. It is least at τ = (0.3125·σ²·dt/a²)^(1/5).
+//! [`settings_for`] takes the τ and L with the least sum of variance and squares. Of an output that is used at once, and for a
+//! τ far above dt, the sum is σ²·1.25·dt/τ + a²·τ⁴. It is least at τ = (0.3125·σ²·dt/a²)^(1/5).
 
 use model_core::filter::{Settings, State, Track};
 use model_core::{Estimate, RowStatus};
@@ -91,21 +92,52 @@ pub fn mean_age_us(scan_us: f64, decode_us: f64, period_us: f64) -> f64 {
     scan_us / 2.0 + decode_us + period_us / 2.0
 }
 
-/// Settings of least expected error for an output with white noise of standard deviation `noise`, and accelerations of
-/// this root mean square (the output's unit per s²), which is read each `period_us` and extrapolated by `lead_us`.
+/// How fast an output changes, as root mean squares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Movement {
+    /// Change in a second.
+    pub rate_per_s: f64,
+    /// Change of that rate in a second. What a filter sees is the change over about its time constant: where a contact ends,
+    /// the rate jumps, and any shorter time would give a larger number.
+    pub acceleration_per_s2: f64,
+}
+
+/// Leads that are tried, from 0 to the age.
+const LEADS: u32 = 16;
+
+/// Settings of least expected error for an output with white noise of standard deviation `noise`, and this `movement`, which
+/// is read each `period_us` and used when it is `age_us` old: see the [rule](self#rule).
 ///
 /// # Panics
 /// If a number is negative or not finite, or the period is 0.
-pub fn settings_for(noise: f64, acceleration: f64, period_us: f64, lead_us: f64) -> Settings {
-    let numbers = [noise, acceleration, period_us, lead_us];
+pub fn settings_for(noise: f64, movement: Movement, period_us: f64, age_us: f64) -> Settings {
+    let Movement { rate_per_s, acceleration_per_s2 } = movement;
+    let numbers = [noise, rate_per_s, acceleration_per_s2, period_us, age_us];
     let are_good = numbers.iter().all(|number| number.is_finite() && *number >= 0.0);
-    assert!(are_good && period_us > 0.0, "noise, acceleration, period and lead: {numbers:?}");
-    let most_us = f64::from(Settings::MOST_US);
-    let error = |log_us: f64| {
-        squared_error([noise, acceleration], log_us.exp() * 1e-6, period_us * 1e-6, lead_us * 1e-6)
+    assert!(are_good && period_us > 0.0, "noise, movement, period and age: {numbers:?}");
+    let of_lead = |step: u32| {
+        let lead_us = age_us * f64::from(step) / f64::from(LEADS);
+        let (time_constant_us, squared) =
+            time_constant_for([noise, acceleration_per_s2], period_us, [lead_us, age_us]);
+        let moved = rate_per_s * (age_us - lead_us) * 1e-6;
+        (squared + moved * moved, [time_constant_us, lead_us])
     };
+    let best = (0..=LEADS).map(of_lead).min_by(|(a, _), (b, _)| a.total_cmp(b));
+    let [time_constant_us, lead_us] = best.map_or([0.0; 2], |(_, settings)| settings);
+    let whole = |us: f64| us.round().clamp(0.0, f64::from(Settings::MOST_US)) as u32;
+    Settings { time_constant_us: whole(time_constant_us).max(1), lead_us: whole(lead_us) }
+}
+
+/// Time constant in µs of least expected squared error with this lead, for an output that is used at this age, and that error.
+fn time_constant_for(
+    of_output: [f64; 2],
+    period_us: f64,
+    [lead_us, age_us]: [f64; 2],
+) -> (f64, f64) {
+    let times_s = [period_us, lead_us, age_us].map(|us| us * 1e-6);
+    let error = |log_us: f64| squared_error(of_output, log_us.exp() * 1e-6, times_s);
     // A sum of powers of τ has one minimum over its logarithm: golden sections of that.
-    let (mut low, mut high) = ((period_us / 10.0).ln(), most_us.ln());
+    let (mut low, mut high) = ((period_us / 10.0).ln(), f64::from(Settings::MOST_US).ln());
     while high - low > 1e-9 {
         let third = (high - low) * 0.381_966;
         if error(low + third) <= error(high - third) {
@@ -114,12 +146,16 @@ pub fn settings_for(noise: f64, acceleration: f64, period_us: f64, lead_us: f64)
             low += third;
         }
     }
-    let whole = |us: f64| us.round().clamp(0.0, most_us) as u32;
-    Settings { time_constant_us: whole(low.exp()).max(1), lead_us: whole(lead_us) }
+    (low.exp(), error(low))
 }
 
-/// Expected squared error of an output behind a filter with the time constant `tau_s`; see the [rule](self#rule).
-fn squared_error([noise, acceleration]: [f64; 2], tau_s: f64, dt_s: f64, lead_s: f64) -> f64 {
+/// Expected squared error of an output that does not move but accelerates, behind a filter with the time constant `tau_s`; see
+/// the [rule](self#rule).
+fn squared_error(
+    [noise, acceleration]: [f64; 2],
+    tau_s: f64,
+    [dt_s, lead_s, age_s]: [f64; 3],
+) -> f64 {
     let theta = (-dt_s / tau_s).exp();
     let rest = -(-dt_s / tau_s).exp_m1();
     let variance = rest * (1.0 + 4.0 * theta + 5.0 * theta * theta)
@@ -127,7 +163,7 @@ fn squared_error([noise, acceleration]: [f64; 2], tau_s: f64, dt_s: f64, lead_s:
         + (lead_s / dt_s).powi(2) * 2.0 * rest.powi(3);
     let lag = (dt_s * theta / rest).powi(2)
         + lead_s * dt_s * (1.0 + 3.0 * theta) / (2.0 * rest)
-        + lead_s * lead_s / 2.0;
+        + age_s * age_s / 2.0;
     noise * noise * variance / (1.0 + theta).powi(3) + (acceleration * lag).powi(2)
 }
 

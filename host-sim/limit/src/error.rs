@@ -9,6 +9,9 @@ pub enum Refusal {
     /// World without noise, in which nothing limits a decoder but the sensor itself.
     #[error("there is no noise, so there is no posterior to sample")]
     NoNoise,
+    /// Errors on contacts that move.
+    #[error("it is that of single frames, and contacts move while they are read and decoded")]
+    Moving,
     /// Motion with more latents than the sampler can handle.
     #[error("{latents} unknowns at once are more than the {most} that the sampler is made for")]
     TooManyLatents {

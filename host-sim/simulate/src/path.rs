@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use taxel_data::error::require;
 use taxel_data::random::Purpose;
 use taxel_data::simd::{self, LANES, Lanes};
@@ -26,7 +26,7 @@ const MOST_TRAJECTORIES: usize = 10_000;
 /// differ by up to half a radian. Depth: d·max(0, 0.4 + 0.6·sin(2πft + φ)): it touches for 73 % of the time. At a rate
 /// of 0 the depth is d. Half lengths are aₓ = l + (h − l)·|cos θ| and a_y = l + (h − l)·|sin θ| for a range [l, h] and θ
 /// uniform on the circle; all other quantities are uniform on their ranges.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Path {
     /// Range of the centre's greatest speed v in mm/s.

@@ -11,7 +11,8 @@ use crate::metrics;
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::{Args, ValueEnum};
-use taxel_data::columns;
+use taxel_data::{BadValue, columns};
+use taxel_simulate::path::Path;
 
 use super::arguments::{self, of_option};
 use super::progress::Terminal;
@@ -38,6 +39,7 @@ mod page;
   host-sim trade press --max-error 0.045
   host-sim trade press --max-cycles 40000 --max-flash 40000
   host-sim trade press --average 1,4,16 --max-latency-ms 25
+  host-sim trade press --average 1,4 --motion 50mm/s,3Hz
   host-sim trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
     /// Folder that receives a folder named after the scene or the CSV file.
@@ -58,9 +60,13 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1")]
     average: Vec<usize>,
     /// Gates to try besides none: tolerances in standard deviations of the averaged noise; `none` for no
-    /// gate [default: 3.5 if the scene's noise is relative, or the sensor at rest is known].
+    /// gate [default: 3.5 if the scene's noise is relative, or the sensor at rest is known; none on contacts that move].
     #[arg(long, value_name = "K,…", value_delimiter = ',', allow_negative_numbers = true)]
     gate: Vec<GateOption>,
+    /// Judge on contacts that slide at this speed, and are pressed and lifted so often a second, instead of the scene's
+    /// motion: by the newest finished estimate against the truth at that moment. `none` for still contacts.
+    #[arg(long, value_name = "MM/S,HZ")]
+    motion: Option<MotionOption>,
     /// Outputs that determine the front and the choice, such as dz_mm; or all, by the mean of RMSE/standard deviation
     /// [default: the last of a scene, all of a data file].
     #[arg(long, value_name = "GROUP")]
@@ -100,8 +106,11 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.subject.refuse_time("trade")?;
-    let subject = arguments.subject.load(common)?;
+    let mut subject = arguments.subject.load(common)?;
     subject.require_inverse("trade")?;
+    if let Some(motion) = arguments.motion {
+        motion.apply(&mut subject)?;
+    }
     let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let group = match &arguments.group {
@@ -244,6 +253,55 @@ impl FromStr for GateOption {
     }
 }
 
+/// Value of `--motion`.
+#[derive(Clone, Copy)]
+enum MotionOption {
+    None,
+    At { speed_mm_per_s: f64, press_rate_hz: f64 },
+}
+
+impl FromStr for MotionOption {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        if text == "none" {
+            return Ok(Self::None);
+        }
+        let number =
+            |text: &str, unit: &str| text.trim().trim_end_matches(unit).trim().parse().ok();
+        let parsed = text.split_once(',').and_then(|(speed, rate)| {
+            let (speed_mm_per_s, press_rate_hz) = (number(speed, "mm/s")?, number(rate, "Hz")?);
+            Some(Self::At { speed_mm_per_s, press_rate_hz })
+        });
+        parsed
+            .ok_or_else(|| "give a speed and a rate of presses, such as 50mm/s,3Hz, or none".into())
+    }
+}
+
+impl MotionOption {
+    /// Lets the contacts of a scene move.
+    fn apply(self, subject: &mut Subject) -> Result<()> {
+        let Subject::Scene(scene) = subject else {
+            let message =
+                "--motion: measured contacts are as they were; only a scene can move them";
+            return Err(Error::Usage(message.into()));
+        };
+        scene.world.path = match self {
+            Self::None => None,
+            Self::At { speed_mm_per_s, press_rate_hz } => Some(Path {
+                speed_mm_per_s: [speed_mm_per_s; 2],
+                press_rate_hz: [press_rate_hz; 2],
+                ..scene.world.path.unwrap_or_else(|| Path::at(speed_mm_per_s, press_rate_hz))
+            }),
+        };
+        let path = scene.world.path;
+        path.map_or(Ok(()), |path| scene.world.check_path(&path)).map_err(|bad| {
+            let bad = BadValue { field: bad.field.replace("motion.", "--motion: "), ..bad };
+            Error::Usage(bad.to_string())
+        })
+    }
+}
+
 /// Value of `--output-rank`.
 #[derive(Clone, Copy)]
 struct RankOption(Option<usize>);
@@ -369,6 +427,9 @@ fn output_ranks(given: &[RankOption]) -> Result<Vec<usize>> {
 /// Gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
 fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
     if given.is_empty() {
+        if subject.moving_scene().is_some() {
+            return Ok(vec![]);
+        }
         let usual = match subject {
             Subject::Scene(scene) => gate::check_noise(&scene.world),
             Subject::Measured(data) if data.rest.is_none() => return Ok(vec![]),

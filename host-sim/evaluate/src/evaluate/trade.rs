@@ -12,6 +12,8 @@ use taxel_data::progress::Progress;
 use taxel_learn::cost::Prices;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{ModelBlob, Options};
+use taxel_limit::Refusal;
+use taxel_simulate::path::Path;
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
@@ -25,6 +27,7 @@ mod line;
 mod choice;
 mod point;
 mod gating;
+mod touches;
 mod frames;
 mod readings;
 mod ways;
@@ -76,6 +79,9 @@ pub struct Trade {
     pub test_frames: usize,
     /// How test frames were chosen among measured ones, in words.
     pub test_choice: Option<String>,
+    /// Path of the contacts that errors are of: newest finished estimates against the truth at that moment. `None` for still
+    /// test frames.
+    pub motion: Option<Path>,
     /// Outliers among measured frames; `None` for a scene.
     pub outliers: Option<Outliers>,
     /// Compiler of the code whose costs are given.
@@ -236,7 +242,7 @@ pub fn compute(
     progress.stage("prepare frames", subjects.len() * plan.samples_averaged.len());
     let each = subjects.iter().flat_map(|of| plan.samples_averaged.iter().map(move |n| (of, *n)));
     let synthesised = each.clone().map(|(subject, samples)| {
-        let frames = Frames::new(subject, samples, plan);
+        let frames = Frames::new(subject, samples, plan, group);
         progress.step();
         frames
     });
@@ -258,8 +264,13 @@ pub fn compute(
         bounds.check_possible(&offers.collect::<Vec<_>>(), &named(unit, group))
     };
     possible(&vec![0.0; frames.len()])?;
-    let measures: Vec<(Measure, LimitSummary)> =
-        each.clone().map(|(subject, samples)| subject.measure(samples, progress)).collect();
+    let measures: Vec<(Measure, LimitSummary)> = each
+        .clone()
+        .map(|(subject, samples)| match subject.moving_scene() {
+            Some((scene, _)) => (scene.measure(), LimitSummary::new(&Err(Refusal::Moving))),
+            None => subject.measure(samples, progress),
+        })
+        .collect();
     let least = |limit| least_error(limit, group).map_or(0.0, |[limit, se]| limit - CERTAIN * se);
     possible(&measures.iter().map(|(_, limit)| least(limit)).collect::<Vec<_>>())?;
 
@@ -281,6 +292,7 @@ pub fn compute(
     let readings = of_frames.map(|(((subject, _), frames), (measure, limit))| {
         Readings::new(subject, frames, (&measure, limit))
     });
+    let readings = readings.collect::<std::result::Result<_, _>>()?;
     Ok(Trade {
         subject: subject.name().into(),
         seed: subject.origin().seed,
@@ -294,13 +306,14 @@ pub fn compute(
             Subject::Scene(_) => None,
             Subject::Measured(data) => Some(data.test_choice.clone()),
         },
+        motion: subject.moving_scene().map(|(_, path)| path),
         outliers: subject.measurements().map(|data| data.outliers.clone()),
         compiler: prices.compiler,
         device: plan.device,
         line,
         group: group.into(),
         unit: unit.into(),
-        readings: readings.collect(),
+        readings,
         points,
         left_out,
         bounds: Bounds::default(),
@@ -347,6 +360,10 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
         return Err(BadValue::new("output-rank", 0, "a network computes one component at least"));
     }
     plan.device.check()?;
+    if subject.moving_scene().is_some() && !plan.gate_k.is_empty() {
+        let rule = "a gate is judged by still contacts; leave it out, or give --motion none";
+        return Err(BadValue::new("gate", plan.gate_k[0], rule));
+    }
     if let Subject::Measured(_) = subject
         && let Some(samples) = plan.samples_averaged.iter().find(|samples| **samples != 1)
     {

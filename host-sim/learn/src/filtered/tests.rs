@@ -92,36 +92,49 @@ fn the_rule_finds_the_least_error_of_a_simulation() {
         (0.03, 20.0, 5300, 5400), // the filter has few frames
         (0.1, 400.0, 500, 500),
     ] {
-        let best = settings_for(noise, acceleration, period_us as f64, f64::from(lead_us));
+        let (output, lead) = ([noise, acceleration], f64::from(lead_us));
+        let (best_us, squared) = time_constant_for(output, period_us as f64, [lead; 2]);
         let at = |factor: f64| {
-            let time_constant_us = (f64::from(best.time_constant_us) * factor).round() as u32;
-            simulated(noise, acceleration, period_us, Settings { time_constant_us, ..best })
+            let time_constant_us = (best_us * factor).round() as u32;
+            simulated(noise, acceleration, period_us, Settings { time_constant_us, lead_us })
         };
         let [shorter, found, longer] = [0.7, 1.0, 1.4].map(at);
-        assert!(found < shorter && found < longer, "{best:?}: {shorter} {found} {longer}");
-        let tau_s = f64::from(best.time_constant_us) * 1e-6;
-        let (dt_s, lead_s) = (period_us as f64 * 1e-6, f64::from(lead_us) * 1e-6);
-        let expected = squared_error([noise, acceleration], tau_s, dt_s, lead_s).sqrt();
+        assert!(found < shorter && found < longer, "{best_us}: {shorter} {found} {longer}");
+        let expected = squared.sqrt();
         assert!((found / expected - 1.0).abs() < 0.03, "{found} instead of {expected}");
         assert!(found < 0.8 * noise, "{found} of {noise}");
     }
 }
 
 #[test]
-fn without_a_lead_the_rule_is_a_fifth_root() {
+fn an_output_that_is_used_at_once_has_the_fifth_root_of_the_rule() {
     for (noise, acceleration, period_us) in [(0.03_f64, 50.0_f64, 200.0_f64), (1.0, 30.0, 1000.0)] {
-        let found = settings_for(noise, acceleration, period_us, 0.0).time_constant_us;
+        let movement = Movement { rate_per_s: 1.0, acceleration_per_s2: acceleration };
+        let found = settings_for(noise, movement, period_us, 0.0).time_constant_us;
         let tau_s = (0.3125 * (noise / acceleration).powi(2) * period_us * 1e-6).powf(0.2);
         assert!((f64::from(found) / (tau_s * 1e6) - 1.0).abs() < 0.01, "{found} and {tau_s}");
     }
 }
 
 #[test]
+fn a_fast_output_is_extrapolated_by_its_age_and_a_slow_noisy_one_is_not() {
+    let of = |noise: f64, rate_per_s: f64| {
+        let movement = Movement { rate_per_s, acceleration_per_s2: 80.0 };
+        settings_for(noise, movement, 5600.0, 5700.0).lead_us
+    };
+    assert_eq!((of(0.001, 50.0), of(0.1, 0.0)), (5700, 0));
+    let between = of(0.02, 2.1);
+    assert!((500..4000).contains(&between), "{between}");
+}
+
+#[test]
 fn the_rule_keeps_to_what_a_device_takes() {
+    let still = Movement { rate_per_s: 10.0, acceleration_per_s2: 0.0 };
     assert_eq!(
-        settings_for(1.0, 0.0, 1000.0, 3e6),
+        settings_for(1e-3, still, 1000.0, 3e6),
         Settings { time_constant_us: 1_000_000, lead_us: 1_000_000 }
     );
-    assert_eq!(settings_for(0.0, 50.0, 5.0, 0.4), Settings { time_constant_us: 1, lead_us: 0 });
+    let shaken = Movement { rate_per_s: 1.0, acceleration_per_s2: 50.0 };
+    assert_eq!(settings_for(0.0, shaken, 5.0, 0.4), Settings { time_constant_us: 1, lead_us: 0 });
     assert_eq!(mean_age_us(5600.0, 200.0, 6000.0), 6000.0);
 }

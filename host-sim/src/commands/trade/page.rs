@@ -1,21 +1,27 @@
 //! What the command prints: the front, and the choice in words.
 
-use std::path::Path;
+use std::path::Path as FilePath;
 
 use crate::evaluate::trade::{Memory, Point, Trade, Wires};
 use crate::metrics;
 use crate::verdict::Verdict;
 
+use taxel_simulate::path::Path;
+
 use crate::commands::print::{Page, wrapped};
 
 /// Page of the front, or of `all` points; the last lines say what was chosen and what to open.
-pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
+pub fn of(trade: &Trade, all: bool, folder: &FilePath) -> Page {
     let mut page = Page::default();
     let tested = if let Some(choice) = &trade.test_choice {
         format!("{} measured test frames ({choice})", trade.test_frames)
     } else {
         let percent = (trade.noise_level * 1e6).round() / 1e4;
         format!("noise {percent} % a sample, {} test frames", trade.test_frames)
+    };
+    let tested = match &trade.motion {
+        Some(path) => format!("{tested}; {}", words_of(path)),
+        None => tested,
     };
     page.line(format_args!(
         "{}: {} ways to decode, {tested}; RMSE of {}{}",
@@ -25,7 +31,7 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
     ));
     page.line(format_args!(
-        "\n  {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>8} {:>7} {:>10} {:>6} {:>5}",
+        "\n  {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>6} {:>7} {:>7} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6} {:>5}",
         "format",
         "K",
         "rank",
@@ -33,9 +39,11 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         "cols",
         "avg",
         "gate",
+        "filter",
         "RMSE",
         "× limit",
         "ms",
+        "age ms",
         "frames/s",
         "cycles",
         "from flash",
@@ -75,6 +83,19 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     page
 }
 
+/// Motion of the contacts that errors are of.
+fn words_of(path: &Path) -> String {
+    let range = |[low, high]: [f64; 2]| {
+        if low == high { low.to_string() } else { format!("{low} to {high}") }
+    };
+    format!(
+        "judged on {} contacts that slide at {} mm/s and press {} times a second",
+        path.trajectories,
+        range(path.speed_mm_per_s),
+        range(path.press_rate_hz)
+    )
+}
+
 /// The limit that ratios of the chosen point are to.
 fn limit_note(trade: &Trade) -> String {
     let readings = trade.main_readings();
@@ -112,6 +133,16 @@ fn legend(trade: &Trade, all: bool) -> String {
         "× limit: RMSE relative to the least possible one with as many samples a reading and the same columns".into(),
         "avg: samples a reading; frames/s: computed on the device, the serial line may carry fewer".into(),
     ];
+    if trade.motion.is_some() {
+        lines.push(
+            "RMSE: of the newest finished estimate against the truth at that moment, every ms"
+                .into(),
+        );
+        lines.push("filter: time constant in ms of an α–β filter behind the decoder (docs/filter.md); - for none".into());
+    }
+    if trade.points.iter().any(|point| point.times.age_ms.is_some()) {
+        lines.push("age: mean time from the middle of a scan until its estimate is used".into());
+    }
     if trade.group == metrics::ALL {
         lines.push("RMSE of all: mean over the outputs of RMSE/standard deviation σ; always predicting the mean has 1".into());
     }
@@ -164,7 +195,7 @@ fn line_of(trade: &Trade, i: usize) -> String {
     };
     let ratio = point.ratio_to_limit(&trade.group).map_or("-".into(), |r| format!("{r:.2}"));
     format!(
-        "{mark} {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>8} {:>7} {:>10} {:>6} {:>5}",
+        "{mark} {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>6} {:>7} {ratio:>7} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6} {:>5}",
         point.way(),
         point.centres,
         point.output_rank.map_or("-".into(), |rank| rank.to_string()),
@@ -172,8 +203,10 @@ fn line_of(trade: &Trade, i: usize) -> String {
         point.columns.map_or("-".into(), |columns| columns.to_string()),
         point.samples_averaged,
         point.gate_k.map_or("-".into(), |k| k.to_string()),
+        point.filter.map_or("-".into(), |filter| format!("{:.1}", filter.time_constant_ms)),
         error(point.rmse(&trade.group)),
         ms(point.times.frame_ms),
+        point.times.age_ms.map_or("-".into(), ms),
         rate(point.times.frames_per_s),
         point.frame.cycles,
         point.frame.flash_cycles,
@@ -183,7 +216,7 @@ fn line_of(trade: &Trade, i: usize) -> String {
 }
 
 /// The chosen point in words, and what to do with it.
-fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
+fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &FilePath) {
     let point = &trade.points[chosen];
     let verdict = trade.verdict_on(chosen);
     wrapped(page, &format!("Chosen: {}. {}", point.name(), verdict.sentence));
@@ -202,7 +235,10 @@ fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
     let tolerance = trade
         .rest_tolerance(chosen)
         .map(|tolerance| format!(" --rest-tolerance {tolerance} (once it has a baseline)"));
-    let options: String = [period, oversampling, tolerance].into_iter().flatten().collect();
+    let filter = point.filter.map(|filter| {
+        format!(" --filter-ms {} --lead-ms {}", filter.time_constant_ms, filter.lead_ms)
+    });
+    let options: String = [period, oversampling, tolerance, filter].into_iter().flatten().collect();
     if !options.is_empty() {
         page.line(format_args!("on a device: host-sim link PORT configure{options}"));
     }
@@ -235,11 +271,13 @@ fn cost(point: &Point) -> String {
     let times = &point.times;
     let time = match times.scan_ms {
         Some(scan_ms) => format!(
-            "A frame takes {} ms ({} ms to scan, {} ms to decode), so at most {} frames a second",
+            "A frame takes {} ms ({} ms to scan, {} ms to decode), so at most {} frames a second, and an estimate is {} ms old \
+             when it is used, on average",
             ms(times.frame_ms),
             ms(scan_ms),
             ms(times.decode_ms),
-            rate(times.frames_per_s)
+            rate(times.frames_per_s),
+            ms(times.age_ms.unwrap_or_default())
         ),
         None => format!("Decoding a frame takes {} ms, besides its scan", ms(times.decode_ms)),
     };

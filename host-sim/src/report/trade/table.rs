@@ -67,6 +67,11 @@ fn columns(trade: &Trade) -> Vec<Column> {
             .then(|| number("samples", |_, p| p.samples_averaged.to_string())),
         any(|p| p.gate_k.is_some())
             .then(|| number("gate k", |_, p| p.gate_k.map_or(UNDEFINED.into(), |k| k.to_string()))),
+        any(|p| p.filter.is_some()).then(|| {
+            number("filter, ms", |_, p| {
+                p.filter.map_or(UNDEFINED.into(), |filter| fixed(filter.time_constant_ms, 1))
+            })
+        }),
         Some(number(&rmse, |trade, p| significant(p.rmse(&trade.group), 3))),
         any(|p| p.errors.iter().any(|e| e.ratio_to_limit.is_some())).then(|| {
             number("× limit", |trade, p| {
@@ -74,6 +79,9 @@ fn columns(trade: &Trade) -> Vec<Column> {
             })
         }),
         Some(number(time, |_, p| fixed(p.times.frame_ms, 3))),
+        any(|p| p.times.age_ms.is_some()).then(|| {
+            number("age, ms", |_, p| p.times.age_ms.map_or(UNDEFINED.into(), |ms| fixed(ms, 3)))
+        }),
         Some(number("frames/s", |_, p| rate(p.times.frames_per_s))),
         Some(number("cycles", |_, p| grouped(p.frame.cycles as usize))),
         Some(number("from flash", |_, p| grouped(p.frame.flash_cycles as usize))),

@@ -154,8 +154,13 @@ mod tests {
     fn offer(rmse: f64, scan_ms: f64, cycles: u64) -> Offer {
         let decode_ms = cycles as f64 / 180_000.0;
         let frame_ms = scan_ms + decode_ms;
-        let times =
-            Times { scan_ms: Some(scan_ms), decode_ms, frame_ms, frames_per_s: 1000.0 / frame_ms };
+        let times = Times {
+            scan_ms: Some(scan_ms),
+            decode_ms,
+            frame_ms,
+            frames_per_s: 1000.0 / frame_ms,
+            age_ms: None,
+        };
         Offer { rmse, cycles, blob_bytes: 1000, times }
     }
 

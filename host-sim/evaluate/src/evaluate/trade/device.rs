@@ -7,6 +7,8 @@ use serde::Serialize;
 use taxel_data::{BadValue, columns};
 use taxel_learn::cost::Cost;
 
+use crate::moving::age_ms;
+
 /// Clock of the NUCLEO-F446RE in MHz.
 pub const BOARD_CLOCK_MHZ: f64 = 180.0;
 
@@ -66,6 +68,16 @@ pub struct Times {
     pub frame_ms: f64,
     /// Frames in a second, at most: one over the time of a frame.
     pub frames_per_s: f64,
+    /// Mean age of the newest finished estimate when it is used: the time since the middle of its scan. `None` if the
+    /// scan's time is unknown.
+    pub age_ms: Option<f64>,
+}
+
+impl Times {
+    /// Time from the start of one scan to the start of the next.
+    pub fn period_ms(&self) -> f64 {
+        1000.0 / self.frames_per_s
+    }
 }
 
 impl Device {
@@ -104,7 +116,8 @@ impl Device {
     pub fn times(&self, scan_ms: Option<f64>, cost: &Cost) -> Times {
         let decode_ms = self.cycles(cost) as f64 / (self.clock_mhz * 1000.0);
         let frame_ms = scan_ms.unwrap_or(0.0) + decode_ms;
-        Times { scan_ms, decode_ms, frame_ms, frames_per_s: 1000.0 / frame_ms }
+        let age_ms = scan_ms.map(|scan_ms| age_ms(scan_ms, frame_ms, frame_ms));
+        Times { scan_ms, decode_ms, frame_ms, frames_per_s: 1000.0 / frame_ms, age_ms }
     }
 }
 
@@ -122,6 +135,8 @@ mod tests {
         assert_eq!(scans, [5.573, 21.022]);
         let times = board.times(Some(5.5), &cost);
         assert_eq!((times.decode_ms, times.frame_ms), (0.2, 5.7));
+        // Half the scan and the decoding, and half a frame until the next one is finished.
+        assert!((times.age_ms.unwrap() - (2.75 + 0.2 + 2.85)).abs() < 1e-12);
         assert!((times.frames_per_s - 175.4).abs() < 0.1);
         let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
         assert_eq!(ram.times(None, &cost).frame_ms, 0.2);

@@ -5,11 +5,13 @@ use std::borrow::Cow;
 use taxel_data::dataset::Dataset;
 use taxel_learn::Options;
 use taxel_learn::train::projection;
+use taxel_simulate::Synthesis;
 use taxel_simulate::outputs::Outputs;
 
 use super::Plan;
 use super::device::Wires;
 use super::gating::Gates;
+use super::touches::Touches;
 use crate::error::Result;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
@@ -26,6 +28,8 @@ pub(super) struct Frames<'s> {
     /// Options for training, except for the settings that the plan varies.
     pub options: Options,
     pub set: TrainingSet<'s>,
+    /// Moving contacts that points are judged by; `None` for still frames.
+    pub touches: Option<Touches<'s>>,
     pub test: Cow<'s, Dataset>,
     /// Networks that see a row each, and networks that see the whole array.
     pub inputs: Vec<Inputs>,
@@ -47,7 +51,12 @@ impl Inputs {
 
 impl<'s> Frames<'s> {
     /// Frames of a subject with so many samples a reading, and the networks that a plan tries on them.
-    pub fn new(subject: &'s Subject, samples_averaged: usize, plan: &Plan) -> Result<Self> {
+    pub fn new(
+        subject: &'s Subject,
+        samples_averaged: usize,
+        plan: &Plan,
+        group: &str,
+    ) -> Result<Self> {
         // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
         let (level, of_array, wires) = match subject {
             Subject::Scene(scene) => {
@@ -60,6 +69,10 @@ impl<'s> Frames<'s> {
         };
         let noise_level = level / (samples_averaged as f64).sqrt();
         let (set, test) = subject.sets(samples_averaged);
+        let touches = subject.scene().and_then(|scene| {
+            let synthesis = Synthesis::new(&scene.world).noise_level(noise_level);
+            Some(Touches::new(scene, synthesis, scene.world.path?, group))
+        });
         let options = subject.options();
         let arrays: &[bool] = match (of_array, set.frames.rows) {
             (true, _) => &[true],
@@ -74,7 +87,17 @@ impl<'s> Frames<'s> {
         };
         let inputs = arrays.iter().map(inputs).collect::<Result<_>>()?;
         let scan_ms = plan.device.scan_ms(wires, samples_averaged);
-        Ok(Self { samples_averaged, noise_level, wires, scan_ms, options, set, test, inputs })
+        Ok(Self {
+            samples_averaged,
+            noise_level,
+            wires,
+            scan_ms,
+            options,
+            set,
+            touches,
+            test,
+            inputs,
+        })
     }
 
     /// Frames to train on.

@@ -1,5 +1,6 @@
 //! Training and judging of the points that share their training and test frames.
 
+use model_core::filter::Settings;
 use rayon::prelude::*;
 use taxel_data::progress::Progress;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
@@ -91,8 +92,8 @@ impl Judged {
         }
     }
 
-    /// Adds the points of a network: without a gate, and behind every gate that was measured with its
-    /// exponential.
+    /// Adds the points of a network: without a gate, and behind every gate that was measured with its exponential. On contacts
+    /// that move, without a filter and behind one.
     fn points(
         &mut self,
         blob: &ModelBlob,
@@ -109,8 +110,7 @@ impl Judged {
         let centres = design.networks.iter().map(|network| network.shape.centres).max();
         let centres = centres.unwrap_or_default();
         let costs = prices.frames(&design, arithmetic.exponential)?;
-        let estimate = model.decode_lines(&test.inputs.values);
-        let mut add = |gate_k: Option<f64>, frame: Cost, estimate: &[f64]| {
+        let mut add = |(gate_k, filter): (Option<f64>, Settings), frame: Cost, errors| {
             self.points.push(Point {
                 arithmetic,
                 whole_array: inputs.whole_array(),
@@ -122,7 +122,8 @@ impl Judged {
                 columns: frames.wires.map(|wires| wires.columns),
                 samples_averaged: frames.samples_averaged,
                 gate_k,
-                errors: metrics::by_group(&test.outputs, estimate, measure),
+                filter: filter.is_on().then(|| filter.into()),
+                errors,
                 ratio_to_best: vec![],
                 frame,
                 times: device.times(frames.scan_ms, &frame),
@@ -132,13 +133,27 @@ impl Judged {
             });
             self.blobs.push(self.distinct.len());
         };
-        add(None, costs.ungated, &estimate);
+        let (no_gate, no_filter) = (None, Settings::default());
+        if let Some(touches) = &frames.touches {
+            let times = device.times(frames.scan_ms, &costs.ungated);
+            let touched = touches.at(&times)?;
+            let estimates = model.decode_lines(&touched.moving.frames.inputs.values);
+            let age_ms = times.age_ms.unwrap_or_default();
+            for filter in [no_filter, touched.filter_settings(&model, &estimates, age_ms)] {
+                let errors = touched.errors(&estimates, filter, &times, measure);
+                add((no_gate, filter), costs.ungated, errors);
+            }
+            return Ok(());
+        }
+        let errors = |estimate: &[f64]| metrics::by_group(&test.outputs, estimate, measure);
+        let estimate = model.decode_lines(&test.inputs.values);
+        add((no_gate, no_filter), costs.ungated, errors(&estimate));
         // Behind a gate with the firmware's exponential alone.
         if arithmetic.exponential == Exponential::default() {
             let rest_outputs = model.decode_lines(&inputs.gates.rest_inputs.values);
             for gate in inputs.gates.iter() {
-                let frame = costs.mean_cost(gate.share);
-                add(Some(gate.k), frame, &gate.gated(&estimate, &rest_outputs));
+                let gated = errors(&gate.gated(&estimate, &rest_outputs));
+                add((Some(gate.k), no_filter), costs.mean_cost(gate.share), gated);
             }
         }
         Ok(())

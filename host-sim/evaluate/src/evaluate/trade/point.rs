@@ -1,5 +1,6 @@
 //! Points: ways to decode, with their errors and their cost.
 
+use model_core::filter::Settings;
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_learn::Exponential;
@@ -45,6 +46,22 @@ fn by_name<S: serde::Serializer>(
     serializer.serialize_str(&arithmetic.name())
 }
 
+/// Settings of a filter in time, as a device is configured with them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FilterSettings {
+    pub time_constant_ms: f64,
+    /// Time by which outputs are extrapolated.
+    pub lead_ms: f64,
+}
+
+impl From<Settings> for FilterSettings {
+    fn from(settings: Settings) -> Self {
+        let [time_constant_ms, lead_ms] =
+            [settings.time_constant_us, settings.lead_us].map(|us| f64::from(us) / 1000.0);
+        Self { time_constant_ms, lead_ms }
+    }
+}
+
 /// Way to decode, with its cost and its errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
@@ -68,7 +85,9 @@ pub struct Point {
     pub samples_averaged: usize,
     /// Tolerance of the gate, in standard deviations of the averaged readings' noise; `None` without a gate.
     pub gate_k: Option<f64>,
-    /// Errors on the test frames, by group.
+    /// Filter in time behind the decoder; `None` without one.
+    pub filter: Option<FilterSettings>,
+    /// Errors on the test frames, or on [contacts that move](super::Trade::motion), by group.
     pub errors: Vec<Errors>,
     /// Ratio of the RMSE to the smallest of all points, by group.
     pub ratio_to_best: Vec<f64>,
@@ -110,7 +129,10 @@ impl Point {
         let readings = in_words(self.columns, samples);
         let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
         let rank = self.output_rank.map_or(String::new(), |rank| format!(", rank {rank}"));
-        format!("{}, K = {}{rank}{tail}{readings}{gate}", self.way(), self.centres)
+        let filter = self.filter.map_or(String::new(), |filter| {
+            format!(", filter of {:.1} ms", filter.time_constant_ms)
+        });
+        format!("{}, K = {}{rank}{tail}{readings}{gate}{filter}", self.way(), self.centres)
     }
 
     /// What the point has to offer by the error of a group.

@@ -1,6 +1,7 @@
 //! Readings that points decode, and what other decoders make of the same ones.
 
 use serde::Serialize;
+use taxel_data::BadValue;
 use taxel_learn::decoders::{BASELINES, linear, mean};
 
 use super::device::Wires;
@@ -18,7 +19,7 @@ pub struct Readings {
     pub samples_averaged: usize,
     /// Least possible errors of a decoder that sees all these readings of a frame.
     pub limit: LimitSummary,
-    /// Errors of the baselines, fitted to these readings.
+    /// Errors of the baselines, fitted to these readings. On contacts that move, decoding them takes no time.
     pub decoders: Vec<DecoderErrors>,
 }
 
@@ -28,19 +29,29 @@ impl Readings {
         subject: &Subject,
         frames: &Frames<'_>,
         (measure, limit): (&Measure, LimitSummary),
-    ) -> Self {
-        let decoders = BASELINES.iter().map(|baseline| {
-            metrics::judge(baseline.fit(frames.training()).as_ref(), &frames.test, measure)
-        });
+    ) -> Result<Self, BadValue> {
+        let decoders: Vec<DecoderErrors> = BASELINES
+            .iter()
+            .map(|baseline| {
+                let decoder = baseline.fit(frames.training());
+                let Some(touches) = &frames.touches else {
+                    return Ok(metrics::judge(decoder.as_ref(), &frames.test, measure));
+                };
+                let touched = touches.while_scanned(frames.scan_ms)?;
+                let estimates = decoder.decode_all(&touched.moving.frames.inputs.values, 1);
+                let errors = touched.errors_at_once(&estimates.values, measure);
+                Ok(DecoderErrors::new(decoder.name(), errors))
+            })
+            .collect::<Result<_, BadValue>>()?;
         let sensor = subject.scene().map(|scene| &scene.world.sensor);
         let chosen = sensor.filter(|sensor| sensor.read_columns.is_some());
-        Self {
+        Ok(Self {
             wires: frames.wires,
             column_wires: chosen.map(|it| it.column_numbers().map(|wire| wire + 1).collect()),
             samples_averaged: frames.samples_averaged,
             limit,
-            decoders: decoders.collect(),
-        }
+            decoders,
+        })
     }
 
     /// Number of column-wires; `None` if the readings are not those of wires.
