@@ -27,6 +27,7 @@ mod sketch;
 mod tables;
 mod sweep;
 mod over_time;
+mod moving;
 mod html;
 mod printed;
 mod trade;

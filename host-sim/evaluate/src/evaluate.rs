@@ -10,3 +10,4 @@ pub mod confidence;
 pub mod printed;
 pub mod table1;
 pub mod trade;
+pub mod moving_contacts;

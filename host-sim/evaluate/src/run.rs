@@ -16,6 +16,7 @@ use crate::by_depth::{DepthErrors, by_depth};
 use crate::error::Result;
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
+use crate::evaluate::moving_contacts::MovingContacts;
 use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
@@ -55,6 +56,8 @@ pub struct RunResult {
     pub by_depth: Vec<DepthErrors>,
     /// Errors of the network by row-wire; nothing for outputs that belong to no row-wire.
     pub by_row: Vec<RowErrors>,
+    /// Errors on contacts that move, if the scene has any.
+    pub moving: Option<MovingContacts>,
     /// Distribution of the network's errors on the test frames, and frames to look at.
     pub distribution: Distribution,
     /// Table 1, if the scene asks for it.
@@ -204,11 +207,13 @@ pub fn run(
         limit,
         by_depth: by_depth(&test.outputs, &estimate.values, &measure),
         by_row: by_row(subject, &test, &estimate, &measure),
+        moving: None,
         distribution,
         table1: None,
     };
     match subject {
         Subject::Scene(scene) => {
+            result.moving = MovingContacts::new(scene, &blob, &baselines)?;
             result.scene = Some(scene_summary(scene, &result.distribution));
             if scene.table1.is_some() {
                 result.table1 = Some(table1::compute(scene, progress)?);

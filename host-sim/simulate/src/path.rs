@@ -71,6 +71,19 @@ impl Path {
         }
     }
 
+    /// Contacts in words: `64 contacts that slide at 10 to 100 mm/s and press 1 to 5 times a second`.
+    pub fn in_words(&self) -> String {
+        let range = |[low, high]: [f64; 2]| {
+            if low == high { low.to_string() } else { format!("{low} to {high}") }
+        };
+        format!(
+            "{} contacts that slide at {} mm/s and press {} times a second",
+            self.trajectories,
+            range(self.speed_mm_per_s),
+            range(self.press_rate_hz)
+        )
+    }
+
     /// Checks all settings, for contacts up to `deepest_mm` on `sensor`.
     ///
     /// # Errors

@@ -278,6 +278,7 @@ fn page_of(
         limit: &limit,
         by_depth: &summary.by_depth,
         over_time: summary.over_time.as_ref(),
+        moving: None,
         distribution,
         frames: summary.frames_evaluated,
         sensor: None,

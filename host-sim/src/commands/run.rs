@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use crate::Result;
+use crate::evaluate::moving_contacts::MovingContacts;
 use crate::evaluate::table1::Table1;
 use crate::report::{self, Made};
 use crate::run::{self, RunResult};
@@ -108,6 +109,33 @@ fn write_files(
     Ok(names)
 }
 
+/// Adds the errors on contacts that move.
+fn moving_page(page: &mut print::Page, moving: &MovingContacts) {
+    let Some(times) = moving.ways.first().map(|way| way.times) else { return };
+    page.line("");
+    print::wrapped(
+        page,
+        &format!(
+            "As a robot meets it, on {}: newest finished estimate against the truth at that moment. The board takes {:.2} ms a \
+             frame, so that an estimate is {:.2} ms old when it is used, on average.",
+            moving.path.in_words(),
+            times.frame_ms,
+            times.age_ms.unwrap_or_default()
+        ),
+    );
+    let ways = moving.ways.iter();
+    let ways = ways
+        .map(|way| (if way.filter.is_some() { "filtered" } else { "network" }, &way.errors[..]));
+    let decoders = moving.decoders.iter().map(|it| (it.decoder.as_str(), &it.errors[..]));
+    print::errors(page, &ways.chain(decoders).collect::<Vec<_>>());
+    for filter in moving.ways.iter().filter_map(|way| way.filter) {
+        page.line(format_args!(
+            "the filter: host-sim link PORT configure --filter-ms {} --lead-ms {} (docs/filter.md)",
+            filter.time_constant_ms, filter.lead_ms
+        ));
+    }
+}
+
 fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     let mut page = print::Page::default();
     let model = &result.model;
@@ -166,6 +194,9 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     print::errors(&mut page, &decoders);
     print::errors_legend(&mut page);
     print::wrapped(&mut page, &result.limit.note());
+    if let Some(moving) = &result.moving {
+        moving_page(&mut page, moving);
+    }
     print::by_depth(&mut page, &result.by_depth);
     if !result.by_row.is_empty() {
         let wires = result.by_row.iter().map(|row| row.row_wire.to_string());

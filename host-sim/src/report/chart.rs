@@ -13,6 +13,8 @@ pub enum Mark {
     LineAnd(Shape),
     /// Shapes without a line.
     Points(Shape),
+    /// Line without shapes.
+    Line,
     Dashed,
     Dotted,
     /// Bars from zero, this wide on the x axis.
@@ -154,6 +156,7 @@ fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
         svg.line([x, y], [x + SWATCH_PX - 6.0, y], &format!("{} {style}", series.class));
     };
     match &series.mark {
+        Mark::Line => line(svg, "line"),
         Mark::Dashed => line(svg, "line dashed"),
         Mark::Dotted => line(svg, "line dotted"),
         Mark::LineAnd(shape) => {
@@ -175,6 +178,7 @@ impl Frame<'_> {
         let class = |style: &str| format!("{} {style}", series.class);
         let present = |[_, y]: &&[f64; 2]| y.is_finite();
         match &series.mark {
+            Mark::Line => self.draw_line(svg, series, &class("line")),
             Mark::Dashed => self.draw_line(svg, series, &class("line dashed")),
             Mark::Dotted => self.draw_line(svg, series, &class("line dotted")),
             Mark::LineAnd(shape) => {

@@ -7,7 +7,7 @@ use super::figures::Figure;
 use super::format::{grouped, significant, symbol};
 use super::svg::escape;
 use super::view::View;
-use super::{errors, frames, over_time, sketch, sweep, tables};
+use super::{errors, frames, moving, over_time, sketch, sweep, tables};
 
 /// Body of a page, which numbers its figures and tables, and lists its headings.
 #[derive(Default)]
@@ -62,6 +62,19 @@ pub fn page(view: &View<'_>) -> String {
         if let Some(rest) = &log.rest {
             body.figure(&over_time::at_rest(log, rest));
         }
+    }
+    if let Some(moving) = view.moving {
+        body.heading("moving", "Contacts that move");
+        body.table(
+            &format!(
+                "Errors as a robot meets them, on {}: the newest finished estimate against the truth at that moment, every ms, \
+                 read by the board. Age: mean time from the middle of a scan until its estimate is used.",
+                escape(&moving.path.in_words())
+            ),
+            &moving::table(moving),
+            "",
+        );
+        body.figure(&moving::trajectory(moving));
     }
     frame_section(&mut body, view, face.as_ref());
     if let Some(sensor) = view.sensor {

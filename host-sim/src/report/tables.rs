@@ -23,7 +23,7 @@ pub fn rmse(errors: &[Errors], group: &str) -> f64 {
 }
 
 /// Short name of a decoder, for the head of a column.
-fn short_name(decoder: &DecoderErrors) -> &str {
+pub fn short_name(decoder: &DecoderErrors) -> &str {
     match decoder.decoder.as_str() {
         NETWORK => "Network",
         linear::NAME => "Linear",

@@ -112,6 +112,7 @@ fn result(groups: &[&str]) -> RunResult {
         ],
     };
     RunResult {
+        moving: None,
         subject: "by <hand>".into(),
         scene_digest: "0123".into(),
         seed: 7,

@@ -4,6 +4,7 @@ use taxel_data::columns;
 use taxel_evaluate::by_depth::DepthErrors;
 use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::distribution::Distribution;
+use taxel_evaluate::evaluate::moving_contacts::MovingContacts;
 use taxel_evaluate::evaluate::table1::Table1;
 use taxel_evaluate::metrics::{DecoderErrors, LimitSummary};
 use taxel_evaluate::over_time::OverTime;
@@ -39,6 +40,8 @@ pub struct View<'a> {
     pub by_depth: &'a [DepthErrors],
     /// Errors and readings at rest by time, of a log.
     pub over_time: Option<&'a OverTime>,
+    /// Errors on contacts that move, of a scene that has any.
+    pub moving: Option<&'a MovingContacts>,
     /// Distribution of the model's errors.
     pub distribution: &'a Distribution,
     /// Number of frames that were decoded.
@@ -70,6 +73,7 @@ impl<'a> View<'a> {
             limit: &result.limit,
             by_depth: &result.by_depth,
             over_time: result.data.as_ref().and_then(|data| data.over_time.as_ref()),
+            moving: result.moving.as_ref(),
             distribution: &result.distribution,
             frames: result.model.test_frames,
             sensor: scene.and_then(|scene| scene.sensor.as_ref()),

@@ -23,6 +23,7 @@ mod manners;
 mod mat;
 mod log;
 mod measured;
+mod moving;
 #[cfg(unix)]
 mod output;
 mod readout;

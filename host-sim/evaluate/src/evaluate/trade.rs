@@ -39,8 +39,9 @@ pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Times, Wires};
 use frames::Frames;
 use judge::Judged;
 pub use line::Line;
-pub use point::{Arithmetic, Point};
+pub use point::{Arithmetic, FilterSettings, Point};
 pub use readings::Readings;
+pub(super) use touches::{OfPeriod, Touches};
 use ways::Ways;
 
 pub use crate::verdict::SLOT_BYTES;

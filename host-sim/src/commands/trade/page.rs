@@ -1,17 +1,15 @@
 //! What the command prints: the front, and the choice in words.
 
-use std::path::Path as FilePath;
+use std::path::Path;
 
 use crate::evaluate::trade::{Memory, Point, Trade, Wires};
 use crate::metrics;
 use crate::verdict::Verdict;
 
-use taxel_simulate::path::Path;
-
 use crate::commands::print::{Page, wrapped};
 
 /// Page of the front, or of `all` points; the last lines say what was chosen and what to open.
-pub fn of(trade: &Trade, all: bool, folder: &FilePath) -> Page {
+pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     let mut page = Page::default();
     let tested = if let Some(choice) = &trade.test_choice {
         format!("{} measured test frames ({choice})", trade.test_frames)
@@ -20,7 +18,7 @@ pub fn of(trade: &Trade, all: bool, folder: &FilePath) -> Page {
         format!("noise {percent} % a sample, {} test frames", trade.test_frames)
     };
     let tested = match &trade.motion {
-        Some(path) => format!("{tested}; {}", words_of(path)),
+        Some(path) => format!("{tested}; judged on {}", path.in_words()),
         None => tested,
     };
     page.line(format_args!(
@@ -31,22 +29,22 @@ pub fn of(trade: &Trade, all: bool, folder: &FilePath) -> Page {
         if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
     ));
     page.line(format_args!(
-        "\n  {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>6} {:>7} {:>7} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6} {:>5}",
+        "\n  {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
         "format",
         "K",
         "rank",
         "tail",
         "cols",
         "avg",
-        "gate",
-        "filter",
+        // On contacts that move there is no gate.
+        if trade.motion.is_some() { "filt" } else { "gate" },
         "RMSE",
         "× limit",
         "ms",
         "age ms",
-        "frames/s",
+        "Hz",
         "cycles",
-        "from flash",
+        "flash",
         "blob",
         "RAM"
     ));
@@ -83,19 +81,6 @@ pub fn of(trade: &Trade, all: bool, folder: &FilePath) -> Page {
     page
 }
 
-/// Motion of the contacts that errors are of.
-fn words_of(path: &Path) -> String {
-    let range = |[low, high]: [f64; 2]| {
-        if low == high { low.to_string() } else { format!("{low} to {high}") }
-    };
-    format!(
-        "judged on {} contacts that slide at {} mm/s and press {} times a second",
-        path.trajectories,
-        range(path.speed_mm_per_s),
-        range(path.press_rate_hz)
-    )
-}
-
 /// The limit that ratios of the chosen point are to.
 fn limit_note(trade: &Trade) -> String {
     let readings = trade.main_readings();
@@ -129,16 +114,16 @@ fn legend(trade: &Trade, all: bool) -> String {
     };
     let mut lines = vec![
         format!("{scan}, {memory} at {} MHz", trade.device.clock_mhz),
-        "cycles: of decoding on a Cortex-M4F, at zero wait and from flash (docs/cycles.md); blob, RAM: bytes".into(),
+        "cycles, flash: of decoding on a Cortex-M4F, at zero wait and from flash (docs/cycles.md); blob, RAM: bytes".into(),
         "× limit: RMSE relative to the least possible one with as many samples a reading and the same columns".into(),
-        "avg: samples a reading; frames/s: computed on the device, the serial line may carry fewer".into(),
+        "avg: samples a reading; Hz: frames a second on the device, the serial line may carry fewer".into(),
     ];
     if trade.motion.is_some() {
         lines.push(
             "RMSE: of the newest finished estimate against the truth at that moment, every ms"
                 .into(),
         );
-        lines.push("filter: time constant in ms of an α–β filter behind the decoder (docs/filter.md); - for none".into());
+        lines.push("filt: time constant in ms of an α–β filter behind the decoder (docs/filter.md); - for none".into());
     }
     if trade.points.iter().any(|point| point.times.age_ms.is_some()) {
         lines.push("age: mean time from the middle of a scan until its estimate is used".into());
@@ -195,15 +180,18 @@ fn line_of(trade: &Trade, i: usize) -> String {
     };
     let ratio = point.ratio_to_limit(&trade.group).map_or("-".into(), |r| format!("{r:.2}"));
     format!(
-        "{mark} {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>6} {:>7} {ratio:>7} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6} {:>5}",
+        "{mark} {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
         point.way(),
         point.centres,
         point.output_rank.map_or("-".into(), |rank| rank.to_string()),
         if point.affine_tail { "yes" } else { "no" },
         point.columns.map_or("-".into(), |columns| columns.to_string()),
         point.samples_averaged,
-        point.gate_k.map_or("-".into(), |k| k.to_string()),
-        point.filter.map_or("-".into(), |filter| format!("{:.1}", filter.time_constant_ms)),
+        match (point.gate_k, point.filter) {
+            (Some(k), _) => k.to_string(),
+            (None, Some(filter)) => format!("{:.1}", filter.time_constant_ms),
+            (None, None) => "-".into(),
+        },
         error(point.rmse(&trade.group)),
         ms(point.times.frame_ms),
         point.times.age_ms.map_or("-".into(), ms),
@@ -216,7 +204,7 @@ fn line_of(trade: &Trade, i: usize) -> String {
 }
 
 /// The chosen point in words, and what to do with it.
-fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &FilePath) {
+fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
     let point = &trade.points[chosen];
     let verdict = trade.verdict_on(chosen);
     wrapped(page, &format!("Chosen: {}. {}", point.name(), verdict.sentence));

@@ -23,7 +23,7 @@ const FEW_TRAJECTORIES: usize = 8;
 const USUAL_MOMENTS: usize = 5;
 
 /// Moving contacts of a scene, with one number of samples a reading.
-pub(super) struct Touches<'s> {
+pub struct Touches<'s> {
     scene: &'s Experiment,
     synthesis: Synthesis<'s>,
     path: Path,
@@ -34,7 +34,7 @@ pub(super) struct Touches<'s> {
 }
 
 /// Frames of one period, and what setting a filter needs to know of them.
-pub(super) struct OfPeriod {
+pub struct OfPeriod {
     pub moving: Moving,
     scan_ms: f64,
     period_ms: f64,

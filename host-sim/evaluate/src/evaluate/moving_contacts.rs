@@ -1,0 +1,124 @@
+//! What a model is worth on contacts that move, read by a board at its own pace.
+
+use model_core::filter::Settings;
+use serde::Serialize;
+use taxel_data::columns;
+use taxel_learn::cost::{Design, Prices};
+use taxel_learn::{Decoder, Exponential, ModelBlob};
+use taxel_simulate::Synthesis;
+use taxel_simulate::path::Path;
+
+use super::trade::{Device, FilterSettings, OfPeriod, Times, Touches, Wires};
+use crate::error::Result;
+use crate::experiment::Experiment;
+use crate::metrics::{DecoderErrors, Errors};
+
+/// Errors on contacts that move: of the newest finished estimate against the truth at that moment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MovingContacts {
+    pub path: Path,
+    /// Group of outputs for whose errors filters are set.
+    pub group: String,
+    /// Of the model without a filter, and behind one.
+    pub ways: Vec<MovingWay>,
+    /// Errors of the baselines, whose decoding takes no time.
+    pub decoders: Vec<DecoderErrors>,
+    /// Trajectory to look at.
+    pub shown: ShownTrajectory,
+}
+
+/// Errors of one way to read and decode.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MovingWay {
+    /// Filter in time behind the model; `None` without one.
+    pub filter: Option<FilterSettings>,
+    #[serde(flatten)]
+    pub times: Times,
+    pub errors: Vec<Errors>,
+}
+
+/// One output over a trajectory, every ms: the truth, and the newest finished estimate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShownTrajectory {
+    pub output: String,
+    pub unit: String,
+    pub time_s: Vec<f64>,
+    pub truth: Vec<f64>,
+    pub estimate: Vec<f64>,
+    pub filtered: Vec<f64>,
+}
+
+impl MovingContacts {
+    /// Errors of the model in `blob` on the moving contacts of `scene`, beside those of the `baselines`; `None` if its contacts
+    /// do not move.
+    pub fn new(
+        scene: &Experiment,
+        blob: &ModelBlob,
+        baselines: &[Box<dyn Decoder>],
+    ) -> Result<Option<Self>> {
+        let Some(path) = scene.world.path.filter(|_| !scene.is_forward()) else { return Ok(None) };
+        let model = blob.prepare(Exponential::default()).of_inputs();
+        let (world, measure) = (&scene.world, scene.measure());
+        let device = Device::default();
+        let cost = Prices::accepted()?.frames(&Design::new(blob), Exponential::default())?.ungated;
+        let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
+        let times = device.times(device.scan_ms(Some(wires), 1), &cost);
+        let names = scene.output_names();
+        let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();
+        let touches = Touches::new(scene, Synthesis::new(world), path, &group);
+        let touched = touches.at(&times)?;
+        let estimates = model.decode_lines(&touched.moving.frames.inputs.values);
+        let filter = touched.filter_settings(&model, &estimates, times.age_ms.unwrap_or_default());
+        let way = |settings: Settings| MovingWay {
+            filter: settings.is_on().then(|| settings.into()),
+            times,
+            errors: touched.errors(&estimates, settings, &times, &measure),
+        };
+        let ways = vec![way(Settings::default()), way(filter)];
+        let scanned = touches.while_scanned(times.scan_ms)?;
+        let decoders = baselines.iter().map(|baseline| {
+            let estimates = baseline.decode_all(&scanned.moving.frames.inputs.values, 1);
+            let errors = scanned.errors_at_once(&estimates.values, &measure);
+            DecoderErrors::new(baseline.name(), errors)
+        });
+        let decoders = decoders.collect();
+        let shown = ShownTrajectory::new(&touched, &group, &estimates, filter, times.frame_ms);
+        Ok(Some(Self { path, group, ways, decoders, shown }))
+    }
+}
+
+impl ShownTrajectory {
+    /// First trajectory, and the output of `group` that changes most in it.
+    fn new(
+        touched: &OfPeriod,
+        group: &str,
+        estimates: &[f64],
+        filter: Settings,
+        finished_ms: f64,
+    ) -> Self {
+        let moving = &touched.moving;
+        let names = &moving.truth.names;
+        let of_output = |values: &[f64], output: usize| -> Vec<f64> {
+            let moments = values.chunks_exact(names.len()).take(moving.moments_s.len());
+            moments.map(|line| line[output]).collect()
+        };
+        let range = |output: usize| {
+            let values = of_output(&moving.truth.values, output);
+            let of = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
+            of(f64::max).zip(of(f64::min)).map_or(0.0, |(most, least)| most - least)
+        };
+        let outputs = (0..names.len()).filter(|output| columns::group_of(&names[*output]) == group);
+        let ranges = outputs.map(|output| (output, range(output)));
+        let (output, _) = ranges.max_by(|(_, a), (_, b)| a.total_cmp(b)).unwrap_or_default();
+        let filtered = moving.filtered(estimates, filter);
+        let held = |estimates: &[f64]| of_output(&moving.held(estimates, finished_ms), output);
+        Self {
+            output: names[output].clone(),
+            unit: columns::unit_of(&names[output]).into(),
+            time_s: moving.moments_s.clone(),
+            truth: of_output(&moving.truth.values, output),
+            estimate: held(estimates),
+            filtered: held(&filtered),
+        }
+    }
+}
