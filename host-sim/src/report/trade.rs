@@ -30,6 +30,13 @@ pub fn html(trade: &Trade, command: &str) -> String {
             grouped(trade.test_frames)
         ),
     };
+    let tested = match &trade.motion {
+        Some(path) => format!(
+            "{tested}; errors are those of the newest finished estimate on {}",
+            path.in_words()
+        ),
+        None => tested,
+    };
     let memory = match trade.device.memory {
         Memory::Flash => "code in flash with 5 wait states",
         Memory::Ram => "memory that never waits",
@@ -103,6 +110,9 @@ fn answer(trade: &Trade) -> String {
     if let Some(scan_ms) = times.scan_ms {
         fact("Frames a second, at most", words::rate(times.frames_per_s), "");
         fact("Scan", fixed(scan_ms, 2), "ms");
+    }
+    if let Some(age_ms) = times.age_ms {
+        fact("Age when used", significant(age_ms, 3), "ms");
     }
     fact("Decoding", significant(1000.0 * times.decode_ms, 3), "µs");
     fact("Blob", significant(point.blob_bytes as f64 / 1000.0, 3), "kB");
