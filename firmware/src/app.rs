@@ -4,6 +4,8 @@
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
 //! is allocated.
 
+use model_core::filter::State;
+
 use crate::link::message::Configuration;
 use crate::link::receive::Receiver;
 use crate::log::{info, warning};
@@ -75,6 +77,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             scratch,
             estimate,
             rest,
+            tracks,
             deviations,
         } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
@@ -103,6 +106,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             scratch: scratch.as_flattened_mut().as_flattened_mut(),
             estimate: estimate.whole(),
             rest: rest.whole(),
+            filter: State::new(tracks.as_flattened_mut()),
             deviations: deviations.as_flattened_mut(),
         };
         let core = Core { sensor, models, link, work };

@@ -101,11 +101,11 @@ impl Capacity {
     /// About the bytes of RAM that an image's buffers take, a little too many.
     pub const fn buffer_bytes(self) -> usize {
         let (readings, outputs) = (self.rows * self.columns, self.all_outputs());
-        // The frame, its baseline with the reciprocals, working space, places; two estimates, deviations, and statuses.
+        // The frame, its baseline with the reciprocals, working space, places; two estimates, deviations, the filter, and statuses.
         let frames = readings * (4 * size_of::<f32>() + size_of::<u16>())
             + 4 * self.scratch_floats()
             - 4 * readings;
-        frames + 3 * outputs * size_of::<f32>() + 2 * self.rows + 2 * self.message_bytes()
+        frames + 5 * outputs * size_of::<f32>() + 2 * self.rows + 2 * self.message_bytes()
     }
 
     /// Whether there is room for the readings and outputs of a model of this `shape`.

@@ -6,5 +6,6 @@ mod baseline;
 mod confidence;
 mod configuration;
 mod decoding;
+mod filter;
 mod model;
 mod turns;

@@ -148,7 +148,7 @@ fn settings(mut use_it: impl FnMut(&Request<'_>)) {
 /// What the device shows of its settings.
 fn shown(session: &mut Running<'_, '_>, board: &Board) -> String {
     let ohm = [60.0; 6];
-    let decode = Request::Decode { frame: 1, readings_ohm: Floats::new(&ohm) };
+    let decode = Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats::new(&ohm) };
     let requests = [Request::Configuration, Request::Constants, Request::Kept, decode];
     requests.map(|request| ask(session, board, &request, |report| format!("{report:?}")).0).concat()
 }
@@ -305,7 +305,7 @@ fn requests_without_the_key_prolong_no_lease() {
         let chunk = UploadStep::Chunk { offset: 0, bytes: &[0; 4] };
         ask(session, board, &Request::Upload(begin(&model)), |_| ());
         for request in [
-            Request::Decode { frame: 1, readings_ohm: Floats::new(&ohm) },
+            Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats::new(&ohm) },
             Request::Kept,
             Request::Resume,
             Request::Upload(chunk),

@@ -77,12 +77,27 @@ fn requests() -> Vec<Example> {
             ),
         ),
         (
+            "configure: filter of 5 ms, lead 2 ms, a report every 10 scans",
+            request_bytes(
+                300,
+                &configure(
+                    Configuration {
+                        filter_time_constant_us: 5000,
+                        filter_lead_us: 2000,
+                        report_every: 10,
+                        ..Configuration::DEFAULT
+                    },
+                    0,
+                ),
+            ),
+        ),
+        (
             "capture baseline of 20 frames",
             request_bytes(4, &Request::CaptureBaseline { frames: 20 }),
         ),
         (
             "decode frame 300: 60 Ω, missing",
-            request_bytes(5, &Request::Decode { frame: 300, readings_ohm }),
+            request_bytes(5, &Request::Decode { frame: 300, start_us: START_US, readings_ohm }),
         ),
         ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
         ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
@@ -186,6 +201,7 @@ fn reports() -> Vec<Example> {
         longest_decode_us: 2,
         slot_erases: 1,
         model_checks: 300,
+        longest_latency_us: 2,
         ..Statistics::default()
     };
     let configuration =

@@ -101,7 +101,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
             let mut frame = frame_at_rest();
             frame[1][2] = ohm;
             let readings_ohm = Floats::new(frame.as_flattened());
-            let request = Request::Decode { frame: 1, readings_ohm };
+            let request = Request::Decode { frame: 1, start_us: 0, readings_ohm };
             ask(session, &bench.board, &request, |report| match report {
                 Report::Estimate(estimate) => estimate.flags,
                 other => panic!("{other:?}"),
@@ -202,11 +202,16 @@ fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
     };
     let found = kept_now(&mut slots, &journal);
     assert_eq!((found.configuration, found.constants), (Some(quiet()), true));
-    // As the firmware before kept it: without what is sent of a confidence.
-    let before = b"\x01\x90\x4e\x64\x01\0\x01\0\0\xa0\x40\0\0\x7a\x44\x0a\xd7\xa3\x3c\0\0\0\0";
-    journal.keep(Kind::Configuration, &[before]).unwrap();
-    let found = kept_now(&mut slots, &journal);
-    assert_eq!((found.configuration, found.constants), (None, true));
+    // As earlier firmware kept it: without what is sent of a confidence, and without a filter.
+    let limits = b"\0\0\xa0\x40\0\0\x7a\x44\x0a\xd7\xa3\x3c\0\0\0\0";
+    for before in [&b"\x01\x90\x4e\x64\x01\0\x01"[..], b"\x02\x90\x4e\x14\x01\0\x01\0"] {
+        // The second time with bytes behind it that a filter could be read from.
+        for more in [&[][..], &[0, 0, 1]] {
+            journal.keep(Kind::Configuration, &[before, limits, more]).unwrap();
+            let found = kept_now(&mut slots, &journal);
+            assert_eq!((found.configuration, found.constants), (None, true));
+        }
+    }
 }
 
 #[test]

@@ -16,6 +16,7 @@ mod data_file;
 mod mat_cells;
 mod readings;
 mod rest_argument;
+mod filter_arguments;
 mod health;
 mod data_argument;
 mod data_stream;

@@ -189,8 +189,9 @@ fn decode<W: Wire>(device: &mut Device<W>, path: &Path, frames: &Dataset) -> Out
     let per_frame = frames.inputs.names.len();
     let readings: Vec<f32> = frames.inputs.values.iter().map(|value| *value as f32).collect();
     let mut bit_identical = 0;
+    let start_us = [0; FRAMES];
     let decoded = device.while_paused(|device| {
-        stream::decode_frames(device, &readings, per_frame, 1, |frame, estimate| {
+        stream::decode_frames(device, &readings, &start_us, 1, |frame, estimate| {
             let start = frame as usize * per_frame;
             let expected = host.decode(&readings[start..start + per_frame]);
             let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();

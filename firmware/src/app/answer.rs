@@ -80,14 +80,19 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::CaptureBaseline { frames } => {
                 sensor.begin_capture(number, frames, link).map(|()| None)
             }
-            Request::Decode { frame, readings_ohm } => sensor.set_frame(readings_ohm).map(|()| {
-                let decoder = model.decoder.as_ref();
-                let sent = ConfidenceSent::Deviations;
-                let (mut flags, _) = work.decode(sensor, link, decoder);
-                let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
-                work.send_estimate(number, (frame, 0), flags, (novelty, sent), link);
-                None
-            }),
+            Request::Decode { frame, start_us, readings_ohm } => {
+                sensor.set_frame(readings_ohm).map(|()| {
+                    let decoder = model.decoder.as_ref();
+                    let sent = ConfidenceSent::Deviations;
+                    // A filter of scans is left alone: anybody may ask for a decoding.
+                    let filtered_us =
+                        (sensor.configuration.frame_period_us == 0).then_some(start_us);
+                    let (mut flags, _) = work.decode(sensor, filtered_us, link, decoder);
+                    let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
+                    work.send_estimate(number, (frame, start_us), flags, (novelty, sent), link);
+                    None
+                })
+            }
             Request::SetBaseline { readings_ohm } => sensor.set_frame(readings_ohm).map(|()| {
                 sensor.take_baseline(link);
                 work.decode_baseline(&sensor.baseline, model.decoder.as_ref());
@@ -131,9 +136,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::Sealed { .. } => Err(Refusal::Unknown), // in another one
         };
         match report {
-            Ok(Some(report)) => link.send(number, &report),
+            Ok(Some(report)) => _ = link.send(number, &report),
             Ok(None) => {}
-            Err(refusal) => link.send(number, &Report::Refused(refusal)),
+            Err(refusal) => _ = link.send(number, &Report::Refused(refusal)),
         }
         end
     }

@@ -1,5 +1,6 @@
 //! The large part of an application's memory.
 
+use model_core::filter::Track;
 use model_core::{Estimate, RowStatus};
 
 /// The buffers of an application with room for `ROWS` rows of `COLUMNS` readings and `OUTPUTS` outputs. They are all
@@ -24,6 +25,8 @@ pub struct Buffers<
     pub(super) scratch: [[[f32; COLUMNS]; ROWS]; 2],
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     pub(super) rest: Outcome<ROWS, OUTPUTS>,
+    /// State of the filter in time.
+    pub(super) tracks: [[Track; OUTPUTS]; ROWS],
     /// Standard deviations of the outputs.
     #[cfg(feature = "confidence")]
     pub(super) deviations: [[f32; OUTPUTS]; ROWS],
@@ -75,6 +78,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
             rest: Outcome::NOTHING,
+            tracks: [[[0.0; 2]; OUTPUTS]; ROWS],
             deviations: [[0.0; OUTPUTS]; _],
         }
     }

@@ -2,6 +2,7 @@
 
 use core::ops::RangeInclusive;
 
+use model_core::filter::Settings;
 use model_core::health::Limits;
 
 use crate::link::message::{ConfidenceSent, Configuration, ConfigurationField};
@@ -12,7 +13,7 @@ impl Configuration {
     pub const FRAME_PERIOD_US: RangeInclusive<u32> = 100..=1_000_000_000;
 
     /// The default configuration: 100 frames a second, estimates are sent without confidence, limits for rubber of about
-    /// 60 Ω, and every row is decoded.
+    /// 60 Ω, every row is decoded, and nothing is filtered.
     pub const DEFAULT: Self = Self {
         frame_period_us: 10_000,
         scan: ScanSettings { settling_us: 20, oversampling: 1 },
@@ -23,7 +24,15 @@ impl Configuration {
         open_above_ohm: Limits::USUAL.open_above_ohm,
         contact_threshold: 0.02,
         rest_tolerance: 0.0,
+        filter_time_constant_us: 0,
+        filter_lead_us: 0,
+        report_every: 1,
     };
+
+    /// Settings of the filter in time.
+    pub fn filter(&self) -> Settings {
+        Settings { time_constant_us: self.filter_time_constant_us, lead_us: self.filter_lead_us }
+    }
 
     /// Checks that every field is in its range.
     ///
@@ -46,6 +55,12 @@ impl Configuration {
             (limits[0] < limits[1], ConfigurationField::Limits),
             (positive(self.contact_threshold), ConfigurationField::ContactThreshold),
             ((0.0..1.0).contains(&self.rest_tolerance), ConfigurationField::RestTolerance),
+            (
+                self.filter_time_constant_us <= Settings::MOST_US,
+                ConfigurationField::FilterTimeConstant,
+            ),
+            (self.filter_lead_us <= Settings::MOST_US, ConfigurationField::FilterLead),
+            (self.report_every > 0, ConfigurationField::ReportEvery),
         ];
         checks.into_iter().find(|(good, _)| !good).map_or(Ok(()), |(_, field)| Err(field))
     }
@@ -77,6 +92,12 @@ mod tests {
             (Configuration { rest_tolerance: -0.01, ..good }, ConfigurationField::RestTolerance),
             (Configuration { rest_tolerance: 1.0, ..good }, ConfigurationField::RestTolerance),
             (Configuration { rest_tolerance: f32::NAN, ..good }, ConfigurationField::RestTolerance),
+            (
+                Configuration { filter_time_constant_us: 1_000_001, ..good },
+                ConfigurationField::FilterTimeConstant,
+            ),
+            (Configuration { filter_lead_us: 1_000_001, ..good }, ConfigurationField::FilterLead),
+            (Configuration { report_every: 0, ..good }, ConfigurationField::ReportEvery),
         ] {
             assert_eq!(bad.check(), Err(field), "{bad:?}");
         }

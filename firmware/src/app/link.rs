@@ -82,12 +82,15 @@ impl<'m, P: Port> Link<'m, P> {
         self.time.at(self.platform.now_us())
     }
 
-    /// Sends one report. If the host's side takes no more bytes, it is lost, which the statistics count.
-    pub fn send(&mut self, number: u16, report: &Report<'_>) {
-        if !self.try_send(number, report) {
+    /// Sends one report. If the host's side takes no more bytes, it is lost, which the statistics count. Returns whether all
+    /// bytes were taken.
+    pub fn send(&mut self, number: u16, report: &Report<'_>) -> bool {
+        let sent = self.try_send(number, report);
+        if !sent {
             let lost = &mut self.statistics.lost_reports;
             *lost = lost.saturating_add(1);
         }
+        sent
     }
 
     /// Sends one report; returns `false` if the host's side takes no more bytes.

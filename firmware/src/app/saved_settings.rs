@@ -26,9 +26,10 @@ use crate::store::Kind;
 /// Version of what is kept for `setting`. Whoever changes the setting's fields must raise it.
 const fn version(setting: Setting) -> u8 {
     match setting {
-        // Before version 2 it did not tell what is sent of a model's confidence.
+        // Before version 2 it did not tell what is sent of a model's confidence, and before version 3 nothing of a filter.
+        Setting::Configuration => 3,
         // Before version 2 a baseline did not tell its wires.
-        Setting::Configuration | Setting::Baseline => 2,
+        Setting::Baseline => 2,
         Setting::Constants => 1,
     }
 }

@@ -32,6 +32,8 @@ pub struct Sensor<'m, F, const ROWS: usize> {
     pub capture: Option<Capture>,
     /// Whether the last scan gave at least one reading.
     pub answers: bool,
+    /// Whether the configuration changed since the last frame was decoded.
+    pub is_configured_anew: bool,
 }
 
 /// A baseline that is being captured.
@@ -65,6 +67,7 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
             baseline: Baseline::new(baseline),
             capture: None,
             answers: true,
+            is_configured_anew: false,
         }
     }
 
@@ -204,7 +207,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         if configuration == self.configuration {
             return;
         }
-        self.configuration = configuration;
+        (self.configuration, self.is_configured_anew) = (configuration, true);
         self.give_up_capture(link);
         self.answers |= configuration.frame_period_us == 0; // it is not scanned any more
         self.clock.restart(link.platform().now_us());

@@ -144,13 +144,17 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         *missed_frames = missed_frames.saturating_add(missed);
         let start_us = link.now_us();
         let frame = sensor.scan(start_us, work.scratch, link);
-        let (mut flags, health) = work.decode(sensor, link, decoder);
+        let (mut flags, health) = work.decode(sensor, Some(start_us), link, decoder);
         let sent = sensor.configuration.confidence;
         let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
         if let Some(number) = sensor.feed_baseline() {
             work.decode_baseline(&sensor.baseline, decoder);
             let readings_ohm = Floats::new(sensor.baseline.mean());
             link.send(number, &Report::Baseline { readings_ohm });
+        }
+        let every = sensor.configuration.report_every;
+        if frame.checked_rem(every.into()) != Some(0) {
+            return;
         }
         if !health.is_good() {
             sensor.send_health(frame, start_us, health, link);

@@ -1,6 +1,9 @@
 //! Decoding: the memory for it, and what is reported of a frame.
 
+use core::mem;
+
 use model_core::blob::Floats;
+use model_core::filter::{State, Track};
 use model_core::gate::Rest;
 use model_core::health::Health;
 use model_core::relative::reciprocal;
@@ -10,6 +13,7 @@ use super::buffers::cut;
 use super::link::Link;
 use super::sensor::Sensor;
 use crate::link::message::{ConfidenceSent, EstimateReport, Report, Statistics};
+use crate::link::packet::UNASKED;
 use crate::platform::Platform;
 use crate::readout::{Baseline, FrameSource};
 
@@ -27,15 +31,19 @@ pub struct Work<'m, const ROWS: usize> {
     pub estimate: Estimate<'m>,
     /// The baseline, decoded by the model in force; valid once a baseline is captured.
     pub rest: Estimate<'m>,
+    /// State of the filter in time.
+    pub filter: State<&'m mut [Track]>,
     /// Standard deviations of the outputs, for a model with a confidence.
     pub deviations: &'m mut [f32],
 }
 
 impl<const ROWS: usize> Work<'_, ROWS> {
-    /// Decodes the sensor's frame without its faulty readings.
+    /// Decodes the sensor's frame without its faulty readings. The estimate of a frame that began at `filtered_us` passes
+    /// the filter in time.
     pub fn decode<P: Platform, F: FrameSource>(
         &mut self,
         sensor: &mut Sensor<'_, F, ROWS>,
+        filtered_us: Option<u64>,
         link: &mut Link<'_, P>,
         decoder: Option<&Decoder<'_, ROWS>>,
     ) -> (u8, Health) {
@@ -65,6 +73,12 @@ impl<const ROWS: usize> Work<'_, ROWS> {
                 self.scratch,
                 &mut estimate,
             );
+            if mem::take(&mut sensor.is_configured_anew) {
+                self.filter.restart();
+            }
+            if let Some(start_us) = filtered_us {
+                self.filter.filter(sensor.configuration.filter(), start_us, &mut estimate);
+            }
             if decoder.metadata().relative_inputs && !self.has_reciprocals {
                 flags |= EstimateReport::NO_BASELINE;
             }
@@ -160,10 +174,16 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         let deviation = Floats::new(self.deviations.get(..deviations).unwrap_or_default());
         let report =
             EstimateReport { frame, start_us, flags, row_status, outputs, novelty, deviation };
-        link.send(number, &Report::Estimate(report));
+        let sent = link.send(number, &Report::Estimate(report));
+        if sent && number == UNASKED {
+            let latency_us = link.now_us().wrapping_sub(start_us) as u32;
+            let longest_us = &mut link.statistics.longest_latency_us;
+            *longest_us = latency_us.max(*longest_us);
+        }
     }
 
-    /// Takes the baseline's reciprocals, decodes it with the model in force, and keeps the outputs for rows at rest.
+    /// Takes the baseline's reciprocals, decodes it with the model in force, and keeps the outputs for rows at rest. The
+    /// filter starts anew.
     pub fn decode_baseline(
         &mut self,
         baseline: &Baseline<'_>,
@@ -174,6 +194,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         for (place, mean) in self.reciprocals.iter_mut().zip(baseline.mean()).filter(|_| known) {
             *place = reciprocal(*mean);
         }
+        self.filter.restart();
         self.has_reciprocals = self.reciprocals.iter().any(|reciprocal| !reciprocal.is_nan());
         let mut rest = cut(&mut self.rest, self.rows, self.outputs);
         let decoded = decoder.filter(|_| known).is_some_and(|decoder| {

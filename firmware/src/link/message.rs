@@ -40,9 +40,13 @@ pub enum Request<'a> {
     },
     /// Decode these readings as if they had been scanned, with the faults that a scan would have.
     /// Answered by [`Report::Estimate`].
+    ///
+    /// While nothing is scanned, the estimate passes the filter in time, if that is on. Frames of one time count once.
     Decode {
         /// Number of the frame, repeated in the answer.
         frame: u32,
+        /// Time in µs at which the frame began, by the host's clock, repeated in the answer.
+        start_us: u64,
         /// Readings in Ω for the model in force, row after row; NaN is missing.
         #[serde(borrow)]
         readings_ohm: Floats<'a>,
@@ -333,6 +337,13 @@ pub struct Configuration {
     /// rest. Such a row is skipped, and gets the outputs of the baseline. With 0, or without a baseline, every row
     /// is decoded.
     pub rest_tolerance: f32,
+    /// Time constant in µs of the filter in time ([`model_core::filter`]) that outputs pass; with 0, none.
+    pub filter_time_constant_us: u32,
+    /// Time in µs by which the filter extrapolates outputs.
+    pub filter_lead_us: u32,
+    /// Number of scans of which one is reported, with its estimate and its faults: those whose number it divides. All are
+    /// decoded and filtered. Readings are sent of every scan.
+    pub report_every: u16,
 }
 
 /// What is sent of a model's [confidence](model_core::confidence) with the estimate of a scan. An answer to
@@ -377,22 +388,22 @@ pub struct KeptBaseline {
 pub struct EstimateReport<'a> {
     /// Number of the frame.
     pub frame: u32,
-    /// Time in µs since the device's start at which the scan began; 0 in an answer to [`Request::Decode`].
+    /// Time in µs since the device's start at which the scan began; in an answer to [`Request::Decode`], the request's.
     pub start_us: u64,
     /// Sum of the flags below.
     pub flags: u8,
     /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow, 3 at rest.
     pub row_status: &'a [u8],
     /// `rows × outputs` numbers in the units of the model's outputs, NaN where a row is not decoded; none without a
-    /// model.
+    /// model. Filtered, if the configuration says so.
     #[serde(borrow)]
     pub outputs: Floats<'a>,
     /// Novelty of the frame in nats: above 0, it is unlike the frames of training. NaN if a reading is missing, and the
     /// largest number of f32 if the frame is too far off to tell. `None` if the model has no confidence, or it was not
     /// asked for.
     pub novelty: Option<f32>,
-    /// Standard deviation of every output, in its unit; NaN if a reading is missing. None at all if the model has no
-    /// confidence, or they were not asked for.
+    /// Standard deviation of every output of this frame before it is filtered, in its unit; NaN if a reading is missing.
+    /// None at all if the model has no confidence, or they were not asked for.
     #[serde(borrow)]
     pub deviation: Floats<'a>,
 }
@@ -459,7 +470,7 @@ pub struct Statistics {
     pub bad_loops: u32,
     /// Longest scan in µs.
     pub longest_scan_us: u32,
-    /// Longest decoding of one frame in µs.
+    /// Longest decoding of one frame in µs, its filter included.
     pub longest_decode_us: u32,
     /// Longest decoding of one frame in cycles of the processor; 0 on a board that does not count them.
     pub longest_decode_cycles: u32,
@@ -481,6 +492,9 @@ pub struct Statistics {
     pub model_damages: u32,
     /// Number of times that a model that is decoded from RAM was found damaged in its slot.
     pub slot_damages: u32,
+    /// Longest time in µs from the start of a scan until the board's line took the last byte of its estimate. What the
+    /// line holds back, such as a ring of bytes, is still to be sent then.
+    pub longest_latency_us: u32,
 }
 
 impl Statistics {
@@ -620,6 +634,12 @@ pub enum ConfigurationField {
     ContactThreshold,
     /// The tolerance of the gate: at least 0, and below 1.
     RestTolerance,
+    /// The filter's time constant: at most 1 s.
+    FilterTimeConstant,
+    /// The filter's lead: at most 1 s.
+    FilterLead,
+    /// The number of scans of which one is reported: at least 1.
+    ReportEvery,
 }
 
 /// Fault of an uploaded blob; `host-sim inspect` says more about the file itself.

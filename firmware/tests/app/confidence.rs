@@ -43,7 +43,7 @@ fn expected(blob: &[u8], frame: &TestFrame, baseline_ohm: f32) -> Sent {
 /// Lets the device decode `frame`.
 fn decode(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> (Sent, u8) {
     let readings_ohm = Floats::new(frame.as_flattened());
-    let request = Request::Decode { frame: 5, readings_ohm };
+    let request = Request::Decode { frame: 5, start_us: 0, readings_ohm };
     ask(session, board, &request, |report| match report {
         Report::Estimate(estimate) => (Sent::new(&estimate), estimate.flags),
         other => panic!("{other:?}"),

@@ -85,7 +85,8 @@ fn a_frame_of_another_length_is_refused() {
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     for readings in [&[60.0; 5][..], &[60.0; 7], &[]] {
-        let request = Request::Decode { frame: 0, readings_ohm: Floats::new(readings) };
+        let request =
+            Request::Decode { frame: 0, start_us: 0, readings_ohm: Floats::new(readings) };
         let (refused, _) = ask(&mut session, &bench.board, &request, |report| {
             report == Report::Refused(Refusal::FrameLength { expected: 6 })
         });

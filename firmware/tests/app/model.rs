@@ -141,7 +141,8 @@ fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
     for (next, contact) in [(&second, 0), (&first, EstimateReport::CONTACT)] {
         install(&mut bench, &mut slots, &mut [], (next, 64)).unwrap();
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let request = Request::Decode { frame: 1, readings_ohm: Floats::new(&[30.0; 2]) };
+        let request =
+            Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats::new(&[30.0; 2]) };
         ask(&mut session, &board, &request, |report| match report {
             Report::Estimate(it) => assert_eq!(it.flags & EstimateReport::CONTACT, contact),
             other => panic!("{other:?}"),
@@ -165,7 +166,8 @@ fn a_model_of_other_rows_does_not_take_the_baseline_of_the_rows_before() {
         let _ = session;
         upload(&mut bench, &mut slots, &mut [], &upload_steps(next, 64)).unwrap();
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let request = Request::Decode { frame: 1, readings_ohm: Floats::new(&[30.0; 2]) };
+        let request =
+            Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats::new(&[30.0; 2]) };
         ask(&mut session, &board, &request, |report| match report {
             Report::Estimate(it) => assert_eq!(it.flags & EstimateReport::CONTACT, contact),
             other => panic!("{other:?}"),

@@ -26,7 +26,7 @@ pub fn decode(
     frame: &TestFrame,
 ) -> (u8, Vec<u8>, Vec<u32>) {
     let readings_ohm = Floats::new(frame.as_flattened());
-    let request = Request::Decode { frame: 5, readings_ohm };
+    let request = Request::Decode { frame: 5, start_us: 0, readings_ohm };
     ask(session, board, &request, |report| match report {
         Report::Estimate(e) => {
             assert_eq!(e.frame, 5);

@@ -10,6 +10,7 @@ use firmware::link::message::{
 use firmware::link::packet::PROTOCOL_VERSION;
 use firmware::readout::ScanSettings;
 use model_core::blob::Model;
+use model_core::filter::Settings;
 
 use crate::image;
 
@@ -124,6 +125,9 @@ impl Error {
     }
 }
 
+/// Longest time constant and lead of a filter in ms.
+const MOST_FILTER_MS: u32 = Settings::MOST_US / 1000;
+
 /// A field of the configuration in words, its option, and what it may be.
 fn configuration_range(field: ConfigurationField) -> String {
     use ConfigurationField as Field;
@@ -149,6 +153,11 @@ fn configuration_range(field: ConfigurationField) -> String {
         Field::RestTolerance => {
             "the tolerance of rows at rest (--rest-tolerance: 0 to below 1)".into()
         }
+        Field::FilterTimeConstant => {
+            format!("the filter's time constant (--filter-ms: 0 to {MOST_FILTER_MS})")
+        }
+        Field::FilterLead => format!("the filter's lead (--lead-ms: 0 to {MOST_FILTER_MS})"),
+        Field::ReportEvery => "the scans of which one is reported (--report-every: from 1)".into(),
     }
 }
 

@@ -17,11 +17,15 @@ use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, synthesise};
 
 use super::data_file::FieldArguments;
+use super::filter_arguments::{FilterArguments, PeriodArgument, cycled};
 use super::progress::Terminal;
 use super::readings::model_inputs;
 use super::rest_argument::UntouchedArguments;
 use super::scene_argument::{DEFAULT_SCENE, SceneArgument, Sizes};
 use super::{Common, arguments, print, stderr};
+
+/// Time in µs from one frame of a scene to the next.
+const PERIOD_US: u32 = 10_000;
 
 /// Options of a check.
 #[derive(Args)]
@@ -37,6 +41,10 @@ pub struct CheckArguments {
     model: Option<PathBuf>,
     #[command(flatten)]
     untouched: UntouchedArguments,
+    #[command(flatten)]
+    filter: FilterArguments,
+    #[command(flatten)]
+    period: PeriodArgument,
     /// Frames that the device decodes. Lines of a CSV file are repeated.
     #[arg(
         short = 'n',
@@ -114,7 +122,13 @@ impl CheckArguments {
         let metadata = parsed.metadata();
         let rest = self.untouched.rest_if_relative(&file, metadata, None)?;
         let baseline_ohm = self.baseline_ohm(metadata, path, rest.as_ref())?;
-        let frames = Frames { readings: readings.cycled(self.frames.max(1)), baseline_ohm };
+        let count = self.frames.max(1);
+        let start_us = if self.filter.settings().is_on() {
+            cycled(&self.period.of_file(&file)?, count)
+        } else {
+            self.period.even(count, PERIOD_US)
+        };
+        let frames = Frames { readings: readings.cycled(count), baseline_ohm, start_us };
         Ok(Checked { frames, model })
     }
 
@@ -166,7 +180,8 @@ impl CheckArguments {
             self.baseline_ohm(metadata, path, None)?
         };
         let readings = synthesise(&scene.world, Stream::Test, self.frames.max(1)).inputs;
-        let frames = Frames { readings, baseline_ohm };
+        let start_us = self.period.even(readings.len(), PERIOD_US);
+        let frames = Frames { readings, baseline_ohm, start_us };
         Ok(Checked { frames, model })
     }
 
@@ -178,6 +193,7 @@ impl CheckArguments {
             interruptions: self.interruptions,
             garbage_bytes: self.garbage,
             window,
+            filter: self.filter.settings(),
         }
     }
 }

@@ -6,15 +6,18 @@ use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::EstimateReport;
+use model_core::filter::State;
 use serde::Serialize;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::{DataFile, FieldTexts};
 use taxel_data::table::Table;
+use taxel_learn::filtered::filter_frames;
 use taxel_learn::infer::is_missing;
 use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 
 use super::arguments::exponential;
 use super::data_file::DataFileArguments;
+use super::filter_arguments::{FilterArguments, PeriodArgument};
 use super::health::{Health, HealthArguments};
 use super::readings::{model_inputs, related};
 use super::rest_argument::UntouchedArguments;
@@ -34,7 +37,8 @@ use super::{Common, print, stderr};
   host-sim decode press.bin readings.csv -o estimate.csv
   host-sim decode press.bin readings.csv --confidence -o estimate.csv
   host-sim decode relative.bin readings.csv --baseline rest.csv -o estimate.csv
-  host-sim decode m.bin log.csv --keep time_s,frame -o estimate.csv")]
+  host-sim decode m.bin log.csv --keep time_s,frame -o estimate.csv
+  host-sim decode m.bin log.csv --filter-ms 8 --lead-ms 5 -o estimate.csv")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
@@ -54,6 +58,10 @@ pub struct Arguments {
     untouched: UntouchedArguments,
     #[command(flatten)]
     health: HealthArguments,
+    #[command(flatten)]
+    filter: FilterArguments,
+    #[command(flatten)]
+    period: PeriodArgument,
     /// Exponential of the activations.
     #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
     exponential: Exponential,
@@ -98,7 +106,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let health = arguments.health.apply(&model, &mut readings)?;
     let (model, readings) = related(model, readings, baselines.as_ref());
     remark_on_range(&model, &readings);
-    let estimate = model.decode_table(&readings);
+    let mut estimate = model.decode_table(&readings);
+    let settings = arguments.filter.settings();
+    if settings.is_on() {
+        let start_us = arguments.period.of_file(&file)?;
+        let mut state = State::new(vec![[0.0; 2]; estimate.names.len()]);
+        filter_frames(&mut state, settings, &start_us, &mut estimate.values);
+    }
     let keep = kept(arguments, &file, &estimate)?;
     let assessed = arguments.confidence.then(|| model.assess(&readings.values));
     let assessed = match assessed {

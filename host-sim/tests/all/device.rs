@@ -11,6 +11,7 @@ use firmware::link::message::{
 };
 use model_core::blob::{Floats, ModelParts, encode_to_vec};
 use model_core::confidence::{Confidence, Sizes};
+use model_core::filter::Settings;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
@@ -68,7 +69,7 @@ fn with_confidence(model: &ModelBlob) -> ModelBlob {
 /// So many test frames, for a model that needs no baseline.
 pub fn frames_of(frames: usize) -> Frames {
     let readings = synthesise(&press(), Stream::Test, frames).inputs;
-    Frames { readings, baseline_ohm: None }
+    Frames { start_us: (0..frames as u64).collect(), readings, baseline_ohm: None }
 }
 
 /// Ideal readings of a few frames, for a device that scans.
@@ -135,6 +136,7 @@ fn a_sound_device_passes_every_check() {
         interruptions: true,
         garbage_bytes: 100_000,
         window: 4,
+        filter: Settings::default(),
     };
     let findings = check(&mut device, &frames_of(500), &model, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
@@ -155,9 +157,9 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     let readings = frames();
     for (frame, readings_ohm) in (0..).zip(readings.iter().cycle().take(40)) {
         let readings_ohm = Floats::new(readings_ohm.as_flattened());
-        add(&Request::Decode { frame, readings_ohm });
+        add(&Request::Decode { frame, start_us: 0, readings_ohm });
     }
-    add(&Request::Decode { frame: 40, readings_ohm: Floats::new(&[60.0; 7]) });
+    add(&Request::Decode { frame: 40, start_us: 0, readings_ohm: Floats::new(&[60.0; 7]) });
     add(&Request::Upload(UploadStep::Chunk { offset: 0, bytes: &[1; 8] }));
     add(&Request::Upload(upload::begin(new.bytes())));
     for (index, bytes) in new.bytes().chunks(512).enumerate() {
@@ -166,7 +168,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     add(&Request::Upload(UploadStep::Try { lease_ms: 60_000 }));
     add(&Request::Identify);
     let again = Floats::new(readings[0].as_flattened());
-    add(&Request::Decode { frame: 41, readings_ohm: again });
+    add(&Request::Decode { frame: 41, start_us: 0, readings_ohm: again });
     // Garbage, with zeros within it and at its end.
     let garbage: Vec<u8> = (0..40_000_u32).map(|n| (n * n / 7) as u8).chain([0]).collect();
     requests.push((garbage, 0));
@@ -232,8 +234,14 @@ fn the_image_answers_alike_on_both_lines() {
 fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
     let mut device = device(SOUND, &model(3));
     let wanted = model(5);
-    let plan =
-        Plan { seed: 1, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let plan = Plan {
+        seed: 1,
+        damaged_uploads: 0,
+        interruptions: false,
+        garbage_bytes: 0,
+        window: 1,
+        filter: Settings::default(),
+    };
     let findings = check(&mut device, &frames_of(20), &wanted, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
     assert_eq!(findings.device.model.unwrap().crc_32, wanted.parse().crc());
@@ -251,7 +259,7 @@ fn a_device_divides_by_its_baseline_as_the_host_does() {
         // A device without a baseline decodes nothing, and says why.
         let unknown = synthesise(&press(), Stream::Test, 1).inputs;
         let readings: Vec<f32> = unknown.values.iter().map(|ohm| *ohm as f32).collect();
-        taxel_rig::device::stream::decode_frames(&mut device, &readings, 144, 1, |_, estimate| {
+        taxel_rig::device::stream::decode_frames(&mut device, &readings, &[0], 1, |_, estimate| {
             assert_eq!(estimate.flags, EstimateReport::NO_BASELINE);
             assert!(estimate.outputs.iter().all(f32::is_nan));
         })
@@ -263,9 +271,16 @@ fn a_device_divides_by_its_baseline_as_the_host_does() {
         };
         let session = Synthesis::new(&scene.world);
         let baseline_ohm = Some(drifted(session.baselines(Stream::Test, 1, 100)).values);
-        let frames = Frames { readings: drifted(frames_of(50).readings), baseline_ohm };
-        let plan =
-            Plan { seed: 1, damaged_uploads: 7, interruptions: false, garbage_bytes: 0, window: 1 };
+        let Frames { readings, start_us, .. } = frames_of(50);
+        let frames = Frames { readings: drifted(readings), baseline_ohm, start_us };
+        let plan = Plan {
+            seed: 1,
+            damaged_uploads: 7,
+            interruptions: false,
+            garbage_bytes: 0,
+            window: 1,
+            filter: Settings::default(),
+        };
         let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
         assert!(findings.all_good(), "{findings:#?}");
     }
@@ -275,8 +290,14 @@ fn a_device_divides_by_its_baseline_as_the_host_does() {
 fn a_device_tells_novelty_and_deviations_as_the_host_does() {
     let model = with_confidence(&model(3));
     let mut device = device(SOUND, &model);
-    let plan =
-        Plan { seed: 1, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let plan = Plan {
+        seed: 1,
+        damaged_uploads: 0,
+        interruptions: false,
+        garbage_bytes: 0,
+        window: 1,
+        filter: Settings::default(),
+    };
     let mut frames = frames_of(30);
     // One is far from all others, and one lacks a reading.
     frames.readings.values[..144].fill(900.0);
@@ -297,8 +318,14 @@ fn over_a_line_that_spoils_bytes_everything_still_arrives() {
     let new = model(16);
     let identity = upload::replace(&mut device, new.bytes(), &Silent).unwrap();
     assert_eq!(identity.model.unwrap().crc_32, new.parse().crc());
-    let plan =
-        Plan { seed: 1, damaged_uploads: 0, interruptions: false, garbage_bytes: 0, window: 1 };
+    let plan = Plan {
+        seed: 1,
+        damaged_uploads: 0,
+        interruptions: false,
+        garbage_bytes: 0,
+        window: 1,
+        filter: Settings::default(),
+    };
     let findings = check(&mut device, &frames_of(30), &new, &plan, &Silent).unwrap();
     assert_eq!(findings.frames.bit_identical, 30);
     assert!(findings.repeated > 0 && !findings.all_good(), "the line was sound");
@@ -700,5 +727,29 @@ pub mod serial_port {
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2));
         assert!(message.contains("/dev/no-such-port"), "{message}");
+    }
+}
+
+#[test]
+fn a_device_filters_in_time_as_the_host_does() {
+    let model = model(3);
+    let filter = Settings { time_constant_us: 5000, lead_us: 2000 };
+    let plan = Plan {
+        seed: 1,
+        damaged_uploads: 0,
+        interruptions: false,
+        garbage_bytes: 500,
+        window: 4,
+        filter,
+    };
+    let mut frames = frames_of(60);
+    frames.start_us.iter_mut().for_each(|us| *us *= 1000);
+    frames.start_us[40..].iter_mut().for_each(|us| *us += 60_000); // a gap
+    frames.readings.values[144 * 20] = f64::NAN; // a row starts anew
+    let mut device = device(SOUND, &model);
+    // The second time the filter starts anew.
+    for _ in 0..2 {
+        let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
+        assert!(findings.all_good(), "{findings:#?}");
     }
 }

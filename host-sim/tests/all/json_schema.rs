@@ -4,6 +4,7 @@ mod validator;
 
 use std::collections::BTreeSet;
 
+use model_core::filter::Settings;
 use serde::Serialize;
 use serde_json::{Value, json};
 use taxel_data::progress::Silent;
@@ -132,8 +133,14 @@ fn what_devices_tell_is_told_by_the_schema() {
     let schema = schema();
     let model = device::model(4);
     let mut device = device::device(device::SOUND, &model);
-    let plan =
-        Plan { seed: 1, damaged_uploads: 2, interruptions: true, garbage_bytes: 100, window: 2 };
+    let plan = Plan {
+        seed: 1,
+        damaged_uploads: 2,
+        interruptions: true,
+        garbage_bytes: 100,
+        window: 2,
+        filter: Settings::default(),
+    };
     let findings = check(&mut device, &device::frames_of(5), &model, &plan, &Silent).unwrap();
     for command in ["emulate", "link check"] {
         assert_eq!(schema.faults(&document(command, &findings)), [""; 0]);

@@ -83,6 +83,7 @@ fn blobs() -> Outcome<Vec<Vec<u8>>> {
 /// Requests that a host may send.
 fn requests(use_them: &mut dyn FnMut(&Request<'_>)) {
     let readings = [60.0_f32.to_le_bytes(); 6].concat();
+    let filtering = Configuration { filter_time_constant_us: 5000, report_every: 2, ..quiet() };
     for request in [
         Request::Identify,
         Request::Statistics,
@@ -91,7 +92,9 @@ fn requests(use_them: &mut dyn FnMut(&Request<'_>)) {
         Request::Configure { configuration: Configuration::DEFAULT, lease_ms: 20 },
         Request::Resume,
         Request::CaptureBaseline { frames: 1 },
-        Request::Decode { frame: 1, readings_ohm: Floats(&readings) },
+        Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats(&readings) },
+        Request::Configure { configuration: filtering, lease_ms: 20 },
+        Request::Decode { frame: 2, start_us: 1 << 40, readings_ohm: Floats(&readings) },
     ] {
         use_them(&request);
     }

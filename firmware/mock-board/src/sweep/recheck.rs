@@ -141,7 +141,8 @@ fn judge(
     for frame in 0..FRAMES {
         let reading = |i: usize| 50.0 + ((7 * i + 3 * frame) % 20) as f32;
         let readings_ohm: Vec<f32> = (0..ROWS * COLS).map(reading).collect();
-        let request = Request::Decode { frame: 0, readings_ohm: Floats::new(&readings_ohm) };
+        let request =
+            Request::Decode { frame: 0, start_us: 0, readings_ohm: Floats::new(&readings_ohm) };
         let (found, flags) = ask(session, board, &request, |report| match report {
             Report::Estimate(it) => Ok((it.outputs.iter().map(f32::to_bits).collect(), it.flags)),
             other => Err(format!("{other:?}")),

@@ -3,12 +3,13 @@
 use std::time::{Duration, Instant};
 
 use firmware::link::message::{Report, Request, Statistics};
+use model_core::filter::Settings;
 use serde::Serialize;
 use taxel_data::progress::{Progress, Silent};
 use taxel_data::random::{Purpose, Random, Stream};
-use taxel_data::table::Table;
 use taxel_learn::ModelBlob;
 
+pub use super::expected::Frames;
 use super::expected::{Expected, prepare};
 use super::{Device, DeviceIdentity, Wire};
 use crate::error::{Error, Result};
@@ -20,15 +21,6 @@ use uploads::check_uploads;
 
 /// Time in which any device has taken all bytes that were sent to it, however slow it is.
 const SWALLOWED: Duration = Duration::from_mins(2);
-
-/// Frames that a device is to decode.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frames {
-    /// Readings in Ω, in the columns of the model's inputs.
-    pub readings: Table,
-    /// Baseline in Ω of each of these columns, for a model with relative inputs.
-    pub baseline_ohm: Option<Vec<f64>>,
-}
 
 /// Plan of a check.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +34,10 @@ pub struct Plan {
     /// Number of random bytes to send.
     pub garbage_bytes: usize,
     /// Number of frames on their way at a time: see [`decode_frames`](super::stream::decode_frames).
+    /// A filter needs them one after the other, however many they are.
     pub window: usize,
+    /// Settings of the filter in time that the device and the host pass outputs through.
+    pub filter: Settings,
 }
 
 /// Findings of a check.
@@ -129,8 +124,8 @@ fn check_paused<W: Wire>(
 ) -> Result<Findings> {
     let exponential = prepare(device, blob, progress)?;
 
-    let Frames { readings, baseline_ohm } = frames;
-    let expected = Expected::new(blob, exponential, readings, baseline_ohm.as_deref());
+    let expected = Expected::new(blob, exponential, frames, plan.filter);
+    let readings = &frames.readings;
     let frames = readings.len();
     let crc_32 = blob.parse().crc();
     let (bit_identical, time) = expected.count_same(device, frames, plan.window, progress)?;

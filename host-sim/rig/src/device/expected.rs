@@ -4,14 +4,27 @@ use std::time::Duration;
 
 use firmware::link::message::{Configuration, EstimateReport};
 use model_core::blob::Model;
+use model_core::filter::{Settings, State};
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Frame};
 use taxel_data::progress::Progress;
 use taxel_data::table::Table;
+use taxel_learn::filtered::filter_frames;
 use taxel_learn::{Exponential, ModelBlob};
 
 use super::{Device, DeviceIdentity, Wire, stream, upload};
 use crate::error::{Error, Result, check_room};
+
+/// Frames that a device is to decode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    /// Readings in Ω, in the columns of the model's inputs.
+    pub readings: Table,
+    /// Baseline in Ω of each of these columns, for a model with relative inputs.
+    pub baseline_ohm: Option<Vec<f64>>,
+    /// Start of each frame in µs, for a filter.
+    pub start_us: Vec<u64>,
+}
 
 /// Frames of a scene with the answers that the host computes.
 pub(super) struct Expected {
@@ -22,23 +35,30 @@ pub(super) struct Expected {
     confidence: Vec<(f32, Vec<f32>)>,
     /// Baseline that the device needs, in Ω.
     baseline_ohm: Option<Vec<f32>>,
+    /// Start of each frame in µs.
+    start_us: Vec<u64>,
+    /// Filter that the outputs have passed.
+    filter: Settings,
 }
 
 impl Expected {
-    /// Answers of the model of `blob` to `readings`, with this exponential, and with this baseline if its inputs are
-    /// relative.
+    /// Answers of the model of `blob` to `frames`, with this exponential, through this filter, and with their baseline if
+    /// its inputs are relative.
     pub(super) fn new(
         blob: &ModelBlob,
         exponential: Exponential,
-        readings: &Table,
-        baseline_ohm: Option<&[f64]>,
+        Frames { readings, baseline_ohm, start_us }: &Frames,
+        filter: Settings,
     ) -> Self {
-        let model = blob.prepare(exponential);
+        let (model, start_us) = (blob.prepare(exponential), start_us.clone());
+        let baseline_ohm = baseline_ohm.as_deref();
         let model = match baseline_ohm {
             Some(baseline) => model.with_baseline(baseline),
             None => model,
         };
-        let outputs = model.decode_table(readings);
+        let mut outputs = model.decode_table(readings);
+        let mut state = State::new(vec![[0.0; 2]; outputs.names.len()]);
+        filter_frames(&mut state, filter, &start_us, &mut outputs.values);
         let f32s =
             |values: &[f64]| -> Vec<f32> { values.iter().map(|value| *value as f32).collect() };
         let (baseline_ohm, readings_ohm) = (baseline_ohm.map(f32s), f32s(&readings.values));
@@ -46,7 +66,7 @@ impl Expected {
         let confidence =
             confidence(&blob.parse(), &readings_ohm, per_frame, baseline_ohm.as_deref());
         let outputs = f32s(&outputs.values);
-        Self { readings_ohm, outputs, per_frame, confidence, baseline_ohm }
+        Self { readings_ohm, outputs, per_frame, confidence, baseline_ohm, start_us, filter }
     }
 
     /// Gives the device the baseline that it needs, if any.
@@ -54,32 +74,36 @@ impl Expected {
         self.baseline_ohm.as_deref().map_or(Ok(()), |baseline| device.set_baseline(baseline))
     }
 
-    /// Lets the device take readings beyond its limits, if there are any: other sensors read other numbers.
-    fn widen_limits<W: Wire>(&self, device: &mut Device<W>) -> Result<()> {
-        let usual = Configuration::DEFAULT;
-        let good = usual.shorted_below_ohm..=usual.open_above_ohm;
-        if self.readings_ohm.iter().all(|ohm| good.contains(ohm)) {
-            return Ok(());
-        }
-        let [shorted_below_ohm, open_above_ohm] = [f32::NEG_INFINITY, f32::INFINITY];
-        device.configure(Configuration {
+    /// Lets the device filter from the first frame on, and take readings beyond its limits, if there are any: other sensors
+    /// read other numbers.
+    fn configure<W: Wire>(&self, device: &mut Device<W>) -> Result<()> {
+        let mut wanted = Configuration {
             frame_period_us: 0,
-            shorted_below_ohm,
-            open_above_ohm,
-            ..usual
-        })
+            filter_time_constant_us: self.filter.time_constant_us,
+            filter_lead_us: self.filter.lead_us,
+            ..Configuration::DEFAULT
+        };
+        let good = wanted.shorted_below_ohm..=wanted.open_above_ohm;
+        if !self.readings_ohm.iter().all(|ohm| good.contains(ohm)) {
+            [wanted.shorted_below_ohm, wanted.open_above_ohm] = [f32::NEG_INFINITY, f32::INFINITY];
+        }
+        // Another configuration starts the filter anew.
+        device.pause()?;
+        device.configure(wanted)
     }
 
     fn first(&self, frames: usize) -> &[f32] {
         &self.readings_ohm[..frames * self.per_frame[0]]
     }
 
-    /// Whether the `estimate` has the outputs of frame number `frame`, and its novelty and deviations.
+    /// Whether the `estimate` has the time and the outputs of frame number `frame`, and its novelty and deviations.
     pub(super) fn is_same(&self, frame: u32, estimate: &EstimateReport<'_>) -> bool {
         let confidence = self.confidence.get(frame as usize);
         let expected = confidence.map_or(&[][..], |(_, deviation)| deviation);
         let deviation = estimate.deviation.iter().map(f32::to_bits);
-        estimate.novelty.map(f32::to_bits) == confidence.map(|(novelty, _)| novelty.to_bits())
+        Some(&estimate.start_us) == self.start_us.get(frame as usize)
+            && estimate.novelty.map(f32::to_bits)
+                == confidence.map(|(novelty, _)| novelty.to_bits())
             && deviation.eq(expected.iter().map(|value| value.to_bits()))
             && Self::is_line(&self.outputs, frame, self.per_frame[1], estimate.outputs.iter())
     }
@@ -100,13 +124,14 @@ impl Expected {
         progress: &dyn Progress,
     ) -> Result<(usize, Duration)> {
         let mut same = 0;
-        self.widen_limits(device)?;
+        self.configure(device)?;
         self.set_baseline(device)?;
         progress.stage("decoding on the device", frames);
+        let window = if self.filter.is_on() { 1 } else { window };
         let time = stream::decode_frames(
             device,
             self.first(frames),
-            self.per_frame[0],
+            &self.start_us[..frames],
             window,
             |frame, estimate| {
                 same += usize::from(self.is_same(frame, estimate));
@@ -190,6 +215,8 @@ mod tests {
             per_frame: [2, 2],
             confidence: Vec::new(),
             baseline_ohm: None,
+            start_us: vec![0; 2],
+            filter: Settings::default(),
         };
         assert!(expected.is_same(1, &estimate(&[0.0, 1.0], &[])));
         assert!(!expected.is_same(1, &estimate(&[0.0, 1.0], &[0.5, 0.5])));
@@ -208,6 +235,8 @@ mod tests {
             per_frame: [2, 2],
             confidence: vec![(0.5, vec![1.0, 1.0]), (-2.5, vec![0.125, 0.25])],
             baseline_ohm: None,
+            start_us: vec![0; 2],
+            filter: Settings::default(),
         };
         let good = estimate(&[0.0, 1.0], &[0.125, 0.25]);
         assert!(expected.is_same(1, &good));

@@ -19,23 +19,25 @@ struct Outstanding {
     attempts: u32,
 }
 
-/// Lets the device decode every frame of `readings_ohm` (`frames × per_frame`, in Ω), and passes each
-/// estimate to `take` once. Returns the time it took.
+/// Lets the device decode a frame for each of `start_us`, at which it began, of `readings_ohm` (frame after frame, in Ω).
+/// Passes each estimate to `take` once. Returns the time it took.
 ///
 /// Up to `window` frames are on their way at a time. A window above 1 is for lines that hold bytes back
-/// while the device is busy, such as an emulator's; a real board may lose them.
+/// while the device is busy, such as an emulator's; a real board may lose them. With a window of 1 the device decodes the
+/// frames in their order, even if some are sent again: a filter in time needs that.
 pub fn decode_frames<W: Wire>(
     device: &mut Device<W>,
     readings_ohm: &[f32],
-    per_frame: usize,
+    start_us: &[u64],
     window: usize,
     mut take: impl FnMut(u32, &EstimateReport<'_>),
 ) -> Result<Duration> {
-    let frames = (readings_ohm.len() / per_frame) as u32;
+    let frames = start_us.len() as u32;
+    let per_frame = readings_ohm.len() / start_us.len().max(1);
     let request = |frame: u32| {
-        let start = frame as usize * per_frame;
+        let (start, start_us) = (frame as usize * per_frame, start_us[frame as usize]);
         let readings_ohm = Floats::new(&readings_ohm[start..start + per_frame]);
-        Request::Decode { frame, readings_ohm }
+        Request::Decode { frame, start_us, readings_ohm }
     };
     let mut on_their_way: VecDeque<Outstanding> = VecDeque::new();
     let (start, mut next) = (Instant::now(), 0);

@@ -131,7 +131,7 @@ fn see_estimate<W: Wire>(device: &mut Device<W>, crc_32: u32) -> Result<DeviceId
         return Err(Error::NotInForce { committed: crc_32, in_force });
     }
     let frame = vec![ANY_OHM; identity.readings()];
-    let request = Request::Decode { frame: 0, readings_ohm: Floats::new(&frame) };
+    let request = Request::Decode { frame: 0, start_us: 0, readings_ohm: Floats::new(&frame) };
     let flags = device.ask_plainly(&request, |report| match report {
         Report::Estimate(estimate) => Some(estimate.flags),
         _ => None,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 use clap::Args;
-use firmware::link::message::Refusal;
+use firmware::link::message::{Configuration, Refusal};
 use model_core::blob::Model;
 use model_core::health::Limits;
 use serde::Serialize;
@@ -22,7 +22,7 @@ use super::super::readings::{BaselineArgument, table_of};
 use super::super::{Common, print};
 use super::activate;
 use super::frames::hear_frames;
-use super::scan::{Confidence, ScanArguments, Wanted, configure, patience, reading_names};
+use super::scan::{ScanArguments, Wanted, configure, patience, reading_names};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -128,7 +128,7 @@ fn record_presses<W: Wire>(
         ask_for_press(number, outputs)?;
         // Paused first, so that no frame is from before the press.
         let (frames, _) = device.while_paused(|device| -> Result<_> {
-            configure(device, scan, Wanted::Readings, 0.0, Confidence::Nothing)?;
+            configure(device, scan, Wanted::Readings, Configuration::DEFAULT)?;
             hear_frames(device, scan.frames.into(), patience, Wanted::Readings, names.len())
         })?;
         let scanned = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();

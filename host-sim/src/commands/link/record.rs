@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
-use clap::Args;
+use clap::{Args, value_parser};
 use firmware::link::message::{Configuration, Report, Request, Setting};
 use model_core::blob::Model;
 use serde::Serialize;
@@ -12,6 +12,7 @@ use taxel_data::table::Table;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::{Device, DeviceIdentity, Wire};
 
+use super::super::filter_arguments::FilterArguments;
 use super::super::health::note_faults;
 use super::super::{Common, print};
 use super::frames::{hear_frames, missing};
@@ -35,6 +36,11 @@ pub struct RecordArguments {
     /// `baseline`; 0 decodes all rows (docs/gating.md).
     #[arg(long, value_name = "SHARE", default_value_t = Configuration::DEFAULT.rest_tolerance, value_parser = tolerance, allow_negative_numbers = true)]
     rest_tolerance: f32,
+    #[command(flatten)]
+    filter: FilterArguments,
+    /// Scans of which one is saved; all are decoded and filtered.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "model", conflicts_with = "readings", value_parser = value_parser!(u16).range(1..))]
+    report_every: u16,
     /// What is saved of the MODEL's confidence: columns NAME_deviation for each output, and novelty_nats
     /// (docs/confidence.md).
     #[arg(long, value_enum, value_name = "WHAT", default_value = "nothing", requires = "model")]
@@ -105,9 +111,23 @@ pub fn record<W: Wire>(
     if let Some(model) = &model {
         names.extend(confidence_names(model, action.confidence, &names)?);
     }
-    let patience = patience(&action.scan, &identity);
+    let every = action.report_every;
+    let patience = patience(&action.scan, &identity) * every.into();
+    let filter = action.filter.settings();
+    if filter.is_on() && wanted == Wanted::Readings {
+        let message = "--filter-ms filters estimates, and readings are saved: name the MODEL, without --readings";
+        return Err(Error::Usage(message.into()));
+    }
+    let decoding = Configuration {
+        rest_tolerance: action.rest_tolerance,
+        confidence: action.confidence.into(),
+        filter_time_constant_us: filter.time_constant_us,
+        filter_lead_us: filter.lead_us,
+        report_every: every,
+        ..Configuration::DEFAULT
+    };
     let (frames, rows_at_rest) = device.while_paused(|device| -> Result<_> {
-        configure(device, &action.scan, wanted, action.rest_tolerance, action.confidence)?;
+        configure(device, &action.scan, wanted, decoding)?;
         hear_frames(device, action.scan.frames.into(), patience, wanted, names.len())
     })?;
     let missing = missing(frames.iter().flat_map(|frame| &frame.values[..values]), wanted)?;
@@ -119,7 +139,7 @@ pub fn record<W: Wire>(
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let ends = frames.last().zip(frames.first());
     let steps = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number));
-    let frames_lost = (steps + 1).saturating_sub(frames.len() as u32);
+    let frames_lost = (steps / u32::from(every) + 1).saturating_sub(frames.len() as u32);
     let elapsed_us = ends.map_or(0, |(last, first)| last.start_us - first.start_us);
     let frames_per_s = (elapsed_us > 0).then(|| f64::from(steps) / (elapsed_us as f64 * 1e-6));
     let frames_novel = frames.iter().filter(|frame| frame.novel).count();
@@ -189,7 +209,7 @@ pub fn baseline<W: Wire>(
     let request = Request::CaptureBaseline { frames };
     let patience = patience(&action.scan, &identity);
     let answer = device.while_paused(|device| {
-        configure(device, &action.scan, Wanted::Nothing, 0.0, Confidence::Nothing)?;
+        configure(device, &action.scan, Wanted::Nothing, Configuration::DEFAULT)?;
         device.ask(&request, patience, |report| match report {
             Report::Baseline { readings_ohm } => {
                 Some(readings_ohm.iter().map(f64::from).collect::<Vec<_>>())

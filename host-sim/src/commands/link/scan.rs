@@ -61,21 +61,18 @@ pub fn tolerance(text: &str) -> std::result::Result<f32, String> {
     share.ok_or_else(|| "give a share from 0 and below 1, such as 0.0175 for 3.5 × 0.5 %".into())
 }
 
-/// Activates a configuration for scanning.
+/// Activates a configuration for scanning, which decodes as `decoding` says.
 pub fn configure<W: Wire>(
     device: &mut Device<W>,
     scan: &ScanArguments,
     wanted: Wanted,
-    rest_tolerance: f32,
-    confidence: Confidence,
+    decoding: Configuration,
 ) -> taxel_rig::Result<()> {
     let mut configuration = Configuration {
         frame_period_us: scan.period_us,
         send_readings: wanted == Wanted::Readings,
         send_estimates: wanted == Wanted::Estimates,
-        rest_tolerance,
-        confidence: confidence.into(),
-        ..Configuration::DEFAULT
+        ..decoding
     };
     configuration.scan.settling_us = scan.settling_us;
     configuration.scan.oversampling = scan.oversampling;

@@ -7,6 +7,7 @@ use serde::Serialize;
 use taxel_rig::calibration::CircuitConstants;
 use taxel_rig::device::{Device, Wire};
 
+use super::super::filter_arguments::milliseconds;
 use super::super::{Common, print};
 use super::scan::{Confidence, tolerance};
 
@@ -40,6 +41,15 @@ pub struct ConfigureArguments {
     /// Relative change within which a row counts as untouched and is not decoded; 0 decodes all rows.
     #[arg(long, value_name = "SHARE", value_parser = tolerance, allow_negative_numbers = true)]
     rest_tolerance: Option<f32>,
+    /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/filter.md).
+    #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    filter_ms: Option<u32>,
+    /// Time in ms by which the filter extrapolates outputs: their age when they are used.
+    #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    lead_ms: Option<u32>,
+    /// Scans of which one is reported, with its estimate and its faults; all are decoded and filtered.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
+    report_every: Option<u16>,
 }
 
 /// Reports of each scan.
@@ -66,6 +76,9 @@ impl ConfigureArguments {
         c.open_above_ohm = self.open_above_ohm.unwrap_or(c.open_above_ohm);
         c.contact_threshold = self.contact_threshold.unwrap_or(c.contact_threshold);
         c.rest_tolerance = self.rest_tolerance.unwrap_or(c.rest_tolerance);
+        c.filter_time_constant_us = self.filter_ms.unwrap_or(c.filter_time_constant_us);
+        c.filter_lead_us = self.lead_ms.unwrap_or(c.filter_lead_us);
+        c.report_every = self.report_every.unwrap_or(c.report_every);
         c
     }
 }
@@ -148,12 +161,21 @@ fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
         "{:<17} a scan every {} µs, {} µs settling, {} samples a reading",
         "", c.frame_period_us, c.scan.settling_us, c.scan.oversampling
     ));
+    let filter = if c.filter().is_on() {
+        let [time_constant_ms, lead_ms] =
+            [c.filter_time_constant_us, c.filter_lead_us].map(|us| f64::from(us) / 1e3);
+        format!("outputs with a time constant of {time_constant_ms} ms, a lead of {lead_ms} ms")
+    } else {
+        "nothing".into()
+    };
+    page.line(format_args!("{:<17} {filter}", "filtered in time"));
     let yes = |sent: bool| if sent { "yes" } else { "no" };
     page.line(format_args!(
-        "{:<17} readings {}, estimates {}, of confidence {}",
+        "{:<17} readings {}, estimates {}{}, of confidence {}",
         "sent of each scan",
         yes(c.send_readings),
         yes(c.send_estimates),
+        if c.report_every > 1 { format!(" (one of {})", c.report_every) } else { String::new() },
         match c.confidence {
             ConfidenceSent::Nothing => "nothing",
             ConfidenceSent::Novelty => "novelty",

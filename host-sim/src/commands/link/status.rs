@@ -72,6 +72,12 @@ pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
         "{:<17} scan {} µs, decoding {} µs",
         "longest", s.longest_scan_us, s.longest_decode_us
     ));
+    if s.longest_latency_us > 0 {
+        page.line(format_args!(
+            "{:<17} {} µs at most from the start of a scan until the line took its estimate",
+            "latency", s.longest_latency_us
+        ));
+    }
     if s.longest_decode_cycles > 0 {
         page.line(format_args!(
             "{:<17} decoding {} to {} of the processor",

@@ -1,0 +1,267 @@
+//! The filter in time, and reports of every n-th scan.
+
+use firmware::app::Session;
+use firmware::link::message::{Configuration, Report, Request};
+use model_core::blob::Floats;
+use model_core::filter::State;
+use model_core::{Estimate, RowStatus};
+
+use super::requests::{bits, expected};
+use mock_board::*;
+
+/// A configuration that filters, and scans only on request.
+fn filtering() -> Configuration {
+    Configuration { filter_time_constant_us: 4000, filter_lead_us: 1500, ..quiet() }
+}
+
+/// Frames of a touch that deepens.
+fn touch(frame: usize) -> TestFrame {
+    frame_at_rest().map(|row| row.map(|ohm| ohm - 0.7 * frame as f32 - 0.4 * (frame % 3) as f32))
+}
+
+/// The filter of the device as model-core computes it.
+struct Own {
+    blob: model_core::AlignedBytes,
+    state: State<[[f32; 2]; ROWS * OUTPUTS]>,
+}
+
+impl Own {
+    fn new(seed: usize) -> Self {
+        Self { blob: blob(seed, 4), state: State::new([[0.0; 2]; ROWS * OUTPUTS]) }
+    }
+
+    /// Bits of the outputs for a frame at this time.
+    fn bits(&mut self, start_us: u64, frame: &TestFrame) -> Vec<u32> {
+        let (mut outputs, mut status) = (expected(&self.blob, frame), [RowStatus::Decoded; ROWS]);
+        let outputs = outputs.as_flattened_mut();
+        let mut estimate = Estimate { outputs, status: &mut status };
+        self.state.filter(filtering().filter(), start_us, &mut estimate);
+        bits(outputs.iter().copied())
+    }
+}
+
+/// Asks for the estimate of a `frame` that began at this time; returns the status of its rows and its bits.
+fn decode_at(
+    session: &mut TestSession<'_>,
+    board: &Board,
+    start_us: u64,
+    frame: &TestFrame,
+) -> (Vec<u8>, Vec<u32>) {
+    let readings_ohm = Floats::new(frame.as_flattened());
+    let request = Request::Decode { frame: 5, start_us, readings_ohm };
+    ask(session, board, &request, |report| match report {
+        Report::Estimate(estimate) => {
+            assert_eq!(estimate.start_us, start_us);
+            (estimate.row_status.to_vec(), bits(estimate.outputs.iter()))
+        }
+        other => panic!("{other:?}"),
+    })
+    .0
+}
+
+/// Estimates that were sent unasked: number of the frame, its time, and its bits.
+fn estimates_of_scans(board: &Board) -> Vec<(u32, u64, Vec<u32>)> {
+    let mut found = Vec::new();
+    find_report(&board.pins.borrow().to_host, |number, report| -> Option<()> {
+        if let (0, Report::Estimate(e)) = (number, report) {
+            found.push((e.frame, e.start_us, bits(e.outputs.iter())));
+        }
+        None
+    });
+    found
+}
+
+#[test]
+fn frames_of_a_host_pass_the_filter_by_their_times_and_may_be_repeated() {
+    let mut own = Own::new(3);
+    let mut slots = Flash::slots_with(&own.blob);
+    let mut bench = Bench::new(filtering());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    for frame in 0..20 {
+        let start_us = (1 << 33) + 900 * frame as u64 + 100 * (frame % 2) as u64;
+        let wanted = own.bits(start_us, &touch(frame));
+        for _ in 0..3 {
+            let (_, found) = decode_at(&mut session, &bench.board, start_us, &touch(frame));
+            assert_eq!(found, wanted, "frame {frame}");
+        }
+        let raw = bits(expected(&own.blob, &touch(frame)).into_iter().flatten());
+        assert_eq!(raw == wanted, frame == 0);
+    }
+}
+
+#[test]
+fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
+    let own = Own::new(3);
+    let rest = frame_at_rest();
+    let set_baseline = Request::SetBaseline { readings_ohm: Floats::new(rest.as_flattened()) };
+    let circuit = firmware::circuit::ZeroPotential::<ROWS, COLS> {
+        drive_v: 0.21,
+        ..firmware::circuit::ZeroPotential::TYPICAL
+    };
+    let constants = firmware::circuit::Circuit::constants(&circuit).unwrap();
+    let other = Configuration { filter_lead_us: 1501, ..filtering() };
+    for (request, is_new) in [
+        (Request::Identify, false),
+        (configure(filtering()), false), // in force already
+        (configure(other), true),
+        (set_baseline, true),
+        (Request::SetConstants(constants), true),
+    ] {
+        let mut slots = Flash::slots_with(&own.blob);
+        let mut bench = Bench::new(filtering());
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        for frame in 0..3 {
+            decode_at(&mut session, &bench.board, 1000 * frame as u64, &touch(frame));
+        }
+        ask(&mut session, &bench.board, &request, |report| {
+            assert!(!matches!(report, Report::Refused(_)), "{report:?}");
+        });
+        let (_, found) = decode_at(&mut session, &bench.board, 3000, &touch(3));
+        let raw = bits(expected(&own.blob, &touch(3)).into_iter().flatten());
+        assert_eq!(found == raw, is_new, "{request:?}");
+    }
+    // Another model, too.
+    let next = Own::new(5);
+    let mut slots = Flash::slots_with(&own.blob);
+    let mut bench = Bench::new(filtering());
+    {
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        decode_at(&mut session, &bench.board, 0, &touch(0));
+    }
+    install(&mut bench, &mut slots, &mut [], (&next.blob, 64)).unwrap();
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (_, found) = decode_at(&mut session, &board, 1000, &touch(1));
+    assert_eq!(found, bits(expected(&next.blob, &touch(1)).into_iter().flatten()));
+}
+
+#[test]
+fn a_row_at_rest_has_the_outputs_at_rest_and_a_touch_starts_from_there() {
+    let mut own = Own::new(3);
+    let mut slots = Flash::slots_with(&own.blob);
+    let mut bench = Bench::new(Configuration { rest_tolerance: 0.02, ..filtering() });
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let rest = frame_at_rest();
+    let set_baseline = Request::SetBaseline { readings_ohm: Floats::new(rest.as_flattened()) };
+    ask(&mut session, &bench.board, &set_baseline, |_| ());
+    let at_rest = bits(expected(&own.blob, &rest).into_iter().flatten());
+    let near = rest.map(|row| row.map(|ohm| ohm * 1.001));
+    for frame in 0..3 {
+        let (status, found) = decode_at(&mut session, &bench.board, 1000 * frame, &near);
+        assert_eq!((&status[..], &found), (&[3, 3][..], &at_rest));
+        own.bits(1000 * frame, &rest);
+    }
+    let (status, found) = decode_at(&mut session, &bench.board, 3000, &touch(8));
+    assert_eq!((&status[..], found), (&[0, 0][..], own.bits(3000, &touch(8))));
+}
+
+#[test]
+fn scans_are_filtered_and_no_request_between_them_changes_that() {
+    let mut own = Own::new(3);
+    let mut slots = Flash::slots_with(&own.blob);
+    let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..filtering() });
+    let board = bench.board.clone();
+    let shown = bench.frame.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let raw = bits(expected(&own.blob, &touch(9)).into_iter().flatten());
+    for frame in 1..15 {
+        *shown.borrow_mut() = touch(frame);
+        board.pins.borrow_mut().to_host.clear();
+        while estimates_of_scans(&board).is_empty() {
+            session.step();
+        }
+        let [(_, start_us, found)] = &estimates_of_scans(&board)[..] else {
+            panic!("one estimate")
+        };
+        assert_eq!(found, &own.bits(*start_us, &touch(frame)), "frame {frame}");
+        // Anybody may ask for that, even without a key.
+        let (_, answer) = decode_at(&mut session, &board, *start_us + 500, &touch(9));
+        assert_eq!(answer, raw);
+    }
+}
+
+#[test]
+fn one_scan_of_some_is_reported_and_all_are_filtered() {
+    let mut own = Own::new(3);
+    let mut slots = Flash::slots_with(&own.blob);
+    let scanning = Configuration { frame_period_us: 1000, ..filtering() };
+    let mut bench = Bench::new(Configuration { report_every: 3, send_readings: true, ..scanning });
+    let board = bench.board.clone();
+    let mut faulty = touch(2);
+    faulty[0][0] = f32::NAN;
+    let shown = bench.frame.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    for frame in 1..=10 {
+        *shown.borrow_mut() = touch(frame);
+        while board.pins.borrow().now_us < 1000 * frame as u32 + 200 {
+            session.step();
+        }
+    }
+    let mut wanted = Vec::new();
+    find_report(&board.pins.borrow().to_host, |_, report| -> Option<()> {
+        if let Report::Readings { frame, start_us, .. } = report {
+            wanted.push((frame, start_us, own.bits(start_us, &touch(frame as usize))));
+        }
+        None
+    });
+    assert_eq!(wanted.len(), 10);
+    wanted.retain(|(frame, ..)| [3, 6, 9].contains(frame));
+    assert_eq!(estimates_of_scans(&board), wanted);
+    // Faults are told with the estimate.
+    *shown.borrow_mut() = faulty;
+    board.pins.borrow_mut().to_host.clear();
+    while board.pins.borrow().now_us < 16_200 {
+        session.step();
+    }
+    let all = reports(&board.pins.borrow().to_host);
+    let health: Vec<_> = all.iter().filter(|(_, text)| text.starts_with("Health")).collect();
+    assert!(health.len() == 2 && health[1].1.contains("frame: 15"), "{health:?}");
+    let s = statistics(&mut session, &board);
+    assert_eq!((s.frames_scanned, s.frames_decoded), (16, 16));
+}
+
+#[test]
+fn the_latency_lasts_until_the_last_byte_is_taken() {
+    let mut slots = Flash::slots_with(&blob(3, 4));
+    let mut bench = Bench::new(Configuration { frame_period_us: 10_000, ..quiet() });
+    let board = bench.board.clone();
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let mut latencies = Vec::new();
+    for gap_us in [0, 20] {
+        board.pins.borrow_mut().gap_us = gap_us;
+        let end_us = board.pins.borrow().now_us + 25_000;
+        board.pins.borrow_mut().to_host.clear();
+        while board.pins.borrow().now_us < end_us {
+            session.step();
+        }
+        let bytes = board.pins.borrow().to_host.len() as u32 / 2; // two estimates
+        board.pins.borrow_mut().gap_us = 0;
+        latencies.push((statistics(&mut session, &board).longest_latency_us, bytes));
+    }
+    let [(fast_us, bytes), (slow_us, _)] = latencies[..] else { panic!("two") };
+    assert!((10..60).contains(&fast_us), "{latencies:?}"); // the scan, and a look at the clock now and then
+    let line_us = 20 * (bytes - 1);
+    assert!((line_us + 1..line_us + 200).contains(&slow_us), "{latencies:?}");
+    // An answer to a request has no scan.
+    decode_at(&mut session, &board, 0, &touch(0));
+    assert_eq!(statistics(&mut session, &board).longest_latency_us, slow_us);
+}
+
+#[test]
+fn a_filter_out_of_range_is_refused_by_its_field() {
+    use firmware::link::message::{ConfigurationField as Field, Refusal};
+    let mut slots = Flash::slots();
+    let mut bench = Bench::new(quiet());
+    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let good = quiet();
+    for (bad, field) in [
+        (Configuration { filter_time_constant_us: u32::MAX, ..good }, Field::FilterTimeConstant),
+        (Configuration { filter_lead_us: 1_000_001, ..good }, Field::FilterLead),
+        (Configuration { report_every: 0, ..good }, Field::ReportEvery),
+    ] {
+        let refusal = Refusal::Configuration(field);
+        let refused =
+            ask(&mut session, &bench.board, &configure(bad), |r| r == Report::Refused(refusal)).0;
+        assert!(refused, "{bad:?}");
+    }
+}
