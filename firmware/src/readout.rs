@@ -116,15 +116,34 @@ pub struct Selection<'a> {
 }
 
 /// Source of frames: a scanned sensor, or a substitute for one.
+///
+/// One that only waits implements [`scan`](Self::scan). One whose hardware scans by itself implements the other three
+/// too: the application decodes a frame while the next one is scanned.
 pub trait FrameSource {
-    /// Scans `wires` into `frame`: one reading in Ω for each row and column, row after row. Readings that could not
-    /// be taken become NaN.
+    /// Scans `wires` into `frame`, and waits for the end: one reading in Ω for each row and column, row after row.
+    /// Readings that could not be taken become NaN.
     fn scan(
         &mut self,
         settings: ScanSettings,
         wires: Selection<'_>,
         frame: &mut [f32],
     ) -> ScanReport;
+
+    /// Starts a scan that goes on by itself. Returns whether it does: a source does so always, or never as by default.
+    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) -> bool {
+        let _ = (settings, wires);
+        false
+    }
+
+    /// Ends the scan that was started: fills `frame` as [`scan`](Self::scan) does, for the settings and wires of the
+    /// start; `None` while it goes on.
+    fn poll(&mut self, frame: &mut [f32]) -> Option<ScanReport> {
+        let _ = frame;
+        None
+    }
+
+    /// Gives up the scan that was started, if there is one: rows idle, and nothing of it gets into another frame.
+    fn stop(&mut self) {}
 
     /// The circuit's constants, if there are any that can be asked for.
     fn constants(&self) -> Option<Constants<'_>> {

@@ -2,6 +2,7 @@
 
 pub mod requests;
 
+mod background;
 mod baseline;
 mod confidence;
 mod configuration;

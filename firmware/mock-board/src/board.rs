@@ -24,6 +24,11 @@ pub struct Pins {
     pub look_us: u32,
     /// Time in µs that a scan takes besides 10 µs.
     pub scan_us: u32,
+    /// Whether the sensor scans by itself, while the device does other things.
+    pub scans_alone: bool,
+    /// Number of scans that it began so, and of those that were given up.
+    pub started: u32,
+    pub stopped: u32,
     /// Number of times that the watchdog was fed.
     pub feeds: u32,
     /// Longest time in µs between two feeds, the first of which is at 0.

@@ -18,13 +18,28 @@ pub struct Source {
     circuit: ZeroPotential<ROWS, COLS>,
     frame: Rc<RefCell<TestFrame>>,
     board: Board,
+    /// What a scan by itself has read, and the time in µs at which it ends.
+    under_way: Option<(Vec<f32>, u32)>,
 }
 
 impl Source {
     /// A sensor with this `frame`.
     pub fn new(frame: &Rc<RefCell<TestFrame>>, board: &Board) -> Self {
-        Self { circuit: ZeroPotential::TYPICAL, frame: frame.clone(), board: board.clone() }
+        let (frame, board) = (frame.clone(), board.clone());
+        Self { circuit: ZeroPotential::TYPICAL, frame, board, under_way: None }
     }
+
+    fn read(&self, settings: ScanSettings, wires: Selection<'_>) -> Vec<f32> {
+        assert!(settings.oversampling > 0, "a scan without samples");
+        let (shown, columns) = (self.frame.borrow(), wires.columns);
+        let readings = wires.rows.iter().flat_map(|row| columns.pick(shown[row.0]));
+        readings.collect()
+    }
+}
+
+fn report(frame: &[f32]) -> ScanReport {
+    let missing = frame.iter().filter(|reading| reading.is_nan());
+    ScanReport { failed_samples: missing.count() as u16 }
 }
 
 impl FrameSource for Source {
@@ -34,15 +49,32 @@ impl FrameSource for Source {
         wires: Selection<'_>,
         frame: &mut [f32],
     ) -> ScanReport {
-        assert!(settings.oversampling > 0, "a scan without samples");
-        let (shown, columns) = (self.frame.borrow(), wires.columns);
-        let readings = wires.rows.iter().flat_map(|row| columns.pick(shown[row.0]));
-        assert_eq!(frame.len(), wires.rows.len() * columns.count());
-        frame.iter_mut().zip(readings).for_each(|(place, reading)| *place = reading);
+        frame.copy_from_slice(&self.read(settings, wires));
         let mut pins = self.board.pins.borrow_mut();
         pins.now_us = pins.now_us.wrapping_add(SCAN_US + pins.scan_us);
-        let missing = frame.iter();
-        ScanReport { failed_samples: missing.filter(|reading| reading.is_nan()).count() as u16 }
+        report(frame)
+    }
+
+    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) -> bool {
+        let (readings, mut pins) = (self.read(settings, wires), self.board.pins.borrow_mut());
+        if pins.scans_alone {
+            pins.started += 1;
+            let end_us = pins.now_us.wrapping_add(SCAN_US + pins.scan_us);
+            assert!(self.under_way.replace((readings, end_us)).is_none(), "two scans at once");
+        }
+        pins.scans_alone
+    }
+
+    fn poll(&mut self, frame: &mut [f32]) -> Option<ScanReport> {
+        let now_us = self.board.pins.borrow().now_us;
+        let (readings, _) = self.under_way.take_if(|(_, end_us)| now_us >= *end_us)?;
+        frame.copy_from_slice(&readings);
+        Some(report(frame))
+    }
+
+    fn stop(&mut self) {
+        assert!(self.under_way.take().is_some(), "there is no scan to give up");
+        self.board.pins.borrow_mut().stopped += 1;
     }
 
     fn constants(&self) -> Option<Constants<'_>> {
@@ -50,6 +82,7 @@ impl FrameSource for Source {
     }
 
     fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        assert!(self.under_way.is_none(), "constants change within a scan");
         self.circuit.set_constants(constants)
     }
 }

@@ -12,7 +12,11 @@ use crate::link::message::{Configuration, HealthReport, Refusal, Report};
 use crate::link::packet::UNASKED;
 use crate::log::info;
 use crate::platform::Platform;
-use crate::readout::{Baseline, FrameSource, Selection};
+use crate::readout::{Baseline, FrameSource, ScanReport, Selection};
+
+/// Longest time in µs for which a scan may go on by itself; then it has failed. With a watchdog's period it is long for
+/// every setting.
+const LONGEST_SCAN_US: u64 = 2_000_000;
 
 /// The sensor and the settings that belong to it.
 pub struct Sensor<'m, F, const ROWS: usize> {
@@ -34,6 +38,17 @@ pub struct Sensor<'m, F, const ROWS: usize> {
     pub answers: bool,
     /// Whether the configuration changed since the last frame was decoded.
     pub is_configured_anew: bool,
+    /// The scan that goes on by itself.
+    under_way: Option<Scan>,
+}
+
+/// A scan that was begun.
+#[derive(Clone, Copy)]
+pub struct Scan {
+    /// Time in µs since the start at which it began.
+    pub start_us: u64,
+    /// Number of frames that were missed before it.
+    pub missed: u32,
 }
 
 /// A baseline that is being captured.
@@ -68,6 +83,7 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
             capture: None,
             answers: true,
             is_configured_anew: false,
+            under_way: None,
         }
     }
 
@@ -131,33 +147,83 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         let before = of_wiring(&self.wiring);
         self.wiring.take(capacity, names, shape);
         if of_wiring(&self.wiring) != before {
+            self.stop_scan();
             self.restart_baseline(link);
         }
     }
 
-    /// Scans a frame, counts it and sends its readings if they are wanted. Returns its number.
-    pub fn scan<P: Platform>(
+    /// Ends a scan, and starts the next one if it is due: that goes on by itself while the frame is decoded, if the source
+    /// can do so. Counts the frame that was scanned, and sends its readings if they are wanted. Returns its number.
+    pub fn scan_if_due<P: Platform>(
         &mut self,
-        start_us: u64,
         scratch: &mut [f32],
         link: &mut Link<'_, P>,
-    ) -> u32 {
-        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
-        let settings = self.configuration.scan;
-        let scan =
-            |wires: Selection<'_>, frame: &mut [f32]| self.source.scan(settings, wires, frame);
-        let report = self.wiring.fill(frame, scratch, scan);
-        self.answers = frame.iter().any(|reading| !reading.is_nan());
-        let scan_us = link.now_us().wrapping_sub(start_us) as u32;
+    ) -> Option<(u32, Scan)> {
+        let mut ended = self.poll(scratch, link);
+        let period_us = self.configuration.frame_period_us;
+        if self.under_way.is_none()
+            && let Some(missed) = self.clock.due(link.platform().now_us(), period_us)
+        {
+            let missed_frames = &mut link.statistics.frames_missed;
+            *missed_frames = missed_frames.saturating_add(missed);
+            let scan = Scan { start_us: link.now_us(), missed };
+            if self.source.start(self.configuration.scan, self.wiring.selection()) {
+                self.under_way = Some(scan);
+            } else {
+                ended = self.wait_for(scratch).map(|report| (scan, report, link.now_us()));
+            }
+        }
+        let (scan, report, end_us) = ended?;
+        self.answers = self.frame().iter().any(|reading| !reading.is_nan());
         let s = &mut link.statistics;
         let frame = s.number_frame();
         s.failed_samples = s.failed_samples.saturating_add(u32::from(report.failed_samples));
-        s.longest_scan_us = s.longest_scan_us.max(scan_us);
+        s.longest_scan_us = s.longest_scan_us.max(end_us.wrapping_sub(scan.start_us) as u32);
         if self.configuration.send_readings {
-            let readings_ohm = Floats::new(self.frame());
+            let (start_us, readings_ohm) = (scan.start_us, Floats::new(self.frame()));
             link.send(UNASKED, &Report::Readings { frame, start_us, readings_ohm });
         }
-        frame
+        Some((frame, scan))
+    }
+
+    /// Ends the scan that goes on by itself, if there is one and it is complete; with its report, and the time in µs at
+    /// which that was seen. One that takes too long gives no reading.
+    fn poll<P: Platform>(
+        &mut self,
+        scratch: &mut [f32],
+        link: &mut Link<'_, P>,
+    ) -> Option<(Scan, ScanReport, u64)> {
+        let scan = self.under_way?;
+        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
+        let report = self.wiring.fill(frame, scratch, |_, frame| self.source.poll(frame));
+        let now_us = link.now_us();
+        if report.is_none() && now_us.wrapping_sub(scan.start_us) < LONGEST_SCAN_US {
+            return None;
+        }
+        let report = report.unwrap_or_else(|| {
+            self.source.stop();
+            frame.fill(f32::NAN);
+            ScanReport { failed_samples: frame.len() as u16 }
+        });
+        self.under_way = None;
+        Some((scan, report, now_us))
+    }
+
+    /// Scans a frame by a source that cannot do so by itself.
+    fn wait_for(&mut self, scratch: &mut [f32]) -> Option<ScanReport> {
+        let settings = self.configuration.scan;
+        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
+        let scan = |wires: Selection<'_>, frame: &mut [f32]| {
+            Some(self.source.scan(settings, wires, frame))
+        };
+        self.wiring.fill(frame, scratch, scan)
+    }
+
+    /// Gives up the scan that goes on by itself: what it is of changes. It counts as no frame.
+    fn stop_scan(&mut self) {
+        if self.under_way.take().is_some() {
+            self.source.stop();
+        }
     }
 
     /// Reports the last frame's faulty readings.
@@ -207,6 +273,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         if configuration == self.configuration {
             return;
         }
+        self.stop_scan();
         (self.configuration, self.is_configured_anew) = (configuration, true);
         self.give_up_capture(link);
         self.answers |= configuration.frame_period_us == 0; // it is not scanned any more
@@ -221,6 +288,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         link: &mut Link<'_, P>,
     ) -> Result<bool, ConstantsFault> {
         let before = self.origin_crc();
+        self.stop_scan();
         self.source.set_constants(constants)?;
         let changed = self.origin_crc() != before;
         if changed {
@@ -244,6 +312,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         if self.capture.is_some_and(is_repeated) {
             return Ok(()); // the answer takes a while
         }
+        self.stop_scan(); // it began before the request
         self.restart_baseline(link);
         self.capture = Some(Capture { number, frames, left: frames });
         Ok(())

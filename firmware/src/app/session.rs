@@ -5,6 +5,7 @@ use model_core::blob::{Columns, Floats};
 
 use super::model::{InForce, candidates, check_head, choose, copy_to};
 use super::recheck::{Checked, Recheck};
+use super::sensor::Scan;
 use super::session_end::SessionEnd;
 use super::{App, Core};
 use crate::link::message::{EstimateReport, Report};
@@ -135,15 +136,13 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         work.decode_baseline(&sensor.baseline, decoder);
     }
 
-    /// Scans a frame if one is due, decodes it and reports on it.
+    /// Scans frames, decodes the one that is complete and reports on it.
     fn scan_if_due(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
         let Self { sensor, link, work, .. } = self;
-        let period_us = sensor.configuration.frame_period_us;
-        let Some(missed) = sensor.clock.due(link.platform().now_us(), period_us) else { return };
-        let missed_frames = &mut link.statistics.frames_missed;
-        *missed_frames = missed_frames.saturating_add(missed);
-        let start_us = link.now_us();
-        let frame = sensor.scan(start_us, work.scratch, link);
+        let Some((frame, Scan { start_us, missed })) = sensor.scan_if_due(work.scratch, link)
+        else {
+            return;
+        };
         let (mut flags, health) = work.decode(sensor, Some(start_us), link, decoder);
         let sent = sensor.configuration.confidence;
         let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
