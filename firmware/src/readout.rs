@@ -16,11 +16,13 @@ mod baseline;
 mod rows;
 mod columns;
 mod scanner;
+mod passes;
 #[cfg(test)]
 mod tests;
 
 pub use baseline::Baseline;
 pub use columns::{Mcp3208s, MultiplexedAdc, OnChipAdc, SampleError};
+pub use passes::{PassScanner, Sequencer, SequencerFault, add_samples};
 pub use rows::{DirectPins, DriveError, Multiplexer4051, ShiftRegister595};
 pub use scanner::Scanner;
 

@@ -124,6 +124,7 @@ pub fn exercise() {
         idle_samples: opaque(true),
         settling_us: timing::settling_us(time_constant_ns, opaque(12)),
         oversampling: opaque(2),
+        pass_samples: u16::MAX,
         sample_ns: timing::spi_transfer_ns(opaque(3), opaque(1_000_000)),
         reading_ns: opaque(1_000),
         row_ns: opaque(5_000),
