@@ -59,6 +59,8 @@ def session(make, files):
     expect(busy_s <= most_s, f"erasing and writing take {busy_s:.2f} s")
     said = bench.host_sim("check", "press", "--model", files.model, "-n", files.frames)
     expect(f"{files.frames} of {files.frames} bit-identical" in said, "it does not decode as the host")
+    filtered = bench.host_sim("check", "press", "--model", files.model, "-n", 10, "--filter-ms", 5, "--period-ms", 1)
+    expect("10 of 10 bit-identical" in filtered, "it does not filter as the host")
     bench.host_sim("baseline", "-n", 10, "-o", files.directory / "baseline.csv")
     check_baseline(bench, files.directory / "baseline.csv", 8 * 18)
     check_scan_time(bench, files.model)
