@@ -260,6 +260,12 @@ impl Experiment {
         }
     }
 
+    /// Synthesis of the scene's frames, with the noise that is left in the mean of so many samples a reading.
+    pub fn synthesis(&self, samples_averaged: usize) -> Synthesis<'_> {
+        let level = self.world.noise.level / (samples_averaged as f64).sqrt();
+        Synthesis::new(&self.world).noise_level(level)
+    }
+
     /// Measure for errors of the scene's outputs.
     pub fn measure(&self) -> Measure {
         Measure {

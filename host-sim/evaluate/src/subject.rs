@@ -8,7 +8,6 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::{Options, Origin};
 use taxel_limit::Refusal;
-use taxel_simulate::Synthesis;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::path::Path;
 
@@ -135,18 +134,10 @@ impl Subject {
         }
     }
 
-    /// Synthesis of a scene's frames, with the noise that is left in the mean of so many samples a reading.
-    fn synthesis(scene: &Experiment, samples_averaged: usize) -> Synthesis<'_> {
-        let level = scene.world.noise.level / (samples_averaged as f64).sqrt();
-        Synthesis::new(&scene.world).noise_level(level)
-    }
-
     /// Frames to train on, whose readings are means of so many samples. Measurements are as they are.
     pub fn training_set(&self, samples_averaged: usize) -> TrainingSet<'_> {
         match self {
-            Self::Scene(scene) => {
-                TrainingSet::of_scene(scene, Self::synthesis(scene, samples_averaged))
-            }
+            Self::Scene(scene) => TrainingSet::of_scene(scene, scene.synthesis(samples_averaged)),
             Self::Measured(data) => {
                 let mut set = TrainingSet::of_folds(&data.training, &data.fold_of, data.origin());
                 (set.refine, set.confidence) = (data.refine, data.confidence);
@@ -160,7 +151,7 @@ impl Subject {
     pub fn sets(&self, samples_averaged: usize) -> (TrainingSet<'_>, Cow<'_, Dataset>) {
         let test = match self {
             Self::Scene(scene) => {
-                let synthesis = Self::synthesis(scene, samples_averaged);
+                let synthesis = scene.synthesis(samples_averaged);
                 let frames = scene.training.test_frames;
                 Cow::Owned(scene.dataset(&synthesis, Stream::Test, frames))
             }

@@ -28,6 +28,7 @@ use crate::question::directions::{self, DirectionsResult, INVERTED, INVERTED_DAM
 use crate::question::drift::{self, DriftResult, Line, TYPICAL_GAIN};
 use crate::question::equations::{self, EquationsResult, RowWire};
 use crate::question::map::{self, MapStudy};
+use crate::question::rate::{self, RateStudy};
 use crate::question::readout::{self, ReadoutResult};
 use crate::question::recursion::{
     self, DIVERGED, FORGETTING_FACTORS, INITIAL_COVARIANCES, KINDS, Outcome,
@@ -181,6 +182,19 @@ pub enum Question {
         #[arg(long, value_name = "FILE")]
         model: Option<PathBuf>,
     },
+    /// Error against the rate of frames, for both readouts of the board, by samples a reading.
+    ///
+    /// Trains the scene's model for the noise that is left in the mean of so many samples, and judges it on still contacts, and
+    /// on moving ones by the newest finished estimate, without a filter and behind one (docs/rate.md).
+    #[command(after_help = "Example: cargo xtask study rate moving -o rate.svg")]
+    Rate {
+        #[command(flatten)]
+        scene: SceneArgument,
+        #[command(flatten)]
+        noise: NoiseArgument,
+        #[command(flatten)]
+        picture: Picture,
+    },
     Reconstruct(reconstruct::Arguments),
 }
 
@@ -238,6 +252,7 @@ impl Question {
             Self::Drift { .. } => "drift",
             Self::Readout { .. } => "readout",
             Self::Confidence { .. } => "confidence",
+            Self::Rate { .. } => "study rate",
             Self::Reconstruct(_) => "study reconstruct",
         }
     }
@@ -318,6 +333,14 @@ impl Question {
                     message: "this model has no confidence: train it with --confidence".into(),
                 })?;
                 show(common, &found, confidence_page)
+            }
+            Self::Rate { scene, noise, picture } => {
+                picture.check(scene.path())?;
+                let mut scene = scene.load(common)?;
+                noise.apply(&mut scene)?;
+                let study = rate::measure(&scene, &progress)?;
+                picture.write(|| picture::rate_svg(&study))?;
+                show(common, &study, rate_page)
             }
             Self::Reconstruct(arguments) => reconstruct::answer(arguments, common),
         }
@@ -734,4 +757,22 @@ fn confidence_page(found: &Confidence, page: &mut Page) {
         vec![it.anomaly.clone(), it.frames.to_string(), format!("{:.2}", it.percent_novel)]
     });
     table(page, &["frames with", "frames", "novel, %"], line);
+}
+
+fn rate_page(study: &RateStudy, page: &mut Page) {
+    page.line(format_args!(
+        "{}, seed {}: RMSE of {} in {}; moving: of the newest finished estimate against the truth at that moment",
+        study.subject, study.seed, study.group, study.unit
+    ));
+    let lines = study.lines.iter().map(|line| {
+        let filter = line.filter.map_or("-".into(), |filter| {
+            format!("{:.1} ms, {:.1} ahead", filter.time_constant_ms, filter.lead_ms)
+        });
+        let times = [format!("{:.1}", line.frames_per_s), format!("{:.2}", line.age_ms)];
+        let errors = [line.still, line.moving, line.filtered].map(figure);
+        let first = [line.readout.image().to_owned(), line.samples_averaged.to_string()];
+        [&first[..], &times, &errors, &[filter]].concat()
+    });
+    let head = ["image", "samples", "frames/s", "age, ms", "still", "moving", "filtered", "filter"];
+    table(page, &head, lines);
 }

@@ -8,3 +8,4 @@ pub mod recursion;
 pub mod drift;
 pub mod readout;
 pub mod confidence;
+pub mod rate;
