@@ -21,6 +21,7 @@ pub mod table;
 pub mod dataset;
 pub mod clock;
 pub mod rest;
+pub mod spectrum;
 
 pub use elementary::{exp, ln, normal_share_below, sin_cos};
 pub use error::{BadValue, Error, Result};

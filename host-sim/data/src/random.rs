@@ -49,6 +49,10 @@ pub enum Purpose {
     Setup = 14,
     /// The path of a contact.
     Path = 15,
+    /// Noise with a memory on one row's readings.
+    CorrelatedNoise = 16,
+    /// What is left of such noise in the baseline of one session.
+    CorrelatedBaseline = 17,
 }
 
 /// Set of frames that draws are for. Training and test frames are independent.

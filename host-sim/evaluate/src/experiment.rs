@@ -19,7 +19,7 @@ use taxel_learn::train::stream::Pieces;
 use taxel_learn::train::{FreshFrames, Recursive, Solver, Widths, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::{Reference, Refusal};
-use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::noise::{Noise, NoiseKind};
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::world::check_noise_level;
@@ -253,17 +253,11 @@ impl Experiment {
         Origin {
             name: self.name.clone(),
             digest: self.digest,
-            noise: (kind, noise.level),
+            noise: (kind, noise.total_level()),
             seed: self.world.seed,
             thickness_mm: Some(self.world.sensor.size_mm[2]),
             full_scale: self.full_scales(),
         }
-    }
-
-    /// Synthesis of the scene's frames, with the noise that is left in the mean of so many samples a reading.
-    pub fn synthesis(&self, samples_averaged: usize) -> Synthesis<'_> {
-        let level = self.world.noise.level / (samples_averaged as f64).sqrt();
-        Synthesis::new(&self.world).noise_level(level)
     }
 
     /// Measure for errors of the scene's outputs.
@@ -275,18 +269,18 @@ impl Experiment {
         }
     }
 
-    /// Measure for errors of the scene's outputs, and of their ratio to the limit at `noise_level`: that of all
+    /// Measure for errors of the scene's outputs, and of their ratio to the limit with this `noise`: that of all
     /// readings of a frame. Ratios are formed on the first of so many `test_frames`.
     ///
     /// Where the limit is refused, its summary says why and there are no ratios.
     pub fn measure_beside_limit(
         &self,
-        noise_level: f64,
+        noise: Noise,
         test_frames: usize,
         progress: &dyn Progress,
     ) -> (Measure, LimitSummary) {
         let mut world = self.world.clone();
-        world.noise.level = noise_level;
+        world.noise = noise;
         if self.is_forward() {
             let noise_ohm = noise_ohm(&world, test_frames);
             return (self.measure(), LimitSummary::new(&Err(Refusal::OwnNoise { noise_ohm })));

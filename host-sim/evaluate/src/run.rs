@@ -155,13 +155,13 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<(RunResult, ModelBlob)> {
     progress.stage("read or synthesise", 1);
-    let (training, test) = subject.sets(1);
+    let (training, test) = subject.sets(None);
     progress.step();
 
     let blob = training.blob(options, progress)?;
     let network = blob.prepare(Exponential::default()).of_inputs();
 
-    let (measure, limit) = subject.measure(1, progress);
+    let (measure, limit) = subject.measure(None, progress);
     progress.stage("decode and evaluate", 1);
     let baselines: Vec<Box<dyn Decoder>> =
         BASELINES.iter().map(|b| b.fit(&training.frames)).collect();
@@ -291,7 +291,7 @@ fn scene_summary(scene: &Experiment, shown: &Distribution) -> SceneSummary {
     let world = &scene.world;
     SceneSummary {
         noise_kind: world.noise.kind.name().into(),
-        noise_level: world.noise.level,
+        noise_level: world.noise.total_level(),
         gain_drift: world.drift.map_or(0.0, |drift| drift.gain),
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,

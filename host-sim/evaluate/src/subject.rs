@@ -8,6 +8,8 @@ use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_learn::{Options, Origin};
 use taxel_limit::Refusal;
+use taxel_simulate::Synthesis;
+use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::path::Path;
 
@@ -134,10 +136,20 @@ impl Subject {
         }
     }
 
-    /// Frames to train on, whose readings are means of so many samples. Measurements are as they are.
-    pub fn training_set(&self, samples_averaged: usize) -> TrainingSet<'_> {
+    /// Noise of a scene's readings that are means of so many samples, one every `spacing_s`; `None` for measurements.
+    pub fn noise_averaged(&self, samples: usize, spacing_s: f64) -> Option<Noise> {
+        Some(self.scene()?.world.noise.averaged(samples, spacing_s))
+    }
+
+    /// Synthesis of a scene's frames, with this noise or its own.
+    fn synthesis(scene: &Experiment, noise: Option<Noise>) -> Synthesis<'_> {
+        Synthesis::new(&scene.world).noise(noise.unwrap_or(scene.world.noise))
+    }
+
+    /// Frames to train on, with this `noise` or the scene's own. Measurements are as they are.
+    pub fn training_set(&self, noise: Option<Noise>) -> TrainingSet<'_> {
         match self {
-            Self::Scene(scene) => TrainingSet::of_scene(scene, scene.synthesis(samples_averaged)),
+            Self::Scene(scene) => TrainingSet::of_scene(scene, Self::synthesis(scene, noise)),
             Self::Measured(data) => {
                 let mut set = TrainingSet::of_folds(&data.training, &data.fold_of, data.origin());
                 (set.refine, set.confidence) = (data.refine, data.confidence);
@@ -146,31 +158,30 @@ impl Subject {
         }
     }
 
-    /// Frames to train on, and those to judge by, whose readings are means of so many samples. Measurements are as they
-    /// are.
-    pub fn sets(&self, samples_averaged: usize) -> (TrainingSet<'_>, Cow<'_, Dataset>) {
+    /// Frames to train on, and those to judge by, with this `noise` or the scene's own. Measurements are as they are.
+    pub fn sets(&self, noise: Option<Noise>) -> (TrainingSet<'_>, Cow<'_, Dataset>) {
         let test = match self {
             Self::Scene(scene) => {
-                let synthesis = scene.synthesis(samples_averaged);
+                let synthesis = Self::synthesis(scene, noise);
                 let frames = scene.training.test_frames;
                 Cow::Owned(scene.dataset(&synthesis, Stream::Test, frames))
             }
             Self::Measured(data) => Cow::Borrowed(&data.test),
         };
-        (self.training_set(samples_averaged), test)
+        (self.training_set(noise), test)
     }
 
-    /// Measure for errors on the test frames, with the limit at so many samples a reading where it is known, and a
+    /// Measure for errors on the test frames, with the limit at this `noise` or the scene's own where it is known, and a
     /// summary of that limit or the reason why there is none.
     pub fn measure(
         &self,
-        samples_averaged: usize,
+        noise: Option<Noise>,
         progress: &dyn Progress,
     ) -> (Measure, LimitSummary) {
         match self {
             Self::Scene(scene) => {
-                let level = scene.world.noise.level / (samples_averaged as f64).sqrt();
-                scene.measure_beside_limit(level, scene.training.test_frames, progress)
+                let noise = noise.unwrap_or(scene.world.noise);
+                scene.measure_beside_limit(noise, scene.training.test_frames, progress)
             }
             Self::Measured(data) => (data.measure(), LimitSummary::new(&Err(Refusal::Measured))),
         }

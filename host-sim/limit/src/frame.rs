@@ -86,7 +86,7 @@ impl Rows<'_> {
             #[inline(always)]
             || {
                 if self.deviation_ohm.is_empty() {
-                    of_relative_noise(self.world.noise.level, readings_ohm, ideal_ohm)
+                    of_relative_noise(self.world.noise.total_level(), readings_ohm, ideal_ohm)
                 } else {
                     of_absolute_noise(self.deviation_ohm, readings_ohm, ideal_ohm)
                 }

@@ -109,7 +109,7 @@ pub fn observability(
     prior: &Prior,
     row_wires: &[usize],
 ) -> Result<Observability, Refusal> {
-    if world.noise.level <= 0.0 {
+    if world.noise.is_none() {
         return Err(Refusal::NoNoise);
     }
     let sensor = &world.sensor;
@@ -136,7 +136,8 @@ pub fn observability(
             }
             // Standard deviation of ln R.
             let span_ohm = spans_ohm.get(place * columns + k);
-            let deviation = world.noise.level * span_ohm.map_or(1.0, |span| span / resistance);
+            let deviation =
+                world.noise.total_level() * span_ohm.map_or(1.0, |span| span / resistance);
             precisions.push(1.0 / deviation);
         }
     }

@@ -24,7 +24,7 @@ const PRIOR_SAMPLES: usize = 16_384;
 /// Decoder with the least possible mean square error: the posterior mean of a world's own prior and noise.
 ///
 /// It knows the sensor's equations, how electrodes move, and the noise: what a trained decoder has to find out. It
-/// models ideal readings with the world's white noise, which is what [`Synthesis`] draws; circuits of a readout are
+/// models ideal readings with the world's noise, of which a still frame has both parts at once, and which is what [`Synthesis`] draws; circuits of a readout are
 /// no part of it. It is slow: about 10 ms a frame of one contact.
 #[derive(Debug, Clone)]
 pub struct Limit {
@@ -70,7 +70,7 @@ impl Limit {
         if world.drift.is_some() {
             return Err(Refusal::Drift);
         }
-        if world.noise.level <= 0.0 {
+        if world.noise.is_none() {
             return Err(Refusal::NoNoise);
         }
         let together = if motion.has_independent_rows() { 1 } else { world.read_rows.len() };
@@ -80,7 +80,7 @@ impl Limit {
         }
         let spans_ohm = Synthesis::new(world).noise_span_ohm();
         let deviations_ohm: Vec<f64> =
-            spans_ohm.iter().map(|span| (world.noise.level * span).max(1e-12)).collect();
+            spans_ohm.iter().map(|span| (world.noise.total_level() * span).max(1e-12)).collect();
         let groups = world.read_rows.chunks(together).enumerate().map(|(place, rows)| {
             let readings = together * world.sensor.column_wires;
             let deviation_ohm = if deviations_ohm.is_empty() {

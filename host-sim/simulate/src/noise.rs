@@ -1,15 +1,71 @@
-//! White Gaussian noise on readings.
+//! Gaussian noise on readings: a white part, and a part with a memory.
 
 use serde::Deserialize;
+use taxel_data::exp;
+use taxel_data::spectrum::left_of_mean;
 
-/// White Gaussian noise on the readings, with a standard normal n for every reading of every frame.
+/// Gaussian noise on the readings: a standard normal n for every reading of every frame, and first-order autoregressive
+/// noise of variance 1.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
-    /// Meaning of the level.
+    /// Meaning of the levels.
     pub kind: NoiseKind,
-    /// Noise level p, as a fraction: 0.005 is 0.5 %.
+    /// Level p of the white part, as a fraction: 0.005 is 0.5 %.
     pub level: f64,
+    /// Level of the part with a memory.
+    #[serde(default)]
+    pub correlated_level: f64,
+    /// Time in ms after which the correlation of that part has fallen to 1/e.
+    #[serde(default)]
+    pub time_constant_ms: f64,
+}
+
+impl Noise {
+    /// White noise.
+    pub fn white(kind: NoiseKind, level: f64) -> Self {
+        Self { kind, level, correlated_level: 0.0, time_constant_ms: 0.0 }
+    }
+
+    /// Whether there is no noise.
+    pub fn is_none(&self) -> bool {
+        self.level == 0.0 && self.correlated_level == 0.0
+    }
+
+    /// This noise with a white part of another level.
+    #[must_use]
+    pub fn with_level(self, level: f64) -> Self {
+        Self { level, ..self }
+    }
+
+    /// Level of both parts together: that of a single reading.
+    pub fn total_level(&self) -> f64 {
+        if self.correlated_level == 0.0 {
+            return self.level;
+        }
+        (self.level * self.level + self.correlated_level * self.correlated_level).sqrt()
+    }
+
+    /// Correlation of the part with a memory after so long.
+    pub fn correlation(&self, after_s: f64) -> f64 {
+        if self.time_constant_ms > 0.0 {
+            exp(-1000.0 * after_s / self.time_constant_ms)
+        } else {
+            0.0
+        }
+    }
+
+    /// Noise of means of so many `samples`, one every `spacing_s`: white noise falls with the root of their number, the
+    /// other part by the exact variance of such means. Its time constant is kept: a mean changes as slowly.
+    #[must_use]
+    pub fn averaged(self, samples: usize, spacing_s: f64) -> Self {
+        let left = left_of_mean(samples, self.correlation(spacing_s));
+        Self {
+            level: self.level / (samples as f64).sqrt(),
+            correlated_level: self.correlated_level * left.sqrt(),
+            ..self
+        }
+    }
 }
 
 /// Meaning of a noise level p, for a standard normal n.
@@ -29,5 +85,29 @@ impl NoiseKind {
             Self::Relative => "relative",
             Self::Span => "span",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn averaging_lowers_white_noise_by_the_root_and_the_rest_by_its_memory() {
+        let noise = Noise {
+            correlated_level: 0.03,
+            time_constant_ms: 20.0,
+            ..Noise::white(NoiseKind::Relative, 0.04)
+        };
+        assert!((noise.total_level() - 0.05).abs() < 1e-15);
+        assert_eq!(noise.averaged(1, 0.001), noise);
+        let close = noise.averaged(16, 36e-6);
+        assert_eq!(close.level, 0.01);
+        // Samples within 0.6 ms share their noise: its variance falls by a third of their span over τ.
+        let expected = 0.03 * (1.0 - 15.0 * 36e-6 / 0.02 / 3.0_f64).sqrt();
+        assert!((close.correlated_level / expected - 1.0).abs() < 1e-3, "{close:?}");
+        let apart = noise.averaged(16, 1.0);
+        assert!((apart.correlated_level - 0.03 / 4.0).abs() < 1e-9, "{apart:?}");
+        assert_eq!(Noise::white(NoiseKind::Span, 0.1).averaged(4, 1.0).total_level(), 0.05);
     }
 }

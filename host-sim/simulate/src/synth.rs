@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use firmware::timing::ScanPlan;
 use rayon::prelude::*;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::{Purpose, Stream};
@@ -68,17 +69,25 @@ impl<'w> Synthesis<'w> {
         self.world
     }
 
-    /// Replaces the noise level, a fraction (0.005 is 0.5 %).
+    /// Replaces the level of the white noise, a fraction (0.005 is 0.5 %).
     #[must_use]
-    pub fn noise_level(mut self, level: f64) -> Self {
-        self.noise.level = level;
+    pub fn noise_level(self, level: f64) -> Self {
+        let noise = self.noise.with_level(level);
+        self.noise(noise)
+    }
+
+    /// Replaces the noise.
+    #[must_use]
+    pub fn noise(mut self, noise: Noise) -> Self {
+        self.noise = noise;
         self
     }
 
     /// Leaves out the noise on readings.
     #[must_use]
     pub fn ideal(self) -> Self {
-        self.noise_level(0.0)
+        let kind = self.noise.kind;
+        self.noise(Noise::white(kind, 0.0))
     }
 
     /// Replaces the drift of the gain; `None` for no drift.
@@ -181,8 +190,8 @@ impl<'w> Synthesis<'w> {
     /// frame, in Ω. A session is a trajectory.
     ///
     /// A baseline is what a user captures before the session: the mean of so many `averaged` frames of the untouched
-    /// sensor. It has the session's drift, and what averaging leaves of the white noise: the noise level over the
-    /// square root of that number, with draws of its own.
+    /// sensor. It has the session's drift, and what averaging [leaves](Noise::averaged) of the noise, with draws of its
+    /// own. Frames follow one another as scans do, or as the board scans.
     pub fn baselines(&self, stream: Stream, frames: usize, averaged: usize) -> Table {
         self.baselines_from(stream, 0, frames, averaged)
     }
@@ -198,7 +207,12 @@ impl<'w> Synthesis<'w> {
     ) -> Table {
         let steps = self.steps();
         let mut at_rest = self.clone().untouched().timed(Timetable::still());
-        at_rest.noise.level /= (averaged as f64).sqrt();
+        let (rows, columns) = (self.read_rows.len() as u16, self.world.sensor.column_wires as u16);
+        let spacing_s = match steps {
+            1 => f64::from(ScanPlan::of_nucleo(rows, columns, 1).scan_us()) * 1e-6,
+            _ => self.timetable.since_last_s(1),
+        };
+        at_rest.noise = at_rest.noise.averaged(averaged, spacing_s);
         at_rest.noise_purpose = Purpose::Baseline;
         let sessions = at_rest.frames_from(stream, first, frames.div_ceil(steps)).inputs;
         if steps == 1 {
@@ -221,7 +235,7 @@ impl<'w> Synthesis<'w> {
 
     /// Span in Ω of every channel over the world, if its noise is relative to the span; otherwise empty.
     pub fn noise_span_ohm(&self) -> Vec<f64> {
-        if self.noise.kind == NoiseKind::Relative || self.noise.level == 0.0 {
+        if self.noise.kind == NoiseKind::Relative || self.noise.is_none() {
             return Vec::new();
         }
         let motion = Cow::Borrowed(&self.world.motion);

@@ -54,7 +54,7 @@ impl World {
             motion: motion.into(),
             path: None,
             rubber: rubber::Kind::default(),
-            noise: Noise { kind: NoiseKind::Relative, level: 0.005 },
+            noise: Noise::white(NoiseKind::Relative, 0.005),
             drift: None,
             read_rows: (0..sensor.row_wires).collect(),
             readout: Readout::default(),
@@ -131,7 +131,7 @@ impl World {
         sensor(&self.sensor)?;
         motion(self)?;
         self.path.as_ref().map_or(Ok(()), |path| self.check_path(path))?;
-        check_noise_level("noise.level", self.noise.level)?;
+        noise(&self.noise)?;
         self.drift.map_or(Ok(()), |drift| check_gain("drift.gain", drift.gain))?;
         rows(self)?;
         readout(&self.readout)?;
@@ -176,6 +176,20 @@ impl World {
 pub fn check_noise_level(field: &str, level: f64) -> Check {
     require((0.0..=1.0).contains(&level), field, level, || {
         "it is a fraction from 0 to 1 (0.005 is 0.5 %)".into()
+    })
+}
+
+fn noise(noise: &Noise) -> Check {
+    check_noise_level("noise.level", noise.level)?;
+    check_noise_level("noise.correlated_level", noise.correlated_level)?;
+    let (field, time_constant_ms) = ("noise.time_constant_ms", noise.time_constant_ms);
+    if noise.correlated_level == 0.0 {
+        return require(time_constant_ms == 0.0, field, time_constant_ms, || {
+            "white noise has none: give noise.correlated_level too, or leave it out".into()
+        });
+    }
+    require((1e-6..=MOST).contains(&time_constant_ms), field, time_constant_ms, || {
+        format!("noise with a correlated_level has one, from 1e-6 to {MOST:e} ms")
     })
 }
 

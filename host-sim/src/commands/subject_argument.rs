@@ -145,7 +145,7 @@ impl SubjectOptions {
 /// Loads the blob at `path`, whose columns must be those of `subject`; without a path, trains its model.
 pub fn model(path: Option<&Path>, subject: &Subject, progress: &dyn Progress) -> Result<ModelBlob> {
     let Some(path) = path else {
-        return subject.training_set(1).blob(&subject.options(), progress);
+        return subject.training_set(None).blob(&subject.options(), progress);
     };
     let data = match subject {
         Subject::Scene(scene) => return scene_argument::model(Some(path), scene, progress),

@@ -152,7 +152,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     refused_readings::note_scene(&subject);
     let mut options = arguments.model.over(subject.options());
     options.solver = recursion.as_ref().map_or(options.solver, recursion::Plan::solver);
-    let mut set = subject.training_set(1);
+    let mut set = subject.training_set(None);
     set.fill |= arguments.fill;
     if set.fill {
         fill::check(&set.frames)?;

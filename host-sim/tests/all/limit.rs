@@ -96,7 +96,7 @@ fn errors_are_given_beside_the_limit_and_its_own_ratio_is_one() {
     let mut experiment = Experiment::load("press").unwrap();
     experiment.world.read_rows = vec![3, 4];
     let world = &experiment.world;
-    let (measure, summary) = experiment.measure_beside_limit(world.noise.level, 60, &Silent);
+    let (measure, summary) = experiment.measure_beside_limit(world.noise, 60, &Silent);
     assert_eq!((summary.frames, summary.refused.as_ref()), (60, None));
     let test = Synthesis::new(world).frames(Stream::Test, 60);
     let training = Synthesis::new(world).frames(Stream::Training, 2000);

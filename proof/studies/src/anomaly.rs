@@ -236,7 +236,7 @@ mod tests {
     use taxel_simulate::noise::Noise;
 
     fn ideal() -> World {
-        let noise = Noise { kind: NoiseKind::Relative, level: 0.0 };
+        let noise = Noise::white(NoiseKind::Relative, 0.0);
         World { noise, ..World::press() }
     }
 

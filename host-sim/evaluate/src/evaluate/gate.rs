@@ -61,7 +61,7 @@ pub fn check_noise(world: &World) -> Result<(), BadValue> {
         let rule = "the gate's tolerance is relative to each reading; use a scene with noise.kind = \"relative\"";
         return Err(BadValue::new("noise.kind", "\"span\"", rule));
     }
-    if world.noise.level <= 0.0 {
+    if world.noise.is_none() {
         let rule = "the gate's tolerance is k times it; give a positive one, such as 0.005";
         return Err(BadValue::new("noise level", 0, rule));
     }
@@ -71,7 +71,7 @@ pub fn check_noise(world: &World) -> Result<(), BadValue> {
 /// Checks that tolerances `k`, in standard deviations of a reading's noise, make gates for `world`.
 pub fn check(world: &World, k: &[f64]) -> Result<(), BadValue> {
     check_noise(world)?;
-    check_tolerances(world.noise.level, k)
+    check_tolerances(world.noise.total_level(), k)
 }
 
 /// Checks tolerances `k`, in standard deviations of a reading's relative noise `level`.

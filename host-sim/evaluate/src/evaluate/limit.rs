@@ -183,7 +183,7 @@ fn level(
     let measure = Measure { limit: all.ok(), ..experiment.measure() };
     let decoders = plan.models.iter().map(|model| judge(model, experiment, frames, &measure));
     let decoders = decoders.collect();
-    Ok(Level { noise_level: world.noise.level, limits, decoders, observability, by_row })
+    Ok(Level { noise_level: world.noise.total_level(), limits, decoders, observability, by_row })
 }
 
 /// Errors of a model on the experiment's first test frames.

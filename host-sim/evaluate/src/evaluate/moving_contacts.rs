@@ -73,6 +73,14 @@ impl MovingContacts {
     }
 }
 
+/// Synthesis of frames of `scene` that a `device` scans, with what averaging so many `samples` a reading leaves of the noise.
+pub fn scanned(scene: &Experiment, device: Device, samples: usize) -> Synthesis<'_> {
+    let world = &scene.world;
+    let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
+    let noise = world.noise.averaged(samples, device.sample_spacing_s(Some(wires)));
+    Synthesis::new(world).noise(noise)
+}
+
 /// Errors of the model in `blob` on the moving contacts of `scene`, without a filter and behind one, on a `device` that
 /// averages so many `samples` a reading.
 ///
@@ -88,7 +96,7 @@ pub fn on_device(
         let rule = "a scene whose contacts do not move has no such errors; add [motion]";
         return Err(BadValue::new("motion", "none", rule).into());
     };
-    let synthesis = scene.synthesis(samples);
+    let synthesis = scanned(scene, device, samples);
     Ok(Judged::new(scene, synthesis, path, blob, device, samples)?.ways)
 }
 

@@ -120,7 +120,14 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
             (training.clone(), (experiment.measure(), no_limit_on_training()))
         } else {
             let test = experiment.dataset(&frames, Stream::Test, settings.test_frames);
-            (test, experiment.measure_beside_limit(level, settings.test_frames, progress))
+            (
+                test,
+                experiment.measure_beside_limit(
+                    experiment.world.noise.with_level(level),
+                    settings.test_frames,
+                    progress,
+                ),
+            )
         };
         progress.stage(&format!("table 1, noise {level}"), experiment.world.read_rows.len());
         let decoders = decoders(settings, experiment.world.seed, &training, progress)?;

@@ -57,7 +57,7 @@ pub struct Plan {
     /// Numbers of components that a network for the whole array may compute, which are expanded to its outputs. There
     /// are always points that compute all outputs as well.
     pub output_ranks: Vec<usize>,
-    /// Numbers of samples averaged for each reading: white noise falls with the square root.
+    /// Numbers of samples averaged for each reading: white noise falls with the square root, noise with a memory hardly.
     pub samples_averaged: Vec<usize>,
     /// Steps from one column-wire that is read to the next: 1 reads all. Only scenes have others than 1.
     pub column_steps: Vec<usize>,
@@ -216,7 +216,9 @@ impl Trade {
     /// Tolerance for the configuration of a device, relative to each reading, for a point behind a gate.
     pub fn rest_tolerance(&self, point: usize) -> Option<f64> {
         let point = &self.points[point];
-        point.gate_k.map(|k| k * self.noise_level / (point.samples_averaged as f64).sqrt())
+        let same = |readings: &&Readings| readings.samples_averaged == point.samples_averaged;
+        let readings = self.readings.iter().find(same)?;
+        point.gate_k.map(|k| k * readings.noise_level)
     }
 }
 
@@ -267,9 +269,10 @@ pub fn compute(
     possible(&vec![0.0; frames.len()])?;
     let measures: Vec<(Measure, LimitSummary)> = each
         .clone()
-        .map(|(subject, samples)| match subject.moving_scene() {
+        .zip(&frames)
+        .map(|((subject, _), frames)| match subject.moving_scene() {
             Some((scene, _)) => (scene.measure(), LimitSummary::new(&Err(Refusal::Moving))),
-            None => subject.measure(samples, progress),
+            None => subject.measure(frames.noise, progress),
         })
         .collect();
     let least = |limit| least_error(limit, group).map_or(0.0, |[limit, se]| limit - CERTAIN * se);
@@ -298,7 +301,7 @@ pub fn compute(
         subject: subject.name().into(),
         seed: subject.origin().seed,
         noise_level: match subject {
-            Subject::Scene(scene) => scene.world.noise.level,
+            Subject::Scene(scene) => scene.world.noise.total_level(),
             Subject::Measured(data) => data.noise_level().unwrap_or(0.0),
         },
         training_frames: subject.training_frames(),

@@ -1,7 +1,7 @@
 //! Synthesis of some trajectories, one a lane: drawn, computed, disturbed, and laid out frame after
 //! frame.
 
-use taxel_data::random::{RandomLanes, Stream};
+use taxel_data::random::{Purpose, RandomLanes, Stream};
 use taxel_data::simd::{self, LANES, Lanes};
 
 use super::Synthesis;
@@ -32,6 +32,8 @@ pub(super) struct Workspace {
     resistance_ohm: Vec<Lanes>,
     /// Factor on all readings of each trajectory, if the gain drifts.
     gain: Option<Lanes>,
+    /// Noise with a memory on every reading of a scan, of variance 1; empty if there is none.
+    correlated: Vec<Lanes>,
     scratch: Scratch,
 }
 
@@ -64,6 +66,10 @@ impl<'s> LaneSynthesis<'s> {
             deformation_mm: vec![[[0.0; LANES]; 3]; sensor.electrodes_per_row_wire],
             resistance_ohm: vec![[0.0; LANES]; sensor.column_wires],
             gain: None,
+            correlated: match self.synthesis.noise.correlated_level {
+                0.0 => Vec::new(),
+                _ => vec![[0.0; LANES]; self.synthesis.read_rows.len() * sensor.column_wires],
+            },
             scratch: Scratch::default(),
         }
     }
@@ -128,7 +134,7 @@ impl<'s> LaneSynthesis<'s> {
         let Synthesis { world, read_rows, .. } = self.synthesis;
         let (steps, rows) = (self.synthesis.steps(), read_rows.len());
         let columns = world.sensor.column_wires;
-        let Workspace { deformation_mm, resistance_ohm, gain, scratch } = workspace;
+        let Workspace { deformation_mm, resistance_ohm, gain, correlated, scratch } = workspace;
         let precision = world.precision;
         self.model.row_column_resistance_ohm(
             row,
@@ -137,7 +143,11 @@ impl<'s> LaneSynthesis<'s> {
             scratch,
             resistance_ohm,
         );
+        let ideal_ohm = if correlated.is_empty() { Vec::new() } else { resistance_ohm.clone() };
         self.disturb((place, row), (first, step), resistance_ohm);
+        if let Some(states) = correlated.get_mut(place * columns..(place + 1) * columns) {
+            self.add_correlated((place, row), (first, step), (states, &ideal_ohm), resistance_ohm);
+        }
         if let Some(gain) = gain {
             for readings in resistance_ohm.iter_mut() {
                 readings.iter_mut().zip(&*gain).for_each(|(reading, gain)| *reading *= gain);
@@ -189,7 +199,7 @@ impl<'s> LaneSynthesis<'s> {
         }
     }
 
-    /// Adds noise to the readings of one row at one step.
+    /// Adds white noise to the readings of one row at one step.
     #[inline(always)]
     fn disturb(
         &self,
@@ -215,6 +225,39 @@ impl<'s> LaneSynthesis<'s> {
                 for (reading, normal) in readings.iter_mut().zip(normals) {
                     *reading += level * span.unwrap_or(reading) * normal;
                 }
+            }
+        }
+    }
+
+    /// Adds noise with a memory to the readings of one row at one step. Its `states` start stationary, and run from scan to
+    /// scan with the correlation that the time between them leaves.
+    fn add_correlated(
+        &self,
+        (place, row): (usize, usize),
+        (first, step): (usize, usize),
+        (states, ideal_ohm): (&mut [Lanes], &[Lanes]),
+        resistance_ohm: &mut [Lanes],
+    ) {
+        let Synthesis { world, noise, noise_purpose, timetable, .. } = self.synthesis;
+        let purpose = match noise_purpose {
+            Purpose::Baseline => Purpose::CorrelatedBaseline,
+            _ => Purpose::CorrelatedNoise,
+        };
+        let decay = if step == 0 { 0.0 } else { noise.correlation(timetable.since_last_s(step)) };
+        let (level, fresh) = (noise.correlated_level, (1.0 - decay * decay).sqrt());
+        let steps = self.synthesis.steps();
+        let mut random = RandomLanes::every(first * steps + step, steps);
+        random.start(world.seed, self.stream, purpose, row as u64);
+        let mut normals = [[0.0; LANES]; 2];
+        for (column, (state, readings)) in states.iter_mut().zip(resistance_ohm).enumerate() {
+            if column % 2 == 0 {
+                let [even, odd] = &mut normals;
+                random.normal_pair(even, odd);
+            }
+            let span = self.span_ohm.get(place * world.sensor.column_wires + column);
+            for (lane, reading) in readings.iter_mut().enumerate() {
+                state[lane] = decay * state[lane] + fresh * normals[column % 2][lane];
+                *reading += level * span.unwrap_or(&ideal_ohm[column][lane]) * state[lane];
             }
         }
     }

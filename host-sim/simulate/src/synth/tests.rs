@@ -1,4 +1,5 @@
 use taxel_data::digest::digest;
+use taxel_data::spectrum::{NoiseColour, Spectrum};
 
 use super::*;
 use crate::outputs::ContactOutput;
@@ -108,7 +109,7 @@ fn a_drifting_gain_multiplies_all_readings_of_a_session_and_its_baseline() {
 fn a_baseline_is_the_untouched_sensor_with_the_noise_that_averaging_leaves() {
     for kind in [NoiseKind::Relative, NoiseKind::Span] {
         let mut world = World { read_rows: vec![3, 4], ..World::press() };
-        world.noise = Noise { kind, level: 0.02 };
+        world.noise = Noise::white(kind, 0.02);
         let (frames, averaged) = (4000, 25);
         let untouched = Synthesis::new(&world).ideal().untouched().frames(Stream::Test, 1).inputs;
         let ideal = Sensor::paper();
@@ -382,4 +383,85 @@ fn the_centre_of_a_contact_that_is_lifted_is_missing() {
     let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
     let there = middle.true_outputs(Stream::Test, 300 * 8);
     assert!(outputs.values.iter().zip(&there.values).all(same));
+}
+
+/// World of `press` with noise of a memory.
+fn remembering(level: f64, correlated_level: f64, time_constant_ms: f64) -> World {
+    let noise =
+        Noise { correlated_level, time_constant_ms, ..Noise::white(NoiseKind::Relative, level) };
+    let world = World { noise, ..World::press() };
+    world.check().unwrap();
+    world
+}
+
+#[test]
+fn noise_with_a_memory_has_the_size_and_the_time_constant_that_it_is_asked_for() {
+    for (level, correlated_level, time_constant_ms) in
+        [(0.0, 0.01, 20.0), (0.005, 0.005, 20.0), (0.005, 0.005, 2.0)]
+    {
+        let world = remembering(level, correlated_level, time_constant_ms);
+        let period_s = 0.1 * time_constant_ms / 1000.0;
+        let times = Timetable::every(period_s, 0.0, 4000.0 * period_s).unwrap();
+        let log = Synthesis::new(&world).untouched().timed(times.clone());
+        let readings = log.frames(Stream::Training, 4000).inputs;
+        let numbers: Vec<usize> = (0..4000).collect();
+        let found = Spectrum::new(&readings, &numbers, Some(&times.starts_s)).unwrap();
+        let tau_ms = 1000.0 * found.time_constant_s.unwrap();
+        assert!((tau_ms / time_constant_ms - 1.0).abs() < 0.1, "{tau_ms}");
+        let [white, correlated] = found.levels.unwrap();
+        assert!((white - level).abs() < 0.0003, "{white}");
+        assert!((correlated / correlated_level - 1.0).abs() < 0.05, "{correlated}");
+        let few = log.frames(Stream::Training, 20).inputs.values;
+        assert_eq!(few, readings.values[..few.len()]);
+    }
+    let white = remembering(0.005, 0.005, 20.0);
+    let white = World { noise: Noise::white(NoiseKind::Relative, 0.005), ..white };
+    let times = Timetable::every(0.002, 0.0, 8.0).unwrap();
+    let log = Synthesis::new(&white).untouched().timed(times);
+    let readings = log.frames(Stream::Training, 4000).inputs;
+    let numbers: Vec<usize> = (0..4000).collect();
+    let found = Spectrum::new(&readings, &numbers, None).unwrap();
+    assert_eq!((found.colour, found.correlated_share), (NoiseColour::White, 0.0));
+}
+
+#[test]
+fn noise_with_a_memory_is_more_variance_on_still_frames_and_hardly_less_in_a_baseline() {
+    let world = remembering(0.003, 0.004, 2000.0);
+    let still = Synthesis::new(&world).untouched();
+    let ideal = still.clone().ideal().frames(Stream::Test, 400).inputs;
+    let squares = |readings: &Table| {
+        let sum: f64 = ratios(readings, &ideal).flatten().map(|it| (it - 1.0).powi(2)).sum();
+        (sum / readings.values.len() as f64).sqrt()
+    };
+    let noisy = still.frames(Stream::Test, 400).inputs;
+    assert!((squares(&noisy) / 0.005 - 1.0).abs() < 0.02, "{}", squares(&noisy));
+    // A hundred scans take 0.56 s.
+    let left = world.noise.averaged(100, 0.005_573).total_level();
+    let baselines = still.baselines(Stream::Test, 400, 100);
+    assert!((0.0036..0.0039).contains(&left), "{left}");
+    assert!((squares(&baselines) / left - 1.0).abs() < 0.02, "{}", squares(&baselines));
+    // Its draws are its own.
+    let together: f64 = ratios(&noisy, &ideal)
+        .flatten()
+        .zip(ratios(&baselines, &ideal).flatten())
+        .map(|(a, b)| (a - 1.0) * (b - 1.0))
+        .sum();
+    assert!(together.abs() / 57_600.0 < 0.05 * 0.005 * left, "{together}");
+}
+
+#[test]
+fn noise_with_half_a_memory_is_refused() {
+    for (level, correlated, time_constant_ms, field) in [
+        (0.005, 1.5, 20.0, "noise.correlated_level = 1.5"),
+        (0.005, 0.01, 0.0, "noise.time_constant_ms = 0"),
+        (0.005, 0.01, f64::INFINITY, "noise.time_constant_ms = inf"),
+        (0.005, 0.0, 20.0, "noise.time_constant_ms = 20"),
+    ] {
+        let mut world = World::press();
+        world.noise.level = level;
+        (world.noise.correlated_level, world.noise.time_constant_ms) =
+            (correlated, time_constant_ms);
+        let refused = world.check().unwrap_err().to_string();
+        assert!(refused.contains(field), "{refused}");
+    }
 }

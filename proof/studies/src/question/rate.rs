@@ -52,7 +52,7 @@ pub fn measure(scene: &Experiment, progress: &dyn Progress) -> Result<RateStudy>
     for (readout, samples) in WAYS {
         for &samples_averaged in samples {
             let device = Device { readout, ..Device::default() };
-            let synthesis = scene.synthesis(samples_averaged);
+            let synthesis = moving_contacts::scanned(scene, device, samples_averaged);
             let set = TrainingSet::of_scene(scene, synthesis.clone());
             let blob = set.blob(&scene.options(), progress)?;
             let model = blob.prepare(Exponential::default()).of_inputs();

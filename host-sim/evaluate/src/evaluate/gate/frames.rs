@@ -52,11 +52,11 @@ impl GateFrames {
         let whole_array = model.model().projection().is_some();
         let touched = frames.frames(Stream::Test, settings.frames);
         let (measure, limit) =
-            experiment.measure_beside_limit(world.noise.level, settings.frames, progress);
+            experiment.measure_beside_limit(world.noise, settings.frames, progress);
         Ok(Self {
             name: experiment.name.clone(),
             seed: world.seed,
-            noise_level: world.noise.level,
+            noise_level: world.noise.total_level(),
             baseline_frames: settings.baseline_frames,
             rows: world.read_rows.len() / rows_of_a_model_row(world),
             gate: Gate::new(&frames, settings.baseline_frames, whole_array, sessions),

@@ -135,6 +135,18 @@ impl Device {
         self.scan_ms.map(|once| once * samples as f64).or(wires.map(of_board))
     }
 
+    /// Time in s between two samples of one reading; 0 if nothing tells it. They are taken one after the other, by on-chip
+    /// converters those of half a row at once.
+    pub fn sample_spacing_s(&self, wires: Option<Wires>) -> f64 {
+        let scan_ms = |samples| self.scan_ms(wires, samples);
+        let of_all = scan_ms(2).zip(scan_ms(1)).map(|(two, one)| (two - one) / 1000.0);
+        let in_turn = |wires: Wires| match self.readout {
+            Readout::Spi => wires.rows * wires.columns,
+            Readout::OnChip => 2 * wires.rows,
+        };
+        wires.zip(of_all).map_or(0.0, |(wires, of_all_s)| of_all_s / in_turn(wires) as f64)
+    }
+
     /// Cycles of a frame with this `cost` in the device's memory.
     pub fn cycles(&self, cost: &Cost) -> u64 {
         match self.memory {

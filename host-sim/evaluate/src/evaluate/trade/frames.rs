@@ -6,6 +6,7 @@ use taxel_data::dataset::Dataset;
 use taxel_learn::Options;
 use taxel_learn::train::projection;
 use taxel_simulate::Synthesis;
+use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
 
 use super::Plan;
@@ -19,8 +20,8 @@ use crate::training_set::TrainingSet;
 /// Training and test frames with one number of samples a reading, and what is trained on them.
 pub(super) struct Frames<'s> {
     pub samples_averaged: usize,
-    /// Noise level of the averaged readings, as a fraction; 0 for measured ones.
-    pub noise_level: f64,
+    /// Noise of the averaged readings; `None` for measured ones.
+    pub noise: Option<Noise>,
     /// Wires that a scan reads; `None` if the readings are not those of wires.
     pub wires: Option<Wires>,
     /// Time of a scan; `None` if it is unknown.
@@ -50,6 +51,11 @@ impl Inputs {
 }
 
 impl<'s> Frames<'s> {
+    /// Noise level of the averaged readings, as a fraction; 0 for measured ones.
+    pub fn noise_level(&self) -> f64 {
+        self.noise.as_ref().map_or(0.0, Noise::total_level)
+    }
+
     /// Frames of a subject with so many samples a reading, and the networks that a plan tries on them.
     pub fn new(
         subject: &'s Subject,
@@ -58,19 +64,20 @@ impl<'s> Frames<'s> {
         group: &str,
     ) -> Result<Self> {
         // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
-        let (level, of_array, wires) = match subject {
+        let (of_array, wires) = match subject {
             Subject::Scene(scene) => {
                 let world = &scene.world;
                 let wires = (world.read_rows.len(), world.sensor.column_wires);
                 let wires = Wires { rows: wires.0, columns: wires.1 };
-                (world.noise.level, matches!(world.outputs, Outputs::Contact(_)), Some(wires))
+                (matches!(world.outputs, Outputs::Contact(_)), Some(wires))
             }
-            Subject::Measured(data) => (0.0, false, Wires::named(&data.training.inputs.names)),
+            Subject::Measured(data) => (false, Wires::named(&data.training.inputs.names)),
         };
-        let noise_level = level / (samples_averaged as f64).sqrt();
-        let (set, test) = subject.sets(samples_averaged);
+        let spacing_s = plan.device.sample_spacing_s(wires);
+        let noise = subject.noise_averaged(samples_averaged, spacing_s);
+        let (set, test) = subject.sets(noise);
         let touches = subject.scene().and_then(|scene| {
-            let synthesis = Synthesis::new(&scene.world).noise_level(noise_level);
+            let synthesis = Synthesis::new(&scene.world).noise(noise?);
             Some(Touches::new(scene, synthesis, scene.world.path?, group))
         });
         let options = subject.options();
@@ -82,22 +89,12 @@ impl<'s> Frames<'s> {
         let inputs = |&whole_array: &bool| {
             let projection =
                 whole_array.then(|| projection::fit(&set.frames, options.features)).transpose()?;
-            let gates = Gates::new(subject, (&test, noise_level), &plan.gate_k, whole_array)?;
+            let gates = Gates::new(subject, (&test, noise), &plan.gate_k, whole_array)?;
             Ok(Inputs { projection, gates })
         };
         let inputs = arrays.iter().map(inputs).collect::<Result<_>>()?;
         let scan_ms = plan.device.scan_ms(wires, samples_averaged);
-        Ok(Self {
-            samples_averaged,
-            noise_level,
-            wires,
-            scan_ms,
-            options,
-            set,
-            touches,
-            test,
-            inputs,
-        })
+        Ok(Self { samples_averaged, noise, wires, scan_ms, options, set, touches, test, inputs })
     }
 
     /// Frames to train on.

@@ -8,6 +8,7 @@ use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::relative;
 use taxel_simulate::Synthesis;
+use taxel_simulate::noise::Noise;
 
 use super::super::gate::{BASELINE_FRAMES, Gate, GateRest, gated, has_sessions, share};
 use crate::subject::Subject;
@@ -30,10 +31,10 @@ pub(super) struct AtRest {
 
 impl Gates {
     /// Gates of rows, or of the whole array, with these tolerances `k`, for the `test` frames of a subject whose readings
-    /// have this noise level.
+    /// have this noise.
     pub fn new(
         subject: &Subject,
-        (test, noise_level): (&Dataset, f64),
+        (test, noise): (&Dataset, Option<Noise>),
         k: &[f64],
         whole_array: bool,
     ) -> Result<Self, BadValue> {
@@ -44,7 +45,8 @@ impl Gates {
         let relative_inputs = test.relative_inputs;
         let (gate, noise_level, readings) = match subject {
             Subject::Scene(scene) => {
-                let synthesis = Synthesis::new(&scene.world).noise_level(noise_level);
+                let noise = noise.unwrap_or(scene.world.noise);
+                let synthesis = Synthesis::new(&scene.world).noise(noise);
                 // The gate compares readings in Ω.
                 let readings = if relative_inputs {
                     Cow::Owned(synthesis.frames(Stream::Test, test.frames()).inputs)
@@ -53,7 +55,7 @@ impl Gates {
                 };
                 let sessions = has_sessions(&scene.world, relative_inputs).then_some(test.frames());
                 let gate = Gate::new(&synthesis, BASELINE_FRAMES, whole_array, sessions);
-                (gate, noise_level, readings)
+                (gate, noise.total_level(), readings)
             }
             Subject::Measured(data) => {
                 let rest = GateRest::new(data, k)?;

@@ -53,7 +53,7 @@ impl Judged {
             let seen = frames.training().frames();
             let trained = Trained { projection: projection.clone(), networks, frames: seen };
             let origin = &frames.set.origin;
-            let noise = (origin.noise.0, frames.noise_level);
+            let noise = (origin.noise.0, frames.noise_level());
             let origin = Origin { noise, ..origin.clone() };
             let blob = pack(&trained, frames.training(), &origin)?;
             // A network that fell back to direct distances is the point of that format.

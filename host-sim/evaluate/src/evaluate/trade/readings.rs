@@ -17,6 +17,8 @@ pub struct Readings {
     /// Numbers of the column-wires (from 1) as a scene's `[readout]` takes them; `None` if all are read.
     pub column_wires: Option<Vec<usize>>,
     pub samples_averaged: usize,
+    /// Noise level of these means, as a fraction; 0 where a measured sensor at rest is not known.
+    pub noise_level: f64,
     /// Least possible errors of a decoder that sees all these readings of a frame.
     pub limit: LimitSummary,
     /// Errors of the baselines, fitted to these readings. On contacts that move, decoding them takes no time.
@@ -49,6 +51,10 @@ impl Readings {
             wires: frames.wires,
             column_wires: chosen.map(|it| it.column_numbers().map(|wire| wire + 1).collect()),
             samples_averaged: frames.samples_averaged,
+            noise_level: match subject {
+                Subject::Scene(_) => frames.noise_level(),
+                Subject::Measured(data) => data.noise_level().unwrap_or(0.0),
+            },
             limit,
             decoders,
         })
