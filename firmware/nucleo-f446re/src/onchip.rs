@@ -7,7 +7,7 @@ mod device {
     use cortex_m_rt::entry;
     use firmware::circuit::ZeroPotential;
     use firmware::readout::PassScanner;
-    use nucleo_f446re::{COLUMNS, LINES, OnChip, run};
+    use nucleo_f446re::{COLUMNS, LINES, OnChip, restart, run};
 
     const _: () = assert!(
         CAPACITY.rows < LINES && CAPACITY.columns <= COLUMNS,
@@ -19,7 +19,9 @@ mod device {
 
     #[entry]
     fn main() -> ! {
-        run(|readout: OnChip| PassScanner::<_, _, LINES, COLUMNS>::new(readout, CIRCUIT))
+        let sums = cortex_m::singleton!(: [[u32; COLUMNS]; LINES] = [[0; COLUMNS]; LINES]);
+        let Some(sums) = sums else { restart() };
+        run(|readout: OnChip| PassScanner::new(readout, CIRCUIT, sums))
     }
 }
 

@@ -556,12 +556,12 @@ impl Sequencer<3> for Rc<RefCell<Table>> {
     }
 }
 
-type Passes = PassScanner<Rc<RefCell<Table>>, ZeroPotential<2, 3>, 3, 3>;
+type Passes = PassScanner<'static, Rc<RefCell<Table>>, ZeroPotential<2, 3>, 3, 3>;
 
 fn passes(polls: u32) -> (Rc<RefCell<Table>>, Passes) {
     let counts = vec![vec![1000, 1100, 1200], vec![2000, 2100, 4095], vec![248, 249, 250]];
     let table = Rc::new(RefCell::new(Table { counts, polls, ..Table::default() }));
-    (table.clone(), PassScanner::new(table, ZeroPotential::TYPICAL))
+    (table.clone(), PassScanner::new(table, ZeroPotential::TYPICAL, Box::leak(Box::default())))
 }
 
 const BOTH: [RowWire; 2] = [RowWire(1), RowWire(0)];
@@ -574,7 +574,11 @@ fn a_scan_by_passes_is_what_the_circuit_makes_of_the_same_counts() {
         let wires = Selection { rows: &BOTH, columns: ColumnWires(columns) };
         let mut frame = vec![0.0; 2 * wires.columns.count()];
         assert!(scanner.start(ScanSettings { settling_us: 20, oversampling: 10 }, wires));
-        let polls = (1..).find(|_| scanner.poll(&mut frame).is_some()).unwrap();
+        let polls = (1..).find(|_| scanner.poll()).unwrap();
+        // The next one may begin before the frame is taken.
+        assert!(scanner.start(ScanSettings { settling_us: 30, oversampling: 1 }, wires));
+        assert_eq!(table.borrow_mut().passes.pop(), Some((vec![None, Some(1), Some(0)], 30, 1)));
+        assert_eq!(scanner.take(&mut frame), ScanReport::default());
         // Ten samples, four a pass, idle first.
         let lines = vec![None, Some(1), Some(0)];
         let expected: Vec<_> = [4, 4, 2].map(|samples| (lines.clone(), 20, samples)).into();

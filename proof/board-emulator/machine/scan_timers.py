@@ -55,7 +55,7 @@ class ScanTimer(Registers):
 
 class Passes:
     """What the timers do to rows, multiplexers and converters, one event after the other. `moment(cycle)` says when what
-    follows happens; `busy` is called when a pass begins.
+    follows happens; `busy` is called when a pass begins, and when its end is seen.
     """
 
     def __init__(self, time, rules, clock, dma, adc, moment, busy):
@@ -153,4 +153,5 @@ class Passes:
         self._moment(cycle)
         self._dma.to_register(END, CHANNEL, cycle)
         self.rows.stop()
+        self._busy()
         self.on_end(cycle)
