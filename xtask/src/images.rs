@@ -35,8 +35,8 @@ pub const NUCLEO_SPI: &str = "nucleo-f446re";
 pub const NUCLEO_ONCHIP: &str = "nucleo-f446re-onchip";
 
 /// Features of the board's image. All are on unless it is built with others.
-pub const FEATURES: [&str; 7] =
-    ["confidence", "f32", "f32-direct", "fill", "fixed16", "micromath", "settings"];
+pub const FEATURES: [&str; 8] =
+    ["confidence", "f32", "f32-direct", "fill", "filter", "fixed16", "micromath", "settings"];
 
 /// The feature that the board's image does not have.
 pub const SEAL: &str = "seal";
