@@ -7,40 +7,110 @@
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
 
 use std::f64::consts::TAU;
+use std::fmt::Debug;
 
-use taxel_data::simd::{LANES, Lanes};
-use taxel_data::{exp, normal_share_below};
+use taxel_data::normal_share_below;
+use taxel_data::simd::{self, LANES, Lanes};
 
 use crate::sensor::{Sensor, Vector3};
 
-/// Contact in each lane: a Gaussian dent with shear.
+/// Numbers that fix the form of a dent: its radius, and what else its [`Profile`] needs.
+pub type Form<T = Lanes> = [T; 4];
+
+/// Sides of the face along x and y in mm, as seen from a dent's centre: `[axis][low, high]`.
+pub type Sides = [[f64; 2]; 2];
+
+/// Profile of a dent: how deep it is at each place, as a share of its depth.
+pub trait Profile: Debug + Sync {
+    /// Writes the share of the depth at these distances in mm from the centre, along x and y.
+    fn shares(&self, form: &Form, offset_mm: &[Lanes; 2], shares: &mut Lanes);
+
+    /// Volume in mm³ of a dent of this depth on a face with these sides.
+    fn volume_mm3(&self, depth_mm: f64, form: Form<f64>, sides_mm: &Sides) -> f64;
+
+    /// Whether it is a single dent, which has one centre, depth and shear.
+    fn is_single(&self) -> bool {
+        true
+    }
+}
+
+/// Contact in each lane: a dent with shear.
 ///
-/// Deformation: Δz = d·exp(−ρ²/2s²) at a distance ρ from the centre, and (Δx, Δy) in a fixed ratio to Δz.
-#[derive(Debug, Clone, PartialEq)]
+/// Deformation: Δz = d·f(x, y) at a place as seen from the centre, and (Δx, Δy) in a fixed ratio to Δz.
+#[derive(Debug, Clone)]
 pub struct Contact {
     /// Place of the centre on the face, x and y in mm.
     pub centre_mm: [Lanes; 2],
-    /// Radius s of the dent in mm.
-    pub dent_radius_mm: Lanes,
     /// Depth d of the dent in mm: compression at its centre.
     pub dent_depth_mm: Lanes,
     /// Shear ratio along x and y: Δx/Δz and Δy/Δz.
     pub shear: [Lanes; 2],
+    /// Numbers that fix the dent's form.
+    pub form: Form,
+    /// Profiles of the dents.
+    pub profiles: Vec<&'static dyn Profile>,
+    /// Index of each lane's profile.
+    pub profile_of: Lanes<u8>,
 }
 
 impl Contact {
-    /// Writes the deformation in mm of the electrode at rest at `electrode_mm`.
-    #[inline(always)]
-    pub(crate) fn deform(&self, electrode_mm: &Vector3, [dx_mm, dy_mm, dz_mm]: &mut [Lanes; 3]) {
-        let mut exponents = [0.0; LANES];
-        for frame in 0..LANES {
-            let x = electrode_mm[0] - self.centre_mm[0][frame];
-            let y = electrode_mm[1] - self.centre_mm[1][frame];
-            let radius = self.dent_radius_mm[frame];
-            exponents[frame] = -(x * x + y * y) / (2.0 * radius * radius);
+    /// Contact that is in each lane the one of these `contacts` that the lane's number in `which` says.
+    ///
+    /// # Panics
+    /// If there is no such contact.
+    pub fn pick(contacts: &[Self], which: Lanes<u8>) -> Self {
+        let mut picked = contacts[0].clone();
+        picked.profiles = contacts.iter().flat_map(|it| it.profiles.clone()).collect();
+        let mut first = 0;
+        for (number, contact) in (0..).zip(contacts) {
+            for lane in (0..LANES).filter(|lane| which[*lane] == number) {
+                for axis in 0..2 {
+                    picked.centre_mm[axis][lane] = contact.centre_mm[axis][lane];
+                    picked.shear[axis][lane] = contact.shear[axis][lane];
+                }
+                picked.dent_depth_mm[lane] = contact.dent_depth_mm[lane];
+                for (picked, number) in picked.form.iter_mut().zip(&contact.form) {
+                    picked[lane] = number[lane];
+                }
+                picked.profile_of[lane] = first + contact.profile_of[lane];
+            }
+            first += contact.profiles.len() as u8;
         }
+        picked
+    }
+
+    /// Whether it is a single dent in every lane.
+    pub fn is_single(&self) -> bool {
+        self.profiles.iter().all(|profile| profile.is_single())
+    }
+
+    /// Writes the deformations in mm of electrodes at rest at `electrodes_mm`, by electrode and axis.
+    pub(crate) fn deform(&self, electrodes_mm: &[Vector3], deformation_mm: &mut [[Lanes; 3]]) {
+        simd::widest(
+            #[inline(always)]
+            || {
+                for (delta, electrode_mm) in deformation_mm.iter_mut().zip(electrodes_mm) {
+                    self.deform_one(electrode_mm, delta);
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn deform_one(&self, electrode_mm: &Vector3, [dx_mm, dy_mm, dz_mm]: &mut [Lanes; 3]) {
+        let mut offset_mm = [[0.0; LANES]; 2];
         for frame in 0..LANES {
-            dz_mm[frame] = self.dent_depth_mm[frame] * exp(exponents[frame]);
+            offset_mm[0][frame] = electrode_mm[0] - self.centre_mm[0][frame];
+            offset_mm[1][frame] = electrode_mm[1] - self.centre_mm[1][frame];
+        }
+        let mut shares = [0.0; LANES];
+        for (number, profile) in (0..).zip(&self.profiles) {
+            profile.shares(&self.form, &offset_mm, &mut shares);
+            for frame in 0..LANES {
+                if self.profile_of[frame] == number {
+                    dz_mm[frame] = self.dent_depth_mm[frame] * shares[frame];
+                }
+            }
         }
         for frame in 0..LANES {
             dx_mm[frame] = self.shear[0][frame] * dz_mm[frame];
@@ -65,70 +135,64 @@ impl Contact {
         let stiffness_n_per_mm3 = sensor.foundation_n_per_mm3();
         let mut force_n = [0.0; LANES];
         for frame in 0..LANES {
-            let radius = self.dent_radius_mm[frame];
-            // ∫ exp(−(x − c)²/2s²) dx over the face, along x and along y, in mm.
-            let along = |axis: usize| {
+            let side = |axis: usize| {
                 let centre = self.centre_mm[axis][frame];
-                let inside = normal_share_below((sensor.size_mm[axis] - centre) / radius)
-                    - normal_share_below(-centre / radius);
-                radius * TAU.sqrt() * inside
+                [-centre, sensor.size_mm[axis] - centre]
             };
-            let volume_mm3 = self.dent_depth_mm[frame] * along(0) * along(1);
-            force_n[frame] = stiffness_n_per_mm3 * volume_mm3;
+            let profile = self.profiles[usize::from(self.profile_of[frame])];
+            let (depth_mm, form) = (self.dent_depth_mm[frame], self.form.map(|lanes| lanes[frame]));
+            force_n[frame] =
+                stiffness_n_per_mm3 * profile.volume_mm3(depth_mm, form, &[side(0), side(1)]);
         }
         force_n
     }
+}
+
+/// Volume in mm³ of a Gaussian dent d·exp(−ρ²/2s²) on a face with these sides.
+pub fn gaussian_mm3(depth_mm: f64, radius_mm: f64, sides_mm: &Sides) -> f64 {
+    // ∫ exp(−x²/2s²) dx over the face, along x and along y, in mm.
+    let along = |[low, high]: [f64; 2]| {
+        let inside = normal_share_below(high / radius_mm) - normal_share_below(low / radius_mm);
+        radius_mm * TAU.sqrt() * inside
+    };
+    depth_mm * along(sides_mm[0]) * along(sides_mm[1])
+}
+
+/// Sides of the face as seen from a place that is so far from the dent's centre.
+pub fn sides_from(sides_mm: &Sides, offset_mm: [f64; 2]) -> Sides {
+    [0, 1].map(|axis| sides_mm[axis].map(|side| side - offset_mm[axis]))
+}
+
+/// Simpson's rule for the integral of `f` from `low` to `high`, in at least so many `steps`.
+pub fn integral(low: f64, high: f64, steps: usize, f: impl Fn(f64) -> f64) -> f64 {
+    let steps = 2 * steps.div_ceil(2).max(1);
+    let step = (high - low) / steps as f64;
+    let weight = |i: usize| match i {
+        0 => 1.0,
+        i if i == steps => 1.0,
+        i => 2.0 + 2.0 * (i % 2) as f64,
+    };
+    let sum: f64 = (0..=steps).map(|i| weight(i) * f(low + step * i as f64)).sum();
+    sum * step / 3.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn contact(centre_mm: [f64; 2], radius_mm: f64, depth_mm: f64, shear: [f64; 2]) -> Contact {
-        Contact {
-            centre_mm: centre_mm.map(|c| [c; LANES]),
-            dent_radius_mm: [radius_mm; LANES],
-            dent_depth_mm: [depth_mm; LANES],
-            shear: shear.map(|ratio| [ratio; LANES]),
-        }
-    }
-
     #[test]
-    fn the_force_is_the_integral_of_the_pressure_over_the_face() {
-        let sensor = Sensor::paper();
-        // 2 N/mm an electrode, 48 of them on 20 mm × 18 mm.
-        let stiffness = sensor.foundation_n_per_mm3();
-        assert!((stiffness - 2.0 * 48.0 / 360.0).abs() < 1e-15);
-        for (centre_mm, radius_mm) in [([10.0, 9.0], 2.0), ([0.0, 18.0], 3.0), ([17.5, 4.0], 5.0)] {
-            let contact = contact(centre_mm, radius_mm, 0.5, [0.0, 0.0]);
-            // Sum over cells of 0.05 mm × 0.05 mm.
-            let (cell, mut sum) = (0.05, 0.0);
-            for i in 0..400 {
-                for j in 0..360 {
-                    let place = [(f64::from(i) + 0.5) * cell, (f64::from(j) + 0.5) * cell, 5.0];
-                    let mut delta = [[0.0; LANES]; 3];
-                    contact.deform(&place, &mut delta);
-                    sum += stiffness * delta[2][0] * cell * cell;
-                }
-            }
-            let found = contact.force_n(&sensor)[LANES - 1];
-            assert!((found / sum - 1.0).abs() < 1e-5, "{centre_mm:?}: {found} N, {sum} N");
+    fn integrals_are_exact_for_cubics_and_sides_move_with_the_place() {
+        // By hand: ∫ 4x³ + 2 from −1 to 2 is 16 − 1 + 6.
+        for steps in [1, 2, 7] {
+            let found = integral(-1.0, 2.0, steps, |x| 4.0 * x * x * x + 2.0);
+            assert!((found - 21.0).abs() < 1e-12, "{steps}: {found}");
         }
+        let moved = sides_from(&[[-3.0, 17.0], [-4.0, 14.0]], [2.0, -1.0]);
+        assert_eq!(moved, [[-5.0, 15.0], [-3.0, 15.0]]);
         // By hand: a dent well inside has the volume 2π·s²·d; at a corner a quarter of it.
-        let volume_mm3 = TAU * 1.0 * 0.5;
-        let inside = contact([10.0, 9.0], 1.0, 0.5, [0.0; 2]).force_n(&sensor)[0];
-        assert!((inside - stiffness * volume_mm3).abs() < 1e-9, "{inside}");
-        let corner = contact([20.0, 0.0], 1.0, 0.5, [0.0; 2]).force_n(&sensor)[0];
-        assert!((corner - 0.25 * stiffness * volume_mm3).abs() < 1e-9, "{corner}");
-    }
-
-    #[test]
-    fn shear_and_depth_are_those_of_an_electrode_at_the_centre() {
-        let contact = contact([3.0, 4.0], 2.5, 0.8, [0.3, -0.4]);
-        let mut delta = [[0.0; LANES]; 3];
-        contact.deform(&[3.0, 4.0, 5.0], &mut delta);
-        assert_eq!([delta[0], delta[1]], contact.shear_mm());
-        assert_eq!(delta[2], contact.dent_depth_mm);
-        assert!((contact.shear_mm()[1][0] + 0.32).abs() < 1e-15);
+        let inside = gaussian_mm3(0.5, 1.0, &[[-10.0, 10.0], [-9.0, 9.0]]);
+        assert!((inside - 0.5 * TAU).abs() < 1e-9, "{inside}");
+        let corner = gaussian_mm3(0.5, 1.0, &[[0.0, 20.0], [-18.0, 0.0]]);
+        assert!((corner - 0.125 * TAU).abs() < 1e-9, "{corner}");
     }
 }

@@ -14,12 +14,28 @@ use crate::kinds::kinds;
 use crate::sensor::Sensor;
 
 mod independent;
+mod dent;
 mod press;
+mod punch;
+mod edge;
+mod ellipse;
+mod tail;
+mod pair;
+mod mix;
 
+pub use edge::Edge;
+pub use ellipse::Ellipse;
 pub use independent::Independent;
+pub use mix::{Mix, Part};
+pub use pair::Pair;
 pub use press::Press;
+pub use punch::Punch;
+pub use tail::Tail;
 
 /// Motion of the electrodes, drawn at random for every trajectory.
+///
+/// A motion by contacts says what these are; the defaults do the rest. Any other overrides [`place`](Self::place) and
+/// [`start`](Self::start).
 pub trait Motion: Debug + Send + Sync {
     /// Extreme deformations of any electrode along each axis, in mm: `[axis][low, high]`.
     fn range_mm(&self) -> [[f64; 2]; 3];
@@ -33,7 +49,9 @@ pub trait Motion: Debug + Send + Sync {
 
     /// Whether rows move independently, so that [`place`](Self::place) needs only the latents of one row's
     /// electrodes.
-    fn has_independent_rows(&self) -> bool;
+    fn has_independent_rows(&self) -> bool {
+        false
+    }
 
     /// Writes the deformation in mm of the electrodes of row-wire `row` (from 0) that `latents` stand for, one
     /// frame a lane, by electrode and axis.
@@ -48,15 +66,29 @@ pub trait Motion: Debug + Send + Sync {
         row: usize,
         latents: &[Lanes],
         deformation_mm: &mut [[Lanes; 3]],
-    );
+    ) {
+        if let Some(contact) = self.place_contact(sensor, latents) {
+            contact.deform(sensor.row_electrodes_mm(row), deformation_mm);
+        }
+    }
 
-    /// Contact in the middle of the face of `sensor` with the largest radius, depth and shear; `None` for a motion
-    /// that is no single contact.
+    /// Depth in mm down to which a contact may be moved.
+    fn deepest_mm(&self) -> f64 {
+        self.range_mm()[2][1]
+    }
+
+    /// Single Gaussian contact as wide, deep and sheared as this one; `None` for a motion without a contact.
+    fn as_press(&self) -> Option<Press> {
+        None
+    }
+
+    /// Contact in the middle of the face of `sensor` with the largest radius, depth and shear, in a lane of each kind;
+    /// `None` for a motion without a contact.
     fn largest_contact(&self, _sensor: &Sensor) -> Option<Contact> {
         None
     }
 
-    /// Contact that `latents` stand for, one frame a lane; `None` for a motion that is no single contact.
+    /// Contact that `latents` stand for, one frame a lane; `None` for a motion without a contact.
     ///
     /// # Panics
     /// If there are not as many latents as [`latents`](Self::latents) says.
@@ -64,9 +96,16 @@ pub trait Motion: Debug + Send + Sync {
         None
     }
 
+    /// Draws a contact a lane; `None` for a motion without a contact.
+    fn draw_contact(&self, _sensor: &Sensor, _draws: &mut Draws) -> Option<Contact> {
+        None
+    }
+
     /// Draws the quantities that all rows and scans of a trajectory share, for
     /// [`LANES`](taxel_data::simd::LANES) trajectories of `sensor`.
-    fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm>;
+    fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm> {
+        Box::new(dent::Contacts { sensor, contact: self.draw_contact(sensor, draws) })
+    }
 }
 
 /// Trajectories that have been drawn, one a lane.
@@ -74,13 +113,12 @@ pub trait Trajectories {
     /// Writes the deformation in mm of the electrodes of row-wire `row` (from 0), by electrode and axis.
     fn deform(&mut self, row: usize, draws: &mut Draws, deformation_mm: &mut [[Lanes; 3]]);
 
-    /// Contact, which keeps its shape wherever it goes; `None` where nothing touches, or for a motion that is no single
-    /// contact.
+    /// Contact, which keeps its shape wherever it goes; `None` where nothing touches, or for a motion without a contact.
     fn contact(&self) -> Option<&Contact> {
         None
     }
 
-    /// Moves the contact to this centre and depth. Nothing changes for a motion that is no single contact.
+    /// Moves the contact to this centre and depth. Nothing changes for a motion without a contact.
     fn move_to(&mut self, _centre_mm: [Lanes; 2], _depth_mm: Lanes) {}
 }
 
@@ -108,7 +146,7 @@ impl Draws {
 
 kinds! {
     /// Kind of motion that a scene can name.
-    Motion: Independent, Press
+    Motion: Independent, Press, Punch, Edge, Ellipse, Tail, Pair, Mix
 }
 
 /// Checks a uniform distribution's range.

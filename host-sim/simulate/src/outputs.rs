@@ -205,9 +205,10 @@ impl ContactOutput {
     /// Full scale of the quantity's columns: the extent of the face for the centre, else what the `largest` contact
     /// has.
     pub fn full_scales(self, largest: &Contact, sensor: &Sensor) -> Vec<f64> {
-        match self {
-            Self::Centre => sensor.size_mm[..2].to_vec(),
-            _ => self.of(Some(largest), sensor).iter().map(|lanes| lanes[0]).collect(),
+        if self == Self::Centre {
+            return sensor.size_mm[..2].to_vec();
         }
+        let columns = self.of(Some(largest), sensor);
+        columns.iter().map(|lanes| lanes.iter().copied().fold(lanes[0], f64::max)).collect()
     }
 }

@@ -151,7 +151,7 @@ impl World {
         require(self.motion.largest_contact(&self.sensor).is_some(), "motion", "[motion]", || {
             "electrodes that move on their own have no contact that could slide; set deformation.kind = \"press\"".into()
         })?;
-        path.check(&self.sensor, self.motion.range_mm()[2][1])?;
+        path.check(&self.sensor, self.motion.deepest_mm())?;
         let (steps, seconds) = (path.duration_s / path.fine_step_s(), path.duration_s);
         let few = !self.remembers() || steps <= MOST_SCANS as f64;
         require(few, "motion.duration_s", format!("{seconds} s"), || {
@@ -391,8 +391,8 @@ fn outputs_of_contact(wanted: &[ContactOutput], world: &World) -> Check {
          order"
             .into()
     })?;
-    let has_contact = world.motion.largest_contact(&world.sensor).is_some();
-    require(has_contact, "outputs.contact", format!("{names:?}"), || {
+    let largest = world.motion.largest_contact(&world.sensor);
+    require(largest.is_some(), "outputs.contact", format!("{names:?}"), || {
         "electrodes that move on their own have no contact; set deformation.kind = \"press\", or ask for \
          outputs.quantity and outputs.axes"
             .into()
@@ -402,6 +402,13 @@ fn outputs_of_contact(wanted: &[ContactOutput], world: &World) -> Check {
     require(known, "outputs.contact", format!("{names:?}"), || {
         "how deep the rubber is by now depends on where the contact was before; ask for \"centre\" and \"force\" \
          alone, or leave [rubber] out"
+            .into()
+    })?;
+    let is_single = largest.is_some_and(|contact| contact.is_single());
+    let holds = is_single || *wanted == [ContactOutput::Force];
+    require(holds, "outputs.contact", format!("{names:?}"), || {
+        "two contacts (deformation.kind = \"pair\") have no one centre, depth and shear; ask for \"force\" alone, or for \
+         outputs.quantity and outputs.axes"
             .into()
     })
 }

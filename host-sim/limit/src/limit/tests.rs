@@ -1,7 +1,7 @@
 //! The limit against figures that were computed independently, and against what must not change it.
 
 use taxel_learn::Decoder;
-use taxel_simulate::motion::Press;
+use taxel_simulate::motion::{Edge, Ellipse, Kind, Mix, Pair, Part, Press, Punch, Tail};
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::{drift::Drift, synthesise};
 
@@ -83,10 +83,31 @@ fn what_is_not_modelled_is_refused() {
 
 #[test]
 fn latents_have_the_distribution_that_frames_are_drawn_from() {
-    let press =
-        Press { dent_radius_mm: [2.0, 5.0], dent_depth_mm: [0.2, 1.0], shear_ratio: [0.1, 0.5] };
-    let mut world = World { read_rows: vec![1], ..World::of_motion(press) };
-    for motion in [world.motion.clone(), World::paper().motion] {
+    let (dent_radius_mm, direction_deg) = ([2.0, 5.0], None);
+    let (dent_depth_mm, shear_ratio) = ([0.2, 1.0], [0.1, 0.5]);
+    let press: Kind = Press { dent_radius_mm, dent_depth_mm, shear_ratio }.into();
+    let (punch_radius_mm, decay_mm) = ([1.0, 3.0], [0.5, 1.0]);
+    let punch = Punch { punch_radius_mm, decay_mm, dent_depth_mm, shear_ratio };
+    let (edge_length_mm, edge_width_mm) = ([5.0, 12.0], [1.0, 2.0]);
+    let edge = Edge { edge_length_mm, edge_width_mm, direction_deg, dent_depth_mm, shear_ratio };
+    let aspect_ratio = [1.0, 3.0];
+    let ellipse =
+        Ellipse { dent_radius_mm, aspect_ratio, direction_deg, dent_depth_mm, shear_ratio };
+    let tail = Tail { cover_mm: [3.0, 9.0], dent_depth_mm, shear_ratio };
+    let (distance_mm, second_depth_ratio, dent_depth_mm) = ([4.0, 9.0], [0.2, 1.0], [0.2, 0.5]);
+    let pair = Pair {
+        dent_radius_mm,
+        distance_mm,
+        direction_deg,
+        second_depth_ratio,
+        dent_depth_mm,
+        shear_ratio,
+    };
+    let parts = [(2.0, punch.into()), (1.0, press.clone())];
+    let parts = parts.map(|(weight, deformation)| Part { weight, deformation }).to_vec();
+    let mut world = World { read_rows: vec![1], ..World::press() };
+    let kinds = [press, punch.into(), edge.into(), ellipse.into(), tail.into(), pair.into()];
+    for motion in kinds.into_iter().chain([Mix { parts }.into(), World::paper().motion]) {
         world.motion = motion;
         let drawn = Synthesis::new(&world).frames(Stream::Test, 20_000).outputs;
         let prior = prior(&world, &[1]);

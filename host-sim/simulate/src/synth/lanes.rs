@@ -124,7 +124,7 @@ impl<'s> LaneSynthesis<'s> {
         let mut draws = Draws::new(world.seed, self.stream, first);
         workspace.gain = self.synthesis.drift.map(|drift| drift.factors(&mut draws));
         let mut trajectories = motion.start(&world.sensor, &mut draws);
-        let deepest_mm = motion.range_mm()[2][1];
+        let deepest_mm = motion.deepest_mm();
         let paths = path.map(|path| path.start(&world.sensor, deepest_mm, &mut draws));
         let electrodes = world.sensor.electrodes_per_row_wire;
         let move_to = |trajectories: &mut dyn Trajectories, time_s: f64| {
