@@ -1,4 +1,4 @@
-//! The application: scan → health → gate → decode → report, and the link, in one loop without waits.
+//! The application: scan → health → gate → decode → filter → report, and the link, in one loop without waits.
 //!
 //! A board's program makes an [`App`] of its parts and calls [`App::run`], which returns only when the program
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing

@@ -105,7 +105,8 @@ impl Capacity {
         let frames = readings * (4 * size_of::<f32>() + size_of::<u16>())
             + 4 * self.scratch_floats()
             - 4 * readings;
-        frames + 5 * outputs * size_of::<f32>() + 2 * self.rows + 2 * self.message_bytes()
+        let of_output = if cfg!(feature = "filter") { 5 } else { 3 };
+        frames + of_output * outputs * size_of::<f32>() + 2 * self.rows + 2 * self.message_bytes()
     }
 
     /// Whether there is room for the readings and outputs of a model of this `shape`.

@@ -16,11 +16,13 @@ mod baseline;
 mod rows;
 mod columns;
 mod scanner;
+mod passes;
 #[cfg(test)]
 mod tests;
 
 pub use baseline::Baseline;
 pub use columns::{Mcp3208s, MultiplexedAdc, OnChipAdc, SampleError};
+pub use passes::{PassScanner, Sequencer, SequencerFault, add_samples};
 pub use rows::{DirectPins, DriveError, Multiplexer4051, ShiftRegister595};
 pub use scanner::Scanner;
 
@@ -117,8 +119,8 @@ pub struct Selection<'a> {
 
 /// Source of frames: a scanned sensor, or a substitute for one.
 ///
-/// One that only waits implements [`scan`](Self::scan). One whose hardware scans by itself implements the other three
-/// too: the application decodes a frame while the next one is scanned.
+/// One that only waits implements [`scan`](Self::scan). One whose hardware scans by itself implements the other four
+/// too: the application takes and decodes a frame while the next one is scanned.
 pub trait FrameSource {
     /// Scans `wires` into `frame`, and waits for the end: one reading in Ω for each row and column, row after row.
     /// Readings that could not be taken become NaN.
@@ -135,11 +137,16 @@ pub trait FrameSource {
         false
     }
 
-    /// Ends the scan that was started: fills `frame` as [`scan`](Self::scan) does, for the settings and wires of the
-    /// start; `None` while it goes on.
-    fn poll(&mut self, frame: &mut [f32]) -> Option<ScanReport> {
+    /// Whether the scan that was started has ended. Then the next one may be started before the frame is taken.
+    fn poll(&mut self) -> bool {
+        false
+    }
+
+    /// Fills `frame` as [`scan`](Self::scan) does with the scan that ended last, for its settings and wires. It is taken once,
+    /// and before the source is looked at again.
+    fn take(&mut self, frame: &mut [f32]) -> ScanReport {
         let _ = frame;
-        None
+        ScanReport::default()
     }
 
     /// Gives up the scan that was started, if there is one: rows idle, and nothing of it gets into another frame.

@@ -10,6 +10,9 @@ use crate::readout::SCANS_A_ROUND;
 /// divider has powers of two.
 pub const NUCLEO_SPI_HZ: u32 = 703_125;
 
+/// Clock of the NUCLEO-F446RE's processor in MHz, as long as the ST-LINK's is there.
+pub const NUCLEO_MHZ: u32 = 180;
+
 /// Speed of the NUCLEO-F446RE's serial line in bits a second, unless its image is built for another.
 pub const NUCLEO_BAUD: u32 = 921_600;
 
@@ -22,6 +25,78 @@ const MCP3208_BYTES: u32 = 3;
 const NUCLEO_SAMPLE_NS: u32 = 1_350;
 const NUCLEO_READING_NS: u32 = 850;
 const NUCLEO_ROW_NS: u32 = 17_300;
+
+/// Readout by the NUCLEO-F446RE's own converters: three convert at once, three columns each one after the other, and
+/// nine multiplexers give each two halves of the columns. Their clock is an eighth of the processor's, and so of the
+/// timers'.
+const ONCHIP_TICKS_A_CYCLE: u32 = 8;
+
+/// Cycles of the converters' clock: to sample a column, which its 6 kΩ and 4 pF need 8 for; to convert it; and from one
+/// trigger to the next, three for the trigger itself.
+const ONCHIP_SAMPLE_CYCLES: u32 = 15;
+const ONCHIP_COLUMN_CYCLES: u32 = ONCHIP_SAMPLE_CYCLES + 12;
+const ONCHIP_TRIGGER_CYCLES: u32 = 3 * ONCHIP_COLUMN_CYCLES + 3;
+
+/// Cycles from a trigger until the last of its columns is sampled for certain: then the multiplexers may switch. They have
+/// 0.4 µs until the next trigger, and take 0.1.
+const ONCHIP_SAMPLED_CYCLES: u32 = ONCHIP_TRIGGER_CYCLES - 9;
+
+/// Number of columns that the NUCLEO-F446RE's own converters sample.
+pub const ONCHIP_COLUMNS: u16 = 18;
+
+/// Most samples of a reading that the NUCLEO-F446RE has memory for at once.
+pub const ONCHIP_SAMPLES: u16 = 16;
+
+/// Ticks that DMA may take to change the rows, which lengthen each wait; 0.2 µs. And ticks from the last sample's time to the
+/// next row.
+const ONCHIP_ROW_TICKS: u32 = 36;
+const ONCHIP_END_TICKS: u32 = 16;
+
+/// Ticks of the processor's clock from one trigger of the on-chip converters to the next.
+pub const ONCHIP_TRIGGER_TICKS: u16 = (ONCHIP_TRIGGER_CYCLES * ONCHIP_TICKS_A_CYCLE) as u16;
+
+/// Times of a row that is scanned by the NUCLEO-F446RE's own converters, in counts of a timer that divides the
+/// processor's clock. The row is driven at count 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RowCounts {
+    /// Ticks of the processor's clock in a count.
+    pub divider: u16,
+    /// Count at which the converters are triggered first, and every [`ONCHIP_TRIGGER_TICKS`] from there on.
+    pub trigger: u16,
+    /// Count at which the multiplexers switch to the second half of the columns.
+    pub switch: u16,
+    /// Number of counts of a row.
+    pub period: u16,
+}
+
+impl RowCounts {
+    /// Times for a wait and a number of samples, [`ONCHIP_SAMPLES`] at most, at this clock.
+    ///
+    /// ```
+    /// use firmware::timing::RowCounts;
+    /// let counts = RowCounts::new(20, 12, 180);
+    /// assert_eq!((counts.divider, counts.trigger), (1, 3_637)); // 20.2 µs
+    /// assert_eq!(counts.period, 19_781); // 110 µs
+    /// ```
+    pub fn new(settling_us: u32, samples: u16, clock_mhz: u32) -> Self {
+        let trigger_ticks = u32::from(ONCHIP_TRIGGER_TICKS);
+        let samples = u32::from(samples.clamp(1, ONCHIP_SAMPLES));
+        let wait = settling_us.saturating_mul(clock_mhz).saturating_add(ONCHIP_ROW_TICKS);
+        let switch = (samples - 1) * trigger_ticks + ONCHIP_SAMPLED_CYCLES * ONCHIP_TICKS_A_CYCLE;
+        let rest = 2 * samples * trigger_ticks + ONCHIP_END_TICKS;
+        // What rounding up adds is less than two counts.
+        let most_counts = u32::from(u16::MAX) - 4;
+        let divider = wait.saturating_add(rest).div_ceil(most_counts).min(most_counts);
+        let counts = |ticks: u32| ticks.div_ceil(divider) as u16;
+        let trigger = counts(wait).saturating_add(1);
+        Self {
+            divider: divider as u16,
+            trigger,
+            switch: trigger.saturating_add(counts(switch)),
+            period: trigger.saturating_add(counts(rest)),
+        }
+    }
+}
 
 /// Gain–bandwidth product of an MCP6024, the op-amp of docs/readout.md, in Hz.
 pub const OP_AMP_HZ: f32 = 10e6;
@@ -82,6 +157,8 @@ pub struct ScanPlan {
     pub settling_us: u32,
     /// Number of samples averaged for a reading.
     pub oversampling: u16,
+    /// Most samples of a reading between two waits: more take several passes over the rows.
+    pub pass_samples: u16,
     /// Time of one sample in ns.
     pub sample_ns: u32,
     /// Time in ns to turn the samples of a reading into Ω.
@@ -104,9 +181,36 @@ impl ScanPlan {
             idle_samples: true,
             settling_us: Configuration::DEFAULT.scan.settling_us,
             oversampling,
+            pass_samples: u16::MAX,
             sample_ns: spi_transfer_ns(MCP3208_BYTES, NUCLEO_SPI_HZ) + NUCLEO_SAMPLE_NS,
             reading_ns: NUCLEO_READING_NS,
             row_ns: NUCLEO_ROW_NS,
+        }
+    }
+
+    /// Plan of the image that reads the sensor by the NUCLEO-F446RE's own converters, for so many rows. It samples all
+    /// columns, however many are asked for. The processor decodes the frame before meanwhile.
+    ///
+    /// ```
+    /// use firmware::timing::ScanPlan;
+    /// assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).scan_us(), 224);
+    /// assert_eq!(ScanPlan::of_nucleo_onchip(8, 3, 12).scan_us(), 887);
+    /// ```
+    pub fn of_nucleo_onchip(rows: u16, columns: u16, oversampling: u16) -> Self {
+        let columns = columns.max(ONCHIP_COLUMNS);
+        let ns = |ticks: u32| ticks * 1000 / NUCLEO_MHZ;
+        Self {
+            rows,
+            columns,
+            board_columns: columns,
+            idle_samples: true,
+            settling_us: Configuration::DEFAULT.scan.settling_us,
+            oversampling,
+            pass_samples: ONCHIP_SAMPLES,
+            // Half of the columns at once.
+            sample_ns: ns(2 * u32::from(ONCHIP_TRIGGER_TICKS)).div_ceil(u32::from(ONCHIP_COLUMNS)),
+            reading_ns: 0,
+            row_ns: ns(ONCHIP_ROW_TICKS + ONCHIP_END_TICKS),
         }
     }
 
@@ -121,6 +225,7 @@ impl ScanPlan {
     ///     idle_samples: true,
     ///     settling_us: 20,
     ///     oversampling: 2,
+    ///     pass_samples: u16::MAX,
     ///     sample_ns: spi_transfer_ns(3, 1_000_000),
     ///     reading_ns: 0,
     ///     row_ns: 0,
@@ -152,7 +257,8 @@ impl ScanPlan {
     /// Time in ns to change the rows, wait, and sample so many columns.
     fn step_ns(&self, columns: u16) -> u64 {
         let wait_ns = u64::from(self.settling_us) * 1000 + u64::from(self.row_ns);
-        self.samples_ns(columns).saturating_add(wait_ns)
+        let passes = self.oversampling.div_ceil(self.pass_samples.max(1)).max(1);
+        self.samples_ns(columns).saturating_add(wait_ns.saturating_mul(passes.into()))
     }
 
     fn samples_ns(&self, columns: u16) -> u64 {
@@ -166,7 +272,7 @@ impl ScanPlan {
     /// ```
     /// # use firmware::timing::ScanPlan;
     /// # let plan = ScanPlan { rows: 8, columns: 18, board_columns: 18, idle_samples: true, settling_us: 20,
-    /// #     oversampling: 1, sample_ns: 24_000, reading_ns: 0, row_ns: 0 };
+    /// #     oversampling: 1, pass_samples: 256, sample_ns: 24_000, reading_ns: 0, row_ns: 0 };
     /// assert_eq!(plan.most_oversampling(10_000), Some(2));
     /// assert_eq!(plan.most_oversampling(1_000), None);
     /// ```
@@ -200,6 +306,7 @@ mod tests {
         idle_samples: false,
         settling_us: 10,
         oversampling: 1,
+        pass_samples: u16::MAX,
         sample_ns: 1_500,
         reading_ns: 0,
         row_ns: 2_000,
@@ -232,6 +339,7 @@ mod tests {
             idle_samples: true,
             settling_us: u32::MAX,
             oversampling: u16::MAX,
+            pass_samples: 0,
             sample_ns: u32::MAX,
             reading_ns: u32::MAX,
             row_ns: u32::MAX,
@@ -262,6 +370,47 @@ mod tests {
         assert_eq!((plan.scan_us(), plan.longest_us()), (5_573, 6_207));
         assert!(plan.longest_us() * 3 <= frame_period_us * 2);
         assert_eq!(plan.most_oversampling(frame_period_us), Some(1));
+    }
+
+    #[test]
+    fn the_boards_own_converters_are_triggered_in_time_for_every_setting() {
+        for clock_mhz in [158, 180] {
+            for settling_us in [0, 1, 20, 363, 1_000, 10_000] {
+                for samples in 1..=ONCHIP_SAMPLES {
+                    let at = RowCounts::new(settling_us, samples, clock_mhz);
+                    let ticks = |count: u16| u32::from(count) * u32::from(at.divider);
+                    let trigger = u32::from(ONCHIP_TRIGGER_TICKS);
+                    // Driven at count 1, and 0.15 µs for DMA to do so.
+                    assert!(ticks(at.trigger - 1) >= settling_us * clock_mhz + 27, "{at:?}");
+                    let last = ticks(at.trigger) + (u32::from(samples) - 1) * trigger;
+                    let sampled = last + (3 + 2 * ONCHIP_COLUMN_CYCLES + ONCHIP_SAMPLE_CYCLES) * 8;
+                    let next = last + trigger;
+                    assert!(ticks(at.switch) >= sampled, "{at:?}: {samples}");
+                    // 0.1 µs to switch, and as much for DMA.
+                    assert!(ticks(at.switch) + 2 * clock_mhz / 10 <= next, "{at:?}: {samples}");
+                    assert!(
+                        ticks(at.period) >= ticks(at.trigger) + 2 * u32::from(samples) * trigger
+                    );
+                    assert!(at.divider == 1 || ticks(at.period) > u32::from(u16::MAX) - 8);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_scan_by_the_boards_own_converters_is_its_rows() {
+        for (samples, passes) in [(1, 1), (12, 1), (16, 1), (17, 2), (256, 16)] {
+            let plan = ScanPlan::of_nucleo_onchip(8, 18, samples);
+            let counts = RowCounts::new(20, 1, NUCLEO_MHZ);
+            let row_ticks = u64::from(counts.period) + 1; // the last row ends at count 0
+            let more = u64::from(ONCHIP_TRIGGER_TICKS) * 2 * u64::from(samples - passes);
+            let us = (8 * (row_ticks * u64::from(passes) + more)) as f32 / NUCLEO_MHZ as f32;
+            let computed = (plan.longest_us() as f32) * 8.0 / 9.0;
+            assert!((computed / us - 1.0).abs() < 0.01, "{samples}: {us} {computed}");
+        }
+        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).longest_us(), 250);
+        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 12).longest_us(), 990);
+        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).most_oversampling(1000), Some(12));
     }
 
     #[test]

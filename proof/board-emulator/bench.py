@@ -107,15 +107,17 @@ class Bench:
         expect(answers[0].startswith(expected), f"request {message.hex(' ')} is answered by {answers[0].hex(' ')}")
         return answers[0], board.time.seconds() - start
 
-    def scan_every(self, seconds, settling_s=None):
-        """Configures the time from one scan to the next, and the settling; nothing else."""
+    def scan_every(self, seconds, settling_s=None, samples=None):
+        """Configures the time from one scan to the next, the settling, and the samples of a reading; nothing else."""
         answer, _ = self.ask(CONFIGURATION, CONFIGURED)
         # The first fields, whatever follows them.
         _, rest = taken(answer[1:])
         settling_us, rest = taken(rest)
+        before, rest = taken(rest)
         if settling_s is not None:
             settling_us = self.board.settling_us = round(settling_s * 1e6)
-        self.ask(CONFIGURE + varint(round(seconds * 1e6)) + varint(settling_us) + rest, CONFIGURED)
+        self.ask(CONFIGURE + varint(round(seconds * 1e6)) + varint(settling_us)
+                 + varint(samples or before) + rest, CONFIGURED)
 
     def period_us(self):
         """The time from one scan to the next that is in force."""

@@ -23,6 +23,11 @@ def main():
                         help="the same with the feature `fixed16` alone, for the scenario `few-features`")
     parser.add_argument("--seal-image", type=pathlib.Path, required=True,
                         help="the same with the feature `seal` too, for the scenario `seal`")
+    parser.add_argument("--onchip-image", type=pathlib.Path, required=True,
+                        help="the image that reads the sensor by the chip's own converters, for the scenarios `onchip`")
+    parser.add_argument("--onchip-scans", required=True,
+                        help="its scans as computed, in us: mean and longest with one sample a reading, and with twelve")
+    parser.add_argument("--seconds", type=float, default=1.0, help="seconds for which `onchip-stream` counts estimates (1)")
     parser.add_argument("scenarios", nargs="*", metavar="scenario",
                         help=f"all, or some of: {', '.join(SCENARIOS)}; or serve")
     parser.add_argument("--host-sim", type=pathlib.Path, required=True, help="the program host-sim")

@@ -10,10 +10,11 @@ import math
 import pathlib
 import re
 import signal
+import struct
 
 from bench import ERASE_PATIENCE_S, IDENTIFY, KEEP_CONFIGURATION, RESTART, begin, expect
 from machine.flash import FACTORY_OPTIONS, LEVEL_3_OPTIONS, PROGRAM_S, SECTORS
-from machine.line import Terminal, varint
+from machine.line import Terminal, packets, taken, varint
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 #: Sectors of the flash, by what they hold (docs/board.md).
@@ -22,6 +23,9 @@ JOURNAL, SLOT_A, SLOT_B = (1, 2), 6, 7
 RUBBISH = bytes(place % 251 for place in range(0x20000))
 #: First bytes of answers, by their variant.
 IDENTITY, UPLOAD, RESTARTING, REFUSED, KEPT = b"\x00", b"\x07", b"\x08", b"\x09", b"\x0b"
+COUNTERS, BASELINE, ESTIMATE = b"\x01", b"\x03", b"\x05"
+#: Requests for the counters, and for a baseline of some frames.
+STATISTICS, CAPTURE = b"\x01", b"\x04"
 #: That of an upload which is on trial.
 ON_TRIAL = b"\x07\x02"
 #: Requests to set a key and in a seal, and refusals: no seal, a counter that counted before, nobody holds the button.
@@ -59,6 +63,8 @@ def session(make, files):
     expect(busy_s <= most_s, f"erasing and writing take {busy_s:.2f} s")
     said = bench.host_sim("check", "press", "--model", files.model, "-n", files.frames)
     expect(f"{files.frames} of {files.frames} bit-identical" in said, "it does not decode as the host")
+    filtered = bench.host_sim("check", "press", "--model", files.model, "-n", 10, "--filter-ms", 5, "--period-ms", 1)
+    expect("10 of 10 bit-identical" in filtered, "it does not filter as the host")
     bench.host_sim("baseline", "-n", 10, "-o", files.directory / "baseline.csv")
     check_baseline(bench, files.directory / "baseline.csv", 8 * 18)
     check_scan_time(bench, files.model)
@@ -129,6 +135,16 @@ def check_baseline(bench, file, readings):
         if place:
             row, column = (int(number) - 1 for number in place.groups())
             errors.append(float(text or "nan") / bench.ohm[row][column] - 1)
+    check_errors(bench, errors, readings)
+
+
+def check_readings(bench, pairs, readings):
+    """So many readings against the resistances at the wires."""
+    check_errors(bench, [ohm / expected - 1 for ohm, expected in pairs], readings)
+
+
+def check_errors(bench, errors, readings):
+    """Errors of so many readings, as shares."""
     rms = math.sqrt(sum(error * error for error in errors) / len(errors))
     largest = max(map(abs, errors))
     bench.board.note(f"baseline: {len(errors)} readings, RMS error {100 * rms:.4f} %, largest {100 * largest:.4f} %")
@@ -410,6 +426,121 @@ def seal(make, files):
     bench.finish(resets=["program"] * 2, erased=[*JOURNAL, SLOT_B])
 
 
+def onchip(make, files):
+    """The chip's own converters: times of scans with one and twelve samples, and readings, in both halves of a scan's wait."""
+    bench = onchip_bench(make, files)
+    computed = list(map(int, files.onchip_scans.split(",")))
+    for samples, (mean_us, longest_us) in ((1, computed[:2]), (12, computed[2:4])):
+        bench.scan_every(2e-3, samples=samples)
+        check_onchip_scans(bench, samples, mean_us, longest_us)
+        answer, _ = bench.ask(CAPTURE + varint(3), BASELINE)
+        _, floats = taken(answer[1:])
+        ohms = struct.unpack(f"<{len(floats) // 4}f", floats)
+        check_readings(bench, [(ohm, expected) for ohm, expected in zip(ohms, sum(bench.ohm, []))], 8 * 18)
+    # More samples than fit into memory: several passes.
+    bench.scan_every(20e-3, samples=40)
+    bench.run_for(0.1)
+    statistics = ask_statistics(bench)
+    expect(statistics["failed_samples"] == 0, f"samples failed: {statistics}")
+    expect(statistics["frames_missed"] == 0, f"frames were missed: {statistics}")
+    bench.finish()
+
+
+def onchip_bench(make, files, **options):
+    """A board that reads the sensor by its own converters, and has told so."""
+    bench = make(image=files.onchip_image, onchip=True, **options)
+    bench.run_for(0.02)
+    answer, _ = bench.ask(IDENTIFY, IDENTITY)
+    expect(b"nucleo-f446re-onchip" in answer, "it does not tell who it is")
+    return bench
+
+
+def ask_statistics(bench):
+    """The device's counters that matter here."""
+    answer, _ = bench.ask(STATISTICS, COUNTERS)
+    rest, counters = answer[1:], {}
+    for name in ("frames_scanned", "frames_decoded", "rows_at_rest", "frames_missed", "failed_samples", "requests",
+                 "bad_packets", "lost_reports", "bad_loops", "longest_scan_us", "longest_decode_us"):
+        counters[name], rest = taken(rest)
+    return counters
+
+
+def check_onchip_scans(bench, samples, mean_us, longest_us):
+    """The mean time of a round of scans from the first row or idle line to the rows' rest, against what is computed."""
+    passes, starts, ends = bench.board.passes, [], []
+    passes.on_start, passes.on_end = starts.append, ends.append
+    bench.run_for(0.08)
+    passes.on_start = passes.on_end = lambda cycle: None
+    scans = [bench.board.time.ns(end - start) / 1e3 for start, end in zip(starts, ends)][:32]
+    expect(len(scans) == 32, f"there are {len(scans)} scans where 32 should be")
+    for name, found, computed in (("mean", sum(scans) / 32, mean_us), ("longest", max(scans), longest_us)):
+        off = computed / found - 1
+        bench.board.note(f"scan with {samples} samples, {name}: {found:.1f} us, computed {computed} ({100 * off:+.1f} %)")
+        expect(abs(off) <= 0.03, f"a scan takes {found:.0f} us, computed {computed} us")
+    most_us = 250 if samples == 1 else 1000
+    expect(max(scans) <= most_us, f"a scan takes {max(scans):.0f} us")
+
+
+def onchip_stream(make, files):
+    """A thousand contacts a second by the chip's own converters, twelve samples a reading: none missed, and how old they are."""
+    bench, model = onchip_bench(make, files), files.directory / "contact.bin"
+    bench.program("train", "contact", "--no-refine", "--centres", 64, "--format", "fixed16", "-o", model)
+    bench.host_sim("upload", model)
+    said = bench.host_sim("check", "contact", "--model", model, "-n", files.frames)
+    expect(f"{files.frames} of {files.frames} bit-identical" in said, "it does not decode as the host")
+    bench.scan_every(1e-3, samples=12)
+    bench.run_for(0.02)
+    before, board = ask_statistics(bench), bench.board
+    arrivals = board.usart.to_host = Stamped(lambda: board.timer.count())
+    starts, ends = [], []
+    board.passes.on_start, board.passes.on_end = starts.append, ends.append
+    # What is under way at both ends does not count.
+    bench.run_for(files.seconds + 3e-3)
+    frames, latencies_us = [], []
+    for arrival_us, packet in arrivals.packets():
+        for _, message in packets(packet):
+            if message[:1] == ESTIMATE:
+                frame, rest = taken(message[1:])
+                start_us, _ = taken(rest)
+                frames.append(frame)
+                latencies_us.append(arrival_us - start_us)
+    count = len(arrivals)
+    after = ask_statistics(bench)
+    latencies_us.sort()
+    middle = latencies_us[len(latencies_us) // 2]
+    between_us = [board.time.ns(min(start - end for end in ends if end < start)) / 1e3 for start in starts[-100:]]
+    board.note(f"{len(frames)} estimates in {files.seconds:g} s, {count / len(frames):.1f} bytes each")
+    board.note(f"latency from a scan's start to its estimate's last byte: {latencies_us[0]} to {latencies_us[-1]} us, "
+               f"half of them within {middle} us")
+    board.note(f"between two scans: {min(between_us):.1f} us or more; decoding {after['longest_decode_us']} us at most")
+    expect(frames == list(range(frames[0], frames[0] + len(frames))), "estimates are missing")
+    expect(len(frames) >= 1000 * files.seconds, f"{len(frames)} estimates in {files.seconds:g} s")
+    for name in ("frames_missed", "failed_samples", "lost_reports"):
+        expect(after[name] == before[name], f"{name}: {after[name] - before[name]}")
+    bench.finish(erased=[JOURNAL[1], SLOT_B])
+
+
+class Stamped(bytearray):
+    """Bytes of a line, with the time in us by `clock()` at which each packet ended."""
+
+    def __init__(self, clock):
+        super().__init__()
+        self._clock, self._ends = clock, []
+
+    def append(self, byte):
+        super().append(byte)
+        if not byte:
+            # It has begun: a byte takes 11 us.
+            self._ends.append((self._clock() + 11, len(self)))
+
+    def packets(self):
+        """Each packet's end and bytes."""
+        start = 0
+        for at_us, end in self._ends:
+            yield at_us, bytes(self[start:end])
+            start = end
+
+
 def serve(make, files):
     """A board for you: its serial port stays open until Ctrl-C."""
     bench = make()
@@ -426,5 +557,5 @@ SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
     for scenario in (session, sparse, few_features, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow,
                      no_clock, clock_stops, fault_restarts, panic_restarts, brown_out, sagging_supply, keep, burst, overrun,
-                     log_abandoned, restart, dead_host, seal)
+                     log_abandoned, restart, dead_host, seal, onchip, onchip_stream)
 }

@@ -21,7 +21,7 @@ use taxel_rig::device::{Device, Wire, stream, upload};
 use taxel_simulate::{Synthesis, World};
 
 use crate::cycles::models;
-use crate::images::NUCLEO;
+use crate::images::NUCLEO_SPI;
 use crate::process::{Outcome, cargo, first_line, root, run as run_command, target_dir};
 use crate::size::Size;
 use crate::toolchain::{Toolchain, elf};
@@ -98,7 +98,7 @@ pub fn run(options: &Options) -> Outcome {
     let mut device = board.open()?;
     let identity = device.identify().map_err(text)?;
     println!("{}, firmware {}", identity.board, identity.firmware);
-    let image = elf(NUCLEO[1]);
+    let image = elf(NUCLEO_SPI);
     // Who flashed the board without a build has nothing to compare with.
     if image.exists() {
         check_image(&identity.memory, Size::new(&image)?.of_flash())?;

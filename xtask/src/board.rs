@@ -11,7 +11,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::emulate::qemu::decoded;
-use crate::images::{NUCLEO, NUCLEO_FIXED16, SEAL, build_image, build_other, build_variant};
+use crate::images::{
+    NUCLEO, NUCLEO_FIXED16, NUCLEO_SPI, SEAL, build_image, build_other, build_variant,
+};
 use crate::process::{Outcome, Said};
 use crate::toolchain::{Toolchain, elf};
 use copy::Copy;
@@ -26,6 +28,9 @@ pub struct Options {
     /// Frames that `check` decodes.
     #[arg(long, value_name = "N", default_value = "30")]
     frames: NonZeroU32,
+    /// Seconds for which the scenario `onchip-stream` counts estimates.
+    #[arg(long, value_name = "S", default_value = "1")]
+    seconds: NonZeroU32,
     /// Blob to upload, of the scene `press`, instead of a small one.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -37,7 +42,13 @@ pub struct Options {
 impl Options {
     /// No names, and a small model.
     pub fn plain() -> Self {
-        Self { mutants: false, frames: NonZeroU32::MIN, model: None, names: Vec::new() }
+        Self {
+            mutants: false,
+            frames: NonZeroU32::MIN,
+            seconds: NonZeroU32::MIN,
+            model: None,
+            names: Vec::new(),
+        }
     }
 
     /// A name that no mutant has, if mutants are to run. A list that is wrong is for [`run`] to tell.
@@ -47,8 +58,8 @@ impl Options {
     }
 }
 
-/// Name of the image.
-const IMAGE: &str = "nucleo-f446re";
+/// Scenario of the image that reads the sensor by the board's own converters.
+const ONCHIP: &str = "onchip";
 
 /// Scenario of an image with room for a larger sensor.
 const WIDE: &str = "wide";
@@ -88,7 +99,7 @@ pub fn run(options: &Options) -> Outcome {
     if run(WIDE) {
         Copy::make()?.build_wide(&toolchain)?;
     }
-    let image = elf(IMAGE);
+    let image = elf(NUCLEO_SPI);
     emulator.run(&image, &options.names)?;
     for (scenario, text) in LOGGED.iter().filter(|(scenario, _)| run(scenario)) {
         let log = decoded(&emulator::log(scenario), &image)?;

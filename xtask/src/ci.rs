@@ -17,12 +17,13 @@ type Step = (&'static str, Command);
 type Ended = (&'static str, Duration, Outcome<String>);
 
 /// Mutants of the board's image that CI builds: one for each of its files that matter most. All take some minutes.
-const MUTANTS: [&str; 5] = [
+const MUTANTS: [&str; 6] = [
     "select-early",
     "flash-busy",
     "rows-driven-at-a-fault",
     "not-fed-before-erase",
     "button-inverted",
+    "dma-on",
 ];
 
 /// Runs every step, even after a failure, and prints a summary.

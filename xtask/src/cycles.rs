@@ -121,7 +121,8 @@ fn measure(image: &Image, directory: &Path, kernel: Option<&str>) -> Outcome<Vec
     let models = models::train(directory, |_| true)?;
     // Images are measured on all cores at once, since QEMU runs an image on one.
     let figures = models.par_iter().map(|model| {
-        let measured = image.run(&model.path)?;
+        let mut measured = image.run(&model.path)?;
+        measured.retain(|it| it.scope != fit::FILTER);
         Ok(Figure::of_run(measured, model.centres as u64, model.affine))
     });
     let mut figures = figures.collect::<Outcome<Vec<_>>>()?.concat();

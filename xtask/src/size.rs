@@ -9,7 +9,8 @@ use budget::Budget;
 use object::{Object, ObjectSection, ObjectSymbol};
 
 use crate::images::{
-    FEATURES, NUCLEO, NUCLEO_FIXED16, QEMU, SEAL, build_image, build_other, build_variant,
+    FEATURES, NUCLEO, NUCLEO_FIXED16, NUCLEO_SPI, QEMU, SEAL, build_image, build_other,
+    build_variant,
 };
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
@@ -115,7 +116,7 @@ pub fn run() -> Outcome {
         "\n{:21} {:>6} of {:>6} | {:>5} of {:>5}",
         "feature", "flash", "budget", "RAM", "bud."
     );
-    let whole = Size::new(&elf(NUCLEO[1]))?;
+    let whole = Size::new(&elf(NUCLEO_SPI))?;
     for (part, other) in parts.iter().zip(&others) {
         let [flash, ram] = [Size::flash, Size::ram].map(|of| of(&whole).abs_diff(of(other)));
         let Budget { flash: most_flash, ram: most_ram, .. } = part.budget;

@@ -33,7 +33,7 @@ fn with_room(regions: String) -> String {
         capacity.split('x').filter_map(|number| number.parse().ok()).collect();
     let [rows, columns, outputs] = numbers[..] else { return regions };
     let (readings, outputs) = (rows * columns, rows * outputs);
-    let buffers = 22 * readings + 14 * outputs + 2 * (4 * readings).max(8 * outputs);
+    let buffers = 22 * readings + 22 * outputs + 2 * (4 * readings).max(8 * outputs);
     if buffers <= 21 * 1024 {
         return regions;
     }

@@ -63,6 +63,24 @@ impl FrameSource for Sensor {
         opaque(ScanReport::default())
     }
 
+    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) -> bool {
+        opaque((settings, wires));
+        opaque(true)
+    }
+
+    fn poll(&mut self) -> bool {
+        opaque(true)
+    }
+
+    fn take(&mut self, frame: &mut [f32]) -> ScanReport {
+        frame.fill(opaque(60.0));
+        opaque(ScanReport::default())
+    }
+
+    fn stop(&mut self) {
+        opaque(());
+    }
+
     fn constants(&self) -> Option<Constants<'_>> {
         self.0.constants()
     }

@@ -9,7 +9,8 @@ use embedded_hal::spi::{self, Operation, SpiDevice};
 use firmware::circuit::{Circuit, Divider, ZeroPotential};
 use firmware::readout::{
     Baseline, ColumnSampler, DirectPins, FrameSource, Mcp3208s, MultiplexedAdc, Multiplexer4051,
-    OnChipAdc, RowDrive, ScanSettings, Scanner, Selection, ShiftRegister595,
+    OnChipAdc, PassScanner, RowDrive, ScanSettings, Scanner, Selection, Sequencer, SequencerFault,
+    ShiftRegister595, add_samples,
 };
 use firmware::timing;
 use model_core::{ColumnWires, RowWire};
@@ -105,7 +106,42 @@ fn scan_with_every_sampler<D: RowDrive>(drive: impl Fn() -> D) {
     );
 }
 
+impl Sequencer<18> for Part {
+    const FULL_SCALE_COUNTS: u16 = 4095;
+    const MOST_SAMPLES: u16 = timing::ONCHIP_SAMPLES;
+
+    fn start(&mut self, rows: &[Option<RowWire>], settling_us: u32, samples: u16) {
+        opaque((rows, timing::RowCounts::new(settling_us, samples, opaque(180))));
+    }
+
+    fn poll(&mut self, sums: &mut [[u32; 18]]) -> Option<Result<(), SequencerFault>> {
+        add_samples(&opaque([4000; 36]), opaque(1), sums);
+        opaque(None)
+    }
+
+    fn stop(&mut self) {
+        opaque(());
+    }
+}
+
+fn scan_by_passes() {
+    let mut sums = [[0; 18]; 9];
+    let circuit = ZeroPotential::<8, 18>::TYPICAL;
+    let mut scanner = PassScanner::new(Part, circuit, &mut sums);
+    let rows: [RowWire; 8] = array::from_fn(|row| RowWire(opaque(row)));
+    let wires = Selection { rows: &rows, columns: ColumnWires(opaque(0x3_FFFF)) };
+    let settings = ScanSettings { settling_us: opaque(20), oversampling: opaque(12) };
+    let mut frame = [0.0; 144];
+    opaque(scanner.scan(settings, wires, &mut frame));
+    if scanner.start(settings, wires) && scanner.poll() {
+        opaque(scanner.take(&mut frame));
+    }
+    scanner.stop();
+    opaque(frame);
+}
+
 pub fn exercise() {
+    scan_by_passes();
     scan_with_every_sampler(|| DirectPins { rows: [Part; 8] });
     scan_with_every_sampler(|| Multiplexer4051 { address: [Part; 3], enable: Part });
     scan_with_every_sampler(|| ShiftRegister595::<_, 8> { data: Part, clock: Part, latch: Part });
@@ -124,6 +160,7 @@ pub fn exercise() {
         idle_samples: opaque(true),
         settling_us: timing::settling_us(time_constant_ns, opaque(12)),
         oversampling: opaque(2),
+        pass_samples: opaque(16),
         sample_ns: timing::spi_transfer_ns(opaque(3), opaque(1_000_000)),
         reading_ns: opaque(1_000),
         row_ns: opaque(5_000),

@@ -20,13 +20,15 @@ pub struct Source {
     board: Board,
     /// What a scan by itself has read, and the time in µs at which it ends.
     under_way: Option<(Vec<f32>, u32)>,
+    /// What one that has ended has read.
+    ended: Option<Vec<f32>>,
 }
 
 impl Source {
     /// A sensor with this `frame`.
     pub fn new(frame: &Rc<RefCell<TestFrame>>, board: &Board) -> Self {
         let (frame, board) = (frame.clone(), board.clone());
-        Self { circuit: ZeroPotential::TYPICAL, frame, board, under_way: None }
+        Self { circuit: ZeroPotential::TYPICAL, frame, board, under_way: None, ended: None }
     }
 
     fn read(&self, settings: ScanSettings, wires: Selection<'_>) -> Vec<f32> {
@@ -65,11 +67,17 @@ impl FrameSource for Source {
         pins.scans_alone
     }
 
-    fn poll(&mut self, frame: &mut [f32]) -> Option<ScanReport> {
+    fn poll(&mut self) -> bool {
+        assert!(self.ended.is_none(), "a frame was not taken");
         let now_us = self.board.pins.borrow().now_us;
-        let (readings, _) = self.under_way.take_if(|(_, end_us)| now_us >= *end_us)?;
-        frame.copy_from_slice(&readings);
-        Some(report(frame))
+        self.ended =
+            self.under_way.take_if(|(_, end_us)| now_us >= *end_us).map(|(frame, _)| frame);
+        self.ended.is_some()
+    }
+
+    fn take(&mut self, frame: &mut [f32]) -> ScanReport {
+        frame.copy_from_slice(&self.ended.take().expect("a scan has ended"));
+        report(frame)
     }
 
     fn stop(&mut self) {

@@ -2,13 +2,16 @@
 
 use core::cell::RefCell;
 
+use cortex_m::peripheral::SYST;
 use embedded_hal::spi::MODE_0;
 use embedded_hal_bus::spi::{NoDelay, RefCellDevice};
 use heapless::Vec;
-use stm32f4xx_hal::gpio::{ErasedPin, Output, PinState, Pull, Speed};
-use stm32f4xx_hal::pac::Peripherals;
+use stm32f4xx_hal::gpio::{ErasedPin, Output, PinState, Pull, Speed, gpiob};
+use stm32f4xx_hal::gpio::{PA0, PA1, PA4, PA6, PA7};
+use stm32f4xx_hal::gpio::{PC0, PC1, PC2, PC4, PC5, PC6, PC8, PC9};
+use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, ADC2, ADC3, DMA2, Peripherals, SPI2, TIM1, TIM8};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::Config;
+use stm32f4xx_hal::rcc::{Config, Rcc};
 use stm32f4xx_hal::spi::Spi;
 use stm32f4xx_hal::timer::{SysDelay, Timer};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
@@ -42,14 +45,42 @@ pub type Select = ChipSelect<90>;
 /// A wire to the 74HC595; it keeps each level for 100 ns, so that slow edges do no harm.
 pub type RowPin = HeldPin<18, 18>;
 
-/// The board's parts, ready for use.
-pub struct Board {
-    /// Cause of the reset that started the program.
-    pub reset_cause: ResetCause,
-    /// What the processor's clock is made of.
-    pub oscillator: Oscillator,
-    /// The green light LD2.
-    pub led: ErasedPin<Output>,
+/// What reads the sensor: converters around the board, or its own.
+pub trait Readout: Sized {
+    /// Name of the board with this readout, as the link reports it.
+    const BOARD: &'static str;
+
+    /// Sets the readout up, with all rows idle.
+    fn set_up(parts: ReadoutParts, rcc: &mut Rcc) -> Option<Self>;
+}
+
+/// Pins and peripherals that are left to a readout.
+#[expect(missing_docs, reason = "names of the chip's parts")]
+pub struct ReadoutParts {
+    pub pa0: PA0,
+    pub pa1: PA1,
+    pub pa4: PA4,
+    pub pa6: PA6,
+    pub pa7: PA7,
+    pub gpiob: gpiob::Parts,
+    pub pc0: PC0,
+    pub pc1: PC1,
+    pub pc2: PC2,
+    pub pc4: PC4,
+    pub pc5: PC5,
+    pub pc6: PC6,
+    pub pc8: PC8,
+    pub pc9: PC9,
+    pub spi2: SPI2,
+    pub own: OwnConverters,
+    pub syst: SYST,
+}
+
+/// The chip's own converters, and what works with them.
+pub type OwnConverters = (ADC1, ADC2, ADC3, ADC_COMMON, DMA2, TIM1, TIM8);
+
+/// Converters around the board, and a register for the rows.
+pub struct Converters {
     /// MCP3208 converters on one bus, of eight columns each.
     pub converters: [Converter; CONVERTERS],
     /// Serial data of the 74HC595 that drives the rows.
@@ -58,12 +89,24 @@ pub struct Board {
     pub row_clock: RowPin,
     /// Storage clock of the 74HC595.
     pub row_latch: RowPin,
+    /// Delays, by SysTick.
+    pub delay: SysDelay,
+}
+
+/// The board's parts, ready for use.
+pub struct Board<R> {
+    /// Cause of the reset that started the program.
+    pub reset_cause: ResetCause,
+    /// What the processor's clock is made of.
+    pub oscillator: Oscillator,
+    /// The green light LD2.
+    pub led: ErasedPin<Output>,
+    /// What reads the sensor.
+    pub readout: R,
     /// Serial line to the ST-LINK's virtual COM port.
     pub serial: Serial,
     /// Clock that counts microseconds and cycles since the start.
     pub clock: Clock,
-    /// Delays, by SysTick.
-    pub delay: SysDelay,
     /// The two model slots.
     pub slots: [Slot; 2],
     /// The two pages of the journal.
@@ -74,7 +117,7 @@ pub struct Board {
     pub watchdog: IndependentWatchdog,
 }
 
-impl Board {
+impl<R: Readout> Board<R> {
     /// Sets up all parts: 180 MHz from the ST-LINK's 8 MHz if they are there, else 158 MHz; all chip selects and row
     /// signals idle.
     ///
@@ -105,21 +148,74 @@ impl Board {
             rcc.cr().modify(|_, w| w.csson().set_bit());
         }
         let gpioa = parts.GPIOA.split(&mut rcc);
-        let gpiob = parts.GPIOB.split(&mut rcc);
         let gpioc = parts.GPIOC.split(&mut rcc);
-        // At once: splitting has made inputs of all pins, and the row registers' clocks must not float.
+        // At once: splitting has made inputs of all pins, and the rows' control lines must not float.
+        let readout = R::set_up(
+            ReadoutParts {
+                pa0: gpioa.pa0,
+                pa1: gpioa.pa1,
+                pa4: gpioa.pa4,
+                pa6: gpioa.pa6,
+                pa7: gpioa.pa7,
+                gpiob: parts.GPIOB.split(&mut rcc),
+                pc0: gpioc.pc0,
+                pc1: gpioc.pc1,
+                pc2: gpioc.pc2,
+                pc4: gpioc.pc4,
+                pc5: gpioc.pc5,
+                pc6: gpioc.pc6,
+                pc8: gpioc.pc8,
+                pc9: gpioc.pc9,
+                spi2: parts.SPI2,
+                own: (
+                    parts.ADC1,
+                    parts.ADC2,
+                    parts.ADC3,
+                    parts.ADC_COMMON,
+                    parts.DMA2,
+                    parts.TIM1,
+                    parts.TIM8,
+                ),
+                syst: core.SYST,
+            },
+            &mut rcc,
+        )?;
+
+        let serial = Serial::start(parts.USART2, gpioa.pa2, gpioa.pa3, &mut rcc)?;
+        let clock = Clock::start(parts.TIM2, &mut rcc)?;
+        let (slots, pages) = Slot::all(parts.FLASH);
+        Some(Self {
+            reset_cause,
+            oscillator,
+            led: gpioa.pa5.into_push_pull_output().erase(),
+            readout,
+            serial,
+            clock,
+            slots,
+            pages,
+            is_button_held: gpioc.pc13.into_input().is_low(),
+            watchdog,
+        })
+    }
+}
+
+impl Readout for Converters {
+    const BOARD: &'static str = "nucleo-f446re";
+
+    fn set_up(parts: ReadoutParts, rcc: &mut Rcc) -> Option<Self> {
         let [row_data, row_clock, row_latch] = [
-            gpioc.pc6.into_push_pull_output().erase(),
-            gpioc.pc8.into_push_pull_output().erase(),
-            gpioc.pc9.into_push_pull_output().erase(),
+            parts.pc6.into_push_pull_output().erase(),
+            parts.pc8.into_push_pull_output().erase(),
+            parts.pc9.into_push_pull_output().erase(),
         ];
+        let gpiob = parts.gpiob;
 
         // The pull-up makes a line that no converter drives read as no answer.
         let data_in = gpiob.pb14.into_alternate::<5>().internal_resistor(Pull::Up);
         // A slow clock pin delays the clock's feedback: the last bit of each byte would be wrong (ES0298).
         let clock_out = gpiob.pb13.into_alternate::<5>().speed(Speed::High);
         let pins = (Some(clock_out), Some(data_in), Some(gpiob.pb15));
-        let spi = Spi::new(parts.SPI2, pins, MODE_0, SPI_HZ.Hz(), &mut rcc);
+        let spi = Spi::new(parts.spi2, pins, MODE_0, SPI_HZ.Hz(), rcc);
         let bus: &'static RefCell<Bus> =
             cortex_m::singleton!(: RefCell<Bus> = RefCell::new(Bus::new(spi)))?;
         let converter = |select: ErasedPin<Output>| {
@@ -127,34 +223,22 @@ impl Board {
             device
         };
 
-        let serial = Serial::start(parts.USART2, gpioa.pa2, gpioa.pa3, &mut rcc)?;
-        let clock = Clock::start(parts.TIM2, &mut rcc)?;
-        let (slots, pages) = Slot::all(parts.FLASH);
         let high = PinState::High;
         let selects = [
             Some(gpiob.pb12.into_push_pull_output_in_state(high).erase()),
             Some(gpiob.pb1.into_push_pull_output_in_state(high).erase()),
-            Some(gpioc.pc4.into_push_pull_output_in_state(high).erase()),
+            Some(parts.pc4.into_push_pull_output_in_state(high).erase()),
             // Without a fourth converter the pin stays as it is.
-            (CONVERTERS > 3).then(|| gpioc.pc5.into_push_pull_output_in_state(high).erase()),
+            (CONVERTERS > 3).then(|| parts.pc5.into_push_pull_output_in_state(high).erase()),
         ];
         let converters: Vec<_, CONVERTERS> = selects.into_iter().flatten().map(converter).collect();
         Some(Self {
-            reset_cause,
-            oscillator,
-            led: gpioa.pa5.into_push_pull_output().erase(),
             converters: converters.into_array().ok()?,
             row_data: row_data.into(),
             row_clock: row_clock.into(),
             row_latch: row_latch.into(),
-            serial,
-            clock,
             // From the processor's own clock: from an eighth of it, the HAL's waits would be 2 % short.
-            delay: Timer::syst(core.SYST, &rcc.clocks).delay(),
-            slots,
-            pages,
-            is_button_held: gpioc.pc13.into_input().is_low(),
-            watchdog,
+            delay: Timer::syst(parts.syst, &rcc.clocks).delay(),
         })
     }
 }

@@ -1,35 +1,37 @@
-//! The program on the board: the application with the board's parts.
+//! The program on the board: the application with the board's parts, whatever reads the sensor.
+
+use core::marker::PhantomData;
 
 use board_common::region::take_weights;
-use board_common::{BoardApp, CAPACITY, buffers};
-use cortex_m_rt::entry;
+use board_common::{BoardApp, buffers, memory};
 use defmt::{info, warn};
 use defmt_rtt as _;
-use firmware::circuit::ZeroPotential;
 use firmware::link::message::{Configuration, Memory};
 use firmware::platform::{Platform, Port};
-use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
+use firmware::readout::FrameSource;
 use firmware::store::Journal;
-use nucleo_f446re::{Board, Clock, Oscillator, Serial, Slot, memory, restart};
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// Constants of the circuit, until others are kept: `host-sim link PORT calibrate` measures your own.
-const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
+use crate::board::{Board, Readout};
+use crate::clock::Clock;
+use crate::oscillator::Oscillator;
+use crate::reset::restart;
+use crate::serial::Serial;
+use crate::slot::Slot;
 
-type BoardScanner<D, S, T, C> = Scanner<D, S, T, C, { CAPACITY.rows }, { CAPACITY.columns }>;
-
-struct Nucleo {
+struct Nucleo<R> {
     serial: Serial,
     clock: Clock,
     watchdog: IndependentWatchdog,
     led: ErasedPin<Output>,
     journal: Journal<Slot>,
     is_button_held: bool,
+    readout: PhantomData<R>,
 }
 
-impl Port for Nucleo {
+impl<R> Port for Nucleo<R> {
     fn now_us(&mut self) -> u32 {
         self.clock.now_us()
     }
@@ -43,10 +45,10 @@ impl Port for Nucleo {
     }
 }
 
-impl Platform for Nucleo {
+impl<R: Readout> Platform for Nucleo<R> {
     type Page = Slot;
 
-    const BOARD: &'static str = "nucleo-f446re";
+    const BOARD: &'static str = R::BOARD;
 
     /// Feeds the watchdog, and blinks the light about once a second.
     fn feed_watchdog(&mut self) {
@@ -84,12 +86,13 @@ impl Platform for Nucleo {
     }
 }
 
-#[entry]
-fn main() -> ! {
-    let Some(board) = Board::take() else { restart() };
+/// Runs the application with the frames that `source` makes of the readout.
+pub fn run<R: Readout, F: FrameSource>(source: impl FnOnce(R) -> F) -> ! {
+    let Some(board) = Board::<R>::take() else { restart() };
     info!(
-        "taxel {=str} on a NUCLEO-F446RE, started by: {}",
+        "taxel {=str} on a {=str}, started by: {}",
         env!("CARGO_PKG_VERSION"),
+        R::BOARD,
         board.reset_cause
     );
     if board.oscillator == Oscillator::Internal {
@@ -97,23 +100,18 @@ fn main() -> ! {
             "no 8 MHz from the ST-LINK: running from the internal oscillator, 1 % off at 25 °C, up to 4 % elsewhere"
         );
     }
-    let drive = ShiftRegister595::<_, { CAPACITY.rows }> {
-        data: board.row_data,
-        clock: board.row_clock,
-        latch: board.row_latch,
-    };
-    let sampler = Mcp3208s { chips: board.converters };
-    let scanner = BoardScanner::new(drive, sampler, board.delay, CIRCUIT);
-    let nucleo = Nucleo {
+    let nucleo = Nucleo::<R> {
         serial: board.serial,
         clock: board.clock,
         watchdog: board.watchdog,
         led: board.led,
         journal: Journal::new(board.pages),
         is_button_held: board.is_button_held,
+        readout: PhantomData,
     };
     let Some(buffers) = buffers() else { restart() };
-    let mut app = BoardApp::<_, _>::new(nucleo, scanner, Configuration::DEFAULT, buffers);
+    let mut app =
+        BoardApp::<_, _>::new(nucleo, source(board.readout), Configuration::DEFAULT, buffers);
     let mut slots = board.slots;
     // SAFETY: the memory is taken here only.
     app.run(&mut slots, unsafe { take_weights() });

@@ -1,8 +1,32 @@
-//! The image for the board NUCLEO-F446RE: the application, with the sensor at its pins.
+//! The image for the board NUCLEO-F446RE with converters around it: the application, with the sensor at its pins.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-mod device;
+mod device {
+    use board_common::CAPACITY;
+    use cortex_m_rt::entry;
+    use firmware::circuit::ZeroPotential;
+    use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
+    use nucleo_f446re::{Converters, run};
+
+    /// Constants of the circuit, until others are kept: `host-sim link PORT calibrate` measures your own.
+    const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
+
+    type BoardScanner<D, S, T, C> = Scanner<D, S, T, C, { CAPACITY.rows }, { CAPACITY.columns }>;
+
+    #[entry]
+    fn main() -> ! {
+        run(|readout: Converters| {
+            let drive = ShiftRegister595::<_, { CAPACITY.rows }> {
+                data: readout.row_data,
+                clock: readout.row_clock,
+                latch: readout.row_latch,
+            };
+            let sampler = Mcp3208s { chips: readout.converters };
+            BoardScanner::new(drive, sampler, readout.delay, CIRCUIT)
+        })
+    }
+}
 
 #[cfg(not(target_os = "none"))]
 fn main() {

@@ -7,6 +7,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use model_core::blob::Model;
 use model_core::confidence::{Confidence, Sizes};
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::filter::{Settings, State};
 use model_core::gate::{Rest, is_at_rest};
 use model_core::rbf::{Format, Network};
 use model_core::rls::Rls;
@@ -436,7 +437,44 @@ pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()>
             "confidence, {what}: {crc:08x}, {novel} frames novel, {far} of them far, {missing} missing"
         ));
     }
+    let (crc, started) = filtering();
+    say(format_args!("filter: {crc:08x}, started anew {started} times"));
     Some(())
+}
+
+/// CRC-32 of all bits of outputs that a filter in time gives, and how often it starts anew: frames are late, missed and
+/// repeated; rows are at rest and faulty; the settings are drawn now and then.
+fn filtering() -> (u32, usize) {
+    const OUTPUTS: usize = 3;
+    let (crc, mut numbers) = (CRC, Numbers::new(7));
+    let mut digest = crc.digest();
+    let mut draw = |most: f32| (most * (1.0 + numbers.draw()) / 2.0) as u32;
+    let mut state = State::new([[0.0; 2]; ROWS * OUTPUTS]);
+    let mut settings = Settings::default();
+    let (mut start_us, mut started) = (1 << 40, 0);
+    for frame in 0..MANY {
+        if frame % 50 == 0 {
+            settings = Settings { time_constant_us: 1 + draw(2e4), lead_us: draw(1e4) };
+        }
+        let step_us = [1000, 1000 + draw(200.0), 4000, 0, draw(3e5)][draw(4.1) as usize];
+        start_us += u64::from(step_us);
+        started += usize::from(step_us > 10 * settings.time_constant_us);
+        let mut outputs = [[0.0; OUTPUTS]; ROWS];
+        let mut status = [RowStatus::Decoded; ROWS];
+        for (outputs, status) in outputs.iter_mut().zip(&mut status) {
+            outputs.fill_with(|| draw(2e6) as f32 * 1e-6 - 1.0);
+            *status = [RowStatus::AtRest, RowStatus::MissingReading, RowStatus::Decoded]
+                [draw(30.0).min(2) as usize];
+            if *status == RowStatus::MissingReading {
+                outputs.fill(f32::NAN);
+            }
+        }
+        let outputs = outputs.as_flattened_mut();
+        let mut estimate = Estimate { outputs, status: &mut status };
+        state.filter(settings, start_us, &mut estimate);
+        add(&mut digest, outputs);
+    }
+    (digest.finalize(), started)
 }
 
 fn decode_many<E: ExpKernel>(format: Format, blob: &[u8], say: Say<'_>) -> Option<()> {

@@ -26,7 +26,10 @@ pub struct Buffers<
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     pub(super) rest: Outcome<ROWS, OUTPUTS>,
     /// State of the filter in time.
+    #[cfg(feature = "filter")]
     pub(super) tracks: [[Track; OUTPUTS]; ROWS],
+    #[cfg(not(feature = "filter"))]
+    pub(super) tracks: [[Track; OUTPUTS]; 0],
     /// Standard deviations of the outputs.
     #[cfg(feature = "confidence")]
     pub(super) deviations: [[f32; OUTPUTS]; ROWS],
@@ -78,7 +81,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
             rest: Outcome::NOTHING,
-            tracks: [[[0.0; 2]; OUTPUTS]; ROWS],
+            tracks: [[[0.0; 2]; OUTPUTS]; _],
             deviations: [[0.0; OUTPUTS]; _],
         }
     }

@@ -51,6 +51,15 @@ pub struct Scan {
     pub missed: u32,
 }
 
+/// A scan whose frame is still to be read.
+struct Ended {
+    scan: Scan,
+    /// Time in µs at which it was seen to have ended; `None` if the source must be waited for.
+    end_us: Option<u64>,
+    /// Whether the source has a frame of it.
+    is_whole: bool,
+}
+
 /// A baseline that is being captured.
 #[derive(Clone, Copy)]
 pub struct Capture {
@@ -159,7 +168,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         scratch: &mut [f32],
         link: &mut Link<'_, P>,
     ) -> Option<(u32, Scan)> {
-        let mut ended = self.poll(scratch, link);
+        let mut ended = self.poll(link);
         let period_us = self.configuration.frame_period_us;
         if self.under_way.is_none()
             && let Some(missed) = self.clock.due(link.platform().now_us(), period_us)
@@ -170,10 +179,22 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
             if self.source.start(self.configuration.scan, self.wiring.selection()) {
                 self.under_way = Some(scan);
             } else {
-                ended = self.wait_for(scratch).map(|report| (scan, report, link.now_us()));
+                ended = Some(Ended { scan, end_us: None, is_whole: true });
             }
         }
-        let (scan, report, end_us) = ended?;
+        let Ended { scan, end_us, is_whole } = ended?;
+        let settings = self.configuration.scan;
+        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
+        let read = |wires: Selection<'_>, frame: &mut [f32]| match end_us {
+            None => self.source.scan(settings, wires, frame),
+            Some(_) if is_whole => self.source.take(frame),
+            Some(_) => {
+                frame.fill(f32::NAN);
+                ScanReport { failed_samples: frame.len() as u16 }
+            }
+        };
+        let report = self.wiring.fill(frame, scratch, read);
+        let end_us = end_us.unwrap_or_else(|| link.now_us());
         self.answers = self.frame().iter().any(|reading| !reading.is_nan());
         let s = &mut link.statistics;
         let frame = s.number_frame();
@@ -186,37 +207,20 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         Some((frame, scan))
     }
 
-    /// Ends the scan that goes on by itself, if there is one and it is complete; with its report, and the time in µs at
-    /// which that was seen. One that takes too long gives no reading.
-    fn poll<P: Platform>(
-        &mut self,
-        scratch: &mut [f32],
-        link: &mut Link<'_, P>,
-    ) -> Option<(Scan, ScanReport, u64)> {
+    /// Ends the scan that goes on by itself, if there is one and it has ended. One that takes too long is given up.
+    fn poll<P: Platform>(&mut self, link: &mut Link<'_, P>) -> Option<Ended> {
         let scan = self.under_way?;
-        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
-        let report = self.wiring.fill(frame, scratch, |_, frame| self.source.poll(frame));
+        let is_whole = self.source.poll();
         let now_us = link.now_us();
-        if report.is_none() && now_us.wrapping_sub(scan.start_us) < LONGEST_SCAN_US {
+        if !is_whole && now_us.wrapping_sub(scan.start_us) < LONGEST_SCAN_US {
             return None;
         }
-        let report = report.unwrap_or_else(|| {
-            self.source.stop();
-            frame.fill(f32::NAN);
-            ScanReport { failed_samples: frame.len() as u16 }
-        });
-        self.under_way = None;
-        Some((scan, report, now_us))
-    }
-
-    /// Scans a frame by a source that cannot do so by itself.
-    fn wait_for(&mut self, scratch: &mut [f32]) -> Option<ScanReport> {
-        let settings = self.configuration.scan;
-        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
-        let scan = |wires: Selection<'_>, frame: &mut [f32]| {
-            Some(self.source.scan(settings, wires, frame))
-        };
-        self.wiring.fill(frame, scratch, scan)
+        if is_whole {
+            self.under_way = None;
+        } else {
+            self.stop_scan();
+        }
+        Some(Ended { scan, end_us: Some(now_us), is_whole })
     }
 
     /// Gives up the scan that goes on by itself: what it is of changes. It counts as no frame.

@@ -84,24 +84,24 @@ impl<'m, const ROWS: usize> Wiring<'m, ROWS> {
         Selection { rows: self.rows(), columns: self.columns }
     }
 
-    /// Fills the model's `frame` by `scan`, which fills a frame of all cells between the wires, or leaves it for later. If
-    /// these are not the model's readings in their order, it goes to `scratch` first.
+    /// Fills the model's `frame` by `scan`, which fills a frame of all cells between the wires. If these are not the
+    /// model's readings in their order, it goes to `scratch` first.
     pub fn fill<T>(
         &self,
         frame: &mut [f32],
         scratch: &mut [f32],
-        scan: impl FnOnce(Selection<'_>, &mut [f32]) -> Option<T>,
-    ) -> Option<T> {
+        scan: impl FnOnce(Selection<'_>, &mut [f32]) -> T,
+    ) -> T {
         let wires = self.selection();
         if self.in_order {
             return scan(wires, frame);
         }
         let scanned = wires.rows.len().saturating_mul(wires.columns.count());
         let scanned = scratch.get_mut(..scanned).unwrap_or_default();
-        let report = scan(wires, scanned)?;
+        let report = scan(wires, scanned);
         for (reading, place) in frame.iter_mut().zip(self.places.iter()) {
             *reading = scanned.get(usize::from(*place)).copied().unwrap_or(f32::NAN);
         }
-        Some(report)
+        report
     }
 }

@@ -634,7 +634,7 @@ pub enum ConfigurationField {
     ContactThreshold,
     /// The tolerance of the gate: at least 0, and below 1.
     RestTolerance,
-    /// The filter's time constant: at most 1 s.
+    /// The filter's time constant: at most 1 s; 0 in an image that was built without the feature `filter`.
     FilterTimeConstant,
     /// The filter's lead: at most 1 s.
     FilterLead,

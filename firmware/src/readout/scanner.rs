@@ -156,7 +156,8 @@ fn mean_of_samples<S: ColumnSampler>(
     Ok(sum as f32 / f32::from(samples))
 }
 
-fn count_failures(report: &mut ScanReport, failures: usize) {
+/// Counts samples that could not be taken.
+pub(super) fn count_failures(report: &mut ScanReport, failures: usize) {
     let failures = u16::try_from(failures).unwrap_or(u16::MAX);
     report.failed_samples = report.failed_samples.saturating_add(failures);
 }

@@ -14,8 +14,9 @@ use std::collections::HashMap;
 pub use design::{Design, NetworkDesign};
 pub use frames::{Cost, Frames};
 pub use memory::DecoderRam;
+use model_core::blob::ModelShape;
 use model_core::rbf::Format;
-pub use terms::{Terms, terms};
+pub use terms::{Terms, filter_terms, terms};
 
 use crate::error::{Error, Result};
 use crate::infer::Exponential;
@@ -104,16 +105,34 @@ impl Prices {
     /// # Errors
     /// [`Error`] names a term that the list lacks.
     pub fn frame(&self, design: &Design, exponential: Exponential, gating: Gating) -> Result<Cost> {
+        let cost = self.of(&terms(design, exponential, gating))?;
+        let waiting = if gating == Gating::AtRest { 0 } else { design.least_waiting_for_weights() };
+        Ok(Cost { flash_cycles: cost.flash_cycles + waiting, ..cost })
+    }
+
+    /// What the [filter in time](model_core::filter) adds to a frame with estimates of this `shape`.
+    ///
+    /// # Errors
+    /// As [`frame`](Self::frame).
+    pub fn filter(&self, shape: ModelShape) -> Result<Cost> {
+        self.of(&filter_terms(shape))
+    }
+
+    /// What these `terms` cost together, with all weights in RAM.
+    ///
+    /// # Errors
+    /// As [`frame`](Self::frame).
+    pub fn of(&self, terms: &Terms) -> Result<Cost> {
         let mut sum = [0.0; 3];
-        for (name, times) in terms(design, exponential, gating) {
+        for (name, times) in terms {
             let unknown = || bad_prices(&format!("no price for {name:?}"));
-            let price = self.by_term.get(&name).ok_or_else(unknown)?;
-            sum.iter_mut().zip(price).for_each(|(sum, price)| *sum += price * times as f64);
+            let price = self.by_term.get(name).ok_or_else(unknown)?;
+            sum.iter_mut().zip(price).for_each(|(sum, price)| *sum += price * *times as f64);
         }
         let [instructions, cycles, flash_cycles] = sum.map(|cost| cost.round() as u64);
-        let waiting = if gating == Gating::AtRest { 0 } else { design.least_waiting_for_weights() };
-        Ok(Cost { instructions, cycles, flash_cycles: flash_cycles + waiting })
+        Ok(Cost { instructions, cycles, flash_cycles })
     }
+
     /// What a frame costs a model of this `design` without a gate, and behind gates.
     ///
     /// # Errors
@@ -159,8 +178,6 @@ pub fn kernel_name(format: Format, exponential: Exponential) -> String {
 
 #[cfg(test)]
 mod tests {
-    use model_core::blob::ModelShape;
-
     use super::*;
 
     #[test]

@@ -7,7 +7,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::simd::{LANES, Lanes};
 use taxel_learn::{Estimates, FrameDecoder, Frames};
 use taxel_simulate::sensor::LaneModel;
-use taxel_simulate::{Synthesis, World, rubber};
+use taxel_simulate::{Synthesis, World};
 
 use crate::error::Refusal;
 use crate::frame::{Frame, Memory, Rows};
@@ -60,13 +60,12 @@ pub struct Posterior {
 }
 
 impl Limit {
-    /// Prepares the limit of `world` at its noise.
+    /// Prepares the limit of still frames of `world` at its noise. The rubber does not matter: it is at the end of all creep.
     ///
     /// # Errors
     /// [`Refusal`] for a world with something that is not modelled, or without noise.
     pub fn new(world: &World) -> Result<Self, Refusal> {
         let motion = &world.motion;
-        let rubber::Kind::Elastic(_) = world.rubber;
         if world.drift.is_some() {
             return Err(Refusal::Drift);
         }

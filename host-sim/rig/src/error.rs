@@ -154,7 +154,9 @@ fn configuration_range(field: ConfigurationField) -> String {
             "the tolerance of rows at rest (--rest-tolerance: 0 to below 1)".into()
         }
         Field::FilterTimeConstant => {
-            format!("the filter's time constant (--filter-ms: 0 to {MOST_FILTER_MS})")
+            format!(
+                "the filter's time constant (--filter-ms: 0 to {MOST_FILTER_MS}; 0 in an image without the feature `filter`)"
+            )
         }
         Field::FilterLead => format!("the filter's lead (--lead-ms: 0 to {MOST_FILTER_MS})"),
         Field::ReportEvery => "the scans of which one is reported (--report-every: from 1)".into(),

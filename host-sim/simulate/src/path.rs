@@ -17,6 +17,11 @@ use crate::sensor::Sensor;
 const PRESS: [f64; 2] = [0.4, 0.6];
 /// Largest difference in phase between the path's two directions, in turns: half a radian.
 const PHASE: f64 = 0.5 / TAU;
+/// Longest time in s between two moments at which rubber with a memory is told what pushes it. From one to the next the
+/// contact slides by no more than [`FINE_MM`], and no more than [`FINE_PRESS`] of a press passes.
+const FINE_S: f64 = 0.001;
+const FINE_MM: f64 = 0.1;
+const FINE_PRESS: f64 = 0.01;
 /// Most trajectories.
 const MOST_TRAJECTORIES: usize = 10_000;
 
@@ -82,6 +87,12 @@ impl Path {
             range(self.speed_mm_per_s),
             range(self.press_rate_hz)
         )
+    }
+
+    /// Time in s between two moments at which rubber with a memory is told what pushes it.
+    pub(crate) fn fine_step_s(&self) -> f64 {
+        let [speed, rate] = [self.speed_mm_per_s, self.press_rate_hz].map(|[_, most]| most);
+        FINE_S.min(FINE_MM / speed).min(FINE_PRESS / rate)
     }
 
     /// Checks all settings, for contacts up to `deepest_mm` on `sensor`.

@@ -13,6 +13,7 @@ use crate::path::Path;
 use crate::readout::Readout;
 use crate::rubber;
 use crate::sensor::{Precision, Sensor};
+use crate::timetable::MOST_SCANS;
 
 type Check = std::result::Result<(), BadValue>;
 
@@ -31,7 +32,7 @@ pub struct World {
     pub motion: motion::Kind,
     /// Path of the contact, if it moves. Models are trained on still frames all the same.
     pub path: Option<Path>,
-    /// Rubber, and how it follows the motion.
+    /// Rubber, and how it follows contacts that move. Still ones have been held until nothing creeps any more.
     pub rubber: rubber::Kind,
     pub noise: Noise,
     /// Drift of the gain between sessions, if any.
@@ -135,6 +136,10 @@ impl World {
         self.drift.map_or(Ok(()), |drift| check_gain("drift.gain", drift.gain))?;
         rows(self)?;
         readout(&self.readout)?;
+        self.rubber.check()?;
+        require(!self.remembers() || self.path.is_some(), "rubber", "[rubber]", || {
+            "still contacts have been held until nothing creeps any more, so it would change nothing; add [motion], or leave it out".into()
+        })?;
         match &self.outputs {
             Outputs::Electrodes(wanted) => outputs_of_electrodes(wanted),
             Outputs::Contact(wanted) => outputs_of_contact(wanted, self),
@@ -146,7 +151,19 @@ impl World {
         require(self.motion.largest_contact(&self.sensor).is_some(), "motion", "[motion]", || {
             "electrodes that move on their own have no contact that could slide; set deformation.kind = \"press\"".into()
         })?;
-        path.check(&self.sensor, self.motion.range_mm()[2][1])
+        path.check(&self.sensor, self.motion.range_mm()[2][1])?;
+        let (steps, seconds) = (path.duration_s / path.fine_step_s(), path.duration_s);
+        let few = !self.remembers() || steps <= MOST_SCANS as f64;
+        require(few, "motion.duration_s", format!("{seconds} s"), || {
+            format!(
+                "rubber with a memory follows such contacts in {steps:.0} steps, more than {MOST_SCANS}; shorten it"
+            )
+        })
+    }
+
+    /// Whether the rubber follows contacts that move with a memory.
+    fn remembers(&self) -> bool {
+        self.rubber.at_rest(0).is_some()
     }
 
     /// Checks that so many `frames` fit in memory; `field` names them in the message.
@@ -378,6 +395,13 @@ fn outputs_of_contact(wanted: &[ContactOutput], world: &World) -> Check {
     require(has_contact, "outputs.contact", format!("{names:?}"), || {
         "electrodes that move on their own have no contact; set deformation.kind = \"press\", or ask for \
          outputs.quantity and outputs.axes"
+            .into()
+    })?;
+    let of_load = |it: &ContactOutput| matches!(it, ContactOutput::Centre | ContactOutput::Force);
+    let known = !world.remembers() || wanted.iter().all(of_load);
+    require(known, "outputs.contact", format!("{names:?}"), || {
+        "how deep the rubber is by now depends on where the contact was before; ask for \"centre\" and \"force\" \
+         alone, or leave [rubber] out"
             .into()
     })
 }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use crate::error::{Bounded, NoPoint};
 use crate::evaluate::gate::{self, RECOMMENDED_K};
-use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan, Wires};
+use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan, Readout, Wires};
 use crate::metrics;
 use crate::subject::Subject;
 use crate::verdict::Warning;
@@ -41,6 +41,7 @@ mod page;
   host-sim trade press --max-cycles 40000 --max-flash 40000
   host-sim trade press --average 1,4,16 --max-latency-ms 25
   host-sim trade press --average 1,4 --motion 50mm/s,3Hz
+  host-sim trade moving --readout onchip --average 1,4,12 --max-latency-ms 2
   host-sim trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
     /// Folder that receives a folder named after the scene or the CSV file.
@@ -95,6 +96,10 @@ pub struct Arguments {
     /// that never waits.
     #[arg(long, value_enum, default_value_t = MemoryOption::Flash)]
     memory: MemoryOption,
+    /// Readout of the board: converters on a bus, or the chip's own, which scan while the frame before is decoded
+    /// (docs/board.md).
+    #[arg(long, value_enum, default_value_t = ReadoutOption::Spi)]
+    readout: ReadoutOption,
     /// Time of a scan in ms with one sample a reading, instead of that of the board's readout.
     #[arg(long, value_name = "MS", allow_negative_numbers = true)]
     scan_ms: Option<f64>,
@@ -126,6 +131,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let device = Device {
         clock_mhz: arguments.clock_mhz,
         memory: arguments.memory.into(),
+        readout: arguments.readout.into(),
         scan_ms: arguments.scan_ms,
     };
     device.check().map_err(|bad| of_option(bad, &OPTIONS))?;
@@ -237,6 +243,22 @@ impl From<MemoryOption> for Memory {
         match option {
             MemoryOption::Flash => Self::Flash,
             MemoryOption::Ram => Self::Ram,
+        }
+    }
+}
+
+/// Value of `--readout`.
+#[derive(Clone, Copy, ValueEnum)]
+enum ReadoutOption {
+    Spi,
+    Onchip,
+}
+
+impl From<ReadoutOption> for Readout {
+    fn from(option: ReadoutOption) -> Self {
+        match option {
+            ReadoutOption::Spi => Self::Spi,
+            ReadoutOption::Onchip => Self::OnChip,
         }
     }
 }

@@ -15,7 +15,7 @@ use model_core::filter::Settings;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
-use taxel_learn::ModelBlob;
+use taxel_learn::{Decoder, Exponential, Filtered, ModelBlob, Timing};
 use taxel_rig::Error;
 use taxel_rig::device::check::{Frames, Plan, check};
 use taxel_rig::device::{Device, Wire, request_bytes, upload};
@@ -575,6 +575,55 @@ pub mod serial_port {
         assert!(number("error_after") < 0.5 * number("error_before"), "{found}");
         let page = folder.succeed(&["link", &port, "identify"]);
         assert!(page.contains(found["model_crc"].as_str().unwrap()), "{page}");
+    }
+
+    #[test]
+    fn a_recording_has_times_by_which_a_log_can_be_filtered() {
+        let folder = Folder::new("recorded_times");
+        let model = model(3);
+        folder.write("model.bin", model.bytes());
+        let (port, near) = port_with(&model, frames());
+        drop(near);
+        let record = ["link", &port, "record", "model.bin", "-n", "8", "--time", "-o", "log.csv"];
+        folder.succeed(&[&record[..], &["--readings"]].concat());
+        let decode = ["decode", "model.bin", "log.csv", "-o", "estimate.csv"];
+        folder.succeed(&[&decode[..], &["--filter-ms", "30", "--lead-ms", "4"]].concat());
+        let read = |name: &str| {
+            let text = std::fs::read_to_string(folder.path(name)).unwrap();
+            let (header, lines) = text.split_once('\n').unwrap();
+            let values = lines.lines().flat_map(|line| line.split(','));
+            let values = values.map(|value| value.parse().unwrap()).collect();
+            Table { names: header.split(',').map(String::from).collect(), values }
+        };
+        let (log, found) = (read("log.csv"), read("estimate.csv"));
+        assert_eq!((log.names[0].as_str(), log.values[0]), ("time_s", 0.0));
+        let start_us: Vec<u64> = log.lines().map(|line| (line[0] * 1e6).round() as u64).collect();
+        let readings = log.columns(1, 144);
+        let filter = Settings { time_constant_us: 30_000, lead_us: 4000 };
+        let filtered = Filtered::new(model.prepare(Exponential::default()), filter);
+        let timing = Some(Timing { start_us: &start_us, reading_offset_us: &[] });
+        let frames = taxel_learn::Frames { readings: &readings.values, timing };
+        let expected = filtered.decode_frames(frames, 8).values;
+        let outputs = found.columns(0, 144).values;
+        let is_same = |(a, b): (&f64, &f64)| (*a as f32).to_bits() == (*b as f32).to_bits();
+        assert!(outputs.iter().zip(&expected).all(is_same));
+        assert_ne!(outputs, model.prepare(Exponential::default()).decode_table(&readings).values);
+
+        // What the device filters is saved, too, or one of some.
+        let options = ["--filter-ms", "30", "--report-every", "3", "--json"];
+        let saved = folder.succeed(&[&record[..], &options].concat());
+        let saved: serde_json::Value = serde_json::from_str(&saved).unwrap();
+        assert_eq!((saved["frames"].as_u64(), saved["frames_lost"].as_u64()), (Some(8), Some(0)));
+        let said = folder.fail(&[&record[..], &["--readings", "--filter-ms", "30"]].concat(), 2);
+        assert!(said.contains("--filter-ms filters estimates"), "{said}");
+        // The device filters from now on, if it is told to.
+        let configure = ["link", &port, "configure", "--filter-ms", "5", "--lead-ms", "1.5"];
+        let page = folder.succeed(&[&configure[..], &["--report-every", "7"]].concat());
+        for said in ["a time constant of 5 ms, a lead of 1.5 ms", "estimates yes (one of 7)"] {
+            assert!(page.contains(said), "{page}");
+        }
+        let page = folder.succeed(&["link", &port, "identify"]);
+        assert!(page.contains("until the line took its estimate"), "{page}");
     }
 
     #[test]

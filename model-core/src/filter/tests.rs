@@ -185,3 +185,15 @@ fn nothing_is_filtered_without_a_time_constant_or_room() {
     state.filter(settings, 0, &mut Estimate { outputs: &mut [], status: &mut [] });
     assert_eq!(outputs, [0.5]);
 }
+
+#[test]
+fn the_longest_time_constant_keeps_its_coefficients() {
+    let mut worst = 0.0_f64;
+    for gap_us in 100..20_000 {
+        let settings = Settings { time_constant_us: Settings::MOST_US, lead_us: 0 };
+        let Step { alpha, .. } = settings.step(gap_us).unwrap();
+        let expected = -(-2e-6 * gap_us as f64).exp_m1(); // 1 − θ²
+        worst = worst.max((f64::from(alpha) / expected - 1.0).abs());
+    }
+    assert!(worst < 1e-3, "{worst}");
+}

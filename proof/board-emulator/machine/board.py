@@ -3,14 +3,18 @@
 import math
 
 from . import circuit, flash, gpio
+from .adc import BITS, Adc
 from .bus import Bus
 from .core import Core
-from .cpu import FLASH, FLASH_BYTES, SRAM, SRAM_BYTES, Cpu
+from .cpu import FLASH, FLASH_BYTES, PERIPHERALS, SRAM, SRAM_BYTES, Cpu
+from .dma import Dma
 from .image import Image
 from .mcp3208 import Mcp3208
-from .rcc import HSI_HZ, Rcc
+from .rcc import CONVERTERS_RESET, HSI_HZ, TIMERS_RESET, Rcc
+from .row_pins import RowPins
 from .rtt import Rtt
 from .rules import Fault, Rules
+from .scan_timers import Passes
 from .shift_register import ShiftRegister
 from .spi import Spi
 from .timer import Timer
@@ -53,12 +57,13 @@ class Board:
     `hse`: the ST-LINK gives its 8 MHz. `hsi_error`: by how much, as a share, the internal oscillator is too fast.
     `lsi_hz`: the watchdog's own clock. `erase_s`: how long erasing a slot takes, whatever the data sheet says. `options`:
     the option bytes. `sensor`: the converters are there. `settling_us`: the wait after each change of rows that the
-    device is configured to. `op_amp_hz`: the gain-bandwidth product of the op-amps.
+    device is configured to. `op_amp_hz`: the gain-bandwidth product of the op-amps. `onchip`: the chip's own converters
+    read the sensor, with multiplexers before them and the rows at pins.
     """
 
     def __init__(self, path, ohm, *, hse=True, hsi_error=0.0, lsi_hz=32_000, erase_s=None,
                  options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=20.0,
-                 op_amp_hz=circuit.OP_AMP_HZ, log=print):
+                 op_amp_hz=circuit.OP_AMP_HZ, onchip=False, log=print):
         self.image = Image(path)
         self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
         self._hsi_error, self._supply_v, self._op_amp_hz = hsi_error, 3.3, op_amp_hz
@@ -69,7 +74,9 @@ class Board:
         self.rules = Rules(self.where, self.note)
         #: What its flash and option bytes hold, and what was done to them.
         self.store = flash.Store(self.image.segments, options)
+        self._onchip = onchip
         rows = CHIP_WIRES * math.ceil(len(ohm) / CHIP_WIRES)
+        #: What drives the rows.
         self.register = ShiftRegister(self.time, self.rules, rows, lambda: self.settling_us)
         #: Whether the next fault is the scenario's own.
         self._derailed = False
@@ -82,6 +89,8 @@ class Board:
         #: Called again and again while the board runs, with whether the program idles.
         self.glance = lambda idle: None
         self._reset_flags, self._pending_reset = POWER_ON, None
+        #: What the chip's own converters scan, and what lets it go on until now.
+        self.passes, self.advance = None, lambda: None
         self._start(bytes(SRAM_BYTES))
 
     def note(self, text):
@@ -111,6 +120,8 @@ class Board:
             "C": gpio.Port(),
         }
         self.ports["C"].inputs[BUTTON] = lambda: not self.button_held
+        if self._onchip:
+            self.register = RowPins(time, rules, self.ports["B"], lambda: self.settling_us)
         columns = len(self._ohm[0])
         self.circuit = circuit.Circuit(time, rules, self.register, self._ohm, self._op_amp_hz)
         self.converters = [
@@ -138,10 +149,55 @@ class Board:
             bus.attach(0x20000 + 0x400 * index, port, f"GPIO{'ABC'[index]}")
         bus.attach(0x23800, self.rcc, "RCC", gated=False)
         bus.attach(0x23C00, self.flash, "FLASH", gated=False)
-        for chip, (port, pin) in enumerate(SELECTS[:len(self.converters)]):
-            self.ports[port].listeners[pin] = lambda high, chip=chip: self._select(chip, high)
-        self.ports["C"].listeners.update({6: self.register.data, 8: self.register.clock, 9: self.register.latch})
+        if self._onchip:
+            self._start_onchip(bus)
+        else:
+            for chip, (port, pin) in enumerate(SELECTS[:len(self.converters)]):
+                self.ports[port].listeners[pin] = lambda high, chip=chip: self._select(chip, high)
+            self.ports["C"].listeners.update({6: self.register.data, 8: self.register.clock, 9: self.register.latch})
         self._idles, self._pins_checked, self._next_glance, self._patience = False, False, 0, 1
+
+    def _start_onchip(self, bus):
+        """Puts the chip's own converters on the bus, with the timers and the DMA that they work with."""
+        time, rules = self.time, self.rules
+        self._pins_at = None
+
+        def moment(cycle):
+            self._pins_at = cycle
+
+        def advance():
+            self.passes.advance()
+            self._pins_at = None
+
+        def write(address, value, _cycle):
+            bus.write_by_dma(address - PERIPHERALS, value)
+
+        def counts(pin, cycle):
+            column = self.register.column(pin, cycle)
+            waited_us = self.time.ns(cycle - self.register.changed_at) / 1e3 * (1 + self.rcc.clock_error())
+            if waited_us < self.settling_us:
+                rules.breach("wait-short", f"{waited_us:.2f} us of {self.settling_us:g}")
+            volts = 0.0 if column is None else self.circuit.volts(column, cycle)
+            return max(0, min((1 << BITS) - 1, int(volts / circuit.REFERENCE_V * (1 << BITS))))
+
+        def reset(bits):
+            advance()
+            if bits & TIMERS_RESET == TIMERS_RESET:
+                self.passes.reset()
+            if bits & CONVERTERS_RESET:
+                adc.reset()
+
+        dma = Dma(self.cpu.uc, rules, advance, write, self._busy)
+        adc = Adc(time, rules, self.rcc, self.ports, dma, advance, counts)
+        self.passes = Passes(time, rules, lambda: self.rcc.clocks.timer2, dma, adc, moment, self._busy)
+        self.advance = advance
+        self.ports["B"].changed = lambda: self.register.update(
+            time.now if self._pins_at is None else self._pins_at)
+        self.rcc.on_reset = reset
+        bus.attach(0x10000, self.passes.rows, "TIM1")
+        bus.attach(0x10400, self.passes.triggers, "TIM8")
+        bus.attach(0x12000, adc, "ADC1")
+        bus.attach(0x26400, dma, "DMA2")
 
     def _ask_for_reset(self):
         self._pending_reset = ("program", BY_PROGRAM)
@@ -237,6 +293,9 @@ class Board:
         if event is not None:
             cycle = min(cycle, event)
             self.time.wake_at(event)
+        event = self.passes.next_event() if self.passes else None
+        if event is not None:
+            cycle = min(cycle, event)
         self.time.now = max(self.time.now, int(cycle) + 1)
 
     def _stall(self, seconds):
@@ -250,6 +309,7 @@ class Board:
     def _look(self):
         """The program looks at the time, as it does in its main loop."""
         self.flash.finish()
+        self.advance()
         self.register.check_rest()
         if self.register.outputs is None:
             self.rules.breach("rows-undefined")
@@ -303,6 +363,7 @@ class Board:
         """Does what is due; returns whether it was time for a glance at the host's end."""
         time = self.time
         self.usart.advance()
+        self.advance()
         if self._pending_reset:
             self._reset(*self._pending_reset)
         elif time.seconds() > self.watchdog.expires_s():

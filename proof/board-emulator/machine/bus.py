@@ -65,6 +65,12 @@ class Bus:
         register = offset & ~3 if peripheral is self._plain else offset & 0x3FC
         peripheral.write(register, value)
 
+    def write_by_dma(self, offset, value):
+        """Writes a word without the processor, and without its time."""
+        peripheral = self._at(offset)
+        if peripheral is not None:
+            peripheral.write(offset & 0x3FC, value)
+
     def read_bit(self, alias):
         """Reads through the alias where each bit has a word."""
         return self.read(alias >> 5 & ~3, 4) >> (alias >> 2 & 31) & 1

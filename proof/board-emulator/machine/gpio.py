@@ -17,6 +17,8 @@ class Port(Registers):
         #: Functions by pin that tell whether something outside holds it high; without one it reads its output.
         self.inputs = {}
         self._levels = {}
+        #: Called after a change of outputs or modes.
+        self.changed = lambda: None
 
     def _field(self, offset, pin):
         return self.values.get(offset, 0) >> 2 * pin & 3
@@ -62,3 +64,4 @@ class Port(Registers):
                     self._levels[pin] = level
                     if level is not None:
                         listener(level)
+            self.changed()

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from .bus import PAGE_BITS, Registers
 
-CR, PLLCFGR, CFGR, APB1RSTR, CSR = 0x00, 0x04, 0x08, 0x20, 0x74
-AHB1ENR, APB1ENR = 0x30, 0x40
+CR, PLLCFGR, CFGR, APB1RSTR, APB2RSTR, CSR = 0x00, 0x04, 0x08, 0x20, 0x24, 0x74
+AHB1ENR, APB1ENR, APB2ENR = 0x30, 0x40, 0x44
 HSION, HSIRDY, HSEON, HSERDY, PLLON, PLLRDY = 1 << 0, 1 << 1, 1 << 16, 1 << 17, 1 << 24, 1 << 25
 CSSON = 1 << 19
 PLLSRC = 1 << 22
@@ -17,9 +17,13 @@ WAIT_STATE_HZ = ((2.7, 30e6), (2.4, 24e6), (2.1, 22e6), (0.0, 20e6))
 #: Highest HCLK in Hz by the regulator's scale 3, 2, 1, and with over-drive (DS10693).
 SCALE_HZ = {1: (120e6, 120e6), 2: (144e6, 168e6), 3: (168e6, 180e6)}
 
+#: Bits of ADC1, and of what resets timer 1, timer 8 and all converters, on APB2.
+FIRST_CONVERTER, TIMERS_RESET, CONVERTERS_RESET = 8, 3, 1 << 8
+
 #: Enable bits by register and bit, with the page of the peripheral.
 GATES = {
     (AHB1ENR, 0): 0x20000, (AHB1ENR, 1): 0x20400, (AHB1ENR, 2): 0x20800,
+    (AHB1ENR, 22): 0x26400, (APB2ENR, 0): 0x10000, (APB2ENR, 1): 0x10400, (APB2ENR, 8): 0x12000,
     (APB1ENR, 0): 0x00000, (APB1ENR, 14): 0x03800, (APB1ENR, 17): 0x04400, (APB1ENR, 28): 0x07000,
 }
 
@@ -39,6 +43,11 @@ class Clocks:
     def timer1(self):
         """Clock of the timers on APB1."""
         return self.pclk1 * (1 if self.pclk1 == self.hclk else 2)
+
+    @property
+    def timer2(self):
+        """Clock of the timers on APB2."""
+        return self.pclk2 * (1 if self.pclk2 == self.hclk else 2)
 
 
 class Pwr(Registers):
@@ -89,6 +98,8 @@ class Rcc(Registers):
         #: By how much, as a share, HSI is too fast.
         self.hsi_error = hsi_error
         self.values[CSR] = reset_flags
+        #: Called with the bits of APB2's peripherals that are reset.
+        self.on_reset = lambda bits: None
         self.pwr, self.flash_wait_states = Pwr(self.check, supply_v), lambda: 0
         self.clocks = self._tree()
 
@@ -115,8 +126,10 @@ class Rcc(Registers):
         if offset == CSR and value & RMVF:
             value &= 0xFFFFFF
         super().write(offset, value)
-        if offset in (AHB1ENR, APB1ENR):
+        if offset in (AHB1ENR, APB1ENR, APB2ENR):
             self._gate(offset, value)
+        if offset == APB2RSTR and value:
+            self.on_reset(value)
         if offset == CFGR:
             self._switch()
 
@@ -125,6 +138,10 @@ class Rcc(Registers):
             if at == register:
                 change = self._bus.clocked.add if value >> bit & 1 else self._bus.clocked.discard
                 change(page >> PAGE_BITS)
+
+    def converter_clocked(self, converter):
+        """Whether a converter of the chip, counted from 0, has a clock."""
+        return bool(super().read(APB2ENR) >> FIRST_CONVERTER + converter & 1)
 
     def clock_error(self):
         """By how much, as a share, the clock in use is too fast."""

@@ -31,8 +31,10 @@ class Timer(Registers):
         self.looks += 1
         if self.looks > self.LOOKS_WHEN_IDLE:
             self._idle()
-        if not self.values.get(CR1, 0) & CEN:
-            return 0
+        return self.count() if self.values.get(CR1, 0) & CEN else 0
+
+    def count(self):
+        """What it has counted."""
         seconds = (self._time.now - self._start) / self._time.hz
         return int(seconds * self._rate() / (self._prescaler + 1)) % self.period()
 

@@ -13,9 +13,11 @@ use host_sim::commands::{Common, coverage_page};
 use host_sim::metrics::{self, Errors, NETWORK};
 use host_sim::{Error, Result};
 use serde::Serialize;
-use taxel_data::output;
+use taxel_data::{BadValue, output};
 use taxel_learn::Exponential;
 use taxel_learn::decoders::{linear, mean};
+use taxel_simulate::outputs::Outputs;
+use taxel_simulate::rubber::{Kind, Rubber};
 use taxel_simulate::sensor::Precision;
 use taxel_simulate::virtual_board::VirtualBoard;
 use taxel_simulate::world::check_gain;
@@ -28,10 +30,12 @@ use crate::question::directions::{self, DirectionsResult, INVERTED, INVERTED_DAM
 use crate::question::drift::{self, DriftResult, Line, TYPICAL_GAIN};
 use crate::question::equations::{self, EquationsResult, RowWire};
 use crate::question::map::{self, MapStudy};
+use crate::question::rate::{self, RateStudy};
 use crate::question::readout::{self, ReadoutResult};
 use crate::question::recursion::{
     self, DIVERGED, FORGETTING_FACTORS, INITIAL_COVARIANCES, KINDS, Outcome,
 };
+use crate::question::rubber::{self, RubberResult, TYPICAL, TrainedOn};
 use crate::question::widths::{self, WidthsStudy};
 use crate::reconstruct;
 
@@ -145,6 +149,24 @@ pub enum Question {
         #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
         gain: Option<f64>,
     },
+    /// Compare decoders trained without and with rubber that creeps, on moving contacts.
+    ///
+    /// Trains the scene's model on still contacts, on moving ones, and on moving ones on rubber that creeps: a standard linear
+    /// solid. Judges each on the same moving contacts, on rubber that follows at once and on rubber that creeps: the scene's
+    /// outputs, and the contact's force (docs/rubber.md).
+    #[command(after_help = "Example: cargo xtask study rubber moving --time-constant-ms 300")]
+    Rubber {
+        #[command(flatten)]
+        scene: SceneArgument,
+        #[command(flatten)]
+        noise: NoiseArgument,
+        /// Share of a deformation that is reached at once [default: the scene's, or 0.8].
+        #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+        instant_share: Option<f64>,
+        /// Time constant of the creep in ms [default: the scene's, or 100].
+        #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+        time_constant_ms: Option<f64>,
+    },
     /// Compare readout circuits: scan a scene through a virtual board, and decode.
     ///
     /// The firmware's own scanner runs on virtual pins and converters in front of a network of all wires.
@@ -181,6 +203,19 @@ pub enum Question {
         #[arg(long, value_name = "FILE")]
         model: Option<PathBuf>,
     },
+    /// Error against the rate of frames, for both readouts of the board, by samples a reading.
+    ///
+    /// Trains the scene's model for the noise that is left in the mean of so many samples, and judges it on still contacts, and
+    /// on moving ones by the newest finished estimate, without a filter and behind one (docs/rate.md).
+    #[command(after_help = "Example: cargo xtask study rate moving -o rate.svg")]
+    Rate {
+        #[command(flatten)]
+        scene: SceneArgument,
+        #[command(flatten)]
+        noise: NoiseArgument,
+        #[command(flatten)]
+        picture: Picture,
+    },
     Reconstruct(reconstruct::Arguments),
 }
 
@@ -206,7 +241,7 @@ impl Picture {
 }
 
 /// Options that set the fields of plans.
-const OPTIONS: [(&str, &str); 9] = [
+const OPTIONS: [(&str, &str); 11] = [
     ("samples", "--samples"),
     ("centres", "--centres"),
     ("spread", "--spread"),
@@ -216,6 +251,8 @@ const OPTIONS: [(&str, &str); 9] = [
     ("initial_covariance", "--initial-covariance"),
     ("updates", "--updates"),
     ("gain", "--gain"),
+    ("rubber.instant_share", "--instant-share"),
+    ("rubber.time_constant_ms", "--time-constant-ms"),
 ];
 
 /// An error of a setting, as one of the option that sets it.
@@ -236,8 +273,10 @@ impl Question {
             Self::Map { .. } => "study map",
             Self::Recursion { .. } => "study recursion",
             Self::Drift { .. } => "drift",
+            Self::Rubber { .. } => "study rubber",
             Self::Readout { .. } => "readout",
             Self::Confidence { .. } => "confidence",
+            Self::Rate { .. } => "study rate",
             Self::Reconstruct(_) => "study reconstruct",
         }
     }
@@ -296,6 +335,28 @@ impl Question {
                 check_gain("gain", gain).map_err(of_options)?;
                 show(common, &drift::measure(&scene, gain, &progress)?, drift_page)
             }
+            Self::Rubber { scene, noise, instant_share, time_constant_ms } => {
+                let mut scene = scene.load(common)?;
+                scene.require_inverse("rubber")?;
+                noise.apply(&mut scene)?;
+                let path = scene.world.path.ok_or_else(|| {
+                    let rule = "rubber creeps under contacts that move; take a scene with [motion], such as moving";
+                    BadValue::new("motion", "still contacts", rule)
+                })?;
+                let Outputs::Electrodes(_) = scene.world.outputs else {
+                    let rule =
+                        "the contact's force is studied anyway; ask for outputs of electrodes";
+                    return Err(BadValue::new("outputs.contact", &scene.name, rule).into());
+                };
+                let mut solid = match scene.world.rubber {
+                    Kind::StandardLinearSolid(solid) => solid,
+                    Kind::Elastic(_) => TYPICAL,
+                };
+                solid.instant_share = instant_share.unwrap_or(solid.instant_share);
+                solid.time_constant_ms = time_constant_ms.unwrap_or(solid.time_constant_ms);
+                solid.check().map_err(of_options)?;
+                show(common, &rubber::measure(&scene, path, solid, &progress)?, rubber_page)
+            }
             Self::Readout { scene, frames, model: path } => {
                 let scene = scene.load(common)?;
                 scene.require_inverse("readout")?;
@@ -318,6 +379,14 @@ impl Question {
                     message: "this model has no confidence: train it with --confidence".into(),
                 })?;
                 show(common, &found, confidence_page)
+            }
+            Self::Rate { scene, noise, picture } => {
+                picture.check(scene.path())?;
+                let mut scene = scene.load(common)?;
+                noise.apply(&mut scene)?;
+                let study = rate::measure(&scene, &progress)?;
+                picture.write(|| picture::rate_svg(&study))?;
+                show(common, &study, rate_page)
             }
             Self::Reconstruct(arguments) => reconstruct::answer(arguments, common),
         }
@@ -688,6 +757,46 @@ fn drift_page(result: &DriftResult, page: &mut Page) {
     );
 }
 
+fn rubber_page(result: &RubberResult, page: &mut Page) {
+    page.line(format_args!(
+        "{}: {} % of a deformation at once, the rest with a time constant of {} ms; seed {}, {} training frames, {} moving \
+         contacts, {:.2} ms a scan",
+        result.subject,
+        100.0 * result.instant_share,
+        result.time_constant_ms,
+        result.seed,
+        result.training_frames,
+        result.trajectories,
+        result.scan_ms
+    ));
+    let name = |line: &rubber::Line| match (line.trained_on, line.creep_undone) {
+        _ if line.decoder == mean::NAME => line.decoder.clone(),
+        (_, true) => format!("{}, still contacts, creep undone", line.decoder),
+        (TrainedOn::Still, _) => format!("{}, still contacts", line.decoder),
+        (TrainedOn::Moving, _) => format!("{}, moving contacts", line.decoder),
+        (TrainedOn::Creeping, _) => format!("{}, moving contacts, creeping rubber", line.decoder),
+    };
+    for lines in &result.outputs {
+        let groups = lines.first().map_or(&[][..], |line| &line.at_once.when_read);
+        for (place, Errors { group, unit, .. }) in groups.iter().enumerate() {
+            let line = |line: &rubber::Line| {
+                let [at_once, creeping] = [&line.at_once, &line.creeping]
+                    .map(|of| [&of.when_read, &of.when_used].map(|it| figure(it[place].rmse)));
+                [&[name(line)], &at_once[..], &creeping[..]].concat()
+            };
+            let heading = format!("RMSE of {group}, {unit}");
+            let head = [&heading, "at once, read", "used", "creeping, read", "used"];
+            table(page, &head, lines.iter().map(line));
+        }
+    }
+    page.line(
+        "\nat once, creeping: rubber under the moving contacts that decoders are judged on.\n\
+         read: against the truth when each row was read. used: of the newest finished estimate, at every moment.\n\
+         still contacts, moving contacts, creeping rubber: what the decoder was trained on.\n\
+         creep undone: the load that would have crept to the estimates, found by the rubber's own equation.",
+    );
+}
+
 fn readout_page(result: &ReadoutResult, page: &mut Page) {
     page.line(format_args!(
         "{}: {} frames without noise, seed {}, model {}\n\
@@ -734,4 +843,22 @@ fn confidence_page(found: &Confidence, page: &mut Page) {
         vec![it.anomaly.clone(), it.frames.to_string(), format!("{:.2}", it.percent_novel)]
     });
     table(page, &["frames with", "frames", "novel, %"], line);
+}
+
+fn rate_page(study: &RateStudy, page: &mut Page) {
+    page.line(format_args!(
+        "{}, seed {}: RMSE of {} in {}; moving: of the newest finished estimate against the truth at that moment",
+        study.subject, study.seed, study.group, study.unit
+    ));
+    let lines = study.lines.iter().map(|line| {
+        let filter = line.filter.map_or("-".into(), |filter| {
+            format!("{:.1} ms, {:.1} ahead", filter.time_constant_ms, filter.lead_ms)
+        });
+        let times = [format!("{:.1}", line.frames_per_s), format!("{:.2}", line.age_ms)];
+        let errors = [line.still, line.moving, line.filtered].map(figure);
+        let first = [line.readout.image().to_owned(), line.samples_averaged.to_string()];
+        [&first[..], &times, &errors, &[filter]].concat()
+    });
+    let head = ["image", "samples", "frames/s", "age, ms", "still", "moving", "filtered", "filter"];
+    table(page, &head, lines);
 }

@@ -146,6 +146,30 @@ fn drift_costs_readings_a_factor_and_relative_inputs_nothing() {
 }
 
 #[test]
+fn creep_costs_forces_and_not_places_and_its_own_equation_takes_it_back() {
+    let motion = "[motion]\nspeed_mm_per_s = [10.0, 50.0]\npress_rate_hz = [1.0, 3.0]\nduration_s = 0.4\n\
+                  trajectories = 20\n\n[noise]";
+    let folder = folder("studies-rubber", ["[noise]", motion]);
+    let page = succeed(&folder, &["rubber", "scene.toml"]);
+    assert!(page.contains("80 % of a deformation at once"), "{page}");
+    let result = json(&folder, &["rubber", "scene.toml", "--instant-share", "0.6"]);
+    let lines = |outputs: usize| result["outputs"][outputs].as_array().unwrap();
+    let of = |line: &Value, rubber: &str| line[rubber]["when_read"].clone();
+    let force = |line: &Value, rubber: &str| of(line, rubber)[0]["rmse"].as_f64().unwrap();
+    let network = |trained_on: &str, undone: bool| {
+        let mut lines = lines(1).iter().filter(|line| line["decoder"] == "network");
+        let is = |it: &&Value| it["trained_on"] == trained_on && it["creep_undone"] == undone;
+        force(lines.find(is).unwrap(), "creeping")
+    };
+    let still = network("still", false);
+    assert!(network("still", true) < 0.7 * still && network("creeping", false) < 0.9 * still);
+    for line in lines(0).iter().filter(|line| line["trained_on"] == "still") {
+        let ratio = z(&of(line, "creeping")) / z(&of(line, "at_once"));
+        assert!((0.6..1.1).contains(&ratio), "{ratio}: {line}");
+    }
+}
+
+#[test]
 fn cross_talk_ruins_the_divider_and_spares_zero_potential() {
     let all_rows = ["row_wires = [4, 5]", "row_wires = [1, 2, 3, 4, 5, 6, 7, 8]"];
     let folder = folder("studies-circuits", all_rows);
@@ -193,6 +217,9 @@ fn what_cannot_be_studied_is_refused_by_name() {
         (&small, "recursion --centres 0", "--centres 0"),
         (&small, "recursion -n 10", "--updates 10"),
         (&small, "drift press --gain 1", "--gain 1"),
+        (&small, "rubber scene.toml", "motion = still contacts: rubber creeps"),
+        (&small, "rubber moving --instant-share 1.1", "--instant-share 1.1"),
+        (&small, "rubber moving --time-constant-ms 0", "--time-constant-ms 0"),
         (&small, "confidence scene.toml -n 0", "--frames = 0: give from 1"),
         (&small, "readout scene.toml --frames 0", "--frames = 0"),
         (&wide, "readout scene.toml", "19 column-wires"),

@@ -10,7 +10,7 @@ use firmware::timing::NUCLEO_BAUD;
 use taxel_rig::device::{Device, Wire, serial};
 
 use crate::board::{Emulator, Options};
-use crate::images::{NUCLEO, PROFILE, build_image};
+use crate::images::{NUCLEO, NUCLEO_SPI, PROFILE, build_image};
 use crate::process::{Outcome, run};
 use crate::toolchain::{Toolchain, elf};
 
@@ -45,7 +45,7 @@ impl Board {
             let mut build = toolchain.build();
             build.args(PROFILE).args(NUCLEO);
             run(build.envs(baud.map(|baud| (BAUD_VARIABLE, baud.to_string()))))?;
-            flash(&elf(NUCLEO[1]))?;
+            flash(&elf(NUCLEO_SPI))?;
         }
         let baud = baud.map_or_else(usual_baud, Ok)?;
         Ok(Self { port: port.into(), baud, emulator: None })
@@ -54,7 +54,7 @@ impl Board {
     /// The emulated board, running the image.
     pub fn emulated(toolchain: &Toolchain) -> Outcome<Self> {
         build_image(toolchain, NUCLEO)?;
-        let mut command = Emulator::prepare(&Options::plain())?.command(&elf(NUCLEO[1]));
+        let mut command = Emulator::prepare(&Options::plain())?.command(&elf(NUCLEO_SPI));
         command.arg("serve").stdout(Stdio::piped());
         let mut emulator =
             command.spawn().map_err(|cause| format!("the emulated board: {cause}"))?;

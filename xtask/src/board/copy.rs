@@ -8,20 +8,26 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::ONCHIP;
 use super::mutants::Mutant;
 use crate::copy::{update, write_if_new};
 use crate::images::SEAL;
 use crate::process::{Outcome, run, target_dir, watch};
 use crate::toolchain::{Toolchain, elf};
 
-/// Manifests of the copy that differ: file, text that stands once in it, and what replaces it. The image has another
-/// name too, so that it does not replace the project's own.
-const MANIFESTS: [(&str, &str, &str); 2] = [
+/// Manifests of the copy that differ: file, text that stands once in it, and what replaces it. The images have other
+/// names too, so that they do not replace the project's own.
+const MANIFESTS: [(&str, &str, &str); 3] = [
     ("Cargo.toml", concat!("version = \"", env!("CARGO_PKG_VERSION"), "\""), "version = \"0.0.0\""),
     (
         "firmware/nucleo-f446re/Cargo.toml",
         "[[bin]]\nname = \"nucleo-f446re\"",
         "[[bin]]\nname = \"nucleo-variant\"",
+    ),
+    (
+        "firmware/nucleo-f446re/Cargo.toml",
+        "[[bin]]\nname = \"nucleo-f446re-onchip\"",
+        "[[bin]]\nname = \"nucleo-variant-onchip\"",
     ),
 ];
 
@@ -30,6 +36,7 @@ const WIDE: &str = "16x32x18";
 
 const PACKAGE: &str = "nucleo-f446re";
 const IMAGE: &str = "nucleo-variant";
+const ONCHIP_IMAGE: &str = "nucleo-variant-onchip";
 
 /// The copy.
 pub struct Copy {
@@ -41,10 +48,10 @@ impl Copy {
     pub fn make() -> Outcome<Self> {
         let folder = target_dir().join("board").join("workspace");
         update(&folder, |file, content| {
-            let Some((_, text, other)) = MANIFESTS.iter().find(|(name, ..)| *name == file) else {
-                return Ok(content);
-            };
-            Ok(String::from_utf8_lossy(&content).replacen(text, other, 1).into_bytes())
+            let of_file = MANIFESTS.iter().filter(|(name, ..)| *name == file);
+            Ok(of_file.fold(content, |content, (_, text, other)| {
+                String::from_utf8_lossy(&content).replacen(text, other, 1).into_bytes()
+            }))
         })?;
         Ok(Self { folder })
     }
@@ -54,7 +61,8 @@ impl Copy {
         let file = self.folder.join(&mutant.file);
         let sound = read(&file)?;
         write_if_new(&file, mutant.apply(&sound)?.as_bytes())?;
-        let mut command = self.command(toolchain);
+        let name = if mutant.scenario == ONCHIP { ONCHIP_IMAGE } else { IMAGE };
+        let mut command = self.command(toolchain, name);
         if mutant.scenario == SEAL {
             command.args(["--features", SEAL]);
         }
@@ -62,7 +70,7 @@ impl Copy {
         write_if_new(&file, sound.as_bytes())?;
         let built = built?;
         if built.success {
-            Ok(image())
+            Ok(elf(name))
         } else {
             Err(format!("mutant {} does not build:\n{}", mutant.name, built.messages))
         }
@@ -70,18 +78,18 @@ impl Copy {
 
     /// Builds the image with room for [`WIDE`], as [`image`].
     pub fn build_wide(&self, toolchain: &Toolchain) -> Outcome {
-        run(self.command(toolchain).env("TAXEL_CAPACITY", WIDE))
+        run(self.command(toolchain, IMAGE).env("TAXEL_CAPACITY", WIDE))
     }
 
-    fn command(&self, toolchain: &Toolchain) -> Command {
+    fn command(&self, toolchain: &Toolchain, image: &str) -> Command {
         let mut command = toolchain.build();
         command.arg("--manifest-path").arg(self.folder.join("Cargo.toml"));
-        command.args(["--profile", "firmware", "--package", PACKAGE, "--bin", IMAGE]);
+        command.args(["--profile", "firmware", "--package", PACKAGE, "--bin", image]);
         command
     }
 }
 
-/// Path of the variant that was built last.
+/// Path of the image with more room.
 pub fn image() -> PathBuf {
     elf(IMAGE)
 }

@@ -5,9 +5,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use firmware::timing::ScanPlan;
+
 use super::Options;
 use super::copy;
-use crate::images::{NUCLEO_FIXED16, SEAL, other_name};
+use crate::images::{NUCLEO_FIXED16, NUCLEO_ONCHIP, SEAL, other_name};
 use crate::process::{Outcome, Said, capture, cargo, first_line, root, run, target_dir};
 use crate::toolchain::elf;
 
@@ -19,8 +21,9 @@ const OWN_PYTHON: &str = "proof/board-emulator/.venv/bin/python";
 /// A Python program that fails if a package is missing, and prints a line otherwise.
 const NEEDS: &str = "import elftools, unicorn; print(unicorn.__version__)";
 
-/// Option for the image with seals.
+/// Options for the image with seals, and for the one that reads the sensor by the board's own converters.
 const SEAL_IMAGE: &str = "--seal-image";
+const ONCHIP_IMAGE: &str = "--onchip-image";
 
 /// Arguments that train the model which scenarios upload, small enough that an upload takes seconds.
 const TRAIN: [&str; 5] = ["train", "press", "--no-refine", "--centres=16", "--output"];
@@ -55,12 +58,20 @@ impl Emulator {
             ("--wide-image", copy::image()),
             ("--fixed16-image", elf(NUCLEO_FIXED16)),
             (SEAL_IMAGE, elf(&other_name(SEAL))),
+            (ONCHIP_IMAGE, elf(NUCLEO_ONCHIP)),
         ];
         let mut arguments = vec![root().join(FOLDER).join("run.py").into_os_string()];
         for (name, value) in named {
             arguments.extend([name.into(), value.into_os_string()]);
         }
         arguments.extend(["--frames".into(), frames.into()]);
+        let seconds = options.seconds.to_string();
+        arguments.extend(["--seconds".into(), seconds.into()]);
+        let scans = [1, 12].map(|samples| {
+            let plan = ScanPlan::of_nucleo_onchip(8, 18, samples);
+            format!("{},{}", plan.scan_us(), plan.longest_us())
+        });
+        arguments.extend(["--onchip-scans".into(), scans.join(",").into()]);
         Ok(Self { python, arguments })
     }
 
@@ -71,7 +82,8 @@ impl Emulator {
 
     /// Runs a scenario on `image`, which has what it needs, and returns its output.
     pub fn capture(&self, image: &Path, scenario: &str) -> Said {
-        capture(self.command(image).arg(SEAL_IMAGE).arg(image).arg(scenario))
+        let mut command = self.command(image);
+        capture(command.arg(SEAL_IMAGE).arg(image).arg(ONCHIP_IMAGE).arg(image).arg(scenario))
     }
 
     /// The emulator with this `image`, before the names of scenarios.

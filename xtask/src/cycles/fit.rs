@@ -7,7 +7,7 @@ use std::path::Path;
 use model_core::rbf::Format;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use taxel_learn::cost::{Cost, Design, Gating, Price, Prices, Terms, terms};
+use taxel_learn::cost::{Cost, Design, Gating, Price, Prices, Terms, filter_terms, terms};
 use taxel_learn::{Exponential, ModelBlob};
 
 use super::designs;
@@ -29,16 +29,17 @@ const TO_JUDGE: usize = 40;
 /// long code waits for flash depends on what was executed before it.
 pub const MOST_PERCENT: [f64; 3] = [5.0, 5.0, 10.0];
 
+/// Scope of the filter in time. Its cost depends on no model, so that it is priced, and not among the accepted figures.
+pub const FILTER: &str = "filter";
+
 /// How many singular values below the largest one tell nothing about a price.
 const LEAST_SINGULAR: f64 = 1e-9;
 
-/// A frame that was counted, and what its design is.
+/// A frame, or its filter in time, that was counted, and what its cost is told from.
 pub struct Frame {
     pub kernel: String,
     pub scope: String,
-    design: Design,
-    exponential: Exponential,
-    gating: Gating,
+    terms: Terms,
     pub count: Count,
 }
 
@@ -49,6 +50,10 @@ pub fn frames(design: &Design, measured: &[Measured]) -> Vec<Frame> {
             "frame" => Gating::Ungated,
             "resting-frame" => Gating::AtRest,
             "awake-frame" => Gating::Awake,
+            FILTER => {
+                let (kernel, scope, count) = (kernel.clone(), scope.clone(), region.whole);
+                return Some(Frame { kernel, scope, terms: filter_terms(design.shape), count });
+            }
             _ => return None,
         };
         let exponential = match kernel.strip_prefix(Format::F32Direct.name()) {
@@ -57,9 +62,8 @@ pub fn frames(design: &Design, measured: &[Measured]) -> Vec<Frame> {
             _ if kernel.ends_with("-portable") => return None,
             _ => Exponential::default(),
         };
-        let (kernel, scope) = (kernel.clone(), scope.clone());
-        let (design, count) = (design.clone(), region.whole);
-        Some(Frame { kernel, scope, design, exponential, gating, count })
+        let (kernel, scope, count) = (kernel.clone(), scope.clone(), region.whole);
+        Some(Frame { kernel, scope, terms: terms(design, exponential, gating), count })
     };
     measured.iter().filter_map(frame).collect()
 }
@@ -88,7 +92,7 @@ pub fn fit(image: &Image, directory: &Path, compiler: &str) -> Outcome {
     let designs = [telling, designs::random(usual, designs::USUAL, 2)].concat();
     eprintln!("counting {} designs for {FILE}", designs.len());
     let frames = frames_of_all(&designs, image, directory)?;
-    let terms_of = |it: &Frame| (terms(&it.design, it.exponential, it.gating), it.count.all());
+    let terms_of = |it: &Frame| (it.terms.clone(), it.count.all());
     let text =
         Prices::text(compiler, &least_squares(&frames.iter().map(terms_of).collect::<Vec<_>>())?);
     fs::write(root().join(FILE), text).map_err(|cause| format!("{FILE}: {cause}"))
@@ -162,10 +166,7 @@ fn prices() -> Outcome<Prices> {
 /// The list of prices is not sound.
 pub fn predicted(frames: &[Frame]) -> Outcome<Vec<Cost>> {
     let prices = prices()?;
-    let cost = |frame: &Frame| {
-        let design = Design { weights_in_ram: true, ..frame.design.clone() };
-        prices.frame(&design, frame.exponential, frame.gating).map_err(|cause| cause.to_string())
-    };
+    let cost = |frame: &Frame| prices.of(&frame.terms).map_err(|cause| cause.to_string());
     frames.iter().map(cost).collect()
 }
 
@@ -182,7 +183,7 @@ pub fn compare(path: &Path, image: &Image, json: bool) -> Outcome {
     let measured = image.run(path)?;
     let frames = frames(&Design::new(&blob), &measured);
     let predicted = predicted(&frames)?;
-    if !frames.iter().any(|frame| frame.gating == Gating::AtRest) {
+    if !frames.iter().any(|frame| frame.scope.ends_with("resting-frame")) {
         eprintln!(
             "note: no frame behind a gate was measured: a gate compares relative to readings at rest, and needs a \
              training range that reaches above 0 in every input"

@@ -26,6 +26,9 @@ const ON_UART: &[&str] =
 /// Options of the check with one network for the whole array. Only decoding differs; it takes more stack.
 const OF_ARRAY: &[&str] = &["-n1000"];
 
+/// Options of the check of a filter in time, of frames a millisecond after one another.
+const FILTERED: &[&str] = &["-n500", "--filter-ms=5", "--lead-ms=2", "--period-ms=1"];
+
 /// Training options of the network for the whole array: the number format and K that are the fastest on a device.
 const ARRAY: &[&str] = &["--whole-array", "--format=fixed16", "--centres=64"];
 
@@ -67,7 +70,7 @@ pub fn log() -> PathBuf {
 }
 
 /// Trains the models for the checks, and returns the checks.
-pub fn checks() -> Outcome<[Check; 5]> {
+pub fn checks() -> Outcome<[Check; 6]> {
     let [rows, array, components] = ["qemu-rows.bin", "qemu-array.bin", "qemu-components.bin"]
         .map(|name| target_dir().join(name).into_os_string());
     let log = log().into_os_string();
@@ -81,6 +84,7 @@ pub fn checks() -> Outcome<[Check; 5]> {
         // This is the smaller model, because it is uploaded on that line as well.
         Check::new("application on the UART", ON_UART, &["--model".as_ref(), &array]),
         Check::new("application with one network", OF_ARRAY, &["--model".as_ref(), &array]),
+        Check::new("application with a filter", FILTERED, &["--model".as_ref(), &array]),
         Check::new("application with components", OF_ARRAY, &["--model".as_ref(), &components]),
         Check {
             name: "application by tests",

@@ -5,6 +5,7 @@ use core::hint::black_box;
 use defmt::{assert, unwrap};
 use model_core::blob::{Model, ModelShape};
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use model_core::filter::{Settings, State};
 use model_core::gate::{Gate, Rest};
 use model_core::rbf::Format;
 use model_core::relative::reciprocal;
@@ -63,6 +64,11 @@ impl Outcome {
         self.status.get(..self.rows).unwrap_or_default()
     }
 
+    fn estimate(&mut self) -> Estimate<'_> {
+        let status = self.status.get_mut(..self.rows).unwrap_or_default();
+        Estimate { outputs: self.outputs, status }
+    }
+
     /// Decodes `frame` as the firmware does.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the firmware's call alone is measured")]
@@ -72,8 +78,7 @@ impl Outcome {
         frame: model_core::Frame<'_>,
         scratch: &mut [f32],
     ) {
-        let status = self.status.get_mut(..self.rows).unwrap_or_default();
-        let mut estimate = Estimate { outputs: self.outputs, status };
+        let mut estimate = self.estimate();
         let _ = decoder.decode_with::<E>(frame, scratch, &mut estimate);
     }
 }
@@ -107,6 +112,7 @@ pub fn measure(model: &Model<'_>, frame: &[f32], arena: &mut Arena) {
         bench.measure::<Libm, false>("f32-direct-libm");
         bench.measure::<Micromath, false>("f32-direct-micromath");
     }
+    bench.filter(format.name(), arena);
     if model.confidence().is_some() {
         bench.assess(format.name(), arena);
     }
@@ -161,6 +167,19 @@ impl Bench<'_> {
             let all = outcome.status().iter().all(|row| *row == status);
             assert!(all, "a row is not as in {=str}", scope);
         }
+    }
+
+    /// Measures the filter in time of a frame a millisecond after another.
+    #[inline(never)]
+    fn filter(&mut self, name: &str, arena: &mut Arena) {
+        let settings = Settings { time_constant_us: 5000, lead_us: 1000 };
+        let tracks = arena.take(2 * self.rest.outputs.len()).as_chunks_mut().0;
+        let mut state = State::new(tracks);
+        let mut estimate = self.rest.estimate();
+        state.filter(settings, 0, &mut estimate);
+        region(name, "filter", || {
+            black_box(&mut state).filter(black_box(settings), 1000, black_box(&mut estimate));
+        });
     }
 
     /// Measures how far off the frame's outputs may be, and how novel it is.

@@ -1,6 +1,6 @@
 //! Decodes 10,000 frames with every number format and exponential, with readings within and far beyond the
-//! training range, gates as many, and tells their novelty and deviations. At last decodes readings that no sensor gives,
-//! with subnormals kept and with them flushed to zero. `firmware/tests/bit_for_bit.rs` checks that the host gives the same
+//! training range, gates as many, tells their novelty and deviations, and filters as many estimates in time. At last
+//! decodes readings that no sensor gives, with subnormals kept and with them flushed to zero. `firmware/tests/bit_for_bit.rs` checks that the host gives the same
 //! bits: it runs the compiled twins of the assembly routines.
 #![no_std]
 #![no_main]

@@ -1,8 +1,10 @@
 //! What a model is worth on contacts that move, read by a board at its own pace.
 
+use std::sync::Arc;
+
 use model_core::filter::Settings;
 use serde::Serialize;
-use taxel_data::columns;
+use taxel_data::{BadValue, columns};
 use taxel_learn::cost::{Design, Prices};
 use taxel_learn::{Decoder, Exponential, ModelBlob};
 use taxel_simulate::Synthesis;
@@ -57,46 +59,97 @@ impl MovingContacts {
         baselines: &[Box<dyn Decoder>],
     ) -> Result<Option<Self>> {
         let Some(path) = scene.world.path.filter(|_| !scene.is_forward()) else { return Ok(None) };
+        let judged =
+            Judged::new(scene, Synthesis::new(&scene.world), path, blob, Device::default(), 1)?;
+        let scanned = judged.touches.while_scanned(judged.times.scan_ms)?;
+        let decoders = baselines.iter().map(|baseline| {
+            let estimates = baseline.decode_all(&scanned.moving.frames.inputs.values, 1);
+            let errors = scanned.errors_at_once(&estimates.values, &scene.measure());
+            DecoderErrors::new(baseline.name(), errors)
+        });
+        let decoders = decoders.collect();
+        let shown = ShownTrajectory::new(&judged);
+        Ok(Some(Self { path, group: judged.group, ways: judged.ways, decoders, shown }))
+    }
+}
+
+/// Synthesis of frames of `scene` that a `device` scans, with what averaging so many `samples` a reading leaves of the noise.
+pub fn scanned(scene: &Experiment, device: Device, samples: usize) -> Synthesis<'_> {
+    let world = &scene.world;
+    let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
+    let noise = world.noise.averaged(samples, device.sample_spacing_s(Some(wires)));
+    Synthesis::new(world).noise(noise)
+}
+
+/// Errors of the model in `blob` on the moving contacts of `scene`, without a filter and behind one, on a `device` that
+/// averages so many `samples` a reading.
+///
+/// # Errors
+/// [`Error`](crate::Error) for a scene whose contacts do not move.
+pub fn on_device(
+    scene: &Experiment,
+    blob: &ModelBlob,
+    device: Device,
+    samples: usize,
+) -> Result<Vec<MovingWay>> {
+    let Some(path) = scene.world.path else {
+        let rule = "a scene whose contacts do not move has no such errors; add [motion]";
+        return Err(BadValue::new("motion", "none", rule).into());
+    };
+    let synthesis = scanned(scene, device, samples);
+    Ok(Judged::new(scene, synthesis, path, blob, device, samples)?.ways)
+}
+
+/// Model that was judged on one device.
+struct Judged<'s> {
+    touches: Touches<'s>,
+    touched: Arc<OfPeriod>,
+    group: String,
+    /// Times of a frame that is filtered.
+    times: Times,
+    estimates: Vec<f64>,
+    filter: Settings,
+    ways: Vec<MovingWay>,
+}
+
+impl<'s> Judged<'s> {
+    fn new(
+        scene: &'s Experiment,
+        synthesis: Synthesis<'s>,
+        path: Path,
+        blob: &ModelBlob,
+        device: Device,
+        samples: usize,
+    ) -> Result<Self> {
         let model = blob.prepare(Exponential::default()).of_inputs();
         let (world, measure) = (&scene.world, scene.measure());
-        let device = Device::default();
-        let cost = Prices::accepted()?.frames(&Design::new(blob), Exponential::default())?.ungated;
+        let prices = Prices::accepted()?;
+        let cost = prices.frames(&Design::new(blob), Exponential::default())?.ungated;
+        let filtered = cost.plus(prices.filter(blob.parse().shape())?);
         let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
-        let times = device.times(device.scan_ms(Some(wires), 1), &cost);
+        let scan_ms = device.scan_ms(Some(wires), samples);
+        let [raw, times] = [cost, filtered].map(|cost| device.times(scan_ms, &cost));
         let names = scene.output_names();
         let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();
-        let touches = Touches::new(scene, Synthesis::new(world), path, &group);
-        let touched = touches.at(&times)?;
+        let touches = Touches::new(scene, synthesis, path, &group);
+        let touched = touches.at(&raw)?;
         let estimates = model.decode_lines(&touched.moving.frames.inputs.values);
         let filter = touched.filter_settings(&model, &estimates, times.age_ms.unwrap_or_default());
-        let way = |settings: Settings| MovingWay {
+        let way = |settings: Settings, times: Times| MovingWay {
             filter: settings.is_on().then(|| settings.into()),
             times,
             errors: touched.errors(&estimates, settings, &times, &measure),
         };
-        let ways = vec![way(Settings::default()), way(filter)];
-        let scanned = touches.while_scanned(times.scan_ms)?;
-        let decoders = baselines.iter().map(|baseline| {
-            let estimates = baseline.decode_all(&scanned.moving.frames.inputs.values, 1);
-            let errors = scanned.errors_at_once(&estimates.values, &measure);
-            DecoderErrors::new(baseline.name(), errors)
-        });
-        let decoders = decoders.collect();
-        let shown = ShownTrajectory::new(&touched, &group, &estimates, filter, times.frame_ms);
-        Ok(Some(Self { path, group, ways, decoders, shown }))
+        let ways = vec![way(Settings::default(), raw), way(filter, times)];
+        Ok(Self { touches, touched, group, times, estimates, filter, ways })
     }
 }
 
 impl ShownTrajectory {
     /// First trajectory, and the output of `group` that changes most in it.
-    fn new(
-        touched: &OfPeriod,
-        group: &str,
-        estimates: &[f64],
-        filter: Settings,
-        finished_ms: f64,
-    ) -> Self {
-        let moving = &touched.moving;
+    fn new(judged: &Judged<'_>) -> Self {
+        let Judged { touched, group, estimates, filter, times, .. } = judged;
+        let (moving, finished_ms) = (&touched.moving, times.frame_ms);
         let names = &moving.truth.names;
         let of_output = |values: &[f64], output: usize| -> Vec<f64> {
             let moments = values.chunks_exact(names.len()).take(moving.moments_s.len());
@@ -107,10 +160,11 @@ impl ShownTrajectory {
             let of = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
             of(f64::max).zip(of(f64::min)).map_or(0.0, |(most, least)| most - least)
         };
-        let outputs = (0..names.len()).filter(|output| columns::group_of(&names[*output]) == group);
+        let outputs =
+            (0..names.len()).filter(|output| columns::group_of(&names[*output]) == *group);
         let ranges = outputs.map(|output| (output, range(output)));
         let (output, _) = ranges.max_by(|(_, a), (_, b)| a.total_cmp(b)).unwrap_or_default();
-        let filtered = moving.filtered(estimates, filter);
+        let filtered = moving.filtered(estimates, *filter);
         let held = |estimates: &[f64]| of_output(&moving.held(estimates, finished_ms), output);
         Self {
             output: names[output].clone(),

@@ -35,7 +35,7 @@ mod judge;
 
 pub use choice::Bounds;
 use choice::{Offer, SAME_ERROR};
-pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Times, Wires};
+pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Readout, Times, Wires};
 use frames::Frames;
 use judge::Judged;
 pub use line::Line;

@@ -27,6 +27,8 @@ pub(super) struct SceneFile {
     sensor: SensorFile,
     deformation: motion::Kind,
     motion: Option<Path>,
+    #[serde(default)]
+    rubber: rubber::Kind,
     noise: Noise,
     drift: Option<Drift>,
     #[serde(default)]
@@ -153,7 +155,7 @@ impl SceneFile {
                 sensor,
                 motion: self.deformation,
                 path: self.motion,
-                rubber: rubber::Kind::default(),
+                rubber: self.rubber,
                 noise: self.noise,
                 drift: self.drift,
                 read_rows,

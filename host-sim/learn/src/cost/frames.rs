@@ -14,6 +14,18 @@ pub struct Cost {
     pub flash_cycles: u64,
 }
 
+impl Cost {
+    /// Cost of both.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            instructions: self.instructions + other.instructions,
+            cycles: self.cycles + other.cycles,
+            flash_cycles: self.flash_cycles + other.flash_cycles,
+        }
+    }
+}
+
 /// Costs of a frame without a gate and behind one, in any measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Frames<T> {

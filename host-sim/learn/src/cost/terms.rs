@@ -52,6 +52,14 @@ pub fn terms(design: &Design, exponential: Exponential, gating: Gating) -> Terms
     sum.0
 }
 
+/// The terms of the filter in time of one frame with estimates of this `shape`, all of whose rows are decoded.
+#[must_use]
+pub fn filter_terms(ModelShape { rows, outputs, .. }: ModelShape) -> Terms {
+    let mut sum = Sum::default();
+    sum.add("filter", [("", 1), ("row", rows), ("output", rows * outputs)]);
+    sum.0
+}
+
 #[derive(Default)]
 struct Sum(Terms);
 

@@ -28,7 +28,8 @@ fn each_trajectory_is_filtered_by_its_times_as_a_device_filters() {
     let filtered = Filtered::new(Same, settings);
     let mut readings: Vec<f64> = (0..40).map(|i| f64::from(i * 7 % 11) * 0.1).collect();
     readings[9] = f64::NAN;
-    let start_us: Vec<u64> = (0..20).map(|frame| 1_000_000 * (frame / 10) + 900 * frame).collect();
+    let start_us: Vec<u64> =
+        (0..20).map(|frame| 1_000_000 * (frame / 10) + (900 + 20 * frame) * frame).collect();
     let timing = Timing { start_us: &start_us, reading_offset_us: &[] };
     let frames = Frames { readings: &readings, timing: Some(timing) };
     let found = filtered.decode_frames(frames, 10).values;

@@ -140,3 +140,20 @@ fn the_accepted_figures_of_trained_models_are_told() {
     }
     assert!(compared > 100, "{compared}");
 }
+
+#[test]
+fn a_filter_takes_what_its_page_says() {
+    let prices = Prices::accepted().unwrap();
+    let page = include_str!("../../../../docs/filter.md");
+    for (name, rows, outputs) in [
+        ("144 outputs of 8 rows", 8, 18),
+        ("48 outputs of 8 rows", 8, 6),
+        ("6 outputs of one row", 1, 6),
+    ] {
+        let Cost { instructions, cycles, flash_cycles } =
+            prices.filter(ModelShape { outputs, rows, ..PAPER }).unwrap();
+        let us = flash_cycles as f64 / 180.0;
+        let line = format!("| {name} | {instructions} | {cycles} | {flash_cycles} | {us:.0} µs |");
+        assert!(page.contains(&line), "docs/filter.md should say\n{line}");
+    }
+}

@@ -7,7 +7,7 @@ use taxel_data::simd::{self, LANES, Lanes};
 use super::Synthesis;
 use crate::contact::Contact;
 use crate::motion::{Draws, Trajectories};
-use crate::outputs::{ContactOutput, Outputs};
+use crate::outputs::{ContactOutput, ElectrodeOutputs, Outputs, Quantity};
 use crate::rubber::Response;
 use crate::sensor::{LaneModel, Scratch};
 
@@ -20,6 +20,8 @@ pub(super) struct LaneSynthesis<'s> {
     span_ohm: Vec<f64>,
     /// Index of each output of a row among electrodes and axes, and factor on its deformation.
     outputs: Vec<(usize, f64)>,
+    /// Whether outputs of electrodes are of what pushes them, and not of where they are.
+    of_load: bool,
     /// Quantities of the contact, if they are the outputs.
     of_contact: &'s [ContactOutput],
 }
@@ -37,13 +39,47 @@ pub(super) struct Workspace {
     scratch: Scratch,
 }
 
+/// Rubber under one row-wire that remembers. It is told of the load in steps of its own, so that what it reaches does not
+/// depend on when it is looked at.
+struct Memory {
+    response: Box<dyn Response>,
+    step_s: f64,
+    /// Number of times at which it was told of the load; the first is 0.
+    told: usize,
+}
+
+impl Memory {
+    /// Goes on to the last of its steps up to `time_s`; `load` writes the deformation that is wanted at a time.
+    fn go_on(
+        &mut self,
+        time_s: f64,
+        deformation_mm: &mut [[Lanes; 3]],
+        mut load: impl FnMut(f64, &mut [[Lanes; 3]]),
+    ) {
+        while self.told as f64 * self.step_s <= time_s {
+            load(self.told as f64 * self.step_s, deformation_mm);
+            let step_s = if self.told == 0 { 0.0 } else { self.step_s };
+            self.response.advance(step_s, deformation_mm);
+            self.told += 1;
+        }
+    }
+
+    /// Replaces the deformation that is wanted at `time_s`, after the last step, by the one that is reached.
+    fn reach(&self, time_s: f64, deformation_mm: &mut [[Lanes; 3]]) {
+        let last_s = (self.told - 1) as f64 * self.step_s;
+        self.response.reach(time_s - last_s, deformation_mm);
+    }
+}
+
 impl<'s> LaneSynthesis<'s> {
     /// Synthesis of frames of `stream`, with noise relative to `span_ohm` where that is not empty.
     pub(super) fn new(synthesis: &'s Synthesis<'s>, stream: Stream, span_ohm: Vec<f64>) -> Self {
         let sensor = &synthesis.world.sensor;
         let (mut outputs, mut of_contact) = (Vec::new(), &[][..]);
+        let mut of_load = false;
         match &*synthesis.outputs {
-            Outputs::Electrodes(wanted) => {
+            Outputs::Electrodes(wanted @ ElectrodeOutputs { quantity, .. }) => {
+                of_load = *quantity == Quantity::Force;
                 for electrode in 0..sensor.electrodes_per_row_wire {
                     let axes = wanted.axes.iter();
                     outputs.extend(
@@ -56,7 +92,7 @@ impl<'s> LaneSynthesis<'s> {
             Outputs::Contact(wanted) => of_contact = wanted.as_slice(),
         }
         let model = LaneModel::new(sensor);
-        Self { synthesis, stream, model, span_ohm, outputs, of_contact }
+        Self { synthesis, stream, model, span_ohm, outputs, of_load, of_contact }
     }
 
     /// Working memory for one thread.
@@ -91,32 +127,51 @@ impl<'s> LaneSynthesis<'s> {
         let deepest_mm = motion.range_mm()[2][1];
         let paths = path.map(|path| path.start(&world.sensor, deepest_mm, &mut draws));
         let electrodes = world.sensor.electrodes_per_row_wire;
-        let mut rubber: Vec<Box<dyn Response>> =
-            read_rows.iter().map(|_| world.rubber.at_rest(electrodes)).collect();
+        let move_to = |trajectories: &mut dyn Trajectories, time_s: f64| {
+            if let Some(paths) = &paths {
+                let (centre_mm, depth_mm) = paths.at(time_s);
+                trajectories.move_to(centre_mm, depth_mm);
+            }
+        };
+        let memory = || {
+            let (response, step_s) =
+                (world.rubber.at_rest(electrodes)?, path.as_ref()?.fine_step_s());
+            Some(Memory { response, step_s, told: 0 })
+        };
+        let mut memories: Vec<Option<Memory>> = read_rows.iter().map(|_| memory()).collect();
         for (step, start_s) in timetable.starts_s.iter().enumerate() {
-            let move_to = |trajectories: &mut dyn Trajectories, offset_s: f64| {
-                if let Some(paths) = &paths {
-                    let (centre_mm, depth_mm) = paths.at(start_s + offset_s);
-                    trajectories.move_to(centre_mm, depth_mm);
-                }
-            };
             for (place, &row) in read_rows.iter().enumerate() {
                 let deformation_mm = &mut workspace.deformation_mm;
-                move_to(&mut *trajectories, timetable.row_offset_s(place, read_rows.len()));
-                trajectories.deform(row, &mut draws, deformation_mm);
-                rubber[place].respond(timetable.since_last_s(step), deformation_mm);
+                let time_s = start_s + timetable.row_offset_s(place, read_rows.len());
+                let mut load = |time_s: f64, deformation_mm: &mut [[Lanes; 3]]| {
+                    move_to(&mut *trajectories, time_s);
+                    trajectories.deform(row, &mut draws, deformation_mm);
+                };
+                match &mut memories[place] {
+                    None => load(time_s, deformation_mm),
+                    Some(memory) => {
+                        memory.go_on(time_s, deformation_mm, &mut load);
+                        load(time_s, deformation_mm);
+                        if self.of_load {
+                            self.write_row(deformation_mm, step, place, outputs);
+                        }
+                        memory.reach(time_s, deformation_mm);
+                    }
+                }
                 simd::widest(
                     #[inline(always)]
                     || {
                         if !readings.is_empty() {
                             self.read_row(workspace, (first, step), (place, row), readings);
                         }
-                        self.write_row(&workspace.deformation_mm, step, place, outputs);
+                        if !self.of_load || memories[place].is_none() {
+                            self.write_row(&workspace.deformation_mm, step, place, outputs);
+                        }
                     },
                 );
             }
             if !self.of_contact.is_empty() {
-                move_to(&mut *trajectories, 0.5 * timetable.scan_s);
+                move_to(&mut *trajectories, start_s + 0.5 * timetable.scan_s);
                 self.write_contact(trajectories.contact(), step, outputs);
             }
         }

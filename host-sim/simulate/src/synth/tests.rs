@@ -2,8 +2,9 @@ use taxel_data::digest::digest;
 use taxel_data::spectrum::{NoiseColour, Spectrum};
 
 use super::*;
-use crate::outputs::ContactOutput;
-use crate::sensor::{Precision, Sensor};
+use crate::outputs::{ContactOutput, ElectrodeOutputs, Quantity};
+use crate::rubber::StandardLinearSolid;
+use crate::sensor::{Axis, Precision, Sensor};
 
 fn world(name: &str) -> World {
     if name == "paper" { World::paper() } else { World::press() }
@@ -401,10 +402,10 @@ fn noise_with_a_memory_has_the_size_and_the_time_constant_that_it_is_asked_for()
     {
         let world = remembering(level, correlated_level, time_constant_ms);
         let period_s = 0.1 * time_constant_ms / 1000.0;
-        let times = Timetable::every(period_s, 0.0, 4000.0 * period_s).unwrap();
+        let times = Timetable::every(period_s, 0.0, 1500.0 * period_s).unwrap();
         let log = Synthesis::new(&world).untouched().timed(times.clone());
-        let readings = log.frames(Stream::Training, 4000).inputs;
-        let numbers: Vec<usize> = (0..4000).collect();
+        let readings = log.frames(Stream::Training, 1500).inputs;
+        let numbers: Vec<usize> = (0..1500).collect();
         let found = Spectrum::new(&readings, &numbers, Some(&times.starts_s)).unwrap();
         let tau_ms = 1000.0 * found.time_constant_s.unwrap();
         assert!((tau_ms / time_constant_ms - 1.0).abs() < 0.1, "{tau_ms}");
@@ -416,10 +417,10 @@ fn noise_with_a_memory_has_the_size_and_the_time_constant_that_it_is_asked_for()
     }
     let white = remembering(0.005, 0.005, 20.0);
     let white = World { noise: Noise::white(NoiseKind::Relative, 0.005), ..white };
-    let times = Timetable::every(0.002, 0.0, 8.0).unwrap();
+    let times = Timetable::every(0.002, 0.0, 3.0).unwrap();
     let log = Synthesis::new(&white).untouched().timed(times);
-    let readings = log.frames(Stream::Training, 4000).inputs;
-    let numbers: Vec<usize> = (0..4000).collect();
+    let readings = log.frames(Stream::Training, 1500).inputs;
+    let numbers: Vec<usize> = (0..1500).collect();
     let found = Spectrum::new(&readings, &numbers, None).unwrap();
     assert_eq!((found.colour, found.correlated_share), (NoiseColour::White, 0.0));
 }
@@ -464,4 +465,115 @@ fn noise_with_half_a_memory_is_refused() {
         let refused = world.check().unwrap_err().to_string();
         assert!(refused.contains(field), "{refused}");
     }
+}
+
+/// Rubber that reaches half of a deformation at once, and the rest with a time constant of 50 ms.
+const CREEPING: StandardLinearSolid =
+    StandardLinearSolid { instant_share: 0.5, time_constant_ms: 50.0 };
+
+#[test]
+fn rubber_with_a_memory_is_where_the_integral_over_its_past_says_whenever_it_is_looked_at() {
+    let elastic = moving(100.0, 5.0);
+    let world = World { rubber: CREEPING.into(), ..elastic.clone() };
+    world.check().unwrap();
+    let path = world.path.unwrap();
+    let scans = Timetable::every(0.0056, 0.005, 0.3).unwrap();
+    let scanned = Synthesis::new(&world).ideal().along(path, scans.clone());
+    let scanned = scanned.frames(Stream::Test, 70 * scans.scans());
+    let truth_at = |world: &World, starts_s: Vec<f64>| {
+        let frames = 70 * starts_s.len();
+        let instants = Synthesis::new(world).along(path, Timetable::instants(starts_s));
+        instants.true_outputs(Stream::Test, frames)
+    };
+    // At the time of its reading, whatever is read before: row 4 is read at 7/16 of a scan.
+    let of_row = |line: &[f64]| line[3 * 18..4 * 18].to_vec();
+    for scan in [0, 1, 29, 53] {
+        let at = truth_at(&world, vec![scans.starts_s[scan] + scans.row_offset_s(3, 8)]);
+        let of_scans = scanned.outputs.lines().skip(scan).step_by(scans.scans());
+        for (seen, there) in of_scans.zip(at.lines()) {
+            assert_eq!(of_row(seen), of_row(there));
+        }
+    }
+    // Memories go on in straight steps of up to 1 ms: 0.05 µm of dents of 1 mm.
+    // v = ∫ w(t′)·exp((t′ − t)/τ) dt′/τ by Simpson's rule, of what elastic rubber does at steps of 0.1 ms.
+    let (steps, step_s) = (2500, 1e-4);
+    let wanted = truth_at(&elastic, (0..=steps).map(|step| step as f64 * step_s).collect());
+    let reached = truth_at(&world, vec![steps as f64 * step_s]);
+    let (mut largest_mm, mut furthest_mm) = (0.0_f64, 0.0_f64);
+    for trajectory in [0, 5, 69] {
+        for (output, reached_mm) in reached.line(trajectory).iter().enumerate() {
+            let wanted_mm = |step: usize| wanted.line(trajectory * (steps + 1) + step)[output];
+            let crept_mm: f64 = (0..=steps)
+                .map(|step| {
+                    let end = step == 0 || step == steps;
+                    let weight = if end { 1.0 } else { [2.0, 4.0][step % 2] };
+                    let age = (steps - step) as f64 * step_s / 0.05;
+                    weight * wanted_mm(step) * (-age).exp() * step_s / (3.0 * 0.05)
+                })
+                .sum();
+            let expected_mm = 0.5 * wanted_mm(steps) + 0.5 * crept_mm;
+            largest_mm = largest_mm.max((reached_mm - expected_mm).abs());
+            furthest_mm = furthest_mm.max((reached_mm - wanted_mm(steps)).abs());
+        }
+    }
+    assert!(largest_mm < 5e-5 && furthest_mm > 0.05, "{largest_mm} mm, {furthest_mm} mm");
+}
+
+#[test]
+fn rubber_with_a_memory_changes_where_electrodes_are_and_not_what_pushes_them() {
+    let elastic = moving(60.0, 3.0);
+    let world = World { rubber: CREEPING.into(), ..elastic.clone() };
+    let path = world.path.unwrap();
+    let timetable = Timetable::every(0.01, 0.008, 0.2).unwrap();
+    let frames = |world: &World, outputs: Outputs| {
+        let synthesis = Synthesis::new(world).ideal().outputs(outputs);
+        let synthesis = synthesis.along(path, timetable.clone());
+        synthesis.frames(Stream::Test, 20 * 20)
+    };
+    let forces = || ElectrodeOutputs { quantity: Quantity::Force, axes: vec![Axis::X, Axis::Z] };
+    let contact = || Outputs::Contact(vec![ContactOutput::Centre, ContactOutput::Force]);
+    for outputs in [forces().into(), contact()] {
+        let [remembering, at_once] = [&world, &elastic].map(|it| frames(it, outputs.clone()));
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        assert!(remembering.outputs.values.iter().zip(&at_once.outputs.values).all(same));
+        assert_ne!(remembering.inputs.values, at_once.inputs.values);
+    }
+    // Readings are those of the electrodes' places.
+    let moved = frames(&world, Outputs::all_deformations());
+    let lines = moved.inputs.lines().zip(moved.outputs.lines()).step_by(57);
+    for (readings_ohm, deformation_mm) in lines {
+        let (row_mm, _) = deformation_mm[2 * 18..].as_chunks::<3>();
+        let mut expected_ohm = [0.0; 18];
+        world.sensor.row_column_resistance_ohm(2, &row_mm[..6], &mut expected_ohm);
+        let off = |(a, b): (&f64, &f64)| (a / b - 1.0).abs();
+        let worst = readings_ohm[36..].iter().zip(&expected_ohm).map(off).fold(0.0, f64::max);
+        assert!(worst < 1e-12, "{worst}");
+    }
+    // Still contacts were held for long, and nothing presses an untouched sensor.
+    let still = |world: &World| Synthesis::new(world).frames(Stream::Test, 10);
+    assert_eq!(still(&world), still(&elastic));
+    let untouched = |world: &World| {
+        Synthesis::new(world).untouched().timed(timetable.clone()).frames(Stream::Test, 40)
+    };
+    assert_eq!(untouched(&world), untouched(&elastic));
+}
+
+#[test]
+fn rubber_with_a_memory_is_refused_where_it_would_change_nothing_or_nobody_knows_the_answer() {
+    let refused = |world: World| world.check().unwrap_err().to_string();
+    let creeping = World { rubber: CREEPING.into(), ..moving(50.0, 3.0) };
+    let message = refused(World { path: None, ..creeping.clone() });
+    assert!(message.contains("rubber = [rubber]: still contacts"), "{message}");
+    let wanted = vec![ContactOutput::Depth, ContactOutput::Force];
+    let message = refused(World { outputs: Outputs::Contact(wanted), ..creeping.clone() });
+    assert!(message.contains("outputs.contact") && message.contains("[rubber]"), "{message}");
+    let path = Path { duration_s: 3600.0, ..creeping.path.unwrap() };
+    let message = refused(World { path: Some(path), ..creeping.clone() });
+    assert!(
+        message.contains("motion.duration_s") && message.contains("3600000 steps"),
+        "{message}"
+    );
+    let solid = StandardLinearSolid { instant_share: 1.5, ..CREEPING };
+    let message = refused(World { rubber: solid.into(), ..creeping });
+    assert!(message.contains("rubber.instant_share = 1.5"), "{message}");
 }

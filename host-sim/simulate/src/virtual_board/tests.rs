@@ -95,6 +95,7 @@ fn a_scan_takes_the_transactions_and_the_time_that_are_planned() {
         idle_samples: true,
         settling_us: 12,
         oversampling: 2,
+        pass_samples: u16::MAX,
         sample_ns: 24_000,
         reading_ns: 0,
         row_ns: 0,

@@ -38,6 +38,9 @@ pub struct RecordArguments {
     /// `baseline`; 0 decodes all rows (docs/gating.md).
     #[arg(long, value_name = "SHARE", default_value_t = Configuration::DEFAULT.rest_tolerance, value_parser = tolerance, allow_negative_numbers = true)]
     rest_tolerance: f32,
+    /// Save the start of each scan too, in a column time_s: seconds since the first one. `decode --filter-ms` needs it.
+    #[arg(long)]
+    time: bool,
     #[command(flatten)]
     filter: FilterArguments,
     /// Scans of which one is saved; all are decoded and filtered.
@@ -147,9 +150,15 @@ pub fn record<W: Wire>(
         let values = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
         note_faults(&Table { names: names.clone(), values });
     }
-    let noise = if action.untouched { Some(noise(&frames, &names)?) } else { None };
-    let lines = frames.iter().map(|frame| frame.values.iter().copied());
-    csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
+    let noise = if action.untouched { Some(noise(&frames, &names, every)?) } else { None };
+    let time = action.time.then_some("time_s");
+    let first_us = frames.first().map_or(0, |frame| frame.start_us);
+    let lines = frames.iter().map(|frame| {
+        let time = time.map(|_| (frame.start_us - first_us) as f64 / 1e6);
+        time.into_iter().chain(frame.values.iter().copied())
+    });
+    let header = time.into_iter().chain(names.iter().map(String::as_str));
+    csv_file::write(&action.output, header, lines)?;
     let ends = frames.last().zip(frames.first());
     let steps = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number));
     let frames_lost = (steps / u32::from(every) + 1).saturating_sub(frames.len() as u32);
@@ -171,11 +180,13 @@ pub fn record<W: Wire>(
     saved.print(common)
 }
 
-/// Noise on the readings of these `frames`, in columns of these `names`.
-fn noise(frames: &[Frame], names: &[String]) -> Result<Spectrum> {
+/// Noise on the readings of these `frames`, in columns of these `names`. The device has sent `every` so many.
+fn noise(frames: &[Frame], names: &[String], every: u16) -> Result<Spectrum> {
     let first = frames.first().map_or((0, 0), |frame| (frame.number, frame.start_us));
-    let numbers: Vec<usize> =
-        frames.iter().map(|frame| frame.number.wrapping_sub(first.0) as usize).collect();
+    let numbers: Vec<usize> = frames
+        .iter()
+        .map(|frame| (frame.number.wrapping_sub(first.0) / u32::from(every)) as usize)
+        .collect();
     let times_s: Vec<f64> =
         frames.iter().map(|frame| (frame.start_us - first.1) as f64 * 1e-6).collect();
     let values = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();

@@ -91,6 +91,7 @@ pub fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
         idle_samples: true,
         settling_us: scan.settling_us,
         oversampling: scan.oversampling,
+        pass_samples: u16::MAX,
         sample_ns: SLOWEST_SAMPLE_NS,
         reading_ns: SLOWEST_SAMPLE_NS,
         row_ns: SLOWEST_SAMPLE_NS,

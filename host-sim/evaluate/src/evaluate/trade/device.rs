@@ -23,20 +23,47 @@ pub enum Memory {
     Ram,
 }
 
+/// Readout of the NUCLEO-F446RE (docs/board.md): what samples columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Readout {
+    /// MCP3208 converters on a bus. The processor scans, and decodes the frame afterwards.
+    #[default]
+    Spi,
+    /// The chip's own converters, which scan by themselves while the processor decodes the frame before.
+    OnChip,
+}
+
+impl Readout {
+    /// Name of the board's image that scans so.
+    pub fn image(self) -> &'static str {
+        match self {
+            Self::Spi => "nucleo-f446re",
+            Self::OnChip => "nucleo-f446re-onchip",
+        }
+    }
+}
+
 /// Device whose times are given.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Device {
     pub clock_mhz: f64,
     /// Memory that its code runs from.
     pub memory: Memory,
-    /// Time of a scan with one sample a reading, instead of the board's own readout.
+    pub readout: Readout,
+    /// Time of a scan with one sample a reading, instead of what the readout takes.
     pub scan_ms: Option<f64>,
 }
 
 impl Default for Device {
     /// The NUCLEO-F446RE.
     fn default() -> Self {
-        Self { clock_mhz: BOARD_CLOCK_MHZ, memory: Memory::default(), scan_ms: None }
+        Self {
+            clock_mhz: BOARD_CLOCK_MHZ,
+            memory: Memory::default(),
+            readout: Readout::default(),
+            scan_ms: None,
+        }
     }
 }
 
@@ -57,7 +84,7 @@ impl Wires {
     }
 }
 
-/// Times of one frame. The firmware's loop scans, decodes, and only then scans again.
+/// Times of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Times {
     /// Time of the scan; `None` if it is unknown.
@@ -66,7 +93,8 @@ pub struct Times {
     pub decode_ms: f64,
     /// Time of both; of decoding alone if the scan's is unknown.
     pub frame_ms: f64,
-    /// Frames in a second, at most: one over the time of a frame.
+    /// Frames in a second, at most: one over the time of a frame, or of the longer of scan and decoding where both go on at
+    /// once ([`Readout::OnChip`]).
     pub frames_per_s: f64,
     /// Mean age of the newest finished estimate when it is used: the time since the middle of its scan. `None` if the
     /// scan's time is unknown.
@@ -98,17 +126,25 @@ impl Device {
     pub fn scan_ms(&self, wires: Option<Wires>, samples: usize) -> Option<f64> {
         let short = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
         let of_board = |Wires { rows, columns }| {
-            let plan = ScanPlan::of_nucleo(short(rows), short(columns), short(samples));
-            f64::from(plan.scan_us()) / 1000.0
+            let plan = match self.readout {
+                Readout::Spi => ScanPlan::of_nucleo,
+                Readout::OnChip => ScanPlan::of_nucleo_onchip,
+            };
+            f64::from(plan(short(rows), short(columns), short(samples)).scan_us()) / 1000.0
         };
         self.scan_ms.map(|once| once * samples as f64).or(wires.map(of_board))
     }
 
-    /// Time in s between two samples of one reading, which are taken one after the other; 0 if nothing tells it.
+    /// Time in s between two samples of one reading; 0 if nothing tells it. They are taken one after the other, by on-chip
+    /// converters those of half a row at once.
     pub fn sample_spacing_s(&self, wires: Option<Wires>) -> f64 {
         let scan_ms = |samples| self.scan_ms(wires, samples);
         let of_all = scan_ms(2).zip(scan_ms(1)).map(|(two, one)| (two - one) / 1000.0);
-        wires.zip(of_all).map_or(0.0, |(it, of_all_s)| of_all_s / (it.rows * it.columns) as f64)
+        let in_turn = |wires: Wires| match self.readout {
+            Readout::Spi => wires.rows * wires.columns,
+            Readout::OnChip => 2 * wires.rows,
+        };
+        wires.zip(of_all).map_or(0.0, |(wires, of_all_s)| of_all_s / in_turn(wires) as f64)
     }
 
     /// Cycles of a frame with this `cost` in the device's memory.
@@ -123,8 +159,12 @@ impl Device {
     pub fn times(&self, scan_ms: Option<f64>, cost: &Cost) -> Times {
         let decode_ms = self.cycles(cost) as f64 / (self.clock_mhz * 1000.0);
         let frame_ms = scan_ms.unwrap_or(0.0) + decode_ms;
-        let age_ms = scan_ms.map(|scan_ms| age_ms(scan_ms, frame_ms, frame_ms));
-        Times { scan_ms, decode_ms, frame_ms, frames_per_s: 1000.0 / frame_ms, age_ms }
+        let period_ms = match self.readout {
+            Readout::Spi => frame_ms,
+            Readout::OnChip => scan_ms.map_or(decode_ms, |scan_ms| scan_ms.max(decode_ms)),
+        };
+        let age_ms = scan_ms.map(|scan_ms| age_ms(scan_ms, frame_ms, period_ms));
+        Times { scan_ms, decode_ms, frame_ms, frames_per_s: 1000.0 / period_ms, age_ms }
     }
 }
 
@@ -145,6 +185,14 @@ mod tests {
         // Half the scan and the decoding, and half a frame until the next one is finished.
         assert!((times.age_ms.unwrap() - (2.75 + 0.2 + 2.85)).abs() < 1e-12);
         assert!((times.frames_per_s - 175.4).abs() < 0.1);
+        // The board's own converters scan while the frame before is decoded.
+        let onchip = Device { readout: Readout::OnChip, ..board };
+        let scans = [1, 12].map(|samples| onchip.scan_ms(paper, samples).unwrap());
+        assert_eq!(scans, [0.224, 0.887]);
+        let times = onchip.times(Some(0.9), &cost);
+        assert!((times.frame_ms - 1.1).abs() < 1e-12);
+        assert!((times.period_ms() - 0.9).abs() < 1e-12);
+        assert!((times.age_ms.unwrap() - (0.45 + 0.2 + 0.45)).abs() < 1e-12);
         let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
         assert_eq!(ram.times(None, &cost).frame_ms, 0.2);
         assert_eq!(ram.times(None, &cost).frames_per_s, 5000.0);

@@ -1,6 +1,6 @@
 //! Training and judging of the points that share their training and test frames.
 
-use model_core::filter::Settings;
+use model_core::filter::{Settings, Track};
 use rayon::prelude::*;
 use taxel_data::progress::Progress;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
@@ -15,6 +15,9 @@ use super::ways::{Variant, Ways};
 use super::{Arithmetic, Device, Point, SLOT_BYTES};
 use crate::error::Result;
 use crate::metrics::{self, Measure};
+
+/// Bytes of RAM that a filter in time takes for each output.
+const FILTER_BYTES: usize = size_of::<Track>();
 
 /// Points that were trained and judged, and the blobs that they decode with.
 #[derive(Default)]
@@ -128,20 +131,23 @@ impl Judged {
                 frame,
                 times: device.times(frames.scan_ms, &frame),
                 blob_bytes: blob.bytes().len(),
-                ram_bytes: if gate_k.is_some() { ram.gated_bytes() } else { ram.bytes() },
+                ram_bytes: if gate_k.is_some() { ram.gated_bytes() } else { ram.bytes() }
+                    + if filter.is_on() { FILTER_BYTES * test.outputs.names.len() } else { 0 },
                 on_front: false,
             });
             self.blobs.push(self.distinct.len());
         };
         let (no_gate, no_filter) = (None, Settings::default());
         if let Some(touches) = &frames.touches {
-            let times = device.times(frames.scan_ms, &costs.ungated);
-            let touched = touches.at(&times)?;
+            let filtered = costs.ungated.plus(prices.filter(blob.parse().shape())?);
+            let times_of = |cost: &Cost| device.times(frames.scan_ms, cost);
+            let touched = touches.at(&times_of(&costs.ungated))?;
             let estimates = model.decode_lines(&touched.moving.frames.inputs.values);
-            let age_ms = times.age_ms.unwrap_or_default();
-            for filter in [no_filter, touched.filter_settings(&model, &estimates, age_ms)] {
-                let errors = touched.errors(&estimates, filter, &times, measure);
-                add((no_gate, filter), costs.ungated, errors);
+            let age_ms = times_of(&filtered).age_ms.unwrap_or_default();
+            let filter = touched.filter_settings(&model, &estimates, age_ms);
+            for (filter, cost) in [(no_filter, costs.ungated), (filter, filtered)] {
+                let errors = touched.errors(&estimates, filter, &times_of(&cost), measure);
+                add((no_gate, filter), cost, errors);
             }
             return Ok(());
         }

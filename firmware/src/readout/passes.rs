@@ -1,0 +1,250 @@
+//! A scan that hardware makes by itself: the processor is needed at its start and at its end.
+
+use model_core::{ColumnWires, RowWire};
+
+use super::scanner::count_failures;
+use super::{FrameSource, SCANS_A_ROUND, ScanReport, ScanSettings, Selection};
+use crate::circuit::{Circuit, Constants, ConstantsFault, ScannedRow};
+
+/// Hardware that drives rows one after the other and samples all `COLUMNS` columns by itself: a *pass*.
+pub trait Sequencer<const COLUMNS: usize> {
+    /// The converter's largest count.
+    const FULL_SCALE_COUNTS: u16;
+
+    /// Most samples of each reading in a pass.
+    const MOST_SAMPLES: u16;
+
+    /// Starts a pass: drives `rows` one after the other, or lets all idle for `None`. Waits `settling_us` each time, and takes
+    /// so many `samples` of every column. A row that is not wired idles.
+    fn start(&mut self, rows: &[Option<RowWire>], settling_us: u32, samples: u16);
+
+    /// Ends the pass once all rows idle again: adds its samples to `sums`, a line for each of its rows. `None` while it goes
+    /// on.
+    fn poll(&mut self, sums: &mut [[u32; COLUMNS]]) -> Option<Result<(), SequencerFault>>;
+
+    /// Gives up the pass, if one goes on: all rows idle.
+    fn stop(&mut self);
+}
+
+/// A pass of which samples were lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SequencerFault;
+
+/// Looks at a pass until it has failed: 2 s or more, at ten cycles a look.
+const MOST_LOOKS: u32 = 40_000_000;
+
+/// Scanner of a sensor by a [`Sequencer`] and a circuit. `LINES` is one more than the largest number of rows.
+///
+/// All columns are sampled, and those asked for are picked. The first scan, every one in [`SCANS_A_ROUND`] from there on, and
+/// the one behind a failure, other settings or constants begins with a line in which all rows idle. More samples than fit into a
+/// pass are taken in several.
+#[derive(Debug)]
+pub struct PassScanner<'m, Q, C, const LINES: usize, const COLUMNS: usize> {
+    sequencer: Q,
+    circuit: C,
+    /// Idle counts of each column.
+    idle: [f32; COLUMNS],
+    /// The scan that was started last, and the one that has ended.
+    started: Plan<LINES>,
+    ended: Plan<LINES>,
+    /// Samples of each line and column, added up.
+    sums: &'m mut [[u32; COLUMNS]; LINES],
+    /// Whether the sums are those of a scan that has ended.
+    has_ended: bool,
+    /// Number of samples of a reading behind the pass under way.
+    samples_left: u16,
+    /// Number of scans before the next round; 0 begins one.
+    scans_left: u8,
+}
+
+/// What a scan drives and is asked for.
+#[derive(Debug, Clone, Copy)]
+struct Plan<const LINES: usize> {
+    /// A row each, or none.
+    lines: [Option<RowWire>; LINES],
+    line_count: usize,
+    columns: ColumnWires,
+    settings: ScanSettings,
+    has_failed: bool,
+}
+
+impl<const LINES: usize> Plan<LINES> {
+    const NOTHING: Self = Self {
+        lines: [None; LINES],
+        line_count: 0,
+        columns: ColumnWires(0),
+        settings: ScanSettings { settling_us: 0, oversampling: 0 },
+        has_failed: true,
+    };
+
+    fn lines(&self) -> &[Option<RowWire>] {
+        self.lines.get(..self.line_count).unwrap_or_default()
+    }
+}
+
+impl<'m, Q: Sequencer<COLUMNS>, C: Circuit, const LINES: usize, const COLUMNS: usize>
+    PassScanner<'m, Q, C, LINES, COLUMNS>
+{
+    /// Makes a scanner of its parts, with memory for sums.
+    pub const fn new(sequencer: Q, circuit: C, sums: &'m mut [[u32; COLUMNS]; LINES]) -> Self {
+        Self {
+            sequencer,
+            circuit,
+            idle: [f32::NAN; COLUMNS],
+            started: Plan::NOTHING,
+            ended: Plan::NOTHING,
+            sums,
+            has_ended: true,
+            samples_left: 0,
+            scans_left: 0,
+        }
+    }
+
+    /// Starts the next pass of the scan.
+    fn start_pass(&mut self) {
+        let samples = self.samples_left.min(Q::MOST_SAMPLES);
+        self.samples_left -= samples;
+        let Plan { settings, .. } = self.started;
+        self.sequencer.start(self.started.lines(), settings.settling_us, samples);
+    }
+
+    /// Turns the sums into readings in Ω.
+    fn convert(&mut self, frame: &mut [f32]) {
+        let Plan { columns, settings, .. } = self.ended;
+        let (samples, all) = (f32::from(settings.oversampling), ColumnWires::first(COLUMNS));
+        let lines = self.ended.lines().iter().zip(self.sums.iter());
+        let mut readings = frame.chunks_mut(columns.count().max(1));
+        for (line, sums) in lines {
+            let mut counts = sums.map(|sum| sum as f32 / samples);
+            let Some(row) = *line else {
+                self.idle = counts;
+                continue;
+            };
+            let row = ScannedRow { row, columns: all, load: 1.0 };
+            self.circuit.row_ohm(row, &self.idle, Q::FULL_SCALE_COUNTS, &mut counts);
+            let picked = columns.pick(counts);
+            for (reading, ohm) in readings.next().unwrap_or_default().iter_mut().zip(picked) {
+                *reading = ohm;
+            }
+        }
+        self.circuit.correct(columns, frame);
+    }
+}
+
+impl<Q: Sequencer<COLUMNS>, C: Circuit, const LINES: usize, const COLUMNS: usize> FrameSource
+    for PassScanner<'_, Q, C, LINES, COLUMNS>
+{
+    fn scan(
+        &mut self,
+        settings: ScanSettings,
+        wires: Selection<'_>,
+        frame: &mut [f32],
+    ) -> ScanReport {
+        self.start(settings, wires);
+        if (0..MOST_LOOKS).any(|_| self.poll()) {
+            return self.take(frame);
+        }
+        self.stop();
+        failed(frame)
+    }
+
+    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) -> bool {
+        let settings = settings.clamped();
+        let plan = &mut self.started;
+        if plan.settings != settings {
+            self.scans_left = 0;
+        }
+        (plan.columns, plan.settings, plan.has_failed) = (wires.columns, settings, false);
+        let begins_round = self.scans_left == 0;
+        let idle = begins_round.then_some(None);
+        let lines = idle.into_iter().chain(wires.rows.iter().map(|row| Some(*row)));
+        plan.line_count = 0;
+        for (place, line) in plan.lines.iter_mut().zip(lines) {
+            *place = line;
+            plan.line_count += 1;
+        }
+        self.scans_left = if begins_round { SCANS_A_ROUND } else { self.scans_left } - 1;
+        self.samples_left = settings.oversampling;
+        self.start_pass();
+        true
+    }
+
+    fn poll(&mut self) -> bool {
+        if self.has_ended {
+            self.sums.as_flattened_mut().fill(0);
+            self.has_ended = false;
+        }
+        let sums = self.sums.get_mut(..self.started.line_count).unwrap_or_default();
+        let Some(outcome) = self.sequencer.poll(sums) else { return false };
+        if outcome.is_ok() && self.samples_left > 0 {
+            self.start_pass();
+            return false;
+        }
+        self.started.has_failed = outcome.is_err();
+        (self.ended, self.has_ended) = (self.started, true);
+        if outcome.is_err() {
+            self.scans_left = 0;
+        }
+        true
+    }
+
+    fn take(&mut self, frame: &mut [f32]) -> ScanReport {
+        if self.ended.has_failed {
+            return failed(frame);
+        }
+        frame.fill(f32::NAN); // rows and columns that are not wired
+        self.convert(frame);
+        let mut report = ScanReport::default();
+        count_failures(&mut report, frame.iter().filter(|reading| reading.is_nan()).count());
+        report
+    }
+
+    fn stop(&mut self) {
+        self.sequencer.stop();
+        (self.scans_left, self.has_ended) = (0, true);
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        self.circuit.constants()
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        self.scans_left = 0;
+        self.circuit.set_constants(constants)
+    }
+}
+
+/// Number of columns that are sampled at one trigger: by three converters, three each.
+const AT_ONCE: usize = 9;
+
+/// Adds up samples of a pass in the order in which three converters deliver them: for each line and each half of the columns
+/// the `samples` of nine columns, which are the first ones of all converters, then their second and third ones. Converter
+/// and turn choose a multiplexer, 3·converter + turn. It has two neighbouring columns, one of each half.
+pub fn add_samples(delivered: &[u16], samples: u16, sums: &mut [[u32; 2 * AT_ONCE]]) {
+    let mut halves = delivered.chunks_exact(AT_ONCE * usize::from(samples.max(1)));
+    for sums in sums {
+        for is_second in [false, true] {
+            // By name and in this order, so that a sum is a register even where code is as small as can be.
+            let [mut a, mut b, mut c, mut d, mut e, mut f, mut g, mut h, mut i] = [0; AT_ONCE];
+            for counts in halves.next().unwrap_or_default().as_chunks::<AT_ONCE>().0 {
+                let [na, nb, nc, nd, ne, nf, ng, nh, ni] = counts;
+                (a, b, c) = (a + u32::from(*na), b + u32::from(*nb), c + u32::from(*nc));
+                (d, e, f) = (d + u32::from(*nd), e + u32::from(*ne), f + u32::from(*nf));
+                (g, h, i) = (g + u32::from(*ng), h + u32::from(*nh), i + u32::from(*ni));
+            }
+            let by_multiplexer = [a, d, g, b, e, h, c, f, i];
+            for (pair, nine) in sums.as_chunks_mut::<2>().0.iter_mut().zip(by_multiplexer) {
+                let [first, second] = pair;
+                *if is_second { second } else { first } += nine;
+            }
+        }
+    }
+}
+
+/// Makes every reading of the frame a failed one.
+fn failed(frame: &mut [f32]) -> ScanReport {
+    let mut report = ScanReport::default();
+    frame.fill(f32::NAN);
+    count_failures(&mut report, frame.len());
+    report
+}
