@@ -61,7 +61,8 @@ fn a_log_is_judged_at_rest_and_its_page_shows_how_far_averaging_pays() {
         log += &format!("{},{},{force}\n", fields[0], readings.join(","));
     }
     folder.write("log.csv", log);
-    let run = ["run", "log.csv", "--outputs", "f_n", "--no-refine", "--centres", "8"];
+    let run =
+        ["run", "log.csv", "--inputs", "ch*", "--outputs", "f_n", "--no-refine", "--centres", "8"];
     let document = checked(&folder, &schema(), &run);
     let noise = &document["data"]["over_time"]["rest"]["noise"];
     assert_eq!(noise["colour"], "correlated", "{noise}");
