@@ -26,6 +26,7 @@ mod interruption;
 
 pub mod run;
 pub mod synth;
+pub mod noise;
 pub mod forward;
 pub mod train;
 pub mod decode;

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use host_sim::commands::{
-    self, Common, decode, emulate, eval, export, forward, gate, inspect, join, limit, link, run,
-    synth, table1, trade, train,
+    self, Common, decode, emulate, eval, export, forward, gate, inspect, join, limit, link, noise,
+    run, synth, table1, trade, train,
 };
 use host_sim::{Error, Result};
 
@@ -30,6 +30,7 @@ struct Cli {
 enum Command {
     Run(run::Arguments),
     Synth(synth::Arguments),
+    Noise(noise::Arguments),
     Forward(forward::Arguments),
     Train(train::Arguments),
     Join(join::Arguments),
@@ -63,6 +64,7 @@ impl Command {
             Self::Link(arguments) => return format!("link {}", arguments.action_name()),
             Self::Run(_) => "run",
             Self::Synth(_) => "synth",
+            Self::Noise(_) => "noise",
             Self::Forward(_) => "forward",
             Self::Train(_) => "train",
             Self::Decode(_) => "decode",
@@ -128,6 +130,7 @@ fn execute(command: Command, common: &Common) -> Result<()> {
     match command {
         Command::Run(arguments) => run::execute(&arguments, common),
         Command::Synth(arguments) => synth::execute(&arguments, common),
+        Command::Noise(arguments) => noise::execute(&arguments, common),
         Command::Forward(arguments) => forward::execute(&arguments, common),
         Command::Train(arguments) => train::execute(&arguments, common),
         Command::Join(arguments) => join::execute(&arguments, common),

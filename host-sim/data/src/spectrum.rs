@@ -192,6 +192,13 @@ impl Spectrum {
         })
     }
 
+    /// Variance of the noise over half the mean squared difference of neighbours: 1 for white noise.
+    pub fn variance_over_differences(&self) -> f64 {
+        let constant = self.time_constant_frames.filter(|_| self.colour == NoiseColour::Correlated);
+        let shared = constant.map_or(0.0, |frames| self.correlated_share * exp(-1.0 / frames));
+        1.0 / (1.0 - shared)
+    }
+
     /// Averaging of the most frames that pay; of as many as the log tells, if all do.
     pub fn best(&self) -> Option<&Averaging> {
         let most = self.pays_up_to.unwrap_or(usize::MAX);

@@ -120,7 +120,7 @@ impl World {
         }
     }
 
-    /// Changes the noise level, a fraction (0.005 is 0.5 %).
+    /// Changes the level of the white noise, a fraction (0.005 is 0.5 %).
     pub fn set_noise_level(&mut self, level: f64) -> Check {
         check_noise_level("noise level", level)?;
         self.noise.level = level;

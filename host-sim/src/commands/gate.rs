@@ -67,7 +67,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = subject_argument::model(arguments.model.as_deref(), &subject, &Terminal::new())?;
     let model = blob.prepare(Exponential::default());
     if let Subject::Scene(scene) = &subject {
-        remark_on_noise(&model, scene.world.noise.level);
+        remark_on_noise(&model, scene.world.noise.total_level());
     }
     let (frame_cycles, flash_frame_cycles) = if let Some(frames) = given {
         (frames, None)

@@ -115,7 +115,7 @@ impl Sizes {
 /// Noise level instead of the scene's.
 #[derive(Args, Default)]
 pub struct NoiseArgument {
-    /// Noise level as a fraction (0.01 is 1 %), instead of the scene's.
+    /// Level of the white noise as a fraction (0.01 is 1 %), instead of the scene's.
     #[arg(long, value_name = "LEVEL", allow_negative_numbers = true)]
     noise: Option<f64>,
 }

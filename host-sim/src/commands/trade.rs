@@ -9,6 +9,7 @@ use crate::evaluate::gate::{self, RECOMMENDED_K};
 use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan, Readout, Wires};
 use crate::metrics;
 use crate::subject::Subject;
+use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::{Args, ValueEnum};
 use taxel_data::{BadValue, columns};
@@ -142,6 +143,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         gate_k: gate_k(&arguments.gate, &subject)?,
         device,
     };
+    if let Some(scene) = subject.scene() {
+        let spacing_s = plan.device.sample_spacing_s(wires(&subject, 1));
+        let idle = |n: &usize| Warning::idle_averaging(&scene.world.noise, *n, spacing_s);
+        plan.samples_averaged.iter().filter_map(idle).for_each(stderr::remark);
+    }
     let bounds = Bounds {
         error: arguments.max_error,
         cycles: arguments.max_cycles,

@@ -61,6 +61,7 @@ pub fn page(view: &View<'_>) -> String {
         body.figure(&over_time::errors(log));
         if let Some(rest) = &log.rest {
             body.figure(&over_time::at_rest(log, rest));
+            rest.noise.iter().for_each(|noise| body.figure(&over_time::averaging(noise)));
         }
     }
     if let Some(moving) = view.moving {

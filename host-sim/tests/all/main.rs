@@ -24,6 +24,7 @@ mod mat;
 mod log;
 mod measured;
 mod moving;
+mod noise;
 #[cfg(unix)]
 mod output;
 mod readout;

@@ -96,7 +96,11 @@ impl NoiseLevel {
                 let refused = Some(format!("not tried: at more noise, {reason}"));
                 (scene.measure(), LimitSummary { frames: 0, groups: Vec::new(), refused })
             }
-            _ => scene.measure_beside_limit(scene.world.noise.with_level(noise_level), MOST_LIMIT_FRAMES.min(frames), progress),
+            _ => scene.measure_beside_limit(
+                scene.world.noise.with_level(noise_level),
+                MOST_LIMIT_FRAMES.min(frames),
+                progress,
+            ),
         };
         if no_limit.is_none() {
             no_limit.clone_from(&limit.refused);

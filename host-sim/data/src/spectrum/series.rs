@@ -37,8 +37,10 @@ impl Series {
         let frames = readings.len().min(MOST_FRAMES);
         let counts = readings.counts();
         let least = (1.0 - MISSING) * readings.len() as f64;
-        let whole: Vec<usize> =
-            (0..counts.len()).filter(|column| counts[*column] as f64 >= least).collect();
+        let ranges = readings.ranges();
+        let changes = |column: &usize| ranges[*column][0] < ranges[*column][1];
+        let whole = (0..counts.len()).filter(|column| counts[*column] as f64 >= least);
+        let whole: Vec<usize> = whole.filter(changes).collect();
         let step = whole.len().div_ceil(MOST_READINGS).max(1);
         let places: Vec<usize> = whole.into_iter().step_by(step).collect();
         let column = |place: &usize| (0..frames).map(|line| readings.line(line)[*place]).collect();

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use taxel_data::clock::Clock;
 use taxel_data::rest::Rest;
+use taxel_data::spectrum::Spectrum;
 use taxel_learn::Options;
 
 use super::relative_trial::RelativeTrial;
@@ -42,6 +43,8 @@ pub struct RestOverTime {
     pub readings: usize,
     /// Time between the first stretch and the last, in words: `in 9.6 minutes`.
     pub span: String,
+    /// What the noise is like; `None` if too few lines follow one another.
+    pub noise: Option<Spectrum>,
     /// What relative inputs would change; `None` if it was not tried.
     pub relative_trial: Option<RelativeTrial>,
 }
@@ -151,9 +154,16 @@ impl RestOverTime {
             drifts: noticeable,
             readings: all.len(),
             span: clock.span(time(0)[0], time(ranges.len() - 1)[1]),
+            noise: noise_of(rest, lines, clock),
             relative_trial: None,
         })
     }
+}
+
+/// Noise of a log at `rest`, on these `lines`.
+fn noise_of(rest: &Rest, lines: &[usize], clock: &Clock) -> Option<Spectrum> {
+    let times_s: Vec<f64> = lines.iter().map(|line| clock.at[*line]).collect();
+    Spectrum::new(&rest.readings, lines, (clock.unit == "s").then_some(&times_s))
 }
 
 #[cfg(test)]

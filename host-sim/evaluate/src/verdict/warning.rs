@@ -5,13 +5,15 @@ use model_core::blob::Model;
 use model_core::rbf::Format;
 use serde::Serialize;
 use taxel_data::error::cut;
+use taxel_data::spectrum::{self, NoiseColour};
 use taxel_data::table::Table;
 use taxel_learn::cost::{Design, NetworkDesign};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::train::projection;
 use taxel_rig::image;
+use taxel_simulate::noise::Noise;
 
-use super::significant;
+use super::{sentences, significant};
 use crate::over_time::{PercentOf, RestOverTime};
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB.
@@ -176,6 +178,28 @@ impl Warning {
             };
             let tried = tried(rest);
             format!("at rest, {count} {}: {}{tried}", rest.span, named.join(", "))
+        })
+    }
+
+    /// Noise at rest that averaging does not lower as it does white noise.
+    pub fn correlated_noise(rest: &RestOverTime) -> Option<Self> {
+        let noise = rest.noise.as_ref()?;
+        let due = noise.colour == NoiseColour::Correlated;
+        Self::when(due, "noise-with-a-memory", || sentences(noise).join(" "))
+    }
+
+    /// Means of so many `samples`, with this `noise`, that lower it by less than a tenth of what half as many leave.
+    pub fn idle_averaging(noise: &Noise, samples: usize, spacing_s: f64) -> Option<Self> {
+        let level = |samples: usize| noise.averaged(samples.max(1), spacing_s).total_level();
+        let due = samples > 1 && level(samples) > (1.0 - spectrum::PAYS) * level(samples / 2);
+        Self::when(due, "averaging-does-not-pay", || {
+            format!(
+                "the mean of {samples} samples has {} of one sample's noise, and of half as many {}: a part of it has a time \
+                 constant of {} ms, and they lie within; average fewer (--average)",
+                significant(level(samples) / level(1)),
+                significant(level(samples / 2) / level(1)),
+                significant(noise.time_constant_ms)
+            )
         })
     }
 

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::verdict::sentences;
 use crate::{Error, Result};
 use clap::{Args, value_parser};
 use firmware::link::message::{Configuration, Report, Request, Setting};
 use model_core::blob::Model;
 use serde::Serialize;
 use taxel_data::csv_file;
+use taxel_data::spectrum::Spectrum;
 use taxel_data::table::Table;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::{Device, DeviceIdentity, Wire};
@@ -15,7 +17,7 @@ use taxel_rig::device::{Device, DeviceIdentity, Wire};
 use super::super::filter_arguments::FilterArguments;
 use super::super::health::note_faults;
 use super::super::{Common, print};
-use super::frames::{hear_frames, missing};
+use super::frames::{Frame, hear_frames, missing};
 use super::scan::{
     Confidence, ScanArguments, Wanted, check_length, configure, patience, reading_names, tolerance,
 };
@@ -48,6 +50,9 @@ pub struct RecordArguments {
     /// (docs/confidence.md).
     #[arg(long, value_enum, value_name = "WHAT", default_value = "nothing", requires = "model")]
     confidence: Confidence,
+    /// Nothing touches the sensor: judge the noise on its readings (docs/noise.md).
+    #[arg(long, conflicts_with = "confidence")]
+    untouched: bool,
     /// CSV file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -82,6 +87,8 @@ struct Saved {
     rows_at_rest: usize,
     /// Frames that are unlike those of training, as far as the device was to tell.
     frames_novel: usize,
+    /// Noise of the untouched sensor, if it was asked for.
+    noise: Option<Spectrum>,
     file: PathBuf,
 }
 
@@ -93,6 +100,11 @@ pub fn record<W: Wire>(
     let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     print::check_output(&action.output, &inputs)?;
+    if action.untouched && action.model.is_some() && !action.readings {
+        let message =
+            "--untouched: noise is judged by readings, and estimates are saved; add --readings";
+        return Err(Error::Usage(message.into()));
+    }
     let identity = device.identify()?;
     let model = model.as_ref().map(ModelBlob::parse);
     if let Some(model) = &model {
@@ -138,6 +150,7 @@ pub fn record<W: Wire>(
         let values = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
         note_faults(&Table { names: names.clone(), values });
     }
+    let noise = if action.untouched { Some(noise(&frames, &names, every)?) } else { None };
     let time = action.time.then_some("time_s");
     let first_us = frames.first().map_or(0, |frame| frame.start_us);
     let lines = frames.iter().map(|frame| {
@@ -161,9 +174,28 @@ pub fn record<W: Wire>(
         values_missing,
         rows_at_rest,
         frames_novel,
+        noise,
         file,
     };
     saved.print(common)
+}
+
+/// Noise on the readings of these `frames`, in columns of these `names`. The device has sent `every` so many.
+fn noise(frames: &[Frame], names: &[String], every: u16) -> Result<Spectrum> {
+    let first = frames.first().map_or((0, 0), |frame| (frame.number, frame.start_us));
+    let numbers: Vec<usize> = frames
+        .iter()
+        .map(|frame| (frame.number.wrapping_sub(first.0) / u32::from(every)) as usize)
+        .collect();
+    let times_s: Vec<f64> =
+        frames.iter().map(|frame| (frame.start_us - first.1) as f64 * 1e-6).collect();
+    let values = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
+    let readings = Table { names: names.to_vec(), values };
+    Spectrum::new(&readings, &numbers, Some(&times_s)).ok_or_else(|| {
+        let message = "--untouched: it takes 40 frames without a gap, and readings that change, to judge noise; raise \
+                       --frames";
+        Error::Usage(message.into())
+    })
 }
 
 /// Checks that a model `is_active` on the device.
@@ -242,6 +274,7 @@ pub fn baseline<W: Wire>(
         values_missing,
         rows_at_rest: 0,
         frames_novel: 0,
+        noise: None,
         file,
     };
     saved.print(common)
@@ -269,6 +302,7 @@ impl Saved {
         if self.frames_novel > 0 {
             page.line(format_args!("{} frames were unlike those of training", self.frames_novel));
         }
+        self.noise.iter().flat_map(sentences).for_each(|sentence| page.line(sentence));
         page.print()
     }
 }

@@ -24,7 +24,8 @@ pub struct Confidence {
 /// Judges the model in `blob` on so many test `frames`, and as many of every anomaly; `None` if it has no confidence.
 pub fn judge(mut scene: Experiment, blob: &ModelBlob, frames: usize) -> Option<Confidence> {
     let model = blob.prepare(Exponential::default());
-    let (own, level) = (f64::from(model.model().metadata().noise_level), scene.world.noise.level);
+    let (own, level) =
+        (f64::from(model.model().metadata().noise_level), scene.world.noise.total_level());
     if (own - level).abs() > 1e-3 * level {
         eprintln!(
             "note: the model was trained for noise of {:.2} %, and is judged at the scene's {:.2} %; see --noise",

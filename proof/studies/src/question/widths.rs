@@ -129,7 +129,8 @@ pub fn compute(
     };
     let level = experiment.world.noise.level;
     let own = experiment.measure();
-    let (measure, limit) = experiment.measure_beside_limit(experiment.world.noise.with_level(level), frames, progress);
+    let (measure, limit) =
+        experiment.measure_beside_limit(experiment.world.noise.with_level(level), frames, progress);
     let mut set = TrainingSet::of_scene(experiment, synthesis);
     (set.confidence, set.fill) = (false, false);
     let mut models = Vec::new();
