@@ -771,9 +771,10 @@ fn rubber_page(result: &RubberResult, page: &mut Page) {
     ));
     let name = |line: &rubber::Line| match (line.trained_on, line.creep_undone) {
         _ if line.decoder == mean::NAME => line.decoder.clone(),
-        (_, true) => format!("{}, still contacts, creep undone", line.decoder),
-        (TrainedOn::Still, _) => format!("{}, still contacts", line.decoder),
-        (TrainedOn::Moving, _) => format!("{}, moving contacts", line.decoder),
+        (TrainedOn::Still, false) => format!("{}, still contacts", line.decoder),
+        (TrainedOn::Still, true) => format!("{}, still contacts, creep undone", line.decoder),
+        (TrainedOn::Moving, false) => format!("{}, moving contacts", line.decoder),
+        (TrainedOn::Moving, true) => format!("{}, moving contacts, creep undone", line.decoder),
         (TrainedOn::Creeping, _) => format!("{}, moving contacts, creeping rubber", line.decoder),
     };
     for lines in &result.outputs {

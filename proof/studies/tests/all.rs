@@ -148,8 +148,9 @@ fn drift_costs_readings_a_factor_and_relative_inputs_nothing() {
 #[test]
 fn creep_costs_forces_and_not_places_and_its_own_equation_takes_it_back() {
     let motion = "[motion]\nspeed_mm_per_s = [10.0, 50.0]\npress_rate_hz = [1.0, 3.0]\nduration_s = 0.4\n\
-                  trajectories = 20\n\n[noise]";
-    let folder = folder("studies-rubber", ["[noise]", motion]);
+                  trajectories = 20\n";
+    // All rows: two do not tell the force on the whole face.
+    let folder = folder("studies-rubber", ["[readout]\nrow_wires = [4, 5]\n", motion]);
     let page = succeed(&folder, &["rubber", "scene.toml"]);
     assert!(page.contains("80 % of a deformation at once"), "{page}");
     let result = json(&folder, &["rubber", "scene.toml", "--instant-share", "0.6"]);
@@ -162,7 +163,7 @@ fn creep_costs_forces_and_not_places_and_its_own_equation_takes_it_back() {
         force(lines.find(is).unwrap(), "creeping")
     };
     let still = network("still", false);
-    assert!(network("still", true) < 0.7 * still && network("creeping", false) < 0.9 * still);
+    assert!(network("still", true) < 0.7 * still && network("creeping", false) < 0.95 * still);
     for line in lines(0).iter().filter(|line| line["trained_on"] == "still") {
         let ratio = z(&of(line, "creeping")) / z(&of(line, "at_once"));
         assert!((0.6..1.1).contains(&ratio), "{ratio}: {line}");

@@ -3,6 +3,8 @@
 use taxel_learn::Decoder;
 use taxel_simulate::motion::{Edge, Ellipse, Kind, Mix, Pair, Part, Press, Punch, Tail};
 use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::path::Path;
+use taxel_simulate::rubber::StandardLinearSolid;
 use taxel_simulate::{drift::Drift, synthesise};
 
 use super::*;
@@ -79,6 +81,18 @@ fn what_is_not_modelled_is_refused() {
     let mut long = World::paper();
     long.sensor.electrodes_per_row_wire = 11;
     assert!(matches!(refusal(&long), Refusal::TooManyLatents { latents: 33, .. }));
+}
+
+#[test]
+fn the_limit_of_still_frames_does_not_depend_on_the_rubber() {
+    let elastic = World { read_rows: vec![3], path: Some(Path::at(50.0, 3.0)), ..World::press() };
+    let solid = StandardLinearSolid { instant_share: 0.5, time_constant_ms: 100.0 };
+    let creeping = World { rubber: solid.into(), ..elastic.clone() };
+    creeping.check().unwrap();
+    let readings_ohm = Synthesis::new(&creeping).readings_of(Stream::Test, 4);
+    let [with, without] = [&creeping, &elastic]
+        .map(|world| Limit::new(world).unwrap().posteriors(&readings_ohm, &Silent));
+    assert_eq!(with, without);
 }
 
 #[test]

@@ -143,15 +143,17 @@ fn lines(
             let estimates = tests
                 .each_ref()
                 .map(|test| decoder.decode_all(&test.frames.inputs.values, 1).values);
-            let [at_once, creeping] = [0, 1].map(|it| judge(&tests[it], &estimates[it]));
-            let name = decoder.name().to_owned();
-            let line = Line { decoder: name, trained_on, creep_undone: false, at_once, creeping };
-            if of_force && trained_on == TrainedOn::Still && line.decoder != mean::NAME {
-                let undone = undo_creep(&estimates[1], &tests[1].timetable, solid);
-                let creeping = judge(&tests[1], &undone);
-                lines.push(Line { creep_undone: true, creeping, ..line.clone() });
+            let mut line = |estimates: [&[f64]; 2], creep_undone: bool| {
+                let [at_once, creeping] = [0, 1].map(|it| judge(&tests[it], estimates[it]));
+                let decoder = decoder.name().to_owned();
+                lines.push(Line { decoder, trained_on, creep_undone, at_once, creeping });
+            };
+            line(estimates.each_ref().map(Vec::as_slice), false);
+            if of_force && trained_on != TrainedOn::Creeping && decoder.name() != mean::NAME {
+                let undone =
+                    [0, 1].map(|it| undo_creep(&estimates[it], &tests[it].timetable, solid));
+                line(undone.each_ref().map(Vec::as_slice), true);
             }
-            lines.push(line);
         }
     }
     Ok(lines)
