@@ -136,7 +136,7 @@ impl Subject {
     }
 
     /// Synthesis of a scene's frames, with the noise that is left in the mean of so many samples a reading.
-    fn synthesis(scene: &Experiment, samples_averaged: usize) -> Synthesis<'_> {
+    pub(crate) fn synthesis(scene: &Experiment, samples_averaged: usize) -> Synthesis<'_> {
         let level = scene.world.noise.level / (samples_averaged as f64).sqrt();
         Synthesis::new(&scene.world).noise_level(level)
     }

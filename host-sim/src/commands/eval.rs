@@ -277,6 +277,7 @@ fn page_of(
         decoders: &summary.decoders,
         limit: &limit,
         by_depth: &summary.by_depth,
+        others: None,
         over_time: summary.over_time.as_ref(),
         distribution,
         frames: summary.frames_evaluated,

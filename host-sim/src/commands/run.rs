@@ -167,6 +167,9 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     print::errors_legend(&mut page);
     print::wrapped(&mut page, &result.limit.note());
     print::by_depth(&mut page, &result.by_depth);
+    if let Some(others) = &result.others {
+        print::others(&mut page, others, &result.decoders);
+    }
     if !result.by_row.is_empty() {
         let wires = result.by_row.iter().map(|row| row.row_wire.to_string());
         let wires: Vec<String> = wires.collect();

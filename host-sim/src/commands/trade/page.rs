@@ -8,6 +8,7 @@ use crate::verdict::Verdict;
 
 use taxel_simulate::path::Path;
 
+use super::others;
 use crate::commands::print::{Page, wrapped};
 
 /// Page of the front, or of `all` points; the last lines say what was chosen and what to open.
@@ -79,6 +80,7 @@ pub fn of(trade: &Trade, all: bool, folder: &FilePath) -> Page {
         Some(chosen) => choice(&mut page, trade, chosen, folder),
         None => no_choice(&mut page, trade),
     }
+    others::note(&mut page, trade);
     page.line(format_args!("open {}", folder.join("trade.html").display()));
     page
 }

@@ -12,6 +12,7 @@ use super::Plan;
 use super::device::Wires;
 use super::gating::Gates;
 use super::touches::Touches;
+use super::worst::OtherContacts;
 use crate::error::Result;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
@@ -30,6 +31,8 @@ pub(super) struct Frames<'s> {
     pub set: TrainingSet<'s>,
     /// Moving contacts that points are judged by; `None` for still frames.
     pub touches: Option<Touches<'s>>,
+    /// Contacts that models are not trained on.
+    pub others: OtherContacts,
     pub test: Cow<'s, Dataset>,
     /// Networks that see a row each, and networks that see the whole array.
     pub inputs: Vec<Inputs>,
@@ -95,6 +98,7 @@ impl<'s> Frames<'s> {
             options,
             set,
             touches,
+            others: OtherContacts::new(subject, samples_averaged, group),
             test,
             inputs,
         })
