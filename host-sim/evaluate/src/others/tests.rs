@@ -48,7 +48,7 @@ fn contacts_that_are_much_worse_by_either_measure_are_warned_of_with_what_to_do(
     let by_rmse = warning(&[("edge", 0.0601, 0.97, None)]).unwrap();
     let told = "edge (dz_mm 0.060 mm with R² 0.97 instead of 0.040 with 0.96)";
     assert!(
-        by_rmse.contains(told) && by_rmse.ends_with("or let --confidence notice them"),
+        by_rmse.contains(told) && by_rmse.ends_with("notice them (train --confidence)"),
         "{by_rmse}"
     );
     assert!(warning(&[("small", 0.03, 0.90, None)]).unwrap().contains("small (dz_mm 0.030 mm"));

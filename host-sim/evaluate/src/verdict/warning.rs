@@ -141,7 +141,7 @@ impl Warning {
             let advice = if has_novelty {
                 "; train on a mix (docs/contact.md), and believe no estimate that is novel"
             } else {
-                "; train on a mix (docs/contact.md), or let --confidence notice them"
+                "; train on a mix (docs/contact.md), or let a confidence notice them (train --confidence)"
             };
             format!(
                 "contacts unlike those of training are decoded worse: {}{more}{advice}",
