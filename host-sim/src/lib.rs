@@ -17,6 +17,6 @@ pub mod report;
 pub mod commands;
 
 pub use taxel_evaluate::{
-    Error, Result, by_depth, error, evaluate, experiment, measurements, metrics, over_time, run,
-    subject, training_set, verdict,
+    Error, Result, by_depth, error, evaluate, experiment, measurements, metrics, others, over_time,
+    run, subject, training_set, verdict,
 };

@@ -29,10 +29,12 @@ use crate::error::{Error, Result};
 use crate::metrics::{LimitSummary, Measure};
 
 mod direction;
+mod others;
 mod file;
 
 pub use direction::Direction;
 use direction::noise_ohm;
+pub use others::OtherContact;
 
 type Check = std::result::Result<(), BadValue>;
 
@@ -64,6 +66,8 @@ pub struct Experiment {
     pub training: Training,
     /// Settings of Table 1, if it is wanted.
     pub table1: Option<Table1>,
+    /// Contacts that the model is not trained on, and judged by as well.
+    pub others: Vec<OtherContact>,
 }
 
 /// Settings of a model's training.

@@ -34,6 +34,7 @@ pub mod experiment;
 pub mod moving;
 pub mod training_set;
 pub mod subject;
+pub mod others;
 pub mod evaluate;
 pub mod run;
 

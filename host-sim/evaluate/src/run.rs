@@ -8,6 +8,7 @@ use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::cost::{Cost, Design, Prices};
 use taxel_learn::decoders::BASELINES;
+use taxel_learn::decoders::mean::Mean;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Decoder, Exponential, ModelBlob, Options, PreparedModel};
 use taxel_simulate::{Synthesis, World};
@@ -21,6 +22,7 @@ use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::others::{self, Others};
 use crate::over_time::{Decoded, OverTime, RestOverTime, is_log};
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
@@ -54,6 +56,8 @@ pub struct RunResult {
     pub limit: LimitSummary,
     /// Errors of the network by the depth of the contact, if that is an output.
     pub by_depth: Vec<DepthErrors>,
+    /// Errors on contacts that the model was not trained on; `None` for a scene without a contact, and for measurements.
+    pub others: Option<Others>,
     /// Errors of the network by row-wire; nothing for outputs that belong to no row-wire.
     pub by_row: Vec<RowErrors>,
     /// Errors on contacts that move, if the scene has any.
@@ -170,6 +174,9 @@ pub fn run(
         .map(|decoder| metrics::judge(decoder, &test, &measure));
     let decoders: Vec<DecoderErrors> = decoders.collect();
     let estimate = network.decode_table(&test.inputs);
+    let of_mean = Mean::fit(&training.frames);
+    let others = others::frames(subject, None);
+    let others = Others::new(&others, (&network, &of_mean), &test, &measure);
     progress.step();
 
     let at_rest = readings_at_rest(subject);
@@ -183,7 +190,8 @@ pub fn run(
         .of_blob(&blob, training.frames.frames())
         .of_frames(subject.measurements().map(|data| &data.outliers), test.frames())
         .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)))
-        .with(decoding(subject).and_then(|_| Warning::not_positive(&test.inputs)));
+        .with(decoding(subject).and_then(|_| Warning::not_positive(&test.inputs)))
+        .with(others.as_ref().and_then(|it| it.warning(&decoders)));
     let mut over_time = None;
     if let Subject::Measured(data) = subject {
         let at_rest = RestOverTime::of_data(data, options);
@@ -206,6 +214,7 @@ pub fn run(
         decoders,
         limit,
         by_depth: by_depth(&test.outputs, &estimate.values, &measure),
+        others,
         by_row: by_row(subject, &test, &estimate, &measure),
         moving: None,
         distribution,

@@ -142,7 +142,7 @@ impl Subject {
     }
 
     /// Synthesis of a scene's frames, with this noise or its own.
-    fn synthesis(scene: &Experiment, noise: Option<Noise>) -> Synthesis<'_> {
+    pub(crate) fn synthesis(scene: &Experiment, noise: Option<Noise>) -> Synthesis<'_> {
         Synthesis::new(&scene.world).noise(noise.unwrap_or(scene.world.noise))
     }
 

@@ -19,7 +19,7 @@ pub use noise::sentences;
 pub use warning::{FEW_TEST_FRAMES, FRAMES_A_WEIGHT, OUT_OF_RANGE, SLOT_BYTES, Warning};
 
 /// Share of the mean's RMSE above which an output counts as hardly decoded.
-const HARDLY: f64 = 0.85;
+pub const HARDLY: f64 = 0.85;
 
 /// Share of the mean's RMSE above which nothing is gained over always predicting it.
 const NO_GAIN: f64 = 0.98;

@@ -111,6 +111,13 @@ impl<'w> Synthesis<'w> {
         self.timed(timetable)
     }
 
+    /// Replaces what is pressed into the sensor, but not the span of noise, which stays that of the world.
+    #[must_use]
+    pub fn moved_by(mut self, motion: &'w motion::Kind) -> Self {
+        self.motion = Cow::Borrowed(motion);
+        self
+    }
+
     /// Leaves the sensor untouched: nothing moves.
     #[must_use]
     pub fn untouched(mut self) -> Self {

@@ -278,6 +278,7 @@ fn page_of(
         decoders: &summary.decoders,
         limit: &limit,
         by_depth: &summary.by_depth,
+        others: None,
         over_time: summary.over_time.as_ref(),
         moving: None,
         distribution,

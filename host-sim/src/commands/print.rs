@@ -8,12 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::by_depth::DepthErrors;
-use crate::metrics::{Definition, Errors};
+use crate::metrics::{self, DecoderErrors, Definition, Errors, NETWORK};
+use crate::others::Others;
 use crate::verdict::Verdict;
 use crate::{Error, Result};
 use serde::Serialize;
 use taxel_data::error::printable;
 use taxel_data::output;
+use taxel_learn::decoders::mean;
 
 use super::stdout;
 
@@ -184,6 +186,37 @@ pub fn by_depth(page: &mut Page, ranges: &[DepthErrors]) {
             errors.collect::<String>()
         ));
     }
+}
+
+/// Adds errors on contacts that a model was not trained on, below those on its `own`.
+pub fn others(page: &mut Page, others: &Others, decoders: &[DecoderErrors]) {
+    let [own, own_mean] = [NETWORK, mean::NAME].map(|name| metrics::of_decoder(decoders, name));
+    let groups = own.iter().map(|e| format!(" {:>23}", format!("{}, {}", e.group, e.unit)));
+    page.line(format_args!(
+        "\n{:<24}{}{:>9}",
+        "other contacts",
+        groups.collect::<String>(),
+        "novel"
+    ));
+    let heads = format!(" {:>8} {:>6} {:>7}", "RMSE", "R²", "mean").repeat(own.len());
+    page.line(format_args!("{:<24}{heads}", ""));
+    let mut line = |name: &str, errors: &[Errors], mean: &[Errors], novel: Option<f64>| {
+        let of_group = |(errors, mean): (&Errors, &Errors)| {
+            let r_squared = errors.r_squared.map_or("-".into(), |it| format!("{it:.2}"));
+            format!(" {:>8} {r_squared:>6} {:>7}", number(errors.rmse), number(mean.rmse))
+        };
+        let groups: String = errors.iter().zip(mean).map(of_group).collect();
+        let novel = novel.map_or("-".into(), |percent| format!("{percent:.1} %"));
+        page.line(format_args!("{name:<24}{groups}{novel:>9}"));
+    };
+    line("as trained", own, own_mean, others.own_percent_novel);
+    for contact in &others.contacts {
+        line(&contact.name, &contact.errors, &contact.mean, contact.percent_novel);
+    }
+    page.line(format_args!(
+        "mean: RMSE of always predicting the mean of training; novel: frames that a confidence notices; {} frames each",
+        others.frames
+    ));
 }
 
 /// Ratio of an error to the limit with its standard error; a dash where there is no limit.

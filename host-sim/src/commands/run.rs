@@ -198,6 +198,9 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         moving_page(&mut page, moving);
     }
     print::by_depth(&mut page, &result.by_depth);
+    if let Some(others) = &result.others {
+        print::others(&mut page, others, &result.decoders);
+    }
     if !result.by_row.is_empty() {
         let wires = result.by_row.iter().map(|row| row.row_wire.to_string());
         let wires: Vec<String> = wires.collect();

@@ -21,6 +21,7 @@ use super::subject_argument::SubjectArgument;
 use super::{Common, print, stderr};
 
 mod files;
+mod others;
 mod page;
 
 /// Trade speed for accuracy: measure every decoder, and choose the best.
@@ -103,6 +104,9 @@ pub struct Arguments {
     /// Time of a scan in ms with one sample a reading, instead of that of the board's readout.
     #[arg(long, value_name = "MS", allow_negative_numbers = true)]
     scan_ms: Option<f64>,
+    /// Determine front and choice by the largest error of the scene's own contacts and those that it was not trained on.
+    #[arg(long)]
+    worst_case: bool,
     /// Print all points, not only the front and the chosen one (files have all of them).
     #[arg(long)]
     all: bool,
@@ -142,6 +146,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         samples_averaged: distinct("--average", &arguments.average)?,
         gate_k: gate_k(&arguments.gate, &subject)?,
         device,
+        worst_case: arguments.worst_case,
     };
     if let Some(scene) = subject.scene() {
         let spacing_s = plan.device.sample_spacing_s(wires(&subject, 1));
@@ -205,7 +210,8 @@ fn command() -> String {
 }
 
 /// Options by the settings that they set.
-const OPTIONS: [(&str, &str); 12] = [
+const OPTIONS: [(&str, &str); 13] = [
+    ("worst-case", "--worst-case"),
     ("output-rank", "--output-rank"),
     ("clock-mhz", "--clock-mhz"),
     ("scan-ms", "--scan-ms"),

@@ -122,6 +122,14 @@ fn error_section(body: &mut Body, view: &View<'_>, face: Option<&Face>) {
                        not shallow.";
         body.table(caption, &tables::by_depth(view.by_depth), "");
     }
+    if let Some(others) = view.others {
+        let caption = format!(
+            "RMSE and R² on contacts that the model was not trained on, {} frames each; mean: RMSE of always predicting the \
+             mean of training; novel: share of the frames that a confidence notices.",
+            grouped(others.frames)
+        );
+        body.table(&caption, &tables::others(others, view.decoders), "");
+    }
 }
 
 fn frame_section(body: &mut Body, view: &View<'_>, face: Option<&Face>) {

@@ -10,7 +10,8 @@ use super::ticks;
 use super::view::View;
 use taxel_evaluate::by_depth::DepthErrors;
 use taxel_evaluate::evaluate::table1::{Column, NETWORK, Table1};
-use taxel_evaluate::metrics::{DecoderErrors, Definition, Errors};
+use taxel_evaluate::metrics::{self, DecoderErrors, Definition, Errors};
+use taxel_evaluate::others::Others;
 
 /// Errors of one group, if it is among `errors`.
 pub fn of_group<'e>(errors: &'e [Errors], group: &str) -> Option<&'e Errors> {
@@ -192,6 +193,29 @@ pub fn by_depth(ranges: &[DepthErrors]) -> String {
     format!(
         "<table>\n<thead><tr><th>Depth</th>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table>\n",
         numbers("th", heads),
+        lines.collect::<String>()
+    )
+}
+
+/// Table of errors on contacts that the model was not trained on, below those on its own.
+pub fn others(others: &Others, decoders: &[DecoderErrors]) -> String {
+    let [own, own_mean] = [NETWORK, mean::NAME].map(|name| metrics::of_decoder(decoders, name));
+    let heads = own.iter().flat_map(|group| [name(group), "R²".into(), "Mean".into()]);
+    let of = |label: &str, errors: &[Errors], mean: &[Errors], novel: Option<f64>| {
+        let cells = errors.iter().zip(mean).flat_map(|(errors, mean)| {
+            let decimals = rmse_decimals(decoders, &errors.group);
+            let r_squared = errors.r_squared.map_or(UNDEFINED.into(), |it| fixed(it, 2));
+            [fixed(errors.rmse, decimals), r_squared, fixed(mean.rmse, decimals)]
+        });
+        let novel = novel.map_or(UNDEFINED.into(), |percent| fixed(percent, 1));
+        line(&escape(label), cells.chain([novel]))
+    };
+    let own = of("As trained", own, own_mean, others.own_percent_novel);
+    let contacts = others.contacts.iter();
+    let lines = contacts.map(|it| of(&it.name, &it.errors, &it.mean, it.percent_novel));
+    format!(
+        "<table>\n<thead><tr><th>Contact</th>{}</tr></thead>\n<tbody>\n{own}{}</tbody>\n</table>\n",
+        numbers("th", heads.chain(["Novel, %".into()])),
         lines.collect::<String>()
     )
 }

@@ -169,6 +169,7 @@ fn result(groups: &[&str]) -> RunResult {
             .to_vec(),
         limit: LimitSummary::new(&Err(Refusal::Drift)),
         by_depth: vec![],
+        others: None,
         by_row: (0..ROW_WIRES)
             .map(|row| RowErrors { row_wire: row + 2, errors: of_groups(groups, 0.1) })
             .collect(),

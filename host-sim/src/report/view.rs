@@ -7,6 +7,7 @@ use taxel_evaluate::evaluate::distribution::Distribution;
 use taxel_evaluate::evaluate::moving_contacts::MovingContacts;
 use taxel_evaluate::evaluate::table1::Table1;
 use taxel_evaluate::metrics::{DecoderErrors, LimitSummary};
+use taxel_evaluate::others::Others;
 use taxel_evaluate::over_time::OverTime;
 use taxel_evaluate::run::{DataSummary, RunResult, SensorSketch};
 use taxel_evaluate::verdict::Verdict;
@@ -38,6 +39,8 @@ pub struct View<'a> {
     pub limit: &'a LimitSummary,
     /// Errors by the depth of the contact; empty for other outputs.
     pub by_depth: &'a [DepthErrors],
+    /// Errors on contacts that the model was not trained on.
+    pub others: Option<&'a Others>,
     /// Errors and readings at rest by time, of a log.
     pub over_time: Option<&'a OverTime>,
     /// Errors on contacts that move, of a scene that has any.
@@ -72,6 +75,7 @@ impl<'a> View<'a> {
             decoders: &result.decoders,
             limit: &result.limit,
             by_depth: &result.by_depth,
+            others: result.others.as_ref(),
             over_time: result.data.as_ref().and_then(|data| data.over_time.as_ref()),
             moving: result.moving.as_ref(),
             distribution: &result.distribution,

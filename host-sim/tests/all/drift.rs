@@ -59,6 +59,7 @@ fn a_gate_and_a_trade_see_readings_and_baselines_of_the_same_session() {
         samples_averaged: vec![1],
         gate_k: vec![3.5],
         device: Device::default(),
+        worst_case: false,
     };
     let trade = |scene: &Experiment| {
         let subject = Subject::Scene(Box::new(scene.clone()));

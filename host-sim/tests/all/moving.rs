@@ -30,6 +30,7 @@ fn traded(moves: bool, bounds: Bounds) -> Trade {
         samples_averaged: vec![1, 4],
         gate_k: vec![],
         device: Device::default(),
+        worst_case: false,
     };
     let subject = Subject::Scene(Box::new(scene(moves)));
     let mut trade = trade::compute(&subject, &plan, "dz_mm", &bounds, &Silent).unwrap();

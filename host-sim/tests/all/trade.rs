@@ -29,6 +29,7 @@ fn plan() -> Plan {
         samples_averaged: vec![1, 16],
         gate_k: vec![3.5],
         device: Device { clock_mhz: 100.0, memory: Memory::Ram, ..Device::default() },
+        worst_case: false,
     }
 }
 
@@ -304,6 +305,7 @@ fn what_nothing_can_meet_and_plans_that_make_no_gate_are_refused_before_training
         samples_averaged,
         gate_k,
         device: Device::default(),
+        worst_case: false,
     };
     let message = refusal(&scene, &plan);
     assert!(message.contains("gate = 200") && message.contains("below 1"), "{message}");
@@ -323,6 +325,7 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
         samples_averaged: vec![1],
         gate_k: vec![],
         device: Device::default(),
+        worst_case: false,
     };
     let one_row = compute_plan(&scene, &plan, Bounds::default()).unwrap();
     assert!(one_row.points.len() >= 8 && one_row.left_out.is_empty());
@@ -362,6 +365,7 @@ fn chosen_columns_are_judged_beside_what_can_be_told_from_these_alone() {
         samples_averaged: vec![1],
         gate_k: vec![],
         device: Device::default(),
+        worst_case: false,
     };
     let trade = compute_plan(&scene, &chosen(&[1, 3]), Bounds::default()).unwrap();
     let columns = [2, 5, 8, 11, 14, 17];
@@ -432,6 +436,7 @@ fn a_pad_for_pressure_alone_and_a_contact_are_traded() {
         samples_averaged: vec![1],
         gate_k: vec![3.5],
         device: Device::default(),
+        worst_case: false,
     };
     let small = |scene: &str| -> Experiment {
         let mut scene = Experiment::parse("small", scene).unwrap();

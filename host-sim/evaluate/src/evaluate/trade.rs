@@ -28,6 +28,7 @@ mod choice;
 mod point;
 mod gating;
 mod touches;
+mod worst;
 mod frames;
 mod readings;
 mod ways;
@@ -43,6 +44,7 @@ pub use point::{Arithmetic, FilterSettings, Point};
 pub use readings::Readings;
 pub(super) use touches::{OfPeriod, Touches};
 use ways::Ways;
+pub use worst::OtherError;
 
 pub use crate::verdict::SLOT_BYTES;
 
@@ -65,6 +67,8 @@ pub struct Plan {
     /// points without a gate as well.
     pub gate_k: Vec<f64>,
     pub device: Device,
+    /// Whether front and choice count the largest error of the subject's own and [other](OtherError) contacts.
+    pub worst_case: bool,
 }
 
 /// Trade of a subject: every point, and the one chosen.
@@ -92,6 +96,8 @@ pub struct Trade {
     /// Group of outputs by which front and choice are determined, or [`metrics::ALL`].
     pub group: String,
     pub unit: String,
+    /// Whether these count the worst of the subject's own and other contacts.
+    pub worst_case: bool,
     /// Readings that points decode, for each choice of columns and number of samples.
     pub readings: Vec<Readings>,
     /// Every point that was judged.
@@ -114,7 +120,8 @@ pub struct Trade {
 impl Trade {
     /// Picks the point within `bounds`, if any are given.
     pub fn choose(&mut self, bounds: &Bounds) -> std::result::Result<(), NoPoint> {
-        let offers: Vec<Offer> = self.points.iter().map(|p| p.offer(&self.group)).collect();
+        let offers: Vec<Offer> =
+            self.points.iter().map(|p| p.offer(&self.group, self.worst_case)).collect();
         self.bounds = *bounds;
         self.chosen = bounds.choose(&offers, &named(&self.unit, &self.group))?;
         self.verdict = self.chosen.map(|point| self.verdict_on(point));
@@ -125,7 +132,7 @@ impl Trade {
     pub fn front(&self) -> Vec<usize> {
         let mut front: Vec<usize> =
             (0..self.points.len()).filter(|i| self.points[*i].on_front).collect();
-        let key = |i: usize| (self.points[i].times.frame_ms, self.points[i].rmse(&self.group));
+        let key = |i: usize| (self.points[i].times.frame_ms, self.counted_rmse(i));
         front.sort_by(|a, b| {
             let ((time_a, error_a), (time_b, error_b)) = (key(*a), key(*b));
             time_a.total_cmp(&time_b).then(error_b.total_cmp(&error_a))
@@ -133,9 +140,14 @@ impl Trade {
         front
     }
 
+    /// RMSE of the group that a point is chosen by.
+    fn counted_rmse(&self, point: usize) -> f64 {
+        self.points[point].counted_rmse(&self.group, self.worst_case)
+    }
+
     /// Fastest point with the smallest error, or one so near to it that it counts as equal.
     pub fn most_accurate(&self) -> Option<usize> {
-        let rmse = |i: &usize| self.points[*i].rmse(&self.group);
+        let rmse = |i: &usize| self.counted_rmse(*i);
         let front = self.front();
         let least = front.iter().map(rmse).fold(f64::INFINITY, f64::min);
         front.into_iter().find(|i| rmse(i) <= SAME_ERROR * least)
@@ -289,7 +301,7 @@ pub fn compute(
     if let (true, Some(cause)) = (points.is_empty(), left_out.first()) {
         return Err(Error::failed(format!("no way to decode can be trained: {cause}")));
     }
-    compare(&mut points, group);
+    compare(&mut points, group, plan.worst_case);
     let outputs = &frames[0].training().outputs.names;
     let line = Line::new(frames[0].training().rows, outputs.len());
     let of_frames = each.zip(&frames).zip(measures);
@@ -317,6 +329,7 @@ pub fn compute(
         line,
         group: group.into(),
         unit: unit.into(),
+        worst_case: plan.worst_case,
         readings,
         points,
         left_out,
@@ -364,6 +377,12 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
         return Err(BadValue::new("output-rank", 0, "a network computes one component at least"));
     }
     plan.device.check()?;
+    let has_others = subject.scene().is_some_and(|scene| !scene.others.is_empty());
+    if plan.worst_case && !has_others {
+        let rule =
+            "there are no other contacts to judge by; leave it out, or give a scene of contacts";
+        return Err(BadValue::new("worst-case", true, rule));
+    }
     if subject.moving_scene().is_some() && !plan.gate_k.is_empty() {
         let rule = "a gate is judged by still contacts; leave it out, or give --motion none";
         return Err(BadValue::new("gate", plan.gate_k[0], rule));
@@ -386,13 +405,13 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
 }
 
 /// Fills in the fields that compare points with each other.
-fn compare(points: &mut [Point], group: &str) {
+fn compare(points: &mut [Point], group: &str, worst_case: bool) {
     let mut best: BTreeMap<String, f64> = BTreeMap::new();
     for errors in points.iter().flat_map(|point| &point.errors) {
         let least = best.entry(errors.group.clone()).or_insert(f64::INFINITY);
         *least = least.min(errors.rmse);
     }
-    let rank = |point: &Point| (point.times.frame_ms, point.rmse(group));
+    let rank = |point: &Point| (point.times.frame_ms, point.counted_rmse(group, worst_case));
     let ranks: Vec<_> = points.iter().map(rank).collect();
     for (point, own) in points.iter_mut().zip(&ranks) {
         point.ratio_to_best = point.errors.iter().map(|e| e.rmse / best[&e.group]).collect();

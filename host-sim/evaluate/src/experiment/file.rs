@@ -14,7 +14,8 @@ use taxel_simulate::rubber;
 use taxel_simulate::sensor::{self, Precision, Sensor, Vector3};
 use taxel_simulate::world::check_counts;
 
-use super::{Experiment, Table1, Training};
+use super::others::{self, OtherContact};
+use super::{Direction, Experiment, Table1, Training};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,6 +37,7 @@ pub(super) struct SceneFile {
     outputs: Outputs,
     training: Training,
     table1: Option<Table1>,
+    others: Option<Vec<OtherContact>>,
 }
 
 #[derive(Deserialize)]
@@ -146,24 +148,28 @@ impl SceneFile {
             Some(rows) => rows.into_iter().map(|row| row.wrapping_sub(1)).collect(),
             None => (0..sensor.row_wires).collect(),
         };
-        Ok(Experiment {
-            name: self.name,
-            digest,
-            world: World {
-                seed: self.seed,
-                precision: self.precision,
-                sensor,
-                motion: self.deformation,
-                path: self.motion,
-                rubber: self.rubber,
-                noise: self.noise,
-                drift: self.drift,
-                read_rows,
-                readout,
-                outputs: self.outputs,
-            },
-            training: self.training,
-            table1: self.table1,
-        })
+        let world = World {
+            seed: self.seed,
+            precision: self.precision,
+            sensor,
+            motion: self.deformation,
+            path: self.motion,
+            rubber: self.rubber,
+            noise: self.noise,
+            drift: self.drift,
+            read_rows,
+            readout,
+            outputs: self.outputs,
+        };
+        // Settings that hold are needed to derive others; a scene is checked first.
+        world.check()?;
+        let is_forward = self.training.direction == Direction::Forward;
+        let others = match self.others {
+            Some(given) => others::check(&given, &world, is_forward).map(|()| given)?,
+            None if is_forward => vec![],
+            None => others::derived(&world),
+        };
+        let (training, table1) = (self.training, self.table1);
+        Ok(Experiment { name: self.name, digest, world, training, table1, others })
     }
 }

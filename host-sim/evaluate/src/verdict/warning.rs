@@ -136,6 +136,22 @@ impl Warning {
         })
     }
 
+    /// Contacts that a model was not trained on and decodes much worse, the worst in words, and a number of `more`.
+    pub fn other_contacts(worst: &[String], more: usize, has_novelty: bool) -> Option<Self> {
+        Self::when(!worst.is_empty(), "other-contacts", || {
+            let more = if more == 0 { String::new() } else { format!(" and {more} more") };
+            let advice = if has_novelty {
+                "; train on a mix (docs/contact.md), and believe no estimate that is novel"
+            } else {
+                "; train on a mix (docs/contact.md), or let a confidence notice them (train --confidence)"
+            };
+            format!(
+                "contacts unlike those of training are decoded worse: {}{more}{advice}",
+                worst.join(", ")
+            )
+        })
+    }
+
     /// Simulated resistances that noise made zero or negative, which no sensor reads.
     pub fn not_positive(readings: &Table) -> Option<Self> {
         let count = readings.values.iter().filter(|reading| **reading <= 0.0).count();

@@ -6,6 +6,7 @@ use crate::evaluate::trade::{Memory, Point, Trade, Wires};
 use crate::metrics;
 use crate::verdict::Verdict;
 
+use super::others;
 use crate::commands::print::{Page, wrapped};
 
 /// Page of the front, or of `all` points; the last lines say what was chosen and what to open.
@@ -77,6 +78,7 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         Some(chosen) => choice(&mut page, trade, chosen, folder),
         None => no_choice(&mut page, trade),
     }
+    others::note(&mut page, trade);
     page.line(format_args!("open {}", folder.join("trade.html").display()));
     page
 }

@@ -73,6 +73,14 @@ fn columns(trade: &Trade) -> Vec<Column> {
             })
         }),
         Some(number(&rmse, |trade, p| significant(p.rmse(&trade.group), 3))),
+        any(|p| !p.others.is_empty()).then(|| {
+            number("worst of other contacts", |_, p| {
+                let worst = p.worst_other();
+                worst.map_or(UNDEFINED.into(), |it| {
+                    format!("{} ({})", significant(it.rmse, 3), it.name)
+                })
+            })
+        }),
         any(|p| p.errors.iter().any(|e| e.ratio_to_limit.is_some())).then(|| {
             number("× limit", |trade, p| {
                 p.ratio_to_limit(&trade.group).map_or(UNDEFINED.into(), |ratio| fixed(ratio, 2))

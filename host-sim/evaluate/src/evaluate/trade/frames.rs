@@ -13,6 +13,7 @@ use super::Plan;
 use super::device::Wires;
 use super::gating::Gates;
 use super::touches::Touches;
+use super::worst::OtherContacts;
 use crate::error::Result;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
@@ -31,6 +32,8 @@ pub(super) struct Frames<'s> {
     pub set: TrainingSet<'s>,
     /// Moving contacts that points are judged by; `None` for still frames.
     pub touches: Option<Touches<'s>>,
+    /// Contacts that models are not trained on.
+    pub others: OtherContacts,
     pub test: Cow<'s, Dataset>,
     /// Networks that see a row each, and networks that see the whole array.
     pub inputs: Vec<Inputs>,
@@ -94,7 +97,18 @@ impl<'s> Frames<'s> {
         };
         let inputs = arrays.iter().map(inputs).collect::<Result<_>>()?;
         let scan_ms = plan.device.scan_ms(wires, samples_averaged);
-        Ok(Self { samples_averaged, noise, wires, scan_ms, options, set, touches, test, inputs })
+        Ok(Self {
+            samples_averaged,
+            noise,
+            wires,
+            scan_ms,
+            options,
+            set,
+            touches,
+            others: OtherContacts::new(subject, noise, group),
+            test,
+            inputs,
+        })
     }
 
     /// Frames to train on.

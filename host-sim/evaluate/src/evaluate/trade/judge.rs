@@ -107,6 +107,12 @@ impl Judged {
     ) -> Result<()> {
         let test = &frames.test;
         let model = blob.prepare(arithmetic.exponential).of_inputs();
+        // Points that differ only in the exponential share their errors there.
+        let before = self.blobs.last().filter(|blob| **blob == self.distinct.len());
+        let others = match before.and(self.points.last()) {
+            Some(same) => same.others.clone(),
+            None => frames.others.errors(&model, measure),
+        };
         let design = Design::new(blob);
         let ram = DecoderRam::new(&design);
         // Fewer than asked for where there are fewer distinct samples.
@@ -127,6 +133,7 @@ impl Judged {
                 gate_k,
                 filter: filter.is_on().then(|| filter.into()),
                 errors,
+                others: others.clone(),
                 ratio_to_best: vec![],
                 frame,
                 times: device.times(frames.scan_ms, &frame),

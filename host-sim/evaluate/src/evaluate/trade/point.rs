@@ -9,6 +9,7 @@ use taxel_learn::cost::{Cost, kernel_name};
 use super::choice::Offer;
 use super::device::Times;
 use super::readings::in_words;
+use super::worst::OtherError;
 use crate::metrics::{self, Errors};
 
 /// Number format and exponential with which networks are decoded.
@@ -89,6 +90,8 @@ pub struct Point {
     pub filter: Option<FilterSettings>,
     /// Errors on the test frames, or on [contacts that move](super::Trade::motion), by group.
     pub errors: Vec<Errors>,
+    /// Errors on still contacts that the model was not trained on, without a gate and a filter; empty for measurements.
+    pub others: Vec<OtherError>,
     /// Ratio of the RMSE to the smallest of all points, by group.
     pub ratio_to_best: Vec<f64>,
     /// Cost of one frame on a Cortex-M4F; behind a gate, the mean over the test frames.
@@ -136,9 +139,9 @@ impl Point {
     }
 
     /// What the point has to offer by the error of a group.
-    pub(super) fn offer(&self, group: &str) -> Offer {
+    pub(super) fn offer(&self, group: &str, worst_case: bool) -> Offer {
         Offer {
-            rmse: self.rmse(group),
+            rmse: self.counted_rmse(group, worst_case),
             cycles: self.frame.cycles,
             blob_bytes: self.blob_bytes,
             times: self.times,

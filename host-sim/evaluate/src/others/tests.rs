@@ -1,0 +1,131 @@
+use taxel_data::dataset::Dataset;
+use taxel_data::progress::Silent;
+use taxel_learn::Exponential;
+use taxel_learn::decoders::mean::Mean;
+
+use super::*;
+use crate::experiment::Experiment;
+
+fn errors(rmse: f64, r_squared: f64) -> Vec<Errors> {
+    let group = "dz_mm".to_owned();
+    vec![Errors {
+        group,
+        unit: "mm".into(),
+        count: 10,
+        rmse,
+        relative_l2_percent: None,
+        full_scale_percent: None,
+        positional_percent: None,
+        r_squared: Some(r_squared),
+        mean_relative_percent: None,
+        ratio_to_limit: None,
+        ratio_standard_error: None,
+    }]
+}
+
+fn others(contacts: &[(&str, f64, f64, Option<f64>)]) -> Others {
+    let contacts = contacts.iter().map(|(name, rmse, r_squared, percent_novel)| OtherErrors {
+        name: (*name).into(),
+        errors: errors(*rmse, *r_squared),
+        mean: errors(0.2, 0.0),
+        percent_novel: *percent_novel,
+    });
+    let contacts: Vec<OtherErrors> = contacts.collect();
+    Others { frames: FRAMES, own_percent_novel: contacts[0].percent_novel, contacts }
+}
+
+/// Warning beside an RMSE of 0.04 mm and an R² of 0.96 on own contacts.
+fn warning(contacts: &[(&str, f64, f64, Option<f64>)]) -> Option<String> {
+    let decoders = [("network", 0.04, 0.96), ("mean", 0.2, 0.0)];
+    let decoders = decoders.map(|(name, rmse, r)| DecoderErrors::new(name, errors(rmse, r)));
+    others(contacts).warning(&decoders).map(|warning| warning.text)
+}
+
+#[test]
+fn contacts_that_are_much_worse_by_either_measure_are_warned_of_with_what_to_do() {
+    // Not more than 1.5 times the RMSE, nor 1.5 times the share of the deviation: √0.09/√0.04.
+    assert_eq!(warning(&[("edge", 0.0599, 0.9101, None)]), None);
+    let by_rmse = warning(&[("edge", 0.0601, 0.97, None)]).unwrap();
+    let told = "edge (dz_mm 0.060 mm with R² 0.97 instead of 0.040 with 0.96)";
+    assert!(
+        by_rmse.contains(told) && by_rmse.ends_with("notice them (train --confidence)"),
+        "{by_rmse}"
+    );
+    assert!(warning(&[("small", 0.03, 0.90, None)]).unwrap().contains("small (dz_mm 0.030 mm"));
+    let many = [("a", 0.07, 0.9, None), ("b", 0.09, 0.9, None), ("c", 0.08, 0.9, None)];
+    let many = warning(&many).unwrap();
+    assert!(
+        many.contains(": b (") && many.contains(", c (") && many.contains(" and 1 more;"),
+        "{many}"
+    );
+}
+
+#[test]
+fn contacts_that_novelty_notices_and_outputs_that_are_hardly_decoded_are_not_warned_of() {
+    assert_eq!(warning(&[("edge", 0.09, 0.5, Some(90.0))]), None);
+    let missed = warning(&[("edge", 0.09, 0.5, Some(89.9))]).unwrap();
+    assert!(missed.ends_with("believe no estimate that is novel"), "{missed}");
+    let hardly = [("network", 0.18, 0.19), ("mean", 0.2, 0.0)];
+    let hardly = hardly.map(|(name, rmse, r)| DecoderErrors::new(name, errors(rmse, r)));
+    assert_eq!(others(&[("edge", 0.4, -3.0, None)]).warning(&hardly), None);
+}
+
+/// Small model of `press` for compression, on rows 4 and 5.
+fn press() -> Experiment {
+    let mut scene = Experiment::load("press").unwrap();
+    scene.world.read_rows = vec![3, 4];
+    (scene.training.frames, scene.training.centres, scene.training.refine) = (2000, 16, false);
+    scene.training.confidence = true;
+    scene
+}
+
+#[test]
+fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
+    let scene = press();
+    let blob = scene.train(&Silent).unwrap();
+    let model = blob.prepare(Exponential::default());
+    let measure = scene.measure();
+    let subject = Subject::Scene(scene.into());
+    let frames = frames(&subject, 1);
+    let names: Vec<&str> = frames.iter().map(|(name, _)| name.as_str()).collect();
+    let expected = [
+        "smaller radii",
+        "larger radii",
+        "more shear",
+        "flat punch",
+        "edge",
+        "ellipse",
+        "long tail",
+        "two contacts",
+    ];
+    assert_eq!(names, expected);
+    let (training, own) = subject.sets(1);
+    let own = Dataset::clone(&own);
+    let found =
+        Others::new(&frames, (&model, &Mean::fit(&training.frames)), &own, &measure).unwrap();
+    for ((_, frames), found) in frames.iter().zip(&found.contacts) {
+        assert_eq!((frames.frames(), &frames.outputs.names), (FRAMES, &own.outputs.names));
+        let judged = metrics::judge(&model, frames, &measure);
+        assert_eq!(judged.errors[2].rmse, found.errors[2].rmse);
+        assert!(found.mean[2].rmse > 0.05 && found.errors[2].ratio_to_limit.is_none());
+    }
+    // Narrow dents leave most electrodes at rest; wide ones press them all.
+    let of = |name: &str| found.contacts.iter().find(|it| it.name == name).unwrap();
+    assert!(of("smaller radii").mean[2].rmse < 0.8 * of("larger radii").mean[2].rmse);
+    assert!(of("smaller radii").errors[2].r_squared < Some(0.7));
+    // Long tails are more novel than what was trained on, of which half a percent is.
+    let own_novel = found.own_percent_novel.unwrap();
+    assert!(own_novel < 2.0, "{own_novel} %");
+    assert!(found.contacts.iter().all(|it| it.percent_novel.is_some()));
+    assert!(of("two contacts").percent_novel > Some(own_novel));
+}
+
+#[test]
+fn scenes_without_a_contact_and_forward_models_have_no_others() {
+    let subject = |scene: Experiment| Subject::Scene(scene.into());
+    assert!(frames(&subject(Experiment::load("paper").unwrap()), 1).is_empty());
+    let contact = Experiment::load("contact").unwrap();
+    // Two contacts have no one centre.
+    assert!(contact.others.iter().all(|other| other.name != "two contacts"));
+    assert_eq!(contact.others.len(), 7);
+}
