@@ -87,7 +87,7 @@ impl RowCounts {
         // What rounding up adds is less than two counts.
         let most_counts = u32::from(u16::MAX) - 4;
         let divider = wait.saturating_add(rest).div_ceil(most_counts).min(most_counts);
-        let counts = |ticks: u32| ticks.div_ceil(divider) as u16;
+        let counts = |ticks: u32| ticks.div_ceil(divider.max(1)) as u16;
         let trigger = counts(wait).saturating_add(1);
         Self {
             divider: divider as u16,
