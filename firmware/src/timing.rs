@@ -31,7 +31,7 @@ const NUCLEO_ROW_NS: u32 = 17_300;
 /// timers'.
 const ONCHIP_TICKS_A_CYCLE: u32 = 8;
 
-/// Cycles of the converters' clock: to sample a column, which its 6 kΩ and 4 pF need 8 for; to convert it; and from one
+/// Cycles of the converters' clock: to sample a column, which its 6 kΩ and 7 pF need 10 for; to convert it; and from one
 /// trigger to the next, three for the trigger itself.
 const ONCHIP_SAMPLE_CYCLES: u32 = 15;
 const ONCHIP_COLUMN_CYCLES: u32 = ONCHIP_SAMPLE_CYCLES + 12;
