@@ -65,11 +65,14 @@ class Passes:
         #: Events to come, the last one first; the triggers to come: the first one's cycle, their number, and their distance;
         #: and the cycle at which the last column is sampled.
         self._events, self._waiting, self._sampled = [], None, 0
+        #: Number of passes that were given up.
+        self.cuts = 0
         #: Called when a pass begins and ends, with the cycle.
         self.on_start, self.on_end = lambda cycle: None, lambda cycle: None
 
     def reset(self):
         """The clock controller resets both timers."""
+        self.cuts += bool(self._events)
         self.rows.reset()
         self.triggers.reset()
         self._events, self._waiting = [], None
