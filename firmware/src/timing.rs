@@ -31,7 +31,7 @@ const NUCLEO_ROW_NS: u32 = 17_300;
 /// timers'.
 const ONCHIP_TICKS_A_CYCLE: u32 = 8;
 
-/// Cycles of the converters' clock: to sample a column, which its 6 kΩ and 4 pF need 8 for; to convert it; and from one
+/// Cycles of the converters' clock: to sample a column, which its 6 kΩ and 7 pF need 10 for; to convert it; and from one
 /// trigger to the next, three for the trigger itself.
 const ONCHIP_SAMPLE_CYCLES: u32 = 15;
 const ONCHIP_COLUMN_CYCLES: u32 = ONCHIP_SAMPLE_CYCLES + 12;
@@ -87,7 +87,7 @@ impl RowCounts {
         // What rounding up adds is less than two counts.
         let most_counts = u32::from(u16::MAX) - 4;
         let divider = wait.saturating_add(rest).div_ceil(most_counts).min(most_counts);
-        let counts = |ticks: u32| ticks.div_ceil(divider) as u16;
+        let counts = |ticks: u32| ticks.div_ceil(divider.max(1)) as u16;
         let trigger = counts(wait).saturating_add(1);
         Self {
             divider: divider as u16,

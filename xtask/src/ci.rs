@@ -23,7 +23,7 @@ const MUTANTS: [&str; 6] = [
     "rows-driven-at-a-fault",
     "not-fed-before-erase",
     "button-inverted",
-    "dma-on",
+    "numbers-early",
 ];
 
 /// Runs every step, even after a failure, and prints a summary.

@@ -17,6 +17,7 @@ use firmware::timing::{ONCHIP_COLUMNS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, Row
 use model_core::RowWire;
 use stm32f4xx_hal::gpio::PinState;
 use stm32f4xx_hal::pac::adc1::RegisterBlock;
+use stm32f4xx_hal::pac::dma2::ST;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, ADC2, ADC3, DMA2, GPIOB, RCC, TIM1, TIM8};
 use stm32f4xx_hal::rcc::Rcc;
 
@@ -45,12 +46,7 @@ const REST: u32 = {
 /// Channels of each converter, in the order in which it converts them: PA0, PA1, PA4; PA6, PA7, PB0; PC0, PC1, PC2.
 const CHANNELS: [[u32; 3]; 3] = [[0, 1, 4], [6, 7, 8], [10, 11, 12]];
 
-/// Streams of DMA2, and the field that chooses their requests: numbers of the converters; second half, end and row by
-/// timer 1.
-const NUMBERS: usize = 0;
-const SWITCH: usize = 2;
-const END: usize = 5;
-const ROW: usize = 6;
+/// Field of a stream of DMA2 that chooses timer 1's requests; those of the converters are 0.
 const OF_TIMER_1: u32 = 6 << 25;
 
 /// Fields of a stream's control register: enabled; from memory; memory address counts up; words, or half-words; and the highest
@@ -170,16 +166,8 @@ impl Readout for OnChip {
 }
 
 impl OnChip {
-    /// Prepares a stream for so many `items` between memory and a register, with these fields.
-    fn start_stream(
-        &self,
-        stream: usize,
-        memory: usize,
-        register: usize,
-        items: usize,
-        fields: u32,
-    ) {
-        let stream = self.dma().st(stream);
+    /// Starts a stream of so many `items` between memory and a register, with these fields.
+    fn start_stream(stream: &ST, memory: usize, register: usize, items: usize, fields: u32) {
         // SAFETY: the addresses are of `MEMORY` and of a register, and the items are as many as there is room for.
         unsafe {
             stream.par().write(|w| w.bits(register as u32));
@@ -188,6 +176,12 @@ impl OnChip {
             stream.cr().write(|w| w.bits(fields | FIRST));
             stream.cr().write(|w| w.bits(fields | FIRST | ENABLED));
         }
+    }
+
+    /// Streams of the numbers, of the second half, of the end and of the rows.
+    fn streams(&self) -> [&ST; 4] {
+        let dma = self.dma();
+        [dma.st(0), dma.st(2), dma.st(5), dma.st(6)]
     }
 
     fn dma(&self) -> &DMA2 {
@@ -235,11 +229,12 @@ impl Sequencer<COLUMNS> for OnChip {
             self.dma().lifcr().write(|w| w.bits(LOW_FLAGS));
             self.dma().hifcr().write(|w| w.bits(HIGH_FLAGS));
         }
-        self.start_stream(NUMBERS, to, number, numbers, HALF_WORDS | COUNT_UP);
-        let of_rows = OF_TIMER_1 | FROM_MEMORY | WORDS;
-        self.start_stream(ROW, rows, changes, lines, of_rows | COUNT_UP);
-        self.start_stream(SWITCH, select, changes, lines, of_rows);
-        self.start_stream(END, rest, changes, 1, of_rows);
+        let [of_numbers, of_switch, of_end, of_rows] = self.streams();
+        Self::start_stream(of_numbers, to, number, numbers, HALF_WORDS | COUNT_UP);
+        let fields = OF_TIMER_1 | FROM_MEMORY | WORDS;
+        Self::start_stream(of_rows, rows, changes, lines, fields | COUNT_UP);
+        Self::start_stream(of_switch, select, changes, lines, fields);
+        Self::start_stream(of_end, rest, changes, 1, fields);
         let (rows, triggers) = self.timers();
         // SAFETY: all are counts or the fields that their constants tell.
         unsafe {
@@ -282,10 +277,12 @@ impl Sequencer<COLUMNS> for OnChip {
         // SAFETY: nobody else uses these peripherals, and the other ones' bits stay as they are.
         let rcc = unsafe { RCC::steal() };
         let resets = TIMERS | CONVERTERS_RESET;
-        rcc.apb2rstr().modify(|r, w| unsafe { w.bits(r.bits() | resets) });
-        rcc.apb2rstr().modify(|r, w| unsafe { w.bits(r.bits() & !resets) });
-        for stream in [NUMBERS, SWITCH, END, ROW] {
-            let control = self.dma().st(stream).cr();
+        for bits in [resets, 0] {
+            // SAFETY: as above.
+            rcc.apb2rstr().modify(|r, w| unsafe { w.bits(r.bits() & !resets | bits) });
+        }
+        for stream in self.streams() {
+            let control = stream.cr();
             control.modify(|_, w| w.en().clear_bit());
             (0..MOST_LOOKS).find(|_| control.read().en().bit_is_clear());
         }

@@ -62,14 +62,17 @@ class Passes:
         self._time, self._rules, self._clock, self._dma, self._adc = time, rules, clock, dma, adc
         self._moment, self._busy = moment, busy
         self.rows, self.triggers = ScanTimer(self.advance, self._start), ScanTimer(self.advance)
-        #: Events to come, the last one first; the triggers to come: the first one's cycle, their number, and their distance;
-        #: and the cycle at which the last column is sampled.
+        #: Events to come, the last one first; the triggers to come: the first one's cycle, their number, their
+        #: distance, and what the converters do at each; and the cycle at which the last column is sampled.
         self._events, self._waiting, self._sampled = [], None, 0
+        #: Number of passes that were given up.
+        self.cuts = 0
         #: Called when a pass begins and ends, with the cycle.
         self.on_start, self.on_end = lambda cycle: None, lambda cycle: None
 
     def reset(self):
         """The clock controller resets both timers."""
+        self.cuts += bool(self._events)
         self.rows.reset()
         self.triggers.reset()
         self._events, self._waiting = [], None
@@ -118,20 +121,19 @@ class Passes:
             self._rules.breach("triggers-cut", f"{self._waiting[1]} are left")
         tick = self._time.hz / self._clock()
         step = (self.triggers.values[ARR] + 1) * tick
-        self._waiting = [cycle + self.triggers.values.get(CCR1, 0) * tick, self.triggers.loaded[1] + 1, step]
+        first = cycle + self.triggers.values.get(CCR1, 0) * tick
+        self._waiting = first, self.triggers.loaded[1] + 1, step, self._adc.turns()[0]
 
     def _convert_until(self, cycle):
-        """Converts at the triggers before `cycle`: all before it see the same pins."""
+        """Converts what begins to be sampled before `cycle`: all of it sees the same pins."""
         if not self._waiting:
             return
-        first, left, step = self._waiting
-        count = min(left, max(0, -int((first - cycle) // step)))
+        first, left, step, turns = self._waiting
+        count = min(left, max(0, -int((first + turns[0][1] - cycle) // step)))
         if count:
             self._adc.convert(first, step, count)
-            last = first + (count - 1) * step
-            turns, _ = self._adc.turns()
-            self._sampled = last + turns[-1][2]
-            self._waiting = [first + count * step, left - count, step] if left > count else None
+            self._sampled = first + (count - 1) * step + turns[-1][2]
+            self._waiting = (first + count * step, left - count, step, turns) if left > count else None
 
     def _check_sampled(self, cycle):
         if self._sampled > cycle:
