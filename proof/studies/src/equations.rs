@@ -209,6 +209,7 @@ impl FrameDecoder for Equations<'_> {
 mod tests {
     use super::*;
     use taxel_data::random::Stream;
+    use taxel_learn::Decoder;
 
     fn readings(world: &World, place: usize, deformation_mm: &[f64]) -> Vec<f64> {
         let mut readings_ohm = vec![0.0; world.sensor.column_wires];
