@@ -797,9 +797,9 @@ fn a_device_filters_in_time_as_the_host_does() {
         window: 4,
         filter,
     };
-    let mut frames = frames_of(60);
+    let mut frames = frames_of(160);
     frames.start_us.iter_mut().for_each(|us| *us *= 1000);
-    frames.start_us[40..].iter_mut().for_each(|us| *us += 60_000); // a gap
+    frames.start_us[140..].iter_mut().for_each(|us| *us += 60_000); // a gap
     frames.readings.values[144 * 20] = f64::NAN; // a row starts anew
     let mut device = device(SOUND, &model);
     // The second time the filter starts anew.

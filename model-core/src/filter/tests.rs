@@ -53,12 +53,13 @@ fn a_ramp_is_followed_without_lag_however_frames_come() {
 
 #[test]
 fn a_step_is_answered_as_by_two_equal_poles() {
-    for time_constant_us in [500, 2000, 12_000] {
-        let (mut one, theta) = (One::new(time_constant_us, 0), theta(time_constant_us));
+    for (time_constant_us, period_us) in [(500, 1000), (2000, 1000), (12_000, 1000), (5000, 2300)] {
+        let mut one = One::new(time_constant_us, 0);
+        let theta = (-(period_us as f64) / f64::from(time_constant_us)).exp();
         one.at(0, 0.0);
         for n in 0..50 {
             let expected = 1.0 - theta.powi(n + 1) * (theta - (1.0 - theta) * f64::from(n));
-            let found = f64::from(one.at(1000 * (n as u64 + 1), 1.0));
+            let found = f64::from(one.at(period_us * (n as u64 + 1), 1.0));
             assert!((found - expected).abs() < 1e-5, "{found} instead of {expected}, {n}");
         }
     }

@@ -15,6 +15,9 @@ use taxel_learn::{Exponential, ModelBlob};
 use super::{Device, DeviceIdentity, Wire, stream, upload};
 use crate::error::{Error, Result, check_room};
 
+/// Frames after which a lease is prolonged: on a device with a key, a request to decode does not do it.
+const FRAMES_A_LEASE: usize = 100;
+
 /// Frames that a device is to decode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
@@ -74,9 +77,9 @@ impl Expected {
         self.baseline_ohm.as_deref().map_or(Ok(()), |baseline| device.set_baseline(baseline))
     }
 
-    /// Lets the device filter from the first frame on, and take readings beyond its limits, if there are any: other sensors
-    /// read other numbers.
-    fn configure<W: Wire>(&self, device: &mut Device<W>) -> Result<()> {
+    /// Configuration of a device that filters, and takes readings beyond its limits, if there are any: other sensors read
+    /// other numbers.
+    fn configuration(&self) -> Configuration {
         let mut wanted = Configuration {
             frame_period_us: 0,
             filter_time_constant_us: self.filter.time_constant_us,
@@ -87,13 +90,7 @@ impl Expected {
         if !self.readings_ohm.iter().all(|ohm| good.contains(ohm)) {
             [wanted.shorted_below_ohm, wanted.open_above_ohm] = [f32::NEG_INFINITY, f32::INFINITY];
         }
-        // Another configuration starts the filter anew.
-        device.pause()?;
-        device.configure(wanted)
-    }
-
-    fn first(&self, frames: usize) -> &[f32] {
-        &self.readings_ohm[..frames * self.per_frame[0]]
+        wanted
     }
 
     /// Whether the `estimate` has the time and the outputs of frame number `frame`, and its novelty and deviations.
@@ -123,21 +120,24 @@ impl Expected {
         window: usize,
         progress: &dyn Progress,
     ) -> Result<(usize, Duration)> {
-        let mut same = 0;
-        self.configure(device)?;
+        let (mut same, mut time) = (0, Duration::ZERO);
+        device.pause()?; // what is configured next is another configuration, and starts the filter anew
+        device.configure(self.configuration())?;
         self.set_baseline(device)?;
         progress.stage("decoding on the device", frames);
         let window = if self.filter.is_on() { 1 } else { window };
-        let time = stream::decode_frames(
-            device,
-            self.first(frames),
-            &self.start_us[..frames],
-            window,
-            |frame, estimate| {
-                same += usize::from(self.is_same(frame, estimate));
+        for first in (0..frames).step_by(FRAMES_A_LEASE) {
+            let end = frames.min(first + FRAMES_A_LEASE);
+            device.configure(self.configuration())?;
+            let readings_ohm = &self.readings_ohm[first * self.per_frame[0]..];
+            let readings_ohm = &readings_ohm[..(end - first) * self.per_frame[0]];
+            let take = |frame, estimate: &EstimateReport<'_>| {
+                same += usize::from(self.is_same(first as u32 + frame, estimate));
                 progress.step();
-            },
-        )?;
+            };
+            let start_us = &self.start_us[first..end];
+            time += stream::decode_frames(device, readings_ohm, start_us, window, take)?;
+        }
         Ok((same, time))
     }
 }
