@@ -156,13 +156,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let of = |decoder: &str, errors| DecoderErrors { decoder: decoder.into(), errors };
     let mean_errors = metrics::by_group(&truth, &means, &measure);
     let at_rest = over_time.as_ref().and_then(|log| log.rest.as_ref());
-    let drift = at_rest.filter(|_| !metadata.relative_inputs);
     let decoders = vec![of("network", errors), of("mean", mean_errors)];
     let verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
-        .with(drift.and_then(Warning::drift))
+        .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift))
         .with(at_rest.and_then(Warning::correlated_noise));
     let summary = Summary {
         model_file: arguments.model.clone(),

@@ -1,5 +1,7 @@
 //! Noise at rest: what the program says of it, from a scene to a recording.
 
+use std::fmt::Write as _;
+
 use crate::common::{Folder, small_scene};
 use crate::json_schema::{checked, schema};
 
@@ -58,7 +60,7 @@ fn a_log_is_judged_at_rest_and_its_page_shows_how_far_averaging_pays() {
         let force = if number % 600 < 300 { 0.0 } else { (number as f64 / 30.0).sin().abs() + 1.0 };
         let readings = fields[2..5].iter().map(|field| field.parse::<f64>().unwrap() - force);
         let readings: Vec<String> = readings.map(|reading| reading.to_string()).collect();
-        log += &format!("{},{},{force}\n", fields[0], readings.join(","));
+        let _ = writeln!(log, "{},{},{force}", fields[0], readings.join(","));
     }
     folder.write("log.csv", log);
     let run =
