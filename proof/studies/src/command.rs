@@ -206,7 +206,8 @@ pub enum Question {
     /// Error against the rate of frames, for both readouts of the board, by samples a reading.
     ///
     /// Trains the scene's model for the noise that is left in the mean of so many samples, and judges it on still contacts, and
-    /// on moving ones by the newest finished estimate, without a filter and behind one (docs/rate.md).
+    /// on moving ones by the newest finished estimate, without a filter and behind one: for white noise, and for noise of the
+    /// same level with a time constant of 2 and 20 ms (docs/rate.md).
     #[command(after_help = "Example: cargo xtask study rate moving -o rate.svg")]
     Rate {
         #[command(flatten)]
@@ -857,7 +858,11 @@ fn rate_page(study: &RateStudy, page: &mut Page) {
         });
         let times = [format!("{:.1}", line.frames_per_s), format!("{:.2}", line.age_ms)];
         let errors = [line.still, line.moving, line.filtered].map(figure);
-        let first = [line.readout.image().to_owned(), line.samples_averaged.to_string()];
+        let noise = match line.time_constant_ms {
+            0.0 => "white".to_owned(),
+            ms => format!("{ms} ms"),
+        };
+        let first = [noise, line.readout.image().to_owned(), line.samples_averaged.to_string()];
         [&first[..], &times, &errors, &[filter]].concat()
     });
     let head = ["image", "samples", "frames/s", "age, ms", "still", "moving", "filtered", "filter"];

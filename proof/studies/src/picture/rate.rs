@@ -11,13 +11,14 @@ use host_sim::report::ticks;
 
 const SIZE: [f64; 2] = [920.0, 460.0];
 
-/// Errors that are drawn: their name, their colour, and where they stand in a line.
-type Drawn = (&'static str, &'static str, fn(&Line) -> f64);
+/// Errors that are drawn: their name, their colour, the noise's time constant, and where they stand in a line.
+type Drawn = (&'static str, &'static str, f64, fn(&Line) -> f64);
 
-const DRAWN: [Drawn; 3] = [
-    ("still", "c3", |line| line.still),
-    ("moving", "c2", |line| line.moving),
-    ("moving, filtered", "c1", |line| line.filtered),
+const DRAWN: [Drawn; 4] = [
+    ("still", "c3", 0.0, |line| line.still),
+    ("moving", "c2", 0.0, |line| line.moving),
+    ("moving, filtered", "c1", 0.0, |line| line.filtered),
+    ("noise of 20 ms", "muted", 20.0, |line| line.filtered),
 ];
 
 /// Picture of a study: a line for each readout and kind of contact.
@@ -27,8 +28,10 @@ pub fn svg(study: &RateStudy) -> String {
         (Readout::Spi, "SPI converters", Shape::Circle),
         (Readout::OnChip, "on-chip", Shape::Square),
     ] {
-        for (contact, class, of) in DRAWN {
-            let lines = study.lines.iter().filter(|line| line.readout == readout);
+        for (contact, class, time_constant_ms, of) in DRAWN {
+            let lines = study.lines.iter().filter(|line| {
+                line.readout == readout && line.time_constant_ms == time_constant_ms
+            });
             let points = lines.map(|line| [line.frames_per_s, of(line)]).collect();
             let name = format!("{name}: {contact}");
             series.push(Series::new(&name, class, Mark::LineAnd(shape), points));

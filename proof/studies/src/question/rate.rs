@@ -10,14 +10,20 @@ use taxel_evaluate::experiment::Experiment;
 use taxel_evaluate::metrics::{self, Errors};
 use taxel_evaluate::training_set::TrainingSet;
 use taxel_learn::Exponential;
+use taxel_simulate::noise::Noise;
 
 /// Readouts and numbers of samples a reading that are compared.
 const WAYS: [(Readout, &[usize]); 2] =
     [(Readout::Spi, &[1, 2, 4, 16]), (Readout::OnChip, &[1, 4, 12, 48])];
 
-/// One readout with so many samples a reading.
+/// Time constants in ms of the noises that are compared, all of the scene's level; 0 for white noise.
+pub const TIME_CONSTANTS_MS: [f64; 3] = [0.0, 2.0, 20.0];
+
+/// One readout with so many samples a reading, under one noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
+    /// Time constant of the noise in ms; 0 for white noise.
+    pub time_constant_ms: f64,
     pub readout: Readout,
     pub samples_averaged: usize,
     pub frames_per_s: f64,
@@ -44,13 +50,23 @@ pub struct RateStudy {
 }
 
 /// Trains the model of `scene` for the noise that each readout and number of samples leaves, and judges it on still contacts
-/// and on those that move.
+/// and on those that move; for white noise, and for noises of the same level with a memory.
 pub fn measure(scene: &Experiment, progress: &dyn Progress) -> Result<RateStudy> {
     let (names, mut lines) = (scene.output_names(), Vec::new());
     let group = taxel_data::columns::groups(&names).last().map_or("", |(group, _)| *group);
     let rmse = |errors: &[Errors]| metrics::rmse_of(errors, group).unwrap_or(f64::NAN);
-    for (readout, samples) in WAYS {
-        for &samples_averaged in samples {
+    let ways =
+        WAYS.iter().flat_map(|(readout, all)| all.iter().map(|samples| (*readout, *samples)));
+    for time_constant_ms in TIME_CONSTANTS_MS {
+        let mut scene = scene.clone();
+        let level = scene.world.noise.total_level();
+        scene.world.noise = Noise::white(scene.world.noise.kind, level);
+        if time_constant_ms > 0.0 {
+            let noise = scene.world.noise.with_level(0.0);
+            scene.world.noise = Noise { correlated_level: level, time_constant_ms, ..noise };
+        }
+        let scene = &scene;
+        for (readout, samples_averaged) in ways.clone() {
             let device = Device { readout, ..Device::default() };
             let synthesis = moving_contacts::scanned(scene, device, samples_averaged);
             let set = TrainingSet::of_scene(scene, synthesis.clone());
@@ -64,6 +80,7 @@ pub fn measure(scene: &Experiment, progress: &dyn Progress) -> Result<RateStudy>
             };
             let errors = |way: Option<&MovingWay>| way.map_or(f64::NAN, |way| rmse(&way.errors));
             lines.push(Line {
+                time_constant_ms,
                 readout,
                 samples_averaged,
                 frames_per_s: ways[0].times.frames_per_s,
