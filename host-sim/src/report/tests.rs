@@ -11,6 +11,7 @@ use taxel_evaluate::evaluate::distribution::{Distribution, Reference};
 use taxel_evaluate::evaluate::printed::Printed;
 use taxel_evaluate::evaluate::table1::{Column, Entry, NETWORK, Table1};
 use taxel_evaluate::metrics::{DecoderErrors, Errors, LimitSummary};
+use taxel_evaluate::others::{OtherErrors, Others};
 use taxel_evaluate::run::{
     ModelSummary, RowErrors, RowWire, RunResult, SceneSummary, SensorSketch,
 };
@@ -267,6 +268,26 @@ fn what_is_under_the_pointer_is_told() {
     assert!(page.contains("<title>row-wire 4, column-wire 2: "));
     assert!(page.contains("<title>row-wire 5, electrode 2, not read</title>"), "sketch");
     assert!(!page.contains("<title>row-wire 5, electrode 2: "), "it has no value");
+}
+
+#[test]
+fn errors_on_other_contacts_stand_below_those_of_the_scene() {
+    let groups = ["dz_mm"];
+    let contacts = vec![OtherErrors {
+        name: "flat <punch>".into(),
+        errors: of_groups(&groups, 0.0712),
+        mean: of_groups(&groups, 0.1816),
+        percent_novel: Some(12.9),
+    }];
+    let (frames, own_percent_novel) = (1000, Some(0.4));
+    let others = Some(Others { frames, own_percent_novel, contacts });
+    let page = html(&RunResult { others, ..result(&groups) });
+    let line = page.lines().find(|line| line.contains("flat &lt;punch&gt;")).unwrap();
+    for number in ["0.071", "0.182", "12.9"] {
+        assert!(line.contains(number), "{line}");
+    }
+    assert!(page.contains("As trained") && page.contains(" frames each"));
+    assert!(!html(&result(&groups)).contains("As trained"));
 }
 
 #[test]
