@@ -52,6 +52,13 @@ pub const ONCHIP_SAMPLES: u16 = 16;
 const ONCHIP_ROW_TICKS: u32 = 36;
 const ONCHIP_END_TICKS: u32 = 16;
 
+/// Time in µs that the processor takes to add up the samples of a scan of 8 × 18 wires by the on-chip converters, before the
+/// next one starts. From the cycles of the emulated board.
+pub const ONCHIP_SUMS_US: u32 = 61;
+
+/// Time in µs that it then takes to turn the sums into Ω, while the next scan runs.
+pub const ONCHIP_READINGS_US: u32 = 200;
+
 /// Ticks of the processor's clock from one trigger of the on-chip converters to the next.
 pub const ONCHIP_TRIGGER_TICKS: u16 = (ONCHIP_TRIGGER_CYCLES * ONCHIP_TICKS_A_CYCLE) as u16;
 

@@ -291,7 +291,7 @@ fn every_command_has_help_with_an_example() {
     let (_, help) = help.split_once("\nOptions:\n").unwrap();
     let (own, rest) = help.split_once("\nData files (CSV, .npy, .npz):\n").unwrap();
     let (of_files, _) = rest.split_once("\nExamples:").unwrap();
-    assert!((20..=28).contains(&options(own)) && own.contains("--seed"), "{own}");
+    assert!((20..=31).contains(&options(own)) && own.contains("--seed"), "{own}");
     assert!(options(of_files) >= 10 && of_files.contains("--test"), "{of_files}");
     assert!(!of_files.contains("--max-error"), "{of_files}");
 }

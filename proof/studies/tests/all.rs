@@ -81,6 +81,31 @@ fn every_study_answers_in_words_and_in_json() {
 }
 
 #[test]
+fn a_fast_readout_is_better_on_contacts_that_move_and_no_better_on_still_ones() {
+    let motion = "[motion]\nspeed_mm_per_s = [100.0, 100.0]\npress_rate_hz = [5.0, 5.0]\n\
+                  duration_s = 0.4\ntrajectories = 4\n\n[noise]";
+    let folder = folder("studies-rate", ["[noise]", motion]);
+    let result = json(&folder, &["rate", "scene.toml", "-o", "rate.svg"]);
+    let lines = result["lines"].as_array().unwrap();
+    let of = |readout: &str, samples: u64, ms: f64, field: &str| {
+        let line = lines.iter().find(|line| {
+            line["readout"] == readout
+                && line["samples_averaged"] == samples
+                && line["time_constant_ms"] == ms
+        });
+        line.unwrap()[field].as_f64().unwrap()
+    };
+    assert_eq!(lines.len(), 24);
+    assert_eq!(of("spi", 4, 0.0, "still"), of("onchip", 4, 0.0, "still"));
+    assert!(of("onchip", 4, 0.0, "moving") < 0.8 * of("spi", 4, 0.0, "moving"), "{result}");
+    // Samples of one scan share noise of 20 ms.
+    assert!(of("onchip", 12, 0.0, "still") < 0.9 * of("onchip", 12, 20.0, "still"), "{result}");
+    let picture = std::fs::read_to_string(folder.join("rate.svg")).unwrap();
+    assert!(picture.contains("on-chip: moving, filtered"));
+    assert!(fail(&folder, &["rate", "press"]).contains("[motion]"));
+}
+
+#[test]
 fn equations_refuse_what_they_do_not_decode_and_draw_a_picture() {
     let of_z = folder("studies-z", ["[\"x\", \"y\", \"z\"]", "[\"z\"]"]);
     let said = fail(&of_z, &["equations", "scene.toml"]);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use firmware::timing::ScanPlan;
+use firmware::timing::{ONCHIP_READINGS_US, ONCHIP_SUMS_US, ScanPlan};
 use serde::Serialize;
 use taxel_data::{BadValue, columns};
 use taxel_learn::cost::Cost;
@@ -91,10 +91,10 @@ pub struct Times {
     pub scan_ms: Option<f64>,
     /// Time of decoding; behind a gate, the mean over the test frames.
     pub decode_ms: f64,
-    /// Time of both; of decoding alone if the scan's is unknown.
+    /// Time of both, and of the work between them; of decoding alone if the scan's is unknown.
     pub frame_ms: f64,
-    /// Frames in a second, at most: one over the time of a frame, or of the longer of scan and decoding where both go on at
-    /// once ([`Readout::OnChip`]).
+    /// Frames in a second, at most: one over the time of a frame, or of the longer of scan and processor's work where both go
+    /// on at once ([`Readout::OnChip`]).
     pub frames_per_s: f64,
     /// Mean age of the newest finished estimate when it is used: the time since the middle of its scan. `None` if the
     /// scan's time is unknown.
@@ -158,10 +158,19 @@ impl Device {
     /// Times of a frame whose decoding has this `cost`.
     pub fn times(&self, scan_ms: Option<f64>, cost: &Cost) -> Times {
         let decode_ms = self.cycles(cost) as f64 / (self.clock_mhz * 1000.0);
-        let frame_ms = scan_ms.unwrap_or(0.0) + decode_ms;
+        let scanned_ms = scan_ms.unwrap_or(0.0);
+        let [sums_ms, readings_ms] = match self.readout {
+            Readout::OnChip if scan_ms.is_some() => {
+                [ONCHIP_SUMS_US, ONCHIP_READINGS_US].map(|us| f64::from(us) / 1000.0)
+            }
+            // They are part of the scan, or unknown.
+            _ => [0.0; 2],
+        };
+        let work_ms = sums_ms + readings_ms + decode_ms;
+        let frame_ms = scanned_ms + work_ms;
         let period_ms = match self.readout {
             Readout::Spi => frame_ms,
-            Readout::OnChip => scan_ms.map_or(decode_ms, |scan_ms| scan_ms.max(decode_ms)),
+            Readout::OnChip => (scanned_ms + sums_ms).max(work_ms),
         };
         let age_ms = scan_ms.map(|scan_ms| age_ms(scan_ms, frame_ms, period_ms));
         Times { scan_ms, decode_ms, frame_ms, frames_per_s: 1000.0 / period_ms, age_ms }
@@ -189,10 +198,13 @@ mod tests {
         let onchip = Device { readout: Readout::OnChip, ..board };
         let scans = [1, 12].map(|samples| onchip.scan_ms(paper, samples).unwrap());
         assert_eq!(scans, [0.224, 0.887]);
+        // Sums are added up before the next scan, and turned into Ω while it runs.
         let times = onchip.times(Some(0.9), &cost);
-        assert!((times.frame_ms - 1.1).abs() < 1e-12);
-        assert!((times.period_ms() - 0.9).abs() < 1e-12);
-        assert!((times.age_ms.unwrap() - (0.45 + 0.2 + 0.45)).abs() < 1e-12);
+        assert!((times.frame_ms - (0.9 + 0.061 + 0.2 + 0.2)).abs() < 1e-12);
+        assert!((times.period_ms() - 0.961).abs() < 1e-12);
+        assert!((times.age_ms.unwrap() - (0.45 + 0.461 + 0.5 * 0.961)).abs() < 1e-12);
+        // With a short scan the processor is what takes longest.
+        assert!((onchip.times(Some(0.2), &cost).period_ms() - 0.461).abs() < 1e-12);
         let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
         assert_eq!(ram.times(None, &cost).frame_ms, 0.2);
         assert_eq!(ram.times(None, &cost).frames_per_s, 5000.0);
