@@ -18,7 +18,7 @@ use crate::experiment::Experiment;
 
 /// Synthesise frames of a scene as CSV: noisy readings, true outputs.
 ///
-/// A scene whose contacts move ([motion]) is written as a log: time_s and trajectory come first, and each row is read at its
+/// A scene whose contacts move (`[motion]`) is written as a log: time_s and trajectory come first, and each row is read at its
 /// own time, as the board scans.
 #[derive(Args)]
 #[command(after_help = "Examples:

@@ -283,6 +283,7 @@ impl Question {
     }
 
     /// Computes and prints the answer.
+    #[expect(clippy::too_many_lines, reason = "an arm for each study")]
     pub fn answer(&self, common: &Common) -> Result<()> {
         let progress = Terminal::new();
         match self {
