@@ -234,10 +234,12 @@ fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
     }
 }
 
-/// Period of frames in µs to configure: as asked for, or the shortest that the point can keep up with.
+/// Period of frames in µs to configure: as asked for, or the shortest that the point can keep up with. On contacts that move
+/// the latter, at which the point was judged.
 fn period_us(trade: &Trade, point: &Point) -> Option<u64> {
-    let shortest = point.times.scan_ms.map(|_| (1000.0 * point.times.frame_ms).ceil())?;
-    let asked = trade.bounds.frame_rate_hz.map(|hz| (1e6 / hz).floor());
+    let shortest = point.times.scan_ms.map(|_| (1000.0 * point.times.period_ms()).ceil())?;
+    let asked = trade.bounds.frame_rate_hz.filter(|_| trade.motion.is_none());
+    let asked = asked.map(|hz| (1e6 / hz).floor());
     Some(asked.unwrap_or(shortest) as u64)
 }
 
