@@ -59,7 +59,7 @@ pub struct Spectrum {
     pub correlated_share: f64,
     /// Time constant of the correlated part, or of what is slow at least.
     pub time_constant_frames: Option<f64>,
-    /// The same in s, if the time between two frames is known.
+    /// Time constant in s, if the time between two frames is known.
     pub time_constant_s: Option<f64>,
     /// Standard deviations of the white and of the correlated part as fractions of a reading, root mean squares over
     /// readings; `None` where a reading is near zero.

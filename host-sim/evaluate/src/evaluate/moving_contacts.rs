@@ -21,7 +21,7 @@ pub struct MovingContacts {
     pub path: Path,
     /// Group of outputs for whose errors filters are set.
     pub group: String,
-    /// Of the model without a filter, and behind one.
+    /// Errors of the model without a filter, and behind one.
     pub ways: Vec<MovingWay>,
     /// Errors of the baselines, whose decoding takes no time.
     pub decoders: Vec<DecoderErrors>,

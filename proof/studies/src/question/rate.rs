@@ -33,7 +33,7 @@ pub struct Line {
     pub still: f64,
     /// RMSE of the newest finished estimate on contacts that move.
     pub moving: f64,
-    /// The same behind a filter.
+    /// RMSE of the newest finished estimate behind a filter.
     pub filtered: f64,
     pub filter: Option<FilterSettings>,
 }

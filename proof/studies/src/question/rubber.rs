@@ -49,9 +49,9 @@ pub struct Line {
 /// Errors of the estimates of all scans.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judged {
-    /// Against what was true when each row was read.
+    /// Errors against what was true when each row was read.
     pub when_read: Vec<Errors>,
-    /// Of the newest finished estimate against the truth, at every moment.
+    /// Errors of the newest finished estimate against the truth, at every moment.
     pub when_used: Vec<Errors>,
 }
 
