@@ -172,6 +172,8 @@ pub struct ScanPlan {
     pub reading_ns: u32,
     /// Time in ns for a row besides its wait, its samples and its readings.
     pub row_ns: u32,
+    /// Time in ns from the end of one pass to the start of the next.
+    pub between_passes_ns: u32,
 }
 
 impl ScanPlan {
@@ -192,6 +194,7 @@ impl ScanPlan {
             sample_ns: spi_transfer_ns(MCP3208_BYTES, NUCLEO_SPI_HZ) + NUCLEO_SAMPLE_NS,
             reading_ns: NUCLEO_READING_NS,
             row_ns: NUCLEO_ROW_NS,
+            between_passes_ns: 0,
         }
     }
 
@@ -218,6 +221,7 @@ impl ScanPlan {
             sample_ns: ns(2 * u32::from(ONCHIP_TRIGGER_TICKS)).div_ceil(u32::from(ONCHIP_COLUMNS)),
             reading_ns: 0,
             row_ns: ns(ONCHIP_ROW_TICKS + ONCHIP_END_TICKS),
+            between_passes_ns: ONCHIP_SUMS_US * 1000,
         }
     }
 
@@ -236,6 +240,7 @@ impl ScanPlan {
     ///     sample_ns: spi_transfer_ns(3, 1_000_000),
     ///     reading_ns: 0,
     ///     row_ns: 0,
+    ///     between_passes_ns: 0,
     /// };
     /// assert_eq!(plan.scan_us(), 7_128); // fits the 10 ms of 100 Hz
     /// assert_eq!(plan.longest_us(), 7_956); // with idle samples
@@ -250,9 +255,17 @@ impl ScanPlan {
         in_us(self.of_rows_ns().saturating_add(self.of_round_ns()))
     }
 
+    /// Number of passes over the rows.
+    pub fn passes(&self) -> u16 {
+        self.oversampling.div_ceil(self.pass_samples.max(1)).max(1)
+    }
+
     fn of_rows_ns(&self) -> u64 {
         let readings_ns = u64::from(self.columns) * u64::from(self.reading_ns);
-        u64::from(self.rows).saturating_mul(self.step_ns(self.columns).saturating_add(readings_ns))
+        let row_ns = self.step_ns(self.columns).saturating_add(readings_ns);
+        let between_ns =
+            u64::from(self.passes().saturating_sub(1)) * u64::from(self.between_passes_ns);
+        u64::from(self.rows).saturating_mul(row_ns).saturating_add(between_ns)
     }
 
     /// Time in ns that the first scan of a round takes besides its rows.
@@ -264,8 +277,7 @@ impl ScanPlan {
     /// Time in ns to change the rows, wait, and sample so many columns.
     fn step_ns(&self, columns: u16) -> u64 {
         let wait_ns = u64::from(self.settling_us) * 1000 + u64::from(self.row_ns);
-        let passes = self.oversampling.div_ceil(self.pass_samples.max(1)).max(1);
-        self.samples_ns(columns).saturating_add(wait_ns.saturating_mul(passes.into()))
+        self.samples_ns(columns).saturating_add(wait_ns.saturating_mul(self.passes().into()))
     }
 
     fn samples_ns(&self, columns: u16) -> u64 {
@@ -279,7 +291,8 @@ impl ScanPlan {
     /// ```
     /// # use firmware::timing::ScanPlan;
     /// # let plan = ScanPlan { rows: 8, columns: 18, board_columns: 18, idle_samples: true, settling_us: 20,
-    /// #     oversampling: 1, pass_samples: 256, sample_ns: 24_000, reading_ns: 0, row_ns: 0 };
+    /// #     oversampling: 1, pass_samples: 256, sample_ns: 24_000, reading_ns: 0, row_ns: 0,
+    /// #     between_passes_ns: 0 };
     /// assert_eq!(plan.most_oversampling(10_000), Some(2));
     /// assert_eq!(plan.most_oversampling(1_000), None);
     /// ```
@@ -317,6 +330,7 @@ mod tests {
         sample_ns: 1_500,
         reading_ns: 0,
         row_ns: 2_000,
+        between_passes_ns: 0,
     };
 
     #[test]
@@ -350,6 +364,7 @@ mod tests {
             sample_ns: u32::MAX,
             reading_ns: u32::MAX,
             row_ns: u32::MAX,
+            between_passes_ns: u32::MAX,
         };
         assert_eq!(most.scan_us(), u32::MAX);
         let nothing = ScanPlan { rows: 0, columns: 0, board_columns: 0, ..PLAN };
@@ -412,7 +427,9 @@ mod tests {
             let row_ticks = u64::from(counts.period) + 1; // the last row ends at count 0
             let more = u64::from(ONCHIP_TRIGGER_TICKS) * 2 * u64::from(samples - passes);
             let us = (8 * (row_ticks * u64::from(passes) + more)) as f32 / NUCLEO_MHZ as f32;
-            let computed = (plan.longest_us() as f32) * 8.0 / 9.0;
+            // With an idle line, and sums that are added up between two passes.
+            let between_us = u32::from(plan.passes() - 1) * ONCHIP_SUMS_US;
+            let computed = ((plan.longest_us() - between_us) as f32) * 8.0 / 9.0;
             assert!((computed / us - 1.0).abs() < 0.01, "{samples}: {us} {computed}");
         }
         assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).longest_us(), 250);

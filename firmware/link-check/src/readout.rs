@@ -164,6 +164,7 @@ pub fn exercise() {
         sample_ns: timing::spi_transfer_ns(opaque(3), opaque(1_000_000)),
         reading_ns: opaque(1_000),
         row_ns: opaque(5_000),
+        between_passes_ns: opaque(61_000),
     };
     opaque(plan.scan_us());
     opaque(plan.longest_us());

@@ -16,8 +16,9 @@ use taxel_simulate::timetable::Timetable;
 use crate::experiment::Experiment;
 use crate::metrics::{self, Errors, Measure};
 
-/// Time between two moments at which estimates are compared with the truth, in s.
-const GRID_S: f64 = 0.001;
+/// Time between two moments at which estimates are compared with the truth, in s: 1.5 ms times the golden section, so that
+/// no period keeps step with them, and every age of an estimate counts.
+pub(crate) const GRID_S: f64 = 0.001_5 * 0.618_033_988_749_895;
 /// Time in s, and share of a trajectory, in which a filter may find its feet: the shorter of both is not judged.
 const WARM_UP: (f64, f64) = (0.15, 0.25);
 
@@ -41,8 +42,8 @@ pub struct Moving {
 }
 
 impl Moving {
-    /// Frames of `scene`, whose contacts move along `path`, from a `synthesis` of its world. A scan takes `scan_ms`, and one
-    /// starts every `period_ms`.
+    /// Frames of `scene`, whose contacts move along `path`, from a `synthesis` of its world. A scan takes `scan_ms`, in so many
+    /// `passes` over the rows, and one starts every `period_ms`.
     ///
     /// # Errors
     /// [`BadValue`] for a period at which a trajectory has too many frames, or not even four.
@@ -50,16 +51,17 @@ impl Moving {
         scene: &Experiment,
         synthesis: &Synthesis<'_>,
         path: Path,
-        [scan_ms, period_ms]: [f64; 2],
+        ([scan_ms, period_ms], passes): ([f64; 2], usize),
     ) -> Result<Self, BadValue> {
         let period_s = period_ms / 1000.0;
-        let timetable = Timetable::every(period_s, scan_ms / 1000.0, path.duration_s)?;
+        let timetable =
+            Timetable::every(period_s, scan_ms / 1000.0, path.duration_s)?.in_passes(passes);
         if path.duration_s < 4.0 * period_s {
             let (value, least) = (format!("{} s", path.duration_s), 4.0 * period_s);
             let rule = format!("frames are {period_s:.4} s apart; give at least {least:.3} s");
             return Err(BadValue::new("motion.duration_s", value, rule));
         }
-        // Estimates of two periods before are finished, whether or not scans and decoding overlap.
+        // The first estimate is finished within two periods, whether or not scans and decoding overlap.
         let from_s = WARM_UP.0.min(WARM_UP.1 * path.duration_s).max(2.0 * period_s);
         let (first, last) = ((from_s / GRID_S).ceil(), (path.duration_s / GRID_S).floor());
         let moments_s: Vec<f64> =
@@ -117,20 +119,23 @@ mod tests {
         let mut scene = Experiment::load("moving").unwrap();
         scene.world.path.as_mut().unwrap().trajectories = 3;
         let (path, synthesis) = (scene.world.path.unwrap(), Synthesis::new(&scene.world));
-        Moving::new(&scene, &synthesis, path, [scan_ms, period_ms]).unwrap()
+        Moving::new(&scene, &synthesis, path, ([scan_ms, period_ms], 1)).unwrap()
     }
 
     #[test]
     fn the_newest_finished_estimate_is_held_until_the_next_one() {
         let moving = moving(3.0, 5.0);
         assert_eq!((moving.timetable.scans(), moving.frames.frames()), (120, 360));
-        assert_eq!((moving.moments_s[0], moving.moments_s.len()), (0.15, 451));
+        let (first, moments) = (moving.moments_s[0], moving.moments_s.len());
+        assert!((0.15..0.151).contains(&first) && moments == 486, "{first} {moments}");
         // Each estimate is the number of its frame.
         let numbers: Vec<f64> = (0..360).flat_map(|frame| [f64::from(frame); 48]).collect();
         let held: Vec<f64> = moving.held(&numbers, 4.0).iter().copied().step_by(48).collect();
         // Frame 29 starts at 145 ms and is finished at 149, frame 30 at 154, frame 31 at 159.
-        assert_eq!(held[..10], [29.0, 29.0, 29.0, 29.0, 30.0, 30.0, 30.0, 30.0, 30.0, 31.0]);
-        assert_eq!((held[450], held[451]), (119.0, 120.0 + 29.0));
+        let due = |at_s: f64| ((at_s * 1000.0 - 4.0) / 5.0).floor();
+        let due: Vec<f64> = moving.moments_s.iter().map(|at_s| due(*at_s)).collect();
+        assert_eq!((due[0], due[5], held[..486] == due), (29.0, 30.0, true));
+        assert_eq!((held[485], held[486]), (119.0, 120.0 + 29.0));
         assert_eq!(age_ms(3.0, 4.0, 5.0), 5.0);
     }
 
@@ -143,16 +148,17 @@ mod tests {
         };
         let (soon, late) = (rmse(0.01, 1.0, 0.01), rmse(0.01, 1.0, 4.01));
         let slow = rmse(6.0, 6.0, 6.0);
-        // At a moment the newest estimates are 1 ms and 5 ms old; those of rows read over 6 ms are 3 to 9 ms old.
-        assert!((0.001..0.003).contains(&soon), "{soon} mm");
-        assert!((late / soon - 5.0).abs() < 0.2 && slow > 1.1 * late, "{soon} {late} {slow}");
+        // At a moment the newest estimates are 0 to 1 ms and 4 to 5 ms old: 0.587 and 4.52 ms as root mean squares. Those of
+        // rows read over 6 ms are 0 to 12 ms old.
+        assert!((0.000_7..0.002).contains(&soon), "{soon} mm");
+        assert!((late / soon - 7.7).abs() < 0.25 && slow > 1.1 * late, "{soon} {late} {slow}");
     }
 
     #[test]
     fn a_trajectory_of_few_frames_is_refused() {
         let scene = Experiment::load("moving").unwrap();
         let path = Path { duration_s: 0.05, ..scene.world.path.unwrap() };
-        let refused = Moving::new(&scene, &Synthesis::new(&scene.world), path, [23.0, 24.0]);
+        let refused = Moving::new(&scene, &Synthesis::new(&scene.world), path, ([23.0, 24.0], 1));
         let refused = refused.unwrap_err().to_string();
         assert!(refused.contains("motion.duration_s") && refused.contains("0.096"), "{refused}");
     }

@@ -136,11 +136,6 @@ impl Subject {
         }
     }
 
-    /// Noise of a scene's readings that are means of so many samples, one every `spacing_s`; `None` for measurements.
-    pub fn noise_averaged(&self, samples: usize, spacing_s: f64) -> Option<Noise> {
-        Some(self.scene()?.world.noise.averaged(samples, spacing_s))
-    }
-
     /// Synthesis of a scene's frames, with this noise or its own.
     pub(crate) fn synthesis(scene: &Experiment, noise: Option<Noise>) -> Synthesis<'_> {
         Synthesis::new(&scene.world).noise(noise.unwrap_or(scene.world.noise))

@@ -83,15 +83,6 @@ pub fn filter_frames(
     }
 }
 
-/// Mean age of an estimate in µs when it is used: from the middle of its scan until the middle of the period for which it
-/// is the newest. It is the lead that a filter needs.
-///
-/// Readings are taken half a scan after its start in the mean. The estimate is there when the scan and its decoding have
-/// ended, and the next one comes a period later.
-pub fn mean_age_us(scan_us: f64, decode_us: f64, period_us: f64) -> f64 {
-    scan_us / 2.0 + decode_us + period_us / 2.0
-}
-
 /// How fast an output changes, as root mean squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Movement {
@@ -136,8 +127,9 @@ fn time_constant_for(
 ) -> (f64, f64) {
     let times_s = [period_us, lead_us, age_us].map(|us| us * 1e-6);
     let error = |log_us: f64| squared_error(of_output, log_us.exp() * 1e-6, times_s);
-    // A sum of powers of τ has one minimum over its logarithm: golden sections of that.
-    let (mut low, mut high) = ((period_us / 10.0).ln(), f64::from(Settings::MOST_US).ln());
+    // A sum of powers of τ has one minimum over its logarithm: golden sections of that. A filter starts anew after ten time
+    // constants: a fifth of a period leaves room for one frame that is lost.
+    let (mut low, mut high) = ((period_us / 5.0).ln(), f64::from(Settings::MOST_US).ln());
     while high - low > 1e-9 {
         let third = (high - low) * 0.381_966;
         if error(low + third) <= error(high - third) {

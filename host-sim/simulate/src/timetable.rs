@@ -6,13 +6,15 @@ use taxel_data::error::require;
 /// Most scans of a trajectory.
 pub const MOST_SCANS: usize = 1_000_000;
 
-/// Times of the scans of a trajectory. Rows are read one after the other, in equal parts of the scan.
+/// Times of the scans of a trajectory. Rows are read one after the other, in equal parts of the scan or of each of its passes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timetable {
     /// Time at which each scan starts in s, ascending.
     pub starts_s: Vec<f64>,
     /// Time that a scan takes in s; with 0 it reads all rows at once.
     pub scan_s: f64,
+    /// Number of passes over the rows that a scan consists of.
+    pub passes: usize,
 }
 
 impl Timetable {
@@ -23,7 +25,7 @@ impl Timetable {
 
     /// Readings of all rows at once, at each of these times.
     pub fn instants(starts_s: Vec<f64>) -> Self {
-        Self { starts_s, scan_s: 0.0 }
+        Self { starts_s, scan_s: 0.0, passes: 1 }
     }
 
     /// Scans of `scan_s` each, one every `period_s`, that start within `duration_s`; at least one.
@@ -40,7 +42,13 @@ impl Timetable {
             format!("{duration_s} s have {scans} frames, more than {MOST_SCANS}; make it longer")
         })?;
         let starts_s = (0..scans as usize).map(|scan| scan as f64 * period_s).collect();
-        Ok(Self { starts_s, scan_s })
+        Ok(Self { starts_s, scan_s, passes: 1 })
+    }
+
+    /// The same scans in so many `passes` over the rows; a reading is the mean of its row's.
+    #[must_use]
+    pub fn in_passes(self, passes: usize) -> Self {
+        Self { passes: passes.max(1), ..self }
     }
 
     /// Number of scans.
@@ -48,9 +56,11 @@ impl Timetable {
         self.starts_s.len()
     }
 
-    /// Time in s from the start of a scan to the middle of its reading of the row at `place` among so many `rows`.
+    /// Time in s from the start of a scan to the middle of its readings of the row at `place` among so many `rows`. A
+    /// reading that is the mean of several passes counts as one at the mean of their times.
     pub fn row_offset_s(&self, place: usize, rows: usize) -> f64 {
-        self.scan_s * (place as f64 + 0.5) / rows as f64
+        let passes_before = 0.5 * (self.passes - 1) as f64;
+        self.scan_s / self.passes as f64 * (passes_before + (place as f64 + 0.5) / rows as f64)
     }
 
     /// Time in s since the scan before; 0 for the first.
@@ -69,6 +79,10 @@ mod tests {
         assert_eq!((table.scans(), table.starts_s[4]), (5, 0.04));
         let offsets: Vec<f64> = (0..4).map(|place| table.row_offset_s(place, 4)).collect();
         assert_eq!(offsets, [0.001, 0.003, 0.005, 0.007]);
+        // In two passes of 4 ms, rows are read at 0.5 and 4.5 ms, … 3.5 and 7.5 ms.
+        let passes = table.clone().in_passes(2);
+        let offsets: Vec<f64> = (0..4).map(|place| passes.row_offset_s(place, 4)).collect();
+        assert_eq!(offsets, [0.0025, 0.0035, 0.0045, 0.0055]);
         assert_eq!(table.since_last_s(0), 0.0);
         assert!((table.since_last_s(3) - 0.01).abs() < 1e-15);
         assert_eq!(Timetable::every(1.0, 0.0, 0.5).unwrap(), Timetable::still());

@@ -116,8 +116,8 @@ fn moving_page(page: &mut print::Page, moving: &MovingContacts) {
     print::wrapped(
         page,
         &format!(
-            "As a robot meets it, on {}: newest finished estimate against the truth at that moment. The board takes {:.2} ms a \
-             frame, so that an estimate is {:.2} ms old when it is used, on average.",
+            "As a robot meets it, on {}: newest finished estimate against the truth at that moment. The board finishes an \
+             estimate {:.2} ms after the start of its scan, so that it is {:.2} ms old when it is used, on average.",
             moving.path.in_words(),
             times.frame_ms,
             times.age_ms.unwrap_or_default()

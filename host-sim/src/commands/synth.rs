@@ -19,7 +19,7 @@ use crate::experiment::Experiment;
 /// Synthesise frames of a scene as CSV: noisy readings, true outputs.
 ///
 /// A scene whose contacts move (`[motion]`) is written as a log: time_s and trajectory come first, and each row is read at its
-/// own time, as the board scans.
+/// own time, as the board scans. A second lies between two trajectories, so that a filter starts anew with each.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim synth press -n 5000 --seed 2 -o test.csv
@@ -56,6 +56,9 @@ pub struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
+
+/// Time between the end of a trajectory and the start of the next one in s.
+const PAUSE_S: f64 = 1.0;
 
 #[derive(Serialize)]
 struct Summary {
@@ -137,7 +140,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let duration_s = scene.world.path.as_ref().map_or(0.0, |path| path.duration_s);
             let of_frame = |frame: usize| {
                 let (trajectory, scan) = (frame / timetable.scans(), frame % timetable.scans());
-                let start_s = trajectory as f64 * duration_s + timetable.starts_s[scan];
+                let start_s = trajectory as f64 * (duration_s + PAUSE_S) + timetable.starts_s[scan];
                 // To the nanosecond: a sum of binary fractions has more digits than it means.
                 [(start_s * 1e9).round() / 1e9, (trajectory + 1) as f64]
             };

@@ -26,12 +26,13 @@ mod page;
 
 /// Trade speed for accuracy: measure every decoder, and choose the best.
 ///
-/// Trains and judges every number format, exponential, K, affine tail, number of samples averaged and gate.
-/// Marks the Pareto front of error and time of a frame, and chooses the best point within your bounds.
+/// Trains and judges every number format, exponential, K, affine tail, number of columns read, number of samples averaged,
+/// gate, and on contacts that move filter in time. Marks the Pareto front of error and time from the start of a scan to its
+/// estimate, and chooses the best point within your bounds.
 ///
 /// Writes trade.csv, trade.json, trade.svg and trade.html to `out/<scene>/`, and with a bound chosen.bin, all together at
 /// the end; those of an earlier trade go.
-/// The time of a frame is that of the scan, by the plan of the board's firmware (docs/board.md), and of decoding, by
+/// That time is the scan's, by the plan of the board's firmware for either readout (docs/board.md), and the decoding's, by
 /// the price list of the firmware's code (docs/cycles.md). Behind a gate cycles are the mean over the test frames, by the
 /// share of untouched rows (docs/trade.md). Bounds that nothing can meet are refused before anything is trained.
 #[derive(Args)]
@@ -149,8 +150,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         worst_case: arguments.worst_case,
     };
     if let Some(scene) = subject.scene() {
-        let spacing_s = plan.device.sample_spacing_s(wires(&subject, 1));
-        let idle = |n: &usize| Warning::idle_averaging(&scene.world.noise, *n, spacing_s);
+        let left = |n| plan.device.averaged(scene.world.noise, wires(&subject, 1), n);
+        let idle = |n: &usize| Warning::idle_averaging(*n, left);
         plan.samples_averaged.iter().filter_map(idle).for_each(stderr::remark);
     }
     let bounds = Bounds {

@@ -58,12 +58,10 @@ fn four_samples_are_chosen_for_still_contacts_and_one_for_moving_ones() {
         let samples = point.samples_averaged as f64;
         let synthesis = Synthesis::new(&scene.world).noise_level(0.005 / samples.sqrt());
         let (times, blob) = (point.times, ModelBlob::of_bytes(moving.blob(i)).unwrap());
-        // Both points of a model have the same frames: 5.6 ms and some make 5.7 or 5.8 ms, 21 ms make 22.
-        let unfiltered = if point.filter.is_some() { &moving.points[i - 1] } else { point };
-        let frame_ms = unfiltered.times.frame_ms;
-        let period_ms =
-            if samples > 1.0 { frame_ms.ceil() } else { (frame_ms * 10.0).ceil() / 10.0 };
-        let seen = Moving::new(&scene, &synthesis, path, [times.scan_ms.unwrap(), period_ms]);
+        // Decoders that take about as long share their frames: periods are 2 % apart.
+        let period_ms = ((times.period_ms().ln() / 0.02).ceil() * 0.02).exp();
+        let scan = ([times.scan_ms.unwrap(), period_ms], 1);
+        let seen = Moving::new(&scene, &synthesis, path, scan);
         let seen = seen.unwrap();
         let model = blob.prepare(Exponential::default());
         if point.arithmetic.exponential != Exponential::default() {
@@ -98,7 +96,7 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     );
     assert!(rmse(&ways[0]) < rmse(&moving["decoders"][0]), "{moving}");
     assert!(ways[0]["age_ms"].as_f64().unwrap() > 1.0);
-    assert_eq!(moving["shown"]["time_s"].as_array().unwrap().len(), 451);
+    assert_eq!(moving["shown"]["time_s"].as_array().unwrap().len(), 486);
     let text = folder.succeed(&["run", "small.toml"]);
     assert!(
         text.contains(

@@ -63,7 +63,7 @@ fn moving_contacts_are_written_as_a_log_and_still_ones_as_a_model_is_trained_on(
     let log = synth("moving.toml -n 250 --frame-rate 1000 --scan-ms 0.9");
     assert_eq!(fields(&log, 0), ["time_s", "trajectory", "r4c1_ohm"]);
     assert_eq!(fields(&log, 100)[..2], ["0.099", "1"]);
-    assert_eq!(fields(&log, 101)[..2], ["0.1", "2"]);
+    assert_eq!(fields(&log, 101)[..2], ["1.1", "2"]);
     assert_eq!(synth("moving.toml -n 20 --still"), synth("still.toml -n 20"));
     // The untouched sensor over time: the draws of one trajectory.
     let rest = synth("still.toml -n 30 --untouched --frame-rate 50 --scan-ms 5");

@@ -1,8 +1,5 @@
 //! What a model is worth on contacts that move, read by a board at its own pace.
 
-use std::sync::Arc;
-
-use model_core::filter::Settings;
 use serde::Serialize;
 use taxel_data::{BadValue, columns};
 use taxel_learn::cost::{Design, Prices};
@@ -10,7 +7,7 @@ use taxel_learn::{Decoder, Exponential, ModelBlob};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
-use super::trade::{Device, FilterSettings, OfPeriod, Times, Touches, Wires};
+use super::trade::{Device, FilterSettings, Times, Touched, Touches, Way, Wires};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::metrics::{DecoderErrors, Errors};
@@ -61,7 +58,8 @@ impl MovingContacts {
         let Some(path) = scene.world.path.filter(|_| !scene.is_forward()) else { return Ok(None) };
         let judged =
             Judged::new(scene, Synthesis::new(&scene.world), path, blob, Device::default(), 1)?;
-        let scanned = judged.touches.while_scanned(judged.times.scan_ms)?;
+        let scan_ms = judged.touched.ways[0].times.scan_ms;
+        let scanned = judged.touches.while_scanned(scan_ms)?;
         let decoders = baselines.iter().map(|baseline| {
             let estimates = baseline.decode_all(&scanned.moving.frames.inputs.values, 1);
             let errors = scanned.errors_at_once(&estimates.values, &scene.measure());
@@ -69,7 +67,8 @@ impl MovingContacts {
         });
         let decoders = decoders.collect();
         let shown = ShownTrajectory::new(&judged);
-        Ok(Some(Self { path, group: judged.group, ways: judged.ways, decoders, shown }))
+        let ways = judged.ways();
+        Ok(Some(Self { path, group: judged.group, ways, decoders, shown }))
     }
 }
 
@@ -77,8 +76,7 @@ impl MovingContacts {
 pub fn scanned(scene: &Experiment, device: Device, samples: usize) -> Synthesis<'_> {
     let world = &scene.world;
     let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
-    let noise = world.noise.averaged(samples, device.sample_spacing_s(Some(wires)));
-    Synthesis::new(world).noise(noise)
+    Synthesis::new(world).noise(device.averaged(world.noise, Some(wires), samples))
 }
 
 /// Errors of the model in `blob` on the moving contacts of `scene`, without a filter and behind one, on a `device` that
@@ -97,19 +95,14 @@ pub fn on_device(
         return Err(BadValue::new("motion", "none", rule).into());
     };
     let synthesis = scanned(scene, device, samples);
-    Ok(Judged::new(scene, synthesis, path, blob, device, samples)?.ways)
+    Ok(Judged::new(scene, synthesis, path, blob, device, samples)?.ways())
 }
 
 /// Model that was judged on one device.
 struct Judged<'s> {
     touches: Touches<'s>,
-    touched: Arc<OfPeriod>,
+    touched: Touched,
     group: String,
-    /// Times of a frame that is filtered.
-    times: Times,
-    estimates: Vec<f64>,
-    filter: Settings,
-    ways: Vec<MovingWay>,
 }
 
 impl<'s> Judged<'s> {
@@ -122,34 +115,35 @@ impl<'s> Judged<'s> {
         samples: usize,
     ) -> Result<Self> {
         let model = blob.prepare(Exponential::default()).of_inputs();
-        let (world, measure) = (&scene.world, scene.measure());
         let prices = Prices::accepted()?;
         let cost = prices.frames(&Design::new(blob), Exponential::default())?.ungated;
-        let filtered = cost.plus(prices.filter(blob.parse().shape())?);
+        let world = &scene.world;
         let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
         let scan_ms = device.scan_ms(Some(wires), samples);
-        let [raw, times] = [cost, filtered].map(|cost| device.times(scan_ms, &cost));
         let names = scene.output_names();
         let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();
-        let touches = Touches::new(scene, synthesis, path, &group);
-        let touched = touches.at(&raw)?;
-        let estimates = model.decode_lines(&touched.moving.frames.inputs.values);
-        let filter = touched.filter_settings(&model, &estimates, times.age_ms.unwrap_or_default());
-        let way = |settings: Settings, times: Times| MovingWay {
-            filter: settings.is_on().then(|| settings.into()),
-            times,
-            errors: touched.errors(&estimates, settings, &times, &measure),
+        let touches = Touches::new(scene, synthesis, (path, device.passes(samples)), &group);
+        let (cost, device) = ((cost, &prices), (&device, scan_ms));
+        let touched = touches.judge((blob, &model), cost, device, &scene.measure())?;
+        Ok(Self { touches, touched, group })
+    }
+
+    fn ways(&self) -> Vec<MovingWay> {
+        let way = |way: &Way| MovingWay {
+            filter: way.filter.is_on().then(|| way.filter.into()),
+            times: way.times,
+            errors: way.errors.clone(),
         };
-        let ways = vec![way(Settings::default(), raw), way(filter, times)];
-        Ok(Self { touches, touched, group, times, estimates, filter, ways })
+        self.touched.ways.iter().map(way).collect()
     }
 }
 
 impl ShownTrajectory {
     /// First trajectory, and the output of `group` that changes most in it.
     fn new(judged: &Judged<'_>) -> Self {
-        let Judged { touched, group, estimates, filter, times, .. } = judged;
-        let (moving, finished_ms) = (&touched.moving, times.frame_ms);
+        let Judged { touched, group, .. } = judged;
+        let moving = &touched.of_period.moving;
+        let [plain, behind] = &touched.ways;
         let names = &moving.truth.names;
         let of_output = |values: &[f64], output: usize| -> Vec<f64> {
             let moments = values.chunks_exact(names.len()).take(moving.moments_s.len());
@@ -164,15 +158,16 @@ impl ShownTrajectory {
             (0..names.len()).filter(|output| columns::group_of(&names[*output]) == *group);
         let ranges = outputs.map(|output| (output, range(output)));
         let (output, _) = ranges.max_by(|(_, a), (_, b)| a.total_cmp(b)).unwrap_or_default();
-        let filtered = moving.filtered(estimates, *filter);
-        let held = |estimates: &[f64]| of_output(&moving.held(estimates, finished_ms), output);
+        let held = |estimates: &[f64], way: &Way| {
+            of_output(&moving.held(estimates, way.times.frame_ms), output)
+        };
         Self {
             output: names[output].clone(),
             unit: columns::unit_of(&names[output]).into(),
             time_s: moving.moments_s.clone(),
             truth: of_output(&moving.truth.values, output),
-            estimate: held(estimates),
-            filtered: held(&filtered),
+            estimate: held(&touched.estimates, plain),
+            filtered: held(&touched.filtered, behind),
         }
     }
 }

@@ -42,7 +42,7 @@ use judge::Judged;
 pub use line::Line;
 pub use point::{Arithmetic, FilterSettings, Point};
 pub use readings::Readings;
-pub(super) use touches::{OfPeriod, Touches};
+pub(super) use touches::{Touched, Touches, Way};
 use ways::Ways;
 pub use worst::OtherError;
 

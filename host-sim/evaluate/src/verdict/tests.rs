@@ -218,7 +218,8 @@ fn averaging_within_a_time_constant_is_warned_of() {
         ..Noise::white(NoiseKind::Relative, 0.005)
     };
     let warning = |noise: &Noise, samples, spacing_s| {
-        Warning::idle_averaging(noise, samples, spacing_s).map(|it| (it.name, it.text))
+        Warning::idle_averaging(samples, |n| noise.averaged(n, spacing_s))
+            .map(|it| (it.name, it.text))
     };
     // White noise of 16 samples has a quarter of one's, so that both have 0.73 of it; of eight, 0.75.
     let (name, text) = warning(&noise, 16, 36e-6).unwrap();

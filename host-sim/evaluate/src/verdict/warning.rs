@@ -204,9 +204,10 @@ impl Warning {
         Self::when(due, "noise-with-a-memory", || sentences(noise).join(" "))
     }
 
-    /// Means of so many `samples`, with this `noise`, that lower it by less than a tenth of what half as many leave.
-    pub fn idle_averaging(noise: &Noise, samples: usize, spacing_s: f64) -> Option<Self> {
-        let level = |samples: usize| noise.averaged(samples.max(1), spacing_s).total_level();
+    /// Means of so many `samples` that lower the noise by less than a tenth of what half as many leave: what is
+    /// `left` of it by a number of samples.
+    pub fn idle_averaging(samples: usize, left: impl Fn(usize) -> Noise) -> Option<Self> {
+        let level = |samples: usize| left(samples.max(1)).total_level();
         let due = samples > 1 && level(samples) > (1.0 - spectrum::PAYS) * level(samples / 2);
         Self::when(due, "averaging-does-not-pay", || {
             format!(
@@ -214,7 +215,7 @@ impl Warning {
                  constant of {} ms, and they lie within; average fewer (--average)",
                 significant(level(samples) / level(1)),
                 significant(level(samples / 2) / level(1)),
-                significant(noise.time_constant_ms)
+                significant(left(1).time_constant_ms)
             )
         })
     }

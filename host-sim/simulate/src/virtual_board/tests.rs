@@ -99,6 +99,7 @@ fn a_scan_takes_the_transactions_and_the_time_that_are_planned() {
         sample_ns: 24_000,
         reading_ns: 0,
         row_ns: 0,
+        between_passes_ns: 0,
     };
     assert_eq!(board.elapsed_ns(), u64::from(plan.longest_us()) * 1000);
     assert_eq!(board.active_row(), None);

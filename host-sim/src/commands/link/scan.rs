@@ -95,6 +95,7 @@ pub fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
         sample_ns: SLOWEST_SAMPLE_NS,
         reading_ns: SLOWEST_SAMPLE_NS,
         row_ns: SLOWEST_SAMPLE_NS,
+        between_passes_ns: 0,
     };
     let period = Duration::from_micros(scan.period_us.max(plan.longest_us()).into());
     Duration::from_secs(2) + 4 * u32::from(scan.frames) * period

@@ -263,8 +263,8 @@ fn cost(point: &Point) -> String {
     let times = &point.times;
     let time = match times.scan_ms {
         Some(scan_ms) => format!(
-            "A frame takes {} ms ({} ms to scan, {} ms to decode), so at most {} frames a second, and an estimate is {} ms old \
-             when it is used, on average",
+            "An estimate is finished {} ms after the start of its scan ({} ms to scan, {} ms to decode). There are at most {} \
+             frames a second. An estimate is {} ms old when it is used, on average",
             ms(times.frame_ms),
             ms(scan_ms),
             ms(times.decode_ms),

@@ -30,11 +30,14 @@ fn ticks_between(
     ticks.at.into_iter().filter(|(value, _)| (low..=high).contains(value)).collect()
 }
 
-/// What the level axis shows: decoding in µs if all scans take the same time, else scan and decoding in ms.
+/// What the level axis shows: decoding in µs if all scans take the same time, else the time from the start of a scan to its
+/// estimate in ms.
 pub struct AxisOfTimes {
     /// Time of all scans, if it is the same for all points.
     scan_ms: Option<f64>,
     is_decoding: bool,
+    /// Whether the next scan starts only when the estimate is finished: then the axis tells the rate as well.
+    in_turn: bool,
 }
 
 /// Both axes.
@@ -49,7 +52,9 @@ impl Axes {
     pub fn new(trade: &Trade) -> Self {
         let scan_ms = trade.points.first().and_then(|point| point.times.scan_ms);
         let is_decoding = trade.points.iter().all(|point| point.times.scan_ms == scan_ms);
-        let times = AxisOfTimes { scan_ms, is_decoding };
+        let in_turn = |times: &Times| (times.period_ms() / times.frame_ms - 1.0).abs() < 1e-9;
+        let in_turn = trade.points.iter().all(|point| in_turn(&point.times));
+        let times = AxisOfTimes { scan_ms, is_decoding, in_turn };
         let shown = || {
             let chosen = |i: usize| trade.chosen == Some(i);
             let points = trade.points.iter().enumerate();
@@ -82,7 +87,7 @@ impl AxisOfTimes {
         if self.is_decoding { 1000.0 * times.decode_ms } else { times.frame_ms }
     }
 
-    /// Level coordinate of a time of a frame in ms.
+    /// Level coordinate of a time in ms from the start of a scan to its estimate.
     fn of_frame(&self, frame_ms: f64) -> f64 {
         if self.is_decoding {
             1000.0 * (frame_ms - self.scan_ms.unwrap_or(0.0)).max(0.0)
@@ -93,7 +98,7 @@ impl AxisOfTimes {
 
     fn label(&self) -> String {
         match (self.is_decoding, self.scan_ms) {
-            (false, _) => "time of a frame, scan and decoding, ms".into(),
+            (false, _) => "time from the start of a scan to its estimate, ms".into(),
             (true, Some(ms)) => {
                 format!("time of decoding a frame, µs; each scan takes {ms} ms before")
             }
@@ -102,15 +107,20 @@ impl AxisOfTimes {
     }
 
     pub fn rate_label(&self) -> &'static str {
-        if self.scan_ms.is_some() || !self.is_decoding {
+        if !self.in_turn {
+            "scans go on while the frame before is decoded"
+        } else if self.scan_ms.is_some() || !self.is_decoding {
             "frames a second"
         } else {
             "frames a second, by decoding alone"
         }
     }
 
-    /// Frames a second along the x axis: level coordinates and labels.
+    /// Frames a second along the x axis: level coordinates and labels. None where scan and decoding overlap.
     pub fn rates(&self, x: &Axis) -> Vec<(f64, String)> {
+        if !self.in_turn {
+            return Vec::new();
+        }
         let scan_ms = if self.is_decoding { self.scan_ms.unwrap_or(0.0) } else { 0.0 };
         let unit = if self.is_decoding { 1000.0 } else { 1.0 };
         let rate = |x: f64| 1000.0 / (scan_ms + x / unit);
@@ -121,7 +131,7 @@ impl AxisOfTimes {
 
     /// Bounds on time: what they are, and their level coordinate.
     pub fn uprights(&self, trade: &Trade) -> Vec<(String, f64)> {
-        let rate = trade.bounds.frame_rate_hz;
+        let rate = trade.bounds.frame_rate_hz.filter(|_| self.in_turn);
         let rate = rate.map(|hz| (format!("at least {hz} frames/s"), self.of_frame(1000.0 / hz)));
         let latency = trade.bounds.latency_ms;
         let latency = latency.map(|ms| (format!("at most {ms} ms"), self.of_frame(ms)));

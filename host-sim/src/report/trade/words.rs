@@ -17,12 +17,12 @@ pub fn error(trade: &Trade, rmse: f64) -> String {
     format!("{} {}", significant(rmse, 3), trade.unit).trim_end().into()
 }
 
-/// Times of a frame.
+/// Times of a frame, and its rate.
 pub fn times(times: &Times) -> String {
     let decoding = format!("{} ms to decode", fixed(times.decode_ms, 3));
     match times.scan_ms {
         Some(scan_ms) => format!(
-            "{} ms a frame ({} ms to scan, {decoding}), {} frames/s",
+            "{} ms from scan to estimate ({} ms to scan, {decoding}), {} frames/s",
             fixed(times.frame_ms, 3),
             fixed(scan_ms, 3),
             rate(times.frames_per_s)

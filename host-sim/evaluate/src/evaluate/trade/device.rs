@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use firmware::timing::{ONCHIP_READINGS_US, ONCHIP_SUMS_US, ScanPlan};
+use firmware::timing::{ONCHIP_READINGS_US, ONCHIP_SAMPLES, ONCHIP_SUMS_US, ScanPlan};
 use serde::Serialize;
 use taxel_data::{BadValue, columns};
 use taxel_learn::cost::Cost;
+use taxel_simulate::noise::Noise;
 
 use crate::moving::age_ms;
 
@@ -91,7 +92,8 @@ pub struct Times {
     pub scan_ms: Option<f64>,
     /// Time of decoding; behind a gate, the mean over the test frames.
     pub decode_ms: f64,
-    /// Time of both, and of the work between them; of decoding alone if the scan's is unknown.
+    /// Time from the start of the scan until its estimate is finished: both, and what the processor does between them; of
+    /// decoding alone if the scan's is unknown.
     pub frame_ms: f64,
     /// Frames in a second, at most: one over the time of a frame, or of the longer of scan and processor's work where both go
     /// on at once ([`Readout::OnChip`]).
@@ -135,16 +137,29 @@ impl Device {
         self.scan_ms.map(|once| once * samples as f64).or(wires.map(of_board))
     }
 
-    /// Time in s between two samples of one reading; 0 if nothing tells it. They are taken one after the other, by on-chip
-    /// converters those of half a row at once.
-    pub fn sample_spacing_s(&self, wires: Option<Wires>) -> f64 {
-        let scan_ms = |samples| self.scan_ms(wires, samples);
-        let of_all = scan_ms(2).zip(scan_ms(1)).map(|(two, one)| (two - one) / 1000.0);
+    /// Number of passes over the rows in which so many `samples` a reading are taken.
+    pub fn passes(&self, samples: usize) -> usize {
+        match (self.readout, self.scan_ms) {
+            (Readout::OnChip, None) => samples.div_ceil(usize::from(ONCHIP_SAMPLES)).max(1),
+            _ => 1,
+        }
+    }
+
+    /// What means of so many `samples` leave of `noise`. White noise falls with the root of their number, the other part by
+    /// the times at which a scan of `wires` takes them; by none if nothing tells these.
+    pub fn averaged(&self, noise: Noise, wires: Option<Wires>, samples: usize) -> Noise {
+        let scan_s = |samples| self.scan_ms(wires, samples).unwrap_or(0.0) / 1000.0;
+        // Samples are taken one after the other, by on-chip converters those of half a row at once.
         let in_turn = |wires: Wires| match self.readout {
             Readout::Spi => wires.rows * wires.columns,
             Readout::OnChip => 2 * wires.rows,
         };
-        wires.zip(of_all).map_or(0.0, |(wires, of_all_s)| of_all_s / in_turn(wires) as f64)
+        let spacing_s = wires.map_or(0.0, |wires| (scan_s(2) - scan_s(1)) / in_turn(wires) as f64);
+        let passes = self.passes(samples);
+        let in_pass = samples.div_ceil(passes);
+        let of_pass = noise.averaged(in_pass, spacing_s);
+        let left = of_pass.averaged(passes, scan_s(in_pass) + f64::from(ONCHIP_SUMS_US) * 1e-6);
+        Noise { level: noise.level / (samples as f64).sqrt(), ..left }
     }
 
     /// Cycles of a frame with this `cost` in the device's memory.
@@ -166,11 +181,14 @@ impl Device {
             // They are part of the scan, or unknown.
             _ => [0.0; 2],
         };
-        let work_ms = sums_ms + readings_ms + decode_ms;
-        let frame_ms = scanned_ms + work_ms;
-        let period_ms = match self.readout {
-            Readout::Spi => frame_ms,
-            Readout::OnChip => (scanned_ms + sums_ms).max(work_ms),
+        let work_ms = readings_ms + decode_ms;
+        let (period_ms, frame_ms) = match self.readout {
+            Readout::Spi => (scanned_ms + work_ms, scanned_ms + work_ms),
+            // Sums wait until the frame before is decoded.
+            Readout::OnChip => {
+                let period_ms = scanned_ms.max(work_ms) + sums_ms;
+                (period_ms, period_ms + work_ms)
+            }
         };
         let age_ms = scan_ms.map(|scan_ms| age_ms(scan_ms, frame_ms, period_ms));
         Times { scan_ms, decode_ms, frame_ms, frames_per_s: 1000.0 / period_ms, age_ms }
@@ -179,6 +197,8 @@ impl Device {
 
 #[cfg(test)]
 mod tests {
+    use taxel_simulate::noise::NoiseKind;
+
     use super::*;
 
     #[test]
@@ -203,11 +223,39 @@ mod tests {
         assert!((times.frame_ms - (0.9 + 0.061 + 0.2 + 0.2)).abs() < 1e-12);
         assert!((times.period_ms() - 0.961).abs() < 1e-12);
         assert!((times.age_ms.unwrap() - (0.45 + 0.461 + 0.5 * 0.961)).abs() < 1e-12);
-        // With a short scan the processor is what takes longest.
-        assert!((onchip.times(Some(0.2), &cost).period_ms() - 0.461).abs() < 1e-12);
+        // With a short scan the processor is what takes longest, and the next frame waits for it.
+        let times = onchip.times(Some(0.2), &cost);
+        assert!((times.period_ms() - 0.461).abs() < 1e-12);
+        assert!((times.frame_ms - (0.461 + 0.4)).abs() < 1e-12);
         let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
         assert_eq!(ram.times(None, &cost).frame_ms, 0.2);
         assert_eq!(ram.times(None, &cost).frames_per_s, 5000.0);
+    }
+
+    #[test]
+    fn samples_of_several_passes_lie_apart() {
+        let noise = Noise {
+            correlated_level: 0.01,
+            time_constant_ms: 1.0,
+            ..Noise::white(NoiseKind::Relative, 0.01)
+        };
+        let (paper, onchip) = (
+            Some(Wires { rows: 8, columns: 18 }),
+            Device { readout: Readout::OnChip, ..Device::default() },
+        );
+        let left = |samples: usize, device: Device| device.averaged(noise, paper, samples);
+        let [one, three] = [left(16, onchip), left(48, onchip)];
+        assert!((three.level / 0.01 - (1.0 / 48.0_f64).sqrt()).abs() < 1e-12);
+        // Passes of 1.19 ms: means of 16 samples within 0.1 ms, whose correlations are e^(−1.19), and its square.
+        let (a, rest) = ((-1.189_f64).exp(), one.correlated_level / 0.01);
+        let expected = ((1.0 + 2.0 * (2.0 * a + a * a) / 3.0) / 3.0).sqrt() * rest;
+        assert!((three.correlated_level / 0.01 / expected - 1.0).abs() < 1e-3, "{three:?}");
+        assert!(rest > 0.95 && (onchip.passes(17), onchip.passes(16)) == (2, 1));
+        // On SPI all samples of a reading follow one another, 36 µs apart.
+        let spi = left(48, Device::default()).correlated_level / 0.01;
+        assert!((0.7..0.8).contains(&spi), "{spi}");
+        let given = Device { scan_ms: Some(1.0), ..onchip };
+        assert_eq!((given.passes(48), onchip.averaged(noise, None, 4).correlated_level), (1, 0.01));
     }
 
     #[test]

@@ -76,12 +76,14 @@ impl<'s> Frames<'s> {
             }
             Subject::Measured(data) => (false, Wires::named(&data.training.inputs.names)),
         };
-        let spacing_s = plan.device.sample_spacing_s(wires);
-        let noise = subject.noise_averaged(samples_averaged, spacing_s);
+        let noise = subject
+            .scene()
+            .map(|scene| plan.device.averaged(scene.world.noise, wires, samples_averaged));
         let (set, test) = subject.sets(noise);
         let touches = subject.scene().and_then(|scene| {
             let synthesis = Synthesis::new(&scene.world).noise(noise?);
-            Some(Touches::new(scene, synthesis, scene.world.path?, group))
+            let passes = plan.device.passes(samples_averaged);
+            Some(Touches::new(scene, synthesis, (scene.world.path?, passes), group))
         });
         let options = subject.options();
         let arrays: &[bool] = match (of_array, set.frames.rows) {

@@ -11,6 +11,7 @@ use taxel_learn::{Exponential, ModelBlob, Options, Origin, Trained, pack};
 
 use super::progress::Part;
 use super::readings::in_words;
+use super::touches::Way;
 use super::ways::{Variant, Ways};
 use super::{Arithmetic, Device, Point, SLOT_BYTES};
 use crate::error::Result;
@@ -146,14 +147,9 @@ impl Judged {
         };
         let (no_gate, no_filter) = (None, Settings::default());
         if let Some(touches) = &frames.touches {
-            let filtered = costs.ungated.plus(prices.filter(blob.parse().shape())?);
-            let times_of = |cost: &Cost| device.times(frames.scan_ms, cost);
-            let touched = touches.at(&times_of(&costs.ungated))?;
-            let estimates = model.decode_lines(&touched.moving.frames.inputs.values);
-            let age_ms = times_of(&filtered).age_ms.unwrap_or_default();
-            let filter = touched.filter_settings(&model, &estimates, age_ms);
-            for (filter, cost) in [(no_filter, costs.ungated), (filter, filtered)] {
-                let errors = touched.errors(&estimates, filter, &times_of(&cost), measure);
+            let (cost, device) = ((costs.ungated, prices), (device, frames.scan_ms));
+            let touched = touches.judge((blob, &model), cost, device, measure)?;
+            for Way { filter, cost, errors, .. } in touched.ways {
                 add((no_gate, filter), cost, errors);
             }
             return Ok(());

@@ -7,30 +7,55 @@ use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_data::{BadValue, columns};
-use taxel_learn::PreparedModel;
+use taxel_learn::cost::{Cost, Prices};
 use taxel_learn::filtered::{Movement, settings_for};
+use taxel_learn::{ModelBlob, PreparedModel};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
-use super::device::Times;
+use super::device::{Device, Times};
+use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::metrics::{self, Errors, Measure};
-use crate::moving::Moving;
+use crate::moving::{GRID_S, Moving};
 
 /// Trajectories on which a decoder's noise is measured.
 const FEW_TRAJECTORIES: usize = 8;
-/// Moments over which movement is measured to begin with: 5 ms.
-const USUAL_MOMENTS: usize = 5;
+/// Time in s over which movement is measured to begin with.
+const USUAL_S: f64 = 0.005;
+/// Step of the logarithms of periods whose frames are made.
+const PERIOD_STEP: f64 = 0.02;
 
 /// Moving contacts of a scene, with one number of samples a reading.
 pub struct Touches<'s> {
     scene: &'s Experiment,
     synthesis: Synthesis<'s>,
     path: Path,
+    /// Number of passes over the rows that a scan consists of.
+    passes: usize,
     /// Group of outputs for whose errors filters are set.
     group: String,
-    /// Frames of the period that was asked for last.
-    last: Mutex<Option<Arc<OfPeriod>>>,
+    /// Frames of the two periods that were asked for last: one without a filter, and one with it.
+    last: Mutex<Vec<Arc<OfPeriod>>>,
+}
+
+/// A model on moving contacts.
+pub struct Touched {
+    /// Frames as they come where a filter works behind it.
+    pub of_period: Arc<OfPeriod>,
+    /// Its estimates of all these frames, and what the filter makes of them.
+    pub estimates: Vec<f64>,
+    pub filtered: Vec<f64>,
+    /// Without a filter, and behind one.
+    pub ways: [Way; 2],
+}
+
+/// One way to decode moving contacts.
+pub struct Way {
+    pub filter: Settings,
+    pub cost: Cost,
+    pub times: Times,
+    pub errors: Vec<Errors>,
 }
 
 /// Frames of one period, and what setting a filter needs to know of them.
@@ -45,45 +70,86 @@ pub struct OfPeriod {
 }
 
 impl<'s> Touches<'s> {
-    /// Contacts of `scene` along `path`, from a `synthesis` of its world. Filters are set for the errors of `group`.
-    pub fn new(scene: &'s Experiment, synthesis: Synthesis<'s>, path: Path, group: &str) -> Self {
-        Self { scene, synthesis, path, group: group.into(), last: Mutex::new(None) }
+    /// Contacts of `scene` along `path`, from a `synthesis` of its world, in scans of so many `passes`. Filters are set for the
+    /// errors of `group`.
+    pub fn new(
+        scene: &'s Experiment,
+        synthesis: Synthesis<'s>,
+        (path, passes): (Path, usize),
+        group: &str,
+    ) -> Self {
+        Self { scene, synthesis, path, passes, group: group.into(), last: Mutex::default() }
     }
 
-    /// Frames of a device that scans and decodes in these `times`. Their period is rounded up to two digits, so that decoders
-    /// that take about as long share their frames.
+    /// Errors of the model in `blob` as a `device` runs it that scans in `scan_ms`: without a filter in time, and behind one.
+    /// Its decoding has this `cost`.
     ///
     /// # Errors
-    /// [`BadValue`] for times that [`Moving::new`] refuses.
-    pub fn at(&self, times: &Times) -> Result<Arc<OfPeriod>, BadValue> {
+    /// [`BadValue`] for times that [`Moving::new`] refuses, and a model that `prices` do not cover.
+    pub fn judge(
+        &self,
+        (blob, model): (&ModelBlob, &PreparedModel<'_>),
+        (cost, prices): (Cost, &Prices),
+        (device, scan_ms): (&Device, Option<f64>),
+        measure: &Measure,
+    ) -> Result<Touched> {
+        let behind_filter = cost.plus(prices.filter(blob.parse().shape())?);
+        let [times, filter_times] = [cost, behind_filter].map(|cost| device.times(scan_ms, &cost));
+        let decode =
+            |of_period: &OfPeriod| model.decode_lines(&of_period.moving.frames.inputs.values);
+        let of_period = self.at(&times)?;
+        let estimates = decode(&of_period);
+        let errors = of_period.moving.errors(&estimates, times.frame_ms, measure);
+        let plain = Way { filter: Settings::default(), cost, times, errors };
+        // Behind a filter frames take longer, if only a little.
+        let slower = self.at(&filter_times)?;
+        let estimates = if Arc::ptr_eq(&slower, &of_period) { estimates } else { decode(&slower) };
+        let age_ms = filter_times.age_ms.unwrap_or_default();
+        let filter = slower.filter_settings(model, &estimates, age_ms);
+        let filtered = slower.moving.filtered(&estimates, filter);
+        let errors = slower.moving.errors(&filtered, filter_times.frame_ms, measure);
+        let behind = Way { filter, cost: behind_filter, times: filter_times, errors };
+        Ok(Touched { of_period: slower, estimates, filtered, ways: [plain, behind] })
+    }
+
+    /// Frames of a device that scans and decodes in these `times`. Their period is rounded up, by a fiftieth at most, so that
+    /// decoders that take about as long share their frames.
+    fn at(&self, times: &Times) -> std::result::Result<Arc<OfPeriod>, BadValue> {
         self.of(times.scan_ms.unwrap_or_default(), times.period_ms())
     }
 
     /// Frames of a device whose decoding takes no time.
     ///
     /// # Errors
-    /// As [`at`](Self::at).
-    pub fn while_scanned(&self, scan_ms: Option<f64>) -> Result<Arc<OfPeriod>, BadValue> {
+    /// [`BadValue`] for times that [`Moving::new`] refuses.
+    pub fn while_scanned(
+        &self,
+        scan_ms: Option<f64>,
+    ) -> std::result::Result<Arc<OfPeriod>, BadValue> {
         self.of(scan_ms.unwrap_or_default(), scan_ms.unwrap_or_default())
     }
 
-    fn of(&self, scan_ms: f64, period_ms: f64) -> Result<Arc<OfPeriod>, BadValue> {
-        let digit = 10_f64.powf(period_ms.log10().floor() - 1.0);
-        let period_ms = (period_ms / digit - 1e-9).ceil() * digit;
+    fn of(&self, scan_ms: f64, period_ms: f64) -> std::result::Result<Arc<OfPeriod>, BadValue> {
+        let period_ms = ((period_ms.ln() / PERIOD_STEP - 1e-9).ceil() * PERIOD_STEP).exp();
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(same) = last.as_ref().filter(|last| last.period_ms == period_ms) {
+        if let Some(same) = last.iter().find(|last| last.period_ms == period_ms) {
             return Ok(Arc::clone(same));
         }
         let found = Arc::new(OfPeriod::new(self, scan_ms, period_ms)?);
-        *last = Some(Arc::clone(&found));
+        last.insert(0, Arc::clone(&found));
+        last.truncate(2);
         Ok(found)
     }
 }
 
 impl OfPeriod {
-    fn new(touches: &Touches<'_>, scan_ms: f64, period_ms: f64) -> Result<Self, BadValue> {
-        let Touches { scene, synthesis, path, group, .. } = touches;
-        let moving = Moving::new(scene, synthesis, *path, [scan_ms, period_ms])?;
+    fn new(
+        touches: &Touches<'_>,
+        scan_ms: f64,
+        period_ms: f64,
+    ) -> std::result::Result<Self, BadValue> {
+        let Touches { scene, synthesis, path, passes, group, .. } = touches;
+        let moving = Moving::new(scene, synthesis, *path, ([scan_ms, period_ms], *passes))?;
         let few = path.trajectories.min(FEW_TRAJECTORIES) * moving.timetable.scans();
         let ideal = synthesis.clone().ideal().along(*path, moving.timetable.clone());
         let ideal = scene.dataset(&ideal, Stream::Test, few);
@@ -93,7 +159,7 @@ impl OfPeriod {
 
     /// Settings of a filter behind `model`, whose `estimates` are those of all frames: those of least expected error by the
     /// [rule](taxel_learn::filtered#rule). The model's noise is what noise on the readings adds to its estimates.
-    pub fn filter_settings(
+    fn filter_settings(
         &self,
         model: &PreparedModel<'_>,
         estimates: &[f64],
@@ -109,25 +175,21 @@ impl OfPeriod {
             of.iter().zip(&of[outputs..]).map(|(before, after)| after - before).collect::<Vec<_>>()
         });
         let noise = (0.5 * weighted_mean_square(steps, &self.weights)).sqrt();
-        let settings = |moments: usize| {
+        let settings = |over_s: f64| {
+            let moments = (over_s / GRID_S).round() as usize;
+            let moments = moments.clamp(1, self.moving.moments_s.len() / 4);
             let movement = self.movement(moments);
             settings_for(noise, movement, 1000.0 * self.period_ms, 1000.0 * age_ms)
         };
         // The movement over about the time constant that it leads to.
-        let usual = settings(USUAL_MOMENTS);
-        let moments = f64::from(usual.time_constant_us) / 1e6 / self.step_s();
-        settings((moments.round() as usize).clamp(1, self.moving.moments_s.len() / 4))
-    }
-
-    /// Time between two moments at which the truth is known.
-    fn step_s(&self) -> f64 {
-        self.moving.moments_s[1] - self.moving.moments_s[0]
+        let usual = settings(USUAL_S);
+        settings(f64::from(usual.time_constant_us) / 1e6)
     }
 
     /// Movement of the true outputs, by differences over so many `moments`.
     fn movement(&self, moments: usize) -> Movement {
         let outputs = self.weights.len();
-        let (over, step_s) = (outputs * moments, self.step_s() * moments as f64);
+        let (over, step_s) = (outputs * moments, GRID_S * moments as f64);
         let of_trajectories =
             || self.moving.truth.values.chunks_exact(outputs * self.moving.moments_s.len());
         let first = of_trajectories().flat_map(|of| {
@@ -143,21 +205,6 @@ impl OfPeriod {
         ]
         .map(f64::sqrt);
         Movement { rate_per_s, acceleration_per_s2 }
-    }
-
-    /// Errors of the `estimates` of all frames, or of what a filter with these `settings` makes of them.
-    pub fn errors(
-        &self,
-        estimates: &[f64],
-        settings: Settings,
-        times: &Times,
-        measure: &Measure,
-    ) -> Vec<Errors> {
-        let finished_ms = times.frame_ms;
-        if !settings.is_on() {
-            return self.moving.errors(estimates, finished_ms, measure);
-        }
-        self.moving.errors(&self.moving.filtered(estimates, settings), finished_ms, measure)
     }
 
     /// Errors of the `estimates` of a decoder that takes no time.
