@@ -19,9 +19,9 @@ use taxel_rig::device::Device;
 use taxel_rig::device::calibrate::{Reading, calibrate};
 use taxel_rig::emulator::{self, Emulator};
 use taxel_rig::mailbox::Mailbox;
-use taxel_simulate::readout::{Drive, Readout, op_amp_time_constant_us};
-use taxel_simulate::virtual_board::{Parts, Pin, VirtualBoard};
+use taxel_simulate::readout::{Drive, Readout};
 use taxel_simulate::{World, synthesise};
+use taxel_virtual_board::{Parts, Pin, VirtualBoard, op_amp_time_constant_us};
 
 use crate::common::Folder;
 use crate::virtual_device::mailbox::{Memory, pair};

@@ -7,8 +7,8 @@ use model_core::blob::Model;
 use model_core::rbf::Network;
 use taxel_data::random::Stream;
 use taxel_simulate::readout::Drive;
-use taxel_simulate::virtual_board::{Pin, VirtualBoard, all_readings};
 use taxel_simulate::{World, synthesise};
+use taxel_virtual_board::{Pin, VirtualBoard, all_readings};
 
 use crate::common::{Folder, small_scene};
 

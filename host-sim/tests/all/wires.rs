@@ -15,7 +15,7 @@ use taxel_data::random::{Purpose, Random, Stream};
 use taxel_rig::device::{Device, upload};
 use taxel_simulate::World;
 use taxel_simulate::readout::Readout;
-use taxel_simulate::virtual_board::{FrameScanner, SeriesResistance, VirtualBoard, all_readings};
+use taxel_virtual_board::{FrameScanner, SeriesResistance, VirtualBoard, all_readings};
 
 use crate::virtual_device::mailbox::pair;
 use crate::virtual_device::{Line, run_with};

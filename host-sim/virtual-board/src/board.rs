@@ -14,11 +14,11 @@ use super::converters::{ColumnSelector, mcp3208_answer, mcp3208_column};
 use super::fault::BoardFault;
 use super::pin::Pin;
 use super::rows::RowSelector;
+use super::violation::Violation;
 use super::{COLUMNS, ROWS};
-use crate::Error;
-use crate::error::Violation;
-use crate::readout::{Readout, Sampler};
-use crate::world::World;
+use taxel_data::Error;
+use taxel_simulate::readout::{Readout, Sampler};
+use taxel_simulate::world::World;
 
 /// Resolution of every converter on the board, in bits.
 const CONVERTER_BITS: u8 = 12;
