@@ -1,7 +1,7 @@
 //! Outputs that a model should predict, and the names of their columns.
 
 use serde::Deserialize;
-use taxel_data::simd::{LANES, Lanes};
+use taxel_data::{LANES, Lanes};
 
 use crate::contact::Contact;
 use crate::sensor::{Axis, Sensor, Vector3};

@@ -7,9 +7,7 @@ use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::Memory;
 use model_core::blob::Metadata;
-use taxel_data::data_file::DataFile;
-use taxel_data::random::Stream;
-use taxel_data::rest::Rest;
+use taxel_data::{DataFile, Rest, Stream};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::check::{Findings, Frames, Plan};
 use taxel_simulate::sensor::Precision;
@@ -200,11 +198,7 @@ impl CheckArguments {
 
 /// Prints the findings. Wrong answers, and more memory than allowed, are a failure.
 pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result<()> {
-    if common.json {
-        print::json(findings)?;
-    } else {
-        page_of(findings).print()?;
-    }
+    print::result(common, findings, || page_of(findings))?;
     if findings.all_good() {
         limits.check(&findings.device.memory)
     } else {

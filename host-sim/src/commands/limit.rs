@@ -85,11 +85,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(folder) = &arguments.output {
         write_files(folder, &result)?;
     }
-    if common.json {
-        print::json(&result)?;
-    } else {
-        page_of(&result, arguments.output.as_deref()).print()?;
-    }
+    print::result(common, &result, || page_of(&result, arguments.output.as_deref()))?;
     refusal(&result)
 }
 

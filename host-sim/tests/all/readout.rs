@@ -2,7 +2,7 @@
 //! derives it, for readings without noise, cross-talk and series resistance.
 
 use firmware::circuit::{Divider, ZeroPotential};
-use taxel_data::table::Table;
+use taxel_data::Table;
 use taxel_simulate::World;
 use taxel_simulate::readout::{Circuit, Readout};
 use taxel_virtual_board::{SeriesResistance, VirtualBoard, all_readings};

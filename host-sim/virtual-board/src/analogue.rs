@@ -2,7 +2,7 @@
 
 use firmware::circuit::{Divider, ZeroPotential};
 use firmware::timing::{OP_AMP_HZ, noise_gain, time_constant_ns};
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Stream};
 
 use super::fault::BoardFault;
 use super::network::{Tie, potentials_v};

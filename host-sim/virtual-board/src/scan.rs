@@ -1,11 +1,9 @@
 //! Scans of whole tables of readings, by the firmware's scanner on a virtual board.
 
-use taxel_data::random::Stream;
-use taxel_data::table::Table;
+use taxel_data::{Result, Stream, Table};
 
 use super::board::VirtualBoard;
 use super::scanner::SeriesResistance;
-use taxel_data::Result;
 use taxel_simulate::synth::Synthesis;
 use taxel_simulate::world::World;
 
