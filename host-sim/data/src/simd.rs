@@ -31,7 +31,7 @@ macro_rules! widest {
     };
 }
 
-/// Runs `work`, which is to be inlined, as [`widest`](crate::widest) does.
+/// Runs `work`, which is to be inlined, as [`widest`] does.
 #[inline]
 pub fn run<R>(mut work: impl FnMut() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
