@@ -16,6 +16,7 @@ const MOCKS: &[&str] = &["mock-board"];
 const DESK: &[&str] = &[
     "taxel-data",
     "taxel-simulate",
+    "taxel-virtual-board",
     "taxel-learn",
     "taxel-limit",
     "taxel-rig",
