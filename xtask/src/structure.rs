@@ -21,6 +21,7 @@ const DESK: &[&str] = &[
     "taxel-rig",
     "taxel-evaluate",
     "host-sim",
+    "device-log",
     "xtask",
 ];
 
