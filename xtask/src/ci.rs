@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use std::{env, thread};
 
-use crate::process::{Outcome, PROOF, cargo, root, target_dir};
+use crate::process::{Outcome, PROOF_TESTED, cargo, root, target_dir};
 
 /// A step's name and command.
 type Step = (&'static str, Command);
@@ -59,26 +59,26 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
         command.args(arguments).current_dir(root());
         (name, command)
     };
-    let mut docs = cargo(&["doc", "--workspace", "--no-deps"]);
-    docs.env("RUSTDOCFLAGS", "-D warnings");
     // The fuzz targets are checked as if libFuzzer had been built: that needs no nightly toolchain and no C++.
-    let proof = ["clippy", "--manifest-path", PROOF, "--workspace", "--all-targets"];
-    let mut proof = cargo(&[&proof[..], &["--", "-D", "warnings"]].concat());
-    proof.env("CUSTOM_LIBFUZZER_PATH", "./libfuzzer.a");
-    let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+    let of_all = |arguments: &[&str]| {
+        let mut command = cargo(arguments);
+        command.env("CUSTOM_LIBFUZZER_PATH", "./libfuzzer.a");
+        command
+    };
+    let clippy = of_all(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]);
+    let mut docs = of_all(&["doc", "--workspace", "--no-deps"]);
+    docs.env("RUSTDOCFLAGS", "-D warnings");
     [
         vec![
             ("format", cargo(&["fmt", "--all", "--check"])),
-            ("proof-format", cargo(&["fmt", "--manifest-path", PROOF, "--all", "--check"])),
             own("structure", &["structure"]),
             // Plain `cargo test`, as users run it, for the default crates.
             ("tests", cargo(&["test"])),
             ("xtask-tests", cargo(&["test", "--package", "xtask"])),
             // What `cargo xtask torture` runs is built with its tests.
-            ("proof-tests", cargo(&["test", "--manifest-path", PROOF])),
+            ("proof-tests", cargo(&[&["test"][..], &PROOF_TESTED].concat())),
             // Docs need what clippy has checked.
-            ("clippy", cargo(&clippy)),
-            ("proof-clippy", proof),
+            ("clippy", clippy),
             ("docs", docs),
         ],
         ["firmware", "cores", "size", "cycles"].map(|name| own(name, &[name])).into(),
