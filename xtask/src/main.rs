@@ -32,7 +32,7 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
-use process::{Outcome, PROOF, cargo, status};
+use process::{Outcome, cargo, status};
 
 /// Everything that people and CI run. `bash firmware/setup.sh` installs on Debian what the commands need.
 #[derive(Parser)]
@@ -153,7 +153,7 @@ fn main() -> ExitCode {
 
 /// Runs a study of `proof/studies`, which says itself what is wrong with `options`.
 fn study(options: &[&str]) -> Outcome<ExitCode> {
-    let run = ["run", "--release", "--manifest-path", PROOF, "--package", "studies", "--"];
+    let run = ["run", "--release", "--package", "studies", "--"];
     status(cargo(&run).args(options)).map(torture::code)
 }
 
