@@ -50,7 +50,7 @@ def fastest_of(taken: dict[int, Seconds]) -> tuple[int, Seconds]:
 
 def bench(name: str) -> None:
     """Runs one of the benches of the package `benchmarks`; its log goes to stderr."""
-    command = ["cargo", "bench", "--quiet", "--manifest-path", "proof/Cargo.toml", "--package", "benchmarks", "--bench", name]
+    command = ["cargo", "bench", "--quiet", "--package", "benchmarks", "--bench", name]
     subprocess.run(command, cwd=ROOT, check=True, stdout=2)
 
 

@@ -85,8 +85,7 @@ struct Wanted {
     estimates: bool,
 }
 
-type Opened =
-    (Device<Box<dyn serialport::SerialPort>>, (String, String, Option<u32>), (usize, usize, usize));
+type Opened = (Device, (String, String, Option<u32>), (usize, usize, usize));
 
 fn refused(error: &Error) -> PyErr {
     PyRuntimeError::new_err(error.to_string())
@@ -120,7 +119,7 @@ fn open(
 
 /// Keeps what a device sends of its scans until `stop`.
 fn listen(
-    device: &mut Device<Box<dyn serialport::SerialPort>>,
+    device: &mut Device,
     (shared, stop): (&Shared, &AtomicBool),
     wanted: Wanted,
     buffer: usize,

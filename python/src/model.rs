@@ -1,4 +1,5 @@
 //! Models: what a blob says, and what it makes of readings.
+#![expect(clippy::needless_pass_by_value, reason = "arguments come from Python by value")]
 
 use model_core::{Decoder, Estimate, Frame, RowStatus, relative};
 use numpy::{
@@ -70,11 +71,11 @@ fn lines<'a>(readings: &'a PyReadonlyArray2<'_, f64>, inputs: usize) -> PyResult
     Ok(readings.as_slice()?)
 }
 
-fn two_dimensional<'py>(
-    py: Python<'py>,
+fn two_dimensional(
+    py: Python<'_>,
     values: Vec<f64>,
     columns: usize,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let lines = values.len() / columns;
     PyArray1::from_vec(py, values).reshape([lines, columns])
 }

@@ -11,13 +11,11 @@ use std::path::{Path, PathBuf};
 use firmware::link::message::{Configuration, Memory, ModelIdentity, UploadState};
 use firmware::timing::ScanPlan;
 use model_core::Decoder;
-use taxel_data::dataset::Dataset;
 use taxel_data::output::write_bytes;
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::{Dataset, Silent, Stream};
 use taxel_learn::cost::{Design, Gating, Prices};
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_rig::device::{Device, Wire, stream, upload};
+use taxel_rig::device::{Device, stream, upload};
 use taxel_simulate::{Synthesis, World};
 
 use crate::cycles::models;
@@ -166,7 +164,7 @@ fn own_folder() -> PathBuf {
 }
 
 /// Uploads a model of every format and size, and lets each decode the same frames as the host.
-fn decode_all<W: Wire>(device: &mut Device<W>, frames: &Dataset) -> Outcome<Vec<Decoding>> {
+fn decode_all(device: &mut Device, frames: &Dataset) -> Outcome<Vec<Decoding>> {
     let wanted = |options: &taxel_learn::Options| match (options.whole_array, options.affine_tail) {
         (false, false) => CENTRES.contains(&options.centres),
         (array, affine) => array && affine && options.centres == CENTRES[0],
@@ -180,7 +178,7 @@ fn decode_all<W: Wire>(device: &mut Device<W>, frames: &Dataset) -> Outcome<Vec<
     models.iter().map(|model| decode(device, model, frames)).collect()
 }
 
-fn decode<W: Wire>(device: &mut Device<W>, path: &Path, frames: &Dataset) -> Outcome<Decoding> {
+fn decode(device: &mut Device, path: &Path, frames: &Dataset) -> Outcome<Decoding> {
     let blob = ModelBlob::read(path).map_err(text)?;
     device.while_paused(|device| upload::replace(device, blob.bytes(), &Silent)).map_err(text)?;
     // So that the counters start anew.
@@ -220,7 +218,7 @@ fn decode<W: Wire>(device: &mut Device<W>, path: &Path, frames: &Dataset) -> Out
 
 /// Erases the slot that is not in force while the sensor is scanned, and lets it scan on. Returns the time in ms that the
 /// erase took, by the scans that were missed meanwhile, and that of the longest scan in µs.
-fn erase_and_scan<W: Wire>(device: &mut Device<W>) -> Outcome<(Beside<Vec<u32>>, Beside<u32>)> {
+fn erase_and_scan(device: &mut Device) -> Outcome<(Beside<Vec<u32>>, Beside<u32>)> {
     let own = device.configuration().map_err(text)?.configuration;
     let scanning = Configuration { frame_period_us: PERIOD_US, send_estimates: false, ..own };
     device.configure_until_restart(scanning).map_err(text)?;
@@ -242,7 +240,7 @@ fn erase_and_scan<W: Wire>(device: &mut Device<W>) -> Outcome<(Beside<Vec<u32>>,
 }
 
 /// Restarts the board; returns whether the same model is in force afterwards.
-fn restart<W: Wire>(device: &mut Device<W>) -> Outcome<Beside<bool>> {
+fn restart(device: &mut Device) -> Outcome<Beside<bool>> {
     let before = device.identify().map_err(text)?.model;
     let after = device.restart().map_err(text)?.model;
     let crc = |model: Option<ModelIdentity>| model.map(|model| model.crc_32);

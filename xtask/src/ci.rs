@@ -1,5 +1,5 @@
-//! Everything that CI runs: two rows of steps side by side, one for the host and one for the device, and the emulators
-//! after both.
+//! Everything that CI runs: two rows of steps side by side, one for the host and one for the device, and what needs all
+//! cores after both.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use std::{env, thread};
 
-use crate::process::{Outcome, PROOF, cargo, root, target_dir};
+use crate::process::{Outcome, PROOF_TESTED, cargo, root, target_dir};
 
 /// A step's name and command.
 type Step = (&'static str, Command);
@@ -35,9 +35,9 @@ pub fn run() -> Outcome {
     let this = logs.join("xtask").with_extension(env::consts::EXE_EXTENSION);
     fs::copy(env::current_exe().map_err(failed)?, &this).map_err(failed)?;
     let start = Instant::now();
-    let [host, device, emulators] = steps(&this);
+    let [host, device, alone] = steps(&this);
     let mut ended = side_by_side([host, device], &logs);
-    ended.extend(side_by_side([emulators], &logs));
+    ended.extend(side_by_side([alone], &logs));
     println!("\n== summary");
     for (name, time, outcome) in &ended {
         let (verdict, text) = match outcome {
@@ -51,42 +51,50 @@ pub fn run() -> Outcome {
     if failed == 0 { Ok(()) } else { Err(format!("{failed} of {} steps failed", ended.len())) }
 }
 
-/// The steps: two rows that build in different folders, and what follows both. That runs two programs at a time, an
-/// emulator and a host or two emulators, whose devices answer in time only if the machine has a core for each.
+/// The steps: two rows that build in different folders, and what follows both. QEMU's devices answer in time only if the
+/// machine has a core for QEMU and one for its host; the torture takes all cores.
 fn steps(this: &Path) -> [Vec<Step>; 3] {
     let own = |name, arguments: &[&str]| -> Step {
         let mut command = Command::new(this);
         command.args(arguments).current_dir(root());
         (name, command)
     };
-    let mut docs = cargo(&["doc", "--workspace", "--no-deps"]);
-    docs.env("RUSTDOCFLAGS", "-D warnings");
     // The fuzz targets are checked as if libFuzzer had been built: that needs no nightly toolchain and no C++.
-    let proof = ["clippy", "--manifest-path", PROOF, "--workspace", "--all-targets"];
-    let mut proof = cargo(&[&proof[..], &["--", "-D", "warnings"]].concat());
-    proof.env("CUSTOM_LIBFUZZER_PATH", "./libfuzzer.a");
-    let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+    let of_all = |arguments: &[&str]| {
+        let mut command = cargo(arguments);
+        command.env("CUSTOM_LIBFUZZER_PATH", "./libfuzzer.a");
+        command
+    };
+    let clippy = of_all(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]);
+    let mut docs = of_all(&["doc", "--workspace", "--no-deps"]);
+    docs.env("RUSTDOCFLAGS", "-D warnings");
     [
         vec![
             ("format", cargo(&["fmt", "--all", "--check"])),
-            ("proof-format", cargo(&["fmt", "--manifest-path", PROOF, "--all", "--check"])),
             own("structure", &["structure"]),
             // Plain `cargo test`, as users run it, for the default crates.
             ("tests", cargo(&["test"])),
             ("xtask-tests", cargo(&["test", "--package", "xtask"])),
-            // What `cargo xtask torture` runs is built with its tests.
-            ("proof-tests", cargo(&["test", "--manifest-path", PROOF])),
+            ("proof-tests", cargo(&[&["test"][..], &PROOF_TESTED].concat())),
+            // What `cargo xtask torture` runs, after both rows.
+            ("torture-build", cargo(&["build", "--package", "torture"])),
             // Docs need what clippy has checked.
-            ("clippy", cargo(&clippy)),
-            ("proof-clippy", proof),
+            ("clippy", clippy),
             ("docs", docs),
+            own("python", &["python"]),
         ],
-        ["firmware", "cores", "size", "cycles"].map(|name| own(name, &[name])).into(),
+        vec![
+            own("firmware", &["firmware"]),
+            own("cores", &["cores"]),
+            own("size", &["size"]),
+            own("cycles", &["cycles"]),
+            // The emulated board's time is virtual: it answers alike on a busy machine.
+            own("board", &["board"]),
+            own("mutants", &[&["board", "--mutants"], &MUTANTS[..]].concat()),
+        ],
         vec![
             own("emulate", &["emulate"]),
-            own("board", &["board"]),
             own("accept", &["accept", "--emulated"]),
-            own("mutants", &[&["board", "--mutants"], &MUTANTS[..]].concat()),
             own("torture", &["torture", "--short"]),
         ],
     ]

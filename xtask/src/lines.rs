@@ -8,8 +8,9 @@ use std::process::Command;
 use crate::process::{Outcome, capture, root};
 
 /// Folders of what runs for a user; those of `NOT_PRODUCT` excepted.
-const PRODUCT: [&str; 3] = ["model-core", "firmware", "host-sim"];
-const NOT_PRODUCT: [&str; 3] = ["firmware/qemu", "firmware/link-check", "firmware/mock-board"];
+const PRODUCT: [&str; 4] = ["model-core", "firmware", "host-sim", "python"];
+const NOT_PRODUCT: [&str; 4] =
+    ["firmware/qemu", "firmware/link-check", "firmware/mock-board", "host-sim/virtual-board"];
 
 /// All lines; of these the lines of code (no comment, not blank) in the source, and in tests, benches and examples.
 type Lines = [usize; 3];

@@ -14,8 +14,9 @@ pub fn root() -> &'static Path {
     here.parent().unwrap_or(here)
 }
 
-/// Manifest of the workspace of what proves the product.
-pub const PROOF: &str = "proof/Cargo.toml";
+/// Packages of what proves the product that have tests.
+pub const PROOF_TESTED: [&str; 6] =
+    ["--package", "hostile", "--package", "studies", "--package", "torture"];
 
 /// Folder for cargo's builds for the host.
 pub fn target_dir() -> PathBuf {

@@ -3,10 +3,10 @@
 use std::process::{ExitCode, ExitStatus, Stdio};
 
 use crate::mutants;
-use crate::process::{Outcome, PROOF, cargo, run as run_command, status, target_dir};
+use crate::process::{Outcome, cargo, run as run_command, status, target_dir};
 
 /// Cargo's arguments before those of the torture.
-const RUN: [&str; 6] = ["run", "--manifest-path", PROOF, "--package", "torture", "--"];
+const RUN: [&str; 4] = ["run", "--package", "torture", "--"];
 
 /// Builds host-sim and the torture, and runs the torture with `options`.
 ///

@@ -23,5 +23,13 @@ pub mod clock;
 pub mod rest;
 pub mod spectrum;
 
+pub use clock::Clock;
+pub use data_file::DataFile;
+pub use dataset::{Dataset, RowTable};
 pub use elementary::{exp, ln, normal_share_below, sin_cos};
-pub use error::{BadValue, Error, Result};
+pub use error::{BadValue, Error, Result, require};
+pub use progress::{Progress, Silent};
+pub use random::{Purpose, Random, Stream};
+pub use rest::Rest;
+pub use simd::{LANES, Lanes};
+pub use table::Table;

@@ -12,18 +12,28 @@ pub const LANES: usize = 64;
 /// no bounds check and no remainder.
 pub type Lanes<T = f64> = [T; LANES];
 
-/// Runs `work` compiled for the machine's widest vectors (AVX-512 or AVX2 on most x86-64, NEON on AArch64).
+/// Computes `work` compiled for the machine's widest vectors (AVX-512 or AVX2 on most x86-64, NEON on AArch64).
 ///
-/// Code that is to be vectorised must be inlined into `work`: the closure and what it calls need
-/// `#[inline(always)]`. Results do not depend on the machine, since the compiler never contracts or
-/// reorders floating-point operations by itself.
+/// Code that is to be vectorised must be inlined into `work`: what it calls needs `#[inline(always)]`. Results do
+/// not depend on the machine, since the compiler never contracts or reorders floating-point operations by itself.
 ///
 /// ```
-/// let sum = taxel_data::simd::widest(|| [1.0_f64, 2.0].iter().map(|x| x * x).sum::<f64>());
+/// let sum = taxel_data::widest!([1.0_f64, 2.0].iter().map(|x| x * x).sum::<f64>());
 /// assert_eq!(sum, 5.0);
 /// ```
+#[macro_export]
+macro_rules! widest {
+    ($work:expr) => {
+        $crate::simd::run(
+            #[inline(always)]
+            || $work,
+        )
+    };
+}
+
+/// Runs `work`, which is to be inlined, as [`widest`] does.
 #[inline]
-pub fn widest<R>(mut work: impl FnMut() -> R) -> R {
+pub fn run<R>(mut work: impl FnMut() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
     if std::is_x86_feature_detected!("avx512f")
         && std::is_x86_feature_detected!("avx512dq")

@@ -1,7 +1,7 @@
 //! Errors of contacts by their depth: where a shallow contact is, readings hardly tell.
 
 use serde::Serialize;
-use taxel_data::table::Table;
+use taxel_data::Table;
 
 use crate::metrics::{self, Errors, Measure, RELATIVE_THRESHOLD};
 

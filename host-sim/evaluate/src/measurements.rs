@@ -2,11 +2,9 @@
 
 use std::sync::Arc;
 
-use taxel_data::clock::Clock;
-use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
-use taxel_data::rest::Rest;
+use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::spectrum::Spectrum;
-use taxel_data::table::Table;
+use taxel_data::{Clock, Dataset, Rest, Table};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Options, Origin};
 

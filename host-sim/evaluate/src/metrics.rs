@@ -2,9 +2,7 @@
 //! more than the decoders do, so all of them are always given.
 
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::dataset::Dataset;
-use taxel_data::table::Table;
+use taxel_data::{Dataset, Table, columns};
 use taxel_learn::Decoder;
 use taxel_limit::reference::GroupLimit;
 use taxel_limit::{Reference, Refusal};

@@ -1,8 +1,7 @@
 //! Errors on contacts that a model was not trained on, and whether it notices that they are others.
 
 use serde::Serialize;
-use taxel_data::dataset::Dataset;
-use taxel_data::random::Stream;
+use taxel_data::{Dataset, Stream};
 use taxel_learn::decoders::mean;
 use taxel_learn::{Decoder, PreparedModel};
 use taxel_simulate::noise::Noise;

@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 use taxel_data::clock::neighbours_alike;
-use taxel_data::columns;
-use taxel_data::table::Table;
+use taxel_data::{Table, columns};
 
 use crate::measurements::Log;
 use crate::metrics::pooled;

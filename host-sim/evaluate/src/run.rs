@@ -2,10 +2,8 @@
 
 use serde::Serialize;
 use taxel_data::columns::READINGS;
-use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
-use taxel_data::table::Table;
+use taxel_data::dataset::{LeftOut, UnusedInputs};
+use taxel_data::{Dataset, Progress, Stream, Table};
 use taxel_learn::cost::{Cost, Design, Prices};
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::decoders::mean::Mean;

@@ -2,10 +2,7 @@
 
 use std::borrow::Cow;
 
-use taxel_data::columns;
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
+use taxel_data::{Dataset, Progress, Stream, columns};
 use taxel_learn::{Options, Origin};
 use taxel_limit::Refusal;
 use taxel_simulate::Synthesis;

@@ -2,10 +2,7 @@
 
 use std::borrow::Cow;
 
-use taxel_data::BadValue;
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
+use taxel_data::{BadValue, Dataset, Progress, Stream};
 use taxel_learn::confidence::{self, Density, HeldOut};
 use taxel_learn::fill;
 use taxel_learn::train::stream::{self, Frames, Learned, Pieces};

@@ -4,8 +4,7 @@
 //! frames that training did not see.
 
 use model_core::confidence::{Confidence, Sizes};
-use taxel_data::dataset::Dataset;
-use taxel_data::error::require;
+use taxel_data::{Dataset, require};
 
 use crate::error::{Result, no_regression};
 use crate::infer::{Exponential, assess_lines};

@@ -1,6 +1,6 @@
 //! Decoders besides the packed network, and their common parts.
 
-use taxel_data::dataset::{Dataset, RowTable};
+use taxel_data::{Dataset, RowTable};
 
 use crate::decoder::{Decoder, Estimates, FrameDecoder, Frames};
 use crate::infer::{Exponential, infer};

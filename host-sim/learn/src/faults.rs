@@ -14,7 +14,7 @@ use std::ops::Range;
 use model_core::fill::{Fill, MOST_MISSING};
 use model_core::health::Limits;
 use serde::Serialize;
-use taxel_data::table::Table;
+use taxel_data::Table;
 
 use crate::parallel;
 

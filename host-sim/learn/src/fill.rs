@@ -6,8 +6,7 @@
 
 use model_core::fill::Fill;
 use nalgebra::DMatrix;
-use taxel_data::dataset::Dataset;
-use taxel_data::table::Table;
+use taxel_data::{Dataset, Table};
 
 use crate::error::{Error, Result};
 use crate::packing::ModelBlob;

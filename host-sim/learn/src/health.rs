@@ -3,8 +3,7 @@
 use model_core::health::{Fault, Limits};
 use rayon::prelude::*;
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::table::Table;
+use taxel_data::{Table, columns};
 
 use crate::infer::is_missing;
 

@@ -6,7 +6,7 @@ use model_core::confidence::{Confidence, Sizes};
 use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use model_core::rbf::{Network, Shape};
 use serde::Serialize;
-use taxel_data::simd::widest;
+use taxel_data::widest;
 
 use crate::parallel;
 
@@ -95,24 +95,21 @@ fn infer_lines<E: ExpKernel>(networks: &[Network<'_>], readings: &[f64], values:
     let (mut line, mut scaled) = (vec![0.0; inputs], vec![0.0; inputs]);
     let mut inferred = vec![0.0; outputs];
     let lines = values.len() / outputs;
-    widest(
-        #[inline(always)]
-        || {
-            for (first, network) in networks.iter().enumerate() {
-                let numbers = (first..lines).step_by(networks.len());
-                if let Network::F32(network) = network {
-                    side_by_side::infer_lines(*network, numbers, readings, values);
-                    continue;
-                }
-                for number in numbers {
-                    let is_whole = read(&readings[number * inputs..], &mut line);
-                    let done = network.infer_with::<E>(&line, &mut scaled, &mut inferred);
-                    done.expect("lengths of the network");
-                    write(inferred.iter().copied(), is_whole, &mut values[number * outputs..]);
-                }
+    widest!({
+        for (first, network) in networks.iter().enumerate() {
+            let numbers = (first..lines).step_by(networks.len());
+            if let Network::F32(network) = network {
+                side_by_side::infer_lines(*network, numbers, readings, values);
+                continue;
             }
-        },
-    );
+            for number in numbers {
+                let is_whole = read(&readings[number * inputs..], &mut line);
+                let done = network.infer_with::<E>(&line, &mut scaled, &mut inferred);
+                done.expect("lengths of the network");
+                write(inferred.iter().copied(), is_whole, &mut values[number * outputs..]);
+            }
+        }
+    });
 }
 
 /// Copies the first `readings` to `line`, and returns whether none is missing.

@@ -22,8 +22,7 @@
 //! separate cells looks, each of which is rarely touched.
 
 use serde::Serialize;
-use taxel_data::dataset::Dataset;
-use taxel_data::table::Table;
+use taxel_data::{Dataset, Table};
 
 /// Least number of lines that tell what is usual.
 const LEAST_LINES: usize = 20;

@@ -10,8 +10,7 @@ use model_core::confidence::Confidence;
 use model_core::expansion::Expansion;
 use model_core::fill::Fill;
 use model_core::rbf::Network;
-use taxel_data::dataset::Dataset;
-use taxel_data::{columns, input};
+use taxel_data::{Dataset, columns, input};
 
 use crate::error::{Error, Result, not_packed};
 use crate::infer::{Exponential, infer};

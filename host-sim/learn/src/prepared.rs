@@ -6,7 +6,7 @@ use std::sync::Arc;
 use model_core::blob::Model;
 use model_core::rbf::Network;
 use model_core::scale::CLAMP;
-use taxel_data::table::Table;
+use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
 use crate::infer::{Exponential, assess_lines, infer_in_turn, is_missing};

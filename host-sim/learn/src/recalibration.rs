@@ -25,7 +25,7 @@ use model_core::blob::Model;
 use model_core::rbf::Network;
 use model_core::rls;
 use rayon::prelude::*;
-use taxel_data::table::Table;
+use taxel_data::Table;
 
 use crate::error::{Error, Result};
 use crate::packing::{ModelBlob, rebuild};

@@ -3,8 +3,7 @@
 //! [`model_core::relative`] has the arithmetic, which a device shares bit for bit.
 
 use model_core::relative::{reciprocal, relative};
-use taxel_data::dataset::Dataset;
-use taxel_data::table::Table;
+use taxel_data::{Dataset, Table};
 
 /// Reciprocals 1/R₀ of a `baseline`, rounded to `f32` first; NaN for a channel without one.
 pub(crate) fn reciprocals(baseline: &[f64]) -> Vec<f32> {

@@ -1,9 +1,7 @@
 //! Selection of K, spread and ridge penalty by k-fold cross-validation.
 
 use serde::Serialize;
-use taxel_data::BadValue;
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::{Progress, Silent};
+use taxel_data::{BadValue, Dataset, Progress, Silent};
 
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;

@@ -5,10 +5,7 @@
 //! once, to the numbers of its format, as a [`FittedNetwork`].
 
 use model_core::rbf::Format;
-use taxel_data::BadValue;
-use taxel_data::dataset::Dataset;
-use taxel_data::error::require;
-use taxel_data::progress::Progress;
+use taxel_data::{BadValue, Dataset, Progress, require};
 
 use crate::error::Result;
 use crate::parallel;

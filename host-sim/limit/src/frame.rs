@@ -2,8 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
 
-use taxel_data::ln;
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{LANES, Lanes, ln, widest};
 use taxel_simulate::World;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::sensor::{LaneModel, Precision, Scratch};
@@ -63,18 +62,15 @@ impl Rows<'_> {
         let of_rows = resistance_ohm.chunks_exact_mut(self.world.sensor.column_wires);
         for (&row, resistance_ohm) in self.wires.iter().zip(of_rows) {
             self.world.motion.place(&self.world.sensor, row, latents, deformation_mm);
-            simd::widest(
-                #[inline(always)]
-                || {
-                    self.model.row_column_resistance_ohm(
-                        row,
-                        Precision::F32,
-                        deformation_mm,
-                        scratch,
-                        resistance_ohm,
-                    );
-                },
-            );
+            widest!({
+                self.model.row_column_resistance_ohm(
+                    row,
+                    Precision::F32,
+                    deformation_mm,
+                    scratch,
+                    resistance_ohm,
+                );
+            });
         }
         resistance_ohm
     }
@@ -82,16 +78,13 @@ impl Rows<'_> {
     /// Natural logarithm of the likelihood of `readings_ohm`, but for a constant, where ideal readings are
     /// `ideal_ohm`.
     pub fn log_likelihood(&self, readings_ohm: &[f64], ideal_ohm: &[Lanes]) -> Lanes {
-        simd::widest(
-            #[inline(always)]
-            || {
-                if self.deviation_ohm.is_empty() {
-                    of_relative_noise(self.world.noise.total_level(), readings_ohm, ideal_ohm)
-                } else {
-                    of_absolute_noise(self.deviation_ohm, readings_ohm, ideal_ohm)
-                }
-            },
-        )
+        widest!({
+            if self.deviation_ohm.is_empty() {
+                of_relative_noise(self.world.noise.total_level(), readings_ohm, ideal_ohm)
+            } else {
+                of_absolute_noise(self.deviation_ohm, readings_ohm, ideal_ohm)
+            }
+        })
     }
 }
 

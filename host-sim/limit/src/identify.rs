@@ -9,7 +9,7 @@
 
 use nalgebra::{Cholesky, DMatrix};
 use serde::Serialize;
-use taxel_data::random::Stream;
+use taxel_data::Stream;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::sensor::{Axis, Vector3};
 use taxel_simulate::{Synthesis, World};

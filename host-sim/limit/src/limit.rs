@@ -2,9 +2,7 @@
 
 use rayon::prelude::*;
 use taxel_data::digest::digest;
-use taxel_data::progress::{Progress, Silent};
-use taxel_data::random::{Purpose, Random, Stream};
-use taxel_data::simd::{LANES, Lanes};
+use taxel_data::{LANES, Lanes, Progress, Purpose, Random, Silent, Stream};
 use taxel_learn::{Estimates, FrameDecoder, Frames};
 use taxel_simulate::sensor::LaneModel;
 use taxel_simulate::{Synthesis, World};

@@ -5,9 +5,7 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Cholesky, DMatrix};
-use taxel_data::ln;
-use taxel_data::random::Random;
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{LANES, Lanes, Random, ln, widest};
 
 use crate::samples::Samples;
 use crate::weights::effective;
@@ -123,10 +121,7 @@ impl Mixture {
 
     /// Natural logarithm of the prior's density over the mixture's, at the `latents` of each lane.
     pub fn log_prior_over_density(&self, latents: &[Lanes]) -> Lanes {
-        simd::widest(
-            #[inline(always)]
-            || self.log_prior_over_density_in_lanes(latents),
-        )
+        widest!(self.log_prior_over_density_in_lanes(latents))
     }
 
     #[inline(always)]

@@ -5,8 +5,7 @@
 //! power is the largest that leaves enough effective samples. Once it is 1, samples are kept. Their weight is
 //! likelihood × prior / proposal, whatever the earlier rounds did.
 
-use taxel_data::random::Random;
-use taxel_data::simd::{LANES, Lanes};
+use taxel_data::{LANES, Lanes, Random};
 
 use crate::mixture::Mixture;
 use crate::samples::Samples;

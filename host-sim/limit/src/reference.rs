@@ -1,10 +1,7 @@
 //! Limit of a scene's test frames, and the ratio of any decoder's error to it.
 
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
-use taxel_data::table::Table;
+use taxel_data::{Progress, Stream, Table, columns};
 use taxel_simulate::{Synthesis, World};
 
 use crate::error::Refusal;

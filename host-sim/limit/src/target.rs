@@ -1,6 +1,6 @@
 //! Interface of what is sampled: latents with a standard normal prior, a likelihood, and outputs.
 
-use taxel_data::simd::Lanes;
+use taxel_data::Lanes;
 
 /// Posterior distribution of independent standard normal latents, given data.
 pub trait Target: Sync {

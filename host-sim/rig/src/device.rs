@@ -56,7 +56,7 @@ const MOST_REPORT_BYTES: usize = 64 * 1024;
 const GLANCE: Duration = Duration::from_millis(5);
 
 /// Line of bytes to a device.
-pub trait Wire: Read + Write {
+pub trait Wire: Read + Write + Send {
     /// Lets reads end after `timeout` if nothing has come.
     fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()>;
 }
@@ -68,8 +68,8 @@ impl Wire for TcpStream {
 }
 
 /// Host's end of the line to a device.
-pub struct Device<W> {
-    wire: W,
+pub struct Device {
+    wire: Box<dyn Wire>,
     receiver: Receiver<Vec<u8>>,
     /// Bytes that were read and not looked at yet.
     pending: VecDeque<u8>,
@@ -97,14 +97,14 @@ pub struct Device<W> {
     pub repeated: u64,
 }
 
-impl<W: Wire> Device<W> {
+impl Device {
     /// Device on `wire`; nothing is sent yet.
-    pub fn new(mut wire: W) -> Result<Self> {
+    pub fn new(mut wire: impl Wire + 'static) -> Result<Self> {
         wire.set_read_timeout(GLANCE)?;
         let receiver = Receiver::new(vec![0; MOST_REPORT_BYTES]);
         let pending = VecDeque::new();
         Ok(Self {
-            wire,
+            wire: Box::new(wire),
             receiver,
             pending,
             // Answers to a host before this one may still come: they shall not have this one's numbers.

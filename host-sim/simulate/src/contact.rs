@@ -9,8 +9,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Debug;
 
-use taxel_data::normal_share_below;
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{LANES, Lanes, normal_share_below, widest};
 
 use crate::sensor::{Sensor, Vector3};
 
@@ -86,14 +85,11 @@ impl Contact {
 
     /// Writes the deformations in mm of electrodes at rest at `electrodes_mm`, by electrode and axis.
     pub(crate) fn deform(&self, electrodes_mm: &[Vector3], deformation_mm: &mut [[Lanes; 3]]) {
-        simd::widest(
-            #[inline(always)]
-            || {
-                for (delta, electrode_mm) in deformation_mm.iter_mut().zip(electrodes_mm) {
-                    self.deform_one(electrode_mm, delta);
-                }
-            },
-        );
+        widest!({
+            for (delta, electrode_mm) in deformation_mm.iter_mut().zip(electrodes_mm) {
+                self.deform_one(electrode_mm, delta);
+            }
+        });
     }
 
     #[inline(always)]

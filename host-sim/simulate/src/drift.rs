@@ -1,8 +1,7 @@
 //! Drift of the gain between sessions: one factor for all readings of a trajectory.
 
 use serde::Deserialize;
-use taxel_data::random::Purpose;
-use taxel_data::simd::{LANES, Lanes};
+use taxel_data::{LANES, Lanes, Purpose};
 
 use crate::motion::Draws;
 

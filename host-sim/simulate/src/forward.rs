@@ -1,9 +1,8 @@
 //! Forward model over a file: deformations in, ideal readings out.
 
 use rayon::prelude::*;
-use taxel_data::data_file::DataFile;
 use taxel_data::error::Problem;
-use taxel_data::simd::{self, LANES};
+use taxel_data::{DataFile, LANES, widest};
 
 use crate::sensor::{LaneModel, Scratch};
 use crate::world::World;
@@ -47,10 +46,7 @@ pub fn forward(world: &World, file: &DataFile) -> taxel_data::Result<Vec<f64>> {
     let pieces = readings.par_chunks_mut(LANES * of_a_line).enumerate();
     pieces.for_each_init(Scratch::default, |scratch, (piece, readings)| {
         let first = piece * LANES;
-        simd::widest(
-            #[inline(always)]
-            || forward.lines(scratch, first, readings),
-        );
+        widest!(forward.lines(scratch, first, readings));
     });
     Ok(readings)
 }

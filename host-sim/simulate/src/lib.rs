@@ -1,5 +1,5 @@
 //! Simulation of a resistive tactile sensor: the ideal sensor of Wang et al. (2014), its motion, the
-//! noise on its readings, and the circuit that reads it.
+//! noise on its readings, and when they are read.
 //!
 //! A [`World`] holds the settings; [`Synthesis`] draws frames of it. Nothing that a world does not ask
 //! for is computed. Modules stand from the ground up; each imports only what stands before it.
@@ -16,7 +16,6 @@
 
 #![allow(missing_docs, clippy::missing_errors_doc)] // a name that says all needs no more
 
-pub mod error;
 mod kinds;
 pub mod sensor;
 pub mod contact;
@@ -31,7 +30,6 @@ pub mod readout;
 pub mod world;
 pub mod synth;
 pub mod forward;
-pub mod virtual_board;
 
 pub use synth::{Synthesis, synthesise};
 pub use taxel_data::error::{Error, Result};

@@ -5,9 +5,8 @@
 
 use std::fmt::Debug;
 
-use taxel_data::BadValue;
-use taxel_data::random::{Purpose, RandomLanes, Stream};
-use taxel_data::simd::Lanes;
+use taxel_data::random::RandomLanes;
+use taxel_data::{BadValue, Lanes, Purpose, Stream};
 
 use crate::contact::Contact;
 use crate::kinds::kinds;

@@ -1,10 +1,10 @@
 //! Outputs that a model should predict, and the names of their columns.
 
 use serde::Deserialize;
-use taxel_data::simd::{LANES, Lanes};
+use taxel_data::{LANES, Lanes};
 
 use crate::contact::Contact;
-use crate::sensor::{Axis, Sensor, Vector3};
+use crate::sensor::{Axis, Sensor};
 
 /// Outputs that a model should predict: of electrodes, or of the one contact.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -130,19 +130,6 @@ impl ElectrodeOutputs {
             Quantity::Deformation => 1.0,
             Quantity::Force => sensor.stiffness_n_per_mm[axis.index()],
         }
-    }
-
-    /// Outputs of one electrode of `sensor` for its deformation in mm, in the order of the axes.
-    pub fn of_electrode(
-        &self,
-        sensor: &Sensor,
-        deformation_mm: Vector3,
-    ) -> impl Iterator<Item = f64> {
-        let vector = match self.quantity {
-            Quantity::Deformation => deformation_mm,
-            Quantity::Force => sensor.force_n(deformation_mm),
-        };
-        self.axes.iter().map(move |axis| vector[axis.index()])
     }
 
     /// Names of the outputs of `rows` (from 0) of `sensor`, row after row.

@@ -5,10 +5,7 @@
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
-use taxel_data::error::require;
-use taxel_data::random::Purpose;
-use taxel_data::simd::{self, LANES, Lanes};
-use taxel_data::{BadValue, sin_cos};
+use taxel_data::{BadValue, LANES, Lanes, Purpose, require, sin_cos, widest};
 
 use crate::motion::Draws;
 use crate::sensor::Sensor;
@@ -166,10 +163,7 @@ impl Path {
             turn,
         ];
         let mut drawn = [[0.0; LANES]; 9];
-        simd::widest(
-            #[inline(always)]
-            || draws.of(Purpose::Path, 0).between(ranges, &mut drawn),
-        );
+        widest!(draws.of(Purpose::Path, 0).between(ranges, &mut drawn));
         let [speed, rate, depth_mm, x_mm, y_mm, direction, phase_x, phase_apart, phase_press] =
             drawn;
         let mut paths = Paths {
@@ -219,22 +213,19 @@ impl Paths {
     /// Centre and depth of the contact in mm at this time.
     pub(crate) fn at(&self, time_s: f64) -> ([Lanes; 2], Lanes) {
         let (mut centre_mm, mut depth_mm) = (self.centre_mm, self.depth_mm);
-        simd::widest(
-            #[inline(always)]
-            || {
-                for (axis, centre_mm) in centre_mm.iter_mut().enumerate() {
-                    for lane in 0..LANES {
-                        let turns = self.turns_per_s[lane] * time_s + self.phase[axis][lane];
-                        centre_mm[lane] += self.half_length_mm[axis][lane] * sine_of_turns(turns);
-                    }
-                }
+        widest!({
+            for (axis, centre_mm) in centre_mm.iter_mut().enumerate() {
                 for lane in 0..LANES {
-                    let turns = self.presses_per_s[lane] * time_s + self.phase_press[lane];
-                    let pressed = (PRESS[0] + PRESS[1] * sine_of_turns(turns)).max(0.0);
-                    depth_mm[lane] *= if self.presses_per_s[lane] > 0.0 { pressed } else { 1.0 };
+                    let turns = self.turns_per_s[lane] * time_s + self.phase[axis][lane];
+                    centre_mm[lane] += self.half_length_mm[axis][lane] * sine_of_turns(turns);
                 }
-            },
-        );
+            }
+            for lane in 0..LANES {
+                let turns = self.presses_per_s[lane] * time_s + self.phase_press[lane];
+                let pressed = (PRESS[0] + PRESS[1] * sine_of_turns(turns)).max(0.0);
+                depth_mm[lane] *= if self.presses_per_s[lane] > 0.0 { pressed } else { 1.0 };
+            }
+        });
         (centre_mm, depth_mm)
     }
 }

@@ -1,7 +1,5 @@
 //! Readout of a sensor: the circuit, its parts, and the faults of these that are simulated.
 
-use firmware::circuit::ZeroPotential;
-use firmware::timing::{OP_AMP_HZ, noise_gain, time_constant_ns};
 use serde::{Deserialize, Serialize};
 
 /// Settings of a readout. Faults that are left out are not simulated.
@@ -86,10 +84,4 @@ pub enum Sampler {
     Mcp3208,
     /// Converter on the microcontroller behind three 74HC4051 multiplexers.
     OnChip,
-}
-
-/// Time constant in µs with which the op-amps of the board follow, when they hold the columns of the paper's sensor.
-pub fn op_amp_time_constant_us() -> f64 {
-    let [feedback_ohm] = ZeroPotential::<1, 1>::TYPICAL.feedback_ohm;
-    f64::from(time_constant_ns(noise_gain(feedback_ohm, 55.0, 8), OP_AMP_HZ)) / 1e3
 }

@@ -9,10 +9,7 @@
 use std::fmt::Debug;
 
 use serde::Deserialize;
-use taxel_data::BadValue;
-use taxel_data::error::require;
-use taxel_data::exp;
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{BadValue, LANES, Lanes, exp, require, widest};
 
 use crate::kinds::kinds;
 
@@ -103,37 +100,31 @@ impl Creep {
 impl Response for Creep {
     fn advance(&mut self, step_s: f64, wanted_mm: &[[Lanes; 3]]) {
         let [rest, lag] = self.rest_and_lag(step_s);
-        simd::widest(
-            #[inline(always)]
-            || {
-                let axes = self.memory_mm.as_flattened_mut().iter_mut();
-                for ([before, crept], wanted) in axes.zip(wanted_mm.as_flattened()) {
-                    for lane in 0..LANES {
-                        crept[lane] = wanted[lane] - lag * (wanted[lane] - before[lane])
-                            + rest * (crept[lane] - before[lane]);
-                        before[lane] = wanted[lane];
-                    }
+        widest!({
+            let axes = self.memory_mm.as_flattened_mut().iter_mut();
+            for ([before, crept], wanted) in axes.zip(wanted_mm.as_flattened()) {
+                for lane in 0..LANES {
+                    crept[lane] = wanted[lane] - lag * (wanted[lane] - before[lane])
+                        + rest * (crept[lane] - before[lane]);
+                    before[lane] = wanted[lane];
                 }
-            },
-        );
+            }
+        });
     }
 
     fn reach(&self, after_s: f64, deformation_mm: &mut [[Lanes; 3]]) {
         let [rest, lag] = self.rest_and_lag(after_s);
         let behind = 1.0 - self.solid.instant_share;
-        simd::widest(
-            #[inline(always)]
-            || {
-                let axes = self.memory_mm.as_flattened().iter();
-                for ([before, crept], wanted) in axes.zip(deformation_mm.as_flattened_mut()) {
-                    for lane in 0..LANES {
-                        let lagging = lag * (wanted[lane] - before[lane])
-                            - rest * (crept[lane] - before[lane]);
-                        wanted[lane] -= behind * lagging;
-                    }
+        widest!({
+            let axes = self.memory_mm.as_flattened().iter();
+            for ([before, crept], wanted) in axes.zip(deformation_mm.as_flattened_mut()) {
+                for lane in 0..LANES {
+                    let lagging =
+                        lag * (wanted[lane] - before[lane]) - rest * (crept[lane] - before[lane]);
+                    wanted[lane] -= behind * lagging;
                 }
-            },
-        );
+            }
+        });
     }
 }
 

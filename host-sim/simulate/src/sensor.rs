@@ -241,11 +241,6 @@ impl Sensor {
     pub fn holds_for(&self, deformation_mm: f64) -> bool {
         deformation_mm.abs() <= self.largest_deformation_mm() * (1.0 + 1e-12)
     }
-
-    /// Force in N on an electrode for its deformation in mm: F = diag(kx, ky, kz)·Δ.
-    pub fn force_n(&self, deformation_mm: Vector3) -> Vector3 {
-        [0, 1, 2].map(|axis| self.stiffness_n_per_mm[axis] * deformation_mm[axis])
-    }
 }
 
 #[cfg(test)]

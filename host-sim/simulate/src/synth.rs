@@ -4,10 +4,7 @@ use std::borrow::Cow;
 
 use firmware::timing::ScanPlan;
 use rayon::prelude::*;
-use taxel_data::dataset::Dataset;
-use taxel_data::random::{Purpose, Stream};
-use taxel_data::simd::LANES;
-use taxel_data::table::Table;
+use taxel_data::{Dataset, LANES, Purpose, Stream, Table};
 
 use crate::drift::Drift;
 use crate::motion::{self, Independent};

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::Error;
+use crate::{Error, Result};
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use model_core::rbf::Format;
 use taxel_data::BadValue;
@@ -46,9 +46,18 @@ pub fn folder() -> impl TypedValueParser<Value = PathBuf> {
 }
 
 /// Parser for a number of GB, in bytes.
-pub fn gigabytes(text: &str) -> Result<u64, &'static str> {
+pub fn gigabytes(text: &str) -> std::result::Result<u64, &'static str> {
     let gb = text.parse::<f64>().ok().filter(|gb| (1e-3..1e6).contains(gb));
     gb.map(|gb| (gb * 1e9) as u64).ok_or("give a number of GB from 0.001 on, such as 16")
+}
+
+/// Refuses the first of these options that was given, with a `message` that takes its name.
+pub fn refuse_given(
+    options: impl IntoIterator<Item = (&'static str, bool)>,
+    message: impl Fn(&str) -> String,
+) -> Result<()> {
+    let given = options.into_iter().find(|(_, given)| *given);
+    given.map_or(Ok(()), |(option, _)| Err(Error::Usage(message(option))))
 }
 
 fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(

@@ -7,9 +7,7 @@ use crate::{Error, Result};
 use clap::Args;
 use firmware::link::message::Memory;
 use model_core::blob::Metadata;
-use taxel_data::data_file::DataFile;
-use taxel_data::random::Stream;
-use taxel_data::rest::Rest;
+use taxel_data::{DataFile, Rest, Stream};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::check::{Findings, Frames, Plan};
 use taxel_simulate::sensor::Precision;
@@ -200,11 +198,7 @@ impl CheckArguments {
 
 /// Prints the findings. Wrong answers, and more memory than allowed, are a failure.
 pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result<()> {
-    if common.json {
-        print::json(findings)?;
-    } else {
-        page_of(findings).print()?;
-    }
+    print::result(common, findings, || page_of(findings))?;
     if findings.all_good() {
         limits.check(&findings.device.memory)
     } else {
@@ -221,64 +215,55 @@ pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result
 
 fn page_of(f: &Findings) -> print::Page {
     let mut page = print::Page::default();
-    let mut line = |label: &str, value: String| page.line(format_args!("{label:<17} {value}"));
     let d = &f.device;
-    line(
-        "device",
-        format!("{}, firmware {}, room for {} × {} wires", d.board, d.firmware, d.rows, d.columns),
-    );
+    page.line(format_args!(
+        "{:<17} {}, firmware {}, room for {} × {} wires",
+        "device", d.board, d.firmware, d.rows, d.columns
+    ));
     if let Some(m) = &d.model {
-        line(
+        page.line(format_args!(
+            "{:<17} {} × {} readings to {} × {} outputs, weights in {}",
             "model",
-            format!(
-                "{} × {} readings to {} × {} outputs, weights in {}",
-                m.rows,
-                m.inputs,
-                m.rows,
-                m.outputs,
-                if m.in_ram { "RAM" } else { "flash" }
-            ),
-        );
+            m.rows,
+            m.inputs,
+            m.rows,
+            m.outputs,
+            if m.in_ram { "RAM" } else { "flash" }
+        ));
     }
-    line("exponential", d.exponential.clone());
-    line(
-        "frames",
-        format!(
-            "{} of {} bit-identical to the host's, {:.0} a second",
-            f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s
-        ),
-    );
+    page.line(format_args!("{:<17} {}", "exponential", d.exponential));
+    page.line(format_args!(
+        "{:<17} {} of {} bit-identical to the host's, {:.0} a second",
+        "frames", f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s
+    ));
     if let Some(u) = &f.uploads {
         let good = if u.good_came_into_force { "activated" } else { "NOT ACTIVATED" };
-        line("good uploads", format!("{good} ({} bytes and more)", u.blob_bytes));
-        line(
-            "damaged uploads",
-            format!("{} of {} refused, previous model active", u.damaged_refused, u.damaged),
-        );
-        line(
-            "interruptions",
-            format!("previous model active after {} of {}", u.old_stayed, u.interrupted),
-        );
+        page.line(format_args!("{:<17} {good} ({} bytes and more)", "good uploads", u.blob_bytes));
+        page.line(format_args!(
+            "{:<17} {} of {} refused, previous model active",
+            "damaged uploads", u.damaged_refused, u.damaged
+        ));
+        page.line(format_args!(
+            "{:<17} previous model active after {} of {}",
+            "interruptions", u.old_stayed, u.interrupted
+        ));
     }
     if let Some(g) = &f.garbage {
         let decodes = if g.decodes_as_before { "as before" } else { "NOT AS BEFORE" };
-        line(
-            "garbage",
-            format!(
-                "{} bytes; request {} after them was answered, frames are decoded {decodes}",
-                g.bytes, g.requests_until_answer
-            ),
-        );
+        page.line(format_args!(
+            "{:<17} {} bytes; request {} after them was answered, frames are decoded {decodes}",
+            "garbage", g.bytes, g.requests_until_answer
+        ));
     }
-    line("line", format!("{} requests sent again, {} damaged reports", f.repeated, f.damaged));
+    page.line(format_args!(
+        "{:<17} {} requests sent again, {} damaged reports",
+        "line", f.repeated, f.damaged
+    ));
     let s = &f.statistics;
-    line(
-        "since its start",
-        format!(
-            "{} requests, {} bad packets, {} lost reports",
-            s.requests, s.bad_packets, s.lost_reports
-        ),
-    );
+    page.line(format_args!(
+        "{:<17} {} requests, {} bad packets, {} lost reports",
+        "since its start", s.requests, s.bad_packets, s.lost_reports
+    ));
     memory_lines(&mut page, &d.memory);
     page
 }

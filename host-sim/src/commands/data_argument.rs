@@ -6,14 +6,13 @@ use crate::measurements::far_from_zero;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_data::clock::neighbours_alike;
-use taxel_data::data_file::{DataFile, is_array};
-use taxel_data::dataset::Dataset;
+use taxel_data::data_file::is_array;
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::Mat;
-use taxel_data::rest::Rest;
-use taxel_data::table::Table;
+use taxel_data::{DataFile, Dataset, Rest, Table};
 use taxel_learn::select;
 
+use super::arguments::refuse_given;
 use super::data_file::{DATA_FILES, DataFileArguments};
 use super::readings;
 use super::rest_argument::RestArgument;
@@ -99,15 +98,13 @@ impl DataArguments {
             ("--rest", "lines", self.rest.is_given()),
             ("--time", "columns", self.time.is_some()),
         ] {
-            if given {
-                let message = format!("{option} picks {picked} of a CSV file; a scene has its own");
-                return Err(Error::Usage(message));
-            }
+            refuse_given([(option, given)], |option| {
+                format!("{option} picks {picked} of a CSV file; a scene has its own")
+            })?;
         }
-        if self.baseline.is_some() {
-            let message = "--baseline is for a CSV file; a scene synthesises its own: leave it out";
-            return Err(Error::Usage(message.into()));
-        }
+        refuse_given([("--baseline", self.baseline.is_some())], |option| {
+            format!("{option} is for a CSV file; a scene synthesises its own: leave it out")
+        })?;
         self.file.refuse_for_scene()
     }
 
@@ -128,29 +125,24 @@ impl DataArguments {
 
     /// Error if a column of times was named: `command` tells nothing over time.
     pub fn refuse_time(&self, command: &str) -> Result<()> {
-        if self.time.is_some() {
-            let message = format!("--time has no effect in {command}: leave it out");
-            return Err(Error::Usage(message));
-        }
-        Ok(())
+        refuse_given([("--time", self.time.is_some())], |option| {
+            format!("{option} has no effect in {command}: leave it out")
+        })
     }
 
     /// Error if folds were asked for: nothing uses them.
     pub fn refuse_folds(&self) -> Result<()> {
-        for (option, given) in [
+        let of_folds = [
             ("--folds", self.folds.is_some()),
             ("--fold-blocks", self.fold_blocks.is_some()),
             ("--fold-column", self.fold_column.is_some()),
-        ] {
-            if given {
-                let message = format!(
-                    "{option} has no effect without refinement, --select or --confidence: leave it out, or \
-                     leave out --no-refine"
-                );
-                return Err(Error::Usage(message));
-            }
-        }
-        Ok(())
+        ];
+        refuse_given(of_folds, |option| {
+            format!(
+                "{option} has no effect without refinement, --select or --confidence: leave it out, or leave out \
+                 --no-refine"
+            )
+        })
     }
 
     /// File with frames of the untouched sensor, if it was given.
@@ -203,23 +195,20 @@ impl DataArguments {
                     .into(),
             ));
         }
-        for (option, given) in [
+        let of_all_lines = [
             ("--fold-column", self.fold_column.is_some()),
             ("--rest", self.rest.is_given()),
             ("--time", self.time.is_some()),
             ("--first-share and --last-share", self.file.takes_a_share()),
             ("--confidence", how.confidence),
             ("an array of numpy's", is_array(path)),
-        ] {
-            if given {
-                let message = format!(
-                    "{option}: a recursion reads the lines of a CSV file once, and this needs all of them at once: \
-                     leave it out, or give --solver qr"
-                );
-                return Err(Error::Usage(message));
-            }
-        }
-        Ok(())
+        ];
+        refuse_given(of_all_lines, |option| {
+            format!(
+                "{option}: a recursion reads the lines of a CSV file once, and this needs all of them at once: \
+                 leave it out, or give --solver qr"
+            )
+        })
     }
 
     /// Folds of frames with these `outputs`, as many as were asked for: of successive frames, or drawn at random. Unless a

@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
+use super::arguments::refuse_given;
 use super::stderr;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::data_file::{DataFile, Reading, Separator, Stated, is_array};
+use taxel_data::DataFile;
+use taxel_data::data_file::{Reading, Separator, Stated, is_array};
 
 /// Heading of options for data files.
 pub const DATA_FILES: &str = "Data files (CSV, .npy, .npz)";
@@ -102,13 +104,9 @@ impl DataFileArguments {
             ("--first-share", self.first_share.is_some()),
             ("--last-share", self.last_share.is_some()),
         ];
-        for (option, given) in of_fields.into_iter().chain(self.fields.of_text()) {
-            if given {
-                let message = format!("{option} is for data files; a scene has none: leave it out");
-                return Err(Error::Usage(message));
-            }
-        }
-        Ok(())
+        refuse_given(of_fields.into_iter().chain(self.fields.of_text()), |option| {
+            format!("{option} is for data files; a scene has none: leave it out")
+        })
     }
 }
 
@@ -173,12 +171,10 @@ impl FieldArguments {
     }
 
     fn read_as(&self, path: &Path, keeps_text: bool) -> Result<DataFile> {
-        if let (true, Some((option, _))) =
-            (is_array(path), self.of_text().into_iter().find(|(_, given)| *given))
-        {
-            let message =
-                format!("{option} is for text files; {} is none: leave it out", path.display());
-            return Err(Error::Usage(message));
+        if is_array(path) {
+            refuse_given(self.of_text(), |option| {
+                format!("{option} is for text files; {} is none: leave it out", path.display())
+            })?;
         }
         let mut file = DataFile::read_as(path, &Reading { keeps_text, ..self.reading() })?;
         note_found(&file);

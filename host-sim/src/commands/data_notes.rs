@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use taxel_data::columns;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::error::{cut, number};
 use taxel_data::rest::is_zero_at_rest;
-use taxel_data::table::Table;
+use taxel_data::{Table, columns};
 use taxel_learn::outliers::{Outlier, Outliers};
 
 use super::stderr;

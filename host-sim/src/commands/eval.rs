@@ -15,9 +15,7 @@ use crate::{Error, Result};
 use clap::Args;
 use model_core::blob::Metadata;
 use serde::Serialize;
-use taxel_data::clock::Clock;
-use taxel_data::data_file::DataFile;
-use taxel_data::output;
+use taxel_data::{Clock, DataFile, output};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
@@ -189,10 +187,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let page = page_of(arguments, &blob, &summary, &distribution)?;
         output::write_bytes(html, page.as_bytes())?;
     }
-    if common.json {
-        return print::json(&summary);
-    }
-    text_of(&summary).print()
+    print::result(common, &summary, || text_of(&summary))
 }
 
 /// Whether a model that was trained on lines of `file` knows some of those that are kept: it was trained on more lines than

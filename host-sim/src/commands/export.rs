@@ -61,21 +61,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         weight_bytes: export::weight_bytes(&model),
         file: arguments.rust.clone(),
     };
-    if common.json {
-        return print::json(&summary);
-    }
-    let mut page = print::Page::default();
-    page.line(format_args!(
-        "{}: {} row{}, {} network{}, {} bytes of weights, CRC-32 {}",
-        summary.file.display(),
-        summary.rows,
-        if summary.rows == 1 { "" } else { "s" },
-        summary.networks,
-        if summary.networks == 1 { "" } else { "s" },
-        summary.weight_bytes,
-        summary.model_crc
-    ));
-    page.print()
+    print::result(common, &summary, || {
+        print::Page::of(format_args!(
+            "{}: {} row{}, {} network{}, {} bytes of weights, CRC-32 {}",
+            summary.file.display(),
+            summary.rows,
+            if summary.rows == 1 { "" } else { "s" },
+            summary.networks,
+            if summary.networks == 1 { "" } else { "s" },
+            summary.weight_bytes,
+            summary.model_crc
+        ))
+    })
 }
 
 /// How to train a model without this part.

@@ -3,8 +3,7 @@
 use crate::{Error, Result};
 use clap::Args;
 use model_core::filter::Settings;
-use taxel_data::clock::Clock;
-use taxel_data::data_file::DataFile;
+use taxel_data::{Clock, DataFile};
 
 /// Options of the filter in time.
 #[derive(Args)]

@@ -6,8 +6,7 @@ use crate::Result;
 use crate::experiment::Experiment;
 use clap::Args;
 use serde::Serialize;
-use taxel_data::csv_file;
-use taxel_data::data_file::DataFile;
+use taxel_data::{DataFile, csv_file};
 use taxel_simulate::forward::forward;
 
 use super::{Common, print};
@@ -47,15 +46,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         readings: names.len(),
         file: arguments.output.clone(),
     };
-    if common.json {
-        return print::json(&summary);
-    }
-    let mut page = print::Page::default();
-    page.line(format_args!(
-        "{} frames of {} readings in {}",
-        summary.frames,
-        summary.readings,
-        summary.file.display()
-    ));
-    page.print()
+    print::result(common, &summary, || {
+        print::Page::of(format_args!(
+            "{} frames of {} readings in {}",
+            summary.frames,
+            summary.readings,
+            summary.file.display()
+        ))
+    })
 }

@@ -15,7 +15,7 @@ use serde::Serialize;
 use taxel_learn::cost::{Design, Frames, Prices};
 use taxel_learn::{Exponential, PreparedModel};
 
-use super::arguments::of_option;
+use super::arguments::{of_option, refuse_given};
 use super::subject_argument::{self, SubjectArgument};
 use super::{Common, print, stderr};
 
@@ -89,7 +89,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let result = result.map_err(|bad| of_option(bad, &OPTIONS))?;
     let verdict = verdict(&result);
     let summary = Summary { result, verdict };
-    if common.json { print::json(&summary) } else { page_of(&summary).print() }
+    print::result(common, &summary, || page_of(&summary))
 }
 
 #[derive(Serialize)]
@@ -117,17 +117,13 @@ fn check(arguments: &Arguments, subject: &Subject, numbers: [usize; 2]) -> Resul
             Ok(settings.map_err(|bad| of_option(bad, &OPTIONS))?)
         }
         Subject::Measured(data) => {
-            for (option, given) in [
+            let of_scenes = [
                 ("--frames", arguments.frames.is_some()),
                 ("--baseline-frames", arguments.baseline_frames.is_some()),
-            ] {
-                if given {
-                    let message = format!(
-                        "{option} is for a scene; a CSV file has its own frames: leave it out"
-                    );
-                    return Err(Error::Usage(message));
-                }
-            }
+            ];
+            refuse_given(of_scenes, |option| {
+                format!("{option} is for a scene; a CSV file has its own frames: leave it out")
+            })?;
             gate::GateRest::new(data, &arguments.k).map_err(|bad| of_option(bad, &OPTIONS))?;
             Ok(())
         }

@@ -120,10 +120,7 @@ struct ColumnSummary {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = ModelBlob::read(&arguments.model)?;
     let summary = summarise(&blob)?;
-    if common.json {
-        return print::json(&summary);
-    }
-    page_of(&summary).print()
+    print::result(common, &summary, || page_of(&summary))
 }
 
 fn summarise(blob: &ModelBlob) -> Result<Summary> {

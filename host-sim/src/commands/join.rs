@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use taxel_data::columns;
 use taxel_data::csv_file::{self, Column};
-use taxel_data::data_file::DataFile;
 use taxel_data::join::{Join, Joined, Time};
+use taxel_data::{DataFile, columns};
 
 use super::arguments::of_option;
 use super::data_file::FieldArguments;
@@ -78,17 +77,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         frames_without_partner: first.lines() - frames,
         file: arguments.output.clone(),
     };
-    if common.json {
-        return print::json(&summary);
-    }
-    let mut page = print::Page::default();
-    page.line(format_args!(
-        "{} lines of {} columns in {}",
-        summary.frames,
-        summary.columns,
-        summary.file.display()
-    ));
-    page.print()
+    print::result(common, &summary, || {
+        print::Page::of(format_args!(
+            "{} lines of {} columns in {}",
+            summary.frames,
+            summary.columns,
+            summary.file.display()
+        ))
+    })
 }
 
 /// Writes the lines of both logs that belong together, with their fields as they are written.

@@ -85,11 +85,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(folder) = &arguments.output {
         write_files(folder, &result)?;
     }
-    if common.json {
-        print::json(&result)?;
-    } else {
-        page_of(&result, arguments.output.as_deref()).print()?;
-    }
+    print::result(common, &result, || page_of(&result, arguments.output.as_deref()))?;
     refusal(&result)
 }
 
@@ -225,9 +221,6 @@ fn directions(page: &mut print::Page, level: &Level) {
 }
 
 fn line_of(name: &str, seen: &Observability) -> String {
-    let known: Vec<String> =
-        seen.axes.iter().map(|axis| format!("{:>4.0} %", 100.0 * axis.known)).collect();
-    let rmse: Vec<String> = seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm)).collect();
     let ratios: Vec<String> = seen
         .signal_to_noise
         .iter()
@@ -235,13 +228,19 @@ fn line_of(name: &str, seen: &Observability) -> String {
         .map(|ratio| format!(" {ratio:>6.2}"))
         .collect();
     format!(
-        "{name:<8} {:>10} {:>9}   {} {:>24}  {}",
+        "{name:<8} {:>10} {:>9}   {}  {}",
         seen.observable,
         seen.unknowns,
-        known.concat(),
-        rmse.join(" "),
+        known_by_axis(seen),
         ratios.concat()
     )
+}
+
+/// Share of the variance that is known along each axis, and the RMSE that is left.
+fn known_by_axis(seen: &Observability) -> String {
+    let known = seen.axes.iter().map(|axis| format!("{:>4.0} %", 100.0 * axis.known));
+    let rmse: Vec<String> = seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm)).collect();
+    format!("{} {:>24}", known.collect::<String>(), rmse.join(" "))
 }
 
 fn geometry(page: &mut print::Page, result: &LimitResult) {
@@ -263,16 +262,11 @@ fn geometry(page: &mut print::Page, result: &LimitResult) {
             page.line(format_args!("{start}  -  {refused}"));
         }
         let Some(seen) = &variant.observability else { continue };
-        let known: Vec<String> =
-            seen.axes.iter().map(|axis| format!("{:>4.0} %", 100.0 * axis.known)).collect();
-        let rmse: Vec<String> =
-            seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm)).collect();
         page.line(format_args!(
-            "{start} {:>10} {:>7.1}   {} {:>24}",
+            "{start} {:>10} {:>7.1}   {}",
             seen.observable,
             seen.observable as f64 / seen.row_wires.len() as f64,
-            known.concat(),
-            rmse.join(" ")
+            known_by_axis(seen)
         ));
     }
 }

@@ -10,7 +10,7 @@ use firmware::timing::NUCLEO_BAUD;
 use taxel_data::input;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
-use taxel_rig::device::{Device, DeviceIdentity, LEASE, Wire, key_of, serial, upload};
+use taxel_rig::device::{Device, DeviceIdentity, LEASE, key_of, serial, upload};
 
 use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
@@ -235,7 +235,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 /// Uploads `model`, puts it on trial, and waits until the device has decoded frames with it.
-fn activate<W: Wire>(device: &mut Device<W>, model: &ModelBlob) -> Result<DeviceIdentity> {
+fn activate(device: &mut Device, model: &ModelBlob) -> Result<DeviceIdentity> {
     let progress = Terminal::new();
     let identity =
         device.while_paused(|device| upload::start_trial(device, model.bytes(), &progress))?;

@@ -1,10 +1,8 @@
 //! Columns of a data file that are the cells of a mat, with their names in a model.
 
-use taxel_data::columns;
-use taxel_data::data_file::DataFile;
 use taxel_data::dataset::USUAL_INPUTS;
 use taxel_data::mat::{self, Mat};
-use taxel_data::table::Table;
+use taxel_data::{DataFile, Table, columns};
 
 /// Input columns of a file, each with its name in a model: that of a cell, if they are a mat.
 pub struct MatCells {

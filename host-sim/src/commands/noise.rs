@@ -6,10 +6,8 @@ use crate::verdict::sentences;
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use taxel_data::clock::Clock;
-use taxel_data::columns;
 use taxel_data::spectrum::Spectrum;
-use taxel_data::table::Table;
+use taxel_data::{Clock, Table, columns};
 
 use super::data_file::{DATA_FILES, DataFileArguments};
 use super::{Common, print};

@@ -17,7 +17,7 @@ use taxel_data::error::printable;
 use taxel_data::output;
 use taxel_learn::decoders::mean;
 
-use super::{captured, stdout};
+use super::{Common, captured, stdout};
 
 /// Page of text for people, printed as a whole.
 #[derive(Default)]
@@ -28,6 +28,13 @@ impl Page {
     pub fn line(&mut self, line: impl Display) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.0, "{line}");
+    }
+
+    /// Page of one line.
+    pub fn of(line: impl Display) -> Self {
+        let mut page = Self::default();
+        page.line(line);
+        page
     }
 
     /// Prints the page.
@@ -109,6 +116,11 @@ fn document(result: &impl Serialize, timed: bool) -> Result<String> {
 /// Prints the result of the command as JSON.
 pub fn json(result: &impl Serialize) -> Result<()> {
     show(&document(result, true)?)
+}
+
+/// Prints the result of the command: as JSON if that was asked for, else as a page.
+pub fn result(common: &Common, result: &impl Serialize, page: impl FnOnce() -> Page) -> Result<()> {
+    if common.json { json(result) } else { page().print() }
 }
 
 /// Adds one line a decoder and group, under a header of definitions.

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use taxel_data::progress::Progress;
+use taxel_data::Progress;
 
 use super::captured::{self, Stopped};
 use super::stderr;

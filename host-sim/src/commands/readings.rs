@@ -6,10 +6,7 @@ use crate::{Error, Result};
 use clap::Args;
 use model_core::blob::Metadata;
 use model_core::health::Limits;
-use taxel_data::columns;
-use taxel_data::data_file::DataFile;
-use taxel_data::dataset::Dataset;
-use taxel_data::table::Table;
+use taxel_data::{DataFile, Dataset, Table, columns};
 use taxel_learn::health::judge;
 use taxel_learn::{PreparedModel, outliers, relative};
 

@@ -3,10 +3,8 @@
 use super::stderr;
 use crate::subject::Subject;
 use model_core::health::{Fault, Limits};
-use taxel_data::columns;
 use taxel_data::error::cut;
-use taxel_data::random::Stream;
-use taxel_data::table::Table;
+use taxel_data::{Stream, Table, columns};
 use taxel_learn::faults::{Grid, Place, diagnose};
 use taxel_simulate::Synthesis;
 

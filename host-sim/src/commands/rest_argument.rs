@@ -6,11 +6,8 @@ use crate::{Error, Result};
 use clap::Args;
 use model_core::blob::Metadata;
 use model_core::health::Limits;
-use taxel_data::columns;
-use taxel_data::data_file::DataFile;
-use taxel_data::dataset::Dataset;
-use taxel_data::rest::{self, Rest};
-use taxel_data::table::Table;
+use taxel_data::rest;
+use taxel_data::{DataFile, Dataset, Rest, Table, columns};
 use taxel_learn::health::judge;
 use taxel_learn::outliers;
 

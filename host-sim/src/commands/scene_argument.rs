@@ -5,8 +5,7 @@ use std::path::Path;
 use crate::experiment::Experiment;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::columns;
-use taxel_data::progress::Progress;
+use taxel_data::{Progress, columns};
 use taxel_learn::ModelBlob;
 use taxel_simulate::sensor::Precision;
 

@@ -6,7 +6,7 @@ use crate::experiment::{Experiment, names_a_scene};
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::progress::Progress;
+use taxel_data::Progress;
 use taxel_learn::ModelBlob;
 use taxel_simulate::sensor::Precision;
 

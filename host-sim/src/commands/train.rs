@@ -12,9 +12,8 @@ use crate::{Error, Result, report};
 use clap::Args;
 use model_core::rbf::Format;
 use serde::Serialize;
-use taxel_data::dataset::{Dataset, LeftOut, UnusedInputs};
-use taxel_data::progress::Silent;
-use taxel_data::{columns, output};
+use taxel_data::dataset::{LeftOut, UnusedInputs};
+use taxel_data::{Dataset, Silent, columns, output};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
 use taxel_learn::train::{Widths, projection};
@@ -223,10 +222,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             .map(Measurements::constant_inputs)
             .unwrap_or_default(),
     };
-    if common.json {
-        return print::json(&summary);
-    }
-    page_of(&summary, options.centres).print()
+    print::result(common, &summary, || page_of(&summary, options.centres))
 }
 
 /// Reason for direct distances in a model that was to be in f32, and what is faster. Whether fixed16 holds such a network is

@@ -21,6 +21,10 @@ pub enum Mark {
     Bars(f64),
 }
 
+/// Colours and marks of series that stand beside each other, such as groups of outputs.
+pub const STYLES: [(&str, Shape); 4] =
+    [("c1", Shape::Circle), ("c2", Shape::Square), ("c3", Shape::Triangle), ("c4", Shape::Diamond)];
+
 /// Series of values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {

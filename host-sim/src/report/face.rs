@@ -93,9 +93,7 @@ impl Face {
         let number = |i: usize| [row_wires[i / per_row], i % per_row + 1];
         let cell = |(i, middle): (usize, &[f64; 2])| {
             let [row, electrode] = number(i);
-            let corner = |x: f64, y: f64| [middle[0] + x * size_mm[0], middle[1] + y * size_mm[1]];
-            let outline =
-                vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
+            let outline = rectangle(*middle, size_mm);
             Cell { name: electrode_name([row, electrode]), middle: *middle, outline }
         };
         let cells: Vec<Cell> = places.iter().enumerate().map(cell).collect();
@@ -160,11 +158,8 @@ impl Face {
             numbers.iter().position(|known| *known == number).unwrap_or(0) as f64 + 0.5
         };
         let cell = |wires: &[usize; 2]| {
-            let middle @ [x, y] = [place(&columns, wires[1]), place(&rows, wires[0])];
-            let corner = |dx: f64, dy: f64| [x + dx, y + dy];
-            let outline =
-                vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
-            Cell { name: name(*wires), middle, outline }
+            let middle = [place(&columns, wires[1]), place(&rows, wires[0])];
+            Cell { name: name(*wires), middle, outline: rectangle(middle, [1.0, 1.0]) }
         };
         let axis = |label: &str, numbers: &[usize]| {
             let at = numbers.iter().map(|number| (place(numbers, *number), number.to_string()));
@@ -198,6 +193,12 @@ impl Face {
         let area = x * y;
         (area / self.cells.len().max(1) as f64).sqrt()
     }
+}
+
+/// Rectangle of this size about its middle.
+fn rectangle([x, y]: [f64; 2], [width, height]: [f64; 2]) -> Polygon {
+    let corner = |dx: f64, dy: f64| [x + dx * width, y + dy * height];
+    vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)]
 }
 
 fn electrode_name([row, electrode]: [usize; 2]) -> String {

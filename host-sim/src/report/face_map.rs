@@ -1,12 +1,10 @@
 //! Maps over a face: coloured cells with their numbers, or arrows.
 
-use std::fmt::Write as _;
-
 use super::axes::{Panel, Upright};
 use super::colour::ColourScale;
 use super::face::Face;
 use super::format::{fixed, significant};
-use super::svg::{Anchor, Px, Svg, TEXT_PX, escape, text_width};
+use super::svg::{Anchor, Px, Svg, TEXT_PX, escape, polyline, text_width};
 use super::ticks;
 use super::voronoi;
 
@@ -87,11 +85,7 @@ impl<'f> Map<'f> {
                 continue;
             }
             let (class, opacity) = values.scale.colour(*value);
-            let mut d = String::new();
-            for (i, [x, y]) in outline.iter().enumerate() {
-                // Writing to a string cannot fail.
-                let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, Px(*x), Px(*y));
-            }
+            let d = polyline(&outline);
             self.svg.add(format_args!(
                 r#"<path d="{d}Z" class="{class} cell-of-map" fill-opacity="{opacity:.2}">{title}</path>"#
             ));
@@ -141,11 +135,7 @@ impl<'f> Map<'f> {
             if hover && let [truth, estimate] = &vectors[..] {
                 let text =
                     escape(&format!("{}: true {truth}; decoded {estimate} {unit}", cell.name));
-                self.svg.add(format_args!(
-                    r#"<circle cx="{}" cy="{}" r="9" class="sensitive"><title>{text}</title></circle>"#,
-                    Px(from[0]),
-                    Px(from[1])
-                ));
+                self.svg.circle(from, 9.0, "sensitive", &format!("<title>{text}</title>"));
             }
         }
         self.axes();
@@ -193,31 +183,16 @@ impl<'f> Map<'f> {
         let length = dx.hypot(dy);
         if length < 1.5 {
             // Too short for an arrow: a dot.
-            self.svg.add(format_args!(
-                r#"<circle cx="{}" cy="{}" r="1.2" class="{class} mark"/>"#,
-                Px(x),
-                Px(y)
-            ));
+            self.svg.circle([x, y], 1.2, &format!("{class} mark"), "");
             return;
         }
         let (end, head) = ([x + dx, y + dy], (0.35 * length).clamp(2.0, 5.0));
         let (along, across) = ([dx / length, dy / length], [-dy / length, dx / length]);
         let corner = |side: f64| {
-            let at =
-                |axis: usize| end[axis] - head * along[axis] + side * 0.5 * head * across[axis];
-            format!("{} {}", Px(at(0)), Px(at(1)))
+            [0, 1].map(|axis| end[axis] - head * along[axis] + side * 0.5 * head * across[axis])
         };
-        self.svg.add(format_args!(
-            r#"<path d="M{} {}L{} {}M{}L{} {}L{}" class="{class} arrow"/>"#,
-            Px(x),
-            Px(y),
-            Px(end[0]),
-            Px(end[1]),
-            corner(1.0),
-            Px(end[0]),
-            Px(end[1]),
-            corner(-1.0)
-        ));
+        let (shaft, tip) = (polyline(&[[x, y], end]), polyline(&[corner(1.0), end, corner(-1.0)]));
+        self.svg.path(&(shaft + &tip), &format!("{class} arrow"));
     }
 
     /// Draws the outline, ticks and labels.

@@ -6,7 +6,7 @@ use super::face::Face;
 use super::face_map::{Map, Values};
 use super::figures::Figure;
 use super::format::{fixed, significant, symbol, with_unit};
-use super::svg::{Anchor, Px, TEXT_PX};
+use super::svg::{Anchor, TEXT_PX};
 use super::ticks;
 use super::view::View;
 use taxel_evaluate::evaluate::distribution::{Rank, RelativeTo, ShownFrame};
@@ -206,12 +206,8 @@ pub fn places(view: &View<'_>) -> Option<Figure> {
         let mut map = Map::new(&face, &format!("Place in the {heading}"), &heading, 46.0);
         for row in view.sensor.into_iter().flat_map(|sensor| &sensor.row_wires) {
             for electrode in &row.electrodes_mm {
-                let [x, y] = map.place(*electrode);
-                map.svg().add(format_args!(
-                    r#"<circle cx="{}" cy="{}" r="1.6" class="muted mark pale"/>"#,
-                    Px(x),
-                    Px(y)
-                ));
+                let place = map.place(*electrode);
+                map.svg().circle(place, 1.6, "muted mark pale", "");
             }
         }
         // A place that is decoded beside the face is drawn at its edge.
@@ -247,12 +243,8 @@ pub fn places(view: &View<'_>) -> Option<Figure> {
     (!panels.is_empty()).then(|| Figure::of_panels(caption, &panels))
 }
 
-fn mark(map: &mut Map<'_>, [x, y]: [f64; 2], class: &str, radius: f64, hover: &str) {
-    map.svg().add(format_args!(
-        r#"<circle cx="{}" cy="{}" r="{radius}" class="{class}"><title>{hover}</title></circle>"#,
-        Px(x),
-        Px(y)
-    ));
+fn mark(map: &mut Map<'_>, place: [f64; 2], class: &str, radius: f64, hover: &str) {
+    map.svg().circle(place, radius, class, &format!("<title>{hover}</title>"));
 }
 
 fn legend(map: &mut Map<'_>, face: &Face, depth_mm: Option<[f64; 2]>) {

@@ -3,14 +3,12 @@
 use taxel_evaluate::evaluate::learning_curve::LearningCurve;
 
 use super::axes::Axis;
-use super::chart::{Chart, Mark, Series};
+use super::chart::{Chart, Mark, STYLES, Series};
 use super::format::{grouped, significant, symbol};
-use super::svg::{Shape, standalone};
+use super::svg::standalone;
 use super::ticks;
 
 const SIZE: [f64; 2] = [920.0, 420.0];
-const STYLES: [(&str, Shape); 4] =
-    [("c1", Shape::Circle), ("c2", Shape::Square), ("c3", Shape::Triangle), ("c4", Shape::Diamond)];
 /// Errors beyond so many times that of the mean are arrows at the edge: few frames fit their own noise.
 const MOST: f64 = 10.0;
 

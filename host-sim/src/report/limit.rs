@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use taxel_limit::identify::Observability;
 
 use super::axes::Axis;
-use super::chart::{Chart, Mark, Series};
+use super::chart::{Chart, Mark, STYLES, Series};
 use super::colour::ColourScale;
 use super::errors::BAR_PX;
 use super::face::Face;
@@ -164,12 +164,10 @@ fn name(figures: &Figures) -> String {
 
 /// Chart of the limit against the noise level.
 fn by_noise(result: &LimitResult) -> Chart {
-    const STYLES: [(&str, Shape); 3] =
-        [("c1", Shape::Circle), ("c2", Shape::Square), ("c3", Shape::Triangle)];
     let of_array = || result.levels.iter().filter_map(|l| Some((l.noise_level, l.limits.first()?)));
     let names = of_array().map(|(_, figures)| &figures.groups).max_by_key(|groups| groups.len());
     let mut series = Vec::new();
-    for (group, (class, shape)) in names.into_iter().flatten().zip(STYLES) {
+    for (group, (class, shape)) in names.into_iter().flatten().zip(STYLES).take(3) {
         let line = |of: &dyn Fn(&taxel_limit::reference::GroupLimit) -> f64| {
             let mut points: Vec<[f64; 2]> = of_array()
                 .filter_map(|(noise, f)| {

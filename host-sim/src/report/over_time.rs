@@ -5,7 +5,7 @@ use taxel_evaluate::over_time::{OverTime, PercentOf, RestOverTime, RestStretch, 
 use taxel_evaluate::verdict::sentences;
 
 use super::axes::Axis;
-use super::chart::{Chart, Mark, Series};
+use super::chart::{Chart, Mark, STYLES, Series};
 use super::figures::Figure;
 use super::format::{grouped, significant, symbol};
 use super::svg::Shape;
@@ -13,9 +13,6 @@ use super::ticks::{self, Ticks};
 
 const WIDE: [f64; 2] = [920.0, 300.0];
 const NARROW: [f64; 2] = [360.0, 260.0];
-/// Colours and marks of the groups of outputs; there is no line for more groups.
-const STYLES: [(&str, Shape); 4] =
-    [("c1", Shape::Circle), ("c2", Shape::Square), ("c3", Shape::Triangle), ("c4", Shape::Diamond)];
 /// Errors beyond so many times that of the mean are arrows at the edge.
 const MOST: f64 = 3.0;
 

@@ -1,11 +1,9 @@
 //! Sketch of a sensor in plan view: wires and electrodes.
 
-use std::fmt::Write as _;
-
 use super::axes::{BELOW_PX, Panel, Upright};
 use super::face;
 use super::figures::Figure;
-use super::svg::{Anchor, Px, Svg, TEXT_PX, text_width};
+use super::svg::{Anchor, Svg, TEXT_PX, polyline, text_width};
 use super::ticks;
 use taxel_evaluate::run::SensorSketch;
 
@@ -40,16 +38,10 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
         let class = if row.read { "c1" } else { "muted" };
         let points: Vec<[f64; 2]> = row.electrodes_mm.iter().map(|p| place(*p)).collect();
         wire(&mut svg, &points, if row.read { "c1 wire" } else { "muted wire broken" });
-        for (i, [x, y]) in points.iter().enumerate() {
-            let read = if row.read { "" } else { ", not read" };
-            svg.add(format_args!(
-                r#"<circle cx="{}" cy="{}" r="{}" class="{class} mark"><title>row-wire {}, electrode {}{read}</title></circle>"#,
-                Px(*x),
-                Px(*y),
-                1.5 * size,
-                m + 1,
-                i + 1
-            ));
+        let read = if row.read { "" } else { ", not read" };
+        for (i, place) in points.iter().enumerate() {
+            let title = format!("<title>row-wire {}, electrode {}{read}</title>", m + 1, i + 1);
+            svg.circle(*place, 1.5 * size, &format!("{class} mark"), &title);
         }
     }
     // Numbers stand at the ends of wires, as far as they do not overlap.
@@ -77,12 +69,7 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
 }
 
 fn wire(svg: &mut Svg, points: &[[f64; 2]], class: &str) {
-    let mut d = String::new();
-    for (i, [x, y]) in points.iter().enumerate() {
-        // Writing to a string cannot fail.
-        let _ = write!(d, "{}{} {}", if i == 0 { 'M' } else { 'L' }, Px(*x), Px(*y));
-    }
-    svg.path(&d, class);
+    svg.path(&polyline(points), class);
 }
 
 fn legend(svg: &mut Svg, unread: bool) {

@@ -127,6 +127,13 @@ impl Svg {
         ));
     }
 
+    /// Adds a circle; `inside` is its content.
+    pub fn circle(&mut self, [x, y]: [f64; 2], radius: f64, class: &str, inside: &str) {
+        let (x, y) = (Px(x), Px(y));
+        let end = if inside.is_empty() { "/>".into() } else { format!(">{inside}</circle>") };
+        self.add(format_args!(r#"<circle cx="{x}" cy="{y}" r="{radius}" class="{class}"{end}"#));
+    }
+
     /// Adds a path.
     pub fn path(&mut self, d: &str, class: &str) {
         self.add(format_args!(r#"<path d="{d}" class="{class}"/>"#));
@@ -165,6 +172,14 @@ impl Svg {
             self.body
         )
     }
+}
+
+/// Path along these points.
+pub fn polyline(points: &[[f64; 2]]) -> String {
+    let step = |(i, [x, y]): (usize, &[f64; 2])| {
+        format!("{}{} {}", if i == 0 { 'M' } else { 'L' }, Px(*x), Px(*y))
+    };
+    points.iter().enumerate().map(step).collect()
 }
 
 /// Shapes that distinguish series without colour.

@@ -4,7 +4,7 @@ use taxel_learn::decoders::{linear, mean, standard};
 use taxel_limit::limit;
 
 use super::axes::Axis;
-use super::chart::{Chart, Mark, Series};
+use super::chart::{Chart, Mark, STYLES, Series};
 use super::figures::Figure;
 use super::format::{percent, symbol, with_unit};
 use super::svg::Shape;
@@ -128,8 +128,6 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     }
 }
 
-const SHAPES: [Shape; 4] = [Shape::Circle, Shape::Square, Shape::Triangle, Shape::Diamond];
-
 /// Figure of error against spread, one line a noise level.
 pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
     let name = symbol(group);
@@ -141,7 +139,7 @@ pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
     for (i, column) in table.columns.iter().enumerate() {
         let at = |spread| [spread, rmse(column.errors(NETWORK, Some(spread)), group)];
         let points = column.spreads().map(at).collect();
-        let mark = Mark::LineAnd(SHAPES[i % SHAPES.len()]);
+        let mark = Mark::LineAnd(STYLES[i % STYLES.len()].1);
         let line = Series::new(&percent(column.noise_level), "c1", mark, points);
         series.push(Series { opacity: 0.6 + 0.4 * i as f64 / last, ..line });
     }

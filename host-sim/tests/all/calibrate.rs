@@ -11,20 +11,18 @@ use firmware::readout::{
     FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, Selection, ShiftRegister595,
 };
 use model_core::Wires;
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::{Silent, Stream};
 use taxel_rig::Error;
 use taxel_rig::calibration::{CircuitConstants, Fit};
 use taxel_rig::device::Device;
 use taxel_rig::device::calibrate::{Reading, calibrate};
 use taxel_rig::emulator::{self, Emulator};
-use taxel_rig::mailbox::Mailbox;
-use taxel_simulate::readout::{Drive, Readout, op_amp_time_constant_us};
-use taxel_simulate::virtual_board::{Parts, Pin, VirtualBoard};
+use taxel_simulate::readout::{Drive, Readout};
 use taxel_simulate::{World, synthesise};
+use taxel_virtual_board::{Parts, Pin, VirtualBoard, op_amp_time_constant_us};
 
 use crate::common::Folder;
-use crate::virtual_device::mailbox::{Memory, pair};
+use crate::virtual_device::mailbox::pair;
 use crate::virtual_device::{Line, run_with};
 
 const WIRES: Wires = Wires { rows: 8, columns: 18 };
@@ -106,7 +104,7 @@ fn run_device(far: impl Read + Write + Send + 'static) -> Arc<Mutex<Vec<f64>>> {
 }
 
 /// Device without a model, and what is connected to it.
-fn device() -> (Device<Mailbox<Memory>>, Arc<Mutex<Vec<f64>>>) {
+fn device() -> (Device, Arc<Mutex<Vec<f64>>>) {
     let (near, far) = pair();
     let connected = run_device(far);
     let mut device = Device::new(near).unwrap();
@@ -133,7 +131,7 @@ fn single(place: usize) -> Vec<f64> {
 
 /// Calibrates while `connect` makes of the known resistors what is really connected.
 fn run(
-    device: &mut Device<Mailbox<Memory>>,
+    device: &mut Device,
     connected: &Mutex<Vec<f64>>,
     known: &[Vec<f64>],
     connect: impl Fn(&[f64]) -> Vec<f64>,

@@ -12,9 +12,7 @@ use firmware::link::message::{
 use model_core::blob::{Floats, ModelParts, encode_to_vec};
 use model_core::confidence::{Confidence, Sizes};
 use model_core::filter::Settings;
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
-use taxel_data::table::Table;
+use taxel_data::{Silent, Stream, Table};
 use taxel_learn::{Decoder, Exponential, Filtered, ModelBlob, Timing};
 use taxel_rig::Error;
 use taxel_rig::device::check::{Frames, Plan, check};
@@ -85,7 +83,7 @@ pub fn frames() -> Vec<[[f32; 18]; 8]> {
 }
 
 /// Device with `model`, at the other end of a socket.
-pub fn device(line: Line, model: &ModelBlob) -> Device<TcpStream> {
+pub fn device(line: Line, model: &ModelBlob) -> Device {
     Device::new(socket(line, model)).unwrap()
 }
 

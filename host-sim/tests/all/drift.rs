@@ -6,7 +6,7 @@ use host_sim::evaluate::trade::{self, Bounds, Device, Plan};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
 use host_sim::subject::Subject;
-use taxel_data::progress::Silent;
+use taxel_data::Silent;
 use taxel_learn::Exponential;
 use taxel_learn::cost::Frames;
 use taxel_simulate::drift::Drift;

@@ -5,10 +5,10 @@ use std::fs;
 use model_core::AlignedBytes;
 use model_core::blob::Model;
 use model_core::rbf::Network;
-use taxel_data::random::Stream;
+use taxel_data::Stream;
 use taxel_simulate::readout::Drive;
-use taxel_simulate::virtual_board::{Pin, VirtualBoard, all_readings};
 use taxel_simulate::{World, synthesise};
+use taxel_virtual_board::{Pin, VirtualBoard, all_readings};
 
 use crate::common::{Folder, small_scene};
 

@@ -4,8 +4,7 @@ use crate::common::{Folder, small_scene, unrefined};
 use host_sim::evaluate::gate::{self, GateResult, Settings, woken_by_theory};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::Errors;
-use taxel_data::progress::Silent;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_learn::Exponential;
 use taxel_learn::cost::{Design, Frames, Prices};
 

@@ -13,7 +13,6 @@ use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
 use model_core::blob::Floats;
 use model_core::checksum::CRC_32;
-use serialport::SerialPort;
 use taxel_rig::device::{Device, serial};
 
 /// Length of the leases.
@@ -128,7 +127,7 @@ impl Rig {
     }
 
     /// Host of the device's own.
-    fn device(&self) -> Device<Box<dyn SerialPort>> {
+    fn device(&self) -> Device {
         let deadline = Instant::now() + Duration::from_secs(5);
         loop {
             // The port may still be held by a host that was just killed.

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use model_core::filter::Settings;
 use serde::Serialize;
 use serde_json::{Value, json};
-use taxel_data::progress::Silent;
+use taxel_data::Silent;
 use taxel_rig::device::check::{Plan, check};
 use taxel_rig::device::upload;
 

@@ -3,8 +3,7 @@
 use host_sim::evaluate::limit::{Plan, compute};
 use host_sim::experiment::Experiment;
 use host_sim::{metrics, report};
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::{Silent, Stream};
 use taxel_learn::decoders::BASELINES;
 use taxel_limit::Limit;
 use taxel_simulate::Synthesis;

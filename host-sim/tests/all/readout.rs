@@ -2,10 +2,10 @@
 //! derives it, for readings without noise, cross-talk and series resistance.
 
 use firmware::circuit::{Divider, ZeroPotential};
-use taxel_data::table::Table;
+use taxel_data::Table;
 use taxel_simulate::World;
 use taxel_simulate::readout::{Circuit, Readout};
-use taxel_simulate::virtual_board::{self, SeriesResistance, VirtualBoard, all_readings};
+use taxel_virtual_board::{SeriesResistance, VirtualBoard, all_readings};
 
 /// Counts of the converter at its reference voltage.
 const COUNTS: f64 = 4096.0;
@@ -35,7 +35,7 @@ fn bound_ohm(circuit: Circuit, ohm: f64) -> f64 {
 fn scanned(circuit: Circuit, bits: u8, readings: &Table) -> Table {
     let readout = Readout { circuit: Some(circuit), adc_bits: Some(bits), ..Readout::default() };
     let board = VirtualBoard::with_readout(&World::press(), &readout).unwrap();
-    virtual_board::scan(&board, SeriesResistance::NONE, readings).unwrap()
+    taxel_virtual_board::scan(&board, SeriesResistance::NONE, readings).unwrap()
 }
 
 #[test]

@@ -9,7 +9,7 @@ use firmware::platform::{Platform, Port};
 use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use firmware::store::Journal;
 use mock_board::Flash;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Stream};
 
 pub mod mailbox;
 

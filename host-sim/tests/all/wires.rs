@@ -10,12 +10,11 @@ use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use mock_board::blob_of_a_row;
 use model_core::blob::{Columns, Metadata, ModelShape};
 use model_core::{ColumnWires, Decoder};
-use taxel_data::progress::Silent;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_rig::device::{Device, upload};
 use taxel_simulate::World;
 use taxel_simulate::readout::Readout;
-use taxel_simulate::virtual_board::{FrameScanner, SeriesResistance, VirtualBoard, all_readings};
+use taxel_virtual_board::{FrameScanner, SeriesResistance, VirtualBoard, all_readings};
 
 use crate::virtual_device::mailbox::pair;
 use crate::virtual_device::{Line, run_with};

@@ -19,8 +19,8 @@ use taxel_learn::decoders::{linear, mean};
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::rubber::{Kind, Rubber};
 use taxel_simulate::sensor::Precision;
-use taxel_simulate::virtual_board::VirtualBoard;
 use taxel_simulate::world::check_gain;
+use taxel_virtual_board::VirtualBoard;
 
 use crate::equations::{DAMPED, EXACT};
 use crate::level::AtNoise;

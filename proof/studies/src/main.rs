@@ -1,5 +1,8 @@
 //! Studies of one question each, about the sensor, the paper's method, or a part of the product: a table, JSON, a picture.
 
+// Fields of results carry the names that JSON has.
+#![expect(clippy::struct_field_names)]
+
 use std::process::ExitCode;
 
 use clap::Parser;

@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use firmware::timing::NUCLEO_BAUD;
-use taxel_rig::device::{Device, Wire, serial};
+use taxel_rig::device::{Device, serial};
 
 use crate::board::{Emulator, Options};
 use crate::images::{NUCLEO, NUCLEO_SPI, PROFILE, build_image};
@@ -69,7 +69,7 @@ impl Board {
     }
 
     /// Opens the line to the board.
-    pub fn open(&mut self) -> Outcome<Device<impl Wire + use<>>> {
+    pub fn open(&mut self) -> Outcome<Device> {
         let wire = serial::open(&self.port, self.baud).map_err(|cause| cause.to_string())?;
         let mut device = Device::new(wire).map_err(|cause| cause.to_string())?;
         device.patience = PATIENCE;

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use firmware::link::message::{Report, Request};
-use taxel_data::data_file::DataFile;
-use taxel_rig::device::{Device, Wire};
+use taxel_data::DataFile;
+use taxel_rig::device::Device;
 
 use super::record::Beside;
 use super::text;
@@ -15,7 +15,7 @@ use crate::process::Outcome;
 const RESISTORS_PERCENT: f64 = 1.0;
 
 /// RMS error in per cent of the board's readings of `known` resistances in Ω.
-pub fn compare<W: Wire>(device: &mut Device<W>, known: &[f32]) -> Outcome<Beside<f64>> {
+pub fn compare(device: &mut Device, known: &[f32]) -> Outcome<Beside<f64>> {
     let request = Request::CaptureBaseline { frames: 100 };
     let patience = Duration::from_secs(10);
     let answer = device.ask(&request, patience, |report| match report {

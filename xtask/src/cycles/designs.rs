@@ -7,7 +7,7 @@ use model_core::expansion::Expansion;
 use model_core::projection::Projection;
 use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use model_core::scale::UNITS;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Stream};
 use taxel_learn::cost::{Design, NetworkDesign};
 
 use crate::process::Outcome;

@@ -10,7 +10,7 @@ use object::{Object, ObjectSymbol};
 
 use super::figures::{self, Measured};
 use super::trace::{self, Marks};
-use crate::emulate::qemu::{QEMU, decode, machine, reader, table, wait};
+use crate::emulate::qemu::{QEMU, decode, machine, reader, wait};
 use crate::process::Outcome;
 
 /// Time limit of a run; none takes more than half a minute.
@@ -75,7 +75,6 @@ impl Image {
         if length > room.into() {
             return Err(format!("{length} bytes; the image's slot has room for {room}"));
         }
-        let table = table(&self.elf)?;
         let mut command = machine(&self.elf);
         command.args(["-d", "exec,nochain,in_asm", "-dfilter", &self.traced]);
         // QEMU reads a comma as the end of an option unless it is doubled.
@@ -91,7 +90,7 @@ impl Image {
             (status, traced.join().unwrap_or_else(|_| Err("the trace's reader stopped".into())))
         });
         let logged = logged.join().map_err(|_| format!("cannot read what {QEMU} writes"))?;
-        let log = decode(&table, &logged);
+        let log = decode(&logged, &self.elf)?;
         let (counts, complaints) = traced?;
         eprint!("{complaints}");
         match status?.and_then(|status| status.code()) {

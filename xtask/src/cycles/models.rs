@@ -7,9 +7,7 @@ use std::path::{Path, PathBuf};
 use model_core::blob::{ModelParts, encode_to_vec};
 use model_core::rbf::Format;
 use rayon::prelude::*;
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::{Dataset, Silent, Stream};
 use taxel_learn::{ModelBlob, Options, Origin, pack, train as trainer};
 use taxel_simulate::{Synthesis, World};
 

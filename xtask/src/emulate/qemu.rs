@@ -1,18 +1,20 @@
 //! Running one program in QEMU.
 
 use std::fs;
-use std::io::Read;
-use std::path::Path;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::OnceLock;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use defmt_decoder::{DecodeError, Table};
-
-use crate::process::{Outcome, first_line};
+use crate::process::{Outcome, cargo, first_line, run as run_command, target_dir};
 
 /// Name of the emulator's program.
 pub const QEMU: &str = "qemu-system-arm";
+
+/// Package and name of the program that decodes logs.
+const LOG_DECODER: &str = "device-log";
 
 /// Time limit of a program; none takes more than half a minute.
 const LIMIT: Duration = Duration::from_mins(5);
@@ -25,18 +27,10 @@ pub fn present() -> Outcome {
     ))
 }
 
-/// The table that decodes the logs of the program in `elf`.
-pub fn table(elf: &Path) -> Outcome<Table> {
-    let program = fs::read(elf).map_err(|cause| format!("{}: {cause}", elf.display()))?;
-    Table::parse(&program)
-        .map_err(|cause| format!("{}: {cause:#}", elf.display()))?
-        .ok_or(format!("{} logs nothing through defmt", elf.display()))
-}
-
 /// Decodes a log that was saved while the program in `elf` ran.
 pub fn decoded(log: &Path, elf: &Path) -> Outcome<String> {
     let logged = fs::read(log).map_err(|cause| format!("{}: {cause}", log.display()))?;
-    Ok(decode(&table(elf)?, &logged))
+    decode(&logged, elf)
 }
 
 /// Result of a program that ended by itself.
@@ -49,8 +43,6 @@ pub struct Ended {
 
 /// Runs the program in `elf` to its end.
 pub fn run(elf: &Path) -> Outcome<Ended> {
-    let table = table(elf)?;
-
     let mut command = machine(elf);
     // Time is counted by instructions, 32 ns each, so that a program runs alike on a busy computer.
     command.args(["-icount", "shift=5"]);
@@ -65,7 +57,7 @@ pub fn run(elf: &Path) -> Outcome<Ended> {
     };
 
     let complaints = String::from_utf8_lossy(&complaints).into_owned();
-    let log = decode(&table, &logged);
+    let log = decode(&logged, elf)?;
     match status.and_then(|status| status.code()) {
         Some(code) => Ok(Ended { log: format!("{log}exit status {code}\n"), complaints }),
         None => Err(format!(
@@ -110,27 +102,28 @@ pub fn wait(child: &mut Child, limit: Duration) -> Outcome<Option<ExitStatus>> {
     Ok(None)
 }
 
-/// Decodes a log to text: `LEVEL message`, one entry after the other.
-pub fn decode(table: &Table, logged: &[u8]) -> String {
-    let mut decoder = table.new_stream_decoder();
-    decoder.received(logged);
-    let mut text = String::new();
-    loop {
-        match decoder.decode() {
-            Ok(frame) => {
-                let level = frame.level().map(|level| level.as_str().to_uppercase() + " ");
-                text.extend([level.unwrap_or_default(), frame.display_message().to_string()]);
-                text.push('\n');
-            }
-            Err(DecodeError::UnexpectedEof) => return text,
-            Err(DecodeError::Malformed) => {
-                text.push_str("(bytes that are no log)\n");
-                if !table.encoding().can_recover() {
-                    return text;
-                }
-            }
-        }
-    }
+/// Decodes a log of the program in `elf` to text: `LEVEL message`, one entry after the other.
+pub fn decode(logged: &[u8], elf: &Path) -> Outcome<String> {
+    let mut command = Command::new(log_decoder()?);
+    command.arg(elf).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let failed = |cause| format!("cannot run {LOG_DECODER}: {cause}");
+    let mut child = command.spawn().map_err(failed)?;
+    // It reads all before it writes. If it stops early, it says why itself.
+    _ = child.stdin.take().map(|mut stdin| stdin.write_all(logged));
+    let output = child.wait_with_output().map_err(failed)?;
+    let [text, said] =
+        [output.stdout, output.stderr].map(|it| String::from_utf8_lossy(&it).into_owned());
+    if output.status.success() { Ok(text) } else { Err(said.trim_end().to_owned()) }
+}
+
+/// Path of the program that decodes logs, which is built when it is first asked for.
+fn log_decoder() -> Outcome<&'static Path> {
+    static BUILT: OnceLock<Outcome<PathBuf>> = OnceLock::new();
+    let build = || {
+        let mut build = cargo(&["build", "--quiet", "--package", LOG_DECODER]);
+        run_command(&mut build).map(|()| target_dir().join("debug").join(LOG_DECODER))
+    };
+    BUILT.get_or_init(build).as_ref().map(PathBuf::as_path).map_err(Clone::clone)
 }
 
 #[cfg(all(test, unix))]

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::list::{FOLDER, Fault, splice};
 use crate::copy::{update, write_if_new};
-use crate::process::{Outcome, PROOF, cargo, root, target_dir};
+use crate::process::{Outcome, PROOF_TESTED, cargo, root, target_dir};
 
 /// What the copy's build made.
 pub struct Copy {
@@ -54,7 +54,7 @@ pub fn build(faults: &[Fault], crates: &[String], has_torture: bool) -> Outcome<
         Vec::new()
     };
     let of_proof = if has_all_units {
-        messages(&["test", "--no-run", "--manifest-path", PROOF])?
+        messages(&[&["test", "--no-run"][..], &PROOF_TESTED].concat())?
     } else {
         Vec::new()
     };
@@ -68,7 +68,7 @@ pub fn build(faults: &[Fault], crates: &[String], has_torture: bool) -> Outcome<
     }
     if has_torture {
         messages(&["build", "--package", "host-sim"])?;
-        messages(&["build", "--manifest-path", PROOF, "--package", TORTURE])?;
+        messages(&["build", "--package", TORTURE])?;
     }
     let built = folder().join("build/debug");
     Ok(Copy {

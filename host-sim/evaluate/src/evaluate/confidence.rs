@@ -1,8 +1,7 @@
 //! Confidence of a model: how many errors its intervals cover.
 
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::table::Table;
+use taxel_data::{Table, columns};
 
 /// Errors of one group of outputs beside their deviations.
 #[derive(Debug, Clone, PartialEq, Serialize)]

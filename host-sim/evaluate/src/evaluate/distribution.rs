@@ -2,8 +2,7 @@
 //! measured data share it.
 
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::table::Table;
+use taxel_data::{Table, columns};
 
 mod density;
 mod histogram;

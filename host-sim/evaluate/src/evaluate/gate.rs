@@ -2,10 +2,7 @@
 
 use model_core::gate::is_at_rest;
 use serde::Serialize;
-use taxel_data::BadValue;
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
-use taxel_data::table::Table;
+use taxel_data::{BadValue, Progress, Stream, Table};
 use taxel_learn::cost::Frames;
 use taxel_learn::decoders::mean;
 use taxel_learn::{PreparedModel, relative};

@@ -4,8 +4,7 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
+use taxel_data::{Progress, Stream};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::geometry::{self, Variant};
 use taxel_limit::identify::{self, Observability, Prior};

@@ -4,10 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::dataset::{Dataset, RowTable};
-use taxel_data::progress::Progress;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Dataset, Progress, Purpose, Random, RowTable, Stream, columns};
 use taxel_learn::decoders::standard::{self, StandardNetwork};
 use taxel_learn::decoders::textbook::{Textbook, TextbookNetwork};
 use taxel_learn::decoders::{BASELINES, RowDecoder, Rows, mean};

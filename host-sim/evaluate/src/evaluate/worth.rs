@@ -1,9 +1,7 @@
 //! Worth of a model that was just trained: its errors beside those of the baselines, on the fairest frames there are.
 
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::dataset::Dataset;
-use taxel_data::random::Stream;
+use taxel_data::{Dataset, Stream, columns};
 use taxel_learn::decoders::{BASELINES, mean};
 use taxel_learn::select::Selection;
 use taxel_learn::{Exponential, ModelBlob, Options};

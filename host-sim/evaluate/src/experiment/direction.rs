@@ -1,8 +1,7 @@
 //! Direction of a scene's networks, and what follows from it.
 
 use serde::Deserialize;
-use taxel_data::error::require;
-use taxel_data::random::Stream;
+use taxel_data::{Stream, require};
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::{Synthesis, World};
 

@@ -1,8 +1,7 @@
 //! Scene as it stands in its file, before defaults are filled in.
 
 use serde::Deserialize;
-use taxel_data::BadValue;
-use taxel_data::error::require;
+use taxel_data::{BadValue, require};
 use taxel_simulate::World;
 use taxel_simulate::drift::Drift;
 use taxel_simulate::motion;

@@ -1,8 +1,7 @@
 //! Other contacts than those of a scene, which its model was not trained on.
 
 use serde::Deserialize;
-use taxel_data::BadValue;
-use taxel_data::error::require;
+use taxel_data::{BadValue, require};
 use taxel_simulate::World;
 use taxel_simulate::motion::{Edge, Ellipse, Kind, Pair, Press, Punch, Tail};
 

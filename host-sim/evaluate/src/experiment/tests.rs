@@ -34,7 +34,7 @@ fn listed_positions_replace_the_cells() {
     let text = EMBEDDED[1].1.replace("resistance_ohm_per_mm = 100.0", &listed);
     let scene = Experiment::parse("test", &text).unwrap().world;
     assert_eq!(scene.sensor.upper_electrodes_mm[47], [47.5, 1.0, 6.0]);
-    assert_eq!(scene.sensor.force_n([1.0, 1.0, 0.5]), [0.5, 0.6, 1.5]);
+    assert_eq!(scene.sensor.stiffness_n_per_mm, [0.5, 0.6, 3.0]);
     let default = Experiment::load("press").unwrap().world;
     assert_eq!(scene.sensor.lower_electrodes_mm, default.sensor.lower_electrodes_mm);
     let digest = |text: &str| Experiment::parse("test", text).unwrap().digest;
@@ -61,8 +61,8 @@ fn forces_have_their_own_full_scale_and_values() {
     let scene = Experiment::parse("test", &text).unwrap().world;
     assert_eq!(scene.full_scales()[..3], [1.0, 2.0, 1.0]);
     let Outputs::Electrodes(outputs) = &scene.outputs else { panic!("outputs of electrodes") };
-    let outputs: Vec<f64> = outputs.of_electrode(&scene.sensor, [0.25, 9.0, 0.5]).collect();
-    assert_eq!(outputs, [0.25, 1.0]);
+    let per_mm = outputs.axes.iter().map(|axis| outputs.per_mm(&scene.sensor, *axis));
+    assert_eq!(per_mm.collect::<Vec<_>>(), [1.0, 2.0]);
     assert_eq!(scene.output_names()[1], "r1e1_fz_n");
 }
 

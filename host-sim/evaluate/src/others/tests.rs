@@ -1,5 +1,4 @@
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::Silent;
+use taxel_data::{Dataset, Silent};
 use taxel_learn::Exponential;
 use taxel_learn::decoders::mean::Mean;
 

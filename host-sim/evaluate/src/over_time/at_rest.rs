@@ -1,9 +1,8 @@
 //! Readings of the untouched sensor over time, and which of them drift.
 
 use serde::Serialize;
-use taxel_data::clock::Clock;
-use taxel_data::rest::Rest;
 use taxel_data::spectrum::Spectrum;
+use taxel_data::{Clock, Rest};
 use taxel_learn::Options;
 
 use super::relative_trial::RelativeTrial;

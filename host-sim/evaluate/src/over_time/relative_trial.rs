@@ -1,9 +1,7 @@
 //! Trial of relative inputs on a log: what they would change, found by K-means alone.
 
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::Silent;
+use taxel_data::{Dataset, Silent, columns};
 use taxel_learn::{Exponential, Options, pack, relative, train::train};
 
 use crate::measurements::Measurements;

@@ -1,6 +1,5 @@
-use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::spectrum::Spectrum;
-use taxel_data::table::Table;
+use taxel_data::{Purpose, Random, Stream, Table};
 use taxel_learn::outliers::Outliers;
 use taxel_limit::reference::GroupLimit;
 use taxel_simulate::noise::{Noise, NoiseKind};

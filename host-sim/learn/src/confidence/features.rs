@@ -2,7 +2,7 @@
 
 use model_core::confidence::project;
 use nalgebra::DMatrix;
-use taxel_data::table::Table;
+use taxel_data::Table;
 
 use crate::parallel;
 use crate::train::principal;

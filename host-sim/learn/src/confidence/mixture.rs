@@ -2,7 +2,7 @@
 //! B 39, 1977) from K-means centres.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Stream};
 
 use crate::parallel;
 use crate::train::kmeans::{self, Search};

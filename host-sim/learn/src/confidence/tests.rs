@@ -1,6 +1,5 @@
 use model_core::Decoder;
-use taxel_data::progress::Silent;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_simulate::{World, synthesise};
 
 use super::*;

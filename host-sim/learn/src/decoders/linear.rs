@@ -1,6 +1,6 @@
 //! Baseline: the best linear decoder of each row-wire, which a network must beat.
 
-use taxel_data::dataset::{Dataset, RowTable};
+use taxel_data::{Dataset, RowTable};
 
 use super::{RowDecoder, Rows};
 use crate::train::least_squares::{Factor, Regressors};

@@ -1,6 +1,6 @@
 //! Baseline: always predicting the mean of the training outputs, which any decoder must beat.
 
-use taxel_data::dataset::Dataset;
+use taxel_data::Dataset;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
 

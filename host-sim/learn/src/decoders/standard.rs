@@ -2,7 +2,7 @@
 //! weights interpolate exactly. It is not meant for a device, so it stays in f64.
 
 use nalgebra::DMatrix;
-use taxel_data::dataset::RowTable;
+use taxel_data::RowTable;
 
 use super::RowDecoder;
 use crate::train::least_squares::Regressors;

@@ -4,9 +4,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use taxel_data::dataset::RowTable;
-use taxel_data::random::Random;
-use taxel_data::table::Table;
+use taxel_data::{Random, RowTable, Table};
 
 use super::RowDecoder;
 use crate::train::kmeans;

@@ -1,4 +1,4 @@
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Stream};
 use taxel_simulate::{World, synthesise};
 
 use super::*;

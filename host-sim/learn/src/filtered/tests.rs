@@ -1,4 +1,4 @@
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Stream};
 
 use super::*;
 use crate::decoder::{Decoder, Timing};

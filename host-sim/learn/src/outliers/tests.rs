@@ -1,5 +1,4 @@
-use taxel_data::progress::Silent;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Silent, Stream};
 
 use super::*;
 use crate::decoders::linear;

@@ -2,9 +2,7 @@
 
 use model_core::blob::{Floats, Metadata, ModelParts, encode_to_vec};
 use model_core::rbf::{Format, Shape};
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::Silent;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Dataset, Purpose, Random, Silent, Stream};
 use taxel_simulate::{Synthesis, World, synthesise};
 
 use super::*;

@@ -1,7 +1,6 @@
 //! Folds of measured frames, for cross-validation and for refinement.
 
-use taxel_data::random::{Purpose, Random, Stream};
-use taxel_data::table::Table;
+use taxel_data::{Purpose, Random, Stream, Table};
 
 /// Assigns `frames` to `folds` at random, in equal numbers: the fold of each frame, from 0.
 pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {

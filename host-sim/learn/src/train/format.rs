@@ -9,8 +9,7 @@ use std::cell::OnceCell;
 use model_core::expansion::Expansion;
 use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
-use taxel_data::dataset::RowTable;
-use taxel_data::table::Table;
+use taxel_data::{RowTable, Table};
 
 use super::hidden_layer::{HiddenLayer, not_held};
 use super::least_squares::{Decomposed, Design, Factor, Recursion, predict};

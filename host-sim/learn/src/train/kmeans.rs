@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 
-use taxel_data::random::Random;
+use taxel_data::Random;
 
 mod screen;
 mod assign;

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use taxel_data::dataset::Dataset;
+use taxel_data::Dataset;
 
 use super::hidden_layer::HiddenLayer;
 use super::{Options, Samples, memory, projection};

@@ -1,9 +1,8 @@
 //! Memory that training takes at its peak, estimated before it is taken: it grows with the square of the number of
 //! weights, so that a small file may ask for more than a machine has.
 
-use taxel_data::BadValue;
-use taxel_data::dataset::Dataset;
-use taxel_data::error::{in_words, require};
+use taxel_data::error::in_words;
+use taxel_data::{BadValue, Dataset, require};
 
 use super::{Options, projection};
 

@@ -12,10 +12,7 @@
 
 use model_core::expansion::Expansion;
 use nalgebra::DMatrix;
-use taxel_data::BadValue;
-use taxel_data::dataset::RowTable;
-use taxel_data::error::require;
-use taxel_data::table::Table;
+use taxel_data::{BadValue, RowTable, Table, require};
 
 use super::format::{self, FittedNetwork, Targets};
 use super::hidden_layer::HiddenLayer;

@@ -15,10 +15,7 @@ use std::borrow::Cow;
 
 use model_core::projection::Projection;
 use nalgebra::DMatrix;
-use taxel_data::dataset::Dataset;
-use taxel_data::error::require;
-use taxel_data::simd;
-use taxel_data::table::Table;
+use taxel_data::{Dataset, Table, require, widest};
 
 use super::principal;
 use crate::error::{Error, Result, no_regression};
@@ -297,10 +294,7 @@ fn products(readings: &Table, targets: &Table, means: &[f64]) -> Vec<f64> {
             let readings = readings.iter().map(|reading| f64::from(*reading as f32));
             let values = readings.chain(targets.iter().copied());
             let z: Vec<f64> = values.zip(&means).map(|(value, mean)| value - mean).collect();
-            simd::widest(
-                #[inline(always)]
-                || add_products(&z, inputs, &mut sums),
-            );
+            widest!(add_products(&z, inputs, &mut sums));
         }
         sums
     };

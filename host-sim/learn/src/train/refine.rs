@@ -8,10 +8,7 @@
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
-use taxel_data::BadValue;
-use taxel_data::dataset::Dataset;
-use taxel_data::error::require;
-use taxel_data::progress::Progress;
+use taxel_data::{BadValue, Dataset, Progress, require};
 
 use super::layers::Layers;
 use super::{Options, memory};

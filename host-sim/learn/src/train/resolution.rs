@@ -2,9 +2,8 @@
 //!
 //! A column is refused by its name where little would be left of it, so that no input or output is lost in silence.
 
-use taxel_data::dataset::Dataset;
 use taxel_data::error::{Role, quoted};
-use taxel_data::table::Table;
+use taxel_data::{Dataset, Table};
 
 use crate::error::{Error, Result};
 

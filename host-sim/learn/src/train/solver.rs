@@ -1,7 +1,6 @@
 //! Solver of output weights, and the settings of the recursion.
 
-use taxel_data::BadValue;
-use taxel_data::error::require;
+use taxel_data::{BadValue, require};
 
 /// How output weights are computed. Both ways give the same weights, but for rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -11,11 +11,7 @@ use model_core::expansion::Expansion;
 use model_core::rbf::Format;
 use rayon::prelude::*;
 use serde::Serialize;
-use taxel_data::BadValue;
-use taxel_data::dataset::{Dataset, RowTable};
-use taxel_data::error::require;
-use taxel_data::progress::Progress;
-use taxel_data::table::Table;
+use taxel_data::{BadValue, Dataset, Progress, RowTable, Table, require};
 
 use super::format::{self, FittedNetwork, Held, Targets, expanded_f32};
 use super::least_squares::{Design, Recursion, predict};

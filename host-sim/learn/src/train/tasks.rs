@@ -5,10 +5,8 @@
 
 use std::borrow::Cow;
 
-use taxel_data::BadValue;
-use taxel_data::dataset::RowTable;
-use taxel_data::error::{quoted, require};
-use taxel_data::table::Table;
+use taxel_data::error::quoted;
+use taxel_data::{BadValue, RowTable, Table, require};
 
 use super::least_squares::Factor;
 

@@ -1,7 +1,4 @@
-use taxel_data::dataset::RowTable;
-use taxel_data::progress::Silent;
-use taxel_data::random::{Purpose, Random, Stream};
-use taxel_data::table::Table;
+use taxel_data::{Purpose, Random, RowTable, Silent, Stream, Table};
 
 use super::*;
 use crate::decoders::RowDecoder;

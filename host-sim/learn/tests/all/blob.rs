@@ -3,8 +3,7 @@
 use model_core::blob::{DecodeError, Model};
 use model_core::rbf::{Format, Network};
 use model_core::{AlignedBytes, Decoder};
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::{Silent, Stream};
 use taxel_learn::cost::Design;
 use taxel_learn::train::{Widths, train};
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, pack};

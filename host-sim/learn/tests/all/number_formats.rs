@@ -3,11 +3,7 @@
 
 use model_core::rbf::Format;
 use rayon::prelude::*;
-use taxel_data::columns;
-use taxel_data::dataset::RowTable;
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
-use taxel_data::table::Table;
+use taxel_data::{RowTable, Silent, Stream, Table, columns};
 use taxel_learn::infer::infer;
 use taxel_learn::train::least_squares::{Factor, Regressors};
 use taxel_learn::train::{InputScale, Samples, train};

@@ -1,9 +1,7 @@
 //! Models with inputs relative to the baseline: what they take, and what cancels in it.
 
 use model_core::blob::Model;
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::{Dataset, Silent, Stream};
 use taxel_learn::train::train;
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, PreparedModel, pack, relative};
 use taxel_simulate::{Synthesis, World};

@@ -1,7 +1,7 @@
 //! The sampler against posteriors that are known exactly.
 
 use nalgebra::{DMatrix, DVector};
-use taxel_data::random::{Purpose, Stream};
+use taxel_data::{Purpose, Stream};
 
 use super::*;
 

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use firmware::link::message::{Configuration, Report};
 use firmware::readout::ScanSettings;
 use model_core::Wires;
-use taxel_data::progress::Progress;
+use taxel_data::Progress;
 
-use super::{Device, Wire};
+use super::Device;
 use crate::calibration::{Arrangement, Fit, fit};
 use crate::error::{Error, Result};
 
@@ -32,8 +32,8 @@ pub struct Reading {
 /// # Errors
 /// [`Error::Data`] if constants cannot be found; the former ones then stay active. Errors of `connect`, and
 /// of [`ask`](Device::ask).
-pub fn calibrate<W: Wire, E: From<Error>>(
-    device: &mut Device<W>,
+pub fn calibrate<E: From<Error>>(
+    device: &mut Device,
     wires: Wires,
     known: &[Vec<f64>],
     reading: Reading,
@@ -55,8 +55,8 @@ pub fn calibrate<W: Wire, E: From<Error>>(
 }
 
 /// Mean conductances in S of so many frames; 0 is open, NaN could not be read in some frame.
-fn read<W: Wire>(
-    device: &mut Device<W>,
+fn read(
+    device: &mut Device,
     wires: Wires,
     reading: Reading,
     progress: &dyn Progress,

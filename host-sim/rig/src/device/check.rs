@@ -5,13 +5,12 @@ use std::time::{Duration, Instant};
 use firmware::link::message::{Report, Request, Statistics};
 use model_core::filter::Settings;
 use serde::Serialize;
-use taxel_data::progress::{Progress, Silent};
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Progress, Purpose, Random, Silent, Stream};
 use taxel_learn::ModelBlob;
 
 pub use super::expected::Frames;
 use super::expected::{Expected, prepare};
-use super::{Device, DeviceIdentity, Wire};
+use super::{Device, DeviceIdentity};
 use crate::error::{Error, Result};
 
 mod uploads;
@@ -105,8 +104,8 @@ pub struct GarbageFindings {
 /// # Errors
 /// [`Error`] if the device stops answering, or is not one for this model. Wrong results
 /// are no error: they are in the findings.
-pub fn check<W: Wire>(
-    device: &mut Device<W>,
+pub fn check(
+    device: &mut Device,
     frames: &Frames,
     blob: &ModelBlob,
     plan: &Plan,
@@ -115,8 +114,8 @@ pub fn check<W: Wire>(
     device.while_paused(|device| check_paused(device, frames, blob, plan, progress))
 }
 
-fn check_paused<W: Wire>(
-    device: &mut Device<W>,
+fn check_paused(
+    device: &mut Device,
     frames: &Frames,
     blob: &ModelBlob,
     plan: &Plan,
@@ -157,8 +156,8 @@ fn check_paused<W: Wire>(
     })
 }
 
-fn check_garbage<W: Wire>(
-    device: &mut Device<W>,
+fn check_garbage(
+    device: &mut Device,
     seed: u64,
     expected: &Expected,
     crc_32: u32,

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use firmware::link::message::{Configuration, Report, Request};
 use serde::Serialize;
 
-use super::{Device, Wire};
+use super::Device;
 use crate::error::{Error, Result};
 
 /// Time without requests after which a device returns to its own configuration, unless told otherwise.
@@ -29,7 +29,7 @@ pub(super) struct Kept {
     pub waiting: Option<u16>,
 }
 
-impl<W: Wire> Device<W> {
+impl Device {
     /// Asks for the active configuration.
     pub fn configuration(&mut self) -> Result<ActiveConfiguration> {
         self.ask_for_configuration(&Request::Configuration)

@@ -7,12 +7,11 @@ use model_core::blob::Model;
 use model_core::filter::{Settings, State};
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Frame};
-use taxel_data::progress::Progress;
-use taxel_data::table::Table;
+use taxel_data::{Progress, Table};
 use taxel_learn::filtered::filter_frames;
 use taxel_learn::{Exponential, ModelBlob};
 
-use super::{Device, DeviceIdentity, Wire, stream, upload};
+use super::{Device, DeviceIdentity, stream, upload};
 use crate::error::{Error, Result, check_room};
 
 /// Frames after which a lease is prolonged: on a device with a key, a request to decode does not do it.
@@ -73,7 +72,7 @@ impl Expected {
     }
 
     /// Gives the device the baseline that it needs, if any.
-    pub(super) fn set_baseline<W: Wire>(&self, device: &mut Device<W>) -> Result<()> {
+    pub(super) fn set_baseline(&self, device: &mut Device) -> Result<()> {
         self.baseline_ohm.as_deref().map_or(Ok(()), |baseline| device.set_baseline(baseline))
     }
 
@@ -113,9 +112,9 @@ impl Expected {
     }
 
     /// Number of the first `frames` that the device decodes bit for bit, and the time that it took.
-    pub(super) fn count_same<W: Wire>(
+    pub(super) fn count_same(
         &self,
-        device: &mut Device<W>,
+        device: &mut Device,
         frames: usize,
         window: usize,
         progress: &dyn Progress,
@@ -165,8 +164,8 @@ fn confidence(
 
 /// Activates the model of `blob` unless it is active already, and returns the exponential that the
 /// device decodes with.
-pub(super) fn prepare<W: Wire>(
-    device: &mut Device<W>,
+pub(super) fn prepare(
+    device: &mut Device,
     blob: &ModelBlob,
     progress: &dyn Progress,
 ) -> Result<Exponential> {

@@ -4,7 +4,7 @@ use firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
 use firmware::seal::{Key, tag};
 use taxel_data::BadValue;
 
-use super::{Device, DeviceIdentity, WRITING, Wire};
+use super::{Device, DeviceIdentity, WRITING};
 use crate::error::{Error, KEY_DAMAGED, NO_KEY, Result};
 
 /// Largest size of a request in a seal.
@@ -72,7 +72,7 @@ fn of_digits(text: &[u8]) -> Option<Key> {
     Key::try_from(bytes).ok().filter(|_| whole)
 }
 
-impl<W: Wire> Device<W> {
+impl Device {
     /// Checks that this host may change something on the device of this `identity`, before work that would be in vain.
     ///
     /// # Errors

@@ -2,11 +2,11 @@
 
 use firmware::link::message::{Kept, Report, Request, Setting};
 
-use super::{Device, WRITING, Wire};
+use super::{Device, WRITING};
 use crate::calibration::CircuitConstants;
 use crate::error::{Error, Result};
 
-impl<W: Wire> Device<W> {
+impl Device {
     /// Asks for the active constants of the circuit.
     pub fn constants(&mut self) -> Result<CircuitConstants> {
         self.ask_plainly(&Request::Constants, constants)

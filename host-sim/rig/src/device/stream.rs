@@ -7,7 +7,7 @@ use firmware::link::message::{EstimateReport, Report, Request};
 use firmware::link::packet::UNASKED;
 use model_core::blob::Floats;
 
-use super::{ATTEMPTS, Device, Wire};
+use super::{ATTEMPTS, Device};
 use crate::error::{Error, Result};
 
 /// Request on its way.
@@ -25,8 +25,8 @@ struct Outstanding {
 /// Up to `window` frames are on their way at a time. A window above 1 is for lines that hold bytes back
 /// while the device is busy, such as an emulator's; a real board may lose them. With a window of 1 the device decodes the
 /// frames in their order, even if some are sent again: a filter in time needs that.
-pub fn decode_frames<W: Wire>(
-    device: &mut Device<W>,
+pub fn decode_frames(
+    device: &mut Device,
     readings_ohm: &[f32],
     start_us: &[u64],
     window: usize,
@@ -72,8 +72,8 @@ pub fn decode_frames<W: Wire>(
     Ok(start.elapsed())
 }
 
-fn repeat_oldest<'r, W: Wire>(
-    device: &mut Device<W>,
+fn repeat_oldest<'r>(
+    device: &mut Device,
     on_their_way: &mut VecDeque<Outstanding>,
     request: &impl Fn(u32) -> Request<'r>,
 ) -> Result<()> {

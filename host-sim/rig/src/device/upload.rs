@@ -4,9 +4,9 @@ use std::time::{Duration, Instant};
 
 use firmware::link::message::{EstimateReport, Refusal, Report, Request, UploadState, UploadStep};
 use model_core::blob::{Floats, Model, ModelShape};
-use taxel_data::progress::Progress;
+use taxel_data::Progress;
 
-use super::{Device, DeviceIdentity, WRITING, Wire};
+use super::{Device, DeviceIdentity, WRITING};
 use crate::error::{Error, Result, check_room, no_room};
 
 /// Longest time for erasing flash: a sector of 128 KiB takes up to 4 s on an STM32F4.
@@ -21,8 +21,8 @@ const SLOWEST_SCANS: Duration = Duration::from_secs(5);
 const ANY_OHM: f32 = 60.0;
 
 /// Sends one step of an upload and returns the device's answer.
-pub fn step<W: Wire>(
-    device: &mut Device<W>,
+pub fn step(
+    device: &mut Device,
     step: UploadStep<'_>,
 ) -> Result<std::result::Result<UploadState, Refusal>> {
     let least = match step {
@@ -46,8 +46,8 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
 ///
 /// # Errors
 /// [`Error::NoAnswer`] if the device stops answering, and a failure if no chunk can be sent.
-pub fn send<W: Wire>(
-    device: &mut Device<W>,
+pub fn send(
+    device: &mut Device,
     blob: &[u8],
     chunk_bytes: usize,
     progress: &dyn Progress,
@@ -81,8 +81,8 @@ pub fn send<W: Wire>(
 /// # Errors
 /// [`Error`] if the device refuses it, needs a key, has no room for it or does not decode with it, or the work is interrupted; its
 /// previous model is then active again.
-pub fn start_trial<W: Wire>(
-    device: &mut Device<W>,
+pub fn start_trial(
+    device: &mut Device,
     blob: &[u8],
     progress: &dyn Progress,
 ) -> Result<DeviceIdentity> {
@@ -110,10 +110,7 @@ pub fn start_trial<W: Wire>(
 
 /// Runs `work` on an upload. If it is interrupted, or the device does not decode with the model, the device leaves the
 /// model.
-fn or_abort<W: Wire, T>(
-    device: &mut Device<W>,
-    work: impl FnOnce(&mut Device<W>) -> Result<T>,
-) -> Result<T> {
+fn or_abort<T>(device: &mut Device, work: impl FnOnce(&mut Device) -> Result<T>) -> Result<T> {
     let outcome = work(device);
     let abort = Error::is_settled_by_abort;
     if outcome.as_ref().is_err_and(abort) {
@@ -124,7 +121,7 @@ fn or_abort<W: Wire, T>(
 }
 
 /// Checks that the model with this CRC-32 is active, and that the device decodes a frame with it.
-fn see_estimate<W: Wire>(device: &mut Device<W>, crc_32: u32) -> Result<DeviceIdentity> {
+fn see_estimate(device: &mut Device, crc_32: u32) -> Result<DeviceIdentity> {
     let identity = device.identify()?;
     if !identity.has_in_force(crc_32) {
         let in_force = format!("{:08x?}", identity.model.map(|model| model.crc_32));
@@ -148,7 +145,7 @@ fn see_estimate<W: Wire>(device: &mut Device<W>, crc_32: u32) -> Result<DeviceId
 /// # Errors
 /// [`Error::NotDecoding`] if no frames come, and errors of [`ask`](Device::ask); the device has then left a model on
 /// trial.
-pub fn see_frames<W: Wire>(device: &mut Device<W>) -> Result<()> {
+pub fn see_frames(device: &mut Device) -> Result<()> {
     or_abort(device, |device| {
         let period_us = device.configuration()?.configuration.frame_period_us;
         let period = Duration::from_micros(period_us.into());
@@ -169,7 +166,7 @@ pub fn see_frames<W: Wire>(device: &mut Device<W>) -> Result<()> {
 }
 
 /// Lets the trial that is going on last for so many `minutes` from now on.
-pub fn prolong_trial<W: Wire>(device: &mut Device<W>, minutes: u32) -> Result<()> {
+pub fn prolong_trial(device: &mut Device, minutes: u32) -> Result<()> {
     let again = UploadStep::Try { lease_ms: 60_000 * minutes };
     match step(device, again)?.map_err(Error::Refused)? {
         UploadState::OnTrial { .. } => Ok(()),
@@ -178,7 +175,7 @@ pub fn prolong_trial<W: Wire>(device: &mut Device<W>, minutes: u32) -> Result<()
 }
 
 /// Confirms the model on trial, so that it stays active over restarts.
-pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
+pub fn confirm(device: &mut Device) -> Result<DeviceIdentity> {
     match step(device, UploadStep::Confirm)?.map_err(Error::Refused)? {
         UploadState::Confirmed { crc_32 } => {
             let identity = device.identify()?;
@@ -197,7 +194,7 @@ pub fn confirm<W: Wire>(device: &mut Device<W>) -> Result<DeviceIdentity> {
 ///
 /// # Errors
 /// [`Error::Refused`] if there is none; errors of [`ask`](Device::ask).
-pub fn undo<W: Wire>(device: &mut Device<W>) -> Result<u32> {
+pub fn undo(device: &mut Device) -> Result<u32> {
     let active = device.identify()?.model.ok_or(Error::Refused(Refusal::NothingToUndo))?;
     let request = Request::Undo { crc_32: active.crc_32 };
     let answer = device.ask(&request, device.patience.max(WRITING), |report| match report {
@@ -211,8 +208,8 @@ pub fn undo<W: Wire>(device: &mut Device<W>) -> Result<u32> {
 }
 
 /// Uploads `blob`, makes it the active model, checks that the device decodes with it, and confirms it.
-pub fn replace<W: Wire>(
-    device: &mut Device<W>,
+pub fn replace(
+    device: &mut Device,
     blob: &[u8],
     progress: &dyn Progress,
 ) -> Result<DeviceIdentity> {

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use super::*;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Stream};
 
 #[path = "../../../../firmware/qemu/src/mailbox.rs"]
 #[allow(dead_code, unreachable_pub, reason = "the image's file, of which tests use a part")]

@@ -5,10 +5,9 @@
 use std::f64::consts::TAU;
 use std::fmt::Debug;
 
-use taxel_data::error::require;
-use taxel_data::random::Purpose;
-use taxel_data::simd::{self, LANES, Lanes};
-use taxel_data::{BadValue, exp, normal_share_below, sin_cos};
+use taxel_data::{
+    BadValue, LANES, Lanes, Purpose, exp, normal_share_below, require, sin_cos, widest,
+};
 
 use super::{Draws, Motion, Press, Trajectories, check_range};
 use crate::contact::{Contact, Form, Profile};
@@ -133,23 +132,20 @@ impl<D: Dent> Motion for D {
         let [_, [low, high]] = self.depth_and_shear();
         let (mut units, mut shear) = (latents[..self.latents(0) - 2].to_vec(), [[0.0; LANES]; 2]);
         let across = &latents[units.len()..][..2];
-        simd::widest(
-            #[inline(always)]
-            || {
-                for unit in units.as_flattened_mut() {
-                    *unit = normal_share_below(*unit);
-                }
-                for frame in 0..LANES {
-                    let (x, y) = (across[0][frame], across[1][frame]);
-                    let squared = x * x + y * y;
-                    // 1 − exp(−½r²) is uniform; the square is kept from 0, where the direction does not exist.
-                    let ratio = low + (high - low) * (1.0 - exp(-0.5 * squared));
-                    let factor = ratio / squared.max(1e-300).sqrt();
-                    shear[0][frame] = factor * x;
-                    shear[1][frame] = factor * y;
-                }
-            },
-        );
+        widest!({
+            for unit in units.as_flattened_mut() {
+                *unit = normal_share_below(*unit);
+            }
+            for frame in 0..LANES {
+                let (x, y) = (across[0][frame], across[1][frame]);
+                let squared = x * x + y * y;
+                // 1 − exp(−½r²) is uniform; the square is kept from 0, where the direction does not exist.
+                let ratio = low + (high - low) * (1.0 - exp(-0.5 * squared));
+                let factor = ratio / squared.max(1e-300).sqrt();
+                shear[0][frame] = factor * x;
+                shear[1][frame] = factor * y;
+            }
+        });
         Some(from_units(self, units, &shear, sensor))
     }
 
@@ -157,23 +153,20 @@ impl<D: Dent> Motion for D {
         let (mut units, mut shear) =
             (vec![[0.0; LANES]; 3 + self.quantities().len()], [[0.0; LANES]; 2]);
         let [_, ratio] = self.depth_and_shear();
-        simd::widest(
-            #[inline(always)]
-            || {
-                let random = draws.of(Purpose::Contact, 0);
-                for unit in &mut units {
-                    random.between([[0.0, 1.0]], std::array::from_mut(unit));
-                }
-                let mut drawn = [[0.0; LANES]; 2];
-                random.between([ratio, [0.0, 1.0]], &mut drawn);
-                let [ratios, turns] = drawn;
-                for frame in 0..LANES {
-                    let (sine, cosine) = sin_cos(TAU * turns[frame]);
-                    shear[0][frame] = ratios[frame] * cosine;
-                    shear[1][frame] = ratios[frame] * sine;
-                }
-            },
-        );
+        widest!({
+            let random = draws.of(Purpose::Contact, 0);
+            for unit in &mut units {
+                random.between([[0.0, 1.0]], std::array::from_mut(unit));
+            }
+            let mut drawn = [[0.0; LANES]; 2];
+            random.between([ratio, [0.0, 1.0]], &mut drawn);
+            let [ratios, turns] = drawn;
+            for frame in 0..LANES {
+                let (sine, cosine) = sin_cos(TAU * turns[frame]);
+                shear[0][frame] = ratios[frame] * cosine;
+                shear[1][frame] = ratios[frame] * sine;
+            }
+        });
         Some(from_units(self, units, &shear, sensor))
     }
 }

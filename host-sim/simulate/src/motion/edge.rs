@@ -3,8 +3,7 @@
 use std::f64::consts::TAU;
 
 use serde::Deserialize;
-use taxel_data::simd::{self, LANES, Lanes};
-use taxel_data::{exp, normal_share_below};
+use taxel_data::{LANES, Lanes, exp, normal_share_below, widest};
 
 use super::dent::{Dent, Quantity, of_direction};
 use crate::contact::{Form, Profile, Sides, gaussian_mm3, integral, sides_from};
@@ -73,20 +72,17 @@ impl Profile for Line {
         [x, y]: &[Lanes; 2],
         shares: &mut Lanes,
     ) {
-        simd::widest(
-            #[inline(always)]
-            || {
-                for frame in 0..LANES {
-                    let (half, width) = (half_mm[frame], width_mm[frame]);
-                    let along = cosine[frame] * x[frame] + sine[frame] * y[frame];
-                    let across = cosine[frame] * y[frame] - sine[frame] * x[frame];
-                    let of_line = normal_share_below((along + half) / width)
-                        - normal_share_below((along - half) / width);
-                    let across = exp(-across * across / (2.0 * width * width));
-                    shares[frame] = across * of_line / within(half / width);
-                }
-            },
-        );
+        widest!({
+            for frame in 0..LANES {
+                let (half, width) = (half_mm[frame], width_mm[frame]);
+                let along = cosine[frame] * x[frame] + sine[frame] * y[frame];
+                let across = cosine[frame] * y[frame] - sine[frame] * x[frame];
+                let of_line = normal_share_below((along + half) / width)
+                    - normal_share_below((along - half) / width);
+                let across = exp(-across * across / (2.0 * width * width));
+                shares[frame] = across * of_line / within(half / width);
+            }
+        });
     }
 
     fn volume_mm3(

@@ -3,8 +3,7 @@
 use std::f64::consts::TAU;
 
 use serde::Deserialize;
-use taxel_data::exp;
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{LANES, Lanes, exp, widest};
 
 use super::dent::{Dent, Quantity, of_direction};
 use crate::contact::{Form, Profile, Sides, gaussian_mm3, integral, sides_from};
@@ -71,17 +70,14 @@ impl Profile for Elliptic {
         [x, y]: &[Lanes; 2],
         shares: &mut Lanes,
     ) {
-        simd::widest(
-            #[inline(always)]
-            || {
-                for frame in 0..LANES {
-                    let along = cosine[frame] * x[frame] + sine[frame] * y[frame];
-                    let across = cosine[frame] * y[frame] - sine[frame] * x[frame];
-                    let (along, across) = (along / long_mm[frame], across / short_mm[frame]);
-                    shares[frame] = exp(-0.5 * (along * along + across * across));
-                }
-            },
-        );
+        widest!({
+            for frame in 0..LANES {
+                let along = cosine[frame] * x[frame] + sine[frame] * y[frame];
+                let across = cosine[frame] * y[frame] - sine[frame] * x[frame];
+                let (along, across) = (along / long_mm[frame], across / short_mm[frame]);
+                shares[frame] = exp(-0.5 * (along * along + across * across));
+            }
+        });
     }
 
     /// The dent is a normal distribution, along the longer radius, of round ones of the shorter radius.

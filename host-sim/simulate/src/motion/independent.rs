@@ -1,9 +1,7 @@
 //! Motion of each electrode independently of all others.
 
 use serde::Deserialize;
-use taxel_data::random::Purpose;
-use taxel_data::simd::{self, Lanes};
-use taxel_data::{BadValue, normal_share_below};
+use taxel_data::{BadValue, Lanes, Purpose, normal_share_below, widest};
 
 use super::{Draws, Motion, Trajectories, check_range};
 use crate::sensor::Sensor;
@@ -41,18 +39,15 @@ impl Motion for Independent {
 
     fn place(&self, _: &Sensor, _row: usize, latents: &[Lanes], deformation_mm: &mut [[Lanes; 3]]) {
         let ranges_mm = self.range_mm();
-        simd::widest(
-            #[inline(always)]
-            || {
-                for (delta, latents) in deformation_mm.iter_mut().zip(latents.chunks_exact(3)) {
-                    for ((delta, latents), range) in delta.iter_mut().zip(latents).zip(ranges_mm) {
-                        for (delta, latent) in delta.iter_mut().zip(latents) {
-                            *delta = range[0] + (range[1] - range[0]) * normal_share_below(*latent);
-                        }
+        widest!({
+            for (delta, latents) in deformation_mm.iter_mut().zip(latents.chunks_exact(3)) {
+                for ((delta, latents), range) in delta.iter_mut().zip(latents).zip(ranges_mm) {
+                    for (delta, latent) in delta.iter_mut().zip(latents) {
+                        *delta = range[0] + (range[1] - range[0]) * normal_share_below(*latent);
                     }
                 }
-            },
-        );
+            }
+        });
     }
 
     fn start<'m>(&'m self, _: &'m Sensor, _: &mut Draws) -> Box<dyn Trajectories + 'm> {
@@ -63,14 +58,11 @@ impl Motion for Independent {
 impl Trajectories for Independent {
     fn deform(&mut self, row: usize, draws: &mut Draws, deformation_mm: &mut [[Lanes; 3]]) {
         let ranges_mm = self.range_mm();
-        simd::widest(
-            #[inline(always)]
-            || {
-                let random = draws.of(Purpose::Deformation, row as u64);
-                for delta in &mut *deformation_mm {
-                    random.between(ranges_mm, delta);
-                }
-            },
-        );
+        widest!({
+            let random = draws.of(Purpose::Deformation, row as u64);
+            for delta in &mut *deformation_mm {
+                random.between(ranges_mm, delta);
+            }
+        });
     }
 }

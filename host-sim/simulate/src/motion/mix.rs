@@ -1,10 +1,7 @@
 //! Motion by contacts of several kinds: each trajectory has one of them.
 
 use serde::Deserialize;
-use taxel_data::error::require;
-use taxel_data::random::Purpose;
-use taxel_data::simd::{self, LANES, Lanes};
-use taxel_data::{BadValue, normal_share_below};
+use taxel_data::{BadValue, LANES, Lanes, Purpose, normal_share_below, require, widest};
 
 use super::{Draws, Kind, Motion, Press};
 use crate::contact::Contact;
@@ -122,14 +119,9 @@ impl Motion for Mix {
 
     fn draw_contact(&self, sensor: &Sensor, draws: &mut Draws) -> Option<Contact> {
         let mut units = [0.0; LANES];
-        simd::widest(
-            #[inline(always)]
-            || {
-                draws
-                    .of(Purpose::Contact, 1)
-                    .between([[0.0, 1.0]], std::array::from_mut(&mut units));
-            },
-        );
+        widest!({
+            draws.of(Purpose::Contact, 1).between([[0.0, 1.0]], std::array::from_mut(&mut units));
+        });
         self.pick(self.parts_of(&units), |part| part.deformation.draw_contact(sensor, draws))
     }
 }

@@ -1,8 +1,7 @@
 //! Motion by two contacts at once.
 
 use serde::Deserialize;
-use taxel_data::exp;
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{LANES, Lanes, exp, widest};
 
 use super::dent::{Dent, Quantity, of_direction};
 use crate::contact::{Form, Profile, Sides, gaussian_mm3, sides_from};
@@ -93,18 +92,14 @@ impl Profile for Two {
         [x, y]: &[Lanes; 2],
         shares: &mut Lanes,
     ) {
-        simd::widest(
-            #[inline(always)]
-            || {
-                for frame in 0..LANES {
-                    let (x, y, radius) = (x[frame], y[frame], radius_mm[frame]);
-                    let (to_x, to_y) = (x - to_x[frame], y - to_y[frame]);
-                    let of = |squares: f64| exp(-squares / (2.0 * radius * radius));
-                    shares[frame] =
-                        of(x * x + y * y) + ratio[frame] * of(to_x * to_x + to_y * to_y);
-                }
-            },
-        );
+        widest!({
+            for frame in 0..LANES {
+                let (x, y, radius) = (x[frame], y[frame], radius_mm[frame]);
+                let (to_x, to_y) = (x - to_x[frame], y - to_y[frame]);
+                let of = |squares: f64| exp(-squares / (2.0 * radius * radius));
+                shares[frame] = of(x * x + y * y) + ratio[frame] * of(to_x * to_x + to_y * to_y);
+            }
+        });
     }
 
     fn volume_mm3(&self, depth_mm: f64, [radius, x, y, ratio]: Form<f64>, sides_mm: &Sides) -> f64 {

@@ -1,8 +1,7 @@
 //! Motion by one contact with a Gaussian dent, pressed into the face.
 
 use serde::Deserialize;
-use taxel_data::exp;
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{LANES, Lanes, exp, widest};
 
 use super::dent::{Dent, Quantity};
 use crate::contact::{Form, Profile, Sides, gaussian_mm3};
@@ -43,15 +42,12 @@ struct Gaussian;
 
 impl Profile for Gaussian {
     fn shares(&self, [radius_mm, ..]: &Form, [x, y]: &[Lanes; 2], shares: &mut Lanes) {
-        simd::widest(
-            #[inline(always)]
-            || {
-                for frame in 0..LANES {
-                    let (x, y, radius) = (x[frame], y[frame], radius_mm[frame]);
-                    shares[frame] = exp(-(x * x + y * y) / (2.0 * radius * radius));
-                }
-            },
-        );
+        widest!({
+            for frame in 0..LANES {
+                let (x, y, radius) = (x[frame], y[frame], radius_mm[frame]);
+                shares[frame] = exp(-(x * x + y * y) / (2.0 * radius * radius));
+            }
+        });
     }
 
     fn volume_mm3(&self, depth_mm: f64, [radius_mm, ..]: Form<f64>, sides_mm: &Sides) -> f64 {

@@ -1,8 +1,7 @@
 //! Motion by a flat round punch.
 
 use serde::Deserialize;
-use taxel_data::simd::{self, LANES, Lanes};
-use taxel_data::{exp, ln};
+use taxel_data::{LANES, Lanes, exp, ln, widest};
 
 use super::dent::{Dent, Quantity};
 use crate::contact::{Form, Profile, Sides, integral};
@@ -48,15 +47,12 @@ struct Flat;
 
 impl Profile for Flat {
     fn shares(&self, [radius_mm, decay_mm, ..]: &Form, [x, y]: &[Lanes; 2], shares: &mut Lanes) {
-        simd::widest(
-            #[inline(always)]
-            || {
-                for frame in 0..LANES {
-                    let distance = (x[frame] * x[frame] + y[frame] * y[frame]).sqrt();
-                    shares[frame] = exp(-(distance - radius_mm[frame]).max(0.0) / decay_mm[frame]);
-                }
-            },
-        );
+        widest!({
+            for frame in 0..LANES {
+                let distance = (x[frame] * x[frame] + y[frame] * y[frame]).sqrt();
+                shares[frame] = exp(-(distance - radius_mm[frame]).max(0.0) / decay_mm[frame]);
+            }
+        });
     }
 
     /// ∮ G(ρ) dφ along the sides, where G is the integral of f·ρ from the centre to the side. A side at a distance h is

@@ -1,7 +1,7 @@
 //! Motion by a contact with a long tail: a touch through a soft cover.
 
 use serde::Deserialize;
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::{LANES, Lanes, widest};
 
 use super::dent::{Dent, Quantity};
 use crate::contact::{Form, Profile, Sides};
@@ -49,16 +49,13 @@ struct Covered;
 
 impl Profile for Covered {
     fn shares(&self, [cover_mm, ..]: &Form, [x, y]: &[Lanes; 2], shares: &mut Lanes) {
-        simd::widest(
-            #[inline(always)]
-            || {
-                for frame in 0..LANES {
-                    let (x, y) = (x[frame] / cover_mm[frame], y[frame] / cover_mm[frame]);
-                    let far = 1.0 + x * x + y * y;
-                    shares[frame] = 1.0 / (far * far * far.sqrt());
-                }
-            },
-        );
+        widest!({
+            for frame in 0..LANES {
+                let (x, y) = (x[frame] / cover_mm[frame], y[frame] / cover_mm[frame]);
+                let far = 1.0 + x * x + y * y;
+                shares[frame] = 1.0 / (far * far * far.sqrt());
+            }
+        });
     }
 
     /// Pressure below the corner of an evenly loaded rectangle (Holl, 1940), which by reciprocity is the share of a point

@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
-use taxel_data::simd::{LANES, Lanes};
+use taxel_data::{LANES, Lanes};
 
 use super::{Sensor, Vector3};
 

@@ -1,8 +1,8 @@
 //! Synthesis of some trajectories, one a lane: drawn, computed, disturbed, and laid out frame after
 //! frame.
 
-use taxel_data::random::{Purpose, RandomLanes, Stream};
-use taxel_data::simd::{self, LANES, Lanes};
+use taxel_data::random::RandomLanes;
+use taxel_data::{LANES, Lanes, Purpose, Stream, widest};
 
 use super::Synthesis;
 use crate::contact::Contact;
@@ -158,17 +158,14 @@ impl<'s> LaneSynthesis<'s> {
                         memory.reach(time_s, deformation_mm);
                     }
                 }
-                simd::widest(
-                    #[inline(always)]
-                    || {
-                        if !readings.is_empty() {
-                            self.read_row(workspace, (first, step), (place, row), readings);
-                        }
-                        if !self.of_load || memories[place].is_none() {
-                            self.write_row(&workspace.deformation_mm, step, place, outputs);
-                        }
-                    },
-                );
+                widest!({
+                    if !readings.is_empty() {
+                        self.read_row(workspace, (first, step), (place, row), readings);
+                    }
+                    if !self.of_load || memories[place].is_none() {
+                        self.write_row(&workspace.deformation_mm, step, place, outputs);
+                    }
+                });
             }
             if !self.of_contact.is_empty() {
                 move_to(&mut *trajectories, start_s + 0.5 * timetable.scan_s);

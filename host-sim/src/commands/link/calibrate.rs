@@ -9,11 +9,10 @@ use firmware::link::message::Setting;
 use firmware::readout::ScanSettings;
 use model_core::Wires;
 use serde::{Deserialize, Serialize};
-use taxel_data::data_file::DataFile;
-use taxel_data::input;
+use taxel_data::{DataFile, input};
 use taxel_rig::calibration::{CircuitConstants, Fit};
+use taxel_rig::device::Device;
 use taxel_rig::device::calibrate::{Reading, calibrate as find};
-use taxel_rig::device::{Device, Wire};
 
 use super::super::progress::Terminal;
 use super::super::{Common, print};
@@ -73,11 +72,7 @@ struct Outcome<'o> {
     kept: bool,
 }
 
-pub fn execute<W: Wire>(
-    device: &mut Device<W>,
-    arguments: &Arguments,
-    common: &Common,
-) -> Result<()> {
+pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> Result<()> {
     let identity = device.identify()?;
     let wires = all_wires(&identity)?;
     let known = match &arguments.known {

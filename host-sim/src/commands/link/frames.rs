@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use crate::{Error, Result};
 use firmware::link::message::{EstimateReport, Report};
-use taxel_data::progress::Progress;
-use taxel_rig::device::{Device, Wire};
+use taxel_data::Progress;
+use taxel_rig::device::Device;
 
 use super::super::progress::Terminal;
 use super::scan::{Wanted, check_length};
@@ -41,8 +41,8 @@ impl Frame {
 }
 
 /// Receives the frames that the device sends, of `width` values each, and counts the untouched rows in all of them.
-pub fn hear_frames<W: Wire>(
-    device: &mut Device<W>,
+pub fn hear_frames(
+    device: &mut Device,
     count: usize,
     patience: Duration,
     wanted: Wanted,

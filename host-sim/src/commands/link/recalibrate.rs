@@ -9,13 +9,11 @@ use firmware::link::message::{Configuration, Refusal};
 use model_core::blob::Model;
 use model_core::health::Limits;
 use serde::Serialize;
-use taxel_data::data_file::DataFile;
-use taxel_data::output;
-use taxel_data::table::Table;
+use taxel_data::{DataFile, Table, output};
 use taxel_learn::health::judge;
 use taxel_learn::recalibration::{self, Recalibrated};
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_rig::device::{Device, DeviceIdentity, Wire, upload};
+use taxel_rig::device::{Device, DeviceIdentity, upload};
 
 use super::super::data_file::FieldArguments;
 use super::super::readings::{BaselineArgument, table_of};
@@ -51,8 +49,8 @@ struct Summary {
     model_crc: String,
 }
 
-pub fn execute<W: Wire>(
-    device: &mut Device<W>,
+pub fn execute(
+    device: &mut Device,
     arguments: &Arguments,
     key: Option<&Path>,
     common: &Common,
@@ -115,8 +113,8 @@ fn outputs_of(file: &DataFile, outputs: Table) -> Result<Table> {
 }
 
 /// Asks for one press after the other, and lets the device scan each: mean readings, NaN where one was faulty.
-fn record_presses<W: Wire>(
-    device: &mut Device<W>,
+fn record_presses(
+    device: &mut Device,
     identity: &DeviceIdentity,
     model: &Model<'_>,
     scan: &ScanArguments,

@@ -8,11 +8,10 @@ use clap::{Args, value_parser};
 use firmware::link::message::{Configuration, Report, Request, Setting};
 use model_core::blob::Model;
 use serde::Serialize;
-use taxel_data::csv_file;
 use taxel_data::spectrum::Spectrum;
-use taxel_data::table::Table;
+use taxel_data::{Table, csv_file};
 use taxel_learn::ModelBlob;
-use taxel_rig::device::{Device, DeviceIdentity, Wire};
+use taxel_rig::device::{Device, DeviceIdentity};
 
 use super::super::filter_arguments::FilterArguments;
 use super::super::health::note_faults;
@@ -93,11 +92,7 @@ struct Saved {
     file: PathBuf,
 }
 
-pub fn record<W: Wire>(
-    device: &mut Device<W>,
-    action: &RecordArguments,
-    common: &Common,
-) -> Result<()> {
+pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) -> Result<()> {
     let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     print::check_output(&action.output, &inputs)?;
@@ -233,11 +228,7 @@ fn confidence_names(
     Ok(names)
 }
 
-pub fn baseline<W: Wire>(
-    device: &mut Device<W>,
-    action: &BaselineArguments,
-    common: &Common,
-) -> Result<()> {
+pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common) -> Result<()> {
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     print::check_output(&action.output, &inputs)?;
     let identity = device.identify()?;

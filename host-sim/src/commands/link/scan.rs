@@ -8,7 +8,7 @@ use firmware::link::message::{ConfidenceSent, Configuration};
 use firmware::timing::ScanPlan;
 use model_core::Wires;
 use model_core::blob::Model;
-use taxel_rig::device::{Device, DeviceIdentity, Wire};
+use taxel_rig::device::{Device, DeviceIdentity};
 
 #[derive(Args)]
 pub struct ScanArguments {
@@ -62,8 +62,8 @@ pub fn tolerance(text: &str) -> std::result::Result<f32, String> {
 }
 
 /// Activates a configuration for scanning, which decodes as `decoding` says.
-pub fn configure<W: Wire>(
-    device: &mut Device<W>,
+pub fn configure(
+    device: &mut Device,
     scan: &ScanArguments,
     wanted: Wanted,
     decoding: Configuration,

@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum, value_parser};
 use firmware::link::message::{ConfidenceSent, Configuration, Kept, Setting};
 use serde::Serialize;
 use taxel_rig::calibration::CircuitConstants;
-use taxel_rig::device::{Device, Wire};
+use taxel_rig::device::Device;
 
 use super::super::filter_arguments::milliseconds;
 use super::super::{Common, print};
@@ -106,22 +106,14 @@ struct Settings {
     kept: Kept,
 }
 
-pub fn configure<W: Wire>(
-    device: &mut Device<W>,
-    action: &ConfigureArguments,
-    common: &Common,
-) -> Result<()> {
+pub fn configure(device: &mut Device, action: &ConfigureArguments, common: &Common) -> Result<()> {
     let configuration = action.changed(device.configuration()?.configuration);
     device.configure_until_restart(configuration)?;
     device.keep(Setting::Configuration)?;
     show(device, common)
 }
 
-pub fn settings<W: Wire>(
-    device: &mut Device<W>,
-    action: &SettingsArguments,
-    common: &Common,
-) -> Result<()> {
+pub fn settings(device: &mut Device, action: &SettingsArguments, common: &Common) -> Result<()> {
     let forget: &[Setting] = match action.forget {
         None => &[],
         Some(Forget::Configuration) => &[Setting::Configuration],
@@ -136,7 +128,7 @@ pub fn settings<W: Wire>(
 }
 
 /// Shows what is active, and what is kept.
-fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
+fn show(device: &mut Device, common: &Common) -> Result<()> {
     let constants = match device.constants() {
         Err(taxel_rig::Error::Refused(_)) => None,
         constants => Some(constants?),

@@ -3,7 +3,7 @@
 use crate::Result;
 use firmware::link::message::{KeyState, Statistics};
 use serde::Serialize;
-use taxel_rig::device::{ActiveConfiguration, Device, DeviceIdentity, Wire};
+use taxel_rig::device::{ActiveConfiguration, Device, DeviceIdentity};
 
 use super::super::check_arguments::memory_lines;
 use super::super::{Common, print};
@@ -16,7 +16,7 @@ struct Status {
     statistics: Statistics,
 }
 
-pub fn show<W: Wire>(device: &mut Device<W>, common: &Common) -> Result<()> {
+pub fn show(device: &mut Device, common: &Common) -> Result<()> {
     let status = Status {
         device: device.identify()?,
         active: device.configuration()?,

@@ -4,7 +4,7 @@ use crate::commands::stderr;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use crate::{Error, Result};
-use taxel_data::table::Table;
+use taxel_data::Table;
 use taxel_learn::Options;
 use taxel_learn::select::{self, Candidates, Edge, Scored, Selection};
 use taxel_learn::train::Refinement;

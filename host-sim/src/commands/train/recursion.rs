@@ -8,8 +8,7 @@ use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use crate::{Error, Result};
 use clap::{Args, ValueEnum};
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
+use taxel_data::{Progress, Stream};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::train::stream::FIRST_FRAMES;
 use taxel_learn::train::{Recursive, Solver};
@@ -18,7 +17,7 @@ use taxel_simulate::Synthesis;
 
 use super::Arguments;
 use crate::commands::Common;
-use crate::commands::arguments::of_option;
+use crate::commands::arguments::{of_option, refuse_given};
 use crate::commands::data_argument::HowToTrain;
 use crate::commands::data_stream::DataStream;
 use crate::commands::subject_argument::SubjectOptions;
@@ -85,18 +84,15 @@ impl RecursionArguments {
     /// Plan of the recursion, if weights are computed by one.
     pub fn plan(&self, arguments: &Arguments) -> Result<Option<Plan>> {
         if self.solver == SolverName::Qr {
-            for (option, given) in [
+            let of_recursion = [
                 ("--first-frames", self.first_frames.is_some()),
                 ("--forgetting-factor", self.forgetting_factor.is_some()),
                 ("--initial-covariance", self.initial_covariance.is_some()),
                 ("--curve", self.curve.is_some()),
-            ] {
-                if given {
-                    let message =
-                        format!("{option} is for a recursion: add --solver rls, or leave it out");
-                    return Err(Error::Usage(message));
-                }
-            }
+            ];
+            refuse_given(of_recursion, |option| {
+                format!("{option} is for a recursion: add --solver rls, or leave it out")
+            })?;
             if arguments.source == "-" {
                 let message = "a CSV file on standard input is read once: add --solver rls, or give a file's path";
                 return Err(Error::Usage(message.into()));

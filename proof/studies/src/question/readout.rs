@@ -6,9 +6,11 @@ use taxel_data::table::Table;
 use taxel_learn::PreparedModel;
 use taxel_learn::decoders::mean;
 use taxel_simulate::Synthesis;
-use taxel_simulate::readout::{Circuit, Readout, op_amp_time_constant_us};
+use taxel_simulate::readout::{Circuit, Readout};
 use taxel_simulate::synth::BASELINE_FRAMES;
-use taxel_simulate::virtual_board::{VirtualBoard, all_readings, scan, untouched_readings};
+use taxel_virtual_board::{
+    VirtualBoard, all_readings, op_amp_time_constant_us, scan, untouched_readings,
+};
 
 use taxel_evaluate::experiment::Experiment;
 use taxel_evaluate::metrics::{self, DecoderErrors, Errors, NETWORK};

@@ -113,7 +113,7 @@ fn lines(
     };
     let scenes = [on(Elastic {}.into()), on(solid.into())];
     let moving = |scene: &Experiment| {
-        Moving::new(scene, &Synthesis::new(&scene.world), path, [scan_ms, scan_ms])
+        Moving::new(scene, &Synthesis::new(&scene.world), path, ([scan_ms, scan_ms], 1))
     };
     let tests = [moving(&scenes[0])?, moving(&scenes[1])?];
     let measure = scene.measure();
@@ -163,7 +163,7 @@ fn lines(
 fn trained_scans(path: Path, scan_ms: f64) -> Timetable {
     let part_s = path.duration_s / TRAINED_SCANS as f64;
     let starts_s = (0..TRAINED_SCANS).map(|part| (part as f64 + 0.5) * part_s).collect();
-    Timetable { starts_s, scan_s: scan_ms / 1000.0 }
+    Timetable { starts_s, scan_s: scan_ms / 1000.0, passes: 1 }
 }
 
 /// Loads that change linearly from scan to scan, of which rubber like `solid` reaches the `estimates` of one output, scan

@@ -13,8 +13,8 @@ use taxel_learn::faults::{FEWEST_FOR_NOISE, WINDOW, diagnose};
 use taxel_learn::train::train;
 use taxel_learn::{ModelBlob, Options, Origin, fill, pack};
 use taxel_simulate::readout::Readout;
-use taxel_simulate::virtual_board::{BoardFault, VirtualBoard, scan};
 use taxel_simulate::{World, synthesise};
+use taxel_virtual_board::{BoardFault, VirtualBoard, scan};
 
 use crate::effort::Effort;
 use crate::found::Found;

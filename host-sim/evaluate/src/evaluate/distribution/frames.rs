@@ -1,8 +1,7 @@
 //! Frames to look at: of median, high and largest error.
 
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::table::Table;
+use taxel_data::{Table, columns};
 
 use super::{nearest_rank, pairs};
 

@@ -1,8 +1,7 @@
 //! Readings of frames, relative to what is known of the sensor at rest.
 
 use serde::Serialize;
-use taxel_data::columns;
-use taxel_data::table::Table;
+use taxel_data::{Table, columns};
 
 use super::frames::ShownFrame;
 

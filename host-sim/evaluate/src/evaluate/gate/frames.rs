@@ -1,10 +1,7 @@
 //! Frames that gates are measured on: of a scene, or measured.
 
-use taxel_data::BadValue;
-use taxel_data::progress::Progress;
-use taxel_data::random::Stream;
-use taxel_data::rest::{BASELINE_LINES, Rest};
-use taxel_data::table::Table;
+use taxel_data::rest::BASELINE_LINES;
+use taxel_data::{BadValue, Progress, Rest, Stream, Table};
 use taxel_learn::PreparedModel;
 use taxel_limit::Refusal;
 use taxel_simulate::outputs::Outputs;

@@ -2,7 +2,7 @@
 
 use model_core::rbf::direct::Parameters;
 use model_core::rbf::{Format, Shape};
-use taxel_data::dataset::RowTable;
+use taxel_data::RowTable;
 
 use super::super::hidden_layer::HiddenLayer;
 use super::super::least_squares::{Design, Regressors};

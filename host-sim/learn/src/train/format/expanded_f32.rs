@@ -4,8 +4,7 @@ use model_core::rbf::expanded::{CENTRES_AT_ONCE, Parameters};
 use model_core::rbf::{Format, Network, Shape};
 use model_core::scale::{HALF_RANGE, UNITS};
 
-use taxel_data::dataset::RowTable;
-use taxel_data::table::Table;
+use taxel_data::{RowTable, Table};
 
 use super::super::least_squares::{Design, Regressors};
 use super::super::samples::CentredScale;

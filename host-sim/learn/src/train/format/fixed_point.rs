@@ -13,9 +13,7 @@ use model_core::rbf::fixed16::{
 };
 use model_core::rbf::{Format, NetworkError, Shape};
 use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
-use taxel_data::BadValue;
-
-use taxel_data::dataset::RowTable;
+use taxel_data::{BadValue, RowTable};
 
 use super::super::least_squares::{Design, Factor};
 use super::super::samples::CentredScale;

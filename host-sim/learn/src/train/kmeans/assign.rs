@@ -6,7 +6,7 @@
 //! [`Screen`]: super::screen::Screen
 
 use rayon::prelude::*;
-use taxel_data::simd::widest;
+use taxel_data::widest;
 
 use super::screen::{Centres, Points};
 use super::{Nearest, piece};
@@ -52,13 +52,10 @@ impl<'p> Assignment<'p> {
     pub(super) fn move_to(&mut self, centres: Vec<f64>) {
         let (points, rounded) = (self.points, Centres::new(&self.points.screen, &centres));
         self.pieces.par_iter_mut().zip(firsts(points)).for_each(|(piece, first)| {
-            widest(
-                #[inline(always)]
-                || {
-                    piece.assign(points, first, &rounded, &centres);
-                    piece.add_up(points, first);
-                },
-            );
+            widest!({
+                piece.assign(points, first, &rounded, &centres);
+                piece.add_up(points, first);
+            });
         });
         self.centres = centres;
     }

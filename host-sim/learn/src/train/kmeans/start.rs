@@ -3,8 +3,7 @@
 
 use rayon::prelude::*;
 
-use taxel_data::random::Random;
-use taxel_data::simd::widest;
+use taxel_data::{Random, widest};
 
 use super::screen::Points;
 use super::{LANES, piece};
@@ -34,10 +33,7 @@ pub(super) fn plus_plus(points: &Points<'_>, centres: usize, random: &mut Random
         picked.extend_from_slice(centre);
         pieces.par_iter_mut().enumerate().for_each(|(number, piece)| {
             let points = &points.values[number * size * points.dimensions..];
-            widest(
-                #[inline(always)]
-                || piece.approach(points, centre),
-            );
+            widest!(piece.approach(points, centre));
         });
         let sum: f64 = pieces.iter().map(|piece| piece.sum).sum();
         if sum == 0.0 {

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use taxel_data::random::{Purpose, Stream};
+use taxel_data::{Purpose, Stream};
 
 fn random(seed: u64) -> Random {
     Random::new(seed, Stream::Training, Purpose::Centres, 0, 0)

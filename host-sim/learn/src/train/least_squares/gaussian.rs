@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::Design;
 use super::exp::exponentiate_non_positive;
 use crate::train::squared_distance;
-use taxel_data::simd::widest;
+use taxel_data::widest;
 
 /// Centres evaluated side by side.
 const LANES: usize = 8;
@@ -35,17 +35,13 @@ impl<'c> Regressors<'c> {
     pub fn evaluate(&self, scaled: &[f64], values: &mut [f64]) {
         let centres = self.centres.len() / self.inputs;
         let (activations, rest) = values.split_at_mut(centres);
-        widest(
-            #[inline(always)]
-            || {
-                let gaussians =
-                    self.centres.chunks_exact(self.inputs).zip(self.decays.iter().cycle());
-                for (place, (centre, decay)) in activations.iter_mut().zip(gaussians) {
-                    *place = -decay * squared_distance(scaled, centre);
-                }
-                activations.iter_mut().for_each(|x| *x = taxel_data::exp(*x));
-            },
-        );
+        widest!({
+            let gaussians = self.centres.chunks_exact(self.inputs).zip(self.decays.iter().cycle());
+            for (place, (centre, decay)) in activations.iter_mut().zip(gaussians) {
+                *place = -decay * squared_distance(scaled, centre);
+            }
+            activations.iter_mut().for_each(|x| *x = taxel_data::exp(*x));
+        });
         let tail = if self.affine_tail { scaled } else { &[] };
         let values = tail.iter().copied().chain([1.0]);
         rest.iter_mut().zip(values).for_each(|(place, value)| *place = value);
@@ -89,27 +85,24 @@ impl Design for Gaussians<'_> {
         let (lanes, decays) = (self.lanes.as_slice(), self.decays.as_slice());
         let centres = self.regressors.centres.len() / inputs;
         let scaled = &self.scaled[samples.start * inputs..samples.end * inputs];
-        widest(
-            #[inline(always)]
-            || {
-                for (x, row) in scaled.chunks_exact(inputs).zip(values.chunks_exact_mut(n)) {
-                    let (activations, rest) = row.split_at_mut(centres);
-                    let groups = lanes.chunks_exact(inputs).zip(decays);
-                    for ((group, decays), places) in groups.zip(activations.chunks_mut(LANES)) {
-                        let values = exponents(x, group, decays);
-                        if let Some(whole) = places.first_chunk_mut() {
-                            *whole = values;
-                        } else {
-                            places.copy_from_slice(&values[..places.len()]);
-                        }
+        widest!({
+            for (x, row) in scaled.chunks_exact(inputs).zip(values.chunks_exact_mut(n)) {
+                let (activations, rest) = row.split_at_mut(centres);
+                let groups = lanes.chunks_exact(inputs).zip(decays);
+                for ((group, decays), places) in groups.zip(activations.chunks_mut(LANES)) {
+                    let values = exponents(x, group, decays);
+                    if let Some(whole) = places.first_chunk_mut() {
+                        *whole = values;
+                    } else {
+                        places.copy_from_slice(&values[..places.len()]);
                     }
-                    exponentiate_non_positive(activations);
-                    let tail = rest.len() - 1;
-                    rest[..tail].copy_from_slice(&x[..tail]);
-                    rest[tail] = 1.0;
                 }
-            },
-        );
+                exponentiate_non_positive(activations);
+                let tail = rest.len() - 1;
+                rest[..tail].copy_from_slice(&x[..tail]);
+                rest[tail] = 1.0;
+            }
+        });
     }
 }
 

@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use taxel_data::simd::widest;
+use taxel_data::widest;
 
 use super::super::Recursive;
 use super::{Design, FILLED, Factor};
@@ -105,10 +105,7 @@ impl Recursion {
         let (width, forgets) = (self.width, self.share > 0.0);
         let forgotten = forgets.then_some(self.root_forgetting);
         let (rows, samples) = (self.rows.as_mut_slice(), self.samples.as_mut_slice());
-        widest(
-            #[inline(always)]
-            || pass(width, rows, samples, forgotten),
-        );
+        widest!(pass(width, rows, samples, forgotten));
     }
 
     /// Factor of all samples so far.

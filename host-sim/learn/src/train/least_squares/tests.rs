@@ -2,8 +2,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::{Options, Recursive, Samples};
 use super::*;
-use taxel_data::random::{Purpose, Random, Stream};
-use taxel_data::table::Table;
+use taxel_data::{Purpose, Random, Stream, Table};
 
 /// Oracle by batch: ridge regression with penalty 1/δ through nalgebra's QR decomposition of all samples
 /// at once.

@@ -15,7 +15,7 @@
 //! same on every machine.
 #![expect(clippy::needless_range_loop, reason = "loops over lanes read as the formulas do")]
 
-use taxel_data::simd::widest;
+use taxel_data::widest;
 
 /// Columns in a tile, which stand side by side in memory.
 const LANES: usize = 8;
@@ -153,15 +153,12 @@ impl Triangle {
     fn absorb_from(&mut self, new: &mut NewRows, first_panel: usize) {
         let (columns, rows) = (self.columns, self.rows());
         let tiles = &mut self.tiles;
-        widest(
-            #[inline(always)]
-            || {
-                let u = new.panel.first_chunk_mut().expect("rows of one panel");
-                for panel in first_panel..columns.panels() {
-                    annihilate(columns, rows, tiles, &mut new.tiles, panel, u);
-                }
-            },
-        );
+        widest!({
+            let u = new.panel.first_chunk_mut().expect("rows of one panel");
+            for panel in first_panel..columns.panels() {
+                annihilate(columns, rows, tiles, &mut new.tiles, panel, u);
+            }
+        });
     }
 
     /// Returns R (`n × n`, row-major, its diagonal not negative) and z (`n × outputs`).

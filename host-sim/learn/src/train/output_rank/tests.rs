@@ -1,7 +1,5 @@
 use model_core::rbf::Format;
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::{Dataset, Silent, Stream};
 use taxel_simulate::{Synthesis, World};
 
 use super::*;

@@ -1,4 +1,4 @@
-use taxel_data::random::Stream;
+use taxel_data::Stream;
 use taxel_simulate::{World, synthesise};
 
 use super::*;

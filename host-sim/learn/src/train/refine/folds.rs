@@ -1,6 +1,6 @@
 //! Descent on measured data: on each fold in turn, with an end before it fits noise.
 
-use taxel_data::progress::Progress;
+use taxel_data::Progress;
 
 use super::descent::Descent;
 use super::movable::Piece;

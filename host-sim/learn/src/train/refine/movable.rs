@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use taxel_data::simd::widest;
+use taxel_data::widest;
 
 use super::products::{Line, SIDE, add_combinations, add_products};
 use crate::train::least_squares::{exponentiate_non_positive, squared_distances};
@@ -104,10 +104,7 @@ impl Movable {
         }
         let mut regressors = exponents.clone();
         for line in &mut regressors {
-            widest(
-                #[inline(always)]
-                || exponentiate_non_positive(line),
-            );
+            widest!(exponentiate_non_positive(line));
             line[piece.samples..].fill(0.0);
         }
         if affine_tail {
@@ -135,15 +132,12 @@ impl Movable {
         let lines = by_exponents.iter_mut().zip(&activated.regressors).zip(&activated.exponents);
         for (((by_exponent, activation), exponent), place) in lines.zip(places.clone().cycle()) {
             let mut sums = [0.0; SIDE];
-            widest(
-                #[inline(always)]
-                || {
-                    for s in 0..SIDE {
-                        by_exponent[s] *= activation[s];
-                        sums[s] = -2.0 * exponent[s] * by_exponent[s];
-                    }
-                },
-            );
+            widest!({
+                for s in 0..SIDE {
+                    by_exponent[s] *= activation[s];
+                    sums[s] = -2.0 * exponent[s] * by_exponent[s];
+                }
+            });
             gradient[place] += sums.iter().sum::<f64>();
         }
 
@@ -186,14 +180,11 @@ impl Movable {
 
 /// Exponents −decay·‖x − c‖² of one centre, for all samples.
 fn exponents_of(inputs: &[Line], centre: &[f64], decay: f64) -> Line {
-    widest(
-        #[inline(always)]
-        || {
-            let mut exponents = squared_distances(centre, inputs);
-            exponents.iter_mut().for_each(|square| *square *= -decay);
-            exponents
-        },
-    )
+    widest!({
+        let mut exponents = squared_distances(centre, inputs);
+        exponents.iter_mut().for_each(|square| *square *= -decay);
+        exponents
+    })
 }
 
 /// Samples side by side; lines beyond the last sample are 0.

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use taxel_data::simd::widest;
+use taxel_data::widest;
 
 /// Samples that lie side by side; every line is so long.
 pub(super) const SIDE: usize = 256;
@@ -112,23 +112,20 @@ fn combine_all<const L: usize>(
     a: &[[f64; L]],
     sums: &mut [[f64; L]],
 ) {
-    widest(
-        #[inline(always)]
-        || {
-            for (a, factors) in a.chunks(RUN).zip(factors.chunks(RUN * width)) {
-                let mut first = 0;
-                let (strips, rest) = sums.as_chunks_mut::<STRIP>();
-                for lines in strips {
-                    combine((factors, width, first), a, lines);
-                    first += STRIP;
-                }
-                for line in rest {
-                    combine((factors, width, first), a, std::array::from_mut(line));
-                    first += 1;
-                }
+    widest!({
+        for (a, factors) in a.chunks(RUN).zip(factors.chunks(RUN * width)) {
+            let mut first = 0;
+            let (strips, rest) = sums.as_chunks_mut::<STRIP>();
+            for lines in strips {
+                combine((factors, width, first), a, lines);
+                first += STRIP;
             }
-        },
-    );
+            for line in rest {
+                combine((factors, width, first), a, std::array::from_mut(line));
+                first += 1;
+            }
+        }
+    });
 }
 
 /// Adds the combinations of a few lines `a` to `N` lines, the first of which is number `first`.

@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 use model_core::rbf::Format;
-use taxel_data::dataset::Dataset;
+use taxel_data::Dataset;
 
 use super::movable::Piece;
 use super::targets::Targets;

@@ -1,8 +1,6 @@
 //! What the outputs should be, on a scale on which they can be compared.
 
-use taxel_data::columns;
-use taxel_data::dataset::Dataset;
-use taxel_data::table::Table;
+use taxel_data::{Dataset, Table, columns};
 
 /// Mean of every output, and the factor that its deviations are weighed by.
 ///

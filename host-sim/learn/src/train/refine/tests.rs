@@ -2,8 +2,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use model_core::rbf::Format;
-use taxel_data::progress::Silent;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_simulate::{Synthesis, World};
 
 use super::loss::{Loss, held_out_errors, on_held_out, on_same};

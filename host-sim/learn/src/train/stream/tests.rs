@@ -1,5 +1,4 @@
-use taxel_data::progress::Silent;
-use taxel_data::random::Stream;
+use taxel_data::{Silent, Stream};
 use taxel_simulate::{Synthesis, World};
 
 use super::super::Trained;

@@ -3,16 +3,13 @@
 use firmware::link::message::{Refusal, Request, UploadState, UploadStep};
 use model_core::checksum::CRC_32;
 use serde::Serialize;
-use taxel_data::dataset::Dataset;
-use taxel_data::progress::{Progress, Silent};
-use taxel_data::random::{Purpose, Random, Stream};
-use taxel_data::table::Table;
+use taxel_data::{Dataset, Progress, Purpose, Random, Silent, Stream, Table};
 use taxel_learn::train::train;
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, pack};
 
 use super::Plan;
 use crate::device::expected::Expected;
-use crate::device::{Device, Wire, request_bytes, upload};
+use crate::device::{Device, request_bytes, upload};
 use crate::error::{Error, Result};
 
 /// Findings about uploads.
@@ -54,8 +51,8 @@ fn small_model(
     Ok(pack(&trained, &frames, &Origin::of_data(SMALL, 0, seed, &frames))?)
 }
 
-pub(super) fn check_uploads<W: Wire>(
-    device: &mut Device<W>,
+pub(super) fn check_uploads(
+    device: &mut Device,
     readings: &Table,
     model: &ModelBlob,
     expected: &Expected,
@@ -99,8 +96,8 @@ pub(super) fn check_uploads<W: Wire>(
 
 /// Breaks an upload off before its first chunk, after each, and on trial. Returns how often, and how often the
 /// model with CRC-32 `crc_32` was active afterwards (unless another one is on trial) and after a restart.
-fn break_uploads_off<W: Wire>(
-    device: &mut Device<W>,
+fn break_uploads_off(
+    device: &mut Device,
     blob: &[u8],
     chunk_bytes: usize,
     crc_32: u32,
@@ -143,8 +140,8 @@ const KINDS: usize = 7;
 
 /// Uploads `blob` damaged in one of these ways, in turn, and returns whether the device refused it in
 /// the end.
-fn upload_damaged<W: Wire>(
-    device: &mut Device<W>,
+fn upload_damaged(
+    device: &mut Device,
     blob: &[u8],
     chunk_bytes: usize,
     index: usize,
@@ -194,8 +191,8 @@ fn seal(blob: &mut [u8]) {
 }
 
 /// Uploads with one damaged chunk, like a host that does not look at answers and sends the rest.
-fn upload_with_a_chunk_lost<W: Wire>(
-    device: &mut Device<W>,
+fn upload_with_a_chunk_lost(
+    device: &mut Device,
     blob: &[u8],
     chunk_bytes: usize,
     random: &mut Random,

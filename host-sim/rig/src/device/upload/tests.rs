@@ -1,16 +1,19 @@
 //! Uploads to a device that answers by a script.
 
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
+use std::rc::Rc;
 
 use firmware::link::message::{
     Configuration, Identity, KeyState, Memory, ModelIdentity, Statistics,
 };
 use firmware::link::receive::{Received, Receiver};
 use firmware::link::{cobs, packet};
-use taxel_data::progress::Silent;
+use taxel_data::Silent;
 
 use super::*;
+use crate::device::Wire;
 
 /// Line whose other end answers each request by `script`.
 struct Scripted<S> {
@@ -55,7 +58,7 @@ impl<S: FnMut(&Request<'_>) -> Report<'static>> Wire for Scripted<S> {
     }
 }
 
-fn device<S: FnMut(&Request<'_>) -> Report<'static>>(script: S) -> Device<Scripted<S>> {
+fn device(script: impl FnMut(&Request<'_>) -> Report<'static> + 'static) -> Device {
     let receiver = Receiver::new(vec![0; 4096]);
     Device::new(Scripted { script, receiver, answers: VecDeque::new() }).unwrap()
 }
@@ -97,7 +100,7 @@ fn identity(on_trial: bool) -> Report<'static> {
 #[test]
 fn a_model_that_decodes_no_frame_is_given_up() {
     for (flags, is_seen) in [(0, true), (EstimateReport::NO_MODEL, false)] {
-        let mut device = device(|request| match request {
+        let mut device = device(move |request| match request {
             Request::Identify => identity(true),
             _ => Report::Estimate(EstimateReport {
                 frame: 0,
@@ -116,7 +119,7 @@ fn a_model_that_decodes_no_frame_is_given_up() {
 #[test]
 fn a_model_that_is_still_on_trial_is_not_told_as_confirmed() {
     for on_trial in [false, true] {
-        let mut device = device(|request| match request {
+        let mut device = device(move |request| match request {
             Request::Identify => identity(on_trial),
             _ => Report::Upload(UploadState::Confirmed { crc_32: 7 }),
         });
@@ -127,31 +130,32 @@ fn a_model_that_is_still_on_trial_is_not_told_as_confirmed() {
 #[test]
 fn two_frames_are_waited_for_since_the_first_may_be_the_previous_models() {
     let configuration = Configuration { frame_period_us: 1000, ..Configuration::DEFAULT };
-    let mut asked = 0;
-    let mut device = device(|request| {
+    let asked = Rc::new(Cell::new(0));
+    let counted = asked.clone();
+    let mut device = device(move |request| {
         if *request == Request::Configuration {
             return Report::Configuration { configuration, lease_left_ms: 0 };
         }
-        asked += 1;
-        Report::Statistics(Statistics { frames_decoded: asked, ..Statistics::default() })
+        counted.set(counted.get() + 1);
+        Report::Statistics(Statistics { frames_decoded: counted.get(), ..Statistics::default() })
     });
     see_frames(&mut device).unwrap();
-    drop(device);
-    assert_eq!(asked, 3);
+    assert_eq!(asked.get(), 3);
 }
 
 #[test]
 fn a_trial_that_nobody_ended_does_not_block_an_upload() {
-    let (mut on_trial, mut received) = (true, 0);
-    let mut device = device(|request| match request {
+    let (mut on_trial, received) = (true, Rc::new(Cell::new(0)));
+    let taken = received.clone();
+    let mut device = device(move |request| match request {
         Request::Upload(UploadStep::Begin { .. }) if on_trial => Report::Refused(Refusal::OnTrial),
         Request::Upload(UploadStep::Abort) => {
             on_trial = false;
             Report::Upload(UploadState::Idle)
         }
         Request::Upload(UploadStep::Chunk { bytes, .. }) => {
-            received += bytes.len() as u32;
-            Report::Upload(UploadState::Receiving { received })
+            taken.set(taken.get() + bytes.len() as u32);
+            Report::Upload(UploadState::Receiving { received: taken.get() })
         }
         Request::Upload(UploadStep::Try { .. }) => {
             Report::Upload(UploadState::OnTrial { crc_32: 7 })
@@ -160,6 +164,5 @@ fn a_trial_that_nobody_ended_does_not_block_an_upload() {
     });
     let outcome = send(&mut device, &[1; 8], 4, &Silent).unwrap();
     assert_eq!(outcome, Ok(UploadState::OnTrial { crc_32: 7 }));
-    drop(device);
-    assert_eq!(received, 8);
+    assert_eq!(received.get(), 8);
 }

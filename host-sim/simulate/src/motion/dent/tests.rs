@@ -1,4 +1,4 @@
-use taxel_data::random::Stream;
+use taxel_data::Stream;
 
 use super::*;
 use crate::motion::{Edge, Ellipse, Kind, Mix, Pair, Part, Punch, Tail};

@@ -2,7 +2,7 @@
 
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::table::Table;
-use taxel_simulate::virtual_board::BoardFault;
+use taxel_virtual_board::BoardFault;
 
 use super::{COLUMNS, ROWS};
 

@@ -7,7 +7,7 @@ use firmware::readout::OnChipAdc;
 
 use super::board::VirtualBoard;
 use super::pin::Pin;
-use crate::error::Violation;
+use super::violation::Violation;
 
 impl VirtualBoard {
     /// Handle to a pin.

@@ -11,7 +11,7 @@ use firmware::readout::{
 use super::board::VirtualBoard;
 use super::pin::Pin;
 use super::{COLUMNS, ROWS};
-use crate::readout::{self, Drive, Sampler};
+use taxel_simulate::readout::{self, Drive, Sampler};
 
 /// Scanner for whatever parts a board has.
 pub type FrameScanner = Box<dyn FrameSource>;

@@ -6,19 +6,17 @@ use std::rc::Rc;
 use firmware::readout::{ScanSettings, Selection};
 use firmware::timing;
 use model_core::{ColumnWires, RowWire};
-use taxel_data::BadValue;
-use taxel_data::random::{Purpose, Random, Stream};
+use taxel_data::{BadValue, Error, Purpose, Random, Stream};
 
 use super::analogue::{Analogue, Parts, reference_v};
 use super::converters::{ColumnSelector, mcp3208_answer, mcp3208_column};
 use super::fault::BoardFault;
 use super::pin::Pin;
 use super::rows::RowSelector;
+use super::violation::Violation;
 use super::{COLUMNS, ROWS};
-use crate::Error;
-use crate::error::Violation;
-use crate::readout::{Readout, Sampler};
-use crate::world::World;
+use taxel_simulate::readout::{Readout, Sampler};
+use taxel_simulate::world::World;
 
 /// Resolution of every converter on the board, in bits.
 const CONVERTER_BITS: u8 = 12;

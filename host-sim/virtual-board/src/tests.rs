@@ -4,9 +4,9 @@ use firmware::readout::{ScanReport, ScanSettings};
 use firmware::timing::ScanPlan;
 
 use super::*;
-use crate::readout::{Circuit, Drive, Readout, Sampler, op_amp_time_constant_us};
-use crate::sensor::Sensor;
-use crate::world::World;
+use taxel_simulate::readout::{Circuit, Drive, Readout, Sampler};
+use taxel_simulate::sensor::Sensor;
+use taxel_simulate::world::World;
 
 fn board(readout: Readout) -> VirtualBoard {
     VirtualBoard::new(&World { readout, ..World::press() }).unwrap()

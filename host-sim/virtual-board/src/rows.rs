@@ -2,7 +2,7 @@
 
 use super::ROWS;
 use super::pin::Pin;
-use crate::readout::Drive;
+use taxel_simulate::readout::Drive;
 
 /// Row selector, with the levels of its pins.
 #[derive(Debug)]

@@ -1,13 +1,11 @@
 //! Scans of whole tables of readings, by the firmware's scanner on a virtual board.
 
-use taxel_data::random::Stream;
-use taxel_data::table::Table;
+use taxel_data::{Result, Stream, Table};
 
 use super::board::VirtualBoard;
 use super::scanner::SeriesResistance;
-use crate::Result;
-use crate::synth::Synthesis;
-use crate::world::World;
+use taxel_simulate::synth::Synthesis;
+use taxel_simulate::world::World;
 
 /// Ideal readings in Ω of all row-wires of the sensor, whichever the world reads, without noise and drift: the input
 /// of a board.

@@ -1,17 +1,24 @@
 //! Analogue half of the board: the voltage at each column's converter input.
 
 use firmware::circuit::{Divider, ZeroPotential};
-use taxel_data::random::{Purpose, Random, Stream};
+use firmware::timing::{OP_AMP_HZ, noise_gain, time_constant_ns};
+use taxel_data::{Purpose, Random, Stream};
 
 use super::fault::BoardFault;
 use super::network::{Tie, potentials_v};
 use super::{COLUMNS, ROWS};
-use crate::readout::{Circuit, Readout};
+use taxel_simulate::readout::{Circuit, Readout};
 
 /// Largest conductance of a node, in S; a node of no resistance has it.
 const MOST_CONDUCTANCE_S: f64 = 1e6;
 
 const ZERO_POTENTIAL: ZeroPotential<1, 1> = ZeroPotential::TYPICAL;
+
+/// Time constant in µs with which the op-amps of the board follow, when they hold the columns of the paper's sensor.
+pub fn op_amp_time_constant_us() -> f64 {
+    let [feedback_ohm] = ZERO_POTENTIAL.feedback_ohm;
+    f64::from(time_constant_ns(noise_gain(feedback_ohm, 55.0, 8), OP_AMP_HZ)) / 1e3
+}
 
 /// Actual values of a board's parts in the zero-potential circuit; the firmware's constants should be the same.
 #[derive(Debug, Clone, PartialEq)]
