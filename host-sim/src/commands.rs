@@ -1,5 +1,6 @@
 //! Subcommands, one small file each: arguments in, library calls, results out.
 
+mod captured;
 mod stderr;
 mod stdout;
 pub mod print;
@@ -41,7 +42,7 @@ pub mod limit;
 pub mod emulate;
 pub mod link;
 
-use std::process::ExitCode;
+pub use captured::{Captured, Stopped, capture};
 
 use firmware::link::message::Refusal;
 
@@ -65,18 +66,23 @@ pub struct Common {
 }
 
 /// Runs the `work` of the command of this `name`, prints its error, and returns the program's exit status.
-pub fn run_to_end(name: &str, common: &Common, work: impl FnOnce() -> Result<()>) -> ExitCode {
+pub fn run_to_end(name: &str, common: &Common, work: impl FnOnce() -> Result<()>) -> u8 {
     stderr::set(common.quiet, common.verbose);
     print::begin(name);
     let outcome = interruption::watch()
         .map_err(|cause| Error::failed(format!("cannot watch for Ctrl-C: {cause}")))
         .and_then(|()| work());
-    let Err(error) = outcome else { return ExitCode::SUCCESS };
-    eprintln!("error: {error}{}", advice(&error));
+    let Err(error) = outcome else { return 0 };
+    eprintln!("error: {}", message(&error));
     if matches!(error, Error::Rig(taxel_rig::Error::Interrupted)) {
         interruption::end();
     }
-    ExitCode::from(exit_status(&error))
+    exit_status(&error)
+}
+
+/// Message of an error, with advice on options.
+pub fn message(error: &Error) -> String {
+    format!("{error}{}", advice(error))
 }
 
 /// Advice on options for an error that a library reported without knowing them.
@@ -107,7 +113,7 @@ fn advice(error: &Error) -> &'static str {
 }
 
 /// Exit status of an error: 1 for work that failed, 2 for bad usage or input.
-fn exit_status(error: &Error) -> u8 {
+pub fn exit_status(error: &Error) -> u8 {
     match error {
         // A model and a configuration are inputs too.
         Error::Rig(taxel_rig::Error::Refused(Refusal::BadModel(_) | Refusal::Configuration(_))) => {

@@ -15,6 +15,7 @@ macro_rules! eprintln {
 
 pub mod report;
 pub mod commands;
+pub mod program;
 
 pub use taxel_evaluate::{
     Error, Result, by_depth, error, evaluate, experiment, measurements, metrics, others, over_time,

@@ -8,7 +8,7 @@ use std::process::Command;
 use crate::process::{Outcome, capture, root};
 
 /// Folders of what runs for a user; those of `NOT_PRODUCT` excepted.
-const PRODUCT: [&str; 3] = ["model-core", "firmware", "host-sim"];
+const PRODUCT: [&str; 4] = ["model-core", "firmware", "host-sim", "python"];
 const NOT_PRODUCT: [&str; 4] =
     ["firmware/qemu", "firmware/link-check", "firmware/mock-board", "host-sim/virtual-board"];
 

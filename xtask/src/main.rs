@@ -24,6 +24,8 @@ mod torture;
 
 mod mutants;
 
+mod python;
+
 mod ci;
 
 use std::env::args_os;
@@ -87,6 +89,8 @@ enum Command {
     /// Answer a question about the sensor, the paper's method or a part of Taxel: `study --help`.
     #[command(disable_help_flag = true)]
     Study(Rest),
+    /// Build the wheel of the Python module, install it in an environment of its own, and run its tests (docs/python.md).
+    Python(python::Options),
     /// Put every promise of reliability to the test, and print a table: `torture --help`. As the first option, --self-test
     /// builds a copy of the product with planted faults instead, and fails unless each line sees those that proof/mutants
     /// names it for.
@@ -142,6 +146,7 @@ fn main() -> ExitCode {
         Command::Size => size::run().map(success),
         Command::Cycles(options) => cycles::run(&options).map(success),
         Command::Study(rest) => study(&rest.all()),
+        Command::Python(options) => python::test(&options).map(success),
         Command::Torture(rest) => torture::run(&rest.all()),
         Command::Mutants(options) => mutants::run(&options).map(success),
     };

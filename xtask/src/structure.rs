@@ -22,6 +22,7 @@ const DESK: &[&str] = &[
     "taxel-rig",
     "taxel-evaluate",
     "host-sim",
+    "taxel-python",
     "device-log",
     "xtask",
 ];

@@ -3,6 +3,7 @@
 //! A scene is a TOML file; `docs/scenes.md` explains every field. [`Experiment::load`] reads and checks
 //! it, and the result can be used without further checks.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use model_core::blob::NoiseKind as BlobNoiseKind;
@@ -184,8 +185,16 @@ impl Experiment {
     /// Reads a scene as [`load`](Self::load) does, but for its numbers of frames and of centres to train with: options
     /// may replace them. [`check_sizes`](Self::check_sizes) checks what is in force then.
     pub fn load_open(name_or_path: &str) -> Result<Self> {
+        Self::parse_open(name_or_path, &Self::text(name_or_path)?)
+    }
+
+    /// Text of a scene: the name of an embedded one, or a path.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), for a file that cannot be read.
+    pub fn text(name_or_path: &str) -> Result<Cow<'static, str>> {
         if let Some((_, text)) = EMBEDDED.iter().find(|(name, _)| *name == name_or_path) {
-            return Self::parse_open(name_or_path, text);
+            return Ok((*text).into());
         }
         if !names_a_scene(name_or_path) {
             let known = EMBEDDED.map(|(name, _)| name).join(", ");
@@ -203,7 +212,7 @@ impl Experiment {
             }
             other => other,
         })?;
-        Self::parse_open(name_or_path, &text)
+        Ok(text.into())
     }
 
     /// Reads a scene from its text; `origin` names it in messages.

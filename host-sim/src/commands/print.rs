@@ -3,8 +3,8 @@
 use std::fmt::{Display, Write as _};
 use std::io::{self, ErrorKind, Write as _};
 use std::path::Path;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::by_depth::DepthErrors;
@@ -17,7 +17,7 @@ use taxel_data::error::printable;
 use taxel_data::output;
 use taxel_learn::decoders::mean;
 
-use super::{Common, stdout};
+use super::{Common, captured, stdout};
 
 /// Page of text for people, printed as a whole.
 #[derive(Default)]
@@ -60,6 +60,9 @@ pub fn check_output(path: &Path, inputs: &[&Path]) -> Result<()> {
 
 /// Shows a result; a reader who has seen enough (`| head`) is no failure.
 pub fn show(text: &str) -> Result<()> {
+    if captured::keep_result(text) {
+        return Ok(());
+    }
     let (place, written) = if STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
         ("stderr", io::stderr().write_all(text.as_bytes()))
     } else {
@@ -73,13 +76,12 @@ pub fn show(text: &str) -> Result<()> {
     }
 }
 
-/// Command that runs, and when it began.
-static BEGUN: OnceLock<(String, Instant)> = OnceLock::new();
+/// Command that was begun last, and when.
+static BEGUN: Mutex<(String, Option<Instant>)> = Mutex::new((String::new(), None));
 
 /// Notes that `command` begins, for what [`json`] says of it.
 pub fn begin(command: &str) {
-    // A program runs one command.
-    let _ = BEGUN.set((command.into(), Instant::now()));
+    *BEGUN.lock().unwrap_or_else(PoisonError::into_inner) = (command.into(), Some(Instant::now()));
 }
 
 /// Result of a command with what all of them say (docs/json.md).
@@ -100,11 +102,11 @@ pub fn json_text(result: &impl Serialize) -> Result<String> {
 }
 
 fn document(result: &impl Serialize, timed: bool) -> Result<String> {
-    let (command, begun) = BEGUN.get_or_init(|| (String::new(), Instant::now()));
+    let (command, begun) = BEGUN.lock().unwrap_or_else(PoisonError::into_inner).clone();
     let document = Document {
         version: env!("CARGO_PKG_VERSION"),
-        command,
-        seconds: timed.then(|| begun.elapsed().as_secs_f64()),
+        command: &command,
+        seconds: begun.filter(|_| timed).map(|begun| begun.elapsed().as_secs_f64()),
         result,
     };
     let text = serde_json::to_string_pretty(&document);

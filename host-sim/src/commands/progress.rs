@@ -1,12 +1,15 @@
 //! Progress on stderr: a bar on a terminal, now and then a line elsewhere.
 
 use std::collections::BTreeSet;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use taxel_data::Progress;
 
+use super::captured::{self, Stopped};
 use super::stderr;
 
 /// Least time between two lines of the same stage.
@@ -18,6 +21,8 @@ pub enum Terminal {
     Bar(ProgressBar),
     /// Lines in a log, where stderr is no terminal.
     Log(Mutex<Log>),
+    /// Nothing, for a caller in this process, who may want it to stop.
+    Called(Arc<AtomicBool>),
 }
 
 /// Stage that runs, for lines in a log.
@@ -34,6 +39,9 @@ pub struct Log {
 impl Terminal {
     /// Display of progress on stderr.
     pub fn new() -> Self {
+        if let Some(stop) = captured::stop() {
+            return Self::Called(stop);
+        }
         let is_log = stderr::is_quiet() || stderr::is_verbose();
         if is_log || ProgressDrawTarget::stderr().is_hidden() {
             return Self::Log(Mutex::new(Log::new(Instant::now())));
@@ -53,6 +61,13 @@ fn locked(log: &Mutex<Log>) -> MutexGuard<'_, Log> {
     log.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Unwinds with [`Stopped`] if the flag is set: work has no other way out, and files that it began go with it.
+fn unwind_if(stop: &AtomicBool) {
+    if stop.load(Ordering::Relaxed) {
+        resume_unwind(Box::new(Stopped));
+    }
+}
+
 impl Progress for Terminal {
     fn stage(&self, name: &str, steps: usize) {
         match self {
@@ -67,6 +82,7 @@ impl Progress for Terminal {
                 log.end(Instant::now());
                 log.stage(name, steps, Instant::now()).into_iter().for_each(stderr::remark);
             }
+            Self::Called(stop) => unwind_if(stop),
         }
     }
 
@@ -76,6 +92,7 @@ impl Progress for Terminal {
             Self::Log(log) => {
                 locked(log).step(Instant::now()).into_iter().for_each(stderr::remark);
             }
+            Self::Called(stop) => unwind_if(stop),
         }
     }
 }
@@ -85,6 +102,7 @@ impl Drop for Terminal {
         match self {
             Self::Bar(bar) => bar.finish_and_clear(),
             Self::Log(log) => locked(log).end(Instant::now()),
+            Self::Called(_) => {}
         }
     }
 }

@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use super::captured;
+
 const QUIET: u8 = 0;
 const USUAL: u8 = 1;
 const VERBOSE: u8 = 2;
@@ -29,7 +31,8 @@ pub fn is_verbose() -> bool {
 
 /// Says `text` on a line, unless it is to be quiet.
 pub fn remark(text: impl Display) {
-    if !is_quiet() {
+    let text = text.to_string();
+    if !captured::keep_remark(&text) && !is_quiet() {
         eprintln!("{text}");
     }
 }

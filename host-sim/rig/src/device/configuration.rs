@@ -87,7 +87,7 @@ impl Device {
     }
 
     /// Stops scanning, for as long as this host is there.
-    pub(crate) fn pause(&mut self) -> Result<()> {
+    pub fn pause(&mut self) -> Result<()> {
         self.configure(Configuration { frame_period_us: 0, ..Configuration::DEFAULT })
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use serialport::{ClearBuffer, SerialPort};
+use serialport::{ClearBuffer, SerialPort, SerialPortType};
 
 use super::Wire;
 use crate::error::{Error, Result};
@@ -19,8 +19,7 @@ pub fn open(port: &str, baud: u32) -> Result<Box<dyn SerialPort>> {
     let opened = serialport::new(port, baud).open();
     let cleared = opened.and_then(|port| port.clear(ClearBuffer::Input).map(|()| port));
     cleared.map_err(|cause| {
-        let ports = serialport::available_ports().unwrap_or_default();
-        let names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
+        let names = names();
         let known = if names.is_empty() {
             "no serial port is to be seen".to_owned()
         } else {
@@ -29,4 +28,11 @@ pub fn open(port: &str, baud: u32) -> Result<Box<dyn SerialPort>> {
         let join = "on Linux you may have to join the group dialout";
         Error::unfit_for("port", format!("{port}: {cause}; {known} ({join})"))
     })
+}
+
+/// Names of the serial ports of this computer, those of USB first.
+pub fn names() -> Vec<String> {
+    let mut ports = serialport::available_ports().unwrap_or_default();
+    ports.sort_by_key(|port| !matches!(port.port_type, SerialPortType::UsbPort(_)));
+    ports.into_iter().map(|port| port.port_name).collect()
 }

@@ -1,0 +1,185 @@
+//! The program: its command line, and every command by its name.
+
+use std::ffi::OsString;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
+
+use crate::commands::{
+    self, Captured, Common, decode, emulate, eval, export, forward, gate, inspect, join, limit,
+    link, noise, run, synth, table1, trade, train,
+};
+use crate::{Error, Result};
+
+/// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
+///
+/// Without a command: `run press`. Results go to stdout, progress and remarks to stderr. Exit status: 0
+/// done, 1 failed, 2 bad usage or input, 130 interrupted by Ctrl-C, 143 by SIGTERM.
+///
+/// Files appear whole or not at all: after an error or an interruption the old ones are there, and nothing else. `-o -`
+/// writes to stdout, and results then go to stderr. A link is followed, a read-only file is refused.
+#[derive(Parser)]
+#[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Run(run::Arguments),
+    Synth(synth::Arguments),
+    Noise(noise::Arguments),
+    Forward(forward::Arguments),
+    Train(train::Arguments),
+    Join(join::Arguments),
+    Decode(decode::Arguments),
+    Eval(eval::Arguments),
+    Inspect(inspect::Arguments),
+    Export(export::Arguments),
+    Table1(table1::Arguments),
+    Trade(trade::Arguments),
+    Gate(gate::Arguments),
+    Limit(limit::Arguments),
+    Emulate(emulate::Arguments),
+    Link(link::Arguments),
+    /// Print a script that completes commands and options in a shell.
+    ///
+    /// bash: `host-sim completions bash > ~/.local/share/bash-completion/completions/host-sim`.
+    Completions {
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page of the program or of a command: `host-sim man train | man -l -`.
+    Man {
+        /// Command, instead of the whole program.
+        command: Option<String>,
+    },
+}
+
+impl Command {
+    /// Name of the command, as it is typed; with the action of `link`.
+    fn name(&self) -> String {
+        let name = match self {
+            Self::Link(arguments) => return format!("link {}", arguments.action_name()),
+            Self::Run(_) => "run",
+            Self::Synth(_) => "synth",
+            Self::Noise(_) => "noise",
+            Self::Forward(_) => "forward",
+            Self::Train(_) => "train",
+            Self::Decode(_) => "decode",
+            Self::Eval(_) => "eval",
+            Self::Inspect(_) => "inspect",
+            Self::Export(_) => "export",
+            Self::Table1(_) => "table1",
+            Self::Trade(_) => "trade",
+            Self::Gate(_) => "gate",
+            Self::Limit(_) => "limit",
+            Self::Emulate(_) => "emulate",
+            Self::Join(_) => "join",
+            Self::Completions { .. } => "completions",
+            Self::Man { .. } => "man",
+        };
+        name.into()
+    }
+}
+
+/// Runs the command line with these arguments, of which the first is the program's name, and returns its exit status.
+pub fn main_from<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> u8 {
+    let cli = Cli::try_parse_from(arguments).unwrap_or_else(|error| advised(error).exit());
+    let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
+    commands::run_to_end(&command.name(), &cli.common, || execute(command, &cli.common))
+}
+
+/// What a command said that was called in this process.
+pub struct Called {
+    /// Its result, as `--json` prints it.
+    pub json: String,
+    /// Notes and warnings, one each.
+    pub remarks: Vec<String>,
+}
+
+/// Calls a command with these arguments (without the program's name) in this thread, and returns its result as JSON. It
+/// unwinds with [`commands::Stopped`] soon after `stop` is set.
+///
+/// # Errors
+/// As the program has them, with its message and its exit status.
+pub fn call(
+    arguments: &[String],
+    stop: &Arc<AtomicBool>,
+) -> std::result::Result<Called, (String, u8)> {
+    let all = ["host-sim", "--json"].into_iter().chain(arguments.iter().map(String::as_str));
+    let cli = Cli::try_parse_from(all)
+        .map_err(|error| (advised(error).to_string().trim_end().to_owned(), 2))?;
+    let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
+    commands::print::begin(&command.name());
+    let (outcome, Captured { result: json, remarks, .. }) =
+        commands::capture(stop, || execute(command, &cli.common));
+    match outcome {
+        Ok(()) => Ok(Called { json, remarks }),
+        Err(error) => Err((commands::message(&error), commands::exit_status(&error))),
+    }
+}
+
+/// A usage error with advice, where an option was taken for one with a similar name.
+fn advised(mut error: clap::Error) -> clap::Error {
+    let of_output = matches!(
+        error.get(ContextKind::InvalidArg),
+        Some(ContextValue::String(argument)) if argument.starts_with("--output ")
+    );
+    if error.kind() == ErrorKind::ArgumentConflict && of_output {
+        let tip = "columns that a model is to predict are given by '--outputs <GLOB>'";
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+    }
+    error
+}
+
+/// Prints the manual page of the program, or of its `command`.
+fn print_manual(command: Option<&str>) -> Result<()> {
+    let mut program = Cli::command();
+    program.build();
+    let of_command = |name: &str| program.find_subcommand(name).cloned();
+    let page = match command {
+        None => program,
+        Some(name) => of_command(name).ok_or_else(|| {
+            Error::Usage(format!(
+                "man {name}: there is no such command; `host-sim --help` lists them"
+            ))
+        })?,
+    };
+    let mut text = Vec::new();
+    clap_mangen::Man::new(page)
+        .render(&mut text)
+        .map_err(|cause| Error::failed(cause.to_string()))?;
+    commands::print::show(&String::from_utf8_lossy(&text))
+}
+
+fn execute(command: Command, common: &Common) -> Result<()> {
+    match command {
+        Command::Run(arguments) => run::execute(&arguments, common),
+        Command::Synth(arguments) => synth::execute(&arguments, common),
+        Command::Noise(arguments) => noise::execute(&arguments, common),
+        Command::Forward(arguments) => forward::execute(&arguments, common),
+        Command::Train(arguments) => train::execute(&arguments, common),
+        Command::Join(arguments) => join::execute(&arguments, common),
+        Command::Decode(arguments) => decode::execute(&arguments, common),
+        Command::Eval(arguments) => eval::execute(&arguments, common),
+        Command::Inspect(arguments) => inspect::execute(&arguments, common),
+        Command::Export(arguments) => export::execute(&arguments, common),
+        Command::Table1(arguments) => table1::execute(&arguments, common),
+        Command::Trade(arguments) => trade::execute(&arguments, common),
+        Command::Gate(arguments) => gate::execute(&arguments, common),
+        Command::Limit(arguments) => limit::execute(&arguments, common),
+        Command::Emulate(arguments) => emulate::execute(&arguments, common),
+        Command::Link(arguments) => link::execute(&arguments, common),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut script);
+            commands::print::show(&String::from_utf8_lossy(&script))
+        }
+        Command::Man { command } => print_manual(command.as_deref()),
+    }
+}

@@ -1,0 +1,77 @@
+//! Commands of the program, called in this process.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use host_sim::commands::Stopped;
+use host_sim::program;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+
+/// Time between two looks for Ctrl-C.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Error of Python for a message and the program's exit status.
+pub fn error((message, status): (String, u8)) -> PyErr {
+    if status == 2 { PyValueError::new_err(message) } else { PyRuntimeError::new_err(message) }
+}
+
+/// Does `work` in a thread of its own, while other threads of Python run and Ctrl-C is heard. `stop` is set by the latter,
+/// and the work is waited for.
+pub fn apart<T: Send + 'static>(
+    py: Python<'_>,
+    stop: &Arc<AtomicBool>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let (sender, receiver) = mpsc::channel();
+    let receiver = Mutex::new(receiver); // which Python may look at from any thread
+    let worker =
+        thread::Builder::new().name("taxel".into()).stack_size(16 << 20).spawn(move || {
+            // Nothing of what the work shares is used after a panic.
+            let _ = sender.send(catch_unwind(AssertUnwindSafe(work)));
+        })?;
+    let mut interrupted = None;
+    let done = loop {
+        let heard = py
+            .detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
+        match heard {
+            Ok(done) => break Some(done),
+            Err(RecvTimeoutError::Disconnected) => break None,
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        if interrupted.is_none() {
+            interrupted = py.check_signals().err();
+            stop.store(interrupted.is_some(), Ordering::Relaxed);
+        }
+    };
+    let _ = worker.join();
+    if let Some(interrupted) = interrupted {
+        return Err(interrupted);
+    }
+    match done {
+        Some(Ok(value)) => Ok(value),
+        Some(Err(panic)) if panic.is::<Stopped>() => Err(PyRuntimeError::new_err("stopped")),
+        _ => Err(PyRuntimeError::new_err(
+            "a defect of taxel: its work ended by a panic; please report what you called",
+        )),
+    }
+}
+
+/// Calls a command of `host-sim` with these arguments. Returns its result as JSON, and its remarks.
+#[pyfunction]
+pub fn call(py: Python<'_>, arguments: Vec<String>) -> PyResult<(String, Vec<String>)> {
+    let stop = Arc::default();
+    let flag = Arc::clone(&stop);
+    let called = apart(py, &stop, move || program::call(&arguments, &flag))?.map_err(error)?;
+    Ok((called.json, called.remarks))
+}
+
+/// Runs the program with this command line, whose first argument is its name. Returns its exit status.
+#[pyfunction]
+pub fn main(py: Python<'_>, arguments: Vec<String>) -> u8 {
+    py.detach(|| program::main_from(arguments))
+}

@@ -1,0 +1,20 @@
+//! The part of the module `taxel` that is compiled: commands, models, decoders, scenes and devices, for `python/taxel`.
+
+// From the ground up: a module imports only what is declared before it.
+mod call;
+mod model;
+mod scene;
+mod link;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_function(wrap_pyfunction!(call::call, module)?)?;
+    module.add_function(wrap_pyfunction!(call::main, module)?)?;
+    module.add_function(wrap_pyfunction!(link::ports, module)?)?;
+    module.add_class::<model::Blob>()?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<link::Line>()
+}

@@ -1,0 +1,91 @@
+"""What a device does with one frame after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taxel import _native
+
+if TYPE_CHECKING:
+    from taxel._model import Model
+
+#: How the decoding of a row ended, by its number.
+STATUS = ("decoded", "missing reading", "overflow", "at rest")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a frame was decoded to.
+
+    `outputs` in the units of the model's outputs, row after row, NaN where a row could not be decoded; `status` a number for
+    each row (`taxel._decoder.STATUS`); `clamped` tells whether a reading lies far outside the training range; `filled` the
+    number of missing readings that were told from the others. `std` and `novelty` are None without a confidence.
+    """
+
+    outputs: np.ndarray
+    status: np.ndarray
+    clamped: bool
+    filled: int
+    std: np.ndarray | None
+    novelty: float | None
+
+
+class Decoder:
+    """Decodes frames as a device does, bit for bit.
+
+    `blob` is a path, its bytes or a `Model`; `baseline` readings of the untouched sensor in Ω, one line or several, for a
+    model with relative inputs.
+    """
+
+    def __init__(self, blob: str | Path | bytes | Model, *, baseline: ArrayLike | None = None):
+        if hasattr(blob, "to_bytes"):
+            blob = blob.to_bytes()
+        self._blob = _native.Blob(blob if isinstance(blob, bytes) else Path(blob).read_bytes())
+        rows, inputs, outputs = self._blob.shape
+        self._sizes = (rows, rows * inputs, rows * outputs)
+        self._baseline = None
+        self._reciprocals = np.empty(0, np.float32)
+        if self._blob.relative_inputs:
+            if baseline is None:
+                raise ValueError("the model takes R/R₀: give baseline=, readings of the untouched sensor")
+            rest = np.asarray(baseline, np.float64)
+            self._baseline = np.ascontiguousarray(rest.mean(axis=0) if rest.ndim == 2 else rest)
+            self._reciprocals = _native.Blob.reciprocals(self._baseline.astype(np.float32))
+
+    @property
+    def input_names(self) -> list[str]:
+        return self._blob.input_names
+
+    @property
+    def output_names(self) -> list[str]:
+        return self._blob.output_names
+
+    def decode(self, frame: ArrayLike, out: np.ndarray | None = None) -> Estimate:
+        """Decodes one frame of readings, row after row. `out` (float32, as many as outputs) receives the outputs."""
+        rows, inputs, outputs = self._sizes
+        readings = np.array(frame, np.float32).reshape(-1)
+        if readings.size != inputs:
+            raise ValueError(f"a frame has {inputs} readings, and this one {readings.size}")
+        values = np.empty(outputs, np.float32) if out is None else out
+        if values.dtype != np.float32 or values.shape != (outputs,) or not values.flags.c_contiguous:
+            raise ValueError(f"out: give a contiguous array of {outputs} float32")
+        status = np.empty(rows, np.uint8)
+        std = np.empty(outputs if self._blob.has_confidence else 0, np.float32)
+        clamped, filled, novelty = self._blob.decode_frame(readings, self._reciprocals, values, status, std)
+        if not self._blob.has_confidence:
+            return Estimate(values, status, clamped, filled, None, None)
+        return Estimate(values, status, clamped, filled, std, novelty)
+
+    def decode_many(self, frames: ArrayLike, out: np.ndarray | None = None) -> np.ndarray:
+        """Decodes frames (frames × readings) to outputs (frames × outputs), the same bits as one by one."""
+        readings = np.ascontiguousarray(frames, np.float64)
+        values = self._blob.decode(readings.reshape(len(readings), -1), self._baseline)
+        if out is None:
+            return values
+        out[...] = values
+        return out

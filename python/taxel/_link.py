@@ -1,0 +1,156 @@
+"""Devices on a serial line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel import _native
+from taxel._call import call, folder
+
+if TYPE_CHECKING:
+    from taxel._model import Model
+
+#: Flags of a device's estimate (docs/link.md).
+CONTACT, CLAMPED, NOVEL = 16, 64, 128
+
+
+def list_ports() -> list[str]:
+    """Serial ports of this computer, those of USB first."""
+    return _native.ports()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a device sent of one scan.
+
+    `readings` (rows × columns, Ω) and `outputs` (in the model's units) are empty where they were not asked for; `status` has a
+    number for each row, `flags` those of docs/link.md. `time_us` is when the scan began, since the device's start; `age_ms` how
+    long ago this came; `lost` counts the scans that never came or were not taken.
+    """
+
+    frame: int
+    time_us: int
+    age_ms: float
+    lost: int
+    readings: np.ndarray
+    outputs: np.ndarray
+    status: np.ndarray
+    flags: int
+    std: np.ndarray
+    novelty: float | None
+
+
+class Link:
+    """A device, listened to in the background: an iterator over what it sends, and a context manager.
+
+    `port` None takes the one there is. `send` is "readings", "estimates" or "both"; None takes estimates from a device that
+    has a model, and readings from another. `buffer` readings wait to be taken; older ones are dropped and counted.
+    """
+
+    def __init__(
+        self,
+        port: str | None = None,
+        *,
+        baud: int = 921600,
+        period_us: int | None = None,
+        send: str | None = None,
+        confidence: bool = False,
+        buffer: int = 1024,
+    ):
+        self.port = port or only_port()
+        self._options = (baud, period_us, send, confidence, buffer)
+        self._line: Any = _native.Line(self.port, *self._options)
+
+    @property
+    def board(self) -> str:
+        """Name of the device's board."""
+        return self._opened().identity[0]
+
+    @property
+    def firmware(self) -> str:
+        """Version of its firmware."""
+        return self._opened().identity[1]
+
+    @property
+    def model_crc(self) -> int | None:
+        """CRC-32 of the model in force, or None."""
+        return self._opened().identity[2]
+
+    def read(self, timeout_ms: float = 2000) -> Reading:
+        """The oldest reading that was not taken yet. `TimeoutError` if none comes."""
+        found = self._opened().next(timeout_ms / 1000)
+        if found is None:
+            raise TimeoutError(
+                f"{self.port}: nothing came within {timeout_ms:g} ms: is the device powered, and does it scan?"
+            )
+        return self._reading(found)
+
+    def read_latest(self, max_age_ms: float = 500) -> Reading | None:
+        """The newest reading, and those before it are forgotten; None if it is older than that, or none has come."""
+        found = self._opened().newest(max_age_ms)
+        return None if found is None else self._reading(found)
+
+    def __iter__(self) -> Iterator[Reading]:
+        while self._line is not None:
+            yield self.read()
+
+    def zero(self, n: int = 30) -> np.ndarray:
+        """Captures the untouched sensor over `n` scans as the device's baseline, and returns it (Ω)."""
+        with folder() as work:
+            rest = work / "rest.csv"
+            self._apart(["baseline", "-n", n, "-o", rest])
+            return np.loadtxt(rest, delimiter=",", skiprows=1, ndmin=1)
+
+    def upload(self, model: Model | str | Path) -> None:
+        """Gives the device a model; if it refuses it, the one before stays."""
+        with folder() as work:
+            path = model
+            if hasattr(model, "save"):
+                path = work / "model.bin"
+                model.save(path)
+            self._apart(["upload", path])
+
+    def close(self) -> None:
+        """Stops listening: the device returns to its own configuration, and the port is free."""
+        if self._line is not None:
+            self._line.close()
+            self._line = None
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _opened(self) -> Any:
+        if self._line is None:
+            raise RuntimeError("the link is closed")
+        return self._line
+
+    def _apart(self, action: list[object]) -> None:
+        """Lets a command have the port, and listens again."""
+        self._opened().close()
+        try:
+            call(["link", self.port, "--baud", self._options[0], *action])
+        finally:
+            self._line = _native.Line(self.port, *self._options)
+
+    def _reading(self, found: Any) -> Reading:
+        (frame, time_us, age_ms, lost), (readings, outputs, status, flags), (std, novelty) = found
+        rows, columns, _ = self._opened().shape
+        if readings.size == rows * columns:
+            readings = readings.reshape(rows, columns)
+        return Reading(frame, time_us, age_ms, lost, readings, outputs, status, flags, std, novelty)
+
+
+def only_port() -> str:
+    ports = list_ports()
+    if len(ports) == 1:
+        return ports[0]
+    known = f"there are {', '.join(ports)}" if ports else "no serial port is to be seen"
+    raise ValueError(f"port: name one; {known}")

@@ -1,0 +1,342 @@
+"""Models, as estimators of scikit-learn."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taxel import _native
+from taxel._call import TaxelWarning, call, folder, option, save, two_dimensional
+
+try:
+    from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
+    from sklearn.utils.validation import check_is_fitted, validate_data
+
+    HAS_SKLEARN = True
+except ImportError:  # scikit-learn is optional
+    HAS_SKLEARN = False
+
+    class BaseEstimator:  # type: ignore[no-redef]
+        """Parameters by their names, as scikit-learn has them."""
+
+        def get_params(self, deep: bool = True) -> dict[str, Any]:
+            names = inspect.signature(type(self).__init__).parameters
+            return {name: getattr(self, name) for name in names if name != "self"}
+
+        def set_params(self, **params: Any) -> BaseEstimator:
+            for name, value in params.items():
+                if name not in self.get_params():
+                    raise ValueError(f"{name!r} is no parameter of {type(self).__name__}")
+                setattr(self, name, value)
+            return self
+
+        def __repr__(self) -> str:
+            given = ", ".join(f"{name}={value!r}" for name, value in self.get_params().items())
+            return f"{type(self).__name__}({given})"
+
+    class RegressorMixin:  # type: ignore[no-redef]
+        """The score of a regressor."""
+
+        def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+            y, estimate = two_dimensional(y, "y"), two_dimensional(self.predict(X), "y")
+            weights = None if sample_weight is None else np.asarray(sample_weight)
+            left = np.average((y - estimate) ** 2, axis=0, weights=weights)
+            mean = np.average(y, axis=0, weights=weights)
+            return float(np.mean(1 - left / np.average((y - mean) ** 2, axis=0, weights=weights)))
+
+    class MultiOutputMixin:  # type: ignore[no-redef]
+        """Several outputs."""
+
+
+class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
+    """A network of Gaussians, trained by `host-sim train` and decoded as a device decodes, to the bit.
+
+    Parameters
+    ----------
+    centres : int
+        Largest number of Gaussians K; fewer distinct lines take fewer, with a warning.
+    spread : float or None
+        Width σ on scaled inputs, where refinement starts; None for 0.8.
+    penalty : float or None
+        Ridge penalty on squared weights for each line; None for the usual one.
+    affine_tail : bool
+        Whether outputs have an affine part besides.
+    refine : bool
+        Whether centres and widths are refined after K-means: better, and minutes instead of seconds.
+    format : {"f32", "fixed16", "f32-direct"} or None
+        Number format of the weights; None for f32.
+    whole_array : bool
+        One network behind a projection of all readings. For columns named as wires (`r1c1_ohm`), whose outputs belong to
+        rows, this is instead of a network for each row.
+    features, output_rank : int or None
+        Features of that projection, and components that are expanded to all outputs.
+    relative_inputs : bool
+        Inputs are R/R₀. Lines of `fit` at which all outputs are zero are the baseline; `predict` takes one.
+    confidence : bool
+        Whether `predict` can tell standard deviations and novelty.
+    fill : bool
+        Whether missing readings (NaN) are told from the others of their line.
+    random_state : int
+        Seed of every random draw.
+
+    Attributes
+    ----------
+    n_features_in_ : int
+    feature_names_in_ : array of str, where X had names
+    output_names_ : list of str
+    report_ : dict
+        What `host-sim train --json` says: errors, verdict, warnings, outliers, lines left out.
+    blob_ : taxel._native.Blob
+        The model as a device has it.
+    """
+
+    def __init__(
+        self,
+        centres: int = 64,
+        *,
+        spread: float | None = None,
+        penalty: float | None = None,
+        affine_tail: bool = True,
+        refine: bool = True,
+        format: str | None = None,
+        whole_array: bool = False,
+        features: int | None = None,
+        output_rank: int | None = None,
+        relative_inputs: bool = False,
+        confidence: bool = False,
+        fill: bool = False,
+        random_state: int = 1,
+    ):
+        self.centres = centres
+        self.spread = spread
+        self.penalty = penalty
+        self.affine_tail = affine_tail
+        self.refine = refine
+        self.format = format
+        self.whole_array = whole_array
+        self.features = features
+        self.output_rank = output_rank
+        self.relative_inputs = relative_inputs
+        self.confidence = confidence
+        self.fill = fill
+        self.random_state = random_state
+
+    def fit(self, X: ArrayLike, y: ArrayLike, *, groups: ArrayLike | None = None) -> Model:
+        """Trains on readings `X` (lines × features, Ω or whatever they are) and outputs `y` (lines × outputs, or lines).
+
+        `groups` has a number for each line: one group after the other is held out to refine and to tell confidence, instead
+        of five folds. Columns of a pandas DataFrame keep their names. A value far from all others in its column leaves its
+        line out (`report_["outliers"]`).
+        """
+        if y is None:
+            raise ValueError("fit requires y to be passed, but the target y is None")
+        names_x, names_y = names_of(X, "x"), names_of(y, "y")
+        X, y = self._checked(X, y)
+        if len(X) < 2:
+            raise ValueError("n_samples = 1: training takes two lines or more, and many more to be of use")
+        lines = two_dimensional(y, "y")
+        names_x = names_x or numbered("x", X.shape[1])
+        names_y = names_y or numbered("y", lines.shape[1])
+        columns = dict(zip(names_x, X.T)) | dict(zip(names_y, lines.T))
+        arguments: list[object] = ["--inputs", ",".join(names_x), "--outputs", ",".join(names_y)]
+        if groups is not None:
+            columns["group"] = np.unique(np.asarray(groups), return_inverse=True)[1].astype(float)
+            arguments += ["--fold-column", "group"]
+        centres = min(self.centres, max(len(lines) - 1, 1)) if self.centres >= 1 else self.centres
+        arguments += option("--centres", centres) + option("--spread", self.spread)
+        arguments += option("--penalty", self.penalty) + option("--no-affine", not self.affine_tail)
+        arguments += option("--no-refine", not self.refine) + option("--format", self.format)
+        arguments += option("--whole-array", self.whole_array) + option("--features", self.features)
+        arguments += option("--output-rank", self.output_rank) + option("--fill", self.fill)
+        if self.relative_inputs:
+            arguments += ["--relative-inputs", *option("--rest", names_y)]
+        arguments += option("--confidence", self.confidence) + option("--seed", self.random_state)
+        with folder() as path:
+            data, blob = path / "data.npz", path / "model.bin"
+            save(data, columns)
+            self.report_ = call(["train", data, *arguments, "-o", blob])
+            self._take(blob.read_bytes())
+        self._one_output = np.ndim(y) == 1
+        self._columns = [names_x.index(name) for name in self.blob_.input_names]
+        for warning in self.report_["verdict"]["warnings"]:
+            warnings.warn(warning["text"], TaxelWarning, stacklevel=2)
+        if self.report_["centres"] < self.centres:
+            warnings.warn(
+                f"{self.report_['centres']} centres instead of {self.centres}: there are fewer distinct lines",
+                TaxelWarning,
+                stacklevel=2,
+            )
+        return self
+
+    def predict(
+        self,
+        X: ArrayLike,
+        *,
+        return_std: bool = False,
+        return_novelty: bool = False,
+        baseline: ArrayLike | None = None,
+    ) -> Any:
+        """Outputs for readings `X` (lines × features), in their units: lines × outputs, or lines for one output.
+
+        With `return_std` also their standard deviations, and with `return_novelty` the novelty of each line in nats (above
+        0, it is unlike the lines of training); both need `confidence`. `baseline` are readings of the untouched sensor, one
+        line or several, for a model with relative inputs.
+        """
+        X = self._checked(X)
+        given = np.ascontiguousarray(X[:, self._columns])
+        rest = self._baseline(baseline)
+        values = self.blob_.decode(given, rest)
+        outputs = values[:, 0] if self._one_output else values
+        if not (return_std or return_novelty):
+            return outputs
+        assessed = self.blob_.assess(given, rest)
+        if assessed is None:
+            raise ValueError("the model has no confidence: train it with confidence=True")
+        std, novelty = assessed
+        std = std[:, 0] if self._one_output else std
+        return (outputs, *([std] if return_std else []), *([novelty] if return_novelty else []))
+
+    def save(self, path: str | Path) -> None:
+        """Writes the blob, as `host-sim train -o` does: for `host-sim link PORT upload`."""
+        self._fitted()
+        Path(path).write_bytes(self.blob_.to_bytes())
+
+    def to_bytes(self) -> bytes:
+        """The blob."""
+        self._fitted()
+        return self.blob_.to_bytes()
+
+    @classmethod
+    def load(cls, path: str | Path) -> Model:
+        """Model of a blob that `save` or `host-sim train` wrote."""
+        return cls.of_bytes(Path(path).read_bytes())
+
+    @classmethod
+    def of_bytes(cls, blob: bytes) -> Model:
+        """Model of the bytes of a blob."""
+        model = cls()
+        model._take(blob)
+        model.set_params(
+            centres=model.blob_.centres,
+            format=model.blob_.formats[0],
+            relative_inputs=model.blob_.relative_inputs,
+            confidence=model.blob_.has_confidence,
+            fill=model.blob_.has_fill,
+        )
+        model.n_features_in_ = len(model.blob_.input_names)
+        model._columns = list(range(model.n_features_in_))
+        model._one_output = False
+        return model
+
+    def export_c(self, path: str | Path, name: str = "taxel_model") -> None:
+        """Writes a library in C99 that decodes as this model does, to the bit, into the folder `path` (docs/c.md)."""
+        self._fitted()
+        with folder() as work:
+            blob = work / "model.bin"
+            blob.write_bytes(self.blob_.to_bytes())
+            call(["export", blob, "--c", path, "--name", name])
+
+    def _take(self, blob: bytes) -> None:
+        self.blob_ = _native.Blob(blob)
+        self.output_names_ = list(self.blob_.output_names)
+
+    def _fitted(self) -> None:
+        if not hasattr(self, "blob_"):
+            if HAS_SKLEARN:
+                check_is_fitted(self)
+            raise ValueError("the model is not trained yet: call fit first, or Model.load")
+
+    def _checked(self, X: ArrayLike, y: ArrayLike | None = None) -> Any:
+        """X, and y if it is given, as arrays of float64, after scikit-learn's checks if it is there."""
+        if y is None:
+            self._fitted()
+        if HAS_SKLEARN and (y is not None or hasattr(self, "report_")):
+            missing = "allow-nan" if self.fill else True
+            checks = {"dtype": np.float64, "order": "C", "ensure_all_finite": missing}
+            if y is None:
+                return validate_data(self, X, reset=False, **checks)
+            X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, **checks)
+            return X, y
+        X = two_dimensional(X, "X")
+        if y is None:
+            if X.shape[1] != self.n_features_in_:
+                raise ValueError(
+                    f"X has {X.shape[1]} features, but {type(self).__name__} is expecting "
+                    f"{self.n_features_in_} features as input"
+                )
+            return X
+        y = np.asarray(y, dtype=np.float64)
+        if len(y) != len(X):
+            raise ValueError(f"X has {len(X)} lines and y {len(y)}")
+        self.n_features_in_ = X.shape[1]
+        return X, y
+
+    def _baseline(self, baseline: ArrayLike | None) -> np.ndarray | None:
+        if not self.blob_.relative_inputs:
+            return None
+        if baseline is None:
+            raise ValueError("the model takes R/R₀: give baseline=, readings of the untouched sensor")
+        rest = np.asarray(baseline, dtype=np.float64)
+        rest = rest.mean(axis=0) if rest.ndim == 2 else rest
+        return np.ascontiguousarray(rest[self._columns])
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = self.fill
+        return tags
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(self.__dict__)
+        if "blob_" in state:
+            state["blob_"] = self.blob_.to_bytes()
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if "blob_" in state:
+            self._take(state["blob_"])
+
+    def _repr_html_(self) -> str:
+        if not hasattr(self, "report_"):
+            return f"<code>{escape(repr(self))}</code>"
+        verdict, decoders = self.report_["verdict"], self.report_["decoders"]
+        return f"<p><code>{escape(repr(self))}</code></p><p>{escape(verdict['sentence'])}</p>" + bars(decoders)
+
+
+def names_of(columns: Any, what: str) -> list[str] | None:
+    """Names of a DataFrame's columns, or of a Series."""
+    names = getattr(columns, "columns", None)
+    if names is None:
+        name = getattr(columns, "name", None)
+        return [name] if isinstance(name, str) and np.ndim(columns) == 1 else None
+    return [str(name) for name in names] if all(isinstance(name, str) for name in names) else None
+
+
+def numbered(what: str, count: int) -> list[str]:
+    return [f"{what}{number}" for number in range(1, count + 1)]
+
+
+def bars(decoders: list[dict[str, Any]]) -> str:
+    """Errors of the decoders, of the last group of outputs, as bars."""
+    errors = [(of["decoder"], of["errors"][-1]) for of in decoders]
+    most = max((error["rmse"] for _, error in errors), default=0.0) or 1.0
+    unit = escape(errors[0][1].get("unit") or "") if errors else ""
+    height, lines = 22, []
+    for place, (name, error) in enumerate(errors):
+        y, width = place * height, 220 * error["rmse"] / most
+        lines.append(
+            f'<text x="0" y="{y + 15}">{escape(name)}</text>'
+            f'<rect x="90" y="{y + 4}" width="{width:.1f}" height="14" fill="#3b7dd8" />'
+            f'<text x="{95 + width:.1f}" y="{y + 15}">{error["rmse"]:.3g} {unit}</text>'
+        )
+    group = escape(errors[0][1]["group"]) if errors else ""
+    return (
+        f'<svg width="420" height="{height * len(errors) + 4}" font-family="sans-serif" font-size="12" '
+        f'fill="currentColor" role="img" aria-label="RMSE of {group}">{"".join(lines)}</svg><p>RMSE of {group}</p>'
+    )

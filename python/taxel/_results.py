@@ -1,0 +1,125 @@
+"""What commands tell of scenes and models."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taxel._call import call, folder, option, save, two_dimensional
+from taxel._model import Model, names_of
+from taxel._scene import Scene
+
+
+def source(subject: Scene | str | Path, work: Path) -> object:
+    """A subject as a command takes it."""
+    if not isinstance(subject, Scene):
+        return subject
+    path = work / f"{subject.name}.toml"
+    path.write_text(subject.to_toml(), encoding="utf-8")
+    return path
+
+
+class Trade:
+    """Decoders of a subject, by error and time (docs/trade.md).
+
+    `points` has a dict for each, as `trade --json` has them; `front` those that no other beats; `chosen` the one that the
+    bounds select, or None; `model` the chosen one.
+    """
+
+    def __init__(self, result: dict[str, Any], page: str, svg: str, blob: bytes | None):
+        self.result, self.page_html, self.svg = result, page, svg
+        self.points: list[dict[str, Any]] = result["points"]
+        self.front = [point for point in self.points if point["on_front"]]
+        chosen = result.get("chosen")
+        self.chosen = None if chosen is None else self.points[chosen]
+        self.model = None if blob is None else Model.of_bytes(blob)
+
+    def to_pandas(self) -> Any:
+        """The points as a DataFrame."""
+        import pandas
+
+        return pandas.json_normalize(self.points)
+
+    def __repr__(self) -> str:
+        return f"Trade({len(self.points)} points, {len(self.front)} on the front)"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(repr(self))}</p>{self.svg}"
+
+
+def trade(
+    subject: Scene | str | Path,
+    *,
+    frame_rate: float | None = None,
+    max_error: float | None = None,
+    max_latency_ms: float | None = None,
+    max_cycles: int | None = None,
+    max_flash: int | None = None,
+    centres: ArrayLike | None = None,
+    refine: bool = True,
+    seed: int | None = None,
+    **options: Any,
+) -> Trade:
+    """Trains and judges decoders of a scene or a data file, and chooses one within the bounds. Other options are those of
+    `host-sim trade`, with underlines: `average=[1, 4]`, `readout="onchip"`."""
+    with folder() as work:
+        out = work / "out"
+        arguments: list[object] = ["trade", source(subject, work), "-o", out]
+        arguments += option("--frame-rate", frame_rate) + option("--max-error", max_error)
+        arguments += option("--max-latency-ms", max_latency_ms) + option("--max-cycles", max_cycles)
+        arguments += option("--max-flash", max_flash) + option("--centres", centres)
+        arguments += option("--no-refine", not refine) + option("--seed", seed)
+        for name, value in options.items():
+            arguments += option("--" + name.replace("_", "-"), value)
+        result = call(arguments)
+        (made,) = out.iterdir()
+        blob = made / "chosen.bin"
+        return Trade(
+            result,
+            (made / "trade.html").read_text(encoding="utf-8"),
+            (made / "trade.svg").read_text(encoding="utf-8"),
+            blob.read_bytes() if blob.exists() else None,
+        )
+
+
+class Limit:
+    """What a sensor can know (docs/what-the-sensor-knows.md): the least possible error of any decoder, by group of outputs.
+
+    `result` is what `limit --json` says.
+    """
+
+    def __init__(self, result: dict[str, Any]):
+        self.result = result
+
+    def __repr__(self) -> str:
+        return f"Limit({self.result.get('subject') or self.result.get('scene')})"
+
+
+def limit(scene: Scene | str | Path, *, frames: int | None = None, seed: int | None = None) -> Limit:
+    """Least possible error of any decoder of a scene."""
+    with folder() as work:
+        arguments = ["limit", source(scene, work)]
+        return Limit(call([*arguments, *option("--frames", frames), *option("--seed", seed)]))
+
+
+def evaluate(model: Model, X: ArrayLike, y: ArrayLike, *, baseline: ArrayLike | None = None) -> dict[str, Any]:
+    """Errors of a model on readings `X` and true outputs `y`, as `eval --json` has them."""
+    names_x = names_of(X, "x") or list(model.blob_.input_names)
+    names_y = names_of(y, "y") or list(model.blob_.output_names)
+    X, y = two_dimensional(X, "X"), two_dimensional(y, "y")
+    if X.shape[1] != len(names_x) or y.shape[1] != len(names_y):
+        raise ValueError(f"X and y have {X.shape[1]} and {y.shape[1]} columns: give {len(names_x)} and {len(names_y)}")
+    with folder() as work:
+        data, blob = work / "data.npz", work / "model.bin"
+        save(data, dict(zip(names_x, X.T)) | dict(zip(names_y, y.T)))
+        blob.write_bytes(model.to_bytes())
+        arguments: list[object] = ["eval", blob, data]
+        if baseline is not None:
+            rest = np.atleast_2d(np.asarray(baseline, np.float64))
+            save(work / "rest.npz", dict(zip(names_x, rest.T)))
+            arguments += ["--baseline", work / "rest.npz"]
+        return call(arguments)

@@ -1,0 +1,179 @@
+"""Models: the same bytes and bits as the command line, and what users of scikit-learn expect."""
+
+import json
+import pickle
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pandas
+import pytest
+import taxel
+
+RANDOM = np.random.default_rng(5)
+
+
+def host_sim(*arguments):
+    command = [sys.executable, "-m", "taxel", *map(str, arguments), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def smooth(lines=400, features=3):
+    """Readings about 50 Ω and two outputs that follow from them."""
+    x = RANDOM.uniform(-1, 1, (lines, features))
+    y = np.column_stack([np.sin(2 * x[:, 0]) + 0.3 * x[:, 1], x[:, 1] * x[:, 2 % features]])
+    return 50 + 8 * x, y
+
+
+@pytest.fixture(scope="module")
+def frames():
+    return taxel.synth("press", 600, stream="training", seed=3)
+
+
+@pytest.mark.parametrize("parameters", [{}, {"format": "fixed16", "confidence": True}, {"affine_tail": False}])
+def test_the_blob_is_that_of_the_command_line(tmp_path, parameters):
+    x, y = smooth()
+    model = taxel.Model(12, refine=False, **parameters).fit(x, y)
+    names = [*(f"x{i}" for i in (1, 2, 3)), "y1", "y2"]
+    pandas.DataFrame(np.column_stack([x, y]), columns=names).to_csv(tmp_path / "data.csv", index=False)
+    options = ["--no-affine"] if "affine_tail" in parameters else []
+    options += ["--format", "fixed16", "--confidence"] if "format" in parameters else []
+    host_sim(
+        *("train", tmp_path / "data.csv", "--inputs", "x1..x3", "--outputs", "y1,y2", "--no-refine"),
+        *("--centres", 12, *options, "-o", tmp_path / "model.bin"),
+    )
+    assert model.to_bytes() == (tmp_path / "model.bin").read_bytes()
+    host_sim("decode", tmp_path / "model.bin", tmp_path / "data.csv", "-o", tmp_path / "out.csv")
+    decoded = pandas.read_csv(tmp_path / "out.csv")[["y1", "y2"]].to_numpy()
+    assert np.array_equal(decoded.astype(np.float32), model.predict(x).astype(np.float32))
+    assert np.abs(model.predict(x) - y).max() < 0.5
+
+
+def test_one_frame_after_the_other_has_the_bits_of_all_at_once(frames):
+    scene = taxel.Scene("press")
+    assert (scene.rows, scene.columns, frames.readings.shape) == (8, 18, (600, 144))
+    x, y = frames.to_pandas()
+    model = taxel.Model(16, refine=False, whole_array=True, format="fixed16").fit(x, y)
+    decoder = taxel.Decoder(model)
+    together = model.predict(x)
+    for line in range(20):
+        estimate = decoder.decode(frames.readings[line])
+        assert np.array_equal(estimate.outputs, together[line].astype(np.float32))
+        assert (estimate.status.tolist(), estimate.clamped) == ([0] * 8, False)
+    broken = frames.readings[0].copy()
+    broken[5] = np.nan
+    assert decoder.decode(broken).status.tolist() == [1] * 8
+    assert np.array_equal(decoder.decode_many(frames.readings), together)
+    assert decoder.decode(frames.readings[0] + 1e4).clamped
+
+
+def test_arrays_of_any_layout_and_precision_give_the_same(frames):
+    x, y = smooth()
+    x = x.astype(np.float32)
+    model = taxel.Model(8, refine=False).fit(x, y)
+    expected = model.predict(x)
+    strided = np.asfortranarray(np.repeat(x, 2, axis=0))[::2]
+    for same in (x.astype(np.float64), strided, x.tolist()):
+        assert np.array_equal(model.predict(same), expected)
+        assert taxel.Model(8, refine=False).fit(same, y).to_bytes() == model.to_bytes()
+    before = x.copy()
+    model.predict(x)
+    assert np.array_equal(before, x)
+
+
+def test_names_of_pandas_are_those_of_the_model():
+    x, y = smooth()
+    x = pandas.DataFrame(x, columns=["left", "right", "thumb"])
+    y = pandas.DataFrame(y, columns=["force_n", "place_mm"])
+    model = taxel.Model(8, refine=False).fit(x, y)
+    assert model.blob_.input_names == ["left", "right", "thumb"]
+    assert model.output_names_ == ["force_n", "place_mm"]
+    assert model.feature_names_in_.tolist() == ["left", "right", "thumb"]
+    with pytest.raises(ValueError, match="feature names"):
+        model.predict(x[["right", "left", "thumb"]])
+
+
+def test_missing_readings_are_filled_by_a_model_that_can():
+    x, y = smooth(1500, 4)
+    x[:, 3] = x[:, 0] + 0.5 * x[:, 1] + RANDOM.normal(0, 0.05, len(x))
+    model = taxel.Model(16, refine=False, fill=True).fit(x, y)
+    gaps = x[:200].copy()
+    gaps[:, 3] = np.nan
+    assert np.isfinite(model.predict(gaps)).all()
+    assert np.abs(model.predict(gaps) - model.predict(x[:200])).mean() < 0.1
+    with pytest.raises(ValueError, match="NaN"):
+        taxel.Model(8, refine=False).fit(x, y).predict(gaps)
+
+
+def test_deviations_and_novelty_need_a_confidence():
+    x, y = smooth(1200)
+    model = taxel.Model(16, refine=False, confidence=True).fit(x, y)
+    outputs, std, novelty = model.predict(x, return_std=True, return_novelty=True)
+    assert outputs.shape == std.shape == (1200, 2) and (std > 0).all()
+    assert (novelty > 0).mean() < 0.05
+    far = model.predict(x + 40, return_novelty=True)[1]
+    assert (far > 0).all()
+    with pytest.raises(ValueError, match="confidence=True"):
+        taxel.Model(8, refine=False).fit(x, y).predict(x, return_std=True)
+
+
+def test_groups_are_held_out_and_relative_inputs_take_a_baseline():
+    x, y = smooth(600)
+    groups = np.repeat([3, 8, 9], 200)
+    assert taxel.Model(8, confidence=True, refine=False).fit(x, y, groups=groups).blob_.has_confidence
+    rest = np.array([50.0, 52.0, 47.0])
+    y[:60], x[:60] = 0, rest + RANDOM.normal(0, 0.02, (60, 3))
+    model = taxel.Model(8, refine=False, relative_inputs=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        model.fit(x, y)
+    # A drift of the gain cancels.
+    same = model.predict(x * 1.1, baseline=rest * 1.1)
+    assert np.allclose(same, model.predict(x, baseline=rest), atol=1e-4)
+    with pytest.raises(ValueError, match="baseline"):
+        model.predict(x)
+
+
+def test_a_model_survives_pickle_and_files(tmp_path):
+    x, y = smooth()
+    model = taxel.Model(8, refine=False).fit(x, y[:, 0])
+    assert model.predict(x).shape == (400,)
+    copy = pickle.loads(pickle.dumps(model))
+    assert np.array_equal(copy.predict(x), model.predict(x)) and copy.to_bytes() == model.to_bytes()
+    model.save(tmp_path / "m.bin")
+    loaded = taxel.Model.load(tmp_path / "m.bin")
+    assert np.array_equal(loaded.predict(x)[:, 0], model.predict(x))
+    assert loaded.centres == 8 and pickle.loads(pickle.dumps(taxel.Scene("paper"))).rows == 8
+    page = model._repr_html_()
+    assert model.report_["verdict"]["sentence"].split(":")[0] in page and "<svg" in page
+
+
+def test_fewer_lines_than_centres_take_fewer_with_a_warning():
+    x, y = smooth(20)
+    with pytest.warns(UserWarning, match="19 centres instead of 64"):
+        model = taxel.Model(64, refine=False).fit(x, y)
+    assert model.blob_.centres == 19
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [({"centres": 0}, "centres"), ({"format": "f16"}, "f16"), ({"spread": -1.0}, "spread"), ({"penalty": -2.0}, "penalty")],
+)
+def test_bad_parameters_are_value_errors_with_the_message_of_the_command(parameters, message):
+    x, y = smooth()
+    with pytest.raises(ValueError, match=message):
+        taxel.Model(**({"refine": False} | parameters)).fit(x, y)
+    with pytest.raises(ValueError, match="not a weight blob|too short|truncated|Taxel"):
+        taxel.Model.of_bytes(b"no blob")
+
+
+def test_scikit_learn_finds_nothing_to_complain_of():
+    from sklearn.utils.estimator_checks import check_estimator
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = check_estimator(taxel.Model(16, refine=False), on_fail=None)
+    failed = {check["check_name"]: str(check["exception"]) for check in found if check["status"] == "failed"}
+    assert not failed and len(found) > 40
