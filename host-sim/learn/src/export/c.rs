@@ -57,3 +57,6 @@ pub fn library(blob: &ModelBlob, name: &Name) -> Result<Vec<SourceFile>> {
 pub fn constant_bytes(blob: &ModelBlob) -> usize {
     facts::constant_bytes(blob)
 }
+
+#[cfg(test)]
+mod tests;

@@ -29,11 +29,13 @@ pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
     let has = |format| model.networks().any(|network| network.format() == format);
     let (array, confidence) = (model.projection().is_some(), model.confidence().is_some());
     let fill = model.fill().is_some();
+    let affine = model.networks().any(|network| network.has_affine_tail());
     let flags = [
         ("direct", has(Format::F32Direct)),
         ("f32", has(Format::F32)),
         ("fixed16", has(Format::Fixed16)),
-        ("affine", model.networks().any(|network| network.has_affine_tail())),
+        ("affine", affine),
+        ("accumulate", has(Format::F32Direct) || affine),
         ("rows", !array),
         ("array", array),
         ("expansion", model.expansion().is_some()),

@@ -17,6 +17,7 @@ static float squared_distance(const float *a, const float *b)
 {
     float sum[4] = {0.0f, 0.0f, 0.0f, 0.0f};
     unsigned i = 0;
+    UNROLL
     for (; i + 4 <= INPUTS; i += 4) {
         const float d0 = a[i] - b[i], d1 = a[i + 1] - b[i + 1];
         const float d2 = a[i + 2] - b[i + 2], d3 = a[i + 3] - b[i + 3];
@@ -30,6 +31,12 @@ static float squared_distance(const float *a, const float *b)
         sum[i % 4] += d * d;
     }
     return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+static float activation_of(const struct direct *network, unsigned centre, const float *scaled)
+{
+    const float square = squared_distance(scaled, network->centres + centre * INPUTS);
+    return exponential(-network->decay[centre * network->widths] * square);
 }
 
 /* Infers outputs; `scaled` is room for the inputs. Returns whether one was clamped, or is not finite. */
@@ -47,10 +54,15 @@ static int infer_direct(const struct direct *network, const float *inputs, float
         accumulate(outputs, scaled[i], network->affine + i * NETWORK_OUTPUTS);
     }
 //@end
-    for (unsigned k = 0; k < network->count; k++) {
-        const float square = squared_distance(scaled, network->centres + k * INPUTS);
-        const float activation = exponential(-network->decay[k * network->widths] * square);
-        accumulate(outputs, activation, network->weights + k * NETWORK_OUTPUTS);
+    for (unsigned k = 0; k + 4 <= network->count; k += 4) {
+        float activations[4];
+        for (unsigned of_four = 0; of_four < 4; of_four++) {
+            activations[of_four] = activation_of(network, k + of_four, scaled);
+        }
+        accumulate_four(outputs, activations, network->weights + k * NETWORK_OUTPUTS);
+    }
+    for (unsigned k = network->count / 4 * 4; k < network->count; k++) {
+        accumulate(outputs, activation_of(network, k, scaled), network->weights + k * NETWORK_OUTPUTS);
     }
     for (unsigned j = 0; j < NETWORK_OUTPUTS; j++) {
         outputs[j] += network->bias[j];

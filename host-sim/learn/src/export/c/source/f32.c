@@ -4,7 +4,7 @@
 struct expanded {
     const float *midpoint, *per_unit; /* of each input */
     float decay;                      /* g */
-    unsigned count;                   /* centres, some of which may have no weight */
+    unsigned count;                   /* centres, a multiple of four; some may have no weight */
     const float *exponents;           /* b and a of one centre after the other */
     const float *weights;             /* outputs of one centre after the other */
     const float *bias;
@@ -18,6 +18,7 @@ static float sum_of_products(float first, float second, const float *a, const fl
 {
     float sum[4] = {first, second, 0.0f, 0.0f};
     unsigned i = 0;
+    UNROLL
     for (; i + 4 <= INPUTS; i += 4) {
         sum[0] += a[i] * b[i];
         sum[1] += a[i + 1] * b[i + 1];
@@ -45,9 +46,7 @@ static int infer_f32(const struct expanded *network, const float *inputs, float 
     int clamped = 0;
     float shared;
     for (unsigned i = 0; i < INPUTS; i++) {
-        const float units = (inputs[i] - network->midpoint[i]) * network->per_unit[i];
-        clamped |= saturates(units);
-        x[i] = saturates(units) ? limit_of(units) : (float)(int32_t)units;
+        x[i] = (float)whole_units((inputs[i] - network->midpoint[i]) * network->per_unit[i], &clamped);
     }
     fill_with(outputs, NETWORK_OUTPUTS, 0.0f);
 //@if affine
@@ -56,10 +55,14 @@ static int infer_f32(const struct expanded *network, const float *inputs, float 
     }
 //@end
     shared = -(network->decay * sum_of_products(0.0f, 0.0f, x, x));
-    for (unsigned k = 0; k < network->count; k++) {
+    for (unsigned k = 0; k < network->count; k += 4) {
         const float *exponents = network->exponents + k * (1 + INPUTS);
-        const float u = sum_of_products(exponents[0], shared, x, exponents + 1);
-        accumulate(outputs, power_of_two(u), network->weights + k * NETWORK_OUTPUTS);
+        float activations[4];
+        for (unsigned of_four = 0; of_four < 4; of_four++) {
+            activations[of_four] = power_of_two(sum_of_products(exponents[0], shared, x, exponents + 1));
+            exponents += 1 + INPUTS;
+        }
+        accumulate_four(outputs, activations, network->weights + k * NETWORK_OUTPUTS);
     }
     for (unsigned j = 0; j < NETWORK_OUTPUTS; j++) {
         outputs[j] += network->bias[j];

@@ -15,6 +15,13 @@ struct fixed16 {
 
 #define PAIRS ((INPUTS + 1u) / 2u)
 
+/* A function of its own has all registers. */
+#if defined(__GNUC__)
+#define NOT_INLINE __attribute__((noinline))
+#else
+#define NOT_INLINE
+#endif
+
 /* Words in an array of floats, which is where integers are kept between steps. */
 static uint32_t word(const float *words, unsigned index)
 {
@@ -50,34 +57,37 @@ static uint32_t add_products(uint32_t sum, uint32_t a, uint32_t b)
 #endif
 }
 
-/* An input in steps of 2^16 units, as the low half of a word. */
-static uint32_t steps(float units)
+/* `sum` and the upper half of a product. Shifting a negative number keeps its sign with every known compiler. */
+static int32_t add_upper_product(int32_t sum, int32_t a, int32_t b)
 {
-    const float limited = saturates(units) ? limit_of(units) : units;
-    /* The upper limit is no number of 32 bits; the largest one has the same steps. */
-    const uint32_t whole = limited >= 0x1p+31f ? 0x7fffffffu : (uint32_t)(int32_t)limited;
-    return whole >> 16;
-}
-
-/* The upper half of a product. Shifting a negative number keeps its sign with every compiler that is known. */
-static int32_t upper_product(int32_t a, int32_t b)
-{
-    return (int32_t)(((int64_t)a * b) >> 32);
+#if defined(__GNUC__) && defined(__ARM_FEATURE_DSP)
+    __asm__("smmla %0, %1, %2, %3" : "=r"(sum) : "r"(a), "r"(b), "r"(sum));
+    return sum;
+#else
+    return sum + (int32_t)(((int64_t)a * b) >> 32);
+#endif
 }
 
 /* The activation 2^-v in Q15: a cubic for the fraction of v, and a shift for the rest. */
 static uint32_t activation(uint32_t v)
 {
     const int32_t fraction = (int32_t)(v & 0x3ffffffu);
-    const uint32_t shift = v >> 26;
-    int32_t p = upper_product(fraction, @CUBIC_3@) + @CUBIC_2@;
-    p = upper_product(fraction, p) + @CUBIC_1@;
-    p = upper_product(fraction, p) + @CUBIC_0@;
-    return (uint32_t)p >> (shift < 31 ? shift : 31);
+    uint32_t shift = v >> 26;
+    uint32_t p;
+    int32_t cubic = add_upper_product(@CUBIC_2@, fraction, @CUBIC_3@);
+    cubic = add_upper_product(@CUBIC_1@, fraction, cubic);
+    p = (uint32_t)add_upper_product(@CUBIC_0@, fraction, cubic);
+#if defined(__GNUC__) && defined(__ARM_FEATURE_DSP)
+    /* Here a shift by 32 and more gives 0. */
+    __asm__("lsr %0, %1, %2" : "=r"(p) : "r"(p), "r"(shift));
+    return p;
+#else
+    return p >> (shift < 31 ? shift : 31);
+#endif
 }
 
 /* Adds the weights of a group for its activations, which are in eight pairs. */
-static const uint32_t *add_weights(const uint32_t *weights, const uint32_t *pairs, float *sums)
+NOT_INLINE static void add_weights(const uint32_t *weights, const uint32_t *pairs, float *sums)
 {
     /* Activations stay in registers while weights pass. */
     const uint32_t p0 = pairs[0], p1 = pairs[1], p2 = pairs[2], p3 = pairs[3];
@@ -95,7 +105,12 @@ static const uint32_t *add_weights(const uint32_t *weights, const uint32_t *pair
         set_word(sums, j, sum);
         weights += 8;
     }
-    return weights;
+}
+
+/* An input in steps of 2^16 units, in the low half of a word. */
+static uint32_t step_of(const struct fixed16 *network, const float *inputs, unsigned i, int *clamped)
+{
+    return (uint32_t)whole_units((inputs[i] - network->midpoint[i]) * network->per_unit[i], clamped) >> 16;
 }
 
 /* Infers outputs; `x` is room for the inputs. Returns whether one was clamped, or is not finite. */
@@ -105,20 +120,23 @@ static int infer_fixed16(const struct fixed16 *network, const float *inputs, flo
     uint64_t square = 0;
     uint32_t shared;
     const uint32_t *line = network->centres;
-    for (unsigned i = 0; i < INPUTS; i++) {
-        const float units = (inputs[i] - network->midpoint[i]) * network->per_unit[i];
-        const uint32_t step = steps(units);
-        clamped |= saturates(units);
-        /* The square of a number of 16 bits, by the products of a pair. */
-        square += add_products(0, step, step);
-        set_word(x, i / 2, i % 2 == 0 ? step : word(x, i / 2) | step << 16);
+    for (unsigned i = 0; i < PAIRS; i++) {
+        uint32_t pair = step_of(network, inputs, 2 * i, &clamped);
+        if (2 * i + 1 < INPUTS) {
+            pair |= step_of(network, inputs, 2 * i + 1, &clamped) << 16;
+        }
+        square += add_products(0, pair, pair);
+        set_word(x, i, pair);
     }
     shared = (uint32_t)(((square >> SQUARE_SHIFT) * network->decay) >> (34 - SQUARE_SHIFT));
     for (unsigned j = 0; j < NETWORK_OUTPUTS; j++) {
         uint32_t sum = network->bias[j];
 //@if affine
-        for (unsigned i = 0; network->affine && i < PAIRS; i++) {
-            sum = add_products(sum, network->affine[j * PAIRS + i], word(x, i));
+        if (network->affine) {
+            UNROLL
+            for (unsigned i = 0; i < PAIRS; i++) {
+                sum = add_products(sum, network->affine[j * PAIRS + i], word(x, i));
+            }
         }
 //@end
         set_word(outputs, j, sum);
@@ -129,6 +147,7 @@ static int infer_fixed16(const struct fixed16 *network, const float *inputs, flo
         for (unsigned k = 0; k < 8; k += 2) {
             const uint32_t *a = line, *b = a + 1 + PAIRS, *c = b + 1 + PAIRS, *d = c + 1 + PAIRS;
             uint32_t va = *a + shared, vb = *b + shared, vc = *c + shared, vd = *d + shared;
+            UNROLL
             for (unsigned i = 0; i < PAIRS; i++) {
                 const uint32_t pair = word(x, i);
                 va = add_products(va, *++a, pair);
@@ -140,7 +159,8 @@ static int infer_fixed16(const struct fixed16 *network, const float *inputs, flo
             pairs[k + 1] = activation(vc) | activation(vd) << 16;
             line = d + 1;
         }
-        line = add_weights(line, pairs, outputs);
+        add_weights(line, pairs, outputs);
+        line += 8 * NETWORK_OUTPUTS;
     }
     for (unsigned j = 0; j < NETWORK_OUTPUTS; j++) {
         outputs[j] = (float)as_signed(word(outputs, j)) * network->scale[j];
