@@ -84,6 +84,7 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
         ["firmware", "cores", "size", "cycles"].map(|name| own(name, &[name])).into(),
         vec![
             own("emulate", &["emulate"]),
+            own("c", &["c", "--short"]),
             own("board", &["board"]),
             own("accept", &["accept", "--emulated"]),
             own("mutants", &[&["board", "--mutants"], &MUTANTS[..]].concat()),

@@ -180,6 +180,11 @@ impl Build {
                 link.arg(compile("gcc", C, &harness.join("host.c"), "host.o")?);
                 let flags = [self.flags, &["-x", "c++"]].concat();
                 link.arg(compile(self.compiler, &flags, &main, "main.o")?);
+                // The Arduino IDE includes its own header in a sketch.
+                let board = harness.join("arduino/Arduino.h").display().to_string();
+                let flags = [&flags[..], &["-include", &board]].concat();
+                let sketch = folder.join("examples/Decode/Decode.ino");
+                compile(self.compiler, &flags, &sketch, "sketch.o")?;
             }
             Caller::Emulator => {
                 let platform = harness.join("arm/cortex-m4.c");
@@ -210,14 +215,15 @@ pub fn machine(program: &Path, frames: &Path) -> Command {
 
 /// Runs `command`; the error is what it says.
 fn said(command: &mut Command) -> Outcome<String> {
-    let output =
-        command.output().map_err(|cause| format!("{:?}: {cause}", command.get_program()))?;
+    let output = command
+        .output()
+        .map_err(|cause| format!("{}: {cause}", command.get_program().display()))?;
     let text = [output.stdout, output.stderr].concat();
     let text = String::from_utf8_lossy(&text).trim().to_owned();
     if output.status.success() && text.is_empty() {
         Ok(text)
     } else if text.is_empty() {
-        Err(format!("{:?} ended with {}", command.get_program(), output.status))
+        Err(format!("{} ended with {}", command.get_program().display(), output.status))
     } else {
         Err(text)
     }

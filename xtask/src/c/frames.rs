@@ -92,13 +92,6 @@ fn group_bytes(
         let clamped = decoder.decode_into(frame, scratch, &mut estimate.borrowed());
         Ok((clamped.map_err(|cause| cause.to_string())?, estimate))
     };
-    fn of<'f>(
-        readings_ohm: &'f [f32],
-        reciprocals: &'f [f32],
-        gate: Option<Gate<'f>>,
-    ) -> Frame<'f> {
-        Frame { readings_ohm, reciprocals, gate }
-    }
     let (_, at_rest) = decode(of(baseline, &reciprocals, None), &mut scratch)?;
     let rest = Rest { baseline_ohm: baseline, outputs: &at_rest.outputs, status: &at_rest.status };
     let gate = Gate::new(rest, TOLERANCE);
@@ -133,6 +126,11 @@ fn group_bytes(
         }
     }
     Ok(bytes)
+}
+
+/// A frame behind a gate, or without one.
+fn of<'f>(readings_ohm: &'f [f32], reciprocals: &'f [f32], gate: Option<Gate<'f>>) -> Frame<'f> {
+    Frame { readings_ohm, reciprocals, gate }
 }
 
 fn put(bytes: &mut Vec<u8>, values: &[f32]) {

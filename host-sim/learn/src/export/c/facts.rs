@@ -95,8 +95,8 @@ impl<'b> Facts<'b> {
         values.set("CONSTANT_BYTES", self.constant_bytes);
         values.set("RAM_BYTES", self.ram_bytes());
         let cycles = format!(
-            "{} a frame on a Cortex-M4F by Taxel's own assembly routines; this C takes up to {} times as many instructions",
-            self.cost.cycles, MOST_TIMES
+            "{} a frame on a Cortex-M4F by Taxel's own assembly routines; this C takes about twice as many at most",
+            self.cost.cycles
         );
         values.set("CYCLES", &cycles);
         let listed = |names, units| columns(names, units, " *     ", comment);
@@ -123,9 +123,6 @@ impl<'b> Facts<'b> {
         values.set("WHAT_OUTPUTS", first_and_last(metadata.output_names.iter()));
     }
 }
-
-/// Largest number of instructions of the C code for one of the assembly's, as measured (docs/c.md).
-const MOST_TIMES: &str = "2.0";
 
 /// The first and the last of names, for a line.
 fn first_and_last<'n>(mut names: impl Iterator<Item = &'n str>) -> String {

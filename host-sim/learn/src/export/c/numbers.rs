@@ -9,7 +9,8 @@ const ON_A_LINE: usize = 8;
 pub fn float(value: f32) -> String {
     const DIGITS: u32 = 23;
     let bits = value.to_bits();
-    let (exponent, fraction) = ((bits >> DIGITS & 0xff) as i32, bits & ((1 << DIGITS) - 1));
+    let exponent = (bits >> DIGITS & 0xff).cast_signed();
+    let fraction = bits & ((1 << DIGITS) - 1);
     let sign = if value.is_sign_negative() { "-" } else { "" };
     if exponent == 0 && fraction == 0 {
         return format!("{sign}0x0p+0f");
@@ -24,7 +25,8 @@ pub fn float(value: f32) -> String {
 
 /// Lines of numbers.
 fn lines(numbers: &[String]) -> String {
-    numbers.chunks(ON_A_LINE).map(|line| format!("    {},\n", line.join(", "))).collect()
+    let lines = numbers.chunks(ON_A_LINE).map(|line| format!("    {},\n", line.join(", ")));
+    lines.collect::<Vec<_>>().concat()
 }
 
 /// Definition of an array of numbers of the type `kind`.

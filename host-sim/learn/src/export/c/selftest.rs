@@ -1,6 +1,7 @@
 //! Frames of a library's self-test, and what model-core makes of them.
 
 use model_core::blob::Model;
+use model_core::rbf::NetworkError;
 use model_core::relative::reciprocal;
 use model_core::{Decoder, Frame, OwnedEstimate, RowStatus};
 
@@ -18,7 +19,9 @@ const SWEEPS: usize = 30;
 /// # Errors
 /// Never, for a model that was checked.
 pub fn arrays(model: &Model<'_>) -> Result<String> {
-    let decoder = Decoder::<MOST_ROWS>::new(*model).map_err(refused)?;
+    let decoder =
+        Decoder::<MOST_ROWS>::new(*model).map_err(|cause| Error::failed(cause.to_string()))?;
+    let refused = |cause: NetworkError| Error::failed(cause.to_string());
     let (baseline, frames) = frames(model);
     let reciprocals: Vec<f32> = baseline.iter().map(|it| reciprocal(*it)).collect();
     let mut scratch = vec![0.0; decoder.scratch_floats()];
@@ -60,11 +63,6 @@ pub fn arrays(model: &Model<'_>) -> Result<String> {
         text += &array("uint32_t", "test_baseline", bits(&baseline));
     }
     Ok(text)
-}
-
-/// A model that was checked is never refused.
-fn refused(cause: impl ToString) -> Error {
-    Error::failed(cause.to_string())
 }
 
 fn bits(values: &[f32]) -> Vec<String> {

@@ -61,8 +61,10 @@ pub fn code(model: &Model<'_>, name: &Name, flags: &[&str], facts: &mut Values) 
     tell_constants(model, facts);
     facts.set("TESTS", selftest::arrays(model)?);
     let names = model.metadata().output_names.iter();
-    facts
-        .set("NAMES", names.map(|name| format!("        {},\n", string(name))).collect::<String>());
+    facts.set(
+        "NAMES",
+        names.map(|name| format!("        {},\n", string(name))).collect::<Vec<_>>().concat(),
+    );
     let has = |flag| flags.contains(&flag);
     let text = |template| fill(template, name, flags, facts);
     let mut code = text(START);
@@ -115,7 +117,8 @@ fn sizes(model: &Model<'_>) -> String {
         sizes.extend([("DIRECTIONS", of.directions), ("COMPONENTS", of.components)]);
     }
     sizes.extend(model.fill().map(|fill| ("FACTORS", fill.factors())));
-    sizes.iter().map(|(name, size)| format!("#define {name} {size}u\n")).collect()
+    let lines = sizes.iter().map(|(name, size)| format!("#define {name} {size}u\n"));
+    lines.collect::<Vec<_>>().concat()
 }
 
 /// Constants of formulas, and what depends on the kind of model.

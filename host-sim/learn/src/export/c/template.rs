@@ -16,6 +16,7 @@ pub struct Values(HashMap<&'static str, String>);
 
 impl Values {
     /// Sets what a `key` stands for.
+    #[expect(clippy::needless_pass_by_value, reason = "texts and numbers are given as they are")]
     pub fn set(&mut self, key: &'static str, value: impl ToString) {
         self.0.insert(key, value.to_string());
     }

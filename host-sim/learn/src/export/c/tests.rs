@@ -148,7 +148,7 @@ fn float_of(text: &str) -> u32 {
     let (digits, exponent) = text[2..text.len() - 1].split_once('p').unwrap();
     let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
     let mantissa = u64::from_str_radix(&format!("{whole}{fraction}"), 16).unwrap() as f64;
-    let exponent = exponent.parse::<i32>().unwrap() - 4 * fraction.len() as i32;
+    let exponent = exponent.parse::<i32>().unwrap() - i32::try_from(4 * fraction.len()).unwrap();
     ((sign * mantissa * 2f64.powi(exponent)) as f32).to_bits()
 }
 
