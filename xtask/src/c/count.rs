@@ -40,7 +40,7 @@ pub fn print(models: &[Model], folder: &Path, build: &Build) -> Outcome {
     let prices = Prices::accepted().map_err(|cause| cause.to_string())?;
     println!("\nA frame on a Cortex-M4F, by {}:\n", build.name());
     println!(
-        "| model | instructions in C | of the assembly | times | cycles in C | of the assembly | times | code | constants |"
+        "| model | instructions in C | of the firmware | times | cycles in C | of the firmware | times | code | constants |"
     );
     println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
     let mut failed = Vec::new();

@@ -95,7 +95,7 @@ impl<'b> Facts<'b> {
         values.set("CONSTANT_BYTES", self.constant_bytes);
         values.set("RAM_BYTES", self.ram_bytes());
         let cycles = format!(
-            "{} a frame on a Cortex-M4F by Taxel's own assembly routines; this C takes about twice as many at most",
+            "{} a frame on a Cortex-M4F by Taxel's own firmware; this C takes about twice as many at most",
             self.cost.cycles
         );
         values.set("CYCLES", &cycles);
