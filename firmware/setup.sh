@@ -22,6 +22,10 @@ rustc --version || rustup toolchain install stable --profile minimal --no-self-u
 cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
 cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
 command -v qemu-system-arm >/dev/null || apt_install qemu-system-arm
+# Compilers that `cargo xtask c` tries exported models with. The one for Cortex-M needs no C library here.
+command -v g++ >/dev/null || apt_install g++
+command -v clang >/dev/null || apt_install clang
+command -v arm-none-eabi-gcc >/dev/null || apt_install gcc-arm-none-eabi
 
 # The targets: whatever is there already, then rustup's, then Debian's packages.
 missing=()

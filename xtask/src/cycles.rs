@@ -9,7 +9,7 @@ pub mod models;
 
 mod flash;
 mod instruction;
-mod trace;
+pub mod trace;
 
 mod figures;
 mod image;

@@ -18,6 +18,8 @@ mod board;
 
 mod cycles;
 
+mod c;
+
 mod accept;
 
 mod torture;
@@ -86,6 +88,9 @@ enum Command {
     /// exponential, or its portable Rust version), and compare with budgets and firmware/cycles.csv. Then judge what
     /// firmware/prices.csv predicts by 40 random models.
     Cycles(cycles::Options),
+    /// Export models as C, compile them with gcc, clang and arm-none-eabi-gcc in many ways, and compare all bits with
+    /// model-core's, on this machine and in QEMU. Then count what a frame costs a Cortex-M4F. docs/c.md has the tables.
+    C(c::Options),
     /// Answer a question about the sensor, the paper's method or a part of Taxel: `study --help`.
     #[command(disable_help_flag = true)]
     Study(Rest),
@@ -145,6 +150,7 @@ fn main() -> ExitCode {
         Command::Log { log, elf } => emulate::print_log(&log, elf.as_deref()).map(success),
         Command::Size => size::run().map(success),
         Command::Cycles(options) => cycles::run(&options).map(success),
+        Command::C(options) => c::run(&options).map(success),
         Command::Study(rest) => study(&rest.all()),
         Command::Python(options) => python::test(&options).map(success),
         Command::Torture(rest) => torture::run(&rest.all()),

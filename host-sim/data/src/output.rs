@@ -114,19 +114,41 @@ impl FileSet {
     /// Writes files, by name and content, to `folder`, which is made if it is not there. Other files of the set
     /// are removed: they are from an earlier run.
     pub fn write(&self, folder: &Path, contents: &[(&str, &[u8])]) -> Result<()> {
-        fs::create_dir_all(folder).map_err(|cause| Error::write(folder, cause))?;
-        let written = contents.iter().map(|(name, bytes)| {
-            let path = folder.join(name);
-            Temporary::written(place::file(&path)?, |file| {
-                file.write_all(bytes).map_err(|cause| Error::write(&path, cause))
-            })
-        });
-        let written = written.collect::<Result<Vec<Temporary>>>()?;
+        let written = written_in(folder, contents)?;
         let is_earlier = |name: &&&str| contents.iter().all(|(new, _)| new != *name);
         let earlier: Vec<PathBuf> =
             self.files.iter().filter(is_earlier).map(|name| folder.join(name)).collect();
         temporary::put_in_place(written, &earlier)
     }
+}
+
+/// Writes files that belong together, by their paths in `folder` and their texts. A folder that is not there appears whole or
+/// not at all. In one that is there, all are written before the first one is renamed, and other files stay.
+///
+/// # Errors
+/// [`Error::Write`] if a file cannot be written.
+pub fn write_folder(folder: &Path, contents: &[(String, String)]) -> Result<()> {
+    let contents: Vec<(&str, &[u8])> =
+        contents.iter().map(|(path, text)| (path.as_str(), text.as_bytes())).collect();
+    if folder.exists() {
+        return temporary::put_in_place(written_in(folder, &contents)?, &[]);
+    }
+    let new = temporary::Folder::beside(folder)?;
+    temporary::put_in_place(written_in(new.path(), &contents)?, &[])?;
+    new.put_in_place()
+}
+
+/// Writes temporary files beside those of these paths in `folder`. It is made if it is not there, as are folders in it.
+fn written_in(folder: &Path, contents: &[(&str, &[u8])]) -> Result<Vec<Temporary>> {
+    let write = |(name, bytes): &(&str, &[u8])| {
+        let path = folder.join(name);
+        let around = path.parent().unwrap_or(folder);
+        fs::create_dir_all(around).map_err(|cause| Error::write(around, cause))?;
+        Temporary::written(place::file(&path)?, |file| {
+            file.write_all(bytes).map_err(|cause| Error::write(&path, cause))
+        })
+    };
+    contents.iter().map(write).collect()
 }
 
 #[cfg(test)]

@@ -102,6 +102,63 @@ fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
 }
 
 #[test]
+fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
+    let folder = Folder::new("export_c");
+    let blob = in_testdata("array-fixed16-confidence.bin");
+    let export = ["export", &blob, "--c", "lib/mat", "--name", "mat"];
+    let said = folder.succeed(&export);
+    assert!(
+        said.contains("lib/mat: 2 rows, 1 network, 6160 bytes of weights, CRC-32 142c92f4"),
+        "{said}"
+    );
+    assert_eq!(folder.names(), ["lib"]);
+    let files = [
+        "CMakeLists.txt",
+        "README.md",
+        "examples/Decode/Decode.ino",
+        "examples/posix/main.c",
+        "library.json",
+        "library.properties",
+        "src/mat.c",
+        "src/mat.h",
+        "zephyr/CMakeLists.txt",
+        "zephyr/module.yml",
+    ];
+    let text = |file: &str| fs::read_to_string(folder.path("lib/mat").join(file)).unwrap();
+    assert!(files.iter().all(|file| text(file).contains("mat")));
+    assert!(text("src/mat.h").contains("float mat_assess(const float *readings"));
+    // Again, with a file of the user's.
+    fs::write(folder.path("lib/mat/notes.txt"), "mine").unwrap();
+    fs::write(folder.path("lib/mat/src/mat.c"), "old").unwrap();
+    folder.succeed(&export);
+    assert!(text("src/mat.c").starts_with("/* Model ") && text("notes.txt") == "mine");
+    folder.succeed(&["export", &blob, "--c", "other"]);
+    assert!(folder.path("other/src/taxel_model.c").exists());
+}
+
+#[test]
+fn wrong_usage_of_export_is_refused_and_nothing_is_written() {
+    let folder = Folder::new("export_usage");
+    let blob = in_testdata("row4.bin");
+    folder.write("file", "mine");
+    for (options, says) in [
+        (&["--c", "lib", "--name", "2mat"][..], "a name in C starts with a letter"),
+        (&["--c", "lib", "--name", "class"], "C or C++ have this word"),
+        (&["--c", "lib", "--name", "string"], "a header of this name"),
+        (&["--c", "lib", "--rust", "row4.rs"], "cannot be used with"),
+        (&["--rust", "row4.rs", "--name", "mat"], "cannot be used with"),
+        (&["--name", "mat"], "--c <DIR>"),
+        (&["--c", "file"], "file"),
+    ] {
+        let said = folder.fail(&[&["export", &blob], options].concat(), 2);
+        assert!(said.contains(says), "{options:?}: {said}");
+        assert_eq!(folder.names(), ["file"], "{options:?}");
+    }
+    folder.fail(&["export", "none.bin", "--c", "lib"], 2);
+    assert_eq!(folder.names(), ["file"]);
+}
+
+#[test]
 fn the_example_estimates_compression_from_pins_and_converters() {
     const FRAMES: usize = 200;
     let mut world = World::press();

@@ -74,6 +74,7 @@ fn models_and_data_are_told_by_the_schema() {
     assert_eq!(inspected["fill"]["factors"], 16);
     checked(&["train", "scene.toml", "--format", "f32-direct", "-o", "direct.bin"]);
     assert_eq!(checked(&["export", "direct.bin", "--rust", "direct.rs"])["rows"], 2);
+    assert_eq!(checked(&["export", "m.bin", "--c", "lib"])["rows"], 2);
     // The width that the scene gives, not the blob's rounded one.
     assert_eq!(inspected["networks"][0]["spread"], json!([0.8]));
     folder.write("a.csv", "t_s,a\n0,1\n1,2\n2,4\n");

@@ -145,3 +145,49 @@ impl Scratch {
         self.0.path()
     }
 }
+
+/// Temporary folder beside one that is to be made.
+pub struct Folder<'p> {
+    folder: TempDir,
+    target: &'p Path,
+}
+
+impl<'p> Folder<'p> {
+    /// Makes an empty folder beside `target`, and the folders around it.
+    pub fn beside(target: &'p Path) -> Result<Self> {
+        let error = |cause| Error::write(target, cause);
+        let around = folder_of(target);
+        fs::create_dir_all(&around).map_err(error)?;
+        let mut prefix = OsString::from(".");
+        prefix.push(target.file_name().unwrap_or_default());
+        prefix.push(".");
+        let mut builder = Builder::new();
+        builder.prefix(&prefix).suffix(".tmp").rand_bytes(16);
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777)); // less the umask
+        step(Step::Create(target)).map_err(error)?;
+        let mut pending = pending();
+        let folder = builder.tempdir_in(&around).map_err(error)?;
+        pending.push(folder.path().into());
+        Ok(Self { folder, target })
+    }
+
+    /// Path of the folder.
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Renames the folder to the one that it was made for.
+    pub fn put_in_place(self) -> Result<()> {
+        // An interruption waits until all is done.
+        let mut pending = pending();
+        let path = self.folder.path().to_path_buf();
+        step(Step::Rename(&path, self.target))
+            .and_then(|()| fs::rename(&path, self.target))
+            .map_err(|cause| Error::write(self.target, cause))?;
+        // Nothing is left to be removed.
+        let _ = self.folder.keep();
+        pending.retain(|other| *other != path);
+        Ok(())
+    }
+}

@@ -191,3 +191,46 @@ fn links_are_followed_permissions_are_kept_and_read_only_files_are_refused() {
     let refused = SET.check(folder.path(), &[]).unwrap_err().to_string();
     assert!(refused.contains("it is no file"), "{refused}");
 }
+
+fn texts(text: &str) -> Vec<(String, String)> {
+    ["readme", "src/model.c", "src/model.h"].map(|path| (path.to_owned(), text.to_owned())).into()
+}
+
+#[test]
+fn whichever_step_fails_a_new_folder_is_whole_or_not_there() {
+    for failing in 1.. {
+        let around = tempfile::tempdir().unwrap();
+        let folder = around.path().join("new");
+        let (steps, outcome) = steps_of(failing, || write_folder(&folder, &texts("text")));
+        if steps.len() < failing {
+            outcome.unwrap();
+            assert_eq!(steps.last().unwrap(), "rename temporary to new");
+            let files = ["readme", "src/model.c", "src/model.h"].map(|path| folder.join(path));
+            assert!(files.iter().all(|path| fs::read_to_string(path).unwrap() == "text"));
+            assert_eq!(contents(&around).len(), 1);
+            return;
+        }
+        // The files are safe; only that of their folder could not be told.
+        if steps[failing - 1] == "sync folder" {
+            outcome.unwrap();
+            continue;
+        }
+        assert!(outcome.unwrap_err().to_string().contains("cannot write"));
+        assert_eq!(contents(&around), [], "step {failing}: {}", steps[failing - 1]);
+    }
+}
+
+#[test]
+fn a_folder_that_is_there_keeps_other_files_and_takes_new_ones_together() {
+    let folder = tempfile::tempdir().unwrap();
+    write_folder(folder.path(), &texts("old")).unwrap();
+    fs::write(folder.path().join("notes"), "mine").unwrap();
+    let (steps, outcome) = steps_of(6, || write_folder(folder.path(), &texts("new")));
+    outcome.unwrap_err();
+    assert!(steps.iter().all(|step| !step.starts_with("rename")));
+    let text = |path: &str| fs::read_to_string(folder.path().join(path)).unwrap();
+    assert_eq!([text("readme"), text("src/model.c"), text("notes")], ["old", "old", "mine"]);
+    write_folder(folder.path(), &texts("new")).unwrap();
+    assert_eq!([text("readme"), text("src/model.h"), text("notes")], ["new", "new", "mine"]);
+    assert_eq!(contents(&folder).len(), 3);
+}

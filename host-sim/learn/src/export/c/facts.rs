@@ -1,0 +1,131 @@
+//! What a library says of its model: sizes, cost, columns.
+
+use model_core::blob::Model;
+use model_core::{RowStatus, scratch_floats};
+
+use super::numbers::comment;
+use super::template::Values;
+use crate::cost::{Cost, Design, Gating, Prices};
+use crate::error::Result;
+use crate::export::text::columns;
+use crate::infer::Exponential;
+use crate::packing::ModelBlob;
+
+/// Facts of a model.
+pub struct Facts<'b> {
+    model: Model<'b>,
+    constant_bytes: usize,
+    /// What a frame costs Taxel's own firmware.
+    cost: Cost,
+}
+
+/// Number of bytes of a model's numbers.
+pub fn constant_bytes(blob: &ModelBlob) -> usize {
+    let model = blob.parse();
+    let floats = model.confidence().map_or(0, |it| it.block().len())
+        + model.fill().map_or(0, |it| it.block().len());
+    Design::new(blob).parameter_bytes() + 4 * floats
+}
+
+impl<'b> Facts<'b> {
+    /// Facts of the model in `blob`.
+    pub fn new(blob: &'b ModelBlob) -> Result<Self> {
+        let design = Design::new(blob);
+        let cost = Prices::accepted()?.frame(&design, Exponential::default(), Gating::Ungated)?;
+        Ok(Self { model: blob.parse(), constant_bytes: constant_bytes(blob), cost })
+    }
+
+    /// Bytes of RAM that a caller and the library take.
+    fn ram_bytes(&self) -> usize {
+        let shape = self.model.shape();
+        let (readings, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
+        let baseline = if self.model.metadata().relative_inputs { readings } else { 0 };
+        4 * (readings + outputs + scratch_floats(&self.model) + baseline) + shape.rows
+    }
+
+    fn networks(&self) -> String {
+        let of_network = |network: model_core::rbf::Network<'_>| {
+            let shape = network.shape();
+            let tail = if network.has_affine_tail() { " and a linear part" } else { "" };
+            let (inputs, centres, outputs) = (shape.inputs, shape.centres, shape.outputs);
+            let format = network.format().name();
+            format!("{inputs} inputs, {centres} centres, {outputs} outputs{tail} in {format}")
+        };
+        let mut networks: Vec<String> = self.model.networks().map(of_network).collect();
+        let count = networks.len();
+        networks.dedup();
+        let times = if count > 1 { format!("{count} networks: ") } else { String::new() };
+        times + &networks.join("; ")
+    }
+
+    /// Sets the values that templates ask for.
+    pub fn tell(&self, values: &mut Values) {
+        let (model, shape) = (&self.model, self.model.shape());
+        let metadata = model.metadata();
+        let has = |part: bool| i32::from(part);
+        let relative = metadata.relative_inputs;
+        let said = |is_so: bool, text: &'static str| if is_so { text } else { "" };
+        let title = comment(metadata.name);
+        values.set("TITLE", format!("Model {title}, CRC-32 of its blob {:08x}", model.crc()));
+        values.set("SHORT_TITLE", &title);
+        values.set("CRC", format!("{:08x}", model.crc()));
+        values.set("ROWS", shape.rows);
+        values.set("READINGS", shape.rows * shape.inputs);
+        values.set("OUTPUTS", shape.rows * shape.outputs);
+        values.set("SCRATCH", scratch_floats(model));
+        values.set("RELATIVE", has(relative));
+        values.set("CONFIDENCE", has(model.confidence().is_some()));
+        values.set("FILL", has(model.fill().is_some()));
+        values.set("BUT_BASELINE", said(relative, " but the baseline"));
+        values.set("AND_BASELINE", said(relative, ", baseline"));
+        values.set("FORGETS", said(relative, " It forgets the baseline."));
+        for (key, status) in [
+            ("DECODED", RowStatus::Decoded),
+            ("MISSING_READING", RowStatus::MissingReading),
+            ("OVERFLOW", RowStatus::Overflow),
+            ("AT_REST", RowStatus::AtRest),
+        ] {
+            values.set(key, status as u8);
+        }
+        let array = model.projection().is_some();
+        values.set("OR_ANOTHER_ROWS", said(array, ", or one of another row"));
+        let all = " Either all rows are at rest,\n * or all are decoded.";
+        values.set("ALL_ROWS", said(array, all));
+        values.set("NETWORKS", self.networks());
+        values.set("CONSTANT_BYTES", self.constant_bytes);
+        values.set("RAM_BYTES", self.ram_bytes());
+        let cycles = format!(
+            "{} a frame on a Cortex-M4F by Taxel's own firmware; this C takes about twice as many at most",
+            self.cost.cycles
+        );
+        values.set("CYCLES", &cycles);
+        let listed = |names, units| columns(names, units, " *     ", comment);
+        values.set(
+            "COLUMNS",
+            format!(
+                " * Readings, row after row, with their units:\n{} * Outputs, row after row, with their units:\n{}",
+                listed(metadata.input_names, metadata.input_units),
+                listed(metadata.output_names, metadata.output_units)
+            ),
+        );
+        values.set(
+            "COST",
+            format!(
+                " * Network: {}.\n * Cost, as predicted: {} bytes of constants in flash, {} bytes of RAM with the \
+                 arrays of the caller,\n * and {} cycles.\n",
+                self.networks(),
+                self.constant_bytes,
+                self.ram_bytes(),
+                cycles.replace("; ", ";\n * ")
+            ),
+        );
+        values.set("WHAT_READINGS", first_and_last(metadata.input_names.iter()));
+        values.set("WHAT_OUTPUTS", first_and_last(metadata.output_names.iter()));
+    }
+}
+
+/// The first and the last of names, for a line.
+fn first_and_last<'n>(mut names: impl Iterator<Item = &'n str>) -> String {
+    let first = comment(names.next().unwrap_or_default());
+    names.last().map_or(first.clone(), |last| format!("{first} to {}", comment(last)))
+}

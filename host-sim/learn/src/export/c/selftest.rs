@@ -1,0 +1,135 @@
+//! Frames of a library's self-test, and what model-core makes of them.
+
+use model_core::blob::Model;
+use model_core::rbf::NetworkError;
+use model_core::relative::reciprocal;
+use model_core::{Decoder, Frame, OwnedEstimate, RowStatus};
+
+use super::numbers::{array, table, word};
+use crate::error::{Error, Result};
+
+/// Most rows of a model.
+const MOST_ROWS: usize = 255;
+
+/// Sweeps that bring readings to given features.
+const SWEEPS: usize = 30;
+
+/// Definitions of the tests' arrays in C, and their number.
+///
+/// # Errors
+/// Never, for a model that was checked.
+pub fn arrays(model: &Model<'_>) -> Result<String> {
+    let decoder =
+        Decoder::<MOST_ROWS>::new(*model).map_err(|cause| Error::failed(cause.to_string()))?;
+    let refused = |cause: NetworkError| Error::failed(cause.to_string());
+    let (baseline, frames) = frames(model);
+    let reciprocals: Vec<f32> = baseline.iter().map(|it| reciprocal(*it)).collect();
+    let mut scratch = vec![0.0; decoder.scratch_floats()];
+    let shape = model.shape();
+    let mut estimate = OwnedEstimate {
+        outputs: vec![0.0; shape.rows * shape.outputs],
+        status: vec![RowStatus::Decoded; shape.rows],
+    };
+    let mut deviation = estimate.outputs.clone();
+    let [mut outputs, mut deviations, mut filled, mut status] = [const { Vec::new() }; 4];
+    let [mut clamped, mut novelty] = [const { Vec::new() }; 2];
+    for frame in &frames {
+        let given = Frame { readings_ohm: frame, reciprocals: &reciprocals, gate: None };
+        let any_clamped = decoder.decode_into(given, &mut scratch, &mut estimate.borrowed());
+        clamped.push(u8::from(any_clamped.map_err(refused)?).to_string());
+        status.push(estimate.status.iter().map(|it| (*it as u8).to_string()).collect());
+        outputs.push(bits(&estimate.outputs));
+        let novel = decoder.assess_into(given, &mut scratch, &mut deviation).map_err(refused)?;
+        novelty.extend(novel.map(|it| word(it.to_bits())));
+        deviations.push(bits(&deviation));
+        let mut frame = frame.clone();
+        decoder.fill(&mut frame, &mut scratch);
+        filled.push(bits(&frame));
+    }
+    let readings: Vec<Vec<String>> = frames.iter().map(|frame| bits(frame)).collect();
+    let mut text = format!("#define TESTS {}\n", frames.len());
+    text += &table("uint32_t", "test_readings", &readings);
+    text += &table("uint32_t", "test_outputs", &outputs);
+    text += &table("uint8_t", "test_status", &status);
+    text += &array("uint8_t", "test_clamped", clamped);
+    if model.confidence().is_some() {
+        text += &table("uint32_t", "test_deviations", &deviations);
+        text += &array("uint32_t", "test_novelty", novelty);
+    }
+    if model.fill().is_some() {
+        text += &table("uint32_t", "test_filled", &filled);
+    }
+    if model.metadata().relative_inputs {
+        text += &array("uint32_t", "test_baseline", bits(&baseline));
+    }
+    Ok(text)
+}
+
+fn bits(values: &[f32]) -> Vec<String> {
+    values.iter().map(|value| word(value.to_bits())).collect()
+}
+
+/// A baseline, and frames: two within the range of training, the second with a reading far beyond it; and the first one
+/// with a missing reading.
+fn frames(model: &Model<'_>) -> (Vec<f32>, Vec<Vec<f32>>) {
+    let shape = model.shape();
+    let count = shape.rows * shape.inputs;
+    let relative = model.metadata().relative_inputs;
+    let baseline: Vec<f32> =
+        (0..count).map(|i| if relative { 40.0 + (i % 7) as f32 } else { 1.0 }).collect();
+    let frame = |number: usize| -> Vec<f32> {
+        let inputs = match model.projection() {
+            Some(_) => of_array(model, number * count),
+            None => of_rows(model, number * count),
+        };
+        inputs.iter().zip(&baseline).map(|(input, baseline)| input * baseline).collect()
+    };
+    let (within, mut beyond) = (frame(0), frame(1));
+    beyond[count - 1] *= 4.0;
+    let mut missing = within.clone();
+    missing[0] = f32::NAN;
+    (baseline, vec![within, beyond, missing])
+}
+
+/// Numbers from 0 to 1 that are spread well: multiples of the golden ratio, without their whole part.
+fn spread(index: usize) -> f64 {
+    (index as f64 * 0.618_033_988_75).fract()
+}
+
+/// Inputs of networks of single rows, within their range of training.
+fn of_rows(model: &Model<'_>, start: usize) -> Vec<f32> {
+    let (shape, networks) = (model.shape(), model.networks().collect::<Vec<_>>());
+    let input = |place: usize| {
+        let network = networks[model.network_of_row(place / shape.inputs).unwrap_or_default()];
+        let [low, high] = network.training_range(place % shape.inputs).map(f64::from);
+        (low + (high - low) * spread(start + place)) as f32
+    };
+    (0..shape.rows * shape.inputs).map(input).collect()
+}
+
+/// Readings of an array whose features are within their range of training, by Kaczmarz's method from a mean frame on, if
+/// the model knows one.
+fn of_array(model: &Model<'_>, start: usize) -> Vec<f32> {
+    let (Some(projection), Some(network)) = (model.projection(), model.networks().next()) else {
+        return Vec::new();
+    };
+    let (features, count) = (projection.features(), projection.readings());
+    let mean = model.fill().map(|it| it.block()).or(model.confidence().map(|it| it.block()));
+    let mut readings: Vec<f64> = match mean {
+        Some(block) => block[..count].iter().copied().map(f64::from).collect(),
+        None => vec![0.0; count],
+    };
+    let (offsets, parts) = projection.block().split_at(features);
+    for turn in 0..SWEEPS * features {
+        let feature = turn % features;
+        let [low, high] = network.training_range(feature).map(f64::from);
+        let wanted = low + (high - low) * (0.25 + 0.5 * spread(start + feature));
+        let along: Vec<f64> =
+            parts.iter().skip(feature).step_by(features).copied().map(f64::from).collect();
+        let square: f64 = along.iter().map(|part| part * part).sum();
+        let found: f64 = along.iter().zip(&readings).map(|(part, it)| part * it).sum();
+        let step = (wanted - found - f64::from(offsets[feature])) / square.max(f64::MIN_POSITIVE);
+        readings.iter_mut().zip(&along).for_each(|(reading, part)| *reading += step * part);
+    }
+    readings.iter().map(|reading| *reading as f32).collect()
+}

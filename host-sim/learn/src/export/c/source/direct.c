@@ -1,0 +1,72 @@
+/* A network in f32 with distances from differences. */
+struct direct {
+    const float *minimum, *per_span; /* of each input in training */
+    const float *centres;            /* inputs of one centre after the other */
+    const float *decay;              /* 1/(2 width^2) */
+    unsigned widths;                 /* 1 if each centre has a decay of its own, 0 if all share one */
+    unsigned count;                  /* centres */
+    const float *weights;            /* outputs of one centre after the other */
+    const float *bias;
+//@if affine
+    const float *affine; /* outputs of one input after the other, or null */
+//@end
+};
+
+/* Squared distance, in four partial sums. */
+static float squared_distance(const float *a, const float *b)
+{
+    float sum[4] = {0.0f, 0.0f, 0.0f, 0.0f};
+    unsigned i = 0;
+    UNROLL
+    for (; i + 4 <= INPUTS; i += 4) {
+        const float d0 = a[i] - b[i], d1 = a[i + 1] - b[i + 1];
+        const float d2 = a[i + 2] - b[i + 2], d3 = a[i + 3] - b[i + 3];
+        sum[0] += d0 * d0;
+        sum[1] += d1 * d1;
+        sum[2] += d2 * d2;
+        sum[3] += d3 * d3;
+    }
+    for (; i < INPUTS; i++) {
+        const float d = a[i] - b[i];
+        sum[i % 4] += d * d;
+    }
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+static float activation_of(const struct direct *network, unsigned centre, const float *scaled)
+{
+    const float square = squared_distance(scaled, network->centres + centre * INPUTS);
+    return exponential(-network->decay[centre * network->widths] * square);
+}
+
+/* Infers outputs; `scaled` is room for the inputs. Returns whether one was clamped, or is not finite. */
+static int infer_direct(const struct direct *network, const float *inputs, float *scaled, float *outputs)
+{
+    int clamped = 0;
+    for (unsigned i = 0; i < INPUTS; i++) {
+        const float x = (inputs[i] - network->minimum[i]) * network->per_span[i];
+        clamped |= !(x >= -0.125f && x < 1.125f);
+        scaled[i] = x < -0.125f ? -0.125f : x > 1.125f ? 1.125f : x;
+    }
+    fill_with(outputs, NETWORK_OUTPUTS, 0.0f);
+//@if affine
+    for (unsigned i = 0; network->affine && i < INPUTS; i++) {
+        accumulate(outputs, scaled[i], network->affine + i * NETWORK_OUTPUTS);
+    }
+//@end
+    for (unsigned k = 0; k + 4 <= network->count; k += 4) {
+        float activations[4];
+        for (unsigned of_four = 0; of_four < 4; of_four++) {
+            activations[of_four] = activation_of(network, k + of_four, scaled);
+        }
+        accumulate_four(outputs, activations, network->weights + k * NETWORK_OUTPUTS);
+    }
+    for (unsigned k = network->count / 4 * 4; k < network->count; k++) {
+        accumulate(outputs, activation_of(network, k, scaled), network->weights + k * NETWORK_OUTPUTS);
+    }
+    for (unsigned j = 0; j < NETWORK_OUTPUTS; j++) {
+        outputs[j] += network->bias[j];
+    }
+    return clamped;
+}
+

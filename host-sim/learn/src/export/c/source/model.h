@@ -1,0 +1,101 @@
+/* @TITLE@
+ *
+ * A model of Taxel as C99: no heap, no libm, no state@BUT_BASELINE@. It gives the bits of Taxel's own decoder.
+ * `host-sim export` wrote this file; write it anew rather than edit it.
+ *
+@COLUMNS@ *
+@COST@ */
+#ifndef TAXEL_MODEL_H
+#define TAXEL_MODEL_H
+
+#include <stdint.h>
+
+#define TAXEL_MODEL_ROWS @ROWS@u      /* row-wires */
+#define TAXEL_MODEL_READINGS @READINGS@u  /* readings of a frame, row after row */
+#define TAXEL_MODEL_OUTPUTS @OUTPUTS@u   /* outputs of a frame, row after row */
+#define TAXEL_MODEL_SCRATCH @SCRATCH@u   /* floats of working space */
+#define TAXEL_MODEL_RELATIVE @RELATIVE@    /* 1: readings count relative to a baseline */
+#define TAXEL_MODEL_CONFIDENCE @CONFIDENCE@  /* 1: there is taxel_model_assess */
+#define TAXEL_MODEL_FILL @FILL@        /* 1: there is taxel_model_fill */
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* How the decoding of a row ended. */
+enum taxel_model_status {
+    /* The outputs are valid. */
+    TAXEL_MODEL_DECODED = @DECODED@,
+    /* A reading of the row is not finite@OR_ANOTHER_ROWS@; the outputs are NaN. */
+    TAXEL_MODEL_MISSING_READING = @MISSING_READING@,
+    /* Readings are so large that an output overflowed; the outputs are NaN. */
+    TAXEL_MODEL_OVERFLOW = @OVERFLOW@,
+    /* The row is untouched and was skipped; the outputs are those at rest. Only taxel_model_decode_gated says so. */
+    TAXEL_MODEL_AT_REST = @AT_REST@
+};
+
+/* Decodes one frame: `readings` [TAXEL_MODEL_READINGS], NaN where one is missing, to `outputs` [TAXEL_MODEL_OUTPUTS]
+ * and the `status` of each row [TAXEL_MODEL_ROWS]. `scratch` [TAXEL_MODEL_SCRATCH] is working space. No two arrays may
+ * overlap.
+ *
+ * Returns 1 if an input of a decoded row was clamped, because it lies more than an eighth of its range of training
+ * outside that range: such outputs are guesses. Else it returns 0.
+ */
+int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, float *scratch);
+
+/* The sensor at rest: what a gate compares frames with. */
+struct taxel_model_rest {
+    /* Mean of frames at rest [TAXEL_MODEL_READINGS]. */
+    const float *baseline;
+    /* What taxel_model_decode makes of the baseline: outputs [TAXEL_MODEL_OUTPUTS] and status [TAXEL_MODEL_ROWS]. */
+    const float *outputs;
+    const uint8_t *status;
+    /* Largest change of a reading at rest, relative to its baseline; above 0 and below 1. */
+    float tolerance;
+};
+
+/* Decodes as taxel_model_decode does, but skips rows at rest: each reading is within the tolerance of its baseline, and
+ * the sum of n readings within tolerance / sqrt(n). They get the outputs at rest.@ALL_ROWS@
+ */
+int taxel_model_decode_gated(const float *readings, const struct taxel_model_rest *rest, float *outputs,
+                             uint8_t *status, float *scratch);
+
+//@if relative
+/* Takes the readings of the untouched sensor [TAXEL_MODEL_READINGS], which readings are divided by. Before that, all
+ * readings are missing. Returns how many channels have no usable baseline (NaN, infinite, not positive): their
+ * readings are missing in every frame.
+ */
+int taxel_model_set_baseline(const float *baseline);
+
+//@end
+//@if confidence
+/* Tells how far off the outputs of a frame may be: a standard deviation of each, in its unit, to `deviations`
+ * [TAXEL_MODEL_OUTPUTS]. Returns the novelty of the frame in nats: above 0, it is unlike the frames of training. All are NaN
+ * if a reading is missing. `scratch` is that of taxel_model_decode.
+ */
+float taxel_model_assess(const float *readings, float *deviations, float *scratch);
+
+//@end
+//@if fill
+/* Replaces missing readings (not finite) by those expected of the others; nothing if more than one in four is missing.
+ * Returns how many it replaced. `scratch` is that of taxel_model_decode.
+ */
+int taxel_model_fill(float *readings, float *scratch);
+
+//@end
+/* Name of an output, from 0; a null pointer if there is none. */
+const char *taxel_model_output_name(unsigned output);
+
+/* CRC-32 of the blob that this model comes from, which tells models apart. */
+uint32_t taxel_model_crc(void);
+
+/* Decodes a few frames and compares all bits. Returns 0 if they are right, else the number of the first frame that is
+ * not, from 1: the compiler was told to compute otherwise than the C standard says.@FORGETS@
+ */
+int taxel_model_selftest(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

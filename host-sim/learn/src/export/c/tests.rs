@@ -1,0 +1,262 @@
+use model_core::blob::{Model, ModelParts, encode_to_vec};
+use model_core::rbf::Network;
+
+use super::*;
+
+fn in_testdata(name: &str) -> ModelBlob {
+    let path = format!("{}/../../testdata/{name}.bin", env!("CARGO_MANIFEST_DIR"));
+    ModelBlob::read(path.as_ref()).unwrap()
+}
+
+/// The text of one file of a library.
+fn file(files: &[SourceFile], path: &str) -> String {
+    files.iter().find(|(name, _)| name == path).unwrap().1.clone()
+}
+
+fn source_of(blob: &ModelBlob) -> String {
+    file(&library(blob, &Name::new("mat").unwrap()).unwrap(), "src/mat.c")
+}
+
+const MODELS: [&str; 14] = [
+    "array-f32-components",
+    "array-f32-direct-components",
+    "array-f32-direct",
+    "array-f32-no-tail",
+    "array-f32",
+    "array-fixed16-components",
+    "array-fixed16-confidence",
+    "array-fixed16-no-tail",
+    "array-fixed16",
+    "hand-made",
+    "kernels-f32-direct",
+    "kernels-f32",
+    "kernels-fixed16",
+    "row4",
+];
+
+#[test]
+fn a_name_is_an_identifier_of_c_and_none_of_its_words_and_headers() {
+    for name in ["a", "mat", "My_mat2", &"x".repeat(63)] {
+        assert_eq!(Name::new(name).unwrap().lower(), name);
+    }
+    assert_eq!(Name::new("My_mat2").unwrap().upper(), "MY_MAT2");
+    for name in ["", "2mat", "_mat", "my-mat", "mät", "a b", "a/b", "../mat", &"x".repeat(64)] {
+        assert_eq!(Name::new(name), Err(BadName::NoIdentifier), "{name}");
+    }
+    for name in ["int", "class", "string", "Arduino", "MATH", "while"] {
+        assert_eq!(Name::new(name), Err(BadName::Taken), "{name}");
+    }
+}
+
+#[test]
+fn floats_in_hexadecimal_are_those_of_c() {
+    for (value, text) in [
+        (0.0, "0x0p+0f"),
+        (-0.0, "-0x0p+0f"),
+        (1.0, "0x1p+0f"),
+        (-1.5, "-0x1.8p+0f"),
+        (0.1, "0x1.99999ap-4f"),
+        (f32::MAX, "0x1.fffffep+127f"),
+        (f32::MIN_POSITIVE, "0x1p-126f"),
+        (1e-45, "0x0.000002p-126f"),
+        (-3e-39, "-0x0.41559p-126f"),
+    ] {
+        assert_eq!(numbers::float(value), text);
+    }
+}
+
+#[test]
+fn texts_of_a_model_end_neither_a_literal_nor_a_comment() {
+    assert_eq!(numbers::string("a\"b\\c??/\nµ"), r#""a\042b\134c\077\077/\012\302\265""#);
+    assert_eq!(numbers::comment("Fz [N] */ // ??/ \n\\ Ω"), "Fz [N] __ __ ___ __ Ω");
+}
+
+#[test]
+fn parts_of_a_template_stay_by_their_flags_and_values_are_not_filled_again() {
+    let mut values = Values::default();
+    values.set("A", "@B@ taxel_model");
+    values.set("B", "2");
+    let text = "taxel_model @A@ a@b.c @B@ @NONE@\n//@if x\nTAXEL_MODEL_X\n//@if !y\nxy\n//@end\n//@end\n//@if y\nno\n//@end\nend";
+    let name = Name::new("Mat").unwrap();
+    let filled = template::fill(text, &name, &["x"], &values);
+    assert_eq!(filled, "Mat @B@ taxel_model a@b.c 2 @NONE@\nMAT_X\nxy\nend");
+    assert_eq!(template::fill(text, &name, &["y"], &values).lines().count(), 3);
+}
+
+#[test]
+fn every_file_is_filled_for_every_model() {
+    for model in MODELS {
+        let files = library(&in_testdata(model), &Name::new("my_mat").unwrap()).unwrap();
+        assert_eq!(files.len(), 10);
+        for (path, text) in files {
+            assert!(
+                !text.contains("//@") && !text.to_lowercase().contains("taxel_model"),
+                "{path}"
+            );
+            let mut rest = text.split('@');
+            rest.next_back();
+            let is_key = |part: &str| {
+                !part.is_empty()
+                    && part.chars().all(|c| c.is_ascii_uppercase() || "_0123456789".contains(c))
+            };
+            assert!(!rest.any(is_key), "{model}, {path}");
+        }
+    }
+}
+
+#[test]
+fn only_what_a_model_needs_is_written() {
+    let parts = [
+        "struct direct",
+        "struct expanded",
+        "struct fixed16",
+        "exponential(",
+        "project(",
+        "mat_assess(",
+        "mat_fill(",
+        "square_root(",
+        "mat_set_baseline(",
+        "affine",
+    ];
+    let of = |model: &str| -> Vec<&str> {
+        let source = source_of(&in_testdata(model));
+        parts.into_iter().filter(|part| source.contains(part)).collect()
+    };
+    assert_eq!(of("row4"), ["struct direct", "exponential(", "affine"]);
+    assert_eq!(of("kernels-f32"), ["struct expanded", "affine"]);
+    assert_eq!(of("kernels-fixed16"), ["struct fixed16", "affine"]);
+    assert_eq!(of("array-fixed16-no-tail"), ["struct fixed16", "project("]);
+    let confident = ["struct fixed16", "exponential(", "project(", "mat_assess(", "square_root("];
+    assert_eq!(of("array-fixed16-confidence"), confident);
+}
+
+/// Numbers of the array of this name in a source.
+fn numbers_of(source: &str, name: &str) -> Vec<u32> {
+    let (_, rest) = source.split_once(&format!(" {name}[")).unwrap();
+    let (_, rest) = rest.split_once("{\n").unwrap();
+    let (body, _) = rest.split_once("};").unwrap();
+    let number = |text: &str| match text.strip_suffix('u') {
+        Some(word) => u32::from_str_radix(&word[2..], 16).unwrap(),
+        None => float_of(text),
+    };
+    body.split(',').map(str::trim).filter(|it| !it.is_empty()).map(number).collect()
+}
+
+/// The bits of a float in hexadecimal, as a C compiler reads it.
+fn float_of(text: &str) -> u32 {
+    let (sign, text) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest));
+    let (digits, exponent) = text[2..text.len() - 1].split_once('p').unwrap();
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+    let mantissa = u64::from_str_radix(&format!("{whole}{fraction}"), 16).unwrap() as f64;
+    let exponent = exponent.parse::<i32>().unwrap() - i32::try_from(4 * fraction.len()).unwrap();
+    ((sign * mantissa * 2f64.powi(exponent)) as f32).to_bits()
+}
+
+#[test]
+fn every_number_of_a_network_is_written_to_the_bit() {
+    let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+    for name in ["kernels-f32-direct", "kernels-f32", "kernels-fixed16"] {
+        let blob = in_testdata(name);
+        let source = source_of(&blob);
+        for (index, network) in blob.parse().networks().enumerate() {
+            let found = |part: &str| numbers_of(&source, &format!("network_{index}_{part}"));
+            match network {
+                Network::F32Direct(it) => {
+                    let p = it.parameters();
+                    assert_eq!(found("minimum"), bits(p.input_minimum));
+                    assert_eq!(found("per_span"), bits(p.input_per_span));
+                    assert_eq!(found("centres"), bits(p.centres));
+                    assert_eq!(found("decay"), bits(p.decay));
+                    assert_eq!(found("weights"), bits(p.output_weights));
+                    assert_eq!(found("bias"), bits(p.bias));
+                }
+                Network::F32(it) => {
+                    let p = it.parameters();
+                    assert_eq!(found("midpoint"), bits(p.input_midpoint));
+                    assert_eq!(found("per_unit"), bits(p.input_per_unit));
+                    assert_eq!(found("exponents"), bits(p.exponents));
+                    assert_eq!(found("weights"), bits(p.output_weights));
+                    assert_eq!(found("bias"), bits(p.bias));
+                }
+                Network::Fixed16(it) => {
+                    let p = it.parameters();
+                    assert_eq!(found("midpoint"), bits(p.input_midpoint));
+                    assert_eq!(found("scale"), bits(p.output_scale));
+                    assert_eq!(found("centres"), p.centres);
+                    let bias: Vec<u32> = p.bias.iter().map(|bias| bias.cast_unsigned()).collect();
+                    assert_eq!(found("bias"), bias);
+                    assert!(source.contains(&format!("network_{index}_per_unit, {}u, ", p.decay)));
+                }
+            }
+        }
+    }
+}
+
+/// A model with other metadata.
+fn changed<'m>(
+    model: &Model<'m>,
+    change: impl FnOnce(&mut model_core::blob::Metadata<'m>),
+) -> ModelBlob {
+    let networks: Vec<Network<'_>> = model.networks().collect();
+    let rows: Vec<u8> = (0..model.shape().rows)
+        .filter_map(|row| model.network_of_row(row))
+        .map(|it| it as u8)
+        .collect();
+    let mut metadata = *model.metadata();
+    change(&mut metadata);
+    let parts = ModelParts::new(&networks, &rows, metadata);
+    ModelBlob::of_bytes(&encode_to_vec(&parts).unwrap()).unwrap()
+}
+
+#[test]
+fn a_model_of_ratios_has_a_baseline() {
+    let blob = in_testdata("row4");
+    let relative = changed(&blob.parse(), |it| it.relative_inputs = true);
+    let files = library(&relative, &Name::new("mat").unwrap()).unwrap();
+    for (path, text) in [
+        ("src/mat.h", "int mat_set_baseline(const float *baseline);"),
+        ("src/mat.h", "#define MAT_RELATIVE 1"),
+        ("src/mat.c", "test_baseline"),
+        ("examples/Decode/Decode.ino", "mat_set_baseline(readings);"),
+        ("examples/posix/main.c", "./decode baseline.csv < readings.csv"),
+        ("README.md", "mat_set_baseline"),
+    ] {
+        assert!(file(&files, path).contains(text), "{path}");
+    }
+}
+
+#[test]
+fn names_of_a_model_are_harmless_wherever_they_are_written() {
+    let blob = in_testdata("row4");
+    let model = blob.parse();
+    let outputs = model.shape().outputs;
+    let names = vec!["*/ \"@CRC@\" taxel_model"; outputs].join("\n");
+    let hostile = changed(&model, |it| {
+        it.name = "??/ */ @CRC@\"\\";
+        it.output_names = model_core::blob::Columns(&names);
+    });
+    let files = library(&hostile, &Name::new("mat").unwrap()).unwrap();
+    let source = file(&files, "src/mat.c");
+    assert!(source.contains(r#""*/ \042@CRC@\042 taxel_model","#), "{source}");
+    let header = file(&files, "src/mat.h");
+    assert_eq!(header.matches("/*").count(), header.matches("*/").count());
+    assert!(!header.contains("??/"));
+    assert!(file(&files, "library.properties").contains("Model ___ __ _CRC___,"));
+}
+
+#[test]
+fn the_header_tells_shape_columns_and_cost() {
+    let files = library(&in_testdata("row4"), &Name::new("mat").unwrap()).unwrap();
+    let header = file(&files, "src/mat.h");
+    for part in [
+        "#define MAT_READINGS 18u",
+        "MAT_AT_REST = 3",
+        " *     r4c1_ohm, Ω\n",
+        " *     r4e1_dz_mm, mm\n",
+        "18 inputs, ",
+        " bytes of constants in flash",
+        " cycles",
+    ] {
+        assert!(header.contains(part), "{part}: {header}");
+    }
+}

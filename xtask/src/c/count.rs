@@ -1,0 +1,125 @@
+//! Instructions and cycles of the C code on a Cortex-M4F, counted in QEMU, beside what Taxel's own routines take.
+
+use std::fs;
+use std::io::BufReader;
+use std::path::Path;
+use std::process::Command;
+use std::thread;
+use std::time::Duration;
+
+use object::{Object, ObjectSymbol};
+use taxel_learn::Exponential;
+use taxel_learn::cost::{Design, Gating, Prices};
+
+use super::build::{ARM, Build, machine};
+use super::frames;
+use super::models::Model;
+use crate::cycles::trace::{self, Count, Marks};
+use crate::emulate::qemu::{reader, wait};
+use crate::process::Outcome;
+use crate::queue;
+
+/// Frames that are counted, and the time limit of a run.
+const COUNTED: usize = 3;
+const LIMIT: Duration = Duration::from_mins(5);
+
+/// Most instructions of fixed16 in C for one of the assembly's.
+const MOST_OF_FIXED16: f64 = 2.0;
+
+/// Cost of the C code of a model.
+struct Measured {
+    count: Count,
+    /// Bytes of code and of constants.
+    flash: [u64; 2],
+}
+
+/// Prints what a frame of each model costs, as the way of `build` compiles it.
+pub fn print(models: &[Model], folder: &Path, build: &Build) -> Outcome {
+    let measured =
+        queue::results(models, |model, _| measure(model, &folder.join(model.name()), build));
+    let prices = Prices::accepted().map_err(|cause| cause.to_string())?;
+    println!("\nA frame on a Cortex-M4F, by {}:\n", build.name());
+    println!(
+        "| model | instructions in C | of the firmware | times | cycles in C | of the firmware | times | code | constants |"
+    );
+    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
+    let mut failed = Vec::new();
+    for (model, measured) in models.iter().zip(measured) {
+        let Measured { count, flash: [code, constants] } = measured?;
+        let own = prices.frame(&Design::new(&model.blob), Exponential::default(), Gating::Ungated);
+        let own = own.map_err(|cause| cause.to_string())?;
+        let times = |count: u64, own: u64| count as f64 / own as f64;
+        let of_instructions = times(count.instructions, own.instructions);
+        println!(
+            "| {} | {} | {} | {of_instructions:.2} | {} | {} | {:.2} | {code} | {constants} |",
+            model.name(),
+            count.instructions,
+            own.instructions,
+            count.cycles,
+            own.cycles,
+            times(count.cycles, own.cycles)
+        );
+        if model.format == model_core::rbf::Format::Fixed16 && of_instructions > MOST_OF_FIXED16 {
+            failed.push(format!("{}: {of_instructions:.2} times the instructions", model.name()));
+        }
+    }
+    if failed.is_empty() { Ok(()) } else { Err(failed.join("\n")) }
+}
+
+fn measure(model: &Model, folder: &Path, build: &Build) -> Outcome<Measured> {
+    let program = build.program(folder)?;
+    let path = folder.join("counted.bin");
+    frames::write(model, COUNTED, false, &path)?;
+    let mut command = machine(&program, &path);
+    command.args(["-d", "exec,nochain,in_asm"]);
+    let marks = marks(&program)?;
+    let mut child = command.spawn().map_err(|cause| format!("cannot start QEMU: {cause}"))?;
+    let said = reader(child.stdout.take());
+    let trace = child.stderr.take().ok_or("QEMU has no trace")?;
+    let counted = thread::scope(|scope| {
+        let trace = BufReader::with_capacity(1 << 16, trace);
+        let counted = scope.spawn(|| trace::count(trace, marks));
+        let status = wait(&mut child, LIMIT);
+        let counted = counted.join().unwrap_or_else(|_| Err("the trace's reader stopped".into()));
+        status.and_then(|status| match status {
+            Some(status) if status.success() => counted,
+            _ => Err(String::from_utf8_lossy(&said.join().unwrap_or_default()).into_owned()),
+        })
+    });
+    let (regions, _) = counted.map_err(|cause| format!("{}: {cause}", model.name()))?;
+    let mut count = regions.last().ok_or("no frame was counted")?.whole;
+    // The call at the end.
+    (count.instructions, count.cycles) = (count.instructions - 1, count.cycles - 3);
+    Ok(Measured { count, flash: sizes(&program.with_file_name("model.o"))? })
+}
+
+fn marks(program: &Path) -> Outcome<Marks> {
+    let failed = |cause: &dyn ToString| format!("{}: {}", program.display(), cause.to_string());
+    let bytes = fs::read(program).map_err(|cause| failed(&cause))?;
+    let file = object::File::parse(&*bytes).map_err(|cause| failed(&cause))?;
+    let address = |name: &str| {
+        let found = file.symbols().find(|symbol| symbol.name() == Ok(name));
+        found.map(|it| it.address() as u32 & !1).ok_or_else(|| failed(&format!("no {name}")))
+    };
+    Ok(Marks { begin: address("region_begin")?, end: address("region_end")?, exponential: 0..0 })
+}
+
+/// Bytes of code and of constants in an object, but for the self-test, which a linker leaves out if nobody calls it.
+fn sizes(object: &Path) -> Outcome<[u64; 2]> {
+    let program = ARM.replace("gcc", "nm");
+    let output = Command::new(&program).args(["--print-size", "--radix=d"]).arg(object).output();
+    let output = output.map_err(|cause| format!("{program}: {cause}"))?;
+    let mut sizes = [0; 2];
+    for line in String::from_utf8_lossy(&output.stdout).lines() {
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        let [_, size, kind, name] = fields[..] else { continue };
+        let size: u64 = size.parse().unwrap_or(0);
+        match kind {
+            _ if name.contains("test") => {}
+            "t" | "T" => sizes[0] += size,
+            "r" | "R" => sizes[1] += size,
+            _ => {}
+        }
+    }
+    Ok(sizes)
+}

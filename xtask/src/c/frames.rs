@@ -1,0 +1,173 @@
+//! Frames for a model, ordinary and hostile, and what model-core makes of each: the file that the harness reads.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use model_core::blob::ModelShape;
+use model_core::gate::Rest;
+use model_core::relative::reciprocal;
+use model_core::{Decoder, Frame, Gate, OwnedEstimate, RowStatus};
+
+use super::models::Model;
+use crate::process::Outcome;
+
+/// Tolerance of the gate, as in the harness.
+const TOLERANCE: f32 = 0.02;
+
+/// Most rows of a model.
+const MOST_ROWS: usize = 255;
+
+/// Frames for each baseline.
+const GROUP: usize = 1000;
+
+/// Numbers that a reading may be instead of what it was.
+const HOSTILE: [f32; 12] = [
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MAX,
+    f32::MIN,
+    f32::MIN_POSITIVE,
+    1e-45,
+    0.0,
+    -0.0,
+    -60.0,
+    1e10,
+    3e20,
+];
+
+/// Numbers without order, by a linear congruence.
+struct Draw(u64);
+
+impl Draw {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % bound
+    }
+}
+
+/// Writes the first `count` frames of `model` to `path`, with what is expected of each. If they are to be `hostile`, about
+/// half of them are changed.
+pub fn write(model: &Model, count: usize, hostile: bool, path: &Path) -> Outcome {
+    let failed = |cause: std::io::Error| format!("{}: {cause}", path.display());
+    let mut file = BufWriter::new(File::create(path).map_err(failed)?);
+    let readings = model.baseline.len();
+    let frames: Vec<&[f64]> = model.frames.chunks_exact(readings).take(count).collect();
+    let mut draw = hostile.then_some(Draw(1));
+    for (group, frames) in frames.chunks(GROUP).enumerate() {
+        let mut baseline: Vec<f32> = model.baseline.iter().map(|it| *it as f32).collect();
+        if let Some(draw) = draw.as_mut().filter(|_| group % 3 == 2) {
+            // Some channels without a baseline.
+            for unusable in [f32::NAN, 0.0, -60.0, 1e-45, f32::INFINITY].iter().take(group % 6) {
+                baseline[draw.below(readings)] = *unusable;
+            }
+        }
+        let bytes = group_bytes(model, &baseline, frames, draw.as_mut())?;
+        file.write_all(&bytes).map_err(failed)?;
+    }
+    let end: Vec<u8> = [0, frames.len() as u32].into_iter().flat_map(u32::to_le_bytes).collect();
+    file.write_all(&end).and_then(|()| file.flush()).map_err(failed)
+}
+
+/// A baseline, and frames with what is expected of each.
+fn group_bytes(
+    model: &Model,
+    baseline: &[f32],
+    frames: &[&[f64]],
+    mut draw: Option<&mut Draw>,
+) -> Outcome<Vec<u8>> {
+    let model = model.blob.parse();
+    let decoder = Decoder::<MOST_ROWS>::new(model).map_err(|cause| cause.to_string())?;
+    let reciprocals: Vec<f32> = baseline.iter().map(|it| reciprocal(*it)).collect();
+    let mut scratch = vec![0.0; decoder.scratch_floats()];
+    let ModelShape { rows, outputs, .. } = decoder.shape();
+    let empty = OwnedEstimate {
+        outputs: vec![0.0; rows * outputs],
+        status: vec![RowStatus::Decoded; rows],
+    };
+    let decode = |frame: Frame<'_>, scratch: &mut [f32]| -> Outcome<(bool, OwnedEstimate)> {
+        let mut estimate = empty.clone();
+        let clamped = decoder.decode_into(frame, scratch, &mut estimate.borrowed());
+        Ok((clamped.map_err(|cause| cause.to_string())?, estimate))
+    };
+    let (_, at_rest) = decode(of(baseline, &reciprocals, None), &mut scratch)?;
+    let rest = Rest { baseline_ohm: baseline, outputs: &at_rest.outputs, status: &at_rest.status };
+    let gate = Gate::new(rest, TOLERANCE);
+
+    let mut bytes = (frames.len() as u32).to_le_bytes().to_vec();
+    put(&mut bytes, baseline);
+    for frame in frames {
+        let mut readings: Vec<f32> = frame.iter().map(|reading| *reading as f32).collect();
+        if let Some(draw) = draw.as_deref_mut() {
+            disturb(&mut readings, baseline, rows, draw);
+        }
+        put(&mut bytes, &readings);
+        for gate in [None, gate] {
+            let (clamped, estimate) = decode(of(&readings, &reciprocals, gate), &mut scratch)?;
+            bytes.extend(u32::from(clamped).to_le_bytes());
+            put(&mut bytes, &estimate.outputs);
+            bytes.extend(estimate.status.iter().map(|status| *status as u8));
+        }
+        let mut deviations = vec![0.0; rows * outputs];
+        let novelty =
+            decoder.assess_into(of(&readings, &reciprocals, None), &mut scratch, &mut deviations);
+        if let Some(novelty) = novelty.map_err(|cause| cause.to_string())? {
+            put(&mut bytes, &[novelty]);
+            put(&mut bytes, &deviations);
+        }
+        if model.fill().is_some() {
+            let filled = decoder.fill(&mut readings, &mut scratch) as u32;
+            bytes.extend(filled.to_le_bytes());
+            // Which of all NaN comes out is the processor's choice.
+            readings.iter_mut().filter(|it| it.is_nan()).for_each(|it| *it = f32::NAN);
+            put(&mut bytes, &readings);
+        }
+    }
+    Ok(bytes)
+}
+
+/// A frame behind a gate, or without one.
+fn of<'f>(readings_ohm: &'f [f32], reciprocals: &'f [f32], gate: Option<Gate<'f>>) -> Frame<'f> {
+    Frame { readings_ohm, reciprocals, gate }
+}
+
+fn put(bytes: &mut Vec<u8>, values: &[f32]) {
+    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+}
+
+/// Changes about half of all frames: readings missing, hostile or far beyond training; rows at rest.
+fn disturb(readings: &mut [f32], baseline: &[f32], rows: usize, draw: &mut Draw) {
+    let count = readings.len();
+    match draw.below(10) {
+        0 => readings[draw.below(count)] = HOSTILE[draw.below(HOSTILE.len())],
+        1 => {
+            for _ in 0..=draw.below(count) / 3 {
+                readings[draw.below(count)] = HOSTILE[draw.below(HOSTILE.len())];
+            }
+        }
+        2 => {
+            let factor = [0.01, 0.5, 0.9, 1.2, 3.0, 100.0][draw.below(6)];
+            readings[draw.below(count)] *= factor;
+        }
+        3 => {
+            let factor = [0.8, 0.95, 1.05, 1.3][draw.below(4)];
+            readings.iter_mut().for_each(|reading| *reading *= factor);
+        }
+        4 | 5 => {
+            // Rows at rest, or nearly.
+            let inputs = count / rows;
+            let factor = [1.0, 1.001, 1.004, 1.006, 0.985][draw.below(5)];
+            let every = draw.below(2) == 0;
+            for row in 0..rows {
+                if every || draw.below(2) == 0 {
+                    let places = row * inputs..(row + 1) * inputs;
+                    let rest = readings[places.clone()].iter_mut().zip(&baseline[places]);
+                    rest.for_each(|(reading, baseline)| *reading = baseline * factor);
+                }
+            }
+        }
+        _ => {}
+    }
+}
