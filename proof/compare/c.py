@@ -130,11 +130,11 @@ def main() -> None:
         print(f"emlearn does not convert MLPRegressor: {cause}", file=sys.stderr)
     forests = [
         (f"{n} trees of depth {d}", RandomForestRegressor(n_estimators=n, max_depth=d, random_state=1))
-        for n, d in ((10, 6), (10, 10), (50, 12))
+        for n, d in ((10, 6), (10, 8))
     ]
     grow("emlearn, RandomForestRegressor", forests, by_emlearn(method="inline", dtype="float"), include)
     # Its support vector machines are expressions too deep for Python from some hundred vectors on.
-    grow("m2cgen, RandomForestRegressor", forests[:2], m2cgen.export_to_c)
+    grow("m2cgen, RandomForestRegressor", forests, m2cgen.export_to_c)
 
 
 

@@ -28,36 +28,44 @@ pub fn apart<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
     let (sender, receiver) = mpsc::channel();
-    let receiver = Mutex::new(receiver); // which Python may look at from any thread
     let worker =
         thread::Builder::new().name("taxel".into()).stack_size(16 << 20).spawn(move || {
             // Nothing of what the work shares is used after a panic.
             let _ = sender.send(catch_unwind(AssertUnwindSafe(work)));
         })?;
-    let mut interrupted = None;
-    let done = loop {
-        let heard = py
-            .detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
-        match heard {
-            Ok(done) => break Some(done),
-            Err(RecvTimeoutError::Disconnected) => break None,
-            Err(RecvTimeoutError::Timeout) => {}
-        }
-        if interrupted.is_none() {
-            interrupted = py.check_signals().err();
-            stop.store(interrupted.is_some(), Ordering::Relaxed);
-        }
-    };
+    let done = wait(py, stop, receiver);
     let _ = worker.join();
-    if let Some(interrupted) = interrupted {
-        return Err(interrupted);
-    }
-    match done {
+    match done? {
         Some(Ok(value)) => Ok(value),
         Some(Err(panic)) if panic.is::<Stopped>() => Err(PyRuntimeError::new_err("stopped")),
         _ => Err(PyRuntimeError::new_err(
             "a defect of taxel: its work ended by a panic; please report what you called",
         )),
+    }
+}
+
+/// Waits for what a thread sends, while other threads of Python run; `None` if it ends without. Ctrl-C sets `stop`, and the
+/// thread is waited for all the same.
+pub fn wait<T: Send>(
+    py: Python<'_>,
+    stop: &AtomicBool,
+    receiver: mpsc::Receiver<T>,
+) -> PyResult<Option<T>> {
+    let receiver = Mutex::new(receiver); // which Python may look at from any thread
+    let look = || receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK);
+    let mut interrupted = None;
+    loop {
+        match (py.detach(look), interrupted) {
+            (Ok(_) | Err(RecvTimeoutError::Disconnected), Some(interrupted)) => {
+                return Err(interrupted);
+            }
+            (Ok(sent), None) => return Ok(Some(sent)),
+            (Err(RecvTimeoutError::Disconnected), None) => return Ok(None),
+            (Err(RecvTimeoutError::Timeout), before) => {
+                interrupted = before.or_else(|| py.check_signals().err());
+                stop.store(interrupted.is_some(), Ordering::Relaxed);
+            }
+        }
     }
 }
 

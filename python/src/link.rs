@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
 use std::thread;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use taxel_rig::Error;
 use taxel_rig::device::{Device, serial};
 
-use crate::call::apart;
+use crate::call::wait;
 
 /// Time that one look for reports takes, after which the listener sees whether it is to end.
 const LOOK: Duration = Duration::from_millis(100);
@@ -85,7 +85,8 @@ struct Wanted {
     estimates: bool,
 }
 
-type Opened = (Device, (String, String, Option<u32>), (usize, usize, usize));
+/// Board, version of its firmware and CRC-32 of its model; rows, readings of a row, and outputs of a row.
+type Identity = ((String, String, Option<u32>), (usize, usize, usize));
 
 fn refused(error: &Error) -> PyErr {
     PyRuntimeError::new_err(error.to_string())
@@ -98,7 +99,7 @@ fn open(
     configuration: Configuration,
     wanted: Option<Wanted>,
     stop: &Arc<AtomicBool>,
-) -> Result<(Opened, Wanted), Error> {
+) -> Result<(Device, Identity, Wanted), Error> {
     let mut device = Device::new(serial::open(port, baud)?)?;
     device.stop = Some(Arc::clone(stop));
     let identity = device.identify()?;
@@ -114,7 +115,7 @@ fn open(
         send_estimates: wanted.estimates,
         ..configuration
     })?;
-    Ok(((device, (identity.board, identity.firmware, crc), shape), wanted))
+    Ok((device, ((identity.board, identity.firmware, crc), shape), wanted))
 }
 
 /// Keeps what a device sends of its scans until `stop`.
@@ -232,11 +233,20 @@ impl Line {
         };
         let stop: Arc<AtomicBool> = Arc::default();
         let flag = Arc::clone(&stop);
-        let opened = apart(py, &stop, move || open(&port, baud, configuration, wanted, &flag))?;
-        let ((mut device, identity, shape), wanted) = opened.map_err(|error| refused(&error))?;
         let shared: Arc<Shared> = Arc::default();
-        let (of_listener, flag) = (Arc::clone(&shared), Arc::clone(&stop));
+        let (of_listener, (sender, receiver)) = (Arc::clone(&shared), mpsc::channel());
         let listener = thread::Builder::new().name("taxel link".into()).spawn(move || {
+            let opened = open(&port, baud, configuration, wanted, &flag);
+            let (mut device, wanted) = match opened {
+                Ok((device, identity, wanted)) => {
+                    let _ = sender.send(Ok(identity));
+                    (device, wanted)
+                }
+                Err(error) => {
+                    let _ = sender.send(Err(error));
+                    return;
+                }
+            };
             let ended = listen(&mut device, (&of_listener, &flag), wanted, buffer.max(1));
             let cause = match ended {
                 Ok(()) => "the link is closed".into(),
@@ -248,6 +258,10 @@ impl Line {
             of_listener.heard().ended = Some(cause);
             of_listener.came.notify_all();
         })?;
+        let Some(opened) = wait(py, &stop, receiver)? else {
+            return Err(PyRuntimeError::new_err("a defect of taxel: the listener ended"));
+        };
+        let (identity, shape) = opened.map_err(|error| refused(&error))?;
         Ok(Self { shared, stop, listener: Mutex::new(Some(listener)), identity, shape })
     }
 

@@ -56,7 +56,7 @@ const MOST_REPORT_BYTES: usize = 64 * 1024;
 const GLANCE: Duration = Duration::from_millis(5);
 
 /// Line of bytes to a device.
-pub trait Wire: Read + Write + Send {
+pub trait Wire: Read + Write {
     /// Lets reads end after `timeout` if nothing has come.
     fn set_read_timeout(&mut self, timeout: Duration) -> std::io::Result<()>;
 }

@@ -49,7 +49,7 @@ const TO_IMAGE: Ring = Ring { written: 0x40, read: 0x80, bytes: 0x1000 };
 const TO_HOST: Ring = Ring { written: 0xC0, read: 0x100, bytes: 0x5000 };
 
 /// Bytes of memory that another program reads and writes at the same time.
-pub trait SharedBytes: Send {
+pub trait SharedBytes {
     /// Fills `bytes` with the memory from offset `place` on.
     fn read_at(&mut self, bytes: &mut [u8], place: u64) -> io::Result<()>;
 

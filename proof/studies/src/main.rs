@@ -28,5 +28,6 @@ struct Cli {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    commands::run_to_end(cli.question.name(), &cli.common, || cli.question.answer(&cli.common)).into()
+    commands::run_to_end(cli.question.name(), &cli.common, || cli.question.answer(&cli.common))
+        .into()
 }
