@@ -81,7 +81,6 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             // Docs need what clippy has checked.
             ("clippy", clippy),
             ("docs", docs),
-            own("python", &["python"]),
         ],
         vec![
             own("firmware", &["firmware"]),
