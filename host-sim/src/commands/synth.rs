@@ -88,9 +88,7 @@ impl Arguments {
             }
         }
         let device = Device { scan_ms: self.scan_ms, ..Device::default() };
-        let world = &scene.world;
-        let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
-        let scan_s = device.scan_ms(Some(wires), 1).unwrap_or_default() / 1000.0;
+        let scan_s = device.scan_ms(Some(Wires::of(&scene.world)), 1).unwrap_or_default() / 1000.0;
         let period_s = self.frame_rate.map_or(scan_s, |rate| 1.0 / rate);
         if period_s < scan_s * (1.0 - 1e-9) {
             let most = 1.0 / scan_s;

@@ -75,8 +75,7 @@ impl MovingContacts {
 /// Synthesis of frames of `scene` that a `device` scans, with what averaging so many `samples` a reading leaves of the noise.
 pub fn scanned(scene: &Experiment, device: Device, samples: usize) -> Synthesis<'_> {
     let world = &scene.world;
-    let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
-    Synthesis::new(world).noise(device.averaged(world.noise, Some(wires), samples))
+    Synthesis::new(world).noise(device.averaged(world.noise, Some(Wires::of(world)), samples))
 }
 
 /// Errors of the model in `blob` on the moving contacts of `scene`, without a filter and behind one, on a `device` that
@@ -117,9 +116,7 @@ impl<'s> Judged<'s> {
         let model = blob.prepare(Exponential::default()).of_inputs();
         let prices = Prices::accepted()?;
         let cost = prices.frames(&Design::new(blob), Exponential::default())?.ungated;
-        let world = &scene.world;
-        let wires = Wires { rows: world.read_rows.len(), columns: world.sensor.column_wires };
-        let scan_ms = device.scan_ms(Some(wires), samples);
+        let scan_ms = device.scan_ms(Some(Wires::of(&scene.world)), samples);
         let names = scene.output_names();
         let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();
         let touches = Touches::new(scene, synthesis, (path, device.passes(samples)), &group);

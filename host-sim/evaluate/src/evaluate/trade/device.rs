@@ -6,6 +6,7 @@ use firmware::timing::{ONCHIP_READINGS_US, ONCHIP_SAMPLES, ONCHIP_SUMS_US, ScanP
 use serde::Serialize;
 use taxel_data::{BadValue, columns};
 use taxel_learn::cost::Cost;
+use taxel_simulate::World;
 use taxel_simulate::noise::Noise;
 
 use crate::moving::age_ms;
@@ -76,6 +77,11 @@ pub struct Wires {
 }
 
 impl Wires {
+    /// Wires that a scan of `world`'s sensor reads.
+    pub fn of(world: &World) -> Self {
+        Self { rows: world.read_rows.len(), columns: world.sensor.column_wires }
+    }
+
     /// Wires that readings are named after, such as `r4c17_ohm`; `None` if any has another name.
     pub fn named(readings: &[String]) -> Option<Self> {
         let wires = readings.iter().map(|name| Some(columns::cell_of(name)?.0));

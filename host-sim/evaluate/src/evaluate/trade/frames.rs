@@ -70,9 +70,7 @@ impl<'s> Frames<'s> {
         let (of_array, wires) = match subject {
             Subject::Scene(scene) => {
                 let world = &scene.world;
-                let wires = (world.read_rows.len(), world.sensor.column_wires);
-                let wires = Wires { rows: wires.0, columns: wires.1 };
-                (matches!(world.outputs, Outputs::Contact(_)), Some(wires))
+                (matches!(world.outputs, Outputs::Contact(_)), Some(Wires::of(world)))
             }
             Subject::Measured(data) => (false, Wires::named(&data.training.inputs.names)),
         };

@@ -1,11 +1,11 @@
 //! Readings that points decode, and what other decoders make of the same ones.
 
 use serde::Serialize;
-use taxel_data::BadValue;
 use taxel_learn::decoders::{BASELINES, linear, mean};
 
 use super::device::Wires;
 use super::frames::Frames;
+use crate::error::Result;
 use crate::metrics::{self, DecoderErrors, LimitSummary, Measure};
 use crate::subject::Subject;
 
@@ -31,7 +31,7 @@ impl Readings {
         subject: &Subject,
         frames: &Frames<'_>,
         (measure, limit): (&Measure, LimitSummary),
-    ) -> Result<Self, BadValue> {
+    ) -> Result<Self> {
         let decoders: Vec<DecoderErrors> = BASELINES
             .iter()
             .map(|baseline| {
@@ -44,7 +44,7 @@ impl Readings {
                 let errors = touched.errors_at_once(&estimates.values, measure);
                 Ok(DecoderErrors::new(decoder.name(), errors))
             })
-            .collect::<Result<_, BadValue>>()?;
+            .collect::<Result<_>>()?;
         let sensor = subject.scene().map(|scene| &scene.world.sensor);
         let chosen = sensor.filter(|sensor| sensor.read_columns.is_some());
         Ok(Self {

@@ -3,10 +3,10 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use model_core::filter::Settings;
+use taxel_data::columns;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
-use taxel_data::{BadValue, columns};
 use taxel_learn::cost::{Cost, Prices};
 use taxel_learn::filtered::{Movement, settings_for};
 use taxel_learn::{ModelBlob, PreparedModel};
@@ -85,7 +85,7 @@ impl<'s> Touches<'s> {
     /// Its decoding has this `cost`.
     ///
     /// # Errors
-    /// [`BadValue`] for times that [`Moving::new`] refuses, and a model that `prices` do not cover.
+    /// [`Error`](crate::Error) for times that [`Moving::new`] refuses, and a model that `prices` do not cover.
     pub fn judge(
         &self,
         (blob, model): (&ModelBlob, &PreparedModel<'_>),
@@ -114,22 +114,19 @@ impl<'s> Touches<'s> {
 
     /// Frames of a device that scans and decodes in these `times`. Their period is rounded up, by a fiftieth at most, so that
     /// decoders that take about as long share their frames.
-    fn at(&self, times: &Times) -> std::result::Result<Arc<OfPeriod>, BadValue> {
+    fn at(&self, times: &Times) -> Result<Arc<OfPeriod>> {
         self.of(times.scan_ms.unwrap_or_default(), times.period_ms())
     }
 
     /// Frames of a device whose decoding takes no time.
     ///
     /// # Errors
-    /// [`BadValue`] for times that [`Moving::new`] refuses.
-    pub fn while_scanned(
-        &self,
-        scan_ms: Option<f64>,
-    ) -> std::result::Result<Arc<OfPeriod>, BadValue> {
+    /// [`Error`](crate::Error) for times that [`Moving::new`] refuses.
+    pub fn while_scanned(&self, scan_ms: Option<f64>) -> Result<Arc<OfPeriod>> {
         self.of(scan_ms.unwrap_or_default(), scan_ms.unwrap_or_default())
     }
 
-    fn of(&self, scan_ms: f64, period_ms: f64) -> std::result::Result<Arc<OfPeriod>, BadValue> {
+    fn of(&self, scan_ms: f64, period_ms: f64) -> Result<Arc<OfPeriod>> {
         let period_ms = ((period_ms.ln() / PERIOD_STEP - 1e-9).ceil() * PERIOD_STEP).exp();
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(same) = last.iter().find(|last| last.period_ms == period_ms) {
@@ -143,11 +140,7 @@ impl<'s> Touches<'s> {
 }
 
 impl OfPeriod {
-    fn new(
-        touches: &Touches<'_>,
-        scan_ms: f64,
-        period_ms: f64,
-    ) -> std::result::Result<Self, BadValue> {
+    fn new(touches: &Touches<'_>, scan_ms: f64, period_ms: f64) -> Result<Self> {
         let Touches { scene, synthesis, path, passes, group, .. } = touches;
         let moving = Moving::new(scene, synthesis, *path, ([scan_ms, period_ms], *passes))?;
         let few = path.trajectories.min(FEW_TRAJECTORIES) * moving.timetable.scans();
