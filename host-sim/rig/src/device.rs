@@ -320,12 +320,14 @@ impl Device {
             matches!(report, Report::Restarting).then_some(())
         })?;
         (self.kept, self.counter) = (None, None);
-        // Bytes that arrive while it starts are lost, which is no fault of the line.
+        // Bytes that arrive while it starts are lost, which is no fault of the line. An emulated device may take longer
+        // to answer than a board does to start.
         let (patience, repeated) = (self.patience, self.repeated);
         let start = Instant::now();
         self.patience = START;
         let mut identity = self.identify();
         while identity.is_err() && start.elapsed() < patience {
+            self.patience *= 2;
             identity = self.identify();
         }
         (self.patience, self.repeated) = (patience, repeated);

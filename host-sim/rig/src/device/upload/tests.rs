@@ -15,15 +15,18 @@ use taxel_data::Silent;
 use super::*;
 use crate::device::Wire;
 
-/// Line whose other end answers each request by `script`.
+/// Line whose other end answers each request by `script`, not before it has had its `time_to_answer`.
 struct Scripted<S> {
     script: S,
     receiver: Receiver<Vec<u8>>,
     answers: VecDeque<u8>,
+    time_to_answer: Duration,
+    asked: Instant,
 }
 
 impl<S: FnMut(&Request<'_>) -> Report<'static>> Write for Scripted<S> {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.asked = Instant::now();
         for byte in bytes {
             let Some(Received::Frame(frame)) = self.receiver.push(*byte) else { continue };
             let request = packet::decode::<Request<'_>>(frame).expect("a request");
@@ -45,6 +48,10 @@ impl<S: FnMut(&Request<'_>) -> Report<'static>> Write for Scripted<S> {
 
 impl<S> Read for Scripted<S> {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        if self.asked.elapsed() < self.time_to_answer {
+            std::thread::sleep(Duration::from_millis(1));
+            return Err(ErrorKind::TimedOut.into());
+        }
         match self.answers.read(bytes)? {
             0 => Err(ErrorKind::TimedOut.into()),
             count => Ok(count),
@@ -59,8 +66,26 @@ impl<S: FnMut(&Request<'_>) -> Report<'static>> Wire for Scripted<S> {
 }
 
 fn device(script: impl FnMut(&Request<'_>) -> Report<'static> + 'static) -> Device {
+    slow_device(Duration::ZERO, script)
+}
+
+fn slow_device(
+    time_to_answer: Duration,
+    script: impl FnMut(&Request<'_>) -> Report<'static> + 'static,
+) -> Device {
     let receiver = Receiver::new(vec![0; 4096]);
-    Device::new(Scripted { script, receiver, answers: VecDeque::new() }).unwrap()
+    let (answers, asked) = (VecDeque::new(), Instant::now());
+    Device::new(Scripted { script, receiver, answers, time_to_answer, asked }).unwrap()
+}
+
+#[test]
+fn a_restart_waits_for_a_device_that_takes_longer_to_answer_than_a_board_to_start() {
+    let mut device = slow_device(Duration::from_millis(150), |request| match request {
+        Request::Restart => Report::Restarting,
+        _ => identity(false),
+    });
+    device.patience = Duration::from_secs(5);
+    assert_eq!(device.restart().unwrap().board, "scripted");
 }
 
 /// Device of one reading whose model has the CRC-32 7.
