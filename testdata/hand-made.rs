@@ -5,7 +5,7 @@
 //     x, x (144 times)
 // Outputs, row after row, with their units:
 //     y, y (144 times)
-use model_core::Fixed;
+use taxel_core::Fixed;
 
 /// Network of rows 1, 3, 5, 7.
 #[rustfmt::skip]

@@ -27,7 +27,7 @@
 //     r4e4_dz_mm, mm
 //     r4e5_dz_mm, mm
 //     r4e6_dz_mm, mm
-use model_core::Fixed;
+use taxel_core::Fixed;
 
 /// Network of row 1.
 #[rustfmt::skip]

@@ -5,11 +5,11 @@
 //! `host-sim train press.csv --inputs 'r4c*_ohm' --outputs 'r4e*_dz_mm' --centres 16 --format f32-direct -o row4.bin`
 
 use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiDevice};
-use firmware::circuit::ZeroPotential;
-use firmware::readout::{
+use taxel_core::{ColumnWires, RowWire};
+use taxel_firmware::circuit::ZeroPotential;
+use taxel_firmware::readout::{
     FrameSource, Mcp3208s, ScanSettings, Scanner, Selection, ShiftRegister595,
 };
-use model_core::{ColumnWires, RowWire};
 
 /// What `host-sim export row4.bin --rust row4.rs` writes.
 #[path = "../../testdata/row4.rs"]

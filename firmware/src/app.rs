@@ -4,7 +4,7 @@
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
 //! is allocated.
 
-use model_core::filter::State;
+use taxel_core::filter::State;
 
 use crate::link::message::Configuration;
 use crate::link::receive::Receiver;

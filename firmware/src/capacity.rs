@@ -1,8 +1,8 @@
 //! What an image has room for. The model in force decides what is scanned and decoded.
 
-use model_core::blob::{Columns, ModelShape};
-use model_core::health::MOST_COLUMNS;
-use model_core::{ColumnWire, RowWire, Wires};
+use taxel_core::blob::{Columns, ModelShape};
+use taxel_core::health::MOST_COLUMNS;
+use taxel_core::{ColumnWire, RowWire, Wires};
 
 /// RAM in bytes that this project's images reserve for a copy of the model in force. A larger blob is decoded from
 /// its slot.
@@ -35,7 +35,7 @@ impl Capacity {
     /// outputs a row.
     ///
     /// ```
-    /// use firmware::capacity::Capacity;
+    /// use taxel_firmware::capacity::Capacity;
     /// const WIDE: Capacity = Capacity::parse("16x32x18");
     /// assert_eq!(WIDE, Capacity { rows: 16, columns: 32, outputs: 18 });
     /// ```
@@ -76,7 +76,7 @@ impl Capacity {
     }
 
     /// Number of floats of working space for decoding: more than the readings of a frame and of two rows. What these
-    /// leave is room for the components of an [`Expansion`](model_core::expansion::Expansion).
+    /// leave is room for the components of an [`Expansion`](taxel_core::expansion::Expansion).
     pub const fn scratch_floats(self) -> usize {
         2 * self.rows * self.columns
     }
@@ -112,8 +112,8 @@ impl Capacity {
     /// Whether there is room for the readings and outputs of a model of this `shape`.
     ///
     /// ```
-    /// use firmware::capacity::Capacity;
-    /// use model_core::blob::ModelShape;
+    /// use taxel_firmware::capacity::Capacity;
+    /// use taxel_core::blob::ModelShape;
     /// let fits = |rows, inputs, outputs| Capacity::PAPER.has_room_for(ModelShape { rows, inputs, outputs });
     /// assert!(fits(8, 18, 18) && fits(1, 144, 6));
     /// assert!(!fits(9, 1, 1) && !fits(1, 145, 6));
@@ -142,9 +142,9 @@ impl Capacity {
     /// while another's does, or there are more without names than a row has.
     ///
     /// ```
-    /// use firmware::capacity::Capacity;
-    /// use model_core::blob::{Columns, ModelShape};
-    /// use model_core::{ColumnWire, RowWire};
+    /// use taxel_firmware::capacity::Capacity;
+    /// use taxel_core::blob::{Columns, ModelShape};
+    /// use taxel_core::{ColumnWire, RowWire};
     /// let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
     /// let cells = Capacity::PAPER.cells(Columns("r4c17_ohm\nr9c1_ohm"), shape);
     /// let expected = [Ok((RowWire(3), ColumnWire(16))), Err(1)];

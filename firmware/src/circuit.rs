@@ -4,9 +4,9 @@
 //! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω. A resistance
 //! in series with a row is therefore never negligible, and both circuits correct for it.
 
-use model_core::blob::Floats;
-use model_core::{ColumnWires, RowWire, Wires};
 use serde::{Deserialize, Serialize};
+use taxel_core::blob::Floats;
+use taxel_core::{ColumnWires, RowWire, Wires};
 
 /// Smallest current in counts that counts as one; below it, the reading is open.
 pub const NO_CURRENT_COUNTS: f32 = 4.0;
@@ -155,8 +155,8 @@ impl<C: Circuit> Circuit for &C {
 /// wrongly, whatever its calibration (`docs/readout.md` shows by how much).
 ///
 /// ```
-/// use firmware::circuit::{Circuit, Divider, ScannedRow};
-/// use model_core::{ColumnWires, RowWire};
+/// use taxel_firmware::circuit::{Circuit, Divider, ScannedRow};
+/// use taxel_core::{ColumnWires, RowWire};
 /// let divider = Divider::<1, 1> { row_source_ohm: [0.0], ..Divider::TYPICAL };
 /// // 470 Ω below 58.75 Ω: eight ninths of 4096.
 /// let mut reading = [4096.0 * 8.0 / 9.0];
@@ -215,8 +215,8 @@ impl<const ROWS: usize, const COLS: usize> Circuit for Divider<ROWS, COLS> {
 /// 1 + s·Σ1/R, which [`correct`](Circuit::correct) undoes.
 ///
 /// ```
-/// use firmware::circuit::{Circuit, ScannedRow, ZeroPotential};
-/// use model_core::{ColumnWires, RowWire};
+/// use taxel_firmware::circuit::{Circuit, ScannedRow, ZeroPotential};
+/// use taxel_core::{ColumnWires, RowWire};
 /// let circuit = ZeroPotential::<1, 1> { row_source_ohm: [0.0], ..ZeroPotential::TYPICAL };
 /// // 0.2 V across 62.5 Ω drive 3.2 mA through 560 Ω: 1.792 V above the idle 0.2 V.
 /// let counts = |v: f32| v / 3.3 * 4096.0;

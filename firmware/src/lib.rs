@@ -6,7 +6,9 @@
 //! [`platform`]; [`capacity`] says how large a sensor and a model it has room for. Nothing here allocates, panics or
 //! waits without bound.
 //!
-//! All arithmetic is [`model_core`]'s, so that board and host agree bit for bit.
+//! All arithmetic is [`taxel_core`]'s, so that board and host agree bit for bit.
+//!
+#![doc = include_str!("../README.md")]
 #![cfg_attr(not(test), no_std)]
 
 // From the ground up: a module imports only what is declared before it.

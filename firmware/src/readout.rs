@@ -7,8 +7,8 @@
 //!
 //! `docs/readout.md` has the circuits, their parts and the timing.
 
-use model_core::{ColumnWire, ColumnWires, RowWire};
 use serde::{Deserialize, Serialize};
+use taxel_core::{ColumnWire, ColumnWires, RowWire};
 
 use crate::circuit::{Constants, ConstantsFault};
 
@@ -78,7 +78,7 @@ impl ScanSettings {
     /// Makes settings; `None` if a value is out of its range.
     ///
     /// ```
-    /// use firmware::readout::ScanSettings;
+    /// use taxel_firmware::readout::ScanSettings;
     /// assert!(ScanSettings::try_new(46, 2).is_some());
     /// assert!(ScanSettings::try_new(46, 0).is_none());
     /// ```

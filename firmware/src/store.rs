@@ -4,7 +4,7 @@
 //! A slot holds a blob at its start, and nothing else. Which models were confirmed, and which of them is in force,
 //! [`ConfirmedModels`] tells.
 
-use model_core::blob::Model;
+use taxel_core::blob::Model;
 
 mod journal;
 mod confirmed;
@@ -53,7 +53,7 @@ pub trait Slot {
 /// than it, is returned whole, so that the error of loading it names the cause.
 ///
 /// ```
-/// use firmware::store::blob_in_slot;
+/// use taxel_firmware::store::blob_in_slot;
 /// # let mut slot = [0xFF_u8; 64];
 /// # slot[..5].copy_from_slice(b"TAXL\x01");
 /// # slot[5..9].copy_from_slice(&40_u32.to_le_bytes());

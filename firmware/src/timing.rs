@@ -16,6 +16,10 @@ pub const NUCLEO_MHZ: u32 = 180;
 /// Speed of the NUCLEO-F446RE's serial line in bits a second, unless its image is built for another.
 pub const NUCLEO_BAUD: u32 = 921_600;
 
+/// What a Cortex-M4F's code takes to decode, piece by piece, in instructions and cycles: lines of CSV, from which
+/// `taxel-learn` predicts the cost of any model. `cargo xtask cycles --fit` fits them to counts in an emulator.
+pub const DECODING_PRICES: &str = include_str!("../prices.csv");
+
 /// Bytes that a sample of an MCP3208 takes on its bus.
 const MCP3208_BYTES: u32 = 3;
 
@@ -80,7 +84,7 @@ impl RowCounts {
     /// Times for a wait and a number of samples, [`ONCHIP_SAMPLES`] at most, at this clock.
     ///
     /// ```
-    /// use firmware::timing::RowCounts;
+    /// use taxel_firmware::timing::RowCounts;
     /// let counts = RowCounts::new(20, 12, 180);
     /// assert_eq!((counts.divider, counts.trigger), (1, 3_637)); // 20.2 µs
     /// assert_eq!(counts.period, 19_781); // 110 µs
@@ -111,7 +115,7 @@ pub const OP_AMP_HZ: f32 = 10e6;
 /// Noise gain of the op-amp that holds a column: 1 + R_f/R, with R the cells of all rows in parallel.
 ///
 /// ```
-/// let gain = firmware::timing::noise_gain(560.0, 55.0, 8); // the paper's sensor at rest
+/// let gain = taxel_firmware::timing::noise_gain(560.0, 55.0, 8); // the paper's sensor at rest
 /// assert!((gain - 82.5).abs() < 0.1);
 /// ```
 pub fn noise_gain(feedback_ohm: f32, cell_ohm: f32, rows: u16) -> f32 {
@@ -126,7 +130,7 @@ pub fn time_constant_ns(noise_gain: f32, gain_bandwidth_hz: f32) -> f32 {
 /// Time in µs until a voltage is within half a count of its final value: τ·ln 2^(bits + 1).
 ///
 /// ```
-/// use firmware::timing::{OP_AMP_HZ, settling_us, time_constant_ns};
+/// use taxel_firmware::timing::{OP_AMP_HZ, settling_us, time_constant_ns};
 /// let time_constant_ns = time_constant_ns(82.5, OP_AMP_HZ); // 1.3 µs
 /// assert_eq!(settling_us(time_constant_ns, 12), 12); // nine time constants
 /// ```
@@ -139,7 +143,7 @@ pub fn settling_us(time_constant_ns: f32, bits: u8) -> u32 {
 /// Time in ns of so many bytes over SPI, without gaps; `u32::MAX` for a clock of 0 Hz.
 ///
 /// ```
-/// assert_eq!(firmware::timing::spi_transfer_ns(3, 1_000_000), 24_000);
+/// assert_eq!(taxel_firmware::timing::spi_transfer_ns(3, 1_000_000), 24_000);
 /// ```
 pub fn spi_transfer_ns(bytes: u32, clock_hz: u32) -> u32 {
     if clock_hz == 0 {
@@ -180,7 +184,7 @@ impl ScanPlan {
     /// Plan of the NUCLEO-F446RE's image for so many wires: its converters' bus, and its first configuration's wait.
     ///
     /// ```
-    /// assert_eq!(firmware::timing::ScanPlan::of_nucleo(8, 18, 1).scan_us(), 5_573);
+    /// assert_eq!(taxel_firmware::timing::ScanPlan::of_nucleo(8, 18, 1).scan_us(), 5_573);
     /// ```
     pub fn of_nucleo(rows: u16, columns: u16, oversampling: u16) -> Self {
         Self {
@@ -202,7 +206,7 @@ impl ScanPlan {
     /// columns, however many are asked for. The processor decodes the frame before meanwhile.
     ///
     /// ```
-    /// use firmware::timing::ScanPlan;
+    /// use taxel_firmware::timing::ScanPlan;
     /// assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).scan_us(), 224);
     /// assert_eq!(ScanPlan::of_nucleo_onchip(8, 3, 12).scan_us(), 887);
     /// ```
@@ -228,7 +232,7 @@ impl ScanPlan {
     /// Time of a scan in µs, as a mean over a round of [`SCANS_A_ROUND`].
     ///
     /// ```
-    /// use firmware::timing::{ScanPlan, spi_transfer_ns};
+    /// use taxel_firmware::timing::{ScanPlan, spi_transfer_ns};
     /// let plan = ScanPlan {
     ///     rows: 8,
     ///     columns: 18,
@@ -289,7 +293,7 @@ impl ScanPlan {
     /// takes longer.
     ///
     /// ```
-    /// # use firmware::timing::ScanPlan;
+    /// # use taxel_firmware::timing::ScanPlan;
     /// # let plan = ScanPlan { rows: 8, columns: 18, board_columns: 18, idle_samples: true, settling_us: 20,
     /// #     oversampling: 1, pass_samples: 256, sample_ns: 24_000, reading_ns: 0, row_ns: 0,
     /// #     between_passes_ns: 0 };

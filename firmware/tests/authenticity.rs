@@ -1,16 +1,16 @@
 //! With a key on the device, a host without it changes nothing. Each test is an attack of docs/reliability.md.
 
-use firmware::app::{Session, SessionEnd};
-use firmware::circuit::{Circuit, ZeroPotential};
-use firmware::link::cobs;
-use firmware::link::message::{
+use mock_board::*;
+use taxel_core::blob::Floats;
+use taxel_core::checksum::CRC_32;
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::circuit::{Circuit, ZeroPotential};
+use taxel_firmware::link::cobs;
+use taxel_firmware::link::message::{
     Configuration, KeyState, Refusal, Report, Request, SealFault, Setting, UploadState, UploadStep,
 };
-use firmware::link::packet::PROTOCOL_VERSION;
-use firmware::store::{Kind, Slot};
-use mock_board::*;
-use model_core::blob::Floats;
-use model_core::checksum::CRC_32;
+use taxel_firmware::link::packet::PROTOCOL_VERSION;
+use taxel_firmware::store::{Kind, Slot};
 
 const KEY: [u8; 32] = [0x42; 32];
 const OTHER: [u8; 32] = [0x43; 32];
@@ -196,18 +196,18 @@ fn a_seal_for_one_device_is_none_for_another_and_none_holds_another_seal() {
     device.session(|session, board| {
         let mut buffer = [0; 64];
         let request = postcard::to_slice(&Request::Restart, &mut buffer).unwrap();
-        let tag = firmware::seal::tag(&KEY, b"mock board 2", 1, request);
+        let tag = taxel_firmware::seal::tag(&KEY, b"mock board 2", 1, request);
         let elsewhere = Request::Sealed { counter: 1, tag, request };
         let refused = said(session, board, request_bytes(NUMBER, &elsewhere));
         assert_eq!(refused, fault(SealFault::Forged));
         let mut inner = [0; 64];
         let inner = postcard::to_slice(&elsewhere, &mut inner).unwrap();
-        let tag = firmware::seal::tag(&KEY, &Board::UNIQUE_ID, 1, inner);
+        let tag = taxel_firmware::seal::tag(&KEY, &Board::UNIQUE_ID, 1, inner);
         let outer = Request::Sealed { counter: 1, tag, request: inner };
         assert_eq!(said(session, board, request_bytes(NUMBER, &outer)), Err(Refusal::Unknown));
         // What follows a request in its seal, or is none.
         for bytes in [&[7, 0][..], &[250], &[]] {
-            let tag = firmware::seal::tag(&KEY, &Board::UNIQUE_ID, 2, bytes);
+            let tag = taxel_firmware::seal::tag(&KEY, &Board::UNIQUE_ID, 2, bytes);
             let more = Request::Sealed { counter: 2, tag, request: bytes };
             let said = said(session, board, request_bytes(NUMBER, &more));
             let expected = Err(Refusal::Unknown);

@@ -4,8 +4,8 @@
 use std::fmt::{Arguments, Write};
 use std::fs;
 
-use model_core::AlignedBytes;
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use taxel_core::AlignedBytes;
+use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 
 mod models;
 
@@ -35,7 +35,7 @@ fn the_models_in_testdata_are_those_made_here() {
     for (name, blob) in FILES {
         assert!(
             fs::read(in_testdata(name)).ok().as_deref() == Some(&*blob()),
-            "{name}: changed on purpose? cargo test --package firmware --test all bit_for_bit -- --ignored"
+            "{name}: changed on purpose? cargo test --package taxel-firmware --test all bit_for_bit -- --ignored"
         );
     }
 }

@@ -1,10 +1,10 @@
 //! The journal survives power cuts at any word, flipped bits, and pages that hold anything.
 
-use firmware::store::{Journal, KeepError, KeyFound, Kind, PAGE_BYTES, Slot};
 use mock_board::Flash;
-use model_core::checksum::CRC_32;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_core::checksum::CRC_32;
+use taxel_firmware::store::{Journal, KeepError, KeyFound, Kind, PAGE_BYTES, Slot};
 
 const OURS: [u8; 32] = [0xA5; 32];
 const OTHER: [u8; 32] = [0x3C; 32];

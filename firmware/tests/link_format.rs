@@ -1,16 +1,16 @@
 //! The link's bytes, compared with those in `docs/link.md`.
 
-use firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
-use firmware::link::cobs;
-use firmware::link::message::{
+use mock_board::request_bytes;
+use taxel_core::blob::Floats;
+use taxel_firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
+use taxel_firmware::link::cobs;
+use taxel_firmware::link::message::{
     Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
     KeptBaseline, KeyState, Memory, ModelFault, ModelIdentity, Refusal, Report, Request, SealFault,
     Setting, Statistics, UploadState, UploadStep,
 };
-use firmware::link::packet::{self, PROTOCOL_VERSION};
-use firmware::seal::{Key, tag};
-use mock_board::request_bytes;
-use model_core::blob::Floats;
+use taxel_firmware::link::packet::{self, PROTOCOL_VERSION};
+use taxel_firmware::seal::{Key, tag};
 
 const START_US: u64 = 3_000_000;
 

@@ -3,10 +3,10 @@
 //! Bits of memory that a session has borrowed are flipped from outside, through the kernel, as radiation does.
 #![cfg(target_os = "linux")]
 
-use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{Configuration, ModelFault, Refusal, UploadStep};
-use firmware::store::Slot;
 use mock_board::*;
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::link::message::{Configuration, ModelFault, Refusal, UploadStep};
+use taxel_firmware::store::Slot;
 
 /// Place of the damage in a blob.
 const PLACE: usize = 41;

@@ -1,13 +1,13 @@
 //! Settings are kept over restarts, and what does not fit the device is not believed.
 
-use firmware::app::Session;
-use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
-use firmware::link::message::{
+use mock_board::*;
+use taxel_core::blob::Floats;
+use taxel_firmware::app::Session;
+use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::link::message::{
     Configuration, KeepFault, Kept, KeptBaseline, Refusal, Report, Request, Setting,
 };
-use firmware::store::{Journal, Kind};
-use mock_board::*;
-use model_core::blob::Floats;
+use taxel_firmware::store::{Journal, Kind};
 
 fn kept(report: &Report<'_>) -> Kept {
     match report {

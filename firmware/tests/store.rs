@@ -1,9 +1,9 @@
 //! Loading blobs from slots of flash.
 
-use firmware::store::blob_in_slot;
 use mock_board::{ROWS, blob};
-use model_core::blob::DecodeError;
-use model_core::{AlignedBytes, Decoder};
+use taxel_core::blob::DecodeError;
+use taxel_core::{AlignedBytes, Decoder};
+use taxel_firmware::store::blob_in_slot;
 
 type TestDecoder<'a> = Decoder<'a, ROWS>;
 

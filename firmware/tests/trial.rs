@@ -1,9 +1,11 @@
 //! A new model is on trial until it is confirmed: until then every restart brings the previous one back.
 
-use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{ModelIdentity, Refusal, Report, Request, UploadState, UploadStep};
-use firmware::link::packet::UNASKED;
 use mock_board::*;
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::link::message::{
+    ModelIdentity, Refusal, Report, Request, UploadState, UploadStep,
+};
+use taxel_firmware::link::packet::UNASKED;
 
 const CHUNK: usize = 60;
 

@@ -1,8 +1,8 @@
 //! Undo over the link: the previous model comes into force again, whole and for good.
 
-use firmware::app::Session;
-use firmware::link::message::{KeepFault, Refusal, UploadState};
 use mock_board::*;
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{KeepFault, Refusal, UploadState};
 
 /// A device with the model `first`, flashed, and the others uploaded.
 fn device(first: &[u8], others: &[&[u8]]) -> Device {

@@ -1,13 +1,13 @@
 //! Uploading a model: sound models come into force, and nothing else ever does.
 
-use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{
+use mock_board::*;
+use taxel_core::rbf::Shape;
+use taxel_core::rbf::direct::{Network, Parameters};
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::link::message::{
     Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,
 };
-use firmware::store::{ERASES_AT_ONCE, FlashError, Upload};
-use mock_board::*;
-use model_core::rbf::Shape;
-use model_core::rbf::direct::{Network, Parameters};
+use taxel_firmware::store::{ERASES_AT_ONCE, FlashError, Upload};
 
 const CHUNK: usize = 60;
 

@@ -44,7 +44,7 @@ pub mod link;
 
 pub use captured::{Captured, Stopped, capture};
 
-use firmware::link::message::Refusal;
+use taxel_firmware::link::message::Refusal;
 
 use crate::{Error, Result};
 

@@ -47,10 +47,10 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 /// existing one.
 ///
 /// ```
-/// use model_core::blob::DecodeError;
-/// use model_core::{Aligned, Decoder, Estimate, Frame, RowStatus};
-/// # use model_core::blob::{Metadata, ModelParts, ModelShape, encode};
-/// # use model_core::rbf::{Shape, direct::{Network, Parameters}};
+/// use taxel_core::blob::DecodeError;
+/// use taxel_core::{Aligned, Decoder, Estimate, Frame, RowStatus};
+/// # use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode};
+/// # use taxel_core::rbf::{Shape, direct::{Network, Parameters}};
 /// # let network = Network::try_new(
 /// #     Shape { inputs: 2, centres: 1, outputs: 1 },
 /// #     Parameters {

@@ -27,12 +27,12 @@ impl<'a> Expansion<'a> {
     /// `(1 + components) * outputs` long, [`NetworkError::NotFinite`] for a number that is NaN or infinite.
     ///
     /// ```
-    /// use model_core::expansion::Expansion;
+    /// use taxel_core::expansion::Expansion;
     /// let expansion = Expansion::new(1, 2, &[1.0, 2.0, 0.5, -0.5])?;
     /// let mut outputs = [0.0; 2];
     /// expansion.expand(&[4.0], &mut outputs);
     /// assert_eq!(outputs, [3.0, 0.0]);
-    /// # Ok::<(), model_core::rbf::NetworkError>(())
+    /// # Ok::<(), taxel_core::rbf::NetworkError>(())
     /// ```
     pub fn new(components: usize, outputs: usize, block: &'a [f32]) -> Result<Self, NetworkError> {
         match Projection::new(components, outputs, block) {

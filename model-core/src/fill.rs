@@ -111,7 +111,7 @@ impl<'a> Fill<'a> {
     /// more than one in [`MOST_MISSING`] is, or if a slice is too short.
     ///
     /// ```
-    /// use model_core::fill::Fill;
+    /// use taxel_core::fill::Fill;
     /// // Two readings near 60 Ω, with noise of 0.1 Ω, that move together by 3 Ω; and two more alike.
     /// let part = 3.0 / f32::sqrt(4.0 * 9.0 + 0.01);
     /// let block = [[60.0; 4], [10.0; 4], [part; 4]];
@@ -119,7 +119,7 @@ impl<'a> Fill<'a> {
     /// let mut frame = [63.0, f32::NAN, 63.0, 63.0];
     /// assert_eq!(fill.fill(&mut frame, &mut [0.0; 2]), 1);
     /// assert!((frame[1] - 63.0).abs() < 0.01);
-    /// # Ok::<(), model_core::rbf::NetworkError>(())
+    /// # Ok::<(), taxel_core::rbf::NetworkError>(())
     /// ```
     pub fn fill(&self, readings: &mut [f32], scratch: &mut [f32]) -> usize {
         let missing = readings.iter().filter(|reading| !reading.is_finite()).count();

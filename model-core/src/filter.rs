@@ -63,8 +63,8 @@ pub type Track = [f32; 2];
 /// State of the filter: a [`Track`] for each output in `M`, and the time of the last frame.
 ///
 /// ```
-/// use model_core::filter::{Settings, State};
-/// use model_core::{Estimate, RowStatus};
+/// use taxel_core::filter::{Settings, State};
+/// use taxel_core::{Estimate, RowStatus};
 /// let settings = Settings { time_constant_us: 5000, lead_us: 1000 };
 /// let mut state = State::new([[0.0; 2]]); // one output
 /// let mut filtered = |start_us, mm| {

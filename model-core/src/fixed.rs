@@ -16,7 +16,7 @@ use crate::rbf::{Shape, direct};
 /// outputs are A·x + Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b.
 ///
 /// ```
-/// use model_core::Fixed;
+/// use taxel_core::Fixed;
 ///
 /// // Two readings (Ω), one centre, one output (mm).
 /// static NETWORK: Fixed<2, 1, 1> = Fixed {
@@ -63,7 +63,7 @@ impl<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize>
     /// If a number is not sound. In a `static` or a `const` that is an error of the compiler:
     ///
     /// ```compile_fail
-    /// # use model_core::Fixed;
+    /// # use taxel_core::Fixed;
     /// static NETWORK: Fixed<1, 1, 1> = Fixed {
     ///     decay: [-2.0], // "a decay is not a positive number"
     ///     input_minimum: [50.0],

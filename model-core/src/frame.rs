@@ -14,7 +14,7 @@ pub struct ColumnWire(pub usize);
 /// Numbers of a sensor's wires. There is one reading for each pair of a row-wire and a column-wire.
 ///
 /// ```
-/// use model_core::{ColumnWire, RowWire, Wires};
+/// use taxel_core::{ColumnWire, RowWire, Wires};
 /// let wires = Wires { rows: 8, columns: 18 };
 /// let mut frame = [f32::NAN; 144]; // Ω
 /// assert_eq!(wires.readings(), frame.len());
@@ -52,7 +52,7 @@ impl ColumnWires {
     /// So many column-wires, from the first on; at most 32.
     ///
     /// ```
-    /// use model_core::ColumnWires;
+    /// use taxel_core::ColumnWires;
     /// assert_eq!(ColumnWires::first(3), ColumnWires(0b111));
     /// ```
     pub const fn first(count: usize) -> Self {

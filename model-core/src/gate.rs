@@ -29,8 +29,8 @@ pub struct Rest<'a> {
 /// that a device keeps one copy of each.
 ///
 /// ```
-/// use model_core::gate::{Gate, Rest};
-/// use model_core::{Estimate, RowStatus};
+/// use taxel_core::gate::{Gate, Rest};
+/// use taxel_core::{Estimate, RowStatus};
 /// // One row of two readings and one output; 0.01 is what the model decodes the baseline to.
 /// let (baseline_ohm, outputs, status) = ([50.0, 60.0], [0.01], [RowStatus::Decoded]);
 /// let rest = Rest { baseline_ohm: &baseline_ohm, outputs: &outputs, status: &status };

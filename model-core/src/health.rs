@@ -16,7 +16,7 @@ impl Limits {
     /// The fault of a `reading` in Ω; `None` if it can be believed.
     ///
     /// ```
-    /// use model_core::health::{Fault, Limits};
+    /// use taxel_core::health::{Fault, Limits};
     /// assert_eq!(Limits::USUAL.fault(60.0), None);
     /// assert_eq!(Limits::USUAL.fault(f32::INFINITY), Some(Fault::Open));
     /// ```
@@ -66,7 +66,7 @@ impl Health {
     /// Rows without a word, and columns from [`MOST_COLUMNS`] on, are counted alone.
     ///
     /// ```
-    /// use model_core::health::{Health, Limits};
+    /// use taxel_core::health::{Health, Limits};
     /// let limits = Limits { shorted_below_ohm: 5.0, open_above_ohm: 500.0 };
     /// let mut frame = [60.0, 0.0, f32::INFINITY];
     /// let mut faulty_columns = [0];

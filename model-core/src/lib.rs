@@ -11,6 +11,8 @@
 //! The network and its training follow Wang et al., "Decoupling research of flexible tactile
 //! sensors interfered by white Gaussian noise using improved RBFNN", Sensors & Transducers, 2014
 //! ("the paper").
+//!
+#![doc = include_str!("../README.md")]
 #![cfg_attr(not(test), no_std)]
 
 #[cfg(feature = "std")]

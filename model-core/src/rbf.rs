@@ -122,7 +122,7 @@ impl<'a> Network<'a> {
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     ///
     /// ```
-    /// use model_core::rbf::{Network, Shape, direct};
+    /// use taxel_core::rbf::{Network, Shape, direct};
     /// let network = Network::from(direct::Network::try_new(
     ///     Shape { inputs: 2, centres: 1, outputs: 1 },
     ///     direct::Parameters {
@@ -139,7 +139,7 @@ impl<'a> Network<'a> {
     /// network.infer(&[55.0, 55.0], &mut [0.0; 2], &mut output)?;
     /// // At its centre the activation is 1, so the output is weight + bias.
     /// assert_eq!(output, [4.0]);
-    /// # Ok::<(), model_core::rbf::NetworkError>(())
+    /// # Ok::<(), taxel_core::rbf::NetworkError>(())
     /// ```
     #[inline(always)]
     pub fn infer(

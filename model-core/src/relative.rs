@@ -12,7 +12,7 @@
 /// channel is missing then: [`relative`] is NaN whatever its reading is.
 ///
 /// ```
-/// use model_core::relative::reciprocal;
+/// use taxel_core::relative::reciprocal;
 /// assert_eq!(reciprocal(64.0), 0.015625);
 /// assert!([f32::NAN, 0.0, -64.0, f32::INFINITY, 1e-45].into_iter().all(|baseline| reciprocal(baseline).is_nan()));
 /// ```
@@ -29,7 +29,7 @@ pub fn reciprocal(baseline: f32) -> f32 {
 /// may differ from that of R/R₀.
 ///
 /// ```
-/// use model_core::relative::{reciprocal, relative};
+/// use taxel_core::relative::{reciprocal, relative};
 /// let per_baseline = reciprocal(64.0);
 /// assert_eq!(relative(48.0, per_baseline), 0.75);
 /// // Twice the gain, and twice the baseline: the same input.

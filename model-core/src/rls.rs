@@ -214,7 +214,7 @@ fn solve_row<T: Real>(r: &[T], z_row: &[T], w_row: &mut [T], solved: &[T]) {
 /// needs λ < 1; [`is_excited`](Self::is_excited) tells whether its weights are worth anything.
 ///
 /// ```
-/// use model_core::rls::{Rls, RlsError};
+/// use taxel_core::rls::{Rls, RlsError};
 /// let mut memory = [0.0_f32; Rls::<f32>::values(2, 1)];
 /// let mut rls = Rls::try_new(&mut memory, [2, 1], 1e6, 0.999)?;
 /// for t in 0..100 {

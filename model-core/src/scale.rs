@@ -16,7 +16,7 @@ pub const CLAMP: [f32; 2] = [-0.125, 1.125];
 /// A NaN reading stays NaN.
 ///
 /// ```
-/// use model_core::scale::scale;
+/// use taxel_core::scale::scale;
 /// assert_eq!(scale(60.0, 50.0, 0.05), 0.5);
 /// assert_eq!(scale(1000.0, 50.0, 0.05), 1.125);
 /// ```

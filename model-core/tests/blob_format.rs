@@ -1,13 +1,13 @@
 //! The blob format, compared with its specification in `docs/blob.md`.
 
 use crate::common::{seal, worked_bytes};
-use model_core::blob::{
+use taxel_core::blob::{
     Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
     encoded_length_bound,
 };
-use model_core::rbf::direct::{self, Parameters};
-use model_core::rbf::{Network, Shape};
-use model_core::{Aligned, Decoder, RowStatus};
+use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::{Network, Shape};
+use taxel_core::{Aligned, Decoder, RowStatus};
 
 fn parameters() -> Parameters<'static> {
     Parameters {

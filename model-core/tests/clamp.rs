@@ -1,12 +1,12 @@
 //! A decoder tells whether it clamped an input of a row that it decoded.
 
-use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
-use model_core::gate::Rest;
-use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
-use model_core::relative::{reciprocal, relative};
-use model_core::scale::{CLAMP, HALF_RANGE, UNITS};
-use model_core::{AlignedBytes, Decoder, Estimate, Frame, Gate, RowStatus};
 use proptest::prelude::*;
+use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::gate::Rest;
+use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::relative::{reciprocal, relative};
+use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS};
+use taxel_core::{AlignedBytes, Decoder, Estimate, Frame, Gate, RowStatus};
 
 const ROWS: usize = 2;
 const INPUTS: usize = 3;

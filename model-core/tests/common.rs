@@ -1,8 +1,8 @@
 //! What several tests of the blob share.
 
-use model_core::checksum::CRC_32;
-use model_core::rbf::direct::{self, Parameters};
-use model_core::rbf::{Network, Shape};
+use taxel_core::checksum::CRC_32;
+use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::{Network, Shape};
 
 /// A projection block: the first feature is the mean of the four readings, the second the difference of the rows.
 pub const PROJECTION: [f32; 10] = [0.0, 10.0, 0.25, 0.25, 0.25, 0.25, 0.25, -0.25, 0.25, -0.25];

@@ -1,11 +1,11 @@
 //! Confidence of a model: how a decoder assesses frames with it.
 
-use model_core::blob::{DecodeError, EncodeError, Metadata, ModelParts, ModelShape, encode};
-use model_core::confidence::{Confidence, Sizes};
-use model_core::rbf::direct::{self, Parameters};
-use model_core::rbf::{NetworkError, Shape};
-use model_core::relative::reciprocal;
-use model_core::{Aligned, Decoder, Frame};
+use taxel_core::blob::{DecodeError, EncodeError, Metadata, ModelParts, ModelShape, encode};
+use taxel_core::confidence::{Confidence, Sizes};
+use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::{NetworkError, Shape};
+use taxel_core::relative::reciprocal;
+use taxel_core::{Aligned, Decoder, Frame};
 
 pub const SIZES: Sizes = Sizes { readings: 2, directions: 1, components: 1, outputs: 1 };
 pub const BLOCK: [f32; 16] =

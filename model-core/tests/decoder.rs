@@ -1,11 +1,11 @@
 //! A decoder of the paper's sensor: it decodes as its networks infer, and rejects an unsound blob.
 
-use model_core::blob::{DecodeError, Metadata, ModelParts, ModelShape, encode_to_vec};
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use model_core::rbf::direct::{self, Parameters};
-use model_core::rbf::{Network, NetworkError, Shape};
-use model_core::relative::reciprocal;
-use model_core::{AlignedBytes, Decoder, Estimate, Frame, RowStatus};
+use taxel_core::blob::{DecodeError, Metadata, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::{Network, NetworkError, Shape};
+use taxel_core::relative::reciprocal;
+use taxel_core::{AlignedBytes, Decoder, Estimate, Frame, RowStatus};
 
 const ROWS: usize = 8;
 const COLS: usize = 18;

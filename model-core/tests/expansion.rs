@@ -1,13 +1,13 @@
 //! Expansion of a network's few components to the outputs of all rows: how a decoder decodes with it.
 
 use crate::common::{NEAR_CENTRE, PROJECTION, network};
-use model_core::blob::{
+use taxel_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
-use model_core::expansion::Expansion;
-use model_core::projection::Projection;
-use model_core::rbf::{Network, NetworkError};
-use model_core::{Aligned, Decoder, RowStatus};
+use taxel_core::expansion::Expansion;
+use taxel_core::projection::Projection;
+use taxel_core::rbf::{Network, NetworkError};
+use taxel_core::{Aligned, Decoder, RowStatus};
 
 /// Means of the two outputs, then the part of the one component in each.
 pub const EXPANSION: [f32; 4] = [0.25, -1.0, 1.0, 0.5];

@@ -1,10 +1,10 @@
 //! Fill of missing readings, in a blob and behind a decoder.
 
 use crate::common::worked_bytes;
-use model_core::blob::{DecodeError, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
-use model_core::fill::Fill;
-use model_core::rbf::{Shape, direct};
-use model_core::{AlignedBytes, Decoder, RowStatus};
+use taxel_core::blob::{DecodeError, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::fill::Fill;
+use taxel_core::rbf::{Shape, direct};
+use taxel_core::{AlignedBytes, Decoder, RowStatus};
 
 const SHAPE: ModelShape = ModelShape { rows: 2, inputs: 2, outputs: 1 };
 
@@ -28,7 +28,7 @@ pub fn blob(fill: Option<Fill<'_>>, relative_inputs: bool) -> Result<AlignedByte
     let metadata = Metadata { relative_inputs, ..Metadata::unnamed(SHAPE) };
     let parts = ModelParts { fill, ..ModelParts::new(networks, &[0, 0], metadata) };
     encode_to_vec(&parts).map_err(|error| match error {
-        model_core::blob::EncodeError::Refused(cause) => cause,
+        taxel_core::blob::EncodeError::Refused(cause) => cause,
         other => panic!("{other}"),
     })
 }

@@ -1,11 +1,11 @@
 //! Networks of fixed size infer what networks of slices infer, to the bit.
 
-use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
-use model_core::rbf::Shape;
-use model_core::rbf::direct::{Network, Parameters};
-use model_core::{Decoder, Fixed};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::rbf::Shape;
+use taxel_core::rbf::direct::{Network, Parameters};
+use taxel_core::{Decoder, Fixed};
 
 const SHAPE: Shape = Shape { inputs: 7, centres: 5, outputs: 3 };
 type Small = Fixed<7, 5, 3>;

@@ -1,10 +1,10 @@
 //! A decoder that skips rows at rest.
 
-use model_core::blob::{Metadata, ModelParts, ModelShape, encode};
-use model_core::gate::Rest;
-use model_core::rbf::Shape;
-use model_core::rbf::direct::{Network, Parameters};
-use model_core::{Aligned, Decoder, Frame, Gate, OwnedEstimate, RowStatus};
+use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode};
+use taxel_core::gate::Rest;
+use taxel_core::rbf::Shape;
+use taxel_core::rbf::direct::{Network, Parameters};
+use taxel_core::{Aligned, Decoder, Frame, Gate, OwnedEstimate, RowStatus};
 
 const ROWS: usize = 3;
 const COLS: usize = 2;

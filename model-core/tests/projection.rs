@@ -1,13 +1,13 @@
 //! One network for the whole array, behind a projection: its blob, and how a decoder decodes with it.
 
 use crate::common::{NEAR_CENTRE, PROJECTION, network};
-use model_core::blob::{
+use taxel_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
-use model_core::gate::Rest;
-use model_core::projection::Projection;
-use model_core::rbf::Network;
-use model_core::{Aligned, Decoder, Estimate, Frame, Gate, OwnedEstimate, RowStatus};
+use taxel_core::gate::Rest;
+use taxel_core::projection::Projection;
+use taxel_core::rbf::Network;
+use taxel_core::{Aligned, Decoder, Estimate, Frame, Gate, OwnedEstimate, RowStatus};
 
 fn encoded<'b>(
     block: &[f32],

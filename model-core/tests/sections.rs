@@ -2,10 +2,10 @@
 
 use crate::common::{PROJECTION, seal, worked_bytes};
 use crate::{blob_format, confidence, expansion, fill, projection};
-use model_core::blob::{DecodeError, Model};
-use model_core::rbf::{Network, NetworkError};
-use model_core::{Aligned, AlignedBytes, Decoder, Frame, RowStatus};
 use proptest::prelude::*;
+use taxel_core::blob::{DecodeError, Model};
+use taxel_core::rbf::{Network, NetworkError};
+use taxel_core::{Aligned, AlignedBytes, Decoder, Frame, RowStatus};
 
 /// A blob with such a section: where it starts, and where its numbers do.
 struct Sample {

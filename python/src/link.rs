@@ -7,10 +7,10 @@ use std::thread;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{ConfidenceSent, Configuration, Report};
 use numpy::PyArray1;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use taxel_firmware::link::message::{ConfidenceSent, Configuration, Report};
 use taxel_rig::Error;
 use taxel_rig::device::{Device, serial};
 

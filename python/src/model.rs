@@ -1,7 +1,6 @@
 //! Models: what a blob says, and what it makes of readings.
 #![expect(clippy::needless_pass_by_value, reason = "arguments come from Python by value")]
 
-use model_core::{Decoder, Estimate, Frame, RowStatus, relative};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1,
     PyUntypedArrayMethods,
@@ -10,6 +9,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use self_cell::self_cell;
+use taxel_core::{Decoder, Estimate, Frame, RowStatus, relative};
 use taxel_learn::{Exponential, ModelBlob, PreparedModel};
 
 /// Most rows of a model, as many as the blob format has numbers for.

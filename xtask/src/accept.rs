@@ -8,11 +8,11 @@ use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use firmware::link::message::{Configuration, Memory, ModelIdentity, UploadState};
-use firmware::timing::ScanPlan;
-use model_core::Decoder;
+use taxel_core::Decoder;
 use taxel_data::output::write_bytes;
 use taxel_data::{Dataset, Silent, Stream};
+use taxel_firmware::link::message::{Configuration, Memory, ModelIdentity, UploadState};
+use taxel_firmware::timing::ScanPlan;
 use taxel_learn::cost::{Design, Gating, Prices};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::{Device, stream, upload};

@@ -1,4 +1,4 @@
-//! Exported models in C: compiled in many ways, and compared with model-core bit for bit (docs/c.md).
+//! Exported models in C: compiled in many ways, and compared with taxel-core bit for bit (docs/c.md).
 
 mod models;
 mod frames;

@@ -46,7 +46,7 @@ pub const NUCLEO_FIXED16: &str = "nucleo-f446re-fixed16";
 
 /// Libraries of the images, and the link check.
 const LIBRARIES: Packages =
-    &["--package", "model-core", "--package", "firmware", "--package", "link-check"];
+    &["--package", "taxel-core", "--package", "taxel-firmware", "--package", "link-check"];
 
 /// Builds one `image` for people. Without one, builds and lints everything that runs on a device. Links the link check, and once more with a panic in it,
 /// which must fail. The board's image may hold panics of others alone, as they are listed.

@@ -28,6 +28,8 @@ mod mutants;
 
 mod python;
 
+mod publish;
+
 mod ci;
 
 use std::env::args_os;
@@ -64,7 +66,7 @@ enum Command {
         #[arg(value_parser = [images::APPLICATION, images::NUCLEO_SPI, images::NUCLEO_ONCHIP])]
         image: Option<String>,
     },
-    /// Build model-core and firmware for other cores: thumbv6m, thumbv7m, thumbv8m.main-hf, riscv32imac; model-core for
+    /// Check taxel-core and firmware for other cores: thumbv6m, thumbv7m, thumbv8m.main-hf, riscv32imac; taxel-core for
     /// wasm32 too.
     Cores,
     /// Run the programs in firmware/qemu/src/bin in QEMU, compare log and exit status with the .out file beside each,
@@ -89,13 +91,16 @@ enum Command {
     /// firmware/prices.csv predicts by 40 random models.
     Cycles(cycles::Options),
     /// Export models as C, compile them with gcc, clang and arm-none-eabi-gcc in many ways, and compare all bits with
-    /// model-core's, on this machine and in QEMU. Then count what a frame costs a Cortex-M4F. docs/c.md has the tables.
+    /// taxel-core's, on this machine and in QEMU. Then count what a frame costs a Cortex-M4F. docs/c.md has the tables.
     C(c::Options),
     /// Answer a question about the sensor, the paper's method or a part of Taxel: `study --help`.
     #[command(disable_help_flag = true)]
     Study(Rest),
     /// Build the wheel of the Python module, install it in an environment of its own, and run its tests (docs/python.md).
     Python(python::Options),
+    /// Pack every crate that is published, and build it from its package; those of a device with their oldest Rust, too.
+    /// Nothing is published (docs/crates.md).
+    Publish,
     /// Put every promise of reliability to the test, and print a table: `torture --help`. As the first option, --self-test
     /// builds a copy of the product with planted faults instead, and fails unless each line sees those that proof/mutants
     /// names it for.
@@ -152,6 +157,7 @@ fn main() -> ExitCode {
         Command::Cycles(options) => cycles::run(&options).map(success),
         Command::C(options) => c::run(&options).map(success),
         Command::Study(rest) => study(&rest.all()),
+        Command::Publish => publish::run().map(success),
         Command::Python(options) => python::test(&options).map(success),
         Command::Torture(rest) => torture::run(&rest.all()),
         Command::Mutants(options) => mutants::run(&options).map(success),

@@ -10,10 +10,11 @@ use crate::process::{Outcome, capture, cargo, root};
 
 /// The workspace's crates from the ground up, floor by floor: none depends on one above it.
 const DEVICE: &[&str] =
-    &["model-core", "firmware", "board-common", "link-check", "qemu-image", "nucleo-f446re"];
+    &["taxel-core", "taxel-firmware", "board-common", "link-check", "qemu-image", "nucleo-f446re"];
 /// Crates that stand in for a device in its tests, and in proofs.
 const MOCKS: &[&str] = &["mock-board"];
 const DESK: &[&str] = &[
+    "taxel-scenes",
     "taxel-data",
     "taxel-simulate",
     "taxel-virtual-board",
@@ -22,6 +23,7 @@ const DESK: &[&str] = &[
     "taxel-rig",
     "taxel-evaluate",
     "host-sim",
+    "taxel",
     "taxel-python",
     "device-log",
     "xtask",
@@ -40,7 +42,8 @@ pub fn run() -> Outcome {
     if broken.is_empty() { Ok(()) } else { Err(broken.join("\n")) }
 }
 
-fn metadata() -> Outcome<Value> {
+/// What cargo knows of the workspace's crates.
+pub fn metadata() -> Outcome<Value> {
     let arguments = ["metadata", "--no-deps", "--format-version", "1"];
     let said = capture(cargo(&arguments).current_dir(root()));
     said.outcome.map_err(|cause| said.err + &cause)?;
@@ -170,10 +173,10 @@ mod tests {
             !broken(&json!({"packages": [{"name": name, "dependencies": dependencies}]})).is_empty()
         };
         for (name, on, kind) in [
-            ("model-core", "firmware", None),
-            ("model-core", "taxel-data", Some("dev")),
-            ("firmware", "mock-board", None),
-            ("firmware", "taxel-learn", Some("build")),
+            ("taxel-core", "taxel-firmware", None),
+            ("taxel-core", "taxel-data", Some("dev")),
+            ("taxel-firmware", "mock-board", None),
+            ("taxel-firmware", "taxel-learn", Some("build")),
             ("taxel-data", "taxel-simulate", None),
             ("host-sim", "hostile", Some("dev")),
             ("unknown", "serde", None),
@@ -181,10 +184,10 @@ mod tests {
             assert!(broken(name, on, kind), "{name} on {on}");
         }
         for (name, on, kind) in [
-            ("firmware", "model-core", None),
-            ("firmware", "mock-board", Some("dev")),
+            ("taxel-firmware", "taxel-core", None),
+            ("taxel-firmware", "mock-board", Some("dev")),
             ("taxel-data", "host-sim", Some("dev")),
-            ("taxel-simulate", "firmware", None),
+            ("taxel-simulate", "taxel-firmware", None),
             ("torture", "hostile", None),
         ] {
             assert!(!broken(name, on, kind), "{name} on {on}");

@@ -88,6 +88,11 @@ impl Toolchain {
         self.command(DEBIAN_CARGO, "build")
     }
 
+    /// Command `cargo check` for the target, with a separate target directory.
+    pub fn check(&self) -> Command {
+        self.command(DEBIAN_CARGO, "check")
+    }
+
     /// Command `cargo clippy` for the target, with a separate target directory.
     pub fn clippy(&self) -> Outcome<Command> {
         if matches!(self.source, Source::Debian { .. }) && !Path::new(DEBIAN_CLIPPY).is_file() {

@@ -17,9 +17,9 @@ use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 #[cfg(target_os = "none")]
-use firmware::app::{App, Buffers};
+use taxel_firmware::app::{App, Buffers};
 #[cfg(target_os = "none")]
-use firmware::capacity::Capacity;
+use taxel_firmware::capacity::Capacity;
 
 /// What the image has room for: the paper's sensor, unless `TAXEL_CAPACITY` says otherwise when it is built, such as
 /// `TAXEL_CAPACITY=16x32x18` for 16 rows, 32 columns and 18 outputs a row.

@@ -3,7 +3,7 @@
 use core::ptr;
 
 use cortex_m_rt::STACK_PAINT_VALUE;
-use firmware::link::message::Memory;
+use taxel_firmware::link::message::Memory;
 
 unsafe extern "C" {
     // Mutable, because what stands there changes.

@@ -1,12 +1,12 @@
 //! The application on a board that is opaque to the optimiser.
 
-use firmware::app::{App, Buffers};
-use firmware::capacity::Capacity;
-use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
-use firmware::link::message::{Configuration, Memory};
-use firmware::platform::{Platform, Port};
-use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use firmware::store::{FlashError, Journal, Slot};
+use taxel_firmware::app::{App, Buffers};
+use taxel_firmware::capacity::Capacity;
+use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::link::message::{Configuration, Memory};
+use taxel_firmware::platform::{Platform, Port};
+use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use taxel_firmware::store::{FlashError, Journal, Slot};
 
 use crate::opaque::{opaque, slot};
 

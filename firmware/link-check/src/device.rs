@@ -1,8 +1,8 @@
 //! Calls every function that a device calls, on inputs that are opaque to the optimiser.
 
-use firmware::store::blob_in_slot;
-use model_core::rls::{self, Rls};
-use model_core::{ColumnWire, Decoder, Estimate, RowStatus, RowWire, Wires, decoder_ram_bytes};
+use taxel_core::rls::{self, Rls};
+use taxel_core::{ColumnWire, Decoder, Estimate, RowStatus, RowWire, Wires, decoder_ram_bytes};
+use taxel_firmware::store::blob_in_slot;
 
 use crate::application;
 use crate::opaque::{opaque, slot};

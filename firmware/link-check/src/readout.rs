@@ -6,14 +6,14 @@ use core::convert::Infallible;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
-use firmware::circuit::{Circuit, Divider, ZeroPotential};
-use firmware::readout::{
+use taxel_core::{ColumnWires, RowWire};
+use taxel_firmware::circuit::{Circuit, Divider, ZeroPotential};
+use taxel_firmware::readout::{
     Baseline, ColumnSampler, DirectPins, FrameSource, Mcp3208s, MultiplexedAdc, Multiplexer4051,
     OnChipAdc, PassScanner, RowDrive, ScanSettings, Scanner, Selection, Sequencer, SequencerFault,
     ShiftRegister595, add_samples,
 };
-use firmware::timing;
-use model_core::{ColumnWires, RowWire};
+use taxel_firmware::timing;
 
 use crate::minimal;
 use crate::opaque::opaque;

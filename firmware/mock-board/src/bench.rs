@@ -3,9 +3,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::app::{App, Buffers, Session};
-use firmware::link::message::Configuration;
-use firmware::store::Journal;
+use taxel_firmware::app::{App, Buffers, Session};
+use taxel_firmware::link::message::Configuration;
+use taxel_firmware::store::Journal;
 
 use crate::board::Board;
 use crate::flash::Flash;

@@ -4,10 +4,10 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use firmware::link::message::Memory;
-use firmware::platform::{Platform, Port};
-use firmware::seal::Key;
-use firmware::store::Journal;
+use taxel_firmware::link::message::Memory;
+use taxel_firmware::platform::{Platform, Port};
+use taxel_firmware::seal::Key;
+use taxel_firmware::store::Journal;
 
 use crate::flash::Flash;
 

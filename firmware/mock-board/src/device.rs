@@ -3,12 +3,12 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::app::Session;
-use firmware::link::message::{
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{
     Identity, KeyState, ModelIdentity, Refusal, Report, Request, UploadState, UploadStep,
 };
-use firmware::seal::Key;
-use firmware::store::{Journal, KeepError, Kind};
+use taxel_firmware::seal::Key;
+use taxel_firmware::store::{Journal, KeepError, Kind};
 
 use crate::bench::{Bench, Memory, Running, quiet};
 use crate::board::Board;

@@ -4,9 +4,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::store::{FlashError, Journal, PAGE_BYTES, Slot};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_firmware::store::{FlashError, Journal, PAGE_BYTES, Slot};
 
 /// What an erase leaves of a slot when the power is cut meanwhile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

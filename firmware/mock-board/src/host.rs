@@ -1,13 +1,13 @@
 //! The host's side of the link.
 
-use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{
+use taxel_core::blob::Model;
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::link::message::{
     Configuration, Refusal, Report, Request, Statistics, UploadState, UploadStep,
 };
-use firmware::link::receive::{Received, Receiver};
-use firmware::link::{cobs, packet};
-use firmware::seal::{Key, tag};
-use model_core::blob::Model;
+use taxel_firmware::link::receive::{Received, Receiver};
+use taxel_firmware::link::{cobs, packet};
+use taxel_firmware::seal::{Key, tag};
 
 use crate::bench::{Bench, Running};
 use crate::board::Board;

@@ -4,7 +4,7 @@
 //! [`Bench`] puts an application together with what it is connected to:
 //!
 //! ```
-//! use firmware::app::Session;
+//! use taxel_firmware::app::Session;
 //! use mock_board::{Bench, Flash, blob, crc_of, model_crc, quiet};
 //!
 //! let model = blob(1, 3);

@@ -1,12 +1,12 @@
 //! Small models for this sensor.
 
-use model_core::AlignedBytes;
-use model_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
-use model_core::confidence::{Confidence, Sizes};
-use model_core::expansion::Expansion;
-use model_core::projection::Projection;
-use model_core::rbf::direct::{self, Parameters};
-use model_core::rbf::{Network, Shape};
+use taxel_core::AlignedBytes;
+use taxel_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::confidence::{Confidence, Sizes};
+use taxel_core::expansion::Expansion;
+use taxel_core::projection::Projection;
+use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::{Network, Shape};
 
 use crate::shape::{COLS, OUTPUTS, ROWS};
 

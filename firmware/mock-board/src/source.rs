@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
-use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 
 use crate::board::Board;
 use crate::shape::{COLS, ROWS, TestFrame};

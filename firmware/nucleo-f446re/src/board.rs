@@ -31,7 +31,7 @@ use crate::slot::Slot;
 const WATCHDOG_MS: u32 = 8000;
 
 /// Clock of the converters' bus in Hz.
-pub const SPI_HZ: u32 = firmware::timing::NUCLEO_SPI_HZ;
+pub const SPI_HZ: u32 = taxel_firmware::timing::NUCLEO_SPI_HZ;
 
 /// Number of converters: three, and a fourth if the image has room for more than 24 columns.
 pub const CONVERTERS: usize = if board_common::CONVERTERS > 3 { 4 } else { 3 };

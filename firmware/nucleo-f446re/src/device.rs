@@ -6,13 +6,13 @@ use board_common::region::take_weights;
 use board_common::{BoardApp, buffers, memory};
 use defmt::{info, warn};
 use defmt_rtt as _;
-use firmware::link::message::{Configuration, Memory};
-use firmware::platform::{Platform, Port};
-use firmware::readout::FrameSource;
-use firmware::store::Journal;
 use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
+use taxel_firmware::link::message::{Configuration, Memory};
+use taxel_firmware::platform::{Platform, Port};
+use taxel_firmware::readout::FrameSource;
+use taxel_firmware::store::Journal;
 
 use crate::board::{Board, Readout};
 use crate::clock::Clock;

@@ -5,9 +5,9 @@
 mod device {
     use board_common::CAPACITY;
     use cortex_m_rt::entry;
-    use firmware::circuit::ZeroPotential;
-    use firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
     use nucleo_f446re::{Converters, run};
+    use taxel_firmware::circuit::ZeroPotential;
+    use taxel_firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
 
     /// Constants of the circuit, until others are kept: `host-sim link PORT calibrate` measures your own.
     const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;

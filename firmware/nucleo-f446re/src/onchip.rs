@@ -5,9 +5,9 @@
 mod device {
     use board_common::CAPACITY;
     use cortex_m_rt::entry;
-    use firmware::circuit::ZeroPotential;
-    use firmware::readout::PassScanner;
     use nucleo_f446re::{COLUMNS, LINES, OnChip, restart, run};
+    use taxel_firmware::circuit::ZeroPotential;
+    use taxel_firmware::readout::PassScanner;
 
     const _: () = assert!(
         CAPACITY.rows < LINES && CAPACITY.columns <= COLUMNS,

@@ -12,14 +12,14 @@ use core::cell::UnsafeCell;
 use core::sync::atomic::{Ordering, fence};
 
 use cortex_m::asm;
-use firmware::readout::{Sequencer, SequencerFault, add_samples};
-use firmware::timing::{ONCHIP_COLUMNS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts};
-use model_core::RowWire;
 use stm32f4xx_hal::gpio::PinState;
 use stm32f4xx_hal::pac::adc1::RegisterBlock;
 use stm32f4xx_hal::pac::dma2::ST;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, ADC2, ADC3, DMA2, GPIOB, RCC, TIM1, TIM8};
 use stm32f4xx_hal::rcc::Rcc;
+use taxel_core::RowWire;
+use taxel_firmware::readout::{Sequencer, SequencerFault, add_samples};
+use taxel_firmware::timing::{ONCHIP_COLUMNS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts};
 
 use crate::board::{OwnConverters, Readout, ReadoutParts};
 

@@ -17,7 +17,7 @@ use stm32f4xx_hal::serial::config::Config;
 
 /// Baud rate; 8 data bits, no parity, 1 stop bit. `TAXEL_BAUD=115200` in the environment of the build sets another.
 pub const BAUD: u32 = match option_env!("TAXEL_BAUD") {
-    None => firmware::timing::NUCLEO_BAUD,
+    None => taxel_firmware::timing::NUCLEO_BAUD,
     Some(text) => match u32::from_str_radix(text, 10) {
         Ok(baud) => baud,
         Err(_) => panic!("TAXEL_BAUD must be a number of bits a second, such as 115200"),

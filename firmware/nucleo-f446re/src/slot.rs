@@ -1,8 +1,8 @@
 //! Model slots and pages of the journal, in sectors of the flash that regions.x names.
 
 use board_common::region::Region;
-use firmware::store::FlashError;
 use stm32f4xx_hal::pac::FLASH;
+use taxel_firmware::store::FlashError;
 
 use crate::flash::{Refused, Unlocked};
 
@@ -75,7 +75,7 @@ impl Slot {
     }
 }
 
-impl firmware::store::Slot for Slot {
+impl taxel_firmware::store::Slot for Slot {
     fn bytes(&self) -> &[u8] {
         self.bytes()
     }

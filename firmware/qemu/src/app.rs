@@ -8,11 +8,6 @@ use board_common::{BoardApp, CAPACITY, buffers};
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::entry;
 use defmt::info;
-use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
-use firmware::link::message::{Configuration, Memory};
-use firmware::platform::{Platform, Port};
-use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use firmware::store::Journal;
 use qemu_image::clock::Clock;
 use qemu_image::mailbox::Mailbox;
 use qemu_image::psram::Psram;
@@ -20,6 +15,11 @@ use qemu_image::slot::Slot;
 use qemu_image::uart::Uart;
 use qemu_image::watchdog::Watchdog;
 use qemu_image::{exit, memory};
+use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::link::message::{Configuration, Memory};
+use taxel_firmware::platform::{Platform, Port};
+use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use taxel_firmware::store::Journal;
 
 /// Watchdog period in ms: longer than a loop takes even on a very slow computer.
 const WATCHDOG_MS: u32 = 20_000;

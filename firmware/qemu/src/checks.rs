@@ -4,15 +4,15 @@
 use core::fmt::Arguments;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
-use model_core::blob::Model;
-use model_core::confidence::{Confidence, Sizes};
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use model_core::filter::{Settings, State};
-use model_core::gate::{Rest, is_at_rest};
-use model_core::rbf::{Format, Network};
-use model_core::rls::Rls;
-use model_core::scale::{CLAMP, saturates};
-use model_core::{Decoder, Estimate, Gate, RowStatus};
+use taxel_core::blob::Model;
+use taxel_core::confidence::{Confidence, Sizes};
+use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use taxel_core::filter::{Settings, State};
+use taxel_core::gate::{Rest, is_at_rest};
+use taxel_core::rbf::{Format, Network};
+use taxel_core::rls::Rls;
+use taxel_core::scale::{CLAMP, saturates};
+use taxel_core::{Decoder, Estimate, Gate, RowStatus};
 
 /// Number of row-wires, as in the paper's sensor.
 pub const ROWS: usize = 8;
@@ -79,7 +79,7 @@ impl<const R: usize> Decoded<R> {
         let outputs = self.outputs.as_flattened_mut();
         let mut estimate = Estimate { outputs, status: &mut self.status };
         let mut scratch = [0.0; 2 * COLS + ARRAY_COMPONENTS];
-        let frame = model_core::Frame { gate, ..frame.as_flattened().into() };
+        let frame = taxel_core::Frame { gate, ..frame.as_flattened().into() };
         self.clamped = decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).ok()?;
         Some(())
     }

@@ -1,7 +1,7 @@
 //! Networks of fixed size beside the blobs that they were exported from. Results must be the same on host and target,
 //! to the last bit: `firmware/tests/bit_for_bit.rs` compiles this file for the host too.
 
-use model_core::{Decoder, Estimate, RowStatus};
+use taxel_core::{Decoder, Estimate, RowStatus};
 
 use crate::checks::{COLS, Numbers, OUTPUTS, QUICK_CRC, ROWS, Say, one_of_many};
 

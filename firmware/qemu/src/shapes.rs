@@ -7,12 +7,12 @@ use core::{ptr, slice};
 
 use cortex_m::peripheral::MPU;
 
-use model_core::exp::Polynomial;
-use model_core::gate::{Rest, is_at_rest};
-use model_core::projection::Projection;
-use model_core::rbf::{Format, Network, Shape, expanded, fixed16};
-use model_core::scale::UNITS;
-use model_core::{Estimate, Gate, RowStatus};
+use taxel_core::exp::Polynomial;
+use taxel_core::gate::{Rest, is_at_rest};
+use taxel_core::projection::Projection;
+use taxel_core::rbf::{Format, Network, Shape, expanded, fixed16};
+use taxel_core::scale::UNITS;
+use taxel_core::{Estimate, Gate, RowStatus};
 
 use crate::checks::Numbers;
 

@@ -5,7 +5,7 @@
 //! A.
 
 use board_common::region::Region;
-use firmware::store::FlashError;
+use taxel_firmware::store::FlashError;
 
 /// Why a slot could not be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
@@ -57,7 +57,7 @@ impl Slot {
     }
 }
 
-impl firmware::store::Slot for Slot {
+impl taxel_firmware::store::Slot for Slot {
     fn erase_interval_s(&self) -> u32 {
         0 // memory does not wear
     }

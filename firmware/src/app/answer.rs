@@ -1,7 +1,7 @@
 //! Requests and their answers.
 
-use model_core::blob::Floats;
-use model_core::exp::{ExpKernel, Polynomial};
+use taxel_core::blob::Floats;
+use taxel_core::exp::{ExpKernel, Polynomial};
 
 use super::Core;
 use super::link::Link;

@@ -1,7 +1,7 @@
 //! The large part of an application's memory.
 
-use model_core::filter::Track;
-use model_core::{Estimate, RowStatus};
+use taxel_core::filter::Track;
+use taxel_core::{Estimate, RowStatus};
 
 /// The buffers of an application with room for `ROWS` rows of `COLUMNS` readings and `OUTPUTS` outputs. They are all
 /// zero at first, so that a static of them costs no flash, and nothing is moved over the stack.
@@ -69,7 +69,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             let capacity = Self::CAPACITY;
             assert!(BYTES >= capacity.message_bytes(), "the longest message must fit");
             assert!(ROWS >= 2 && ROWS <= 255 && OUTPUTS >= 1 && OUTPUTS <= 255);
-            assert!(COLUMNS >= 1 && COLUMNS <= model_core::health::MOST_COLUMNS);
+            assert!(COLUMNS >= 1 && COLUMNS <= taxel_core::health::MOST_COLUMNS);
         }
         Self {
             received: [0; BYTES],

@@ -2,8 +2,8 @@
 
 use core::ops::RangeInclusive;
 
-use model_core::filter::Settings;
-use model_core::health::Limits;
+use taxel_core::filter::Settings;
+use taxel_core::health::Limits;
 
 use crate::link::message::{ConfidenceSent, Configuration, ConfigurationField};
 use crate::readout::ScanSettings;

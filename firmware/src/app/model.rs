@@ -1,9 +1,9 @@
 //! The model in force: which slot it comes from, and whether the image has room for it.
 
-use model_core::blob::{Columns, DecodeError, Model};
-use model_core::checksum::CRC_32;
-use model_core::rbf::NetworkError;
-use model_core::{Decoder, scratch_floats};
+use taxel_core::blob::{Columns, DecodeError, Model};
+use taxel_core::checksum::CRC_32;
+use taxel_core::rbf::NetworkError;
+use taxel_core::{Decoder, scratch_floats};
 
 use crate::capacity::Capacity;
 use crate::link::message::{ModelFault, ModelIdentity};

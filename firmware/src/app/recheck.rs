@@ -1,6 +1,6 @@
 //! The model in force, checked again and again in the background: flash and RAM lose bits.
 
-use model_core::checksum::{CRC_32, Crc32Digest};
+use taxel_core::checksum::{CRC_32, Crc32Digest};
 
 /// Bytes that are checked in a turn of the loop: some 25 µs on a Cortex-M4 at 180 MHz whose flash waits.
 pub const PIECE: usize = 256;

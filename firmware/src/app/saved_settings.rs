@@ -10,9 +10,9 @@
 //!
 //! Numbers are little-endian; voltages and resistances are f32.
 
-use model_core::Wires;
-use model_core::blob::Floats;
-use model_core::checksum::CRC_32;
+use taxel_core::Wires;
+use taxel_core::blob::Floats;
+use taxel_core::checksum::CRC_32;
 
 use super::link::Link;
 use super::sensor::Sensor;

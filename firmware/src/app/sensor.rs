@@ -1,7 +1,7 @@
 //! The sensor: which wires are scanned, how, and its baseline.
 
-use model_core::blob::{Columns, Floats, ModelShape};
-use model_core::health::{Health, Limits};
+use taxel_core::blob::{Columns, Floats, ModelShape};
+use taxel_core::health::{Health, Limits};
 
 use super::frame_clock::FrameClock;
 use super::link::Link;

@@ -1,7 +1,7 @@
 //! A session: the application's loop while one model is in force.
 
-use model_core::Decoder;
-use model_core::blob::{Columns, Floats};
+use taxel_core::Decoder;
+use taxel_core::blob::{Columns, Floats};
 
 use super::model::{InForce, candidates, check_head, choose, copy_to};
 use super::recheck::{Checked, Recheck};

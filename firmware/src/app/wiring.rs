@@ -1,8 +1,8 @@
 //! The wires that are scanned for the model in force, and the places of its readings in a scan.
 
-use model_core::blob::{Columns, ModelShape};
-use model_core::checksum::CRC_32;
-use model_core::{ColumnWires, RowWire};
+use taxel_core::blob::{Columns, ModelShape};
+use taxel_core::checksum::CRC_32;
+use taxel_core::{ColumnWires, RowWire};
 
 use crate::capacity::Capacity;
 use crate::readout::Selection;

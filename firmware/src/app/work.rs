@@ -2,12 +2,12 @@
 
 use core::mem;
 
-use model_core::blob::Floats;
-use model_core::filter::{State, Track};
-use model_core::gate::Rest;
-use model_core::health::Health;
-use model_core::relative::reciprocal;
-use model_core::{Decoder, Estimate, Frame, Gate, RowStatus};
+use taxel_core::blob::Floats;
+use taxel_core::filter::{State, Track};
+use taxel_core::gate::Rest;
+use taxel_core::health::Health;
+use taxel_core::relative::reciprocal;
+use taxel_core::{Decoder, Estimate, Frame, Gate, RowStatus};
 
 use super::buffers::cut;
 use super::link::Link;

@@ -3,9 +3,9 @@
 //! The order of fields and variants is the wire format: whoever changes it must raise
 //! [`PROTOCOL_VERSION`](super::packet::PROTOCOL_VERSION).
 
-use model_core::blob::Floats;
-use model_core::feature::Feature;
 use serde::{Deserialize, Serialize};
+use taxel_core::blob::Floats;
+use taxel_core::feature::Feature;
 
 use crate::circuit::{Constants, ConstantsFault};
 use crate::readout::ScanSettings;
@@ -115,7 +115,7 @@ impl Request<'_> {
 pub enum UploadStep<'a> {
     /// Erase the spare slot for a blob. Takes up to seconds on a board.
     Begin {
-        /// The blob's first [`HEAD_BYTES`](model_core::blob::Model::HEAD_BYTES), which tell its length and its shape:
+        /// The blob's first [`HEAD_BYTES`](taxel_core::blob::Model::HEAD_BYTES), which tell its length and its shape:
         /// a model for which there is no room costs no erase. More bytes are ignored.
         #[serde(borrow)]
         head: &'a [u8],
@@ -219,7 +219,7 @@ pub struct Identity<'a> {
     /// Largest number of outputs a row.
     pub outputs: u8,
     /// Name of the exponential for activations of networks in `f32-direct`
-    /// ([`ExpKernel::NAME`](model_core::exp::ExpKernel::NAME)).
+    /// ([`ExpKernel::NAME`](taxel_core::exp::ExpKernel::NAME)).
     pub kernel: &'a str,
     /// The model in force; `None` if there is none.
     pub model: Option<ModelIdentity>,
@@ -333,11 +333,11 @@ pub struct Configuration {
     pub open_above_ohm: f32,
     /// Smallest relative change against the baseline that sets [`EstimateReport::CONTACT`].
     pub contact_threshold: f32,
-    /// Tolerance of the gate ([`model_core::gate`]): relative change against the baseline within which a row is at
+    /// Tolerance of the gate ([`taxel_core::gate`]): relative change against the baseline within which a row is at
     /// rest. Such a row is skipped, and gets the outputs of the baseline. With 0, or without a baseline, every row
     /// is decoded.
     pub rest_tolerance: f32,
-    /// Time constant in µs of the filter in time ([`model_core::filter`]) that outputs pass; with 0, none.
+    /// Time constant in µs of the filter in time ([`taxel_core::filter`]) that outputs pass; with 0, none.
     pub filter_time_constant_us: u32,
     /// Time in µs by which the filter extrapolates outputs.
     pub filter_lead_us: u32,
@@ -346,7 +346,7 @@ pub struct Configuration {
     pub report_every: u16,
 }
 
-/// What is sent of a model's [confidence](model_core::confidence) with the estimate of a scan. An answer to
+/// What is sent of a model's [confidence](taxel_core::confidence) with the estimate of a scan. An answer to
 /// [`Request::Decode`] has all of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum ConfidenceSent {
@@ -424,7 +424,7 @@ impl EstimateReport<'_> {
     /// Flag: a baseline was captured, and a reading differs from it by more than the threshold.
     pub const CONTACT: u8 = 1 << 4;
     /// Flag: at least one reading of a decoded row lies far beyond the range that the model was trained on, and was
-    /// clamped ([`model_core::Decoder::decode_into`]).
+    /// clamped ([`taxel_core::Decoder::decode_into`]).
     pub const CLAMPED: u8 = 1 << 6;
     /// Flag: the frame's novelty was computed and is above 0.
     pub const NOVEL: u8 = 1 << 7;

@@ -1,7 +1,7 @@
 //! A packet: a message with version and number before it, and a CRC-32 behind it.
 
-use model_core::checksum::CRC_32;
 use serde::{Deserialize, Serialize};
+use taxel_core::checksum::CRC_32;
 
 /// Version of the protocol that this crate speaks. A device answers any other version only with
 /// [`Refusal::Version`](super::message::Refusal::Version).

@@ -1,13 +1,13 @@
 //! The baseline: the frame of the unloaded sensor.
 
-use model_core::blob::Floats;
+use taxel_core::blob::Floats;
 
 /// The mean of frames at rest, with which other frames are compared.
 ///
 /// It takes memory for one frame. A reading that was missing, open or shorted in any of the frames stays NaN.
 ///
 /// ```
-/// use firmware::readout::Baseline;
+/// use taxel_firmware::readout::Baseline;
 /// let mut memory = [0.0; 2];
 /// let mut baseline = Baseline::new(&mut memory);
 /// baseline.restart(2);

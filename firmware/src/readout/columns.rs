@@ -2,7 +2,7 @@
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::SpiDevice;
-use model_core::ColumnWire;
+use taxel_core::ColumnWire;
 
 use super::ColumnSampler;
 use super::rows::set_address;

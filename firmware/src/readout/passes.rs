@@ -1,6 +1,6 @@
 //! A scan that hardware makes by itself: the processor is needed at its start and at its end.
 
-use model_core::{ColumnWires, RowWire};
+use taxel_core::{ColumnWires, RowWire};
 
 use super::scanner::count_failures;
 use super::{FrameSource, SCANS_A_ROUND, ScanReport, ScanSettings, Selection};

@@ -1,7 +1,7 @@
 //! Three ways to select a row. An active pin is high; `docs/readout.md` shows what it switches.
 
 use embedded_hal::digital::OutputPin;
-use model_core::RowWire;
+use taxel_core::RowWire;
 
 use super::RowDrive;
 

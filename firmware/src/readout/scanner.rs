@@ -1,7 +1,7 @@
 //! The scan itself: the same sequence for every drive, sampler and circuit.
 
 use embedded_hal::delay::DelayNs;
-use model_core::{ColumnWire, ColumnWires, RowWire};
+use taxel_core::{ColumnWire, ColumnWires, RowWire};
 
 use super::{
     ColumnSampler, FrameSource, RowDrive, SCANS_A_ROUND, ScanReport, ScanSettings, Selection,

@@ -8,7 +8,7 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
 
-use model_core::ColumnWires;
+use taxel_core::ColumnWires;
 
 use super::*;
 use crate::circuit::{Circuit, Divider, ScannedRow, ZeroPotential};

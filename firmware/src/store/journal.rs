@@ -20,7 +20,7 @@
 //! A key must never seem to have gone. So it is written only before a page's start item, and twice: whatever key a
 //! page in use has was whole, and one that does not count has decayed. A start moves a key that has lost one copy.
 
-use model_core::checksum::CRC_32;
+use taxel_core::checksum::CRC_32;
 
 use super::{FlashError, Slot};
 use crate::link::message::Setting;

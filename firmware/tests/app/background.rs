@@ -1,10 +1,10 @@
 //! Scans that go on by themselves while the frame before is decoded.
 
-use firmware::app::Session;
-use firmware::circuit::{Circuit, ZeroPotential};
-use firmware::link::message::{Configuration, EstimateReport, Report, Request};
+use taxel_firmware::app::Session;
+use taxel_firmware::circuit::{Circuit, ZeroPotential};
+use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request};
 
-use model_core::blob::{Columns, Metadata, ModelShape};
+use taxel_core::blob::{Columns, Metadata, ModelShape};
 
 use super::requests::decode;
 use mock_board::*;

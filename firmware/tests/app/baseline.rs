@@ -1,8 +1,8 @@
 //! Capturing a baseline, and what is told against it.
 
-use firmware::app::Session;
-use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
-use model_core::blob::{Floats, Metadata, Model, encode_to_vec};
+use taxel_core::blob::{Floats, Metadata, Model, encode_to_vec};
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 
 use super::requests::{capture, decode};
 use mock_board::*;

@@ -1,10 +1,12 @@
 //! Novelty and deviations: when they are computed, and what is sent of them.
 
-use firmware::app::Session;
-use firmware::link::message::{ConfidenceSent, Configuration, EstimateReport, Report, Request};
-use model_core::blob::Floats;
-use model_core::relative::reciprocal;
-use model_core::{Decoder, Frame};
+use taxel_core::blob::Floats;
+use taxel_core::relative::reciprocal;
+use taxel_core::{Decoder, Frame};
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{
+    ConfidenceSent, Configuration, EstimateReport, Report, Request,
+};
 
 use super::requests::bits;
 use mock_board::*;
@@ -29,7 +31,7 @@ impl Sent {
     const NOTHING: Self = Self { novel: false, novelty: None, deviation: Vec::new() };
 }
 
-/// What model-core itself makes of a frame.
+/// What taxel-core itself makes of a frame.
 fn expected(blob: &[u8], frame: &TestFrame, baseline_ohm: f32) -> Sent {
     let decoder = Decoder::<ROWS>::load(blob).unwrap();
     let reciprocals = [reciprocal(baseline_ohm); ROWS * COLS];

@@ -1,7 +1,7 @@
 //! Configurations, and leases on them.
 
-use firmware::app::Session;
-use firmware::link::message::{Configuration, ConfigurationField, Refusal, Report, Request};
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{Configuration, ConfigurationField, Refusal, Report, Request};
 
 use super::requests::decode;
 use mock_board::*;

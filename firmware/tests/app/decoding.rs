@@ -1,10 +1,10 @@
 //! Readings from the host, and their estimates.
 
-use firmware::app::Session;
-use firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
-use model_core::Decoder;
-use model_core::blob::{Floats, Model, ModelParts, encode_to_vec};
-use model_core::fill::Fill;
+use taxel_core::Decoder;
+use taxel_core::blob::{Floats, Model, ModelParts, encode_to_vec};
+use taxel_core::fill::Fill;
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 
 use super::requests::{bits, capture, decode, expected};
 use mock_board::*;

@@ -1,10 +1,10 @@
 //! The filter in time, and reports of every n-th scan.
 
-use firmware::app::Session;
-use firmware::link::message::{Configuration, Report, Request};
-use model_core::blob::Floats;
-use model_core::filter::State;
-use model_core::{Estimate, RowStatus};
+use taxel_core::blob::Floats;
+use taxel_core::filter::State;
+use taxel_core::{Estimate, RowStatus};
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{Configuration, Report, Request};
 
 use super::requests::{bits, expected};
 use mock_board::*;
@@ -19,9 +19,9 @@ fn touch(frame: usize) -> TestFrame {
     frame_at_rest().map(|row| row.map(|ohm| ohm - 0.7 * frame as f32 - 0.4 * (frame % 3) as f32))
 }
 
-/// The filter of the device as model-core computes it.
+/// The filter of the device as taxel-core computes it.
 struct Own {
-    blob: model_core::AlignedBytes,
+    blob: taxel_core::AlignedBytes,
     state: State<[[f32; 2]; ROWS * OUTPUTS]>,
 }
 
@@ -94,11 +94,11 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
     let own = Own::new(3);
     let rest = frame_at_rest();
     let set_baseline = Request::SetBaseline { readings_ohm: Floats::new(rest.as_flattened()) };
-    let circuit = firmware::circuit::ZeroPotential::<ROWS, COLS> {
+    let circuit = taxel_firmware::circuit::ZeroPotential::<ROWS, COLS> {
         drive_v: 0.21,
-        ..firmware::circuit::ZeroPotential::TYPICAL
+        ..taxel_firmware::circuit::ZeroPotential::TYPICAL
     };
-    let constants = firmware::circuit::Circuit::constants(&circuit).unwrap();
+    let constants = taxel_firmware::circuit::Circuit::constants(&circuit).unwrap();
     let other = Configuration { filter_lead_us: 1501, ..filtering() };
     for (request, is_new) in [
         (Request::Identify, false),
@@ -249,7 +249,7 @@ fn the_latency_lasts_until_the_last_byte_is_taken() {
 
 #[test]
 fn a_filter_out_of_range_is_refused_by_its_field() {
-    use firmware::link::message::{ConfigurationField as Field, Refusal};
+    use taxel_firmware::link::message::{ConfigurationField as Field, Refusal};
     let mut slots = Flash::slots();
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);

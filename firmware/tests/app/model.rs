@@ -1,12 +1,12 @@
 //! The model in force: its identity, its shape, and the memory that it is decoded from.
 
-use firmware::app::Session;
-use firmware::link::message::{
+use taxel_core::blob::{Columns, Floats, Metadata, Model, ModelShape, encode_to_vec};
+use taxel_core::checksum::CRC_32;
+use taxel_core::{AlignedBytes, Decoder};
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{
     Configuration, EstimateReport, ModelFault, Refusal, Report, Request, Setting,
 };
-use model_core::blob::{Columns, Floats, Metadata, Model, ModelShape, encode_to_vec};
-use model_core::checksum::CRC_32;
-use model_core::{AlignedBytes, Decoder};
 
 use super::requests::{bits, capture, decode, expected};
 use mock_board::*;

@@ -1,12 +1,12 @@
 //! Requests that many tests make, and what their answers must be.
 
-use firmware::link::message::{Configuration, Report, Request};
-use model_core::blob::Floats;
-use model_core::{Aligned, Decoder};
+use taxel_core::blob::Floats;
+use taxel_core::{Aligned, Decoder};
+use taxel_firmware::link::message::{Configuration, Report, Request};
 
 use mock_board::*;
 
-/// Outputs of model-core itself.
+/// Outputs of taxel-core itself.
 pub fn expected(blob: &[u8], frame: &TestFrame) -> [[f32; OUTPUTS]; ROWS] {
     let mut aligned = Aligned([0; 2048]);
     aligned.0[..blob.len()].copy_from_slice(blob);

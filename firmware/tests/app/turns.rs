@@ -1,9 +1,9 @@
 //! Turns of the loop: scans in time, the watchdog, and a host that takes no bytes.
 
-use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{Configuration, EstimateReport, Report, Request};
-use firmware::link::packet;
-use firmware::link::receive::{Received, Receiver};
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request};
+use taxel_firmware::link::packet;
+use taxel_firmware::link::receive::{Received, Receiver};
 
 use mock_board::*;
 

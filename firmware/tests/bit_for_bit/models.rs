@@ -1,16 +1,16 @@
 //! The models in `testdata`: of the paper's shape, with parameters from a generator, in every format.
 
-use model_core::AlignedBytes;
-use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
-use model_core::confidence::Confidence;
-use model_core::expansion::Expansion;
-use model_core::projection::Projection;
-use model_core::rbf::direct::Parameters;
-use model_core::rbf::fixed16::{
+use taxel_core::AlignedBytes;
+use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::confidence::Confidence;
+use taxel_core::expansion::Expansion;
+use taxel_core::projection::Projection;
+use taxel_core::rbf::direct::Parameters;
+use taxel_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, EXPONENT_MARGIN,
 };
-use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
-use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
+use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
 use crate::checks::{
     ARRAY_COMPONENTS, ARRAY_CONFIDENCE, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_confidence,

@@ -1,7 +1,8 @@
 //! The ground floor of Taxel's host side: tables of measurements, data files, seeded random numbers.
 //!
 //! Modules stand from the ground up; each imports only what stands before it.
-
+//!
+#![doc = include_str!("../README.md")]
 #![allow(missing_docs, clippy::missing_errors_doc)] // a name that says all needs no more
 
 pub mod error;

@@ -6,9 +6,9 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use model_core::blob::NoiseKind as BlobNoiseKind;
-use model_core::rbf::Format;
 use serde::Deserialize;
+use taxel_core::blob::NoiseKind as BlobNoiseKind;
+use taxel_core::rbf::Format;
 use taxel_data::digest::digest;
 use taxel_data::{BadValue, Dataset, Progress, Stream, input, require};
 use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
@@ -35,20 +35,11 @@ pub use others::OtherContact;
 
 type Check = std::result::Result<(), BadValue>;
 
-/// Names and texts of the scenes that are part of the program.
-pub const EMBEDDED: [(&str, &str); 5] = [
-    ("paper", include_str!("../../../scenes/paper.toml")),
-    ("press", include_str!("../../../scenes/press.toml")),
-    ("contact", include_str!("../../../scenes/contact.toml")),
-    ("moving", include_str!("../../../scenes/moving.toml")),
-    ("paper-as-printed", include_str!("../../../scenes/paper-as-printed.toml")),
-];
-
 /// Whether `name_or_path` is a scene, or otherwise a data file: a built-in one, a file called .toml, or a name without an
 /// extension and a file, which is a mistyped scene.
 pub fn names_a_scene(name_or_path: &str) -> bool {
     let path = Path::new(name_or_path);
-    EMBEDDED.iter().any(|(name, _)| *name == name_or_path)
+    taxel_scenes::ALL.iter().any(|(name, _)| *name == name_or_path)
         || path.extension().map_or(!path.exists(), |end| end.eq_ignore_ascii_case("toml"))
 }
 
@@ -193,11 +184,11 @@ impl Experiment {
     /// # Errors
     /// As [`load`](Self::load), for a file that cannot be read.
     pub fn text(name_or_path: &str) -> Result<Cow<'static, str>> {
-        if let Some((_, text)) = EMBEDDED.iter().find(|(name, _)| *name == name_or_path) {
+        if let Some((_, text)) = taxel_scenes::ALL.iter().find(|(name, _)| *name == name_or_path) {
             return Ok((*text).into());
         }
         if !names_a_scene(name_or_path) {
-            let known = EMBEDDED.map(|(name, _)| name).join(", ");
+            let known = taxel_scenes::ALL.map(|(name, _)| name).join(", ");
             return Err(Error::Usage(format!(
                 "{name_or_path} is a data file by its name, and a scene is wanted here: {known}, or a scene file (.toml). Measured data \
                  tells neither the sensor nor what may happen to it; `train`, `run`, `trade` and `gate` take it"
@@ -205,7 +196,7 @@ impl Experiment {
         }
         let text = input::read_text(Path::new(name_or_path)).map_err(|error| match error {
             taxel_data::Error::Read { path, cause } => {
-                let names: Vec<_> = EMBEDDED.iter().map(|(name, _)| *name).collect();
+                let names: Vec<_> = taxel_scenes::ALL.iter().map(|(name, _)| *name).collect();
                 let known = names.join(", ");
                 let hint = format!("{cause}; built-in scenes are: {known}");
                 taxel_data::Error::read(&path, std::io::Error::new(cause.kind(), hint))

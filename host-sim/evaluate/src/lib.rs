@@ -4,24 +4,7 @@
 //! [`taxel_learn`] trains and decodes; [`evaluate`] judges. Modules stand from the ground up; each imports only what
 //! stands before it.
 //!
-//! ```
-//! use taxel_evaluate::metrics;
-//! use taxel_evaluate::experiment::Experiment;
-//! use taxel_data::{progress::Silent, random::Stream};
-//! use taxel_learn::Exponential;
-//! use taxel_simulate::synthesise;
-//!
-//! let mut experiment = Experiment::load("press")?;
-//! experiment.world.read_rows = vec![3]; // one row-wire: 18 readings, 18 outputs
-//! experiment.training.frames = 2000;
-//! experiment.training.refine = false; // stay with K-means, which is quick
-//! let blob = experiment.train(&Silent)?;
-//! let fresh = synthesise(&experiment.world, Stream::Test, 1000);
-//! let errors = metrics::judge(&blob.prepare(Exponential::default()), &fresh, &experiment.measure());
-//! assert!(errors.errors[2].rmse < 0.06, "{} mm", errors.errors[2].rmse);
-//! # Ok::<(), taxel_evaluate::Error>(())
-//! ```
-
+#![doc = include_str!("../README.md")]
 #![allow(missing_docs, clippy::missing_errors_doc)] // a name that says all needs no more
 
 pub mod error;

@@ -2,8 +2,8 @@
 //! truth at that moment. So they include how long a scan and its decoding take, and how long an estimate is held until the
 //! next.
 
-use model_core::filter::{Settings, State};
 use rayon::prelude::*;
+use taxel_core::filter::{Settings, State};
 use taxel_data::BadValue;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;

@@ -1,7 +1,7 @@
 //! Verdict on a model in plain words: what it is worth, and what to beware of.
 
-use model_core::rbf::{Format, Shape, expanded, fixed16};
 use serde::Serialize;
+use taxel_core::rbf::{Format, Shape, expanded, fixed16};
 use taxel_data::columns::READINGS;
 use taxel_learn::ModelBlob;
 use taxel_learn::cost::Design;

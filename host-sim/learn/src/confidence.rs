@@ -1,9 +1,9 @@
-//! Confidence of a trained model: fitting of what [`model_core::confidence`] assesses frames with.
+//! Confidence of a trained model: fitting of what [`taxel_core::confidence`] assesses frames with.
 //!
 //! The density of frames is fitted to those of training. Deviations and the threshold of novelty are calibrated on
 //! frames that training did not see.
 
-use model_core::confidence::{Confidence, Sizes};
+use taxel_core::confidence::{Confidence, Sizes};
 use taxel_data::{Dataset, require};
 
 use crate::error::{Result, no_regression};

@@ -14,15 +14,15 @@ use std::collections::HashMap;
 pub use design::{Design, NetworkDesign};
 pub use frames::{Cost, Frames};
 pub use memory::DecoderRam;
-use model_core::blob::ModelShape;
-use model_core::rbf::Format;
+use taxel_core::blob::ModelShape;
+use taxel_core::rbf::Format;
 pub use terms::{Terms, filter_terms, terms};
 
 use crate::error::{Error, Result};
 use crate::infer::Exponential;
 
 /// The price list in the repository.
-const FITTED: &str = include_str!("../../../firmware/prices.csv");
+const FITTED: &str = taxel_firmware::timing::DECODING_PRICES;
 
 /// What the first line of a price list starts with; the compiler follows. The second line.
 const COMPILER: &str = "# code of ";
@@ -110,7 +110,7 @@ impl Prices {
         Ok(Cost { flash_cycles: cost.flash_cycles + waiting, ..cost })
     }
 
-    /// What the [filter in time](model_core::filter) adds to a frame with estimates of this `shape`.
+    /// What the [filter in time](taxel_core::filter) adds to a frame with estimates of this `shape`.
     ///
     /// # Errors
     /// As [`frame`](Self::frame).

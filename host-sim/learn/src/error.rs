@@ -1,7 +1,7 @@
 //! Errors that several modules report.
 
-use model_core::blob::EncodeError;
-use model_core::rbf::{Format, NetworkError};
+use taxel_core::blob::EncodeError;
+use taxel_core::rbf::{Format, NetworkError};
 pub use taxel_data::error::{Error, Result};
 
 /// Error for readings without any regression on which a projection could be based.

@@ -4,16 +4,16 @@
 //!
 //! - **Health**: readings that are missing, shorted or open, in all frames or now and then. A wire is named if all of its
 //!   readings are so.
-//! - **What the others say**: a model with a [fill](model_core::fill) tells each reading from the others. One that is far
+//! - **What the others say**: a model with a [fill](taxel_core::fill) tells each reading from the others. One that is far
 //!   off them, again and again, is noisy.
 //! - **Likeness**: two neighbours that touch read alike, where the other wires say that they should differ.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use model_core::fill::{Fill, MOST_MISSING};
-use model_core::health::Limits;
 use serde::Serialize;
+use taxel_core::fill::{Fill, MOST_MISSING};
+use taxel_core::health::Limits;
 use taxel_data::Table;
 
 use crate::parallel;

@@ -1,11 +1,11 @@
-//! Filling of missing readings: fitting of what [`model_core::fill`] fills them by.
+//! Filling of missing readings: fitting of what [`taxel_core::fill`] fills them by.
 //!
 //! Factor analysis by maximum likelihood: readings are a few common factors and noise of each reading's own. Given the
 //! noise, the factors are principal components of readings in units of it; given the factors, noise is what they leave
 //! of each variance (Lawley and Maxwell, *Factor analysis as a statistical method*, 1971).
 
-use model_core::fill::Fill;
 use nalgebra::DMatrix;
+use taxel_core::fill::Fill;
 use taxel_data::{Dataset, Table};
 
 use crate::error::{Error, Result};

@@ -3,7 +3,7 @@
 //! # Rule
 //!
 //! An output with white noise of standard deviation σ, rate v and acceleration a is read each dt, extrapolated by the lead
-//! L, and used when it is A old. Behind a [filter](model_core::filter) with θ = e^(−dt/τ), value and rate have these variances, and the estimate
+//! L, and used when it is A old. Behind a [filter](taxel_core::filter) with θ = e^(−dt/τ), value and rate have these variances, and the estimate
 //! lags behind the truth (Brookner, Tracking and Kalman Filtering Made Easy, 1998, ch. 1):
 //!
 //! - value: σ²·(1 − θ)·(1 + 4θ + 5θ²)/(1 + θ)³; rate: σ²·2(1 − θ)³/(1 + θ)³/dt²; both together:
@@ -14,8 +14,8 @@
 //! [`settings_for`] takes the τ and L with the least sum of variance and squares. Of an output that is used at once, and for a
 //! τ far above dt, the sum is σ²·1.25·dt/τ + a²·τ⁴. It is least at τ = (0.3125·σ²·dt/a²)^(1/5).
 
-use model_core::filter::{Settings, State, Track};
-use model_core::{Estimate, RowStatus};
+use taxel_core::filter::{Settings, State, Track};
+use taxel_core::{Estimate, RowStatus};
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
 

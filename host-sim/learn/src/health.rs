@@ -1,8 +1,8 @@
 //! Health of recorded readings, judged as a device judges those that it scans.
 
-use model_core::health::{Fault, Limits};
 use rayon::prelude::*;
 use serde::Serialize;
+use taxel_core::health::{Fault, Limits};
 use taxel_data::{Table, columns};
 
 use crate::infer::is_missing;
@@ -41,7 +41,7 @@ pub fn fault(name: &str, reading: f64, limits: Option<Limits>) -> Option<Fault> 
 /// Without `limits`, only readings that are not finite are faulty.
 ///
 /// ```
-/// use model_core::health::Limits;
+/// use taxel_core::health::Limits;
 /// use taxel_data::table::Table;
 /// use taxel_learn::health::judge;
 /// let names = ["r1c1_ohm", "r1c2_ohm", "x_v"].map(String::from).to_vec();

@@ -2,10 +2,10 @@
 
 mod side_by_side;
 
-use model_core::confidence::{Confidence, Sizes};
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use model_core::rbf::{Network, Shape};
 use serde::Serialize;
+use taxel_core::confidence::{Confidence, Sizes};
+use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use taxel_core::rbf::{Network, Shape};
 use taxel_data::widest;
 
 use crate::parallel;
@@ -149,8 +149,8 @@ pub(crate) fn assess_lines(confidence: Confidence<'_>, inputs: &[f64]) -> (Vec<f
 
 #[cfg(test)]
 mod tests {
-    use model_core::rbf::{direct, expanded};
-    use model_core::scale::UNITS;
+    use taxel_core::rbf::{direct, expanded};
+    use taxel_core::scale::UNITS;
 
     use super::*;
 

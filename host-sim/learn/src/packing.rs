@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use model_core::AlignedBytes;
-use model_core::blob::{
+use taxel_core::AlignedBytes;
+use taxel_core::blob::{
     self, Columns, DecodeError, Floats, Metadata, Model, ModelParts, NoiseKind,
 };
-use model_core::confidence::Confidence;
-use model_core::expansion::Expansion;
-use model_core::fill::Fill;
-use model_core::rbf::Network;
+use taxel_core::confidence::Confidence;
+use taxel_core::expansion::Expansion;
+use taxel_core::fill::Fill;
+use taxel_core::rbf::Network;
 use taxel_data::{Dataset, columns, input};
 
 use crate::error::{Error, Result, not_packed};

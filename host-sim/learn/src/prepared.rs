@@ -3,9 +3,9 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use model_core::blob::Model;
-use model_core::rbf::Network;
-use model_core::scale::CLAMP;
+use taxel_core::blob::Model;
+use taxel_core::rbf::Network;
+use taxel_core::scale::CLAMP;
 use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
@@ -151,7 +151,7 @@ impl<'b> PreparedModel<'b> {
     }
 
     /// Readings (`frames × inputs`) with missing ones filled as a device fills them, and the number of readings filled in
-    /// each frame; `None` if the model has no [fill](model_core::fill).
+    /// each frame; `None` if the model has no [fill](taxel_core::fill).
     pub fn filled(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
         let fill = self.model.fill()?;
         let of_piece = |frames: &[f64]| {

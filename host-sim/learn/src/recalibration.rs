@@ -21,10 +21,10 @@
 //!
 //! docs/recalibration.md has what it reaches, and what was tried besides.
 
-use model_core::blob::Model;
-use model_core::rbf::Network;
-use model_core::rls;
 use rayon::prelude::*;
+use taxel_core::blob::Model;
+use taxel_core::rbf::Network;
+use taxel_core::rls;
 use taxel_data::Table;
 
 use crate::error::{Error, Result};

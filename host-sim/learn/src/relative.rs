@@ -1,8 +1,8 @@
 //! Readings relative to the baseline, R/R₀: inputs that a drift of the gain leaves as they are.
 //!
-//! [`model_core::relative`] has the arithmetic, which a device shares bit for bit.
+//! [`taxel_core::relative`] has the arithmetic, which a device shares bit for bit.
 
-use model_core::relative::{reciprocal, relative};
+use taxel_core::relative::{reciprocal, relative};
 use taxel_data::{Dataset, Table};
 
 /// Reciprocals 1/R₀ of a `baseline`, rounded to `f32` first; NaN for a channel without one.

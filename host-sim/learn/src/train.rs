@@ -4,7 +4,7 @@
 //! alone decides how work is cut into pieces, whose results are merged in order. The network is rounded
 //! once, to the numbers of its format, as a [`FittedNetwork`].
 
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
 use crate::error::Result;

@@ -5,17 +5,7 @@
 //! with it. `docs/what-the-sensor-knows.md` explains both. Modules stand from the ground up; each imports only what
 //! stands before it.
 //!
-//! ```
-//! use taxel_data::progress::Silent;
-//! use taxel_limit::Reference;
-//! use taxel_simulate::World;
-//!
-//! let world = World { read_rows: vec![3], ..World::press() }; // one row-wire
-//! let reference = Reference::new(&world, 100, &Silent)?;
-//! let z = &reference.limits()[2];
-//! assert!((z.limit - 0.0456).abs() < 3.0 * z.limit_standard_error.hypot(0.0016), "{} mm", z.limit);
-//! # Ok::<(), taxel_limit::Refusal>(())
-//! ```
+#![doc = include_str!("../README.md")]
 
 pub mod error;
 mod target;

@@ -8,11 +8,11 @@
 
 use std::fmt;
 
-use firmware::circuit::Constants;
-use model_core::Wires;
-use model_core::blob::Floats;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use taxel_core::Wires;
+use taxel_core::blob::Floats;
+use taxel_firmware::circuit::Constants;
 
 use crate::error::{Error, Result};
 

@@ -12,12 +12,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
-use firmware::link::packet::PacketError;
-use firmware::link::receive::{Received, Receiver};
-use firmware::link::{cobs, packet};
-use firmware::seal::Key;
-use model_core::blob::Floats;
+use taxel_core::blob::Floats;
+use taxel_firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
+use taxel_firmware::link::packet::PacketError;
+use taxel_firmware::link::receive::{Received, Receiver};
+use taxel_firmware::link::{cobs, packet};
+use taxel_firmware::seal::Key;
 
 use crate::error::{Error, Heard, Result};
 
@@ -301,7 +301,7 @@ impl Device {
     }
 
     /// Asks for the device's counters.
-    pub fn statistics(&mut self) -> Result<firmware::link::message::Statistics> {
+    pub fn statistics(&mut self) -> Result<taxel_firmware::link::message::Statistics> {
         self.ask_plainly(&Request::Statistics, |report| match report {
             Report::Statistics(statistics) => Some(*statistics),
             _ => None,
@@ -357,8 +357,8 @@ fn is_timeout(cause: &std::io::Error) -> bool {
 mod tests {
     use std::io::Cursor;
 
-    use firmware::link::cobs;
-    use model_core::checksum::CRC_32;
+    use taxel_core::checksum::CRC_32;
+    use taxel_firmware::link::cobs;
 
     use super::*;
 

@@ -2,15 +2,15 @@
 
 use std::time::Duration;
 
-use firmware::capacity::Capacity;
-use firmware::circuit::ConstantsFault;
-use firmware::link::message::{
+use taxel_core::blob::Model;
+use taxel_core::filter::Settings;
+use taxel_firmware::capacity::Capacity;
+use taxel_firmware::circuit::ConstantsFault;
+use taxel_firmware::link::message::{
     Configuration, ConfigurationField, KeepFault, ModelFault, Refusal, SealFault,
 };
-use firmware::link::packet::PROTOCOL_VERSION;
-use firmware::readout::ScanSettings;
-use model_core::blob::Model;
-use model_core::filter::Settings;
+use taxel_firmware::link::packet::PROTOCOL_VERSION;
+use taxel_firmware::readout::ScanSettings;
 
 use crate::image;
 

@@ -1,10 +1,10 @@
 //! Images: which one has room for a model and scans its readings, and how it is built.
 
-use firmware::capacity::{Capacity, MOST_OUTPUTS, MOST_ROWS};
-use model_core::blob::Model;
-use model_core::health::MOST_COLUMNS;
-use model_core::scratch_floats;
+use taxel_core::blob::Model;
+use taxel_core::health::MOST_COLUMNS;
+use taxel_core::scratch_floats;
 use taxel_data::columns;
+use taxel_firmware::capacity::{Capacity, MOST_OUTPUTS, MOST_ROWS};
 
 /// RAM in bytes that an image has for its buffers, at most.
 const MOST_BUFFER_BYTES: usize = 52 * 1024;

@@ -4,16 +4,7 @@
 //! A [`World`] holds the settings; [`Synthesis`] draws frames of it. Nothing that a world does not ask
 //! for is computed. Modules stand from the ground up; each imports only what stands before it.
 //!
-//! ```
-//! use taxel_data::random::Stream;
-//! use taxel_simulate::{Synthesis, World};
-//!
-//! let world = World::press();
-//! let frames = Synthesis::new(&world).ideal().frames(Stream::Test, 3);
-//! assert_eq!((frames.inputs.names.len(), frames.frames()), (8 * 18, 3));
-//! assert_eq!(frames.outputs.names[2], "r1e1_dz_mm");
-//! ```
-
+#![doc = include_str!("../README.md")]
 #![allow(missing_docs, clippy::missing_errors_doc)] // a name that says all needs no more
 
 mod kinds;

@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use firmware::timing::ScanPlan;
 use rayon::prelude::*;
 use taxel_data::{Dataset, LANES, Purpose, Stream, Table};
+use taxel_firmware::timing::ScanPlan;
 
 use crate::drift::Drift;
 use crate::motion::{self, Independent};

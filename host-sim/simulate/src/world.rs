@@ -1,8 +1,8 @@
 //! Worlds: a sensor, how it is moved, the noise on its readings, and how it is read.
 
-use firmware::readout::ScanSettings;
 use taxel_data::input::MOST_VALUES;
 use taxel_data::{BadValue, require};
+use taxel_firmware::readout::ScanSettings;
 
 use crate::drift::Drift;
 use crate::motion::{self, Independent, Press};

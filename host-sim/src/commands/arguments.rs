@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::{Error, Result};
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 use taxel_data::BadValue;
 use taxel_learn::Exponential;
 use taxel_learn::train::Widths;

@@ -17,7 +17,7 @@ use super::{Common, print};
 /// In C, it is a library in a folder: one source file in C99 with its header, and what CMake, Arduino, PlatformIO and Zephyr
 /// need. It needs no heap and no other library, holds any model, and gives the bits that the blob gives (docs/c.md).
 ///
-/// In Rust, it is a file with one `static` of `model_core::Fixed` a row-wire, and a function `decode` from the readings of a
+/// In Rust, it is a file with one `static` of `taxel_core::Fixed` a row-wire, and a function `decode` from the readings of a
 /// frame to its outputs. Nothing in it can fail, and it gives the bits that the blob gives. A Fixed holds networks of single
 /// rows in the number format f32-direct, and nothing else (docs/formats.md).
 #[derive(Args)]

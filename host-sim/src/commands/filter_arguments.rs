@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 use clap::Args;
-use model_core::filter::Settings;
+use taxel_core::filter::Settings;
 use taxel_data::{Clock, DataFile};
 
 /// Options of the filter in time.

@@ -3,9 +3,9 @@
 use super::stderr;
 use crate::{Error, Result};
 use clap::Args;
-use model_core::fill::MOST_MISSING;
-use model_core::health::Limits;
 use serde::Serialize;
+use taxel_core::fill::MOST_MISSING;
+use taxel_core::health::Limits;
 use taxel_data::{Table, columns};
 use taxel_learn::PreparedModel;
 use taxel_learn::faults::{FEWEST_FOR_NOISE, Found, Grid, diagnose, stand_still};

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use crate::Result;
 use crate::verdict::Warning;
 use clap::Args;
-use firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
-use firmware::timing::ScanPlan;
-use model_core::blob::{Metadata, Model};
 use serde::Serialize;
+use taxel_core::blob::{Metadata, Model};
+use taxel_firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
+use taxel_firmware::timing::ScanPlan;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::image;
@@ -137,7 +137,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
     let ram = DecoderRam::new(&design);
     Ok(Summary {
         subject: metadata.name.into(),
-        format_version: model_core::blob::FORMAT_VERSION,
+        format_version: taxel_core::blob::FORMAT_VERSION,
         model_crc: format!("{:08x}", model.crc()),
         scene_digest: format!("{:016x}", metadata.scene_digest),
         rows: shape.rows,

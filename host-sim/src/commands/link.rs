@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use crate::{Error, Result};
 use clap::{Args, Subcommand, value_parser};
-use firmware::seal::Key;
-use firmware::timing::NUCLEO_BAUD;
 use taxel_data::input;
+use taxel_firmware::seal::Key;
+use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
 use taxel_rig::device::{Device, DeviceIdentity, LEASE, key_of, serial, upload};

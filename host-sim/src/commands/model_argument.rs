@@ -1,7 +1,7 @@
 //! Options of a model, over those of its scene or the usual ones.
 
 use clap::Args;
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 use taxel_learn::Options;
 use taxel_learn::train::{WHOLE_ARRAY_SPREAD, Widths};
 

@@ -1,7 +1,7 @@
 //! Outputs of a model, with the errors that it had in training.
 
-use model_core::blob::Model;
 use serde::Serialize;
+use taxel_core::blob::Model;
 
 /// Output of a model.
 #[derive(Serialize)]

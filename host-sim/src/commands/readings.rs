@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 use clap::Args;
-use model_core::blob::Metadata;
-use model_core::health::Limits;
+use taxel_core::blob::Metadata;
+use taxel_core::health::Limits;
 use taxel_data::{DataFile, Dataset, Table, columns};
 use taxel_learn::health::judge;
 use taxel_learn::{PreparedModel, outliers, relative};

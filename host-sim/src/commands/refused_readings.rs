@@ -2,7 +2,7 @@
 
 use super::stderr;
 use crate::subject::Subject;
-use model_core::health::{Fault, Limits};
+use taxel_core::health::{Fault, Limits};
 use taxel_data::error::cut;
 use taxel_data::{Stream, Table, columns};
 use taxel_learn::faults::{Grid, Place, diagnose};

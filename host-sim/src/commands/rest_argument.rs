@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::{Error, Result};
 use clap::Args;
-use model_core::blob::Metadata;
-use model_core::health::Limits;
+use taxel_core::blob::Metadata;
+use taxel_core::health::Limits;
 use taxel_data::rest;
 use taxel_data::{DataFile, Dataset, Rest, Table, columns};
 use taxel_learn::health::judge;

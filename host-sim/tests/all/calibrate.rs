@@ -5,13 +5,13 @@ use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
-use firmware::link::message::{Configuration, Setting};
-use firmware::readout::{
+use taxel_core::Wires;
+use taxel_data::{Silent, Stream};
+use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::link::message::{Configuration, Setting};
+use taxel_firmware::readout::{
     FrameSource, Mcp3208s, ScanReport, ScanSettings, Scanner, Selection, ShiftRegister595,
 };
-use model_core::Wires;
-use taxel_data::{Silent, Stream};
 use taxel_rig::Error;
 use taxel_rig::calibration::{CircuitConstants, Fit};
 use taxel_rig::device::Device;
@@ -274,7 +274,7 @@ fn the_image_keeps_settings_over_restarts() {
 }
 
 /// Runs `calibrate known.csv` and connects the resistors that it asks for; returns stdout.
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 fn calibrate_by_hand(
     folder: &Folder,
     port: &str,
@@ -319,7 +319,7 @@ fn calibrate_by_hand(
     String::from_utf8(output.stdout).unwrap()
 }
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 #[test]
 fn a_board_is_set_up_from_the_command_line_and_stays_so() {
     let folder = Folder::new("calibrate");

@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 
 use crate::common::{Folder, unrefined};
 use crate::virtual_device::Line;
-use firmware::link::message::{
+use taxel_core::blob::{Floats, ModelParts, encode_to_vec};
+use taxel_core::confidence::{Confidence, Sizes};
+use taxel_core::filter::Settings;
+use taxel_data::{Silent, Stream, Table};
+use taxel_firmware::link::message::{
     Configuration, EstimateReport, Refusal, Report, Request, UploadStep,
 };
-use model_core::blob::{Floats, ModelParts, encode_to_vec};
-use model_core::confidence::{Confidence, Sizes};
-use model_core::filter::Settings;
-use taxel_data::{Silent, Stream, Table};
 use taxel_learn::{Decoder, Exponential, Filtered, ModelBlob, Timing};
 use taxel_rig::Error;
 use taxel_rig::device::check::{Frames, Plan, check};
@@ -441,33 +441,36 @@ impl Wire for Full {
     }
 }
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 pub mod serial_port {
-    use serialport::{SerialPort, TTYPort};
+    use std::os::fd::AsRawFd;
+
+    use serial2::SerialPort;
 
     use super::*;
 
     /// Name of a pseudo-terminal with a device at its far end.
-    fn port(model: &ModelBlob) -> (String, TTYPort) {
+    fn port(model: &ModelBlob) -> (String, SerialPort) {
         port_with(model, frames())
     }
 
     /// Name of a pseudo-terminal with a device at its far end, whose sensor shows `frames`.
-    fn port_with(model: &ModelBlob, frames: Vec<[[f32; 18]; 8]>) -> (String, TTYPort) {
+    fn port_with(model: &ModelBlob, frames: Vec<[[f32; 18]; 8]>) -> (String, SerialPort) {
         let (name, near, far) = terminal();
         crate::virtual_device::run(far, SOUND, model.bytes(), frames);
         (name, near)
     }
 
     /// Name of a pseudo-terminal, and both its ends; the far one is for a device.
-    pub fn terminal() -> (String, TTYPort, Quick) {
-        let (mut far, near) = TTYPort::pair().unwrap();
-        far.set_timeout(std::time::Duration::from_millis(1)).unwrap();
-        (near.name().unwrap(), near, Quick(far))
+    pub fn terminal() -> (String, SerialPort, Quick) {
+        let (mut far, near) = SerialPort::pair().unwrap();
+        far.set_read_timeout(std::time::Duration::from_millis(1)).unwrap();
+        let name = std::fs::read_link(format!("/proc/self/fd/{}", near.as_raw_fd())).unwrap();
+        (name.to_string_lossy().into_owned(), near, Quick(far))
     }
 
     /// Port that answers a read without bytes like a socket does. Bytes that nobody reads are lost, as on a serial line.
-    pub struct Quick(TTYPort);
+    pub struct Quick(SerialPort);
 
     impl std::io::Read for Quick {
         fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {

@@ -2,9 +2,9 @@
 
 use std::fs;
 
-use model_core::AlignedBytes;
-use model_core::blob::Model;
-use model_core::rbf::Network;
+use taxel_core::AlignedBytes;
+use taxel_core::blob::Model;
+use taxel_core::rbf::Network;
 use taxel_data::Stream;
 use taxel_simulate::readout::Drive;
 use taxel_simulate::{World, synthesise};

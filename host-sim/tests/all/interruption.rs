@@ -8,11 +8,11 @@ use crate::common::{Folder, program, shell_status};
 use crate::device::serial_port::terminal;
 use crate::device::{frames, model};
 use crate::virtual_device;
-use firmware::link::message::{Configuration, Identity, KeyState, Memory, Report, Request};
-use firmware::link::receive::{Received, Receiver};
-use firmware::link::{cobs, packet};
-use model_core::blob::Floats;
-use model_core::checksum::CRC_32;
+use taxel_core::blob::Floats;
+use taxel_core::checksum::CRC_32;
+use taxel_firmware::link::message::{Configuration, Identity, KeyState, Memory, Report, Request};
+use taxel_firmware::link::receive::{Received, Receiver};
+use taxel_firmware::link::{cobs, packet};
 use taxel_rig::device::{Device, serial};
 
 /// Length of the leases.

@@ -4,9 +4,9 @@ mod validator;
 
 use std::collections::BTreeSet;
 
-use model_core::filter::Settings;
 use serde::Serialize;
 use serde_json::{Value, json};
+use taxel_core::filter::Settings;
 use taxel_data::Silent;
 use taxel_rig::device::check::{Plan, check};
 use taxel_rig::device::upload;

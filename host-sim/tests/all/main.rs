@@ -15,7 +15,7 @@ mod drift;
 mod export;
 mod gate;
 mod health;
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 mod interruption;
 mod json_schema;
 mod limit;

@@ -3,7 +3,7 @@
 use host_sim::evaluate::trade::{self, Bounds, Device, Plan, Trade};
 use host_sim::experiment::Experiment;
 use host_sim::subject::Subject;
-use model_core::filter::Settings;
+use taxel_core::filter::Settings;
 use taxel_data::Silent;
 use taxel_evaluate::moving::Moving;
 use taxel_learn::{Exponential, ModelBlob};

@@ -1,8 +1,8 @@
 //! The firmware's readout on the virtual board: a bound on what quantisation alone adds to a reading. docs/readout.md
 //! derives it, for readings without noise, cross-talk and series resistance.
 
-use firmware::circuit::{Divider, ZeroPotential};
 use taxel_data::Table;
+use taxel_firmware::circuit::{Divider, ZeroPotential};
 use taxel_simulate::World;
 use taxel_simulate::readout::{Circuit, Readout};
 use taxel_virtual_board::{SeriesResistance, VirtualBoard, all_readings};

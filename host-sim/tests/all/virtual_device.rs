@@ -2,14 +2,14 @@
 use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
-use firmware::app::{App, Buffers};
-use firmware::capacity::Capacity;
-use firmware::link::message::{Configuration, Memory};
-use firmware::platform::{Platform, Port};
-use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use firmware::store::Journal;
 use mock_board::Flash;
 use taxel_data::{Purpose, Random, Stream};
+use taxel_firmware::app::{App, Buffers};
+use taxel_firmware::capacity::Capacity;
+use taxel_firmware::link::message::{Configuration, Memory};
+use taxel_firmware::platform::{Platform, Port};
+use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use taxel_firmware::store::Journal;
 
 pub mod mailbox;
 

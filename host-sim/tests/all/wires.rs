@@ -5,12 +5,12 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{Configuration, Report};
-use firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use mock_board::blob_of_a_row;
-use model_core::blob::{Columns, Metadata, ModelShape};
-use model_core::{ColumnWires, Decoder};
+use taxel_core::blob::{Columns, Metadata, ModelShape};
+use taxel_core::{ColumnWires, Decoder};
 use taxel_data::{Purpose, Random, Silent, Stream};
+use taxel_firmware::link::message::{Configuration, Report};
+use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use taxel_rig::device::{Device, upload};
 use taxel_simulate::World;
 use taxel_simulate::readout::Readout;

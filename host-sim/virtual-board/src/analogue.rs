@@ -1,8 +1,8 @@
 //! Analogue half of the board: the voltage at each column's converter input.
 
-use firmware::circuit::{Divider, ZeroPotential};
-use firmware::timing::{OP_AMP_HZ, noise_gain, time_constant_ns};
 use taxel_data::{Purpose, Random, Stream};
+use taxel_firmware::circuit::{Divider, ZeroPotential};
+use taxel_firmware::timing::{OP_AMP_HZ, noise_gain, time_constant_ns};
 
 use super::fault::BoardFault;
 use super::network::{Tie, potentials_v};

@@ -3,10 +3,10 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::readout::{ScanSettings, Selection};
-use firmware::timing;
-use model_core::{ColumnWires, RowWire};
+use taxel_core::{ColumnWires, RowWire};
 use taxel_data::{BadValue, Error, Purpose, Random, Stream};
+use taxel_firmware::readout::{ScanSettings, Selection};
+use taxel_firmware::timing;
 
 use super::analogue::{Analogue, Parts, reference_v};
 use super::converters::{ColumnSelector, mcp3208_answer, mcp3208_column};

@@ -3,7 +3,7 @@
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
-use firmware::readout::OnChipAdc;
+use taxel_firmware::readout::OnChipAdc;
 
 use super::board::VirtualBoard;
 use super::pin::Pin;

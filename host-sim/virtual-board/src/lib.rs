@@ -9,7 +9,7 @@
 //! the world's readout asks for it. Quantisation always is, since the parts give counts.
 //!
 //! ```
-//! use firmware::readout::FrameSource;
+//! use taxel_firmware::readout::FrameSource;
 //! use taxel_simulate::World;
 //! use taxel_virtual_board::{SeriesResistance, VirtualBoard};
 //!

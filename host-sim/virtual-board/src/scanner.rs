@@ -2,8 +2,8 @@
 
 use std::array;
 
-use firmware::circuit::{Circuit, Divider, ZeroPotential};
-use firmware::readout::{
+use taxel_firmware::circuit::{Circuit, Divider, ZeroPotential};
+use taxel_firmware::readout::{
     ColumnSampler, DirectPins, FrameSource, Mcp3208s, MultiplexedAdc, Multiplexer4051, RowDrive,
     Scanner, ShiftRegister595,
 };

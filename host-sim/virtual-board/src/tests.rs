@@ -1,7 +1,7 @@
 use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::{Operation, SpiDevice};
-use firmware::readout::{ScanReport, ScanSettings};
-use firmware::timing::ScanPlan;
+use taxel_firmware::readout::{ScanReport, ScanSettings};
+use taxel_firmware::timing::ScanPlan;
 
 use super::*;
 use taxel_simulate::readout::{Circuit, Drive, Readout, Sampler};

@@ -5,7 +5,7 @@
 /// One line puts a model into a program:
 ///
 /// ```
-/// use model_core::{Aligned, Decoder};
+/// use taxel_core::{Aligned, Decoder};
 /// # macro_rules! include_bytes { ($file:literal) => {
 /// #     core::include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/hand-made.bin"))
 /// # } }
@@ -20,7 +20,7 @@ pub struct Aligned<T: ?Sized>(pub T);
 /// Bytes on the heap, at an address that the floats of a blob may be borrowed from.
 ///
 /// ```
-/// use model_core::AlignedBytes;
+/// use taxel_core::AlignedBytes;
 /// let mut bytes = AlignedBytes::copy_of(b"TAXL\x01");
 /// assert_eq!(bytes.as_ptr() as usize % 4, 0);
 /// bytes[4] = 2;

@@ -28,7 +28,7 @@ impl<'a> Columns<'a> {
     /// Index of the column called `name`, from 0; `None` if there is none.
     ///
     /// ```
-    /// use model_core::blob::Columns;
+    /// use taxel_core::blob::Columns;
     /// let names = Columns("r1e1_dx_mm\nr1e1_dy_mm\nr1e1_dz_mm");
     /// assert_eq!(names.position("r1e1_dz_mm"), Some(2));
     /// assert_eq!(names.position("r1e1"), None);
@@ -126,7 +126,7 @@ impl Metadata<'static> {
     /// If all rows together have more than 1024 inputs or 1024 outputs.
     ///
     /// ```
-    /// use model_core::blob::{Metadata, ModelShape};
+    /// use taxel_core::blob::{Metadata, ModelShape};
     /// let shape = ModelShape { rows: 2, inputs: 2, outputs: 1 };
     /// let metadata = Metadata { name: "made", ..Metadata::unnamed(shape) };
     /// assert_eq!(metadata.input_names.0, "x\nx\nx\nx");

@@ -22,7 +22,7 @@ impl Format {
     /// Every number format.
     ///
     /// ```
-    /// use model_core::rbf::Format;
+    /// use taxel_core::rbf::Format;
     /// let names = Format::ALL.map(Format::name);
     /// assert_eq!(names, ["f32-direct", "f32", "fixed16"]);
     /// ```
@@ -66,7 +66,7 @@ impl Format {
     /// The format whose [name](Self::name) is `name`, if there is one.
     ///
     /// ```
-    /// use model_core::rbf::Format;
+    /// use taxel_core::rbf::Format;
     /// assert_eq!(Format::from_name("fixed16"), Some(Format::Fixed16));
     /// assert_eq!(Format::from_name("f64"), None);
     /// ```

@@ -7,8 +7,8 @@ use std::hint::black_box;
 use std::path::PathBuf;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use model_core::rbf::{Network, Shape, direct, expanded, fixed16};
-use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
+use taxel_core::rbf::{Network, Shape, direct, expanded, fixed16};
+use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::Exponential;
 use taxel_learn::infer::infer;

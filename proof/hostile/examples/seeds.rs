@@ -5,20 +5,20 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
-use firmware::app::Session;
-use firmware::link::cobs;
-use firmware::link::message::{Configuration, Report, Request, Setting};
-use firmware::link::packet;
-use firmware::store::{Kind, Slot};
 use hostile::seal;
 use mock_board::{
     Bench, Flash, ask, blob, blob_of_components, blob_with_confidence, configure, quiet,
     request_bytes, upload_steps,
 };
-use model_core::blob::Floats;
-use model_core::rbf::Format;
+use taxel_core::blob::Floats;
+use taxel_core::rbf::Format;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
+use taxel_firmware::app::Session;
+use taxel_firmware::link::cobs;
+use taxel_firmware::link::message::{Configuration, Report, Request, Setting};
+use taxel_firmware::link::packet;
+use taxel_firmware::store::{Kind, Slot};
 use taxel_learn::train::train;
 use taxel_learn::{Options, Origin, fill, pack, relative};
 use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};

@@ -3,10 +3,10 @@
 //! A model that is taken for sound must decode any frame to numbers or to a status that says why not, the same on a
 //! host and on a device, to the bit.
 
-use model_core::blob::Model;
-use model_core::exp::{ExpKernel, Libm, Micromath};
-use model_core::relative::reciprocal;
-use model_core::{Decoder, Estimate, Frame, RowStatus};
+use taxel_core::blob::Model;
+use taxel_core::exp::{ExpKernel, Libm, Micromath};
+use taxel_core::relative::reciprocal;
+use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 use taxel_learn::{Exponential, ModelBlob};
 
 use crate::draws::Draws;

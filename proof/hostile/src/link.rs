@@ -7,17 +7,17 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::app::{Session, SessionEnd};
-use firmware::link::cobs;
-use firmware::link::message::Request;
-use firmware::link::packet::PROTOCOL_VERSION;
-use firmware::seal::Key;
-use firmware::store::Kind;
 use mock_board::{
     Bench, Board, Flash, Memory, Running, TestFrame, blob, crc_of, model_crc, quiet, request_bytes,
     upload_steps,
 };
-use model_core::AlignedBytes;
+use taxel_core::AlignedBytes;
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::link::cobs;
+use taxel_firmware::link::message::Request;
+use taxel_firmware::link::packet::PROTOCOL_VERSION;
+use taxel_firmware::seal::Key;
+use taxel_firmware::store::Kind;
 
 use crate::seal;
 

@@ -1,8 +1,8 @@
 //! Bytes on the line: COBS frames, packets and messages. The first byte says what the rest is.
 
-use firmware::link::message::{Report, Request};
-use firmware::link::receive::{Received, Receiver};
-use firmware::link::{cobs, packet};
+use taxel_firmware::link::message::{Report, Request};
+use taxel_firmware::link::receive::{Received, Receiver};
+use taxel_firmware::link::{cobs, packet};
 
 use crate::seal;
 

@@ -1,8 +1,8 @@
 //! Bytes closed by the length and the CRC that a reader asks for, as someone does who means harm.
 
-use model_core::AlignedBytes;
-use model_core::blob::FORMAT_VERSION;
-use model_core::checksum::CRC_32;
+use taxel_core::AlignedBytes;
+use taxel_core::blob::FORMAT_VERSION;
+use taxel_core::checksum::CRC_32;
 
 /// Bytes of a blob before its body: magic, version and length.
 pub const PREFIX_BYTES: usize = 9;

@@ -1,9 +1,9 @@
 //! What the journal holds when the device starts: any bytes in its pages, or any bytes that are kept as a setting. The device must start, take nothing that is out of range, and answer.
 
-use firmware::app::Session;
-use firmware::link::message::{Report, Request, Setting};
-use firmware::store::{Journal, PAGE_BYTES};
 use mock_board::{Bench, Board, Flash, Memory, ask, blob, crc_of, model_crc, quiet};
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{Report, Request, Setting};
+use taxel_firmware::store::{Journal, PAGE_BYTES};
 
 /// Turns of the loop that the application takes on such settings.
 const TURNS: usize = 20;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use model_core::AlignedBytes;
+use taxel_core::AlignedBytes;
 
 /// Programs built by `cargo xtask torture`.
 #[derive(Debug)]

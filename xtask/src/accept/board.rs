@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use firmware::timing::NUCLEO_BAUD;
+use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_rig::device::{Device, serial};
 
 use crate::board::{Emulator, Options};

@@ -1,7 +1,7 @@
 //! What the file of a board holds.
 
-use firmware::link::message::Memory;
 use serde::Serialize;
+use taxel_firmware::link::message::Memory;
 
 /// Largest difference of the emulated board's scan from its plan, as a share.
 const SCAN_OFF: f64 = 0.03;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use firmware::link::message::{Report, Request};
 use taxel_data::DataFile;
+use taxel_firmware::link::message::{Report, Request};
 use taxel_rig::device::Device;
 
 use super::record::Beside;

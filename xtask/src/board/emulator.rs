@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use firmware::timing::ScanPlan;
+use taxel_firmware::timing::ScanPlan;
 
 use super::Options;
 use super::copy;

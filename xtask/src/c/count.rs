@@ -59,7 +59,7 @@ pub fn print(models: &[Model], folder: &Path, build: &Build) -> Outcome {
             own.cycles,
             times(count.cycles, own.cycles)
         );
-        if model.format == model_core::rbf::Format::Fixed16 && of_instructions > MOST_OF_FIXED16 {
+        if model.format == taxel_core::rbf::Format::Fixed16 && of_instructions > MOST_OF_FIXED16 {
             failed.push(format!("{}: {of_instructions:.2} times the instructions", model.name()));
         }
     }

@@ -1,13 +1,13 @@
-//! Frames for a model, ordinary and hostile, and what model-core makes of each: the file that the harness reads.
+//! Frames for a model, ordinary and hostile, and what taxel-core makes of each: the file that the harness reads.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use model_core::blob::ModelShape;
-use model_core::gate::Rest;
-use model_core::relative::reciprocal;
-use model_core::{Decoder, Frame, Gate, OwnedEstimate, RowStatus};
+use taxel_core::blob::ModelShape;
+use taxel_core::gate::Rest;
+use taxel_core::relative::reciprocal;
+use taxel_core::{Decoder, Frame, Gate, OwnedEstimate, RowStatus};
 
 use super::models::Model;
 use crate::process::Outcome;

@@ -1,7 +1,7 @@
 //! Models that are exported and tried: three shapes, each in every number format.
 
-use model_core::rbf::Format;
 use rayon::prelude::*;
+use taxel_core::rbf::Format;
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;

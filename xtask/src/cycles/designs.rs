@@ -2,11 +2,11 @@
 
 use std::ops::RangeInclusive;
 
-use model_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
-use model_core::expansion::Expansion;
-use model_core::projection::Projection;
-use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
-use model_core::scale::UNITS;
+use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::expansion::Expansion;
+use taxel_core::projection::Projection;
+use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::scale::UNITS;
 use taxel_data::{Purpose, Random, Stream};
 use taxel_learn::cost::{Design, NetworkDesign};
 

@@ -4,9 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use model_core::rbf::Format;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use taxel_core::rbf::Format;
 use taxel_learn::cost::{Cost, Design, Gating, Price, Prices, Terms, filter_terms, terms};
 use taxel_learn::{Exponential, ModelBlob};
 

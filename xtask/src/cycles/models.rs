@@ -4,9 +4,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use model_core::blob::{ModelParts, encode_to_vec};
-use model_core::rbf::Format;
 use rayon::prelude::*;
+use taxel_core::blob::{ModelParts, encode_to_vec};
+use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Silent, Stream};
 use taxel_learn::{ModelBlob, Options, Origin, pack, train as trainer};
 use taxel_simulate::{Synthesis, World};

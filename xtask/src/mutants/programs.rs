@@ -241,7 +241,7 @@ pub fn full_name(copy: &Copy, test: &Test) -> String {
     let stem = file.rsplit_once('-').map_or(&*file, |(stem, _)| stem);
     let package = Path::new(crate_folder).file_name().unwrap_or_default().to_string_lossy();
     debug_assert!(root().join(crate_folder).exists());
-    if stem.replace('_', "-").trim_start_matches("taxel-") == package {
+    if stem.starts_with("taxel_") || stem.replace('_', "-") == package {
         format!("{package} {}", test.name)
     } else {
         format!("{package}/{stem} {}", test.name)

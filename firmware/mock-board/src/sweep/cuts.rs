@@ -1,9 +1,9 @@
 //! Cuts of the power in whatever changes flash: uploads, undos, settings that are kept, keys that are set.
 
-use firmware::seal::{KEY_BYTES, Key};
-use firmware::store::{ConfirmedModels, KeyFound, Kind, PAGE_BYTES};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_firmware::seal::{KEY_BYTES, Key};
+use taxel_firmware::store::{ConfirmedModels, KeyFound, Kind, PAGE_BYTES};
 
 use super::{Cuts, SLOT_WORDS};
 use crate::device::Device;

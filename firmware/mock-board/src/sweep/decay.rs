@@ -1,10 +1,10 @@
 //! Slots that decay or wear out, after an upload that ended in any way.
 
-use firmware::link::message::{Refusal, UploadStep};
-use firmware::store::{PAGE_BYTES, Slot};
-use model_core::AlignedBytes;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_core::AlignedBytes;
+use taxel_firmware::link::message::{Refusal, UploadStep};
+use taxel_firmware::store::{PAGE_BYTES, Slot};
 
 use super::SLOT_WORDS;
 use crate::device::{Device, confirmed, confirmed_steps, trial_steps};

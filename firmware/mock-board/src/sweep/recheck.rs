@@ -3,13 +3,13 @@
 
 use std::fmt::Debug;
 
-use firmware::app::{Session, SessionEnd};
-use firmware::link::message::{Configuration, EstimateReport, Report, Request};
-use firmware::store::Slot;
-use model_core::blob::Floats;
-use model_core::{AlignedBytes, Decoder};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_core::blob::Floats;
+use taxel_core::{AlignedBytes, Decoder};
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request};
+use taxel_firmware::store::Slot;
 
 use crate::bench::{Bench, Memory, Running};
 use crate::board::Board;

@@ -1,9 +1,9 @@
 //! Requests to a device with a key: only what was sealed with it, for this device and just now, changes anything.
 
-use firmware::link::message::{Refusal, Report, Request, SealFault, Setting, UploadStep};
-use firmware::seal::{KEY_BYTES, Key, tag};
-use firmware::store::Slot;
-use model_core::blob::Floats;
+use taxel_core::blob::Floats;
+use taxel_firmware::link::message::{Refusal, Report, Request, SealFault, Setting, UploadStep};
+use taxel_firmware::seal::{KEY_BYTES, Key, tag};
+use taxel_firmware::store::Slot;
 
 use crate::bench::{Running, quiet};
 use crate::board::Board;

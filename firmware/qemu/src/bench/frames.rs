@@ -3,14 +3,14 @@
 use core::hint::black_box;
 
 use defmt::{assert, unwrap};
-use model_core::blob::{Model, ModelShape};
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use model_core::filter::{Settings, State};
-use model_core::gate::{Gate, Rest};
-use model_core::rbf::Format;
-use model_core::relative::reciprocal;
-use model_core::{Decoder, Estimate, RowStatus};
 use qemu_image::checks::Numbers;
+use taxel_core::blob::{Model, ModelShape};
+use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
+use taxel_core::filter::{Settings, State};
+use taxel_core::gate::{Gate, Rest};
+use taxel_core::rbf::Format;
+use taxel_core::relative::reciprocal;
+use taxel_core::{Decoder, Estimate, RowStatus};
 
 use super::region::region;
 use super::{BASELINE_OHM, inputs};
@@ -75,7 +75,7 @@ impl Outcome {
     fn decode<E: ExpKernel>(
         &mut self,
         decoder: &Decoder<'_, MOST_ROWS>,
-        frame: model_core::Frame<'_>,
+        frame: taxel_core::Frame<'_>,
         scratch: &mut [f32],
     ) {
         let mut estimate = self.estimate();
@@ -140,7 +140,7 @@ impl Bench<'_> {
     #[inline(never)] // so that the stack holds the values of one exponential at a time
     fn measure<E: ExpKernel, const GATED: bool>(&mut self, name: &str) {
         let Self { decoder, frame, far_baseline, reciprocals, rest, outcome, scratch } = self;
-        let given = |readings_ohm, gate| model_core::Frame { readings_ohm, reciprocals, gate };
+        let given = |readings_ohm, gate| taxel_core::Frame { readings_ohm, reciprocals, gate };
         rest.decode::<E>(decoder, given(frame, None), scratch);
         // What the sensor shows at rest, if this is its baseline.
         let gate = |baseline_ohm| {
@@ -186,7 +186,7 @@ impl Bench<'_> {
     #[inline(never)]
     fn assess(&mut self, name: &str, arena: &mut Arena) {
         let deviation = arena.take(self.rest.outputs.len());
-        let frame = model_core::Frame {
+        let frame = taxel_core::Frame {
             readings_ohm: self.frame,
             reciprocals: self.reciprocals,
             gate: None,

@@ -1,9 +1,9 @@
 //! The frames that are decoded: the same for every number format and exponential.
 
-use model_core::blob::Model;
-use model_core::projection::Projection;
-use model_core::rbf::Network;
 use qemu_image::checks::Numbers;
+use taxel_core::blob::Model;
+use taxel_core::projection::Projection;
+use taxel_core::rbf::Network;
 
 use super::BASELINE_OHM;
 

@@ -2,9 +2,9 @@
 
 use core::marker::PhantomData;
 
-use model_core::blob::Model;
-use model_core::exp::ExpKernel;
-use model_core::rbf::{Format, Network};
+use taxel_core::blob::Model;
+use taxel_core::exp::ExpKernel;
+use taxel_core::rbf::{Format, Network};
 
 /// Number of readings a row, as in the paper's sensor.
 pub const COLS: usize = 18;

@@ -15,13 +15,13 @@ use core::hint::black_box;
 use board_common::region::take_weights;
 use cortex_m_rt::entry;
 use defmt::{info, unwrap};
-use model_core::blob::Model;
-use model_core::exp::{Libm, Micromath, Polynomial};
-use model_core::rbf::{Format, Network};
-use model_core::scale::UNITS;
 use qemu_image::checks::Numbers;
 use qemu_image::exit;
 use qemu_image::slot::Slot;
+use taxel_core::blob::Model;
+use taxel_core::exp::{Libm, Micromath, Polynomial};
+use taxel_core::rbf::{Format, Network};
+use taxel_core::scale::UNITS;
 
 use frames::Arena;
 use kernel::{COLS, F32, F32Direct, Fixed16, Formatted, Kernel, OUTPUTS, Portable};

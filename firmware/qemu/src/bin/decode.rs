@@ -5,10 +5,10 @@
 
 use cortex_m_rt::entry;
 use defmt::{assert, debug, info, unwrap};
-use model_core::Aligned;
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use qemu_image::memory::{Sections, stack_high_water_bytes};
 use qemu_image::{checks, exit};
+use taxel_core::Aligned;
+use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 
 static MODEL: Aligned<[u8; include_bytes!("../../../../testdata/hand-made.bin").len()]> =
     Aligned(*include_bytes!("../../../../testdata/hand-made.bin"));

@@ -5,8 +5,8 @@
 
 use cortex_m_rt::entry;
 use defmt::{Display2Format, info, unwrap};
-use model_core::Aligned;
 use qemu_image::{exit, fixed};
+use taxel_core::Aligned;
 
 static HAND_MADE: Aligned<[u8; include_bytes!("../../../../testdata/hand-made.bin").len()]> =
     Aligned(*include_bytes!("../../../../testdata/hand-made.bin"));

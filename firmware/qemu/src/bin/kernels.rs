@@ -10,8 +10,8 @@ use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use defmt::{Display2Format, assert_eq, info, unwrap};
-use model_core::Aligned;
 use qemu_image::{checks, exit};
+use taxel_core::Aligned;
 
 /// Makes `model`, which gives the bytes of these models in testdata, aligned.
 macro_rules! models {

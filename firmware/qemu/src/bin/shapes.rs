@@ -5,9 +5,9 @@
 
 use cortex_m_rt::entry;
 use defmt::{info, unwrap};
-use model_core::rbf::Format;
 use qemu_image::exit;
 use qemu_image::shapes::{self, Comparison, Memory};
+use taxel_core::rbf::Format;
 
 fn log(what: &str, comparison: Comparison) {
     let Comparison { compared, different } = comparison;

@@ -1,7 +1,7 @@
 //! Gating: the work saved by skipping untouched rows, and the touches missed.
 
-use model_core::gate::is_at_rest;
 use serde::Serialize;
+use taxel_core::gate::is_at_rest;
 use taxel_data::{BadValue, Progress, Stream, Table};
 use taxel_learn::cost::Frames;
 use taxel_learn::decoders::mean;

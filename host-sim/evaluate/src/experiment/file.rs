@@ -64,8 +64,8 @@ fn default_stiffness() -> Vector3 {
 
 /// Number format by its name.
 pub(super) mod format {
-    use model_core::rbf::Format;
     use serde::{Deserialize, Deserializer, de::Error};
+    use taxel_core::rbf::Format;
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Format, D::Error> {
         let name = String::deserialize(deserializer)?;

@@ -6,7 +6,7 @@ use super::*;
 
 #[test]
 fn embedded_scenes_are_sound_and_named_as_they_are_called() {
-    for (name, _) in EMBEDDED {
+    for (name, _) in taxel_scenes::ALL {
         let scene = Experiment::load(name).unwrap();
         assert_eq!(scene.name, name);
         assert_eq!(scene.world.read_rows, (0..8).collect::<Vec<_>>());
@@ -31,20 +31,20 @@ fn listed_positions_replace_the_cells() {
         "resistance_ohm_per_mm = 250.0\nstiffness_n_per_mm = [0.5, 0.6, 3.0]\n\
          upper_electrodes_mm = [{upper}]"
     );
-    let text = EMBEDDED[1].1.replace("resistance_ohm_per_mm = 100.0", &listed);
+    let text = taxel_scenes::ALL[1].1.replace("resistance_ohm_per_mm = 100.0", &listed);
     let scene = Experiment::parse("test", &text).unwrap().world;
     assert_eq!(scene.sensor.upper_electrodes_mm[47], [47.5, 1.0, 6.0]);
     assert_eq!(scene.sensor.stiffness_n_per_mm, [0.5, 0.6, 3.0]);
     let default = Experiment::load("press").unwrap().world;
     assert_eq!(scene.sensor.lower_electrodes_mm, default.sensor.lower_electrodes_mm);
     let digest = |text: &str| Experiment::parse("test", text).unwrap().digest;
-    assert_ne!(digest(&text), digest(EMBEDDED[1].1));
+    assert_ne!(digest(&text), digest(taxel_scenes::ALL[1].1));
 }
 
 #[test]
 fn electrodes_that_would_touch_are_refused() {
     let upper = (0..48).map(|i| format!("[{i}.5, 1.0, 0.5]")).collect::<Vec<_>>().join(", ");
-    let text = EMBEDDED[0].1.replace(
+    let text = taxel_scenes::ALL[0].1.replace(
         "resistance_ohm_per_mm = 100.0",
         &format!("resistance_ohm_per_mm = 100.0\nupper_electrodes_mm = [{upper}]"),
     );
@@ -54,7 +54,7 @@ fn electrodes_that_would_touch_are_refused() {
 
 #[test]
 fn forces_have_their_own_full_scale_and_values() {
-    let text = EMBEDDED[0]
+    let text = taxel_scenes::ALL[0]
         .1
         .replace("quantity = \"deformation\"", "quantity = \"force\"")
         .replace("axes = [\"x\", \"y\", \"z\"]", "axes = [\"x\", \"z\"]");
@@ -81,7 +81,7 @@ fn full_scales_of_a_contact_are_the_face_and_the_largest_contact() {
 fn a_readout_changes_nothing_that_is_synthesised() {
     let read = "[readout]\nrow_wires = [2, 7]\ncircuit = \"divider\"\ncross_talk = true\n\
                 row_switch_ohm = 0.4\nadc_bits = 10\noversampling = 4\n\n[outputs]";
-    let text = EMBEDDED[1].1.replace("[outputs]", read);
+    let text = taxel_scenes::ALL[1].1.replace("[outputs]", read);
     let scene = Experiment::parse("test", &text).unwrap().world;
     assert_eq!(scene.read_rows, [1, 6]);
     let expected = Readout {
@@ -109,7 +109,7 @@ fn counts_are_checked_before_memory_is_taken_for_them() {
         ("sensor.electrodes_per_column_wire", column, "1001"),
     ] {
         let name = count.split(" = ").next().unwrap();
-        let text = EMBEDDED[1].1.replace(count, &format!("{name} = {huge}"));
+        let text = taxel_scenes::ALL[1].1.replace(count, &format!("{name} = {huge}"));
         let refused = Experiment::parse("test", &text).unwrap_err().to_string();
         assert!(refused.contains(&format!("{field} = {huge}: it must be from 1 to")), "{refused}");
     }
@@ -121,7 +121,7 @@ fn electrodes_and_frames_whose_computing_takes_hours_are_refused() {
     let wires = |electrodes: u32| {
         format!("\ncolumn_wires = 10000\nelectrodes_per_column_wire = {electrodes}")
     };
-    let huge = EMBEDDED[1].1.replace(of_columns, &wires(1000));
+    let huge = taxel_scenes::ALL[1].1.replace(of_columns, &wires(1000));
     let refused = Experiment::parse("test", &huge).unwrap_err().to_string();
     assert!(refused.contains("48 × 10000000 electrodes"), "{refused}");
     let one = huge.replace("\nrow_wires = 8", "\nrow_wires = 1");

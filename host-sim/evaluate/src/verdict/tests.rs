@@ -4,7 +4,7 @@ use taxel_learn::outliers::Outliers;
 use taxel_limit::reference::GroupLimit;
 use taxel_simulate::noise::{Noise, NoiseKind};
 
-use model_core::blob::ModelShape;
+use taxel_core::blob::ModelShape;
 
 use super::*;
 

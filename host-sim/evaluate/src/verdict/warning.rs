@@ -1,12 +1,12 @@
 //! Warnings, each by a name of its own.
 
-use firmware::capacity::Capacity;
-use model_core::blob::Model;
-use model_core::rbf::Format;
 use serde::Serialize;
+use taxel_core::blob::Model;
+use taxel_core::rbf::Format;
 use taxel_data::Table;
 use taxel_data::error::cut;
 use taxel_data::spectrum::{self, NoiseColour};
+use taxel_firmware::capacity::Capacity;
 use taxel_learn::cost::{Design, NetworkDesign};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::train::projection;

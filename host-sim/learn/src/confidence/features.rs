@@ -1,7 +1,7 @@
 //! Features that the density of frames is modelled in: directions of the largest variance, and what they leave out.
 
-use model_core::confidence::project;
 use nalgebra::DMatrix;
+use taxel_core::confidence::project;
 use taxel_data::Table;
 
 use crate::parallel;

@@ -1,4 +1,4 @@
-use model_core::Decoder;
+use taxel_core::Decoder;
 use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_simulate::{World, synthesise};
 

@@ -1,8 +1,8 @@
 //! What the cost of decoding depends on: sizes and options of a model, without its numbers.
 
-use firmware::capacity::WEIGHT_RAM_BYTES;
-use model_core::blob::ModelShape;
-use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::blob::ModelShape;
+use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_firmware::capacity::WEIGHT_RAM_BYTES;
 
 use crate::packing::ModelBlob;
 

@@ -1,7 +1,7 @@
 //! RAM for decoding on a 32-bit device.
 
-use model_core::rbf::Format;
 use serde::Serialize;
+use taxel_core::rbf::Format;
 
 use super::design::Design;
 
@@ -40,7 +40,7 @@ impl DecoderRam {
         };
         let activations = design.networks.iter().map(|it| batch(it.format, it.shape.centres));
         Self {
-            decoder: model_core::decoder_ram_bytes(shape.rows),
+            decoder: taxel_core::decoder_ram_bytes(shape.rows),
             frame: shape.rows * readings,
             estimate: shape.rows * (shape.outputs * float + 1),
             scaled_readings: if design.projection { features } else { readings },

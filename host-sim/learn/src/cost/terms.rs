@@ -6,8 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use model_core::blob::ModelShape;
-use model_core::rbf::{Format, Shape};
+use taxel_core::blob::ModelShape;
+use taxel_core::rbf::{Format, Shape};
 
 use super::{Design, Gating, NetworkDesign};
 use crate::infer::Exponential;

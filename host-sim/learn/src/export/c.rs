@@ -1,7 +1,7 @@
 //! Models as a library in C99: one source file with its header, and what CMake, Arduino, PlatformIO and Zephyr ask for.
 //!
 //! The code stands in `c/source` as templates, what lies around it in `c/library`. Here parts are chosen and numbers are
-//! printed. The C code repeats the arithmetic of model-core operation by operation.
+//! printed. The C code repeats the arithmetic of taxel-core operation by operation.
 
 mod name;
 mod template;

@@ -2,13 +2,13 @@
 
 use std::fmt::{self, Write as _};
 
-use model_core::blob::Model;
-use model_core::rbf::direct::{self, Parameters};
-use model_core::rbf::{Format, Network};
+use taxel_core::blob::Model;
+use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::{Format, Network};
 
 use super::text::{columns, rows_of};
 
-/// Part of a model that [`Fixed`](model_core::Fixed) has no room for.
+/// Part of a model that [`Fixed`](taxel_core::Fixed) has no room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unheld {
     /// Projection of all readings to one network's inputs, with or without an expansion of its outputs.
@@ -35,8 +35,8 @@ impl fmt::Display for Unheld {
     }
 }
 
-/// Rust source of a `model`: a static [`Fixed`](model_core::Fixed) for each network, and a function `decode` from the
-/// readings of a frame to its outputs, with the bits that [`Decoder`](model_core::Decoder) gives.
+/// Rust source of a `model`: a static [`Fixed`](taxel_core::Fixed) for each network, and a function `decode` from the
+/// readings of a frame to its outputs, with the bits that [`Decoder`](taxel_core::Decoder) gives.
 ///
 /// The static of a row-wire is called `ROW_1`, `ROW_2` and so on; rows that share a network share the first one's.
 /// Numbers are written with the digits that tell them from their neighbours in f32.
@@ -85,7 +85,7 @@ fn header(model: &Model<'_>) -> String {
          //     let outputs: {outputs} = model::decode(&readings); // readings: {inputs}\n\
          // Readings, row after row, with their units:\n{}\
          // Outputs, row after row, with their units:\n{}\
-         use model_core::Fixed;\n",
+         use taxel_core::Fixed;\n",
         metadata.name,
         model.crc(),
         columns(metadata.input_names, metadata.input_units),

@@ -1,6 +1,6 @@
 //! What all languages say of a model.
 
-use model_core::blob::{Columns, Model};
+use taxel_core::blob::{Columns, Model};
 
 /// Lines of a comment on columns with their units, each behind `start`; columns that are alike and follow each other
 /// share one. Names are passed through `shown`.

@@ -1,7 +1,7 @@
 //! What a frame's other readings tell of each, by a model's fill, whatever the noise.
 
-use model_core::fill::Fill;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use taxel_core::fill::Fill;
 
 use super::FEWEST_FOR_NOISE;
 

@@ -1,6 +1,6 @@
 //! Faults that the health of readings alone tells.
 
-use model_core::health::{Fault, Limits};
+use taxel_core::health::{Fault, Limits};
 
 use super::Grid;
 use super::wire_fault::{Kind, Place, WireFault};

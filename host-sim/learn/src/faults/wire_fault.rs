@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use model_core::health::Fault;
 use serde::{Serialize, Serializer};
+use taxel_core::health::Fault;
 
 /// Wires of a fault, numbered as their names are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

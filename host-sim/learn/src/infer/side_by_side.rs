@@ -1,10 +1,10 @@
 //! Inference of networks in f32 with expanded distances, several lines side by side: the bits of
-//! [`model_core::rbf::expanded`], several times as fast.
+//! [`taxel_core::rbf::expanded`], several times as fast.
 
-use model_core::exp::exp2;
-use model_core::rbf::expanded::{self, Parameters};
-use model_core::rbf::{Network, Shape};
-use model_core::scale::clamp_units;
+use taxel_core::exp::exp2;
+use taxel_core::rbf::expanded::{self, Parameters};
+use taxel_core::rbf::{Network, Shape};
+use taxel_core::scale::clamp_units;
 
 use super::{read, write};
 

@@ -2,11 +2,11 @@
 
 use std::f64::consts::LN_2;
 
-use model_core::rbf::fixed16::{
+use taxel_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, HIGHEST_ACTIVATION, words_at_once,
 };
-use model_core::rbf::{Network, Shape, direct, expanded, fixed16};
-use model_core::scale::{CLAMP, HALF_RANGE, UNITS, UNITS_PER_STEP};
+use taxel_core::rbf::{Network, Shape, direct, expanded, fixed16};
+use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS, UNITS_PER_STEP};
 
 /// One of [`UNITS`], in spans of the training range.
 const SPANS_PER_UNIT: f64 = HALF_RANGE as f64 / UNITS as f64;

@@ -1,7 +1,7 @@
 //! `cargo test -p taxel-learn recalibration -- --include-ignored --nocapture` prints the figures of docs/recalibration.md.
 
-use model_core::blob::{Floats, Metadata, ModelParts, encode_to_vec};
-use model_core::rbf::{Format, Shape};
+use taxel_core::blob::{Floats, Metadata, ModelParts, encode_to_vec};
+use taxel_core::rbf::{Format, Shape};
 use taxel_data::{Dataset, Purpose, Random, Silent, Stream};
 use taxel_simulate::{Synthesis, World, synthesise};
 

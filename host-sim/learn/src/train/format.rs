@@ -6,8 +6,8 @@
 
 use std::cell::OnceCell;
 
-use model_core::expansion::Expansion;
-use model_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
+use taxel_core::expansion::Expansion;
+use taxel_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
 use taxel_data::{RowTable, Table};
 

@@ -1,8 +1,8 @@
 //! Gaussians of a network: centres, and widths by a rule. One for all centres, or one for each by the distance to its
 //! neighbours.
 
-use model_core::rbf::Format;
 use serde::{Deserialize, Serialize};
+use taxel_core::rbf::Format;
 use taxel_data::BadValue;
 
 use super::squared_distance;

@@ -2,11 +2,11 @@
 //!
 //! The weights minimise Σ_t ‖y_t − Wᵀh_t‖² + ‖W‖²/δ. The recursion ([`Recursion`]) from covariance δ·I without
 //! forgetting arrives at the same weights sample by sample, and the device can go on from there
-//! ([`model_core::rls`]). Taking many samples at once ([`Decomposed`]) changes the order of rounding only.
+//! ([`taxel_core::rls`]). Taking many samples at once ([`Decomposed`]) changes the order of rounding only.
 
 use std::ops::Range;
 
-use model_core::rls;
+use taxel_core::rls;
 
 use crate::parallel;
 

@@ -10,8 +10,8 @@
 //!
 //! Centres and widths are given, wherever they come from, and are those for all outputs.
 
-use model_core::expansion::Expansion;
 use nalgebra::DMatrix;
+use taxel_core::expansion::Expansion;
 use taxel_data::{BadValue, RowTable, Table, require};
 
 use super::format::{self, FittedNetwork, Targets};

@@ -13,8 +13,8 @@
 
 use std::borrow::Cow;
 
-use model_core::projection::Projection;
 use nalgebra::DMatrix;
+use taxel_core::projection::Projection;
 use taxel_data::{Dataset, Table, require, widest};
 
 use super::principal;

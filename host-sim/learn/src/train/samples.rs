@@ -1,6 +1,6 @@
 //! Samples of one network, scaled as the device scales them, and what is fitted to them.
 
-use model_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
+use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
 use taxel_data::{Purpose, Random, RowTable, Stream};
 
 use super::{HiddenLayer, Options, kmeans};

@@ -7,10 +7,10 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use model_core::expansion::Expansion;
-use model_core::rbf::Format;
 use rayon::prelude::*;
 use serde::Serialize;
+use taxel_core::expansion::Expansion;
+use taxel_core::rbf::Format;
 use taxel_data::{BadValue, Dataset, Progress, RowTable, Table, require};
 
 use super::format::{self, FittedNetwork, Held, Targets, expanded_f32};

@@ -1,8 +1,8 @@
 //! A real, trained blob, damaged in every way there is: each damage is rejected with a specific error.
 
-use model_core::blob::{DecodeError, Model};
-use model_core::rbf::{Format, Network};
-use model_core::{AlignedBytes, Decoder};
+use taxel_core::blob::{DecodeError, Model};
+use taxel_core::rbf::{Format, Network};
+use taxel_core::{AlignedBytes, Decoder};
 use taxel_data::{Silent, Stream};
 use taxel_learn::cost::Design;
 use taxel_learn::train::{Widths, train};

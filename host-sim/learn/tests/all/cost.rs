@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use model_core::blob::ModelShape;
-use model_core::rbf::Format;
+use taxel_core::blob::ModelShape;
+use taxel_core::rbf::Format;
 use taxel_learn::Exponential;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices, kernel_name};
 

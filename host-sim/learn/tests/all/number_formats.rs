@@ -1,8 +1,8 @@
 //! Loss of accuracy by number formats: the same centres fitted and evaluated in f64, in f32 and in 16-bit
 //! fixed point, on both reference scenes, by axis. Figures: `cargo test -p taxel-learn --test all number_formats -- --nocapture`.
 
-use model_core::rbf::Format;
 use rayon::prelude::*;
+use taxel_core::rbf::Format;
 use taxel_data::{RowTable, Silent, Stream, Table, columns};
 use taxel_learn::infer::infer;
 use taxel_learn::train::least_squares::{Factor, Regressors};

@@ -1,6 +1,6 @@
 //! Models with inputs relative to the baseline: what they take, and what cancels in it.
 
-use model_core::blob::Model;
+use taxel_core::blob::Model;
 use taxel_data::{Dataset, Silent, Stream};
 use taxel_learn::train::train;
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, PreparedModel, pack, relative};
@@ -38,7 +38,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// Outputs by model-core alone: its arithmetic of ratios, then its networks, line after line.
+/// Outputs by taxel-core alone: its arithmetic of ratios, then its networks, line after line.
 fn by_model_core(model: &Model<'_>, readings: &[f64], baseline: &[f64]) -> Vec<f64> {
     let mut all = Vec::new();
     for line in readings.chunks_exact(READINGS) {
@@ -48,7 +48,7 @@ fn by_model_core(model: &Model<'_>, readings: &[f64], baseline: &[f64]) -> Vec<f
             let (mut scaled, mut outputs) = ([0.0; 18], [0.0; 18]);
             let inputs = &ratios[row * 18..][..18];
             network
-                .infer_with::<model_core::exp::Polynomial>(inputs, &mut scaled, &mut outputs)
+                .infer_with::<taxel_core::exp::Polynomial>(inputs, &mut scaled, &mut outputs)
                 .unwrap();
             all.extend(outputs.map(f64::from));
         }

@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{Configuration, Report};
-use firmware::readout::ScanSettings;
-use model_core::Wires;
+use taxel_core::Wires;
 use taxel_data::Progress;
+use taxel_firmware::link::message::{Configuration, Report};
+use taxel_firmware::readout::ScanSettings;
 
 use super::Device;
 use crate::calibration::{Arrangement, Fit, fit};

@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{Report, Request, Statistics};
-use model_core::filter::Settings;
 use serde::Serialize;
+use taxel_core::filter::Settings;
 use taxel_data::{Progress, Purpose, Random, Silent, Stream};
+use taxel_firmware::link::message::{Report, Request, Statistics};
 use taxel_learn::ModelBlob;
 
 pub use super::expected::Frames;

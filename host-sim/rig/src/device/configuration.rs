@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{Configuration, Report, Request};
 use serde::Serialize;
+use taxel_firmware::link::message::{Configuration, Report, Request};
 
 use super::Device;
 use crate::error::{Error, Result};

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use firmware::link::message::{Configuration, EstimateReport};
-use model_core::blob::Model;
-use model_core::filter::{Settings, State};
-use model_core::relative::reciprocal;
-use model_core::{Decoder, Frame};
+use taxel_core::blob::Model;
+use taxel_core::filter::{Settings, State};
+use taxel_core::relative::reciprocal;
+use taxel_core::{Decoder, Frame};
 use taxel_data::{Progress, Table};
+use taxel_firmware::link::message::{Configuration, EstimateReport};
 use taxel_learn::filtered::filter_frames;
 use taxel_learn::{Exponential, ModelBlob};
 
@@ -189,7 +189,7 @@ fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<E
 
 #[cfg(test)]
 mod tests {
-    use model_core::blob::Floats;
+    use taxel_core::blob::Floats;
 
     use super::*;
 

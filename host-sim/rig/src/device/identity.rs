@@ -1,11 +1,11 @@
 //! What a device says of itself.
 
-use firmware::capacity::Capacity;
-use firmware::link::message::{Identity, KeyState, Memory, ModelIdentity};
-use model_core::Wires;
-use model_core::blob::{Columns, Model, ModelShape};
-use model_core::checksum::CRC_32;
 use serde::{Serialize, Serializer};
+use taxel_core::Wires;
+use taxel_core::blob::{Columns, Model, ModelShape};
+use taxel_core::checksum::CRC_32;
+use taxel_firmware::capacity::Capacity;
+use taxel_firmware::link::message::{Identity, KeyState, Memory, ModelIdentity};
 
 /// Identity that a device reports.
 #[derive(Debug, Clone, PartialEq, Serialize)]

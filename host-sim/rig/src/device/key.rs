@@ -1,8 +1,8 @@
 //! Keys of devices, and requests sealed with them.
 
-use firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
-use firmware::seal::{Key, tag};
 use taxel_data::BadValue;
+use taxel_firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
+use taxel_firmware::seal::{Key, tag};
 
 use super::{Device, DeviceIdentity, WRITING};
 use crate::error::{Error, KEY_DAMAGED, NO_KEY, Result};

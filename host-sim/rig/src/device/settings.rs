@@ -1,6 +1,6 @@
 //! Constants of a device's circuit, and settings that it keeps over restarts.
 
-use firmware::link::message::{Kept, Report, Request, Setting};
+use taxel_firmware::link::message::{Kept, Report, Request, Setting};
 
 use super::{Device, WRITING};
 use crate::calibration::CircuitConstants;

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{EstimateReport, Report, Request};
-use firmware::link::packet::UNASKED;
-use model_core::blob::Floats;
+use taxel_core::blob::Floats;
+use taxel_firmware::link::message::{EstimateReport, Report, Request};
+use taxel_firmware::link::packet::UNASKED;
 
 use super::{ATTEMPTS, Device};
 use crate::error::{Error, Result};

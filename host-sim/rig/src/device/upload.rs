@@ -2,9 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use firmware::link::message::{EstimateReport, Refusal, Report, Request, UploadState, UploadStep};
-use model_core::blob::{Floats, Model, ModelShape};
+use taxel_core::blob::{Floats, Model, ModelShape};
 use taxel_data::Progress;
+use taxel_firmware::link::message::{
+    EstimateReport, Refusal, Report, Request, UploadState, UploadStep,
+};
 
 use super::{Device, DeviceIdentity, WRITING};
 use crate::error::{Error, Result, check_room, no_room};

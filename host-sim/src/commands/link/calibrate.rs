@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 use clap::Args;
-use firmware::link::message::Setting;
-use firmware::readout::ScanSettings;
-use model_core::Wires;
 use serde::{Deserialize, Serialize};
+use taxel_core::Wires;
 use taxel_data::{DataFile, input};
+use taxel_firmware::link::message::Setting;
+use taxel_firmware::readout::ScanSettings;
 use taxel_rig::calibration::{CircuitConstants, Fit};
 use taxel_rig::device::Device;
 use taxel_rig::device::calibrate::{Reading, calibrate as find};

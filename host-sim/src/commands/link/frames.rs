@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use crate::{Error, Result};
-use firmware::link::message::{EstimateReport, Report};
 use taxel_data::Progress;
+use taxel_firmware::link::message::{EstimateReport, Report};
 use taxel_rig::device::Device;
 
 use super::super::progress::Terminal;

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 use clap::Args;
-use firmware::link::message::{Configuration, Refusal};
-use model_core::blob::Model;
-use model_core::health::Limits;
 use serde::Serialize;
+use taxel_core::blob::Model;
+use taxel_core::health::Limits;
 use taxel_data::{DataFile, Table, output};
+use taxel_firmware::link::message::{Configuration, Refusal};
 use taxel_learn::health::judge;
 use taxel_learn::recalibration::{self, Recalibrated};
 use taxel_learn::{Exponential, ModelBlob};

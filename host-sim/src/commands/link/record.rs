@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use crate::verdict::sentences;
 use crate::{Error, Result};
 use clap::{Args, value_parser};
-use firmware::link::message::{Configuration, Report, Request, Setting};
-use model_core::blob::Model;
 use serde::Serialize;
+use taxel_core::blob::Model;
 use taxel_data::spectrum::Spectrum;
 use taxel_data::{Table, csv_file};
+use taxel_firmware::link::message::{Configuration, Report, Request, Setting};
 use taxel_learn::ModelBlob;
 use taxel_rig::device::{Device, DeviceIdentity};
 

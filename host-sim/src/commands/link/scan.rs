@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use crate::{Error, Result};
 use clap::{Args, ValueEnum, value_parser};
-use firmware::link::message::{ConfidenceSent, Configuration};
-use firmware::timing::ScanPlan;
-use model_core::Wires;
-use model_core::blob::Model;
+use taxel_core::Wires;
+use taxel_core::blob::Model;
+use taxel_firmware::link::message::{ConfidenceSent, Configuration};
+use taxel_firmware::timing::ScanPlan;
 use taxel_rig::device::{Device, DeviceIdentity};
 
 #[derive(Args)]

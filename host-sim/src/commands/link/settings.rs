@@ -2,8 +2,8 @@
 
 use crate::Result;
 use clap::{Args, ValueEnum, value_parser};
-use firmware::link::message::{ConfidenceSent, Configuration, Kept, Setting};
 use serde::Serialize;
+use taxel_firmware::link::message::{ConfidenceSent, Configuration, Kept, Setting};
 use taxel_rig::calibration::CircuitConstants;
 use taxel_rig::device::Device;
 

@@ -1,8 +1,8 @@
 //! `identify`: what a device is and does.
 
 use crate::Result;
-use firmware::link::message::{KeyState, Statistics};
 use serde::Serialize;
+use taxel_firmware::link::message::{KeyState, Statistics};
 use taxel_rig::device::{ActiveConfiguration, Device, DeviceIdentity};
 
 use super::super::check_arguments::memory_lines;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 
 use super::labels::Labels;
 use super::scales::{Axes, AxisOfTimes, levels};

@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use crate::equations::Equations;
 use crate::equations::RowModel;
-use model_core::rbf::{Format, Network, direct};
 use nalgebra::DMatrix;
 use serde::Serialize;
+use taxel_core::rbf::{Format, Network, direct};
 use taxel_data::progress::Progress;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
@@ -167,7 +167,7 @@ struct Networks<'m>(Vec<direct::Network<'m>>);
 
 impl<'m> Networks<'m> {
     /// Networks of a model with direct distances, of which each row has one.
-    fn new(model: &model_core::blob::Model<'m>) -> Self {
+    fn new(model: &taxel_core::blob::Model<'m>) -> Self {
         let direct = |network| match network {
             Network::F32Direct(direct) => Some(direct),
             _ => None,

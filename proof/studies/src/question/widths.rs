@@ -1,8 +1,8 @@
 //! What a width for each centre gains over one for all, at the same K and at the same cost.
 
 use clap::Args;
-use model_core::rbf::{Format, Network};
 use serde::Serialize;
+use taxel_core::rbf::{Format, Network};
 use taxel_data::dataset::Dataset;
 use taxel_data::error::require;
 use taxel_data::progress::{Progress, Silent};

@@ -1,6 +1,6 @@
 //! Every exponential, over all numbers that it is for, and over all others.
 
-use model_core::exp::{ExpKernel, Libm, Micromath, Polynomial, exp2};
+use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial, exp2};
 
 use crate::effort::Effort;
 use crate::found::Found;

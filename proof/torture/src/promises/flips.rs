@@ -4,10 +4,10 @@
 //! finds one and two flipped bits in every blob, and three in small ones.
 
 use mock_board::{blob, blob_of_components, blob_with_confidence};
-use model_core::AlignedBytes;
-use model_core::blob::Model;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_core::AlignedBytes;
+use taxel_core::blob::Model;
 
 use crate::effort::Effort;
 use crate::found::Found;

@@ -3,9 +3,9 @@
 
 use std::sync::OnceLock;
 
-use model_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
-use model_core::{Decoder, Estimate, Frame, RowStatus};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Silent;
 use taxel_data::random::{Purpose, Random, Stream};

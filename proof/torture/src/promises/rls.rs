@@ -1,6 +1,6 @@
 //! Recursive least squares in f32 against f64, through what a sensor does over months.
 
-use model_core::rls::{self, Real, Rls};
+use taxel_core::rls::{self, Real, Rls};
 use taxel_data::random::{Purpose, Random, Stream};
 
 use crate::effort::Effort;

@@ -3,9 +3,9 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use model_core::fill::Fill;
-use model_core::health::Limits;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use taxel_core::fill::Fill;
+use taxel_core::health::Limits;
 use taxel_data::progress::Silent;
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_data::table::Table;

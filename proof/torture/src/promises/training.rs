@@ -1,7 +1,7 @@
 //! Training where nothing is moderate: widths, numbers of centres, samples that are alike, readings that are nearly the
 //! same, no noise. Models are judged on frames that they have not seen.
 
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Silent;
 use taxel_data::random::{Purpose, Random, Stream};

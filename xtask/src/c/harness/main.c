@@ -1,4 +1,4 @@
-/* Decodes the frames of a file with an exported model, and compares all bits with what model-core made of them. The
+/* Decodes the frames of a file with an exported model, and compares all bits with what taxel-core made of them. The
  * file is what xtask/src/c/frames.rs writes: groups of a number of frames, a baseline, and the frames, each followed by
  * what is expected of it. A group of none ends it. C and C++ compile this file.
  */

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use firmware::timing::{ONCHIP_READINGS_US, ONCHIP_SAMPLES, ONCHIP_SUMS_US, ScanPlan};
 use serde::Serialize;
 use taxel_data::{BadValue, columns};
+use taxel_firmware::timing::{ONCHIP_READINGS_US, ONCHIP_SAMPLES, ONCHIP_SUMS_US, ScanPlan};
 use taxel_learn::cost::Cost;
 use taxel_simulate::World;
 use taxel_simulate::noise::Noise;

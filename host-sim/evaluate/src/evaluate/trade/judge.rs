@@ -1,7 +1,7 @@
 //! Training and judging of the points that share their training and test frames.
 
-use model_core::filter::{Settings, Track};
 use rayon::prelude::*;
+use taxel_core::filter::{Settings, Track};
 use taxel_data::progress::Progress;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
 use taxel_learn::train::{

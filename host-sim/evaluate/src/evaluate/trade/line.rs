@@ -1,10 +1,10 @@
 //! Serial line of the board, which carries fewer estimates than a device may compute.
 
-use firmware::link::message::{EstimateReport, Report};
-use firmware::link::{cobs, packet};
-use firmware::timing::NUCLEO_BAUD;
-use model_core::blob::Floats;
 use serde::Serialize;
+use taxel_core::blob::Floats;
+use taxel_firmware::link::message::{EstimateReport, Report};
+use taxel_firmware::link::{cobs, packet};
+use taxel_firmware::timing::NUCLEO_BAUD;
 
 /// Line of the board, and the estimates that it carries.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -1,8 +1,8 @@
 //! Points: ways to decode, with their errors and their cost.
 
-use model_core::filter::Settings;
-use model_core::rbf::Format;
 use serde::Serialize;
+use taxel_core::filter::Settings;
+use taxel_core::rbf::Format;
 use taxel_learn::Exponential;
 use taxel_learn::cost::{Cost, kernel_name};
 

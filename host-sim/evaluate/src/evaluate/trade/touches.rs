@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use model_core::filter::Settings;
+use taxel_core::filter::Settings;
 use taxel_data::columns;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;

@@ -3,8 +3,8 @@
 
 use std::collections::HashSet;
 
-use model_core::blob::ModelShape;
-use model_core::rbf::Format;
+use taxel_core::blob::ModelShape;
+use taxel_core::rbf::Format;
 use taxel_data::dataset::Dataset;
 use taxel_learn::Exponential;
 use taxel_learn::cost::{Cost, Design, Prices};

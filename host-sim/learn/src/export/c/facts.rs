@@ -1,7 +1,7 @@
 //! What a library says of its model: sizes, cost, columns.
 
-use model_core::blob::Model;
-use model_core::{RowStatus, scratch_floats};
+use taxel_core::blob::Model;
+use taxel_core::{RowStatus, scratch_floats};
 
 use super::numbers::comment;
 use super::template::Values;
@@ -44,7 +44,7 @@ impl<'b> Facts<'b> {
     }
 
     fn networks(&self) -> String {
-        let of_network = |network: model_core::rbf::Network<'_>| {
+        let of_network = |network: taxel_core::rbf::Network<'_>| {
             let shape = network.shape();
             let tail = if network.has_affine_tail() { " and a linear part" } else { "" };
             let (inputs, centres, outputs) = (shape.inputs, shape.centres, shape.outputs);

@@ -1,9 +1,9 @@
-//! Frames of a library's self-test, and what model-core makes of them.
+//! Frames of a library's self-test, and what taxel-core makes of them.
 
-use model_core::blob::Model;
-use model_core::rbf::NetworkError;
-use model_core::relative::reciprocal;
-use model_core::{Decoder, Frame, OwnedEstimate, RowStatus};
+use taxel_core::blob::Model;
+use taxel_core::rbf::NetworkError;
+use taxel_core::relative::reciprocal;
+use taxel_core::{Decoder, Frame, OwnedEstimate, RowStatus};
 
 use super::numbers::{array, table, word};
 use crate::error::{Error, Result};

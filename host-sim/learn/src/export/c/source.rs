@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use model_core::blob::Model;
-use model_core::exp::{EXP_COEFFICIENTS, EXP2_COEFFICIENTS, LN_2_PARTS};
-use model_core::rbf::{Format, Network, direct, expanded, fixed16};
+use taxel_core::blob::Model;
+use taxel_core::exp::{EXP_COEFFICIENTS, EXP2_COEFFICIENTS, LN_2_PARTS};
+use taxel_core::rbf::{Format, Network, direct, expanded, fixed16};
 
 use super::name::Name;
 use super::numbers::{array, float, floats, string, word, words};
@@ -232,7 +232,7 @@ fn fixed16(p: &fixed16::Parameters<'_>, of: &dyn Fn(&str) -> String, tables: &mu
     if !p.affine.is_empty() {
         *tables += &words(&of("affine"), p.affine);
     }
-    let shape = model_core::rbf::Shape {
+    let shape = taxel_core::rbf::Shape {
         inputs: p.input_midpoint.len(),
         centres: 0,
         outputs: p.bias.len(),

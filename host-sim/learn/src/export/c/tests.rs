@@ -1,5 +1,5 @@
-use model_core::blob::{Model, ModelParts, encode_to_vec};
-use model_core::rbf::Network;
+use taxel_core::blob::{Model, ModelParts, encode_to_vec};
+use taxel_core::rbf::Network;
 
 use super::*;
 
@@ -195,7 +195,7 @@ fn every_number_of_a_network_is_written_to_the_bit() {
 /// A model with other metadata.
 fn changed<'m>(
     model: &Model<'m>,
-    change: impl FnOnce(&mut model_core::blob::Metadata<'m>),
+    change: impl FnOnce(&mut taxel_core::blob::Metadata<'m>),
 ) -> ModelBlob {
     let networks: Vec<Network<'_>> = model.networks().collect();
     let rows: Vec<u8> = (0..model.shape().rows)
@@ -233,7 +233,7 @@ fn names_of_a_model_are_harmless_wherever_they_are_written() {
     let names = vec!["*/ \"@CRC@\" taxel_model"; outputs].join("\n");
     let hostile = changed(&model, |it| {
         it.name = "??/ */ @CRC@\"\\";
-        it.output_names = model_core::blob::Columns(&names);
+        it.output_names = taxel_core::blob::Columns(&names);
     });
     let files = library(&hostile, &Name::new("mat").unwrap()).unwrap();
     let source = file(&files, "src/mat.c");

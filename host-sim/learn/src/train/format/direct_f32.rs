@@ -1,7 +1,7 @@
 //! Networks in f32 with direct distances.
 
-use model_core::rbf::direct::Parameters;
-use model_core::rbf::{Format, Shape};
+use taxel_core::rbf::direct::Parameters;
+use taxel_core::rbf::{Format, Shape};
 use taxel_data::RowTable;
 
 use super::super::hidden_layer::HiddenLayer;

@@ -1,8 +1,8 @@
 //! Fit of networks in f32 with expanded distances, where their rounding is proved harmless.
 
-use model_core::rbf::expanded::{CENTRES_AT_ONCE, Parameters};
-use model_core::rbf::{Format, Network, Shape};
-use model_core::scale::{HALF_RANGE, UNITS};
+use taxel_core::rbf::expanded::{CENTRES_AT_ONCE, Parameters};
+use taxel_core::rbf::{Format, Network, Shape};
+use taxel_core::scale::{HALF_RANGE, UNITS};
 
 use taxel_data::{RowTable, Table};
 
@@ -194,7 +194,7 @@ fn activation_bound(decay: f64, centre: f64, opened: f64, chain: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use model_core::exp::Polynomial;
+    use taxel_core::exp::Polynomial;
     use taxel_data::dataset::Dataset;
     use taxel_data::progress::Silent;
     use taxel_data::random::Stream;
@@ -232,7 +232,7 @@ mod tests {
             let network = Network::from(network);
             network.scale(&reading, &mut scaled).unwrap();
             let x: Vec<f64> =
-                scaled.iter().map(|x| f64::from(model_core::scale::clamp_units(*x))).collect();
+                scaled.iter().map(|x| f64::from(taxel_core::scale::clamp_units(*x))).collect();
             network.infer_scaled_with::<Polynomial>(&mut scaled, &mut output).unwrap();
             // The same sum without rounding of the exponents; rounding in the outputs' sum stays, and is
             // small.

@@ -7,12 +7,12 @@
 use core::f64::consts::{LN_2, LOG2_E};
 use std::ops::Range;
 
-use model_core::rbf::fixed16::{
+use taxel_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, EXPONENT_MARGIN,
     HIGHEST_ACTIVATION, MOST_INPUTS, Network, Parameters,
 };
-use model_core::rbf::{Format, NetworkError, Shape};
-use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
+use taxel_core::rbf::{Format, NetworkError, Shape};
+use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
 use taxel_data::{BadValue, RowTable};
 
 use super::super::least_squares::{Design, Factor};

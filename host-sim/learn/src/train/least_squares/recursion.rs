@@ -1,6 +1,6 @@
 //! Recursive least squares: one sample after another, in memory that does not grow with their number.
 //!
-//! The recursion is that of [`model_core::rls`], to the bit: R and z are rotated with each sample, forgotten by λ, and
+//! The recursion is that of [`taxel_core::rls`], to the bit: R and z are rotated with each sample, forgotten by λ, and
 //! given back what is forgotten of 1/δ. What differs is the order in which independent rotations are computed. A
 //! rotation of row i with sample t needs row i after sample t − 1, and sample t after row i − 1, and nothing else. So a
 //! few samples pass through a few rows at a time, in vector lanes: the divisions and roots of one row hide behind those

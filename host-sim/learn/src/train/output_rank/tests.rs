@@ -1,4 +1,4 @@
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Silent, Stream};
 use taxel_simulate::{Synthesis, World};
 

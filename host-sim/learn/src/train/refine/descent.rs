@@ -1,6 +1,6 @@
 //! A network on its way down the gradient.
 
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 
 use super::Refinement;
 use super::adam::Adam;

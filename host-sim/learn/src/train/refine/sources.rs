@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 use taxel_data::Dataset;
 
 use super::movable::Piece;

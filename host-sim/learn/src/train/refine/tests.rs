@@ -1,7 +1,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use model_core::rbf::Format;
+use taxel_core::rbf::Format;
 use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_simulate::{Synthesis, World};
 

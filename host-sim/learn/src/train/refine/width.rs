@@ -2,9 +2,9 @@
 
 use std::f64::consts::LOG2_E;
 
-use model_core::rbf::Format;
-use model_core::rbf::fixed16::{DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS};
-use model_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
+use taxel_core::rbf::Format;
+use taxel_core::rbf::fixed16::{DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS};
+use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
 /// Part by which widths stay above the limit, since centres and widths are rounded.
 const MARGIN: f64 = 2e-4;

@@ -1,9 +1,9 @@
 //! Check of uploads: damaged and interrupted ones must not become active, and a good one must.
 
-use firmware::link::message::{Refusal, Request, UploadState, UploadStep};
-use model_core::checksum::CRC_32;
 use serde::Serialize;
+use taxel_core::checksum::CRC_32;
 use taxel_data::{Dataset, Progress, Purpose, Random, Silent, Stream, Table};
+use taxel_firmware::link::message::{Refusal, Request, UploadState, UploadStep};
 use taxel_learn::train::train;
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, pack};
 

@@ -5,12 +5,12 @@ use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
 use std::rc::Rc;
 
-use firmware::link::message::{
+use taxel_data::Silent;
+use taxel_firmware::link::message::{
     Configuration, Identity, KeyState, Memory, ModelIdentity, Statistics,
 };
-use firmware::link::receive::{Received, Receiver};
-use firmware::link::{cobs, packet};
-use taxel_data::Silent;
+use taxel_firmware::link::receive::{Received, Receiver};
+use taxel_firmware::link::{cobs, packet};
 
 use super::*;
 use crate::device::Wire;

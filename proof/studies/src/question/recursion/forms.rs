@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use model_core::rls::{Real, Rls};
 use nalgebra::DMatrix;
+use taxel_core::rls::{Real, Rls};
 use taxel_learn::train::least_squares::{Design, Factor, predict};
 
 use super::{DIVERGED, Form, KINDS, LOOK_EVERY, MOST_COMPARED, Outcome, SETTLED};

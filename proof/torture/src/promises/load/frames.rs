@@ -2,14 +2,16 @@
 
 use std::cell::RefCell;
 
-use firmware::app::Session;
-use firmware::link::message::{ConfidenceSent, Configuration, EstimateReport, Report, Request};
 use mock_board::{
     Bench, Board, Flash, Memory, Running, ask, blob, blob_of_components, blob_with_confidence,
     find_report, frame_at_rest, quiet, statistics,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{
+    ConfidenceSent, Configuration, EstimateReport, Report, Request,
+};
 
 use crate::effort::Effort;
 use crate::found::Found;
@@ -111,7 +113,7 @@ fn run(seed: u64, memory: &mut Memory) -> Result<(), String> {
     }
     if seed / 40 % 2 == 1 {
         let rest = frame_at_rest();
-        let readings_ohm = model_core::blob::Floats::new(rest.as_flattened());
+        let readings_ohm = taxel_core::blob::Floats::new(rest.as_flattened());
         ask(&mut session, &board, &Request::SetBaseline { readings_ohm }, |_| ());
     }
     // Frames fall into step with this loop, so that none is scanned together with the answer.

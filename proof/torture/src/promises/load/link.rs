@@ -1,13 +1,13 @@
 //! A line that is too slow: every report arrives whole or is counted as lost.
 
-use firmware::app::Session;
-use firmware::link::message::{ConfidenceSent, Configuration, Report, Request};
 use mock_board::{
     Bench, Board, Flash, Memory, blob, blob_with_confidence, configure, find_report, quiet,
     request_bytes, settle, statistics,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{ConfidenceSent, Configuration, Report, Request};
 
 use crate::effort::Effort;
 use crate::found::Found;

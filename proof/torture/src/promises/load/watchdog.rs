@@ -3,15 +3,15 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use firmware::app::Session;
-use firmware::link::message::{ConfidenceSent, Configuration, Request, Setting, UploadStep};
-use firmware::store::{Journal, Kind, PAGE_BYTES};
 use mock_board::{
     Bench, Board, Flash, Memory, Pins, blob, blob_with_confidence, quiet, request_bytes,
     upload_steps,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use taxel_firmware::app::Session;
+use taxel_firmware::link::message::{ConfidenceSent, Configuration, Request, Setting, UploadStep};
+use taxel_firmware::store::{Journal, Kind, PAGE_BYTES};
 
 use crate::effort::Effort;
 use crate::found::Found;
