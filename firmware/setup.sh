@@ -38,6 +38,11 @@ if [ "${#missing[@]}" -gt 0 ] &&
     apt_install "${debian_toolchain[@]}"
 fi
 
+# The oldest Rust that a device's crates promise, which `cargo xtask publish` tries if it is there.
+oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' model-core/Cargo.toml)
+rustup run "$oldest" rustc --version >/dev/null 2>&1 ||
+    timeout 120 rustup --quiet toolchain install "$oldest" --profile minimal --no-self-update || true
+
 # The emulated board: Python with Unicorn, in a folder of its own.
 emulator=proof/board-emulator
 command -v python3 >/dev/null && python3 -m venv --help >/dev/null 2>&1 && python3 -c 'import ensurepip' 2>/dev/null ||

@@ -81,6 +81,7 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             // Docs need what clippy has checked.
             ("clippy", clippy),
             ("docs", docs),
+            own("publish", &["publish", "--short"]),
         ],
         vec![
             own("firmware", &["firmware"]),

@@ -100,7 +100,7 @@ enum Command {
     Python(python::Options),
     /// Pack every crate that is published, and build it from its package; those of a device with their oldest Rust, too.
     /// Nothing is published (docs/crates.md).
-    Publish,
+    Publish(publish::Options),
     /// Put every promise of reliability to the test, and print a table: `torture --help`. As the first option, --self-test
     /// builds a copy of the product with planted faults instead, and fails unless each line sees those that proof/mutants
     /// names it for.
@@ -157,7 +157,7 @@ fn main() -> ExitCode {
         Command::Cycles(options) => cycles::run(&options).map(success),
         Command::C(options) => c::run(&options).map(success),
         Command::Study(rest) => study(&rest.all()),
-        Command::Publish => publish::run().map(success),
+        Command::Publish(options) => publish::run(&options).map(success),
         Command::Python(options) => python::test(&options).map(success),
         Command::Torture(rest) => torture::run(&rest.all()),
         Command::Mutants(options) => mutants::run(&options).map(success),
