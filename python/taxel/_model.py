@@ -76,6 +76,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         rows, this is instead of a network for each row.
     features, output_rank : int or None
         Features of that projection, and components that are expanded to all outputs.
+    grid : (int, int) or None
+        Rows and columns of a mat whose cells are the columns of X, row by row. Without it, names of a DataFrame may tell a mat
+        (`r1c1`, or numbers that fill a square).
     relative_inputs : bool
         Inputs are R/R₀. Lines of `fit` at which all outputs are zero are the baseline; `predict` takes one.
     confidence : bool
@@ -108,6 +111,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         whole_array: bool = False,
         features: int | None = None,
         output_rank: int | None = None,
+        grid: tuple[int, int] | None = None,
         relative_inputs: bool = False,
         confidence: bool = False,
         fill: bool = False,
@@ -122,6 +126,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.whole_array = whole_array
         self.features = features
         self.output_rank = output_rank
+        self.grid = grid
         self.relative_inputs = relative_inputs
         self.confidence = confidence
         self.fill = fill
@@ -141,6 +146,10 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         if len(X) < 2:
             raise ValueError("n_samples = 1: training takes two lines or more, and many more to be of use")
         lines = two_dimensional(y, "y")
+        if self.grid is not None:
+            grid = "x".join(str(count) for count in self.grid)
+        else:
+            grid = None if names_x else "none"  # numbers that nobody gave tell no mat
         names_x = names_x or numbered("x", X.shape[1])
         names_y = names_y or numbered("y", lines.shape[1])
         columns = dict(zip(names_x, X.T)) | dict(zip(names_y, lines.T))
@@ -154,6 +163,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         arguments += option("--no-refine", not self.refine) + option("--format", self.format)
         arguments += option("--whole-array", self.whole_array) + option("--features", self.features)
         arguments += option("--output-rank", self.output_rank) + option("--fill", self.fill)
+        arguments += option("--grid", grid)
         if self.relative_inputs:
             arguments += ["--relative-inputs", *option("--rest", names_y)]
         arguments += option("--confidence", self.confidence) + option("--seed", self.random_state)
@@ -163,7 +173,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             self.report_ = call(["train", data, *arguments, "-o", blob])
             self._take(blob.read_bytes())
         self._one_output = np.ndim(y) == 1
-        self._columns = [names_x.index(name) for name in self.blob_.input_names]
+        self._columns = [names_x.index(own_name(name, names_x)) for name in self.blob_.input_names]
         for warning in self.report_["verdict"]["warnings"]:
             warnings.warn(warning["text"], TaxelWarning, stacklevel=2)
         if self.report_["centres"] < self.centres:
@@ -189,7 +199,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         line or several, for a model with relative inputs.
         """
         X = self._checked(X)
-        given = np.ascontiguousarray(X[:, self._columns])
+        given = np.ascontiguousarray(X if self._columns == list(range(X.shape[1])) else X[:, self._columns])
         rest = self._baseline(baseline)
         values = self.blob_.decode(given, rest)
         outputs = values[:, 0] if self._one_output else values
@@ -316,6 +326,11 @@ def names_of(columns: Any, what: str) -> list[str] | None:
         name = getattr(columns, "name", None)
         return [name] if isinstance(name, str) and np.ndim(columns) == 1 else None
     return [str(name) for name in names] if all(isinstance(name, str) for name in names) else None
+
+
+def own_name(name: str, known: list[str]) -> str:
+    """Name of a column that a model may call after its cell: `r1c2_adc_1` is `adc_1`."""
+    return name if name in known else name.split("_", 1)[1]
 
 
 def numbered(what: str, count: int) -> list[str]:

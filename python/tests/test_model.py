@@ -2,9 +2,11 @@
 
 import json
 import pickle
+import re
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pandas
@@ -177,3 +179,25 @@ def test_scikit_learn_finds_nothing_to_complain_of():
         found = check_estimator(taxel.Model(16, refine=False), on_fail=None)
     failed = {check["check_name"]: str(check["exception"]) for check in found if check["status"] == "failed"}
     assert not failed and len(found) > 40
+
+
+def test_the_ten_lines_of_the_page_do_what_they_say(tmp_path, monkeypatch, capsys):
+    page = Path(__file__).parents[2] / "docs/python.md"
+    code = re.search(r"## Ten lines\n\n```python\n(.*?)```", page.read_text(), re.DOTALL).group(1)
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    assert float(capsys.readouterr().out) > 0.8
+    model = taxel.Model.load("model.bin")
+    model.export_c("model-c", "finger")
+    assert "int finger_decode(" in (tmp_path / "model-c/src/finger.h").read_text()
+
+
+def test_a_mat_is_told_by_names_or_by_its_grid_and_never_by_numbers_that_nobody_gave():
+    x, y = smooth(200, 64)
+    names = [f"adc_{cell}" for cell in range(64)]
+    fit = lambda x, **grid: taxel.Model(4, refine=False, **grid).fit(x, y).blob_.input_names[:1]
+    assert fit(x) == ["x1"]
+    assert fit(x, grid=(8, 8)) == ["r1c1_x1"]
+    assert fit(pandas.DataFrame(x, columns=names)) == ["r1c1_adc_0"]
+    model = taxel.Model(4, refine=False).fit(pandas.DataFrame(x, columns=names), y)
+    assert model.predict(pandas.DataFrame(x, columns=names)).shape == (200, 2)

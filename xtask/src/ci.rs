@@ -82,6 +82,7 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             ("clippy", clippy),
             ("docs", docs),
             own("publish", &["publish", "--short"]),
+            own("python", &["python"]),
         ],
         vec![
             own("firmware", &["firmware"]),

@@ -22,7 +22,14 @@ pub fn test(options: &Options) -> Outcome {
     let mut build = Command::new(python.with_file_name("maturin"));
     build.args(["build", "--manifest-path"]).arg(folder.join("Cargo.toml"));
     build.arg("--out").arg(&wheels).arg("--interpreter").arg(&python);
-    run(build.args(if options.release { &["--release"][..] } else { &["--profile", "dev"] }))?;
+    if options.release {
+        build.arg("--release");
+    } else {
+        // PyO3's macros want other features of syn than serde does, so that nearly everything is built anew: less optimised,
+        // that takes two thirds of the time, and the tests take no longer.
+        build.args(["--profile", "dev"]).env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
+    }
+    run(&mut build)?;
     let mut install = pip(&python);
     install.args(["install", "--force-reinstall", "--no-deps", "--no-index", "--find-links"]);
     run(install.arg(&wheels).arg("taxel"))?;

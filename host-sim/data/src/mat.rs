@@ -19,15 +19,27 @@ pub struct Mat {
     pub columns: usize,
 }
 
-impl FromStr for Mat {
+/// What a user says of the mat whose cells are the inputs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Grid {
+    /// They are the cells of this mat.
+    Of(Mat),
+    /// They are no mat, whatever their names say.
+    None,
+}
+
+impl FromStr for Grid {
     type Err = String;
 
-    /// Parses `ROWSxCOLUMNS`.
+    /// Parses `ROWSxCOLUMNS` or `none`.
     fn from_str(text: &str) -> Result<Self, String> {
+        if text == "none" {
+            return Ok(Self::None);
+        }
         let number = |text: &str| text.parse().ok().filter(|count| (1..=1000).contains(count));
         let wires = text.split_once(['x', 'X']).and_then(|(m, k)| Some((number(m)?, number(k)?)));
-        let (rows, columns) = wires.ok_or("give ROWSxCOLUMNS, such as 16x16")?;
-        Ok(Self { rows, columns })
+        let (rows, columns) = wires.ok_or("give ROWSxCOLUMNS, such as 16x16, or none")?;
+        Ok(Self::Of(Mat { rows, columns }))
     }
 }
 
@@ -60,13 +72,14 @@ impl Mat {
 pub fn cell_names(
     header: &[String],
     chosen: &[usize],
-    given: Option<Mat>,
+    given: Option<Grid>,
 ) -> Result<(Vec<String>, Option<Mat>), String> {
     let own: Vec<&str> = chosen.iter().map(|column| header[*column].as_str()).collect();
     let as_they_are = || own.iter().map(ToString::to_string).collect();
-    if own.iter().all(|name| cell_of(name).is_some()) {
+    if given == Some(Grid::None) || own.iter().all(|name| cell_of(name).is_some()) {
         return Ok((as_they_are(), None));
     }
+    let given = given.and_then(|grid| if let Grid::Of(mat) = grid { Some(mat) } else { None });
     if let (None, Some(names)) = (given, named_after_wires(&own)) {
         return Ok((names, None));
     }
@@ -192,6 +205,7 @@ mod tests {
         let plain = |pattern| named(&header, pattern, None).unwrap()[0].clone();
         assert_eq!((plain("ch*"), plain("ch1..ch12")), ("r1c1_ch1".into(), "ch1".into()));
         assert_eq!(plain("ch*,time_s"), "time_s");
+        assert_eq!(named(&header, "ch*", Some("none")).unwrap()[0], "ch1");
         let names = named(&header, "ch*", Some("4x16")).unwrap();
         assert_eq!((names[15].as_str(), names[16].as_str()), ("r1c16_ch16", "r2c1_ch17"));
         let refused = named(&header, "ch*", Some("4x17")).unwrap_err();

@@ -8,7 +8,7 @@ use clap::Args;
 use taxel_data::clock::neighbours_alike;
 use taxel_data::data_file::is_array;
 use taxel_data::error::{Problem, Role};
-use taxel_data::mat::Mat;
+use taxel_data::mat::Grid;
 use taxel_data::{DataFile, Dataset, Rest, Table};
 use taxel_learn::select;
 
@@ -31,9 +31,10 @@ pub struct DataArguments {
     #[arg(long, value_name = "GLOB")]
     outputs: Option<String>,
     /// Rows and columns of a mat whose cells are the inputs, row by row, such as 16x16. It is found without this option where
-    /// names say so: r1c1 and so on, or numbers that fill a square of 8x8 or more, from which dead cells may be missing.
-    #[arg(long, value_name = "ROWSxCOLUMNS")]
-    grid: Option<Mat>,
+    /// names say so: r1c1 and so on, or numbers that fill a square of 8x8 or more, from which dead cells may be missing; with
+    /// none they are no mat.
+    #[arg(long, value_name = "ROWSxCOLUMNS|none")]
+    grid: Option<Grid>,
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
     #[arg(long, value_name = "NAME", conflicts_with = "folds")]
     fold_column: Option<String>,
@@ -109,7 +110,7 @@ impl DataArguments {
     }
 
     /// Mat whose cells the inputs are, if it was given.
-    pub fn grid(&self) -> Option<Mat> {
+    pub fn grid(&self) -> Option<Grid> {
         self.grid
     }
 

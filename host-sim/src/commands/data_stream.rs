@@ -11,7 +11,7 @@ use taxel_data::data_file::pieces::Pieces;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::digest::TableDigest;
 use taxel_data::error::Problem;
-use taxel_data::mat::Mat;
+use taxel_data::mat::Grid;
 use taxel_data::{Clock, Dataset, Rest};
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::resolution;
@@ -28,7 +28,7 @@ const MOST_OUTLIERS: usize = 1000;
 struct Selection {
     inputs: Option<String>,
     outputs: Option<String>,
-    grid: Option<Mat>,
+    grid: Option<Grid>,
     missing: Vec<f64>,
     keep_outliers: bool,
 }

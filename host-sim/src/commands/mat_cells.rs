@@ -1,7 +1,7 @@
 //! Columns of a data file that are the cells of a mat, with their names in a model.
 
 use taxel_data::dataset::USUAL_INPUTS;
-use taxel_data::mat::{self, Mat};
+use taxel_data::mat::{self, Grid, Mat};
 use taxel_data::{DataFile, Table, columns};
 
 /// Input columns of a file, each with its name in a model: that of a cell, if they are a mat.
@@ -16,7 +16,7 @@ impl MatCells {
     pub fn of(
         file: &DataFile,
         pattern: Option<&str>,
-        grid: Option<Mat>,
+        grid: Option<Grid>,
     ) -> taxel_data::Result<Self> {
         let chosen = columns::select(&file.header, pattern.unwrap_or(USUAL_INPUTS));
         let (cells, found) =

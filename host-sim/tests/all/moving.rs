@@ -24,7 +24,7 @@ fn scene(moves: bool) -> Experiment {
 
 fn traded(moves: bool, bounds: Bounds) -> Trade {
     let plan = Plan {
-        centres: vec![64],
+        centres: vec![16],
         output_ranks: vec![],
         column_steps: vec![1],
         samples_averaged: vec![1, 4],

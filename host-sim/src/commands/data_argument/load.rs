@@ -29,7 +29,7 @@ impl DataArguments {
         let cells = MatCells::of(&file, inputs, self.grid)?;
         if let Some(mat) = cells.found.filter(|_| self.grid.is_none()) {
             stderr::remark(format_args!(
-                "note: inputs are taken for a mat of {mat} wires, row by row (--grid)"
+                "note: inputs are taken for a mat of {mat} wires, row by row (--grid none: they are not)"
             ));
         }
         for wire in cells.silent_wires(&unused.names()) {
