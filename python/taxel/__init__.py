@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from taxel._native import __version__
 
 if TYPE_CHECKING:
+    from taxel._call import TaxelWarning
     from taxel._decoder import Decoder, Estimate
     from taxel._link import Link, Reading, list_ports
     from taxel._model import Model
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 # Where each name stands: it is imported when it is used first. `Model` takes scikit-learn with it, which takes a second.
 _PLACES = {
+    "_call": ("TaxelWarning",),
     "_decoder": ("Decoder", "Estimate"),
     "_link": ("Link", "Reading", "list_ports"),
     "_model": ("Model",),

@@ -30,9 +30,10 @@ def call(arguments: Sequence[object], *, warn: bool = True) -> dict[str, Any]:
     try:
         text, remarks = _native.call([str(argument) for argument in arguments])
     except (ValueError, RuntimeError) as error:
-        raise type(error)(WORK.sub("", str(error))) from None
+        said = WORK.sub("", str(error)).split("\n\nFor more information")[0]
+        raise type(error)(said) from None
     for remark in remarks if warn else []:
-        warnings.warn(WORK.sub("", remark), TaxelWarning, stacklevel=4)
+        warnings.warn(WORK.sub("", remark).replace("data.npz", "the data"), TaxelWarning, stacklevel=3)
     return json.loads(text) if text else {}
 
 

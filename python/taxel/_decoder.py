@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _native
+from taxel._columns import matrix, untouched
 
 if TYPE_CHECKING:
     from taxel._model import Model
@@ -51,11 +52,11 @@ class Decoder:
         self._baseline = None
         self._reciprocals = np.empty(0, np.float32)
         if self._blob.relative_inputs:
-            if baseline is None:
-                raise ValueError("the model takes R/R₀: give baseline=, readings of the untouched sensor")
-            rest = np.asarray(baseline, np.float64)
-            self._baseline = np.ascontiguousarray(rest.mean(axis=0) if rest.ndim == 2 else rest)
+            self._baseline = untouched(baseline, self._blob.input_names)
             self._reciprocals = _native.Blob.reciprocals(self._baseline.astype(np.float32))
+
+    def __repr__(self) -> str:
+        return f"<Decoder of {len(self.input_names)} readings to {len(self.output_names)} outputs>"
 
     @property
     def input_names(self) -> list[str]:
@@ -70,7 +71,9 @@ class Decoder:
         rows, inputs, outputs = self._sizes
         readings = np.array(frame, np.float32).reshape(-1)
         if readings.size != inputs:
-            raise ValueError(f"a frame has {inputs} readings, and this one {readings.size}")
+            raise ValueError(
+                f"a frame has {inputs} readings, and this one {readings.size}; decode_many takes several frames"
+            )
         values = np.empty(outputs, np.float32) if out is None else out
         if values.dtype != np.float32 or values.shape != (outputs,) or not values.flags.c_contiguous:
             raise ValueError(f"out: give a contiguous array of {outputs} float32")
@@ -82,9 +85,11 @@ class Decoder:
         return Estimate(values, status, clamped, filled, std, novelty)
 
     def decode_many(self, frames: ArrayLike, out: np.ndarray | None = None) -> np.ndarray:
-        """Decodes frames (frames × readings) to outputs (frames × outputs), the same bits as one by one."""
-        readings = np.ascontiguousarray(frames, np.float64)
-        values = self._blob.decode(readings.reshape(len(readings), -1), self._baseline)
+        """Decodes frames (frames × readings, or frames × rows × columns) to outputs (frames × outputs), the same bits as one by
+        one. Columns of a DataFrame are taken by their names."""
+        if np.ndim(frames) > 2:
+            frames = np.reshape(frames, (len(frames), -1))  # type: ignore[arg-type]
+        values = self._blob.decode(matrix(frames, self._blob.input_names, "frames"), self._baseline)
         if out is None:
             return values
         out[...] = values

@@ -65,6 +65,13 @@ class Link:
         self.port = port or only_port()
         self._options = (baud, period_us, send, confidence, buffer)
         self._line: Any = _native.Line(self.port, *self._options)
+        self._has_read = False
+
+    def __repr__(self) -> str:
+        if self._line is None:
+            return f"<Link to {self.port}, closed>"
+        model = "no model" if self.model_crc is None else f"model {self.model_crc:08x}"
+        return f"<Link to {self.port}: {self.board}, firmware {self.firmware}, {model}>"
 
     @property
     def board(self) -> str:
@@ -91,8 +98,11 @@ class Link:
         return self._reading(found)
 
     def read_latest(self, max_age_ms: float = 500) -> Reading | None:
-        """The newest reading, and those before it are forgotten; None if it is older than that, or none has come."""
+        """The newest reading, and those before it are forgotten; None if it is older than that. The first one is waited for as
+        long."""
         found = self._opened().newest(max_age_ms)
+        if found is None and not self._has_read:
+            found = self._opened().next(max_age_ms / 1000)
         return None if found is None else self._reading(found)
 
     def __iter__(self) -> Iterator[Reading]:
@@ -145,12 +155,15 @@ class Link:
         rows, columns, _ = self._opened().shape
         if readings.size == rows * columns:
             readings = readings.reshape(rows, columns)
+        self._has_read = True
         return Reading(frame, time_us, age_ms, lost, readings, outputs, status, flags, std, novelty)
 
 
 def only_port() -> str:
+    """The port of USB that there is, if there is one."""
     ports = list_ports()
-    if len(ports) == 1:
-        return ports[0]
-    known = f"there are {', '.join(ports)}" if ports else "no serial port is to be seen"
-    raise ValueError(f"port: name one; {known}")
+    of_usb = [port for port in ports if any(part in port for part in ("ttyACM", "ttyUSB", "usbmodem", "usbserial", "COM"))]
+    if len(of_usb) == 1:
+        return of_usb[0]
+    known = f"there are {', '.join(of_usb or ports)}" if ports else "this computer has no serial port"
+    raise ValueError(f"port: no device is found by itself: name its port; {known}")

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from taxel import _native
 from taxel._call import TaxelWarning, call, folder, option, save, two_dimensional
+from taxel._columns import matrix, names_of, numbered, pattern, place, untouched
 
 try:
     from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
@@ -41,14 +42,7 @@ except ImportError:  # scikit-learn is optional
             return f"{type(self).__name__}({given})"
 
     class RegressorMixin:  # type: ignore[no-redef]
-        """The score of a regressor."""
-
-        def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
-            y, estimate = two_dimensional(y, "y"), two_dimensional(self.predict(X), "y")
-            weights = None if sample_weight is None else np.asarray(sample_weight)
-            left = np.average((y - estimate) ** 2, axis=0, weights=weights)
-            mean = np.average(y, axis=0, weights=weights)
-            return float(np.mean(1 - left / np.average((y - mean) ** 2, axis=0, weights=weights)))
+        """A regressor."""
 
     class MultiOutputMixin:  # type: ignore[no-redef]
         """Several outputs."""
@@ -141,7 +135,8 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         """
         if y is None:
             raise ValueError("fit requires y to be passed, but the target y is None")
-        names_x, names_y = names_of(X, "x"), names_of(y, "y")
+        self._check_parameters()
+        names_x, names_y = names_of(X, "X"), names_of(y, "y")
         X, y = self._checked(X, y)
         if len(X) < 2:
             raise ValueError("n_samples = 1: training takes two lines or more, and many more to be of use")
@@ -153,19 +148,22 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         names_x = names_x or numbered("x", X.shape[1])
         names_y = names_y or numbered("y", lines.shape[1])
         columns = dict(zip(names_x, X.T)) | dict(zip(names_y, lines.T))
-        arguments: list[object] = ["--inputs", ",".join(names_x), "--outputs", ",".join(names_y)]
+        arguments: list[object] = ["--inputs", pattern(names_x), "--outputs", pattern(names_y)]
         if groups is not None:
+            if len(groups) != len(lines):
+                raise ValueError(f"X has {len(lines)} lines and groups {len(groups)}")
+            if not (self.refine or self.confidence):
+                raise ValueError("groups has no effect without refine and confidence: leave it out")
             columns["group"] = np.unique(np.asarray(groups), return_inverse=True)[1].astype(float)
             arguments += ["--fold-column", "group"]
-        centres = min(self.centres, max(len(lines) - 1, 1)) if self.centres >= 1 else self.centres
-        arguments += option("--centres", centres) + option("--spread", self.spread)
+        arguments += option("--centres", min(self.centres, len(lines) - 1)) + option("--spread", self.spread)
         arguments += option("--penalty", self.penalty) + option("--no-affine", not self.affine_tail)
         arguments += option("--no-refine", not self.refine) + option("--format", self.format)
         arguments += option("--whole-array", self.whole_array) + option("--features", self.features)
         arguments += option("--output-rank", self.output_rank) + option("--fill", self.fill)
         arguments += option("--grid", grid)
         if self.relative_inputs:
-            arguments += ["--relative-inputs", *option("--rest", names_y)]
+            arguments += ["--relative-inputs", *option("--rest", [pattern(names_y)])]
         arguments += option("--confidence", self.confidence) + option("--seed", self.random_state)
         with folder() as path:
             data, blob = path / "data.npz", path / "model.bin"
@@ -173,7 +171,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             self.report_ = call(["train", data, *arguments, "-o", blob])
             self._take(blob.read_bytes())
         self._one_output = np.ndim(y) == 1
-        self._columns = [names_x.index(own_name(name, names_x)) for name in self.blob_.input_names]
+        self._columns = [place(name, names_x) for name in self.blob_.input_names]
         for warning in self.report_["verdict"]["warnings"]:
             warnings.warn(warning["text"], TaxelWarning, stacklevel=2)
         if self.report_["centres"] < self.centres:
@@ -198,9 +196,10 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         0, it is unlike the lines of training); both need `confidence`. `baseline` are readings of the untouched sensor, one
         line or several, for a model with relative inputs.
         """
-        X = self._checked(X)
-        given = np.ascontiguousarray(X if self._columns == list(range(X.shape[1])) else X[:, self._columns])
-        rest = self._baseline(baseline)
+        given, rest = self._checked(X), self._baseline(baseline)
+        if hasattr(self, "report_") and self._columns != list(range(given.shape[1])):
+            given = given[:, self._columns]
+        given = np.ascontiguousarray(given)
         values = self.blob_.decode(given, rest)
         outputs = values[:, 0] if self._one_output else values
         if not (return_std or return_novelty):
@@ -211,6 +210,21 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         std, novelty = assessed
         std = std[:, 0] if self._one_output else std
         return (outputs, *([std] if return_std else []), *([novelty] if return_novelty else []))
+
+    def score(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        *,
+        baseline: ArrayLike | None = None,
+    ) -> float:
+        """Coefficient of determination R², as a mean over the outputs."""
+        y, estimate = two_dimensional(y, "y"), two_dimensional(self.predict(X, baseline=baseline), "y")
+        weights = None if sample_weight is None else np.asarray(sample_weight)
+        left = np.average((y - estimate) ** 2, axis=0, weights=weights)
+        mean = np.average(y, axis=0, weights=weights)
+        return float(np.mean(1 - left / np.average((y - mean) ** 2, axis=0, weights=weights)))
 
     def save(self, path: str | Path) -> None:
         """Writes the blob, as `host-sim train -o` does: for `host-sim link PORT upload`."""
@@ -224,7 +238,8 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
     @classmethod
     def load(cls, path: str | Path) -> Model:
-        """Model of a blob that `save` or `host-sim train` wrote."""
+        """Model of a blob that `save` or `host-sim train` wrote. Columns of a DataFrame are taken by the blob's names, in any
+        order and among others. Parameters that a blob does not hold, such as `refine`, are the usual ones."""
         return cls.of_bytes(Path(path).read_bytes())
 
     @classmethod
@@ -240,7 +255,6 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             fill=model.blob_.has_fill,
         )
         model.n_features_in_ = len(model.blob_.input_names)
-        model._columns = list(range(model.n_features_in_))
         model._one_output = False
         return model
 
@@ -269,10 +283,16 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         if HAS_SKLEARN and (y is not None or hasattr(self, "report_")):
             missing = "allow-nan" if self.fill else True
             checks = {"dtype": np.float64, "order": "C", "ensure_all_finite": missing}
-            if y is None:
-                return validate_data(self, X, reset=False, **checks)
-            X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, **checks)
-            return X, y
+            try:
+                if y is None:
+                    return validate_data(self, X, reset=False, **checks)
+                return validate_data(self, X, y, multi_output=True, y_numeric=True, **checks)
+            except ValueError as error:
+                if "Input X contains NaN" not in str(error):
+                    raise
+                raise ValueError("Input X contains NaN: missing readings take Model(fill=True)") from None
+        if y is None and not hasattr(self, "report_"):
+            return matrix(X, self.blob_.input_names)
         X = two_dimensional(X, "X")
         if y is None:
             if X.shape[1] != self.n_features_in_:
@@ -290,11 +310,24 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
     def _baseline(self, baseline: ArrayLike | None) -> np.ndarray | None:
         if not self.blob_.relative_inputs:
             return None
-        if baseline is None:
-            raise ValueError("the model takes R/R₀: give baseline=, readings of the untouched sensor")
-        rest = np.asarray(baseline, dtype=np.float64)
-        rest = rest.mean(axis=0) if rest.ndim == 2 else rest
-        return np.ascontiguousarray(rest[self._columns])
+        whole = getattr(self, "n_features_in_", 0)
+        if baseline is not None and names_of(baseline, "baseline") is None and hasattr(self, "report_"):
+            # Columns as in `fit`, of which the model may have left some out.
+            lines = np.atleast_2d(np.asarray(baseline, dtype=np.float64))
+            if lines.ndim == 2 and lines.shape[1] == whole:
+                baseline = lines[:, self._columns]
+        return untouched(baseline, self.blob_.input_names)
+
+    def _check_parameters(self) -> None:
+        """Refuses parameters by their own names; others are told by the command."""
+        for name, least in (("centres", 1), ("random_state", 0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+                raise ValueError(f"{name}={value!r}: give a whole number from {least} on")
+        if self.format not in (None, "f32", "fixed16", "f32-direct"):
+            raise ValueError(f'format={self.format!r}: give "f32", "fixed16" or "f32-direct"')
+        if self.grid is not None and np.shape(self.grid) != (2,):
+            raise ValueError(f"grid={self.grid!r}: give rows and columns, such as (16, 16)")
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
@@ -317,24 +350,6 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             return f"<code>{escape(repr(self))}</code>"
         verdict, decoders = self.report_["verdict"], self.report_["decoders"]
         return f"<p><code>{escape(repr(self))}</code></p><p>{escape(verdict['sentence'])}</p>" + bars(decoders)
-
-
-def names_of(columns: Any, what: str) -> list[str] | None:
-    """Names of a DataFrame's columns, or of a Series."""
-    names = getattr(columns, "columns", None)
-    if names is None:
-        name = getattr(columns, "name", None)
-        return [name] if isinstance(name, str) and np.ndim(columns) == 1 else None
-    return [str(name) for name in names] if all(isinstance(name, str) for name in names) else None
-
-
-def own_name(name: str, known: list[str]) -> str:
-    """Name of a column that a model may call after its cell: `r1c2_adc_1` is `adc_1`."""
-    return name if name in known else name.split("_", 1)[1]
-
-
-def numbered(what: str, count: int) -> list[str]:
-    return [f"{what}{number}" for number in range(1, count + 1)]
 
 
 def bars(decoders: list[dict[str, Any]]) -> str:

@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel._call import call, folder, option, save, two_dimensional
-from taxel._model import Model, names_of
+from taxel._columns import names_of
+from taxel._model import Model
 from taxel._scene import Scene
 
 
 def source(subject: Scene | str | Path, work: Path) -> object:
     """A subject as a command takes it."""
-    if not isinstance(subject, Scene):
+    if isinstance(subject, (str, Path)):
         return subject
+    if not isinstance(subject, Scene):
+        raise TypeError(f"a {type(subject).__name__}: give a Scene, its name, or a file's path")
     path = work / f"{subject.name}.toml"
     path.write_text(subject.to_toml(), encoding="utf-8")
     return path
@@ -106,13 +109,19 @@ def limit(scene: Scene | str | Path, *, frames: int | None = None, seed: int | N
         return Limit(call([*arguments, *option("--frames", frames), *option("--seed", seed)]))
 
 
-def evaluate(model: Model, X: ArrayLike, y: ArrayLike, *, baseline: ArrayLike | None = None) -> dict[str, Any]:
-    """Errors of a model on readings `X` and true outputs `y`, as `eval --json` has them."""
-    names_x = names_of(X, "x") or list(model.blob_.input_names)
+def evaluate(model: Model | str | Path, X: ArrayLike, y: ArrayLike, *, baseline: ArrayLike | None = None) -> dict[str, Any]:
+    """Errors of a model, or of the blob at a path, on readings `X` and true outputs `y`, as `eval --json` has them."""
+    if isinstance(model, (str, Path)):
+        model = Model.load(model)
+    if not isinstance(model, Model):
+        raise TypeError(f"a {type(model).__name__}: give a Model, or the path of its blob")
+    names_x = names_of(X, "X") or list(model.blob_.input_names)
     names_y = names_of(y, "y") or list(model.blob_.output_names)
     X, y = two_dimensional(X, "X"), two_dimensional(y, "y")
     if X.shape[1] != len(names_x) or y.shape[1] != len(names_y):
         raise ValueError(f"X and y have {X.shape[1]} and {y.shape[1]} columns: give {len(names_x)} and {len(names_y)}")
+    if len(X) != len(y):
+        raise ValueError(f"X has {len(X)} lines and y {len(y)}")
     with folder() as work:
         data, blob = work / "data.npz", work / "model.bin"
         save(data, dict(zip(names_x, X.T)) | dict(zip(names_y, y.T)))

@@ -68,7 +68,7 @@ class Scene:
         return Scene.from_toml, (self.to_toml(), self.name)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Frames:
     """Frames of a sensor, and the true outputs.
 
@@ -91,6 +91,10 @@ class Frames:
 
     def __len__(self) -> int:
         return len(self.readings)
+
+    def __repr__(self) -> str:
+        _, wires = self.readings.shape
+        return f"<{len(self)} Frames of {wires} readings and {self.outputs.shape[1]} outputs>"
 
 
 def synth(scene: Scene | str | Path, n: int, *, seed: int | None = None, stream: str = "test") -> Frames:

@@ -201,3 +201,67 @@ def test_a_mat_is_told_by_names_or_by_its_grid_and_never_by_numbers_that_nobody_
     assert fit(pandas.DataFrame(x, columns=names)) == ["r1c1_adc_0"]
     model = taxel.Model(4, refine=False).fit(pandas.DataFrame(x, columns=names), y)
     assert model.predict(pandas.DataFrame(x, columns=names)).shape == (200, 2)
+
+
+def named(x, names):
+    return pandas.DataFrame(x, columns=names)
+
+
+def test_a_loaded_model_takes_columns_by_their_names(tmp_path):
+    x, y = smooth(features=4)
+    x[:, 0] = 50  # tells nothing, and is left out
+    names = ["unused", "left, upper", "-b", "c [Ω] "]
+    model = taxel.Model(8, refine=False).fit(named(x, names), named(y, ["Fx, N", "!y"]))
+    assert (model.blob_.input_names, model.output_names_) == (names[1:], ["Fx, N", "!y"])
+    model.save(tmp_path / "model.bin")
+    loaded, known = taxel.Model.load(tmp_path / "model.bin"), model.predict(named(x, names))
+    others = named(x, names)[names[::-1]]
+    assert np.array_equal(loaded.predict(others), known)
+    assert np.array_equal(taxel.Decoder(tmp_path / "model.bin").decode_many(others), known)
+    assert np.array_equal(loaded.predict(x[:, 1:]), known)
+    with pytest.raises(ValueError, match="X has no column '-b'; the model takes left, upper"):
+        loaded.predict(others.rename(columns={"-b": "b"}))
+    with pytest.raises(ValueError, match="X has 4 columns, and the model takes 3: left, upper"):
+        loaded.predict(x)
+    assert loaded.score(others, y) == model.score(named(x, names), y) > 0.5
+
+
+def test_a_baseline_is_one_reading_above_zero_for_each_input():
+    x, y = smooth()
+    y[:100], x[:100] = 0, 50
+    names = ["a", "b", "c"]
+    model = taxel.Model(8, refine=False, relative_inputs=True).fit(named(x, names), y)
+    rest = np.array([50.0, 51, 52])
+    known = model.predict(named(x, names), baseline=rest)
+    turned = named(rest[np.newaxis, ::-1], names[::-1])
+    assert np.array_equal(model.predict(named(x, names), baseline=turned), known)
+    assert np.array_equal(taxel.Decoder(model, baseline=turned).decode_many(x), known)
+    assert model.score(named(x, names), y, baseline=rest) < 1
+    for bad, says in [([50, 51], "baseline has 2 columns"), ([50, 0, 52], "baseline of b is 0.0"), (None, "baseline=")]:
+        with pytest.raises(ValueError, match=says):
+            model.predict(named(x, names), baseline=bad)
+        with pytest.raises(ValueError, match=says):
+            taxel.Decoder(model, baseline=bad)
+
+
+def test_what_a_model_cannot_take_is_told_in_the_words_of_python(tmp_path):
+    x, y = smooth()
+    for parameters, says in [
+        ({"centres": 1.5}, "centres=1.5: give a whole number from 1"),
+        ({"centres": "16"}, "centres='16'"),
+        ({"format": "float16"}, 'format=\'float16\': give "f32"'),
+        ({"grid": 12}, "grid=12: give rows and columns"),
+        ({"random_state": -1}, "random_state=-1"),
+    ]:
+        with pytest.raises(ValueError, match=says):
+            taxel.Model(**{"centres": 4, "refine": False, **parameters}).fit(x, y)
+    for groups, says in [([1, 2], "400 lines and groups 2"), (np.arange(400), "groups has no effect")]:
+        with pytest.raises(ValueError, match=says):
+            taxel.Model(4, refine=False).fit(x, y, groups=groups)
+    x[3, 1] = np.nan
+    with pytest.raises(ValueError, match="NaN: missing readings take Model"):
+        taxel.Model(4, refine=False).fit(x, y)
+    with pytest.raises(TypeError, match="a ndarray: give a Scene"):
+        taxel.trade(x)
+    with pytest.raises(TypeError, match="a ndarray: give a Model"):
+        taxel.evaluate(x, x, y)

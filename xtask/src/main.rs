@@ -30,6 +30,8 @@ mod python;
 
 mod publish;
 
+mod release;
+
 mod ci;
 
 use std::env::args_os;
@@ -97,7 +99,10 @@ enum Command {
     #[command(disable_help_flag = true)]
     Study(Rest),
     /// Build the wheel of the Python module, install it in an environment of its own, and run its tests (docs/python.md).
-    Python(python::Options),
+    Python,
+    /// Build what is given to those who have no Rust, into target/release-files: a static program, a wheel of Python, its sources,
+    /// and the licences of what both hold.
+    Release,
     /// Pack every crate that is published, and build it from its package; those of a device with their oldest Rust, too.
     /// Nothing is published (docs/crates.md).
     Publish(publish::Options),
@@ -158,7 +163,8 @@ fn main() -> ExitCode {
         Command::C(options) => c::run(&options).map(success),
         Command::Study(rest) => study(&rest.all()),
         Command::Publish(options) => publish::run(&options).map(success),
-        Command::Python(options) => python::test(&options).map(success),
+        Command::Python => python::test().map(success),
+        Command::Release => release::run().map(success),
         Command::Torture(rest) => torture::run(&rest.all()),
         Command::Mutants(options) => mutants::run(&options).map(success),
     };

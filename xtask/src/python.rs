@@ -1,6 +1,6 @@
 //! The module of Python: its wheel, and its tests, in a virtual environment of their own.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::process::{Outcome, root, run, target_dir};
@@ -8,28 +8,15 @@ use crate::process::{Outcome, root, run, target_dir};
 /// What the tests take, besides the module itself.
 const PACKAGES: [&str; 5] = ["maturin>=1.9,<2", "numpy", "pandas", "pytest", "scikit-learn>=1.6"];
 
-#[derive(clap::Args)]
-pub struct Options {
-    /// Build the wheel that is given to others, into target/wheels: optimised as `cargo build --release` is.
-    #[arg(long)]
-    release: bool,
-}
-
 /// Builds the wheel, installs it, and runs its tests.
-pub fn test(options: &Options) -> Outcome {
-    let (python, folder) = (environment()?, root().join("python"));
-    let wheels = target_dir().join(if options.release { "wheels" } else { "test-wheels" });
-    let mut build = Command::new(python.with_file_name("maturin"));
-    build.args(["build", "--manifest-path"]).arg(folder.join("Cargo.toml"));
-    build.arg("--out").arg(&wheels).arg("--interpreter").arg(&python);
-    if options.release {
-        build.arg("--release");
-    } else {
-        // PyO3's macros want other features of syn than serde does, so that nearly everything is built anew: less optimised,
-        // that takes two thirds of the time, and the tests take no longer.
-        build.args(["--profile", "dev"]).env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
-    }
-    run(&mut build)?;
+pub fn test() -> Outcome {
+    let (python, folder) = (environment(&PACKAGES)?, root().join("python"));
+    let wheels = target_dir().join("test-wheels");
+    let mut build = maturin(&python, "build", &wheels);
+    // PyO3's macros want other features of syn than serde does, so that nearly everything is built anew: less optimised,
+    // that takes two thirds of the time, and the tests take no longer.
+    build.args(["--profile", "dev"]).env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
+    run(build.arg("--interpreter").arg(&python))?;
     let mut install = pip(&python);
     install.args(["install", "--force-reinstall", "--no-deps", "--no-index", "--find-links"]);
     run(install.arg(&wheels).arg("taxel"))?;
@@ -39,15 +26,25 @@ pub fn test(options: &Options) -> Outcome {
     run(tests.current_dir(target_dir()))
 }
 
-/// The environment's interpreter; made if there is none.
-fn environment() -> Outcome<PathBuf> {
+/// The environment's interpreter, with these `packages`; made if there is none.
+pub fn environment(packages: &[&str]) -> Outcome<PathBuf> {
     let folder = target_dir().join("python");
     let python = folder.join("bin/python");
     if !python.exists() {
         run(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
     }
-    run(pip(&python).arg("install").args(PACKAGES))?;
+    run(pip(&python).arg("install").args(packages))?;
     Ok(python)
+}
+
+/// A command of maturin, which is in the environment of `python`; what it makes lands in `folder`.
+pub fn maturin(python: &Path, command: &str, folder: &Path) -> Command {
+    let mut maturin = Command::new(python.with_file_name("maturin"));
+    // Where it finds zig, if that is wanted.
+    maturin.env("VIRTUAL_ENV", target_dir().join("python"));
+    maturin.args([command, "--manifest-path"]).arg(root().join("python/Cargo.toml"));
+    maturin.arg("--out").arg(folder);
+    maturin
 }
 
 fn pip(python: &PathBuf) -> Command {

@@ -197,7 +197,7 @@ fn flags(
             (clamps[line], EstimateReport::CLAMPED),
             (is_novel, EstimateReport::NOVEL),
         ];
-        flags.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag).sum()
+        flags.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag).sum::<u8>()
     };
     lines.enumerate().map(of_line).collect()
 }

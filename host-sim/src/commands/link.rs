@@ -154,22 +154,18 @@ const MOST_KEY_BYTES: u64 = 4096;
 /// Reads a device's key.
 fn read_key(path: &Path) -> Result<Key> {
     let content = input::read(path, MOST_KEY_BYTES)?;
+    #[cfg(unix)]
     note_readers(path);
     key_of(&content).map_err(|bad| Error::Unfit { path: path.to_owned(), message: bad.to_string() })
 }
 
 /// Notes that others may read the secret at `path`.
+#[cfg(unix)]
 fn note_readers(path: &Path) {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        let mode = std::fs::metadata(path).map_or(0, |metadata| metadata.permissions().mode());
-        if mode & 0o077 != 0 {
-            stderr::remark(format_args!(
-                "note: others may read {0}: chmod 600 {0}",
-                path.display()
-            ));
-        }
+    use std::os::unix::fs::PermissionsExt;
+    let mode = std::fs::metadata(path).map_or(0, |metadata| metadata.permissions().mode());
+    if mode & 0o077 != 0 {
+        stderr::remark(format_args!("note: others may read {0}: chmod 600 {0}", path.display()));
     }
 }
 
