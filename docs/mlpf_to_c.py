@@ -29,7 +29,7 @@ for panel, name, true, told in zip(panels, truth, truth[~known].to_numpy().T, es
     quantity, unit = name.split("_")
     panel.plot(true, told, ".", markersize=2, alpha=0.3)
     panel.axline((true.min(), true.min()), slope=1, color="grey", linewidth=0.8)
-    panel.set(title=f"{quantity}: {rmse[name]:.2f} {unit.upper() if unit == 'n' else unit}", xlabel="true", aspect="equal")
+    panel.set(title=f"{quantity}: {rmse[name]:.2f} {unit.upper() if unit == 'n' else unit}", xlabel="true", box_aspect=1)
 panels[0].set_ylabel("decoded")
 figure.suptitle("Presses at places that the model has never seen: RMSE")
 figure.savefig("mlpf.png", dpi=110)
