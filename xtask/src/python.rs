@@ -1,5 +1,6 @@
 //! The module of Python: its wheel, and its tests, in a virtual environment of their own.
 
+use std::env;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -40,8 +41,12 @@ pub fn environment(packages: &[&str]) -> Outcome<PathBuf> {
 /// A command of maturin, which is in the environment of `python`; what it makes lands in `folder`.
 pub fn maturin(python: &Path, command: &str, folder: &Path) -> Command {
     let mut maturin = Command::new(python.with_file_name("maturin"));
-    // Where it finds zig, if that is wanted.
-    maturin.env("VIRTUAL_ENV", target_dir().join("python"));
+    // It looks for zig, if that is wanted, by the first Python in the path.
+    let own = python.parent().map(Path::to_path_buf);
+    let path = env::var_os("PATH").unwrap_or_default();
+    if let Ok(path) = env::join_paths(own.into_iter().chain(env::split_paths(&path))) {
+        maturin.env("PATH", path);
+    }
     maturin.args([command, "--manifest-path"]).arg(root().join("python/Cargo.toml"));
     maturin.arg("--out").arg(folder);
     maturin
