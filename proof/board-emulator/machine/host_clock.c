@@ -63,6 +63,11 @@ int ppoll(struct pollfd *files, nfds_t count, const struct timespec *limit, cons
     return ready ? ready : wait_us(files, count, limit ? us_of(limit) : -1, mask);
 }
 
+int poll(struct pollfd *files, nfds_t count, int limit_ms) {
+    const struct timespec limit = {limit_ms / 1000, limit_ms % 1000 * 1000000L};
+    return ppoll(files, count, limit_ms < 0 ? 0 : &limit, 0);
+}
+
 static int sleep_us(int64_t us) { return us > 0 && wait_us(0, 0, us, 0) < 0 ? errno : 0; }
 
 int nanosleep(const struct timespec *time, struct timespec *left) {

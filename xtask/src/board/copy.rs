@@ -15,10 +15,15 @@ use crate::images::SEAL;
 use crate::process::{Outcome, run, target_dir, watch};
 use crate::toolchain::{Toolchain, elf};
 
-/// Manifests of the copy that differ: file, text that stands once in it, and what replaces it. The images have other
-/// names too, so that they do not replace the project's own.
-const MANIFESTS: [(&str, &str, &str); 3] = [
-    ("Cargo.toml", concat!("version = \"", env!("CARGO_PKG_VERSION"), "\""), "version = \"0.0.0\""),
+/// The version of the project's packages, and that of the copy's.
+const VERSION: &str = concat!("version = \"", env!("CARGO_PKG_VERSION"), "\"");
+const OTHER_VERSION: &str = "version = \"0.0.0\"";
+
+/// Manifests of the copy that differ: file, text in it, and what replaces it. The images have other names too, so that they
+/// do not replace the project's own.
+const MANIFESTS: [(&str, &str, &str); 4] = [
+    ("Cargo.toml", VERSION, OTHER_VERSION),
+    ("firmware/Cargo.toml", VERSION, OTHER_VERSION),
     (
         "firmware/nucleo-f446re/Cargo.toml",
         "[[bin]]\nname = \"nucleo-f446re\"",
@@ -50,7 +55,7 @@ impl Copy {
         update(&folder, |file, content| {
             let of_file = MANIFESTS.iter().filter(|(name, ..)| *name == file);
             Ok(of_file.fold(content, |content, (_, text, other)| {
-                String::from_utf8_lossy(&content).replacen(text, other, 1).into_bytes()
+                String::from_utf8_lossy(&content).replace(text, other).into_bytes()
             }))
         })?;
         Ok(Self { folder })
