@@ -109,9 +109,10 @@ mod tests {
     use crate::process::root;
 
     #[test]
-    fn what_differs_stands_once_in_its_manifest() {
+    fn what_differs_stands_in_its_manifest_and_names_of_images_once() {
         for (file, text, _) in MANIFESTS {
-            assert_eq!(read(&root().join(file)).unwrap().matches(text).count(), 1, "{file}");
+            let count = read(&root().join(file)).unwrap().matches(text).count();
+            assert!(if text == VERSION { count >= 1 } else { count == 1 }, "{file}: {count}");
         }
     }
 }
