@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
-use clap::Args;
+use clap::{ArgGroup, Args};
 use serde::Serialize;
-use taxel_data::output::{write_bytes, write_folder};
+use taxel_data::output::write_bytes;
 use taxel_learn::ModelBlob;
 use taxel_learn::export::c::{self, Name};
 use taxel_learn::export::rust::{self, Unheld};
@@ -21,6 +21,7 @@ use super::{Common, print};
 /// frame to its outputs. Nothing in it can fail, and it gives the bits that the blob gives. A Fixed holds networks of single
 /// rows in the number format f32-direct, and nothing else (docs/formats.md).
 #[derive(Args)]
+#[command(group(ArgGroup::new("language").required(true)))]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
   host-sim export press.bin --c lib/press --name press
@@ -30,14 +31,14 @@ use super::{Common, print};
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// Folder to write as a library in C; other files in it stay.
-    #[arg(long, value_name = "DIR", required_unless_present = "rust", conflicts_with = "rust")]
+    /// Folder to write as a library in C: a new one, or that of an earlier export under this name.
+    #[arg(long, value_name = "DIR", group = "language")]
     c: Option<PathBuf>,
-    /// Name of the library, with which all that it declares begins.
+    /// Name of the library, with which all that it declares begins, in small letters.
     #[arg(long, value_parser = Name::new, default_value = "taxel_model", conflicts_with = "rust")]
     name: Name,
     /// Rust source file to write.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", group = "language")]
     rust: Option<PathBuf>,
 }
 
@@ -65,7 +66,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     } else {
         let folder = arguments.c.as_ref().ok_or_else(|| Error::Usage("--c or --rust".into()))?;
         blob = ModelBlob::read(&arguments.model)?;
-        write_folder(folder, &c::library(&blob, &arguments.name)?)?;
+        c::write(&blob, &arguments.name, folder)?;
         (written, weight_bytes) = (folder, c::constant_bytes(&blob));
     }
     let model = blob.parse();

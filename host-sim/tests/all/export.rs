@@ -114,6 +114,7 @@ fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
     assert_eq!(folder.names(), ["lib"]);
     let files = [
         "CMakeLists.txt",
+        "LICENSE",
         "README.md",
         "examples/Decode/Decode.ino",
         "examples/posix/main.c",
@@ -125,13 +126,20 @@ fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
         "zephyr/module.yml",
     ];
     let text = |file: &str| fs::read_to_string(folder.path("lib/mat").join(file)).unwrap();
-    assert!(files.iter().all(|file| text(file).contains("mat")));
+    assert!(files.iter().all(|file| text(file).contains("mat") || *file == "LICENSE"));
     assert!(text("src/mat.h").contains("float mat_assess(const float *readings"));
     // Again, with a file of the user's.
     fs::write(folder.path("lib/mat/notes.txt"), "mine").unwrap();
     fs::write(folder.path("lib/mat/src/mat.c"), "old").unwrap();
     folder.succeed(&export);
     assert!(text("src/mat.c").starts_with("/* Model ") && text("notes.txt") == "mine");
+    // Neither the user's own files nor another library's are replaced or mixed with.
+    let said = folder.fail(&["export", &blob, "--c", "lib/mat", "--name", "sole"], 2);
+    assert!(said.contains("lib/mat: it holds other files than a library sole"), "{said}");
+    fs::create_dir(folder.path("own")).unwrap();
+    fs::write(folder.path("own/README.md"), "mine").unwrap();
+    folder.fail(&["export", &blob, "--c", "own", "--name", "mat"], 2);
+    assert_eq!(fs::read_dir(folder.path("own")).unwrap().count(), 1);
     folder.succeed(&["export", &blob, "--c", "other"]);
     assert!(folder.path("other/src/taxel_model.c").exists());
 }
@@ -142,12 +150,12 @@ fn wrong_usage_of_export_is_refused_and_nothing_is_written() {
     let blob = in_testdata("row4.bin");
     folder.write("file", "mine");
     for (options, says) in [
-        (&["--c", "lib", "--name", "2mat"][..], "a name in C starts with a letter"),
-        (&["--c", "lib", "--name", "class"], "C or C++ have this word"),
+        (&["--c", "lib", "--name", "2mat"][..], "name starts with a letter"),
+        (&["--c", "lib", "--name", "class"], "C, C++ or CMake have this word"),
         (&["--c", "lib", "--name", "string"], "a header of this name"),
         (&["--c", "lib", "--rust", "row4.rs"], "cannot be used with"),
         (&["--rust", "row4.rs", "--name", "mat"], "cannot be used with"),
-        (&["--name", "mat"], "--c <DIR>"),
+        (&["--name", "mat"], "--c <DIR>|--rust <FILE>"),
         (&["--c", "file"], "file"),
     ] {
         let said = folder.fail(&[&["export", &blob], options].concat(), 2);

@@ -12,6 +12,12 @@ mod source;
 
 pub use name::{BadName, Name};
 
+use std::fs;
+use std::path::Path;
+
+use taxel_data::BadValue;
+use taxel_data::output::write_folder;
+
 use crate::error::Result;
 use crate::packing::ModelBlob;
 use facts::Facts;
@@ -21,8 +27,9 @@ use template::Values;
 pub type SourceFile = (String, String);
 
 /// Texts around the source, by their paths.
-const LIBRARY: [(&str, &str); 8] = [
+const LIBRARY: [(&str, &str); 9] = [
     ("README.md", include_str!("c/library/README.md")),
+    ("LICENSE", include_str!("c/library/LICENSE")),
     ("CMakeLists.txt", include_str!("c/library/CMakeLists.txt")),
     ("library.properties", include_str!("c/library/library.properties")),
     ("library.json", include_str!("c/library/library.json")),
@@ -31,6 +38,13 @@ const LIBRARY: [(&str, &str); 8] = [
     ("examples/Decode/Decode.ino", include_str!("c/library/examples/Decode/Decode.ino")),
     ("examples/posix/main.c", include_str!("c/library/examples/posix/main.c")),
 ];
+
+/// What the header of every library says.
+const WRITTEN_BY_EXPORT: &str = "`host-sim export` wrote this file";
+
+fn header_path(name: &Name) -> String {
+    format!("src/{}.h", name.lower())
+}
 
 /// The files of a library that decodes as the model in `blob` does, to the bit; all that it declares begins with `name`.
 ///
@@ -44,12 +58,31 @@ pub fn library(blob: &ModelBlob, name: &Name) -> Result<Vec<SourceFile>> {
     let filled = |text| template::fill(text, name, &flags, &values);
     let mut files: Vec<SourceFile> =
         LIBRARY.iter().map(|(path, text)| ((*path).to_owned(), filled(text))).collect();
-    files.push((format!("src/{}.h", name.lower()), source::header(name, &flags, &values)));
+    files.push((header_path(name), source::header(name, &flags, &values)));
     files.push((
         format!("src/{}.c", name.lower()),
         source::code(&model, name, &flags, &mut values)?,
     ));
     Ok(files)
+}
+
+/// Writes the [`library`] of `blob` to `folder`, whole or not at all. Other files in it stay.
+///
+/// # Errors
+/// [`Error`](crate::Error) if there are files in `folder` that no export under this `name` wrote, if it cannot be written, or as
+/// [`library`].
+pub fn write(blob: &ModelBlob, name: &Name, folder: &Path) -> Result<()> {
+    let is_empty = fs::read_dir(folder).is_ok_and(|mut files| files.next().is_none());
+    let header = folder.join(header_path(name));
+    let is_own = || fs::read_to_string(header).is_ok_and(|text| text.contains(WRITTEN_BY_EXPORT));
+    if folder.is_dir() && !is_empty && !is_own() {
+        let rule = format!(
+            "it holds other files than a library {} of an earlier export, and some might be replaced; name a new folder",
+            name.lower()
+        );
+        return Err(BadValue::new("folder", folder.display(), rule).into());
+    }
+    Ok(write_folder(folder, &library(blob, name)?)?)
 }
 
 /// Number of bytes that the constants of the library of `blob` take.

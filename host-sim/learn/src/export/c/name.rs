@@ -2,10 +2,11 @@
 
 use std::fmt;
 
-/// Longest name; Arduino takes no longer one for a library.
+/// Longest name that is taken.
 const LONGEST: usize = 63;
 
-/// Words of C and C++ that no name may be, and headers that a file of the same name would hide.
+/// Words that no name may be: those of C and C++, headers that a file of the same name would hide, targets of CMake, and
+/// beginnings of the source's own macros.
 const TAKEN: &str = "\
     alignas alignof and asm auto bitand bitor bool break case catch char class compl concept const constexpr constinit \
     continue decltype default delete do double else enum explicit export extern false float for friend goto if import \
@@ -13,18 +14,20 @@ const TAKEN: &str = "\
     requires restrict return short signed sizeof static struct switch template this throw true try typedef typeid \
     typename typeof union unsigned using virtual void volatile while xor \
     arduino assert complex ctype errno fenv inttypes iso646 limits locale math setjmp signal stdalign stdarg stdatomic \
-    stdbool stddef stdint stdio stdlib stdnoreturn string strings tgmath threads time uchar unistd wchar wctype";
+    stdbool stddef stdint stdio stdlib stdnoreturn string strings tgmath threads time uchar unistd wchar wctype \
+    all clean depend edit_cache help install list_install_components package package_source rebuild_cache test \
+    network row";
 
-/// Name of a library, with which all names that it declares begin: an identifier of C.
+/// Name of a library, with which all names that it declares begin: an identifier of C, in small letters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Name(String);
 
 /// Why a text is no name of a library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BadName {
-    /// Not a letter of English first, then letters, digits and `_`; or too long.
+    /// Not a small letter of English first, then small letters, digits and `_`; or too long.
     NoIdentifier,
-    /// A word of C or C++, or the name of one of their headers.
+    /// A word of C, C++ or CMake, the name of a header, or a word of the source.
     Taken,
 }
 
@@ -33,9 +36,9 @@ impl fmt::Display for BadName {
         match self {
             Self::NoIdentifier => write!(
                 f,
-                "a name in C starts with a letter from a to z, and has letters, digits and _, {LONGEST} at most"
+                "a library's name starts with a letter from a to z, and has such letters, digits and _, {LONGEST} at most"
             ),
-            Self::Taken => f.write_str("C or C++ have this word, or a header of this name"),
+            Self::Taken => f.write_str("C, C++ or CMake have this word, or a header of this name; add to it, such as my_NAME"),
         }
     }
 }
@@ -48,13 +51,12 @@ impl Name {
     /// # Errors
     /// [`BadName`] says what is wrong with it.
     pub fn new(text: &str) -> Result<Self, BadName> {
-        let is_of_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
-        let starts_well = text.starts_with(|c: char| c.is_ascii_alphabetic());
+        let is_of_name = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+        let starts_well = text.starts_with(|c: char| c.is_ascii_lowercase());
         if !starts_well || !text.chars().all(is_of_name) || text.len() > LONGEST {
             return Err(BadName::NoIdentifier);
         }
-        let lower = text.to_ascii_lowercase();
-        if TAKEN.split_whitespace().any(|word| word == lower) {
+        if TAKEN.split_whitespace().any(|word| word == text) {
             return Err(BadName::Taken);
         }
         Ok(Self(text.to_owned()))

@@ -1,4 +1,5 @@
 /* @TITLE@
+ * SPDX-License-Identifier: MIT OR Apache-2.0
  *
  * A model of Taxel as C99: no heap, no libm, no state@BUT_BASELINE@. It gives the bits of Taxel's own decoder.
  * `host-sim export` wrote this file; write it anew rather than edit it.
@@ -13,6 +14,8 @@
 #define TAXEL_MODEL_ROWS @ROWS@u      /* row-wires */
 #define TAXEL_MODEL_READINGS @READINGS@u  /* readings of a frame, row after row */
 #define TAXEL_MODEL_OUTPUTS @OUTPUTS@u   /* outputs of a frame, row after row */
+#define TAXEL_MODEL_ROW_READINGS @ROW_READINGS@u  /* readings of a row */
+#define TAXEL_MODEL_ROW_OUTPUTS @ROW_OUTPUTS@u   /* outputs of a row: outputs[i] is of row i / TAXEL_MODEL_ROW_OUTPUTS */
 #define TAXEL_MODEL_SCRATCH @SCRATCH@u   /* floats of working space */
 #define TAXEL_MODEL_RELATIVE @RELATIVE@    /* 1: readings count relative to a baseline */
 #define TAXEL_MODEL_CONFIDENCE @CONFIDENCE@  /* 1: there is taxel_model_assess */
@@ -50,7 +53,7 @@ struct taxel_model_rest {
     /* What taxel_model_decode makes of the baseline: outputs [TAXEL_MODEL_OUTPUTS] and status [TAXEL_MODEL_ROWS]. */
     const float *outputs;
     const uint8_t *status;
-    /* Largest change of a reading at rest, relative to its baseline; above 0 and below 1. */
+    /* Largest change of a reading at rest, relative to its baseline; above 0 and below 1, else no row is skipped. */
     float tolerance;
 };
 

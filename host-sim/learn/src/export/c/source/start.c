@@ -1,4 +1,5 @@
 /* @TITLE@. taxel_model.h tells what it does.
+ * SPDX-License-Identifier: MIT OR Apache-2.0
  *
  * Sums are added up in a fixed order, which is part of the model: do not reorder them.
  */

@@ -9,9 +9,9 @@
  * baseline.csv holds one line: the readings of the untouched sensor.
 //@end
  *
- * An empty field or "nan" is a missing reading. A first line that holds names is skipped.
+ * An empty field or "nan" is a missing reading. Blank lines are skipped, and names in the first line.
  */
-#include <errno.h>
+#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,15 +21,30 @@
 static float readings[TAXEL_MODEL_READINGS], outputs[TAXEL_MODEL_OUTPUTS], scratch[TAXEL_MODEL_SCRATCH];
 static uint8_t status[TAXEL_MODEL_ROWS];
 
-/* Reads a line of readings. Returns 1, 0 at the end, or -1 if it does not hold TAXEL_MODEL_READINGS numbers. */
-static int read_line(FILE *file)
+/* Whether a line begins with a name, in quotes or not: a letter, but not that of "nan" or "inf". */
+static int holds_names(const char *line)
+{
+    char *end;
+    strtof(line, &end);
+    line += strspn(line, " \"");
+    return end == line && isalpha((unsigned char)*line);
+}
+
+/* Reads the next line of readings, and counts lines in `number`. Returns 1, 0 at the end, or -1 if it does not hold
+ * TAXEL_MODEL_READINGS numbers.
+ */
+static int read_frame(FILE *file, unsigned long *number)
 {
     static char line[64u * TAXEL_MODEL_READINGS + 64u];
-    char *rest = line;
-    if (fgets(line, sizeof line, file) == NULL) {
-        return 0;
-    }
-    line[strcspn(line, "\r\n")] = '\0';
+    char *rest;
+    do {
+        if (fgets(line, sizeof line, file) == NULL) {
+            return 0;
+        }
+        line[strcspn(line, "\r\n")] = '\0';
+        /* Spreadsheets begin a file with a mark of its encoding. */
+        rest = line + (++*number == 1 && strncmp(line, "\xef\xbb\xbf", 3) == 0 ? 3 : 0);
+    } while (*rest == '\0' || (*number == 1 && holds_names(rest)));
     for (unsigned i = 0; i < TAXEL_MODEL_READINGS; i++) {
         char *end;
         readings[i] = strtof(rest, &end);
@@ -45,30 +60,24 @@ static int read_line(FILE *file)
     return 1;
 }
 
-/* Reads a line, but skips names in the first one. */
-static int read_frame(FILE *file, unsigned long number)
-{
-    const int found = read_line(file);
-    return found < 0 && number == 1 ? read_line(file) : found;
-}
-
 //@if !relative
 int main(void)
 {
-    unsigned long number = 1;
+    unsigned long number = 0;
     int found;
 //@end
 //@if relative
 int main(int count, char **arguments)
 {
-    unsigned long number = 1;
+    unsigned long number = 0;
     int found;
     FILE *file = count == 2 ? fopen(arguments[1], "r") : NULL;
-    if (file == NULL || read_frame(file, 1) != 1) {
+    if (file == NULL || read_frame(file, &number) != 1) {
         fprintf(stderr, "usage: decode BASELINE.csv < READINGS.csv, with %u readings a line\n", TAXEL_MODEL_READINGS);
         return 2;
     }
     fclose(file);
+    number = 0;
 //@end
     if (taxel_model_selftest() != 0) {
         fprintf(stderr, "the self-test failed: compile taxel_model.c as the C standard says\n");
@@ -81,7 +90,7 @@ int main(int count, char **arguments)
         printf("%s%s", i == 0 ? "" : ",", taxel_model_output_name(i));
     }
     puts("");
-    for (; (found = read_frame(stdin, number)) > 0; number++) {
+    while ((found = read_frame(stdin, &number)) > 0) {
 //@if fill
         taxel_model_fill(readings, scratch);
 //@end
@@ -92,7 +101,7 @@ int main(int count, char **arguments)
         puts("");
     }
     if (found < 0) {
-        fprintf(stderr, "frame %lu: not %u numbers with commas between them\n", number, TAXEL_MODEL_READINGS);
+        fprintf(stderr, "line %lu: not %u numbers with commas between them\n", number, TAXEL_MODEL_READINGS);
         return 2;
     }
     return 0;
