@@ -82,7 +82,7 @@ pub fn write(blob: &ModelBlob, name: &Name, folder: &Path) -> Result<()> {
         );
         return Err(BadValue::new("folder", folder.display(), rule).into());
     }
-    Ok(write_folder(folder, &library(blob, name)?)?)
+    write_folder(folder, &library(blob, name)?)
 }
 
 /// Number of bytes that the constants of the library of `blob` take.
