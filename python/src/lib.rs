@@ -17,6 +17,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(call::call, module)?)?;
     module.add_function(wrap_pyfunction!(call::main, module)?)?;
     module.add_function(wrap_pyfunction!(link::ports, module)?)?;
+    module.add_function(wrap_pyfunction!(link::only_usb_port, module)?)?;
     module.add_class::<model::Blob>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<link::Line>()

@@ -161,9 +161,9 @@ class Link:
 
 def only_port() -> str:
     """The port of USB that there is, if there is one."""
-    ports = list_ports()
-    of_usb = [port for port in ports if any(part in port for part in ("ttyACM", "ttyUSB", "usbmodem", "usbserial", "COM"))]
-    if len(of_usb) == 1:
-        return of_usb[0]
-    known = f"there are {', '.join(of_usb or ports)}" if ports else "this computer has no serial port"
-    raise ValueError(f"port: no device is found by itself: name its port; {known}")
+    port = _native.only_usb_port()
+    if port is None:
+        ports = list_ports()
+        known = f"there are {', '.join(ports)}" if ports else "this computer has no serial port"
+        raise ValueError(f"port: no device is found by itself: name its port; {known}")
+    return port

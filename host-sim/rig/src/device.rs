@@ -21,6 +21,7 @@ use taxel_firmware::seal::Key;
 
 use crate::error::{Error, Heard, Result};
 
+pub(crate) mod look;
 mod identity;
 mod configuration;
 pub mod serial;
@@ -52,8 +53,6 @@ const SLOWEST_WRITE: Duration = Duration::from_secs(10);
 const MOST_REQUEST_BYTES: usize = 8192;
 /// Largest size of a report: that of a sensor of 255 rows, 32 columns and 255 outputs a row would be larger.
 const MOST_REPORT_BYTES: usize = 64 * 1024;
-/// Time that one look for bytes waits.
-const GLANCE: Duration = Duration::from_millis(5);
 
 /// Line of bytes to a device.
 pub trait Wire: Read + Write {
@@ -100,7 +99,7 @@ pub struct Device {
 impl Device {
     /// Device on `wire`; nothing is sent yet.
     pub fn new(mut wire: impl Wire + 'static) -> Result<Self> {
-        wire.set_read_timeout(GLANCE)?;
+        wire.set_read_timeout(look::GLANCE)?;
         let receiver = Receiver::new(vec![0; MOST_REPORT_BYTES]);
         let pending = VecDeque::new();
         Ok(Self {
@@ -134,7 +133,7 @@ impl Device {
                 Ok(0) => return Err(std::io::Error::from(ErrorKind::WriteZero).into()),
                 Ok(count) => rest = &rest[count..],
                 // A slow line takes them little by little.
-                Err(cause) if is_timeout(&cause) && start.elapsed() < SLOWEST_WRITE => {}
+                Err(cause) if look::is_timeout(&cause) && start.elapsed() < SLOWEST_WRITE => {}
                 Err(cause) => return Err(cause.into()),
             }
         }
@@ -216,16 +215,10 @@ impl Device {
             }
             self.check_stop()?;
             self.prolong()?;
-            match self.wire.read(&mut bytes) {
-                Ok(0) => return Err(Error::Closed),
-                Ok(count) => {
-                    self.pending.extend(&bytes[..count]);
-                    if self.heard == Heard::Nothing {
-                        self.heard = Heard::Noise;
-                    }
-                }
-                Err(cause) if is_timeout(&cause) => {}
-                Err(cause) => return Err(cause.into()),
+            let count = look::read(&mut *self.wire, &mut bytes)?;
+            self.pending.extend(&bytes[..count]);
+            if count > 0 && self.heard == Heard::Nothing {
+                self.heard = Heard::Noise;
             }
             // The time is looked at after reading, so that even a deadline of now takes the bytes that
             // are there. Bytes that came do not prolong it, since a device that scans never pauses for
@@ -347,10 +340,6 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
         true
     });
     Ok(bytes)
-}
-
-fn is_timeout(cause: &std::io::Error) -> bool {
-    matches!(cause.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }
 
 #[cfg(test)]

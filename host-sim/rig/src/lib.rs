@@ -10,6 +10,7 @@ pub mod image;
 pub mod error;
 pub mod calibration;
 pub mod device;
+pub mod scans;
 pub mod mailbox;
 pub mod emulator;
 

@@ -42,10 +42,24 @@ pub fn names() -> Vec<String> {
     ports.into_iter().map(|port| port.to_string_lossy().into_owned()).collect()
 }
 
-/// Whether a port is one of USB, by the names of Linux (ttyACM0, ttyUSB0) and macOS (cu.usbmodem1, cu.usbserial1).
+/// Name of the port of USB that there is; `None` if there is none.
+///
+/// # Errors
+/// If there are several: it names them.
+pub fn only_usb() -> Result<Option<String>> {
+    let mut ports = names();
+    ports.retain(|port| is_usb(Path::new(port)));
+    match ports.len() {
+        0 | 1 => Ok(ports.pop()),
+        _ => Err(Error::unfit_for("port", format!("there are {}: name one", ports.join(", ")))),
+    }
+}
+
+/// Whether a port may be one of USB, by the names of Linux (ttyACM0, ttyUSB0), macOS (cu.usbmodem1, cu.usbserial1) and
+/// Windows (COM3), which do not tell.
 fn is_usb(port: &Path) -> bool {
     let name = port.to_string_lossy();
-    ["ttyACM", "ttyUSB", "usbmodem", "usbserial"].iter().any(|part| name.contains(part))
+    ["ttyACM", "ttyUSB", "usbmodem", "usbserial", "COM"].iter().any(|part| name.contains(part))
 }
 
 /// Takes a port for this program alone: two would read half of the bytes each. Windows does so by itself.

@@ -19,7 +19,7 @@ use super::super::data_file::FieldArguments;
 use super::super::readings::{BaselineArgument, table_of};
 use super::super::{Common, print};
 use super::activate;
-use super::frames::hear_frames;
+use super::frames::{self, hear_scans};
 use super::scan::{ScanArguments, Wanted, configure, patience, reading_names};
 
 #[derive(Args)]
@@ -125,11 +125,11 @@ fn record_presses(
     for number in 0..outputs.len() {
         ask_for_press(number, outputs)?;
         // Paused first, so that no frame is from before the press.
-        let (frames, _) = device.while_paused(|device| -> Result<_> {
+        let scans = device.while_paused(|device| -> Result<_> {
             configure(device, scan, Wanted::Readings, Configuration::DEFAULT)?;
-            hear_frames(device, scan.frames.into(), patience, Wanted::Readings, names.len())
+            hear_scans(device, scan.frames.into(), patience, Wanted::Readings, names.len())
         })?;
-        let scanned = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
+        let scanned = scans.iter().flat_map(frames::values).collect();
         let mut scanned = Table { names: names.clone(), values: scanned };
         judge(&mut scanned, Some(Limits::USUAL));
         let mean = |reading: usize| {

@@ -9,14 +9,15 @@ use serde::Serialize;
 use taxel_core::blob::Model;
 use taxel_data::spectrum::Spectrum;
 use taxel_data::{Table, csv_file};
-use taxel_firmware::link::message::{Configuration, Report, Request, Setting};
+use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request, Setting};
 use taxel_learn::ModelBlob;
 use taxel_rig::device::{Device, DeviceIdentity};
+use taxel_rig::scans::{Scan, ScanEstimate};
 
 use super::super::filter_arguments::FilterArguments;
 use super::super::health::note_faults;
 use super::super::{Common, print};
-use super::frames::{Frame, hear_frames, missing};
+use super::frames::{hear_scans, missing, values};
 use super::scan::{
     Confidence, ScanArguments, Wanted, check_length, configure, patience, reading_names, tolerance,
 };
@@ -118,7 +119,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         }
         _ => (Wanted::Readings, reading_names(&identity, model.as_ref())?),
     };
-    let values = names.len();
+    let outputs = names.len();
     if let Some(model) = &model {
         names.extend(confidence_names(model, action.confidence, &names)?);
     }
@@ -137,32 +138,36 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         report_every: every,
         ..Configuration::DEFAULT
     };
-    let (frames, rows_at_rest) = device.while_paused(|device| -> Result<_> {
+    let scans = device.while_paused(|device| -> Result<_> {
         configure(device, &action.scan, wanted, decoding)?;
-        hear_frames(device, action.scan.frames.into(), patience, wanted, names.len())
+        hear_scans(device, action.scan.frames.into(), patience, wanted, names.len())
     })?;
-    let missing = missing(frames.iter().flat_map(|frame| &frame.values[..values]), wanted)?;
+    let lines: Vec<Vec<f64>> = scans.iter().map(values).collect();
+    let missing = missing(lines.iter().flat_map(|line| &line[..outputs]), wanted)?;
     if wanted == Wanted::Readings {
-        let values = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
-        note_faults(&Table { names: names.clone(), values });
+        note_faults(&Table { names: names.clone(), values: lines.concat() });
     }
-    let noise = if action.untouched { Some(noise(&frames, &names, every)?) } else { None };
+    let noise = if action.untouched { Some(noise(&scans, &names, every)?) } else { None };
     let time = action.time.then_some("time_s");
-    let first_us = frames.first().map_or(0, |frame| frame.start_us);
-    let lines = frames.iter().map(|frame| {
-        let time = time.map(|_| (frame.start_us - first_us) as f64 / 1e6);
-        time.into_iter().chain(frame.values.iter().copied())
+    let first_us = scans.first().map_or(0, |scan| scan.start_us);
+    let lines = scans.iter().zip(lines).map(|(scan, line)| {
+        let time = time.map(|_| (scan.start_us - first_us) as f64 / 1e6);
+        time.into_iter().chain(line)
     });
     let header = time.into_iter().chain(names.iter().map(String::as_str));
     csv_file::write(&action.output, header, lines)?;
-    let ends = frames.last().zip(frames.first());
+    let ends = scans.last().zip(scans.first());
     let steps = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number));
-    let frames_lost = (steps / u32::from(every) + 1).saturating_sub(frames.len() as u32);
+    let frames_lost = (steps / u32::from(every) + 1).saturating_sub(scans.len() as u32);
     let elapsed_us = ends.map_or(0, |(last, first)| last.start_us - first.start_us);
     let frames_per_s = (elapsed_us > 0).then(|| f64::from(steps) / (elapsed_us as f64 * 1e-6));
-    let frames_novel = frames.iter().filter(|frame| frame.novel).count();
+    let estimates = scans.iter().filter_map(|scan| scan.estimate.as_ref());
+    let is_novel = |it: &&ScanEstimate| it.flags & EstimateReport::NOVEL != 0;
+    let frames_novel = estimates.clone().filter(is_novel).count();
+    let at_rest = |status: &&u8| **status == EstimateReport::ROW_AT_REST;
+    let rows_at_rest = estimates.flat_map(|it| &it.row_status).filter(at_rest).count();
     let file = action.output.clone();
-    let (frames, values_missing) = (frames.len(), missing);
+    let (frames, values_missing) = (scans.len(), missing);
     let saved = Saved {
         frames,
         frames_per_s,
@@ -176,16 +181,16 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     saved.print(common)
 }
 
-/// Noise on the readings of these `frames`, in columns of these `names`. The device has sent `every` so many.
-fn noise(frames: &[Frame], names: &[String], every: u16) -> Result<Spectrum> {
-    let first = frames.first().map_or((0, 0), |frame| (frame.number, frame.start_us));
-    let numbers: Vec<usize> = frames
+/// Noise on the readings of these `scans`, in columns of these `names`. The device has sent `every` so many.
+fn noise(scans: &[Scan], names: &[String], every: u16) -> Result<Spectrum> {
+    let first = scans.first().map_or((0, 0), |scan| (scan.number, scan.start_us));
+    let numbers: Vec<usize> = scans
         .iter()
-        .map(|frame| (frame.number.wrapping_sub(first.0) / u32::from(every)) as usize)
+        .map(|scan| (scan.number.wrapping_sub(first.0) / u32::from(every)) as usize)
         .collect();
     let times_s: Vec<f64> =
-        frames.iter().map(|frame| (frame.start_us - first.1) as f64 * 1e-6).collect();
-    let values = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
+        scans.iter().map(|scan| (scan.start_us - first.1) as f64 * 1e-6).collect();
+    let values = scans.iter().flat_map(values).collect();
     let readings = Table { names: names.to_vec(), values };
     Spectrum::new(&readings, &numbers, Some(&times_s)).ok_or_else(|| {
         let message = "--untouched: it takes 40 frames without a gap, and readings that change, to judge noise; raise \
@@ -251,7 +256,7 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
         })
     })?;
     let readings = answer.map_err(taxel_rig::Error::Refused)?;
-    check_length(0, &readings, names.len())?;
+    check_length(0, readings.len(), names.len())?;
     let values_missing = missing(readings.iter(), Wanted::Readings)?;
     if action.store {
         device.keep(Setting::Baseline)?;

@@ -123,8 +123,7 @@ pub fn all_wires(identity: &DeviceIdentity) -> Result<Wires> {
 }
 
 /// Checks the number of values in a frame.
-pub fn check_length(frame: u32, values: &[f64], expected: usize) -> Result<()> {
-    let found = values.len();
+pub fn check_length(frame: u32, found: usize, expected: usize) -> Result<()> {
     if found == expected {
         return Ok(());
     }

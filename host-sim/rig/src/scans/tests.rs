@@ -1,0 +1,128 @@
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
+
+use super::*;
+use crate::Error;
+
+/// Two ends of a line.
+fn line() -> (TcpStream, TcpStream) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let far = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+    (far, listener.accept().unwrap().0)
+}
+
+/// Readings of `count` scans that `source` hears.
+fn heard(source: &mut dyn Source, count: usize) -> Vec<Vec<f32>> {
+    let (mut scans, end) = (vec![], Instant::now() + Duration::from_secs(20));
+    while scans.len() < count && Instant::now() < end {
+        source.hear(Instant::now(), &mut |scan| scans.push(scan.readings)).unwrap();
+    }
+    scans
+}
+
+#[test]
+fn lines_of_numbers_are_scans_and_all_other_lines_are_skipped() {
+    let (mut far, near) = line();
+    let mut source = NumberLines::new(near, 0).unwrap();
+    // The first line may be cut, whatever it looks like.
+    far.write_all(b"3,4\nr1c1,r1c2,r1c3\n1,2,3\r\n\xff,1,2\n4;5;6\n 7 8  9 \n1,2\n\n10,,nan\n,,\n")
+        .unwrap();
+    far.write_all(b"11\t12\t").unwrap();
+    let scans = heard(&mut source, 4);
+    assert_eq!(scans[..3], [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]]);
+    assert!(scans[3][0] == 10.0 && scans[3][1].is_nan() && scans[3][2].is_nan());
+    far.write_all(b"13\n").unwrap();
+    assert_eq!(heard(&mut source, 1), [[11.0, 12.0, 13.0]]);
+    drop(far);
+    let ended = source.hear(Instant::now() + Duration::from_secs(9), &mut |_| {});
+    assert!(matches!(ended, Err(Error::Closed)), "{ended:?}");
+}
+
+#[test]
+fn frames_between_marks_are_found_although_readings_look_like_marks() {
+    let (mut far, near) = line();
+    let mut source = MarkedBytes::new(near, 4).unwrap();
+    let frames: [[u8; 4]; 3] = [[0xAA, 0x55, 1, 2], [0xAA, 0xAA, 0x55, 0x55], [7, 8, 9, 0xAA]];
+    // Bytes of a frame that began before anybody listened come first, and one byte is lost later on.
+    let mut bytes = vec![0x55, 3, 0xAA, 0x55];
+    for frame in frames.iter().chain(&frames) {
+        bytes.extend([&[0xAA, 0x55], &frame[..]].concat());
+    }
+    bytes.remove(4 + 12 + 3);
+    bytes.extend([0xAA, 0x55]);
+    far.write_all(&bytes).unwrap();
+    let floats = |frame: [u8; 4]| frame.map(f32::from).to_vec();
+    let expected: Vec<Vec<f32>> = [0, 1, 0, 1, 2].map(|at| floats(frames[at])).to_vec();
+    assert_eq!(heard(&mut source, 5), expected);
+}
+
+/// A source that sends the numbers that it is given, and ends with the sender.
+struct Numbers(mpsc::Receiver<u32>, Vec<Vec<f32>>);
+
+impl Source for Numbers {
+    fn hear(&mut self, deadline: Instant, take: &mut dyn FnMut(Scan)) -> Result<()> {
+        match self.0.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            Ok(number) => {
+                let readings = self.1.last().cloned().unwrap_or_default();
+                take(Scan { number, start_us: 0, heard: Instant::now(), readings, estimate: None });
+                Ok(())
+            }
+            Err(mpsc::RecvTimeoutError::Timeout) => Ok(()),
+            Err(mpsc::RecvTimeoutError::Disconnected) => Err(Error::Closed),
+        }
+    }
+
+    fn set_baseline(&mut self, readings: &[f32]) -> Result<()> {
+        self.1.push(readings.to_vec());
+        Ok(())
+    }
+}
+
+#[test]
+fn a_listener_keeps_the_newest_scans_and_counts_those_that_are_lost() {
+    const WAIT: Duration = Duration::from_secs(20);
+    let (sender, receiver) = mpsc::channel();
+    let open = |_: &_| Ok((Box::new(Numbers(receiver, vec![])) as Box<dyn Source>, "opened"));
+    let (listener, opened) = Listener::start(2, open).unwrap();
+    assert_eq!(opened.recv().unwrap().unwrap(), "opened");
+    listener.set_baseline(vec![60.0]).unwrap();
+    // One never came; then the sender starts anew.
+    [7, 9, 10, 0, 1].into_iter().for_each(|number| sender.send(number).unwrap());
+    while listener.shared_newest() != Some(1) {
+        thread::sleep(Duration::from_millis(1));
+    }
+    let first = listener.next(WAIT).unwrap().unwrap();
+    assert_eq!((first.number, first.readings), (0, vec![60.0]));
+    assert_eq!(listener.lost(), 1 + 3);
+    sender.send(2).unwrap();
+    assert_eq!(listener.next(WAIT).unwrap().unwrap().number, 1);
+    assert_eq!(listener.next(WAIT).unwrap().unwrap().number, 2);
+    assert_eq!(listener.newest(WAIT).unwrap().unwrap().number, 2);
+    assert!(listener.newest(Duration::ZERO).unwrap().is_none());
+    assert!(listener.next(Duration::from_millis(1)).unwrap().is_none());
+    drop(sender);
+    let ended = listener.next(WAIT).unwrap_err();
+    assert_eq!(ended.to_string(), Error::Closed.to_string());
+    assert!(listener.set_baseline(vec![]).is_err());
+}
+
+#[test]
+fn a_source_that_cannot_be_opened_ends_its_listener() {
+    let refuse = |_: &_| Err::<(Box<dyn Source>, ()), _>(Error::failed("no such port"));
+    let (listener, opened) = Listener::start(1, refuse).unwrap();
+    assert_eq!(opened.recv().unwrap().unwrap_err().to_string(), "no such port");
+    assert!(listener.next(Duration::from_secs(9)).is_err());
+}
+
+#[test]
+fn a_line_without_bytes_ends_at_its_deadline() {
+    let (mut far, near) = line();
+    let mut source = NumberLines::new(near, 3).unwrap();
+    let start = Instant::now();
+    source.hear(start + Duration::from_millis(30), &mut |_| panic!("nothing was sent")).unwrap();
+    assert!(start.elapsed() >= Duration::from_millis(30));
+    assert!(far.set_nonblocking(true).is_ok() && far.read(&mut [0]).is_err());
+}
