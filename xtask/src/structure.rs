@@ -16,6 +16,7 @@ const MOCKS: &[&str] = &["mock-board"];
 const DESK: &[&str] = &[
     "taxel-scenes",
     "taxel-data",
+    "taxel-recording",
     "taxel-simulate",
     "taxel-virtual-board",
     "taxel-learn",
