@@ -362,6 +362,10 @@ impl<S: Read + Seek> Source<S> {
 
 impl Contents {
     fn add_chunk(&mut self, place: ChunkPlace) -> Result<()> {
+        // None is read twice, whatever an index says.
+        if self.chunks.last().is_some_and(|last| last.at >= place.at) {
+            return Err(Error::damaged(place.at, "chunks are out of order"));
+        }
         self.chunks.push(place);
         at_most(MOST_CHUNKS as u64, self.chunks.len() as u64, "parts of a recording")
     }
