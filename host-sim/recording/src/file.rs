@@ -214,6 +214,7 @@ impl<S: Read + Seek> Source<S> {
         if let Some(summary) = footer.filter(|at| *at > 0)
             && let Ok(contents) = self.summary(summary)
             && contents.parts.contains_key(LAYOUT)
+            && !contents.chunks.is_empty()
         {
             return Ok((contents, false));
         }
@@ -256,6 +257,9 @@ impl<S: Read + Seek> Source<S> {
                     // Nothing of a recording follows.
                     at = self.length;
                     break;
+                }
+                kind::MESSAGE => {
+                    return Err(Error::Foreign("chunks: its messages stand alone".into()));
                 }
                 kind::CHUNK if length >= 16 => {
                     let times = self.read(16)?;

@@ -50,8 +50,17 @@ fn main() -> Outcome {
     Ok(())
 }
 
-/// A recording that is whole, and one that was cut. Their chunks have no checksum, so that what is in them can change.
+/// A recording that is whole, and one that was cut, which has every topic. Their chunks have no checksum, so that what is
+/// in them can change.
 fn recordings() -> Outcome<Vec<Vec<u8>>> {
+    let (whole, _) = recording(false)?;
+    let (mut all, end) = recording(true)?;
+    all.truncate(end);
+    Ok(vec![whole, all])
+}
+
+/// A recording, with every topic or a few, and where its last chunk ends.
+fn recording(has_all: bool) -> Outcome<(Vec<u8>, usize)> {
     let column = |name: &str, unit: &str| Column { name: name.into(), unit: unit.into() };
     let layout = Layout {
         title: "t".into(),
@@ -75,7 +84,8 @@ fn recordings() -> Outcome<Vec<Vec<u8>>> {
     let start = UNIX_EPOCH + Duration::from_secs(1);
     let mut writer = Writer::create(&path, &layout, &extras, start, Replace::Recordings)?;
     for number in 0..4 {
-        let has_contact = number % 2 == 1;
+        let is_second = number % 2 == 1;
+        let has_contact = has_all && is_second;
         writer.write(&Frame {
             time_us: 10_000 * u64::from(number),
             number,
@@ -84,21 +94,22 @@ fn recordings() -> Outcome<Vec<Vec<u8>>> {
             deviations: has_contact.then(|| vec![0.1; 3]),
             truth: has_contact.then(|| vec![0.5; 3]),
             contact: has_contact.then_some(Contact { place_mm: [1.0; 3], force_n: Some([0.5; 3]) }),
-            status: Some(Status {
+            status: has_all.then(|| Status {
                 row_wires: vec![Health::Sound],
                 column_wires: vec![Health::Open, Health::Noisy],
                 is_novel: has_contact,
                 ..Status::default()
             }),
         })?;
-        if has_contact {
+        if is_second {
             writer.flush()?;
         }
     }
     writer.finish()?;
     let mut whole = fs::read(&path)?;
     fs::remove_file(&path)?;
-    // A record is its kind, the length of its body, and that. Chunks are of kind 6; two times and a length stand before their checksum.
+    // A record is its kind, the length of its body, and that. Chunks are of kind 6; two times and a length stand before
+    // their checksum.
     let (mut at, mut last_end) = (8, 0);
     while let Some(length) = whole.get(at + 1..at + 9) {
         let end = at + 9 + u64::from_le_bytes(length.try_into()?) as usize;
@@ -108,8 +119,7 @@ fn recordings() -> Outcome<Vec<Vec<u8>>> {
         }
         at = end;
     }
-    let cut = whole[..last_end].to_vec();
-    Ok(vec![whole, cut])
+    Ok((whole, last_end))
 }
 
 /// Models of every format and with every section.
