@@ -1,14 +1,14 @@
-//! Records of an MCAP file of any bytes, in bounded memory: where a recording's parts are, and chunks of messages.
+//! Records of an MCAP file of any bytes, in bounded memory: where the parts of a recording are.
 //!
 //! A record is a byte that tells its kind, the length of its body in eight bytes, and the body.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
 use crate::bytes::Bytes;
+use crate::chunk::{Channels, Chunk, HEAD, kind};
 use crate::error::{Error, Result, at_most};
 use crate::layout::{MOST_BLOB_BYTES, MOST_COLUMNS, MOST_SCENE_BYTES, MOST_TEXT_BYTES};
-use crate::topic::{ENCODING, LANGUAGE, Topic};
 
 /// Metadata record with the layout, and that with further settings.
 pub const LAYOUT: &str = "taxel";
@@ -29,24 +29,8 @@ pub const MOST_CHUNKS: usize = 1 << 19;
 const MOST_NAME_BYTES: u64 = 64 << 10;
 
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
-/// Bytes before a record's body.
-const HEAD: u64 = 9;
 /// Bytes of the footer's record.
 const FOOTER_BYTES: u64 = HEAD + 20;
-
-mod kind {
-    pub const FOOTER: u8 = 2;
-    pub const SCHEMA: u8 = 3;
-    pub const CHANNEL: u8 = 4;
-    pub const MESSAGE: u8 = 5;
-    pub const CHUNK: u8 = 6;
-    pub const CHUNK_INDEX: u8 = 8;
-    pub const ATTACHMENT: u8 = 9;
-    pub const ATTACHMENT_INDEX: u8 = 10;
-    pub const METADATA: u8 = 12;
-    pub const METADATA_INDEX: u8 = 13;
-    pub const DATA_END: u8 = 15;
-}
 
 /// Place of a chunk in the file.
 #[derive(Debug, Clone, Copy)]
@@ -68,66 +52,6 @@ pub struct Contents {
     pub channels: Channels,
     /// First byte after the last whole record; the file's length if no more was to follow.
     pub whole_bytes: u64,
-}
-
-/// Topics of channels, by their numbers.
-#[derive(Debug, Default)]
-pub struct Channels {
-    /// Types of the schemas that topics of a recording have.
-    kinds: HashMap<u16, &'static str>,
-    topics: HashMap<u16, Topic>,
-}
-
-impl Channels {
-    /// Topic of a channel, if it is one of a recording.
-    pub fn topic(&self, channel: u16) -> Option<Topic> {
-        self.topics.get(&channel).copied()
-    }
-
-    /// Whether there are any.
-    pub fn is_empty(&self) -> bool {
-        self.topics.is_empty()
-    }
-
-    /// Learns what a record tells of channels.
-    ///
-    /// # Errors
-    /// [`Error::Foreign`] if a topic of a recording has messages of another type.
-    fn learn(&mut self, kind: u8, body: &[u8], at: u64) -> Result<()> {
-        let mut bytes = Bytes::record(body);
-        let learnt = match kind {
-            kind::SCHEMA => self.learn_schema(&mut bytes).map(Ok),
-            kind::CHANNEL => self.learn_channel(&mut bytes),
-            _ => Some(Ok(())),
-        };
-        learnt.unwrap_or_else(|| Err(Error::damaged(at, "it is no channel and no schema")))
-    }
-
-    fn learn_schema(&mut self, bytes: &mut Bytes<'_>) -> Option<()> {
-        let (number, name, language) = (bytes.u16()?, bytes.text()?, bytes.text()?);
-        let topic = Topic::ALL.into_iter().find(|topic| topic.kind() == name);
-        match topic.filter(|_| language == LANGUAGE) {
-            Some(topic) => self.kinds.insert(number, topic.kind()),
-            None => self.kinds.remove(&number),
-        };
-        Some(())
-    }
-
-    fn learn_channel(&mut self, bytes: &mut Bytes<'_>) -> Option<Result<()>> {
-        let (number, schema) = (bytes.u16()?, bytes.u16()?);
-        let (name, encoding) = (bytes.text()?, bytes.text()?);
-        self.topics.remove(&number);
-        let Some(topic) = Topic::ALL.into_iter().find(|topic| topic.name() == name) else {
-            return Some(Ok(()));
-        };
-        if encoding == ENCODING && self.kinds.get(&schema) == Some(&topic.kind()) {
-            self.topics.insert(number, topic);
-        } else if name.starts_with("/taxel/") {
-            let lacks = format!("messages of type {} in CDR on topic {name}", topic.kind());
-            return Some(Err(Error::Foreign(lacks)));
-        }
-        Some(Ok(()))
-    }
 }
 
 /// File that is read piece by piece.
@@ -214,6 +138,7 @@ impl<S: Read + Seek> Source<S> {
         if let Some(summary) = footer.filter(|at| *at > 0)
             && let Ok(contents) = self.summary(summary)
             && contents.parts.contains_key(LAYOUT)
+            && !contents.chunks.is_empty()
         {
             return Ok((contents, false));
         }
@@ -257,6 +182,9 @@ impl<S: Read + Seek> Source<S> {
                     at = self.length;
                     break;
                 }
+                kind::MESSAGE => {
+                    return Err(Error::Foreign("chunks: its messages stand alone".into()));
+                }
                 kind::CHUNK if length >= 16 => {
                     let times = self.read(16)?;
                     let last_ns = Bytes::record(&times[8..]).u64().unwrap_or(0);
@@ -290,7 +218,7 @@ impl<S: Read + Seek> Source<S> {
         name: &str,
     ) -> Result<Option<BTreeMap<String, String>>> {
         let Some(&at) = contents.parts.get(name) else { return Ok(None) };
-        let most = 2 * MOST_TEXT_BYTES as u64;
+        let most = MOST_TEXT_BYTES as u64;
         let body = self.body(at, kind::METADATA, most, "bytes of metadata")?;
         let read = || {
             let mut bytes = Bytes::record(&body);
@@ -335,33 +263,16 @@ impl<S: Read + Seek> Source<S> {
     /// [`Error::Compressed`]; [`Error::Damaged`] if it is not as it was written; [`Error::TooMany`].
     pub fn chunk(&mut self, at: u64) -> Result<Chunk> {
         let body = self.body(at, kind::CHUNK, MOST_CHUNK_BYTES, "bytes of a chunk")?;
-        let damaged = |what| Error::damaged(at, what);
-        let read = || {
-            let mut bytes = Bytes::record(&body);
-            bytes.take(16)?;
-            let (length, crc) = (bytes.u64()?, bytes.u32()?);
-            let compression = bytes.text()?;
-            let stored = bytes.u64()?;
-            Some((length, crc, compression, stored, bytes.rest()))
-        };
-        let (length, crc, compression, stored, data) =
-            read().ok_or_else(|| damaged("it is no chunk"))?;
-        if !compression.is_empty() {
-            return Err(Error::Compressed(compression.chars().take(20).collect()));
-        }
-        if length != stored || stored != data.len() as u64 {
-            return Err(damaged("the chunk's lengths differ"));
-        }
-        if crc != 0 && crc != crc32fast::hash(data) {
-            return Err(damaged("the chunk's checksum differs"));
-        }
-        let next = body.len() - data.len();
-        Ok(Chunk { at, body, next })
+        Chunk::parse(at, body)
     }
 }
 
 impl Contents {
     fn add_chunk(&mut self, place: ChunkPlace) -> Result<()> {
+        // None is read twice, whatever an index says.
+        if self.chunks.last().is_some_and(|last| last.at >= place.at) {
+            return Err(Error::damaged(place.at, "chunks are out of order"));
+        }
         self.chunks.push(place);
         at_most(MOST_CHUNKS as u64, self.chunks.len() as u64, "parts of a recording")
     }
@@ -387,63 +298,5 @@ impl Contents {
             self.add_part(bytes.text()?, &[BLOB, SCENE], at);
         }
         Some(Ok(()))
-    }
-}
-
-/// Message of a topic of a recording.
-#[derive(Debug, Clone, Copy)]
-pub struct Message<'c> {
-    pub topic: Topic,
-    pub number: u32,
-    /// Time by the wall clock, in ns since 1970.
-    pub ns: u64,
-    /// Time by the device's clock, in ns.
-    pub device_ns: u64,
-    pub data: &'c [u8],
-}
-
-/// Chunk of messages.
-#[derive(Debug)]
-pub struct Chunk {
-    /// First byte of its record in the file.
-    pub at: u64,
-    body: Vec<u8>,
-    /// Place in the body of the next record.
-    next: usize,
-}
-
-impl Chunk {
-    /// Next message of a recording's topic; `None` at the end. Learns `channels` on the way.
-    pub fn message(&mut self, channels: &mut Channels) -> Result<Option<Message<'_>>> {
-        let at = self.at;
-        loop {
-            let mut bytes = Bytes::record(&self.body[self.next..]);
-            if bytes.rest().is_empty() {
-                return Ok(None);
-            }
-            let mut record = || {
-                let (kind, length) = (bytes.u8()?, bytes.u64()?);
-                Some((kind, bytes.take(usize::try_from(length).ok()?)?))
-            };
-            let Some((kind, body)) = record() else {
-                self.next = self.body.len();
-                return Err(Error::damaged(at, "a record in the chunk has no end"));
-            };
-            self.next += HEAD as usize + body.len();
-            if kind != kind::MESSAGE {
-                channels.learn(kind, body, at)?;
-                continue;
-            }
-            let mut bytes = Bytes::record(body);
-            let mut header = || Some((bytes.u16()?, bytes.u32()?, bytes.u64()?, bytes.u64()?));
-            let Some((channel, number, ns, device_ns)) = header() else {
-                return Err(Error::damaged(at, "a message in the chunk has no header"));
-            };
-            if let Some(topic) = channels.topic(channel) {
-                // Found once more, since what is lent cannot be returned from a loop.
-                let data = &self.body[self.next - bytes.rest().len()..self.next];
-                return Ok(Some(Message { topic, number, ns, device_ns, data }));
-            }
-        }
     }
 }

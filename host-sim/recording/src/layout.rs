@@ -8,8 +8,12 @@ use crate::error::{Error, Result, at_most};
 pub const FORMAT: &str = "1";
 /// Largest number of readings, of outputs and of electrodes.
 pub const MOST_COLUMNS: usize = 32_768;
-/// Largest size of the layout's text, and of the settings.
-pub const MOST_TEXT_BYTES: usize = 4 << 20;
+/// Largest size of all names and units, some of which stand in each message.
+const MOST_NAME_BYTES: usize = 512 << 10;
+/// Largest size of the settings.
+const MOST_SETTINGS_BYTES: usize = 4 << 20;
+/// Largest size of the layout's text, and of the settings with the lengths of their names and values.
+pub const MOST_TEXT_BYTES: usize = 8 << 20;
 /// Largest size of a weight blob.
 pub const MOST_BLOB_BYTES: usize = 16 << 20;
 /// Largest size of a scene.
@@ -84,7 +88,7 @@ impl Extras {
         at_most(MOST_COLUMNS as u64, self.settings.len() as u64, "settings")?;
         let bytes =
             self.settings.iter().map(|(name, value)| name.len() + value.len()).sum::<usize>();
-        at_most(MOST_TEXT_BYTES as u64, bytes as u64, "bytes of settings")?;
+        at_most(MOST_SETTINGS_BYTES as u64, bytes as u64, "bytes of settings")?;
         check_text("the parent frame", &self.parent_frame)?;
         if self.parent_frame.is_empty() || self.parent_frame == "taxel" {
             return Err(Error::layout(format!("{:?} is no parent frame", self.parent_frame)));
@@ -118,6 +122,10 @@ impl Layout {
             check_text("a name", &column.name)?;
             check_text("a unit", &column.unit)?;
         }
+        let columns = readings.iter().chain(outputs);
+        let names: usize = columns.map(|column| column.name.len() + column.unit.len()).sum();
+        let names = names + electrodes.iter().map(|electrode| electrode.name.len()).sum::<usize>();
+        at_most(MOST_NAME_BYTES as u64, names as u64, "bytes of names")?;
         let mut is_taken = vec![false; outputs.len()];
         for Electrode { name, place_mm, outputs: axes } in electrodes {
             check_text("an electrode's name", name)?;
@@ -157,7 +165,7 @@ impl Layout {
         let electrode = |Electrode { name, place_mm: [x, y, z], outputs }: &Electrode| {
             let [dx, dy, dz] =
                 outputs.map(|output| output.map_or("-".into(), |it| (it + 1).to_string()));
-            format!("{name}\t{x}\t{y}\t{z}\t{dx}\t{dy}\t{dz}\n")
+            format!("{name}\t{x:?}\t{y:?}\t{z:?}\t{dx}\t{dy}\t{dz}\n")
         };
         let texts: [(&str, String); 8] = [
             ("format", FORMAT.into()),

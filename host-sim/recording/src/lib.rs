@@ -12,6 +12,7 @@ mod frame;
 mod topic;
 mod message;
 mod diagnostics;
+mod chunk;
 mod file;
 mod output;
 mod writer;

@@ -5,9 +5,10 @@ use std::io::{Read, Seek};
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use crate::chunk::{Chunk, Message};
 use crate::diagnostics::read_diagnostics;
 use crate::error::{Error, Result};
-use crate::file::{BLOB, Chunk, Contents, LAYOUT, Message, PARENT, SCENE, SETTINGS, START, Source};
+use crate::file::{BLOB, Contents, LAYOUT, PARENT, SCENE, SETTINGS, START, Source};
 use crate::frame::{Frame, Status};
 use crate::layout::{Extras, Layout};
 use crate::message;

@@ -6,7 +6,9 @@ use std::fs;
 use std::time::{Duration, UNIX_EPOCH};
 
 use common::{Folder, assert_same, electrodes, extras, forces, frames, start};
-use taxel_recording::{Error, Extras, Frame, Layout, Reader, Replace, Writer, recover};
+use taxel_recording::{
+    Column, Electrode, Error, Extras, Frame, Layout, Reader, Replace, Writer, recover,
+};
 
 fn write(path: &std::path::Path, layout: &Layout, frames: &[Frame], chunk: usize) {
     let mut writer = Writer::create(path, layout, &extras(), start(), Replace::Recordings).unwrap();
@@ -195,6 +197,34 @@ fn a_frame_that_does_not_fit_is_refused_and_harms_nothing() {
     }
     writer.finish().unwrap();
     assert_eq!(Reader::open(&path).unwrap().map(Result::unwrap).count(), 2);
+}
+
+#[test]
+fn frames_of_the_largest_layout_come_back() {
+    let folder = Folder::new("largest");
+    let path = folder.path("largest");
+    let half = 16_384;
+    let mut layout = forces();
+    layout.columns = 2 * half;
+    layout.readings = vec![Column { name: "r".into(), unit: "Ω".into() }; 2 * half];
+    layout.outputs = vec![Column { name: "dx".into(), unit: "mm".into() }; half];
+    layout.outputs.extend(vec![Column { name: "force_of_one".into(), unit: "N".into() }; half]);
+    let electrode = |output| Electrode {
+        name: "e".into(),
+        place_mm: [1e300, 1e-300, 1.0 / 3.0],
+        outputs: [Some(output), None, None],
+    };
+    layout.electrodes = (0..half).map(electrode).collect();
+    let written = frames(&layout, 8);
+    write(&path, &layout, &written, 9);
+    let mut reader = Reader::open(&path).unwrap();
+    assert_eq!(reader.layout(), &layout);
+    assert_same(&reader.by_ref().map(Result::unwrap).collect::<Vec<_>>(), &written);
+
+    layout.outputs.iter_mut().for_each(|output| output.name = "long".repeat(9));
+    let refused = Writer::create(&path, &layout, &extras(), start(), Replace::Recordings);
+    assert!(matches!(refused, Err(Error::TooMany { .. })));
+    assert_eq!(Reader::open(&path).unwrap().count(), 8);
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use std::error::Error;
 use std::fs;
 use std::path::Path;
+use std::time::{Duration, UNIX_EPOCH};
 
 use hostile::seal;
 use mock_board::{
@@ -21,6 +22,9 @@ use taxel_firmware::link::packet;
 use taxel_firmware::store::{Kind, Slot};
 use taxel_learn::train::train;
 use taxel_learn::{Options, Origin, fill, pack, relative};
+use taxel_recording::{
+    Column, Contact, Electrode, Extras, Frame, Health, Layout, Replace, Status, Writer,
+};
 use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
 use taxel_simulate::sensor::Axis;
 use taxel_simulate::{World, synthesise};
@@ -29,7 +33,13 @@ type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
 fn main() -> Outcome {
     let blobs: Vec<Vec<u8>> = blobs()?.iter().map(|blob| seal::body(blob).to_vec()).collect();
-    let all = [("blob", blobs), ("packet", packets()), ("settings", settings()), ("link", links())];
+    let all = [
+        ("blob", blobs),
+        ("packet", packets()),
+        ("settings", settings()),
+        ("link", links()),
+        ("recording", recordings()?),
+    ];
     for (target, seeds) in all {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
         fs::create_dir_all(&folder)?;
@@ -38,6 +48,78 @@ fn main() -> Outcome {
         }
     }
     Ok(())
+}
+
+/// A recording that is whole, and one that was cut, which has every topic. Their chunks have no checksum, so that what is
+/// in them can change.
+fn recordings() -> Outcome<Vec<Vec<u8>>> {
+    let (whole, _) = recording(false)?;
+    let (mut all, end) = recording(true)?;
+    all.truncate(end);
+    Ok(vec![whole, all])
+}
+
+/// A recording, with every topic or a few, and where its last chunk ends.
+fn recording(has_all: bool) -> Outcome<(Vec<u8>, usize)> {
+    let column = |name: &str, unit: &str| Column { name: name.into(), unit: unit.into() };
+    let layout = Layout {
+        title: "t".into(),
+        rows: 1,
+        columns: 2,
+        readings: vec![column("a", ""), column("b", "")],
+        outputs: vec![column("x", "mm"), column("z", "mm"), column("f", "N")],
+        electrodes: vec![Electrode {
+            name: "e".into(),
+            place_mm: [1.0, 2.0, 3.0],
+            outputs: [Some(0), None, Some(1)],
+        }],
+    };
+    let extras = Extras {
+        blob: Some(vec![1, 2]),
+        scene: Some("s".into()),
+        settings: [("k".into(), "v".into())].into(),
+        ..Extras::default()
+    };
+    let path = std::env::temp_dir().join(format!("taxel-seed-{}.mcap", std::process::id()));
+    let start = UNIX_EPOCH + Duration::from_secs(1);
+    let mut writer = Writer::create(&path, &layout, &extras, start, Replace::Recordings)?;
+    for number in 0..4 {
+        let is_second = number % 2 == 1;
+        let has_contact = has_all && is_second;
+        writer.write(&Frame {
+            time_us: 10_000 * u64::from(number),
+            number,
+            readings: vec![60.0, f32::NAN],
+            outputs: Some(vec![0.5, 0.25, 1.0]),
+            deviations: has_contact.then(|| vec![0.1; 3]),
+            truth: has_contact.then(|| vec![0.5; 3]),
+            contact: has_contact.then_some(Contact { place_mm: [1.0; 3], force_n: Some([0.5; 3]) }),
+            status: has_all.then(|| Status {
+                row_wires: vec![Health::Sound],
+                column_wires: vec![Health::Open, Health::Noisy],
+                is_novel: has_contact,
+                ..Status::default()
+            }),
+        })?;
+        if is_second {
+            writer.flush()?;
+        }
+    }
+    writer.finish()?;
+    let mut whole = fs::read(&path)?;
+    fs::remove_file(&path)?;
+    // A record is its kind, the length of its body, and that. Chunks are of kind 6; two times and a length stand before
+    // their checksum.
+    let (mut at, mut last_end) = (8, 0);
+    while let Some(length) = whole.get(at + 1..at + 9) {
+        let end = at + 9 + u64::from_le_bytes(length.try_into()?) as usize;
+        if whole[at] == 6 {
+            whole[at + 33..at + 37].fill(0);
+            last_end = end;
+        }
+        at = end;
+    }
+    Ok((whole, last_end))
 }
 
 /// Models of every format and with every section.

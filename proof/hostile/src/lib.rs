@@ -20,6 +20,7 @@ mod pattern;
 mod time_stamp;
 mod npy;
 mod scene;
+mod recording;
 
 /// A way in for hostile bytes.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +43,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "time", check: time_stamp::check },
     Target { name: "npy", check: npy::check },
     Target { name: "scene", check: scene::check },
+    Target { name: "recording", check: recording::check },
 ];
 
 /// The target called `name`.
