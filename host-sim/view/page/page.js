@@ -1,0 +1,482 @@
+// The page: what comes in, what is drawn when, and what buttons and keys do.
+
+const byId = (id) => document.getElementById(id);
+const token = new URLSearchParams(location.search).get("token") ?? "";
+const address = (path, more = "") => `${path}?token=${encodeURIComponent(token)}${more}`;
+const MOST_CHARTS = 12;
+/** Time in ms without an event after which the server is taken for gone. */
+const SILENCE_MS = 3500;
+/** Longest time in ms that events may be held up on their way. */
+const MOST_DELAY_MS = 1500;
+
+let layout = null, shape = null, baseline = null, frame = null, status = null;
+/** Frame that is drawn, when it arrived, and its age then. */
+let arrived = 0, arrivedAge = 0;
+/** Pictures of the last two seconds: [time in ms, age in ms]. */
+let drawn = [];
+let contact = { trace: new Trace(2), chart: null, wasSeen: false, hasForce: false };
+let values = { trace: null, charts: [], numbers: [] };
+
+// ---- Events ----
+
+let source = null, lastEvent = 0, retry = 0, rate = 60, trouble = "connecting";
+/** Least differences of the clocks in this half minute and the one before, and when it began. */
+let clocks = { now: Infinity, before: Infinity, since: 0 };
+
+function connect() {
+  clearTimeout(retry);
+  source?.close();
+  source = new EventSource(address("/events", `&rate=${rate === 60 ? 120 : rate}`));
+  lastEvent = performance.now();
+  clocks = { now: Infinity, before: Infinity, since: lastEvent };
+  const on = (name, take) => source.addEventListener(name, (event) => {
+    lastEvent = performance.now();
+    trouble = null;
+    take(JSON.parse(event.data));
+    requestDraw();
+  });
+  on("layout", takeLayout);
+  on("baseline", (readings) => { baseline = readings; resetMatrix(); });
+  on("status", (next) => { status = next; showStatus(); });
+  on("frame", takeFrame);
+  source.onerror = () => lose();
+}
+
+/** The server is gone or refuses: says so, and tries again. */
+async function lose() {
+  source?.close();
+  source = null;
+  clearTimeout(retry);
+  retry = setTimeout(connect, 1000);
+  trouble ??= `The program at ${location.host} does not answer. Start it again: this page comes back by itself.`;
+  showBanner();
+  try {
+    const asked = new AbortController(), answer = await fetch(address("/events"), { signal: asked.signal });
+    if (!answer.ok) trouble = `Refused: ${await answer.text()}.`;
+    asked.abort();
+  } catch {
+    trouble = `The program at ${location.host} does not answer. Start it again: this page comes back by itself.`;
+  }
+  if (!source) showBanner();
+}
+
+function takeLayout(next) {
+  [layout, frame, baseline] = [next, null, null];
+  shape = layout.electrodes.length ? shapeOf(layout) : null;
+  document.title = `${layout.title} – Taxel`;
+  byId("title").textContent = layout.title;
+  byId("source").textContent = `${{ device: "Device", simulation: "Simulation", recording: "Recording" }[layout.kind]}: ${layout.source}`;
+  byId("zero").hidden = !layout.can.zero;
+  byId("record").hidden = !layout.can.record;
+  byId("transport").hidden = !layout.can.seek;
+  byId("position").max = layout.duration_s ?? 1;
+  byId("sheet_card").hidden = !shape;
+  byId("values_card").hidden = !!shape;
+  byId("error_card").hidden = layout.kind !== "simulation";
+  byId("limit").textContent = digits(layout.limit_rmse_mm, 3);
+  byId("absolute").textContent = layout.readings[0]?.unit || "value";
+  byId("relative").textContent = relativeName(layout);
+  const [rows, columns, isMatrix] = sizeOf(layout);
+  byId("matrix_words").textContent = isMatrix ? `${rows} rows × ${columns} columns` : `${layout.readings.length} readings`;
+  contact = { trace: new Trace(2), chart: contact.chart, wasSeen: false, hasForce: false };
+  makeValues();
+  resetSheet();
+  resetMatrix();
+}
+
+function takeFrame(next) {
+  const now = performance.now(), difference = now - next.sent_ms;
+  if (now - clocks.since > 30000) clocks = { before: clocks.now, now: Infinity, since: now };
+  clocks.now = Math.min(clocks.now, difference);
+  const delay = difference - Math.min(clocks.now, clocks.before);
+  if (delay > MOST_DELAY_MS) {
+    // The way is too slow for so many frames, or the page slept. What waits on the way is old: begin anew.
+    if (drawn.length && now - drawn.at(-1)[0] < 500) rate = Math.max(4, Math.round(rate / 2));
+    return connect();
+  }
+  [frame, arrived, arrivedAge] = [next, now, next.age_ms + delay];
+  for (const flag of frame.flags) flags.set(flag, now);
+  const time = frame.time_us / 1e6, at = frame.contact;
+  contact.wasSeen ||= !!at;
+  contact.hasForce ||= at?.force_n !== null && at?.force_n !== undefined;
+  contact.trace.push(time, [at ? at.force_n : contact.hasForce ? 0 : null, at ? at.depth_mm : 0]);
+  values.trace?.push(time, frame.outputs.slice(0, MOST_CHARTS));
+}
+
+// ---- Words ----
+
+/** When each flag was seen last: it is shown for a second at least, so that it can be read. */
+const flags = new Map();
+const FLAG_WORDS = {
+  novel: () => `Unlike anything the model was trained on${frame?.novelty ? ` (${digits(frame.novelty, 1)} times as far as it should be)` : ""}: do not trust the picture`,
+  clamped: () => "Out of range: readings were moved to the end of what the model knows",
+  missing: () => {
+    const count = frame?.readings.filter((value) => value === null).length;
+    return count ? `${count} of ${frame.readings.length} readings are missing` : "Readings are missing";
+  },
+};
+
+function setText(id, text) {
+  const element = byId(id);
+  if (element.textContent !== text) element.textContent = text;
+}
+
+function showBanner() {
+  let [level, words] = ["calm", status?.message || "All is well"];
+  const seen = Object.keys(FLAG_WORDS).filter((flag) => performance.now() - (flags.get(flag) ?? -Infinity) < 1000);
+  if (trouble) [level, words] = [trouble === "connecting" ? "calm" : "bad", trouble];
+  else if (status?.state === "no data") level = "bad";
+  else if (seen.length) {
+    const said = seen.map((flag) => FLAG_WORDS[flag]());
+    if (status?.wires.length) said.push(status.message);
+    [level, words] = ["warn", said.join(". ") + "."];
+  } else if (status?.wires.length) level = "warn";
+  setText("banner", words.charAt(0).toUpperCase() + words.slice(1));
+  byId("banner").dataset.level = level;
+  const state = trouble ? "gone" : status?.state ?? "live";
+  const isAtRest = state === "live" && frame?.flags.includes("at rest");
+  setText("state", trouble ? trouble === "connecting" ? "connecting" : "no connection" : isAtRest ? "live, at rest" : state);
+  byId("state").dataset.state = state;
+}
+
+function bytes(count) {
+  const power = count < 1e3 ? 0 : count < 1e6 ? 1 : count < 1e9 ? 2 : 3;
+  return `${power ? (count / 1e3 ** power).toFixed(1) : count} ${["B", "kB", "MB", "GB"][power]}`;
+}
+
+function showStatus() {
+  const { recording } = status, isPaused = ["paused", "ended"].includes(status.state);
+  setText("scan_rate", status.scan_rate === null ? "–" : status.scan_rate.toFixed(0));
+  setText("decode_rate", status.decode_rate === null ? "–" : status.decode_rate.toFixed(0));
+  setText("lost", `${status.lost}`);
+  byId("lost").style.color = status.lost ? theme.warn : "";
+  setText("rmse", digits(status.rmse_mm, 3));
+  setText("times_limit", digits(status.times_limit));
+  byId("pause").setAttribute("aria-pressed", isPaused);
+  byId("pause").firstElementChild.textContent = isPaused ? "Go on" : "Pause";
+  byId("record").setAttribute("aria-pressed", !!recording);
+  byId("record").firstElementChild.textContent = recording ? "Stop" : "Record";
+  setText("recording", recording ? `${recording.file}: ${bytes(recording.bytes)}, ${recording.seconds.toFixed(1)} s` : "");
+  if (status.position_s !== null && !seek.isHeld) showPosition(status.position_s);
+  if (status.speed !== null && document.activeElement !== byId("speed")) byId("speed").value = Math.log10(status.speed);
+  if (status.speed !== null) setText("speed_words", `× ${+status.speed.toPrecision(2)}`);
+  byId("wires").replaceChildren(...status.wires.map(({ wire, health, words }) => {
+    const item = document.createElement("li"), name = document.createElement("b");
+    name.textContent = `${wire}: ${health}`;
+    item.append(name, ` – ${words}`);
+    return item;
+  }));
+  showBanner();
+}
+
+function showPosition(position_s) {
+  byId("position").value = position_s;
+  setText("position_words", `${position_s.toFixed(2)} s`);
+}
+
+function showRates() {
+  const now = performance.now();
+  if (source && now - lastEvent > SILENCE_MS) lose();
+  drawn = drawn.filter(([time]) => now - time < 2000);
+  const last = drawn.filter(([time]) => now - time < 1000);
+  setText("shown_rate", `${last.length}`);
+  const isWaiting = !frame || trouble || ["paused", "ended"].includes(status?.state);
+  const age = last.length ? last.reduce((sum, [, age]) => sum + age, 0) / last.length : now - arrived + arrivedAge;
+  setText("age", isWaiting ? "–" : age.toFixed(0));
+  showBanner();
+}
+
+// ---- Drawing: only when something new came ----
+
+let isDrawing = false, tracesAt = 0;
+function requestDraw() {
+  if (isDrawing) return;
+  isDrawing = true;
+  requestAnimationFrame(draw);
+}
+
+let drawnFrame = null;
+function draw() {
+  isDrawing = false;
+  if (!layout) return;
+  const now = performance.now();
+  if (shape) drawSheet(byId("sheet"), layout, shape, frame);
+  drawMatrix(byId("matrix"), layout, frame, status?.wires ?? []);
+  if (frame) showNumbers();
+  // Charts cost more than the rest, and twenty pictures a second are smooth for lines.
+  if (now - tracesAt > 45 || !frame) {
+    tracesAt = now;
+    drawTraces();
+  }
+  showTip();
+  if (frame && frame !== drawnFrame) {
+    drawn.push([now, arrivedAge + performance.now() - arrived]);
+    drawnFrame = frame;
+  }
+}
+
+function showNumbers() {
+  const at = frame.contact, { hasForce, trace } = contact;
+  byId("contact_card").hidden = !shape && !contact.wasSeen;
+  setText("force", !hasForce ? "–" : digits(at?.force_n ?? 0));
+  setText("depth", digits(at?.depth_mm ?? 0));
+  setText("place", at ? `${digits(at.x_mm, 1)}, ${digits(at.y_mm, 1)}` : "–");
+  const peak = trace.most(hasForce ? 1 : 2);
+  setText("peak", digits(peak));
+  setText("peak_unit", hasForce ? "N" : "mm");
+  values.numbers.forEach((number, index) => {
+    const [value, deviation] = [frame.outputs[index], frame.deviations?.[index]];
+    number.textContent = short(value) + (deviation === undefined || deviation === null ? "" : ` ± ${short(deviation)}`);
+  });
+  if (!frame.truth) return;
+  byId("error_card").hidden = false;
+  const pairs = layout.electrodes.map(({ outputs }) => outputs[2]).filter((index) => index !== null);
+  const sum = pairs.reduce((sum, index) => sum + (frame.outputs[index] - frame.truth[index]) ** 2, 0);
+  setText("frame_rmse", digits(pairs.length ? Math.sqrt(sum / pairs.length) : null, 3));
+}
+
+function drawTraces() {
+  if (!byId("contact_card").hidden) {
+    contact.chart ??= chart(byId("contact_plot"), 150, [
+      { scale: "force", unit: "N", colour: () => theme.force, fromZero: 1 },
+      { scale: "depth", unit: "mm", colour: () => theme.depth, fromZero: 0.2 },
+    ]);
+    contact.chart.setData(contact.trace.data());
+  }
+  if (!values.trace) return;
+  const [times, ...series] = values.trace.data();
+  values.charts.forEach((plot, index) => plot.setData([times, series[index]]));
+}
+
+/** Outputs that belong to no electrode: name, value and trace of each. */
+function makeValues() {
+  values.charts.forEach((plot) => plot.destroy());
+  values = { trace: shape ? null : new Trace(Math.min(MOST_CHARTS, layout.outputs.length)), charts: [], numbers: [] };
+  byId("values").replaceChildren();
+  if (shape) return;
+  layout.outputs.forEach(({ name, unit }, index) => {
+    const [card, line, title, value, number] = ["div", "p", "span", "span", "b"].map((tag) => document.createElement(tag));
+    card.className = "value";
+    title.textContent = name;
+    number.textContent = "–";
+    value.append(number, ` ${unit}`);
+    line.append(title, value);
+    card.append(line);
+    byId("values").append(card);
+    values.numbers.push(number);
+    if (index < MOST_CHARTS) values.charts.push(chart(card, 100, [{ scale: "y", unit: "", colour: () => theme.force }]));
+  });
+}
+
+function fit() {
+  contact.chart?.setSize({ width: byId("contact_plot").clientWidth, height: 150 });
+  values.charts.forEach((plot) => plot.setSize({ width: plot.root.parentElement.clientWidth, height: 100 }));
+  tracesAt = 0;
+  requestDraw();
+}
+
+// ---- Pointer ----
+
+let hover = null;
+function showTip() {
+  const tip = byId("tip");
+  let words = null;
+  if (hover && layout) {
+    const box = hover.canvas.getBoundingClientRect(), [x, y] = [hover.x - box.left, hover.y - box.top];
+    words = hover.canvas.id === "sheet" ? shape && sheetWords(layout, frame, x, y) : matrixWords(layout, frame, status?.wires ?? [], x, y);
+  }
+  tip.hidden = !words;
+  if (!words) return;
+  setText("tip", words);
+  tip.style.left = `${Math.max(4, Math.min(hover.x + 14, innerWidth - tip.offsetWidth - 8))}px`;
+  tip.style.top = `${Math.max(4, Math.min(hover.y + 14, innerHeight - tip.offsetHeight - 8))}px`;
+}
+
+for (const id of ["sheet", "matrix"]) {
+  const canvas = byId(id);
+  canvas.addEventListener("pointermove", (event) => {
+    if (id === "sheet" && sheet.is3d && event.buttons) turn(event.movementX, event.movementY);
+    hover = { canvas, x: event.clientX, y: event.clientY };
+    requestDraw();
+  });
+  canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+  canvas.addEventListener("pointerleave", () => { hover = null; requestDraw(); });
+}
+
+function turn(across, down) {
+  sheet.turn.yaw += across * 0.008;
+  sheet.turn.pitch = Math.max(0.1, Math.min(1.5, sheet.turn.pitch + down * 0.008));
+}
+
+// ---- Buttons and keys ----
+
+let answerTimer = 0;
+function say(words, isBad) {
+  clearTimeout(answerTimer);
+  setText("answer", words);
+  byId("answer").dataset.level = isBad ? "bad" : "good";
+  answerTimer = setTimeout(() => setText("answer", ""), isBad ? 8000 : 3000);
+}
+
+/** Asks the source for something, and shows its answer. */
+async function ask(command, isQuiet) {
+  try {
+    const answer = await fetch(address("/command"), { method: "POST", body: JSON.stringify(command) });
+    const text = await answer.text();
+    if (answer.ok) return isQuiet || say(JSON.parse(text).message);
+    say(answer.status === 409 ? JSON.parse(text).error : text, true);
+  } catch {
+    say("The program does not answer.", true);
+  }
+}
+
+function resetSheet() {
+  sheet.scale = layout?.scale_mm > 0 ? layout.scale_mm : 1;
+  sheet.turn = { ...START_TURN };
+  showScale();
+}
+
+function showScale() {
+  setText("sheet_words", `Δz of ±${short(sheet.scale)} mm${sheet.is3d ? ", exaggerated; drag to turn" : ""}`);
+}
+
+function toggle(id, name) {
+  sheet[name] = !sheet[name];
+  byId(id).setAttribute("aria-pressed", sheet[name]);
+  byId("sheet").classList.toggle("turns", sheet.is3d);
+  showScale();
+}
+
+function setQuantity(isRelative) {
+  if (isRelative && !baseline) return say("There is no baseline yet: changes against it are unknown.", true);
+  matrix.isRelative = isRelative;
+  byId("relative").setAttribute("aria-pressed", isRelative);
+  byId("absolute").setAttribute("aria-pressed", !isRelative);
+}
+
+function rescale(factor) {
+  sheet.scale = Math.max(0.001, Math.min(1000, sheet.scale * factor));
+  showScale();
+}
+
+const unable = (words) => say(words, true);
+const ACTIONS = {
+  zero: () => layout?.can.zero ? ask({ action: "zero" }) : unable("This source has no baseline to take."),
+  pause: () => ask({ action: ["paused", "ended"].includes(status?.state) ? "resume" : "pause" }),
+  record: () => layout?.can.record ? ask({ action: status?.recording ? "stop_recording" : "record" }) : unable("This source is not recorded."),
+  screenshot: () => saveScreenshot(),
+  numbers: () => toggle("numbers", "hasNumbers"),
+  third: () => toggle("third", "is3d"),
+  narrower: () => rescale(0.5),
+  wider: () => rescale(2),
+  reset: () => { resetSheet(); resetMatrix(); },
+  absolute: () => setQuantity(false),
+  relative: () => setQuantity(true),
+  back: () => layout?.can.seek && ask({ action: "step", frames: -1 }, true),
+  forth: () => layout?.can.seek && ask({ action: "step", frames: 1 }, true),
+};
+const KEYS = {
+  b: "zero", " ": "pause", r: "record", s: "screenshot", n: "numbers", 3: "third", "-": "narrower", "+": "wider", "=": "wider",
+  0: "reset", ",": "back", ".": "forth",
+};
+
+for (const [id, act] of Object.entries(ACTIONS)) {
+  byId(id).addEventListener("click", (event) => {
+    act();
+    requestDraw();
+    // After a click, space pauses again; who goes by keyboard stays on the button.
+    if (event.detail) event.currentTarget.blur();
+  });
+}
+
+addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || event.repeat && event.key === " ") return;
+  if (event.target.id === "sheet" && sheet.is3d && event.key.startsWith("Arrow")) {
+    const [across, down] = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] }[event.key];
+    turn(across, down);
+  } else if (event.key === " " && event.target.closest("button")) {
+    return;
+  } else {
+    const act = ACTIONS[KEYS[event.key.toLowerCase()]];
+    if (!act) return;
+    act();
+  }
+  event.preventDefault();
+  requestDraw();
+});
+
+/** Place that the slider asks for: one request at a time, the newest wins. */
+const seek = { isHeld: false, isAsking: false, wanted: null };
+async function seekTo(to_s) {
+  seek.wanted = to_s;
+  if (seek.isAsking) return;
+  seek.isAsking = true;
+  while (seek.wanted !== null) {
+    const now = seek.wanted;
+    seek.wanted = null;
+    await ask({ action: "seek", to_s: now }, true);
+  }
+  seek.isAsking = false;
+}
+byId("position").addEventListener("input", (event) => {
+  seek.isHeld = true;
+  showPosition(+event.target.value);
+  seekTo(+event.target.value);
+});
+byId("position").addEventListener("change", () => { seek.isHeld = false; });
+byId("speed").addEventListener("input", (event) => {
+  const factor = +(10 ** event.target.value).toPrecision(2);
+  setText("speed_words", `× ${factor}`);
+  ask({ action: "speed", factor }, true);
+});
+
+/** Draws the page as it is seen, boxes, canvases and texts, and saves it. */
+function saveScreenshot() {
+  const ratio = devicePixelRatio || 1, body = document.body.getBoundingClientRect();
+  const picture = document.createElement("canvas");
+  [picture.width, picture.height] = [Math.round(body.width * ratio), Math.round(body.height * ratio)];
+  const context = picture.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, -body.left * ratio, -body.top * ratio);
+  context.fillStyle = getComputedStyle(document.body).backgroundColor;
+  context.fillRect(body.left, body.top, body.width, body.height);
+  for (const element of document.querySelectorAll("#banner, .state, section, button, #wires li, canvas")) {
+    const box = element.getBoundingClientRect(), style = getComputedStyle(element);
+    if (!box.width) continue;
+    if (element instanceof HTMLCanvasElement) {
+      context.drawImage(element, box.left, box.top, box.width, box.height);
+      continue;
+    }
+    context.fillStyle = style.backgroundColor;
+    context.strokeStyle = style.borderTopColor;
+    context.beginPath();
+    context.roundRect(box.left + 0.5, box.top + 0.5, box.width - 1, box.height - 1, Math.min(parseFloat(style.borderRadius) || 0, box.height / 2));
+    context.fill();
+    if (parseFloat(style.borderTopWidth)) context.stroke();
+  }
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), range = document.createRange();
+  while (texts.nextNode()) {
+    const node = texts.currentNode, style = getComputedStyle(node.parentElement);
+    range.selectNodeContents(node);
+    const box = range.getBoundingClientRect();
+    if (!box.width || !node.data.trim() || node.parentElement.id === "tip") continue;
+    context.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
+    [context.fillStyle, context.textAlign, context.textBaseline] = [style.color, "left", "middle"];
+    context.fillText(node.data.trim(), box.left, box.top + box.height / 2, box.width + 2);
+  }
+  picture.toBlob((blob) => {
+    const link = document.createElement("a"), name = (layout?.title ?? "view").replace(/[^\w-]+/g, "-").slice(0, 40);
+    link.href = URL.createObjectURL(blob);
+    link.download = `taxel-${name}-${new Date().toISOString().slice(0, 19).replace(/[:T]/g, "-")}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    say(`Saved ${link.download}`);
+  });
+}
+
+// ---- Start ----
+
+readTheme();
+isDark.addEventListener("change", () => { readTheme(); fit(); });
+new ResizeObserver(fit).observe(document.body);
+setInterval(showRates, 250);
+connect();
