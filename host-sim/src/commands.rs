@@ -41,6 +41,8 @@ pub mod gate;
 pub mod limit;
 pub mod emulate;
 pub mod link;
+pub mod view;
+pub mod recover;
 
 pub use captured::{Captured, Stopped, capture};
 

@@ -14,6 +14,7 @@ macro_rules! eprintln {
 }
 
 pub mod report;
+pub mod live;
 pub mod commands;
 pub mod program;
 

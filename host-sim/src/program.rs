@@ -9,7 +9,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
     self, Captured, Common, decode, emulate, eval, export, forward, gate, inspect, join, limit,
-    link, noise, run, synth, table1, trade, train,
+    link, noise, recover, run, synth, table1, trade, train, view,
 };
 use crate::{Error, Result};
 
@@ -47,6 +47,8 @@ enum Command {
     Limit(limit::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
+    View(view::Arguments),
+    Recover(recover::Arguments),
     /// Print a script that completes commands and options in a shell.
     ///
     /// bash: `host-sim completions bash > ~/.local/share/bash-completion/completions/host-sim`.
@@ -80,6 +82,8 @@ impl Command {
             Self::Limit(_) => "limit",
             Self::Emulate(_) => "emulate",
             Self::Join(_) => "join",
+            Self::View(_) => "view",
+            Self::Recover(_) => "recover",
             Self::Completions { .. } => "completions",
             Self::Man { .. } => "man",
         };
@@ -175,6 +179,8 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::Limit(arguments) => limit::execute(&arguments, common),
         Command::Emulate(arguments) => emulate::execute(&arguments, common),
         Command::Link(arguments) => link::execute(&arguments, common),
+        Command::View(arguments) => view::execute(&arguments, common),
+        Command::Recover(arguments) => recover::execute(&arguments, common),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut script);

@@ -1,0 +1,263 @@
+//! Command `view`: a sensor in the browser, live.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use clap::{Args, ValueEnum, value_parser};
+use serde::Serialize;
+use taxel_firmware::timing::NUCLEO_BAUD;
+use taxel_learn::ModelBlob;
+use taxel_recording::Reader;
+use taxel_rig::device::serial;
+use taxel_view::View;
+
+use super::data_file::DataFileArguments;
+use super::scene_argument::DEFAULT_SCENE;
+use super::{Common, interruption, print, stderr};
+use crate::experiment::{Experiment, names_a_scene};
+use crate::live::device::{DeviceFeed, Line, Protocol};
+use crate::live::feed::Feed;
+use crate::live::replay::ReplayFeed;
+use crate::live::simulation::{self, SimulationFeed};
+use crate::live::watch::{Watched, watch};
+use crate::{Error, Result};
+
+/// Frames a second of a simulation.
+const SIMULATED_RATE: f64 = 100.0;
+/// Speed of FlexiTac's line in bits a second.
+const FLEXITAC_BAUD: u32 = 2_000_000;
+/// Rows and columns of FlexiTac's larger pad.
+const FLEXITAC_SHAPE: [usize; 2] = [16, 32];
+
+/// Watch a sensor in the browser, live: a device, a simulation, or a recording.
+///
+/// The page is served to this computer alone, at 127.0.0.1, and asks nothing of any other. It shows the sheet and the readings with
+/// fixed scales, the contact over time, what is wrong, and how old the picture is. It zeroes, pauses, records and takes
+/// screenshots. docs/live.md tells more.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-sim view                          # the device that is plugged in, or else a simulation
+  host-sim view /dev/ttyACM0 --model press.bin
+  host-sim view recording-1.mcap
+  host-sim view mat.csv --model mat.bin
+  host-sim view /dev/ttyUSB0 --protocol csv --model mat.bin")]
+pub struct Arguments {
+    /// A serial port, a scene (press, contact, moving, or a scene file), a recording (.mcap), or a data file of readings [default:
+    /// the only port of USB, or else the scene press].
+    source: Option<String>,
+    /// Weight blob. It names what a device decodes, and decodes what nobody has decoded. A scene without it trains a small
+    /// one.
+    #[arg(long, value_name = "BLOB")]
+    model: Option<PathBuf>,
+    /// How a sensor on a serial port tells its readings.
+    #[arg(long, value_enum, default_value = "taxel")]
+    protocol: SerialProtocol,
+    /// Speed of the line in bits a second [default: the board's; 2000000 of flexitac].
+    #[arg(long, value_name = "BAUD", value_parser = value_parser!(u32).range(1..))]
+    baud: Option<u32>,
+    /// Rows and columns of a sensor that does not tell them, such as 16x32 [default of flexitac: 16x32].
+    #[arg(long, value_name = "ROWSxCOLUMNS", value_parser = shape)]
+    shape: Option<[usize; 2]>,
+    /// Time from one scan of a device to the next [default: the device's own].
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(100..=1_000_000_000))]
+    period_us: Option<u32>,
+    /// Frames a second, of a simulation or of a data file [default: 100, or what the file's times tell].
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    frame_rate: Option<f64>,
+    /// Port of the page [default: a free one].
+    #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
+    http_port: u16,
+    /// Token in the page's address, of 16 letters and digits or more: with --http-port, an open page finds the next view
+    /// [default: a new one each time].
+    #[arg(long, value_name = "TOKEN")]
+    token: Option<String>,
+    /// Open no browser: print the page's address alone.
+    #[arg(long)]
+    no_browser: bool,
+    #[command(flatten)]
+    file: DataFileArguments,
+}
+
+/// How a sensor on a serial port tells its readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SerialProtocol {
+    /// Taxel's link (docs/link.md).
+    Taxel,
+    /// FlexiTac's firmware: 0xAA 0x55, then a byte a reading.
+    Flexitac,
+    /// A line of numbers a scan, between commas, semicolons, tabs or blanks.
+    Csv,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    address: String,
+}
+
+fn shape(text: &str) -> std::result::Result<[usize; 2], String> {
+    let counts = text.split_once('x').map(|(rows, columns)| [rows.parse(), columns.parse()]);
+    match counts {
+        Some([Ok(rows @ 1..=255), Ok(columns @ 1..=255)]) => Ok([rows, columns]),
+        _ => Err("give rows x columns, from 1 to 255 each, such as 16x32".into()),
+    }
+}
+
+fn rate(text: &str) -> std::result::Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (0.01..=10_000.0).contains(rate));
+    rate.ok_or_else(|| "give frames a second from 0.01 to 10000".into())
+}
+
+/// What is watched.
+enum Source {
+    Port(String),
+    Scene(String),
+    Recording(PathBuf),
+    Data(PathBuf),
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let blob = arguments.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
+    match source(arguments)? {
+        Source::Port(port) => {
+            let (protocol, usual_baud) = match arguments.protocol {
+                SerialProtocol::Taxel => (Protocol::Taxel, NUCLEO_BAUD),
+                SerialProtocol::Flexitac => (Protocol::Flexitac, FLEXITAC_BAUD),
+                SerialProtocol::Csv => (Protocol::Csv, NUCLEO_BAUD),
+            };
+            let usual = (protocol == Protocol::Flexitac).then_some(FLEXITAC_SHAPE);
+            let line = Line {
+                port,
+                baud: arguments.baud.unwrap_or(usual_baud),
+                protocol,
+                shape: arguments.shape.or(usual),
+                period_us: arguments.period_us,
+            };
+            let mut feed = DeviceFeed::open(line, blob.as_ref())?;
+            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, arguments, common)
+        }
+        Source::Scene(name) => {
+            let mut scene = Experiment::load(&name)?;
+            scene.world.seed = common.seed.unwrap_or(scene.world.seed);
+            let blob = if let Some(blob) = blob {
+                blob
+            } else {
+                stderr::remark("training a small model; --model takes a better one …");
+                simulation::small_model(&scene)?
+            };
+            let rate = arguments.frame_rate.unwrap_or(SIMULATED_RATE);
+            let mut feed = SimulationFeed::new(&scene, &blob, rate)?;
+            let text = Experiment::text(&name)?.into_owned();
+            show(&mut feed, &Watched { blob: Some(&blob), scene: Some(text) }, arguments, common)
+        }
+        Source::Recording(path) => {
+            let reader = open_recording(&path)?;
+            let mut feed = ReplayFeed::of_recording(reader, &path, blob.as_ref())?;
+            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, arguments, common)
+        }
+        Source::Data(path) => {
+            let file = arguments.file.read(&path)?;
+            let mut feed = ReplayFeed::of_data(file, blob.as_ref(), arguments.frame_rate)?;
+            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, arguments, common)
+        }
+    }
+}
+
+/// Opens a recording, and notes if it was cut.
+fn open_recording(path: &Path) -> Result<Reader> {
+    let reader = Reader::open(path)
+        .map_err(|cause| Error::Unfit { path: path.into(), message: cause.to_string() })?;
+    if reader.was_cut() {
+        stderr::remark(format_args!(
+            "note: {0} has no end, since whoever wrote it was killed: `host-sim recover {0}` mends it",
+            path.display()
+        ));
+    }
+    Ok(reader)
+}
+
+/// What the argument names, or what there is without one.
+fn source(arguments: &Arguments) -> Result<Source> {
+    let Some(text) = &arguments.source else {
+        if let Some(port) = serial::only_usb()? {
+            return Ok(Source::Port(port));
+        }
+        stderr::remark("no device is plugged in: this is a simulation");
+        return Ok(Source::Scene(DEFAULT_SCENE.into()));
+    };
+    let path = Path::new(text);
+    if is_port(text) {
+        return Ok(Source::Port(text.clone()));
+    }
+    if path.extension().is_some_and(|it| it == "mcap") {
+        return Ok(Source::Recording(path.into()));
+    }
+    if names_a_scene(text) {
+        return Ok(Source::Scene(text.clone()));
+    }
+    if path.is_file() {
+        return Ok(Source::Data(path.into()));
+    }
+    let ports = serial::names();
+    let ports =
+        if ports.is_empty() { "no port".into() } else { format!("ports {}", ports.join(", ")) };
+    Err(Error::Usage(format!(
+        "SOURCE {text}: there is no such file, scene or port; there are {ports}, and the scenes paper, press, contact, moving"
+    )))
+}
+
+/// Whether a text names a serial port.
+fn is_port(text: &str) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let is_device = |found: std::fs::Metadata| found.file_type().is_char_device();
+        text.starts_with("/dev/") || std::fs::metadata(text).is_ok_and(is_device)
+    }
+    #[cfg(not(unix))]
+    {
+        text.to_ascii_uppercase().starts_with("COM")
+    }
+}
+
+/// Serves the page of what `feed` brings, until the program is told to end.
+fn show(
+    feed: &mut dyn Feed,
+    watched: &Watched<'_>,
+    arguments: &Arguments,
+    common: &Common,
+) -> Result<()> {
+    let view = View::start(arguments.http_port, arguments.token.as_deref());
+    let (view, commands) = view.map_err(|cause| {
+        Error::Usage(format!("--http-port {}, --token: {cause}", arguments.http_port))
+    })?;
+    let address = view.address();
+    if common.json {
+        print::json(&Summary { address: address.clone() })?;
+    } else {
+        let mut page = print::Page::default();
+        page.line(&address);
+        page.print()?;
+    }
+    // Whoever reads the address waits for it.
+    let _ = std::io::stdout().flush();
+    if !arguments.no_browser && !open_browser(&address) {
+        stderr::remark("no browser was found: open the address yourself");
+    }
+    stderr::remark("Ctrl-C ends it");
+    watch(feed, &view, &commands, watched, &interruption::flag())
+}
+
+/// Opens `address` in the user's browser. Returns whether a program took it.
+fn open_browser(address: &str) -> bool {
+    let program = if cfg!(target_os = "macos") {
+        "open"
+    } else if cfg!(windows) {
+        "explorer"
+    } else {
+        "xdg-open"
+    };
+    let mut command = Command::new(program);
+    command.arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().is_ok()
+}

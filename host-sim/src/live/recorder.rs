@@ -1,0 +1,87 @@
+//! A recording of what is watched.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Instant, SystemTime};
+
+use taxel_recording::{Extras, Frame, Layout, Replace, Writer};
+use taxel_view::message as page;
+
+use super::replay::BASELINE;
+use crate::{Error, Result};
+
+/// A recording that is being written.
+pub struct Recorder {
+    writer: Writer,
+    path: PathBuf,
+    start: Instant,
+}
+
+/// What goes with a recording.
+#[derive(Debug, Clone, Default)]
+pub struct Beside {
+    /// Weight blob.
+    pub blob: Option<Vec<u8>>,
+    /// Text of the scene.
+    pub scene: Option<String>,
+    /// Where the frames came from, in words.
+    pub source: String,
+    /// Readings of the untouched sensor.
+    pub baseline: Option<Vec<f32>>,
+}
+
+impl Recorder {
+    /// Begins a recording at `path`.
+    ///
+    /// # Errors
+    /// If it cannot be written, or another file than a recording would be replaced.
+    pub fn start(path: &Path, layout: &Layout, beside: Beside) -> Result<Self> {
+        let mut settings = BTreeMap::from([("source".to_owned(), beside.source)]);
+        if let Some(baseline) = beside.baseline {
+            let numbers: Vec<String> = baseline.iter().map(f32::to_string).collect();
+            settings.insert(BASELINE.to_owned(), numbers.join(","));
+        }
+        let extras =
+            Extras { blob: beside.blob, scene: beside.scene, settings, ..Extras::default() };
+        let writer = Writer::create(path, layout, &extras, SystemTime::now(), Replace::Recordings);
+        let writer =
+            writer.map_err(|cause| Error::failed(format!("{}: {cause}", path.display())))?;
+        Ok(Self { writer, path: path.into(), start: Instant::now() })
+    }
+
+    /// A name that is free in the current folder.
+    pub fn free_path() -> PathBuf {
+        let paths = (1..).map(|number| PathBuf::from(format!("recording-{number}.mcap")));
+        let mut free = paths.filter(|path| !path.exists());
+        free.next().unwrap_or_default()
+    }
+
+    /// Records a frame.
+    ///
+    /// # Errors
+    /// If the disk is full, or the frame does not fit the layout.
+    pub fn write(&mut self, frame: &Frame) -> Result<()> {
+        let failed = |cause| Error::failed(format!("{}: {cause}", self.path.display()));
+        self.writer.write(frame).map_err(failed)
+    }
+
+    /// Its file, size and length, for the page.
+    pub fn for_page(&self) -> page::Recording {
+        page::Recording {
+            file: self.path.display().to_string(),
+            bytes: self.writer.bytes(),
+            seconds: self.start.elapsed().as_secs_f64(),
+        }
+    }
+
+    /// Ends the recording. Returns what it is, in words.
+    ///
+    /// # Errors
+    /// If its end cannot be written.
+    pub fn finish(self) -> Result<String> {
+        let (path, seconds) = (self.path, self.start.elapsed().as_secs_f64());
+        let failed = |cause| Error::failed(format!("{}: {cause}", path.display()));
+        self.writer.finish().map_err(failed)?;
+        Ok(format!("{}, {seconds:.1} s", path.display()))
+    }
+}

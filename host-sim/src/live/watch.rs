@@ -1,0 +1,388 @@
+//! Shows what a feed brings, and does what the page's buttons ask for, until the program is told to end.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use taxel_firmware::link::message::EstimateReport;
+use taxel_learn::ModelBlob;
+use taxel_recording::{Layout, Status as RecordedStatus};
+use taxel_view::message::{self as page, Channel, Flag, Kind, State, Status};
+use taxel_view::{Action, Command, View};
+
+use super::contact::contact;
+use super::feed::{Feed, Next};
+use super::moment::Moment;
+use super::recorder::{Beside, Recorder};
+use super::wires::Wires;
+use crate::Result;
+
+/// Time that one look for a frame takes, after which buttons are looked at.
+const LOOK: Duration = Duration::from_millis(10);
+/// Time from one status to the next, and from one judgement of the wires to the next.
+const STATUS: Duration = Duration::from_millis(500);
+/// Frames whose mean becomes the baseline.
+const ZERO_FRAMES: usize = 30;
+/// Time over which rates and errors are told.
+const WINDOW: Duration = Duration::from_secs(10);
+/// End of the colour scale in mm.
+const SCALE_MM: f32 = 1.0;
+/// Least change of a reading, relative to itself, that tells of a touch.
+const LEAST_CHANGE: f32 = 0.05;
+
+/// What goes with what is watched.
+pub struct Watched<'b> {
+    /// Model that decodes, if it is known: for its fill, and for recordings.
+    pub blob: Option<&'b ModelBlob>,
+    /// Text of the scene, for recordings.
+    pub scene: Option<String>,
+}
+
+/// Watches `feed` on `view` until `stop` is set.
+///
+/// # Errors
+/// What no waiting mends.
+pub fn watch(
+    feed: &mut dyn Feed,
+    view: &View,
+    commands: &Receiver<Command>,
+    watched: &Watched<'_>,
+    stop: &AtomicBool,
+) -> Result<()> {
+    let mut watch = Watch::new(feed, view, watched);
+    watch.show_layout();
+    while !stop.load(Ordering::Relaxed) {
+        while let Ok(command) = commands.try_recv() {
+            let answer = watch.act(command.action);
+            command.answer(answer);
+            watch.tell();
+        }
+        watch.step()?;
+    }
+    watch.stop_recording().map(drop).map_err(crate::Error::failed)
+}
+
+struct Watch<'w, 'b> {
+    feed: &'w mut dyn Feed,
+    view: &'w View,
+    watched: &'w Watched<'b>,
+    baseline: Option<Vec<f32>>,
+    /// The newest frames, whose mean can become the baseline.
+    newest: VecDeque<Vec<f32>>,
+    wires: Wires,
+    recorder: Option<Recorder>,
+    is_paused: bool,
+    state: State,
+    message: String,
+    is_touched: bool,
+    /// Times of the last frames, whether each was decoded, and squares of errors with their number.
+    past: VecDeque<(Instant, bool, f64, usize)>,
+    told: Instant,
+}
+
+impl<'w, 'b> Watch<'w, 'b> {
+    fn new(feed: &'w mut dyn Feed, view: &'w View, watched: &'w Watched<'b>) -> Self {
+        let wires = Wires::new(&feed.layout().readings);
+        let baseline = feed.baseline();
+        Self {
+            feed,
+            view,
+            watched,
+            baseline,
+            newest: VecDeque::new(),
+            wires,
+            recorder: None,
+            is_paused: false,
+            state: State::Live,
+            message: String::new(),
+            is_touched: false,
+            past: VecDeque::new(),
+            told: Instant::now(),
+        }
+    }
+
+    fn step(&mut self) -> Result<()> {
+        match self.feed.next(LOOK)? {
+            Next::Frame(moment) => self.take(*moment),
+            Next::Nothing => {}
+            Next::Trouble(cause) => self.say(State::NoData, cause),
+            Next::Ended => self.say(State::Ended, "the end of the recording".into()),
+            Next::Anew => {
+                // A recording has one layout from its beginning to its end.
+                if let Err(cause) = self.stop_recording() {
+                    self.message = cause;
+                }
+                self.wires = Wires::new(&self.feed.layout().readings);
+                (self.baseline, self.newest) = (self.feed.baseline(), VecDeque::new());
+                self.show_layout();
+            }
+        }
+        if self.told.elapsed() > STATUS {
+            let model = self.watched.blob.map(ModelBlob::parse);
+            self.wires.judge(model.as_ref().and_then(taxel_core::blob::Model::fill));
+            self.tell();
+        }
+        Ok(())
+    }
+
+    fn say(&mut self, state: State, message: String) {
+        if (self.state, &self.message) != (state, &message) {
+            (self.state, self.message) = (state, message);
+            self.tell();
+        }
+    }
+
+    fn take(&mut self, mut moment: Moment) {
+        let layout = self.feed.layout();
+        let frame = &mut moment.frame;
+        let outputs = frame.outputs.as_deref();
+        let deviations = frame.deviations.as_deref();
+        let found =
+            outputs.and_then(|outputs| contact(layout, outputs, deviations, self.is_touched));
+        frame.contact = frame.contact.or(found);
+        self.is_touched = frame.contact.is_some();
+        let (square, count) = errors(layout, outputs, frame.truth.as_deref());
+        let has_outputs = outputs.is_some();
+        if self.newest.len() == ZERO_FRAMES {
+            self.newest.pop_front();
+        }
+        self.newest.push_back(frame.readings.clone());
+        if self.baseline.is_none() && self.newest.len() == ZERO_FRAMES && !self.is_touched {
+            self.set_baseline();
+        }
+        self.wires.push(&moment.frame.readings);
+        self.past.push_back((moment.heard, has_outputs, square, count));
+        while self.past.front().is_some_and(|(time, ..)| time.elapsed() > WINDOW) {
+            self.past.pop_front();
+        }
+        self.record(&mut moment);
+        if self.state != State::Paused && self.state != State::Live {
+            (self.state, self.message) = (State::Live, String::new());
+        }
+        if !self.is_paused {
+            self.view.show(for_page(&moment));
+        }
+    }
+
+    fn record(&mut self, moment: &mut Moment) {
+        let Some(recorder) = &mut self.recorder else { return };
+        let [row_wires, column_wires] = self.wires.for_recording(self.feed.layout());
+        moment.frame.status = Some(RecordedStatus {
+            row_wires,
+            column_wires,
+            lost_frames: self.feed.lost(),
+            is_novel: moment.has(EstimateReport::NOVEL),
+            is_clamped: moment.has(EstimateReport::CLAMPED),
+        });
+        if let Err(cause) = recorder.write(&moment.frame) {
+            // What was written can be recovered.
+            self.recorder = None;
+            self.message = format!("the recording has ended: {cause}");
+            self.tell();
+        }
+    }
+
+    fn act(&mut self, action: Action) -> std::result::Result<String, String> {
+        let is_recording = self.feed.about().kind == Kind::Recording;
+        match action {
+            Action::Zero => self.zero(),
+            Action::Record => self.start_recording(),
+            Action::StopRecording => self.stop_recording(),
+            Action::Pause | Action::Resume => {
+                self.is_paused = action == Action::Pause;
+                let (state, message) =
+                    if self.is_paused { (State::Paused, "paused") } else { (State::Live, "") };
+                (self.state, self.message) = (state, message.into());
+                // A device goes on scanning, and a recording stands still.
+                if is_recording {
+                    self.is_paused = false;
+                    self.feed.act(action)?;
+                }
+                Ok(message.into())
+            }
+            Action::Step { .. } => {
+                (self.state, self.message) = (State::Paused, "paused".into());
+                self.feed.act(action)
+            }
+            action => self.feed.act(action),
+        }
+    }
+
+    fn zero(&mut self) -> std::result::Result<String, String> {
+        if self.is_touched {
+            return Err("not zeroed: something touches the sensor; lift it, and try again".into());
+        }
+        if self.newest.len() < ZERO_FRAMES {
+            return Err(format!(
+                "not zeroed: it takes {ZERO_FRAMES} frames, and there are {}",
+                self.newest.len()
+            ));
+        }
+        if let Some(share) = self.spread().filter(|share| *share > LEAST_CHANGE) {
+            return Err(format!(
+                "not zeroed: readings change by {:.0} %; let go of the sensor, and try again",
+                share * 100.0
+            ));
+        }
+        self.set_baseline();
+        let baseline = self.baseline.as_deref().unwrap_or_default();
+        self.feed.zero(baseline)?;
+        Ok(format!("zeroed by the mean of {ZERO_FRAMES} frames"))
+    }
+
+    /// Greatest drift of a reading over the newest frames, relative to its mean: between the means of the two halves.
+    fn spread(&self) -> Option<f32> {
+        let half = self.newest.len() / 2;
+        let mean = |from: usize, to: usize, reading: usize| {
+            let values = self.newest.range(from..to).map(|frame| frame[reading]);
+            values.sum::<f32>() / (to - from) as f32
+        };
+        let readings = 0..self.newest.front()?.len();
+        let change = |reading| {
+            let (a, b) = (mean(0, half, reading), mean(half, self.newest.len(), reading));
+            ((a - b) / (0.5 * (a + b))).abs()
+        };
+        readings.map(change).filter(|it| it.is_finite()).reduce(f32::max)
+    }
+
+    fn set_baseline(&mut self) {
+        let count = self.newest.front().map_or(0, Vec::len);
+        let mean = |reading: usize| {
+            let values = self.newest.iter().map(|frame| frame[reading]).filter(|it| it.is_finite());
+            values.clone().sum::<f32>() / values.count() as f32
+        };
+        let baseline: Vec<f32> = (0..count).map(mean).collect();
+        self.view.set_baseline(baseline.clone());
+        self.baseline = Some(baseline);
+    }
+
+    fn start_recording(&mut self) -> std::result::Result<String, String> {
+        if self.recorder.is_some() {
+            return Err("a recording is being written already".into());
+        }
+        let beside = Beside {
+            blob: self.watched.blob.map(|blob| blob.bytes().to_vec()),
+            scene: self.watched.scene.clone(),
+            source: self.feed.about().source,
+            baseline: self.baseline.clone(),
+        };
+        let path = Recorder::free_path();
+        let recorder = Recorder::start(&path, self.feed.layout(), beside);
+        self.recorder = Some(recorder.map_err(|cause| cause.to_string())?);
+        Ok(format!("recording {}", path.display()))
+    }
+
+    fn stop_recording(&mut self) -> std::result::Result<String, String> {
+        match self.recorder.take() {
+            Some(recorder) => recorder.finish().map_err(|cause| cause.to_string()),
+            None => Ok(String::new()),
+        }
+    }
+
+    fn show_layout(&self) {
+        let (layout, about) = (self.feed.layout(), self.feed.about());
+        let channel = |column: &taxel_recording::Column| Channel {
+            name: column.name.clone(),
+            unit: column.unit.clone(),
+        };
+        let electrode = |it: &taxel_recording::Electrode| page::Electrode {
+            name: it.name.clone(),
+            place_mm: it.place_mm.map(|place| place as f32),
+            outputs: it.outputs,
+        };
+        self.view.set_layout(page::Layout {
+            title: layout.title.clone(),
+            kind: about.kind,
+            source: about.source,
+            rows: layout.rows,
+            columns: layout.columns,
+            readings: layout.readings.iter().map(channel).collect(),
+            outputs: layout.outputs.iter().map(channel).collect(),
+            electrodes: layout.electrodes.iter().map(electrode).collect(),
+            scale_mm: SCALE_MM,
+            limit_rmse_mm: None,
+            can: about.can,
+            duration_s: about.duration_s,
+        });
+        if let Some(baseline) = &self.baseline {
+            self.view.set_baseline(baseline.clone());
+        }
+    }
+
+    fn tell(&mut self) {
+        self.told = Instant::now();
+        let span = self.past.front().zip(self.past.back()).map(|(a, b)| b.0 - a.0);
+        let span_s = span.map_or(0.0, |span| span.as_secs_f64());
+        let is_recent = self.past.back().is_some_and(|it| it.0.elapsed() < Duration::from_secs(2));
+        let rate = |count: usize| {
+            (span_s > 0.0 && is_recent).then(|| (count.saturating_sub(1) as f64 / span_s) as f32)
+        };
+        let decoded = self.past.iter().filter(|it| it.1).count();
+        let squares: f64 = self.past.iter().map(|it| it.2).sum();
+        let count: usize = self.past.iter().map(|it| it.3).sum();
+        let judged = self.feed.judged();
+        let (position_s, speed) = self.feed.position().unzip();
+        self.view.set_status(Status {
+            state: self.state,
+            message: self.message.clone(),
+            scan_rate: rate(self.past.len()),
+            decode_rate: rate(decoded).filter(|_| decoded > 0),
+            lost: self.feed.lost(),
+            wires: self.wires.for_page(),
+            recording: self.recorder.as_ref().map(Recorder::for_page),
+            rmse_mm: (count > 0).then(|| (squares / count as f64).sqrt() as f32),
+            times_limit: judged.map(|[best, decoded]| (decoded / best).sqrt() as f32),
+            position_s,
+            speed,
+        });
+    }
+}
+
+/// Sum of the squared errors in mm² of outputs in mm, and their number.
+fn errors(layout: &Layout, outputs: Option<&[f32]>, truth: Option<&[f32]>) -> (f64, usize) {
+    let (Some(outputs), Some(truth)) = (outputs, truth) else { return (0.0, 0) };
+    let pairs = outputs.iter().zip(truth).zip(&layout.outputs);
+    let squares =
+        pairs.filter(|(_, column)| column.unit == "mm").map(|((a, b), _)| (a - b).powi(2));
+    let known: Vec<f64> = squares.filter(|it| it.is_finite()).map(f64::from).collect();
+    (known.iter().sum(), known.len())
+}
+
+/// What is to be said of a row, by how its decoding ended.
+fn row_flag(status: u8) -> Option<Flag> {
+    match status {
+        EstimateReport::ROW_AT_REST => Some(Flag::AtRest),
+        0 => None,
+        _ => Some(Flag::Missing),
+    }
+}
+
+/// A moment as the page takes it.
+fn for_page(moment: &Moment) -> page::Frame {
+    let frame = &moment.frame;
+    let flags = [
+        (EstimateReport::NOVEL, Flag::Novel),
+        (EstimateReport::CLAMPED, Flag::Clamped),
+        (EstimateReport::FAULTY_READING, Flag::Missing),
+    ];
+    page::Frame {
+        number: frame.number.into(),
+        time_us: frame.time_us,
+        age_ms: moment.heard.elapsed().as_secs_f32() * 1000.0,
+        readings: frame.readings.clone(),
+        outputs: frame.outputs.clone().unwrap_or_default(),
+        deviations: frame.deviations.clone(),
+        truth: frame.truth.clone(),
+        row_status: (!moment.row_status.is_empty())
+            .then(|| moment.row_status.iter().map(|status| row_flag(*status)).collect()),
+        novelty: moment.novelty,
+        flags: flags.into_iter().filter(|(flag, _)| moment.has(*flag)).map(|it| it.1).collect(),
+        contact: frame.contact.map(|contact| page::Contact {
+            x_mm: contact.place_mm[0],
+            y_mm: contact.place_mm[1],
+            depth_mm: contact.place_mm[2],
+            force_n: contact.force_n.map(|force| force[2]),
+        }),
+    }
+}

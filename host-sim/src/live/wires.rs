@@ -1,0 +1,120 @@
+//! Wires that are not good, told from the newest frames.
+
+use std::collections::VecDeque;
+
+use taxel_core::health::Limits;
+use taxel_data::{Table, columns};
+use taxel_learn::faults::{Found, Kind, Place, WINDOW, diagnose};
+use taxel_recording::{Column, Health, Layout};
+use taxel_view::message as page;
+
+use super::sheet;
+
+/// The newest frames, and what is wrong with their wires.
+pub struct Wires {
+    frames: VecDeque<Vec<f32>>,
+    names: Vec<String>,
+    /// Limits, if all readings are in Ω.
+    limits: Option<Limits>,
+    faults: Vec<Found>,
+}
+
+impl Wires {
+    /// Wires of readings in these columns.
+    pub fn new(readings: &[Column]) -> Self {
+        let names: Vec<String> = sheet::names(readings).map(String::from).collect();
+        let in_ohm = names.iter().all(|name| columns::is_judged_in_ohm(name));
+        let limits = in_ohm.then_some(Limits::USUAL);
+        Self { frames: VecDeque::new(), names, limits, faults: vec![] }
+    }
+
+    /// Keeps the readings of a frame.
+    pub fn push(&mut self, readings: &[f32]) {
+        if self.frames.len() == WINDOW {
+            self.frames.pop_front();
+        }
+        self.frames.push_back(readings.to_vec());
+    }
+
+    /// Judges the frames that are kept, by the model's fill too if there is one.
+    pub fn judge(&mut self, fill: Option<taxel_core::fill::Fill<'_>>) {
+        let Some(limits) = self.limits else { return };
+        let values = self.frames.iter().flatten().map(|reading| f64::from(*reading)).collect();
+        self.faults = diagnose(&Table { names: self.names.clone(), values }, limits, fill);
+    }
+
+    /// Faults for the page.
+    pub fn for_page(&self) -> Vec<page::Wire> {
+        let wire = |found: &Found| {
+            let text = found.fault.to_string();
+            page::Wire {
+                wire: name(found.fault.place),
+                health: match health(found.fault.kind) {
+                    Health::Open => page::Health::Open,
+                    Health::Noisy => page::Health::Noisy,
+                    Health::Missing => page::Health::Missing,
+                    Health::Shorted | Health::Sound => page::Health::Shorted,
+                },
+                words: format!("{text}{}", advice(found.fault.kind)),
+            }
+        };
+        self.faults.iter().map(wire).collect()
+    }
+
+    /// Health of row-wires and of column-wires, for a recording.
+    pub fn for_recording(&self, layout: &Layout) -> [Vec<Health>; 2] {
+        let mut health_of = [vec![Health::Sound; layout.rows], vec![Health::Sound; layout.columns]];
+        for found in &self.faults {
+            let health = health(found.fault.kind);
+            let mut mark = |of: usize, wire: usize| {
+                if let Some(its) = wire.checked_sub(1).and_then(|wire| health_of[of].get_mut(wire))
+                {
+                    *its = health;
+                }
+            };
+            match found.fault.place {
+                Place::All => (1..=layout.rows).for_each(|row| mark(0, row)),
+                Place::Row(row) => mark(0, row),
+                Place::Rows(a, b) => [a, b].into_iter().for_each(|row| mark(0, row)),
+                Place::Column(column) => mark(1, column),
+                Place::Columns(a, b) => [a, b].into_iter().for_each(|column| mark(1, column)),
+                Place::Reading(..) => {}
+            }
+        }
+        health_of
+    }
+}
+
+/// A wire as the page names it.
+fn name(place: Place) -> String {
+    match place {
+        Place::All => "all".into(),
+        Place::Row(wire) => format!("row {wire}"),
+        Place::Rows(a, b) => format!("rows {a}, {b}"),
+        Place::Column(wire) => format!("column {wire}"),
+        Place::Columns(a, b) => format!("columns {a}, {b}"),
+        Place::Reading(row, column) => format!("row {row}, column {column}"),
+    }
+}
+
+fn health(kind: Kind) -> Health {
+    match kind {
+        Kind::Missing | Kind::IntermittentlyMissing => Health::Missing,
+        Kind::Open | Kind::IntermittentlyOpen => Health::Open,
+        Kind::Shorted | Kind::AtGround | Kind::Touching | Kind::IntermittentlyShorted => {
+            Health::Shorted
+        }
+        Kind::Noisy => Health::Noisy,
+    }
+}
+
+/// What helps.
+fn advice(kind: Kind) -> &'static str {
+    match health(kind) {
+        Health::Open => ": look for a broken wire or a loose plug",
+        Health::Shorted => ": look for wires that touch",
+        Health::Noisy => ": look for a loose contact",
+        Health::Missing => ": its converter does not answer",
+        Health::Sound => "",
+    }
+}
