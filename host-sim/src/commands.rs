@@ -13,6 +13,7 @@ pub mod scene_argument;
 pub mod coverage_page;
 mod data_notes;
 mod refused_readings;
+mod recordings;
 mod data_file;
 mod mat_cells;
 mod readings;

@@ -13,5 +13,5 @@ pub mod device;
 pub mod simulation;
 pub mod replay;
 mod wires;
-mod recorder;
+pub mod recorder;
 pub mod watch;

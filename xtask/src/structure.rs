@@ -17,6 +17,7 @@ const DESK: &[&str] = &[
     "taxel-scenes",
     "taxel-data",
     "taxel-recording",
+    "taxel-view",
     "taxel-simulate",
     "taxel-virtual-board",
     "taxel-learn",

@@ -144,6 +144,17 @@ impl DataFile {
         Ok(file)
     }
 
+    /// A table that was read otherwise, from the file at `path`: columns called `header`, and their `values` line after line.
+    ///
+    /// # Errors
+    /// [`Error::File`] if there is no value, or one that is infinite.
+    ///
+    /// # Panics
+    /// If `header` is empty.
+    pub fn of_table(path: &Path, header: Vec<String>, values: Vec<f64>) -> Result<Self> {
+        npy::data_file(path, header, true, values)
+    }
+
     /// Puts `what` is not plain before what was found.
     fn add_found(&mut self, what: &str) {
         let words = [what, &self.found].into_iter().filter(|words| !words.is_empty());

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::arguments::refuse_given;
+use super::recordings::{self, is_recording};
 use super::stderr;
 use crate::{Error, Result};
 use clap::Args;
@@ -10,9 +11,9 @@ use taxel_data::DataFile;
 use taxel_data::data_file::{Reading, Separator, Stated, is_array};
 
 /// Heading of options for data files.
-pub const DATA_FILES: &str = "Data files (CSV, .npy, .npz)";
+pub const DATA_FILES: &str = "Data files (CSV, .npy, .npz, .mcap)";
 
-/// How data files are read: text of any dialect (with or without a header), numpy's .npy and .npz.
+/// How data files are read: text of any dialect (with or without a header), numpy's .npy and .npz, recordings (.mcap).
 #[derive(Args, Default)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct DataFileArguments {
@@ -171,12 +172,16 @@ impl FieldArguments {
     }
 
     fn read_as(&self, path: &Path, keeps_text: bool) -> Result<DataFile> {
-        if is_array(path) {
+        if is_array(path) || is_recording(path) {
             refuse_given(self.of_text(), |option| {
                 format!("{option} is for text files; {} is none: leave it out", path.display())
             })?;
         }
-        let mut file = DataFile::read_as(path, &Reading { keeps_text, ..self.reading() })?;
+        let mut file = if is_recording(path) {
+            recordings::read(path)?
+        } else {
+            DataFile::read_as(path, &Reading { keeps_text, ..self.reading() })?
+        };
         note_found(&file);
         let name = path.display();
         if !file.names_columns {

@@ -2,11 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::live::replay::USUAL_RATE;
+use crate::live::sheet;
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
 use taxel_core::filter::State;
+use taxel_data::Clock;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::{DataFile, FieldTexts};
 use taxel_data::table::Table;
@@ -14,12 +17,14 @@ use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::filtered::filter_frames;
 use taxel_learn::infer::is_missing;
 use taxel_learn::{Exponential, ModelBlob, PreparedModel};
+use taxel_recording::{Extras, Frame};
 
 use super::arguments::exponential;
 use super::data_file::DataFileArguments;
 use super::filter_arguments::{FilterArguments, PeriodArgument};
 use super::health::{Health, HealthArguments};
 use super::readings::{model_inputs, related};
+use super::recordings::{self, is_recording};
 use super::rest_argument::UntouchedArguments;
 use super::{Common, print, stderr};
 
@@ -42,9 +47,9 @@ use super::{Common, print, stderr};
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// CSV file, .npy or .npz with the model's reading columns, in any order, among others.
+    /// CSV file, .npy, .npz or recording (.mcap) with the model's reading columns, in any order, among others.
     readings: PathBuf,
-    /// CSV file to write, with the model's output columns.
+    /// CSV file to write, with the model's output columns; or a recording (.mcap), with the readings too.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Columns of the readings' file that are written too, as they stand there, in front of the estimates: the time, say.
@@ -88,6 +93,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.untouched.path().unwrap_or(&arguments.readings);
     let read = [&*arguments.model, &arguments.readings, baseline];
     print::check_output(&arguments.output, &read)?;
+    if is_recording(&arguments.output) && !arguments.keep.is_empty() {
+        let message =
+            "--keep: a recording has columns of its own; write a CSV file, or leave the option out";
+        return Err(Error::Usage(message.into()));
+    }
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare(arguments.exponential);
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
@@ -103,6 +113,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baselines =
         arguments.untouched.baselines(metadata, &arguments.model, log, fields, limits)?;
     let mut readings = model_inputs(&model, &file)?;
+    let scanned =
+        is_recording(&arguments.output).then(|| (clock_us(&file), readings.values.clone()));
     let health = arguments.health.apply(&model, &mut readings)?;
     let (model, readings) = related(model, readings, baselines.as_ref());
     remark_on_range(&model, &readings);
@@ -125,7 +137,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let novelty = assessed.as_ref().map(|(_, novelty)| &novelty[..]);
     let flags = flags(&model, &readings, &estimate, &health, novelty);
-    write(&arguments.output, &keep, &estimate, assessed.as_ref(), &flags)?;
+    match scanned {
+        Some((start_us, scanned)) => {
+            record(&arguments.output, &blob, (&start_us, &scanned), &estimate, assessed.as_ref())?;
+        }
+        None => write(&arguments.output, &keep, &estimate, assessed.as_ref(), &flags)?,
+    }
     let inputs = model.model_inputs(&readings.values);
     let frames = inputs.chunks_exact(readings.names.len());
     let incomplete = frames.filter(|frame| frame.iter().any(|v| is_missing(*v))).count();
@@ -243,6 +260,45 @@ fn write(
         values.chain([*novelty, flags])
     });
     Ok(csv_file::write_columns(path, columns, lines)?)
+}
+
+/// Time of each line of `file` in µs since the first; of a file without times, as many frames a second as usual.
+fn clock_us(file: &DataFile) -> Vec<u64> {
+    let clock =
+        Clock::of(file, None).ok().filter(|clock| clock.column.is_some() && clock.unit == "s");
+    let at_s = |line: usize| {
+        clock.as_ref().map_or(line as f64 / USUAL_RATE, |clock| clock.at[line] - clock.at[0])
+    };
+    (0..file.lines()).map(|line| (at_s(line) * 1e6).round() as u64).collect()
+}
+
+/// Writes a recording of readings (frames × inputs) with the times of their scans, of the estimates, and of their deviations.
+fn record(
+    path: &Path,
+    blob: &ModelBlob,
+    (start_us, readings): (&[u64], &[f64]),
+    estimate: &Table,
+    assessed: Option<&(Vec<f64>, Vec<f64>)>,
+) -> Result<()> {
+    let model = blob.parse();
+    let layout = sheet::of_model(model.metadata(), None);
+    let extras = Extras { blob: Some(blob.bytes().to_vec()), ..Extras::default() };
+    let (inputs, outputs) = (layout.readings.len(), estimate.names.len());
+    let floats = |line: &[f64]| line.iter().map(|value| *value as f32).collect::<Vec<f32>>();
+    let frame = |number: usize| {
+        let deviations =
+            assessed.map(|(all, _)| floats(&all[number * outputs..(number + 1) * outputs]));
+        let outputs = floats(&estimate.values[number * outputs..(number + 1) * outputs]);
+        Frame {
+            time_us: start_us[number],
+            number: number as u32,
+            readings: floats(&readings[number * inputs..(number + 1) * inputs]),
+            outputs: Some(outputs),
+            deviations,
+            ..Frame::default()
+        }
+    };
+    recordings::write(path, &layout, &extras, (0..estimate.len()).map(frame))
 }
 
 /// Columns of `file` to write in front of the `outputs`: names, and fields as they are written.

@@ -6,15 +6,19 @@ use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use taxel_data::csv_file;
 use taxel_data::random::Stream;
+use taxel_data::{Dataset, csv_file};
+use taxel_recording::{Extras, Frame};
 use taxel_simulate::Synthesis;
 use taxel_simulate::timetable::Timetable;
 
+use super::recordings::{self, is_recording};
 use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print, stderr};
 use crate::evaluate::trade::{Device, Wires};
 use crate::experiment::Experiment;
+use crate::live::replay::USUAL_RATE;
+use crate::live::sheet;
 
 /// Synthesise frames of a scene as CSV: noisy readings, true outputs.
 ///
@@ -52,7 +56,7 @@ pub struct Arguments {
     /// Multiply all readings by this, as a sensor does whose gain has drifted: 1.02 is 2 % more.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
-    /// CSV file to write: readings, then outputs, one frame a line.
+    /// CSV file to write: readings, then outputs, one frame a line; or a recording (.mcap, docs/live.md).
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
@@ -128,6 +132,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let mut dataset = synthesis.frames(Stream::Training, arguments.frames);
     dataset.inputs.values.iter_mut().for_each(|reading| *reading *= arguments.scale);
+    if is_recording(&arguments.output) {
+        return recorded(arguments, &scene, &dataset, timetable.as_ref(), common);
+    }
     let names = dataset.inputs.names.iter().chain(&dataset.outputs.names).map(String::as_str);
     let lines = dataset.inputs.lines().zip(dataset.outputs.lines());
     let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
@@ -137,8 +144,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let names = ["time_s", "trajectory"].into_iter().chain(names);
             let duration_s = scene.world.path.as_ref().map_or(0.0, |path| path.duration_s);
             let of_frame = |frame: usize| {
-                let (trajectory, scan) = (frame / timetable.scans(), frame % timetable.scans());
-                let start_s = trajectory as f64 * (duration_s + PAUSE_S) + timetable.starts_s[scan];
+                let trajectory = frame / timetable.scans();
+                let start_s = start_s(timetable, duration_s, frame);
                 // To the nanosecond: a sum of binary fractions has more digits than it means.
                 [(start_s * 1e9).round() / 1e9, (trajectory + 1) as f64]
             };
@@ -147,6 +154,55 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             csv_file::write(&arguments.output, names, lines)?;
         }
     }
+    conclude(arguments, &scene, &dataset, common)
+}
+
+/// Time of the start of a frame since the first one in s.
+fn start_s(timetable: &Timetable, duration_s: f64, frame: usize) -> f64 {
+    let (trajectory, scan) = (frame / timetable.scans(), frame % timetable.scans());
+    trajectory as f64 * (duration_s + PAUSE_S) + timetable.starts_s[scan]
+}
+
+/// Writes the frames as a recording.
+fn recorded(
+    arguments: &Arguments,
+    scene: &Experiment,
+    dataset: &Dataset,
+    timetable: Option<&Timetable>,
+    common: &Common,
+) -> Result<()> {
+    let columns = |names: &[String]| sheet::columns(names.iter().map(String::as_str), []);
+    let (readings, outputs) = (columns(&dataset.inputs.names), columns(&dataset.outputs.names));
+    let layout = sheet::layout(&scene.name, readings, outputs, Some(&scene.world.sensor));
+    let text = Experiment::text(&arguments.scene.path().to_string_lossy())?.into_owned();
+    let extras = Extras { scene: Some(text), ..Extras::default() };
+    let duration_s = scene.world.path.as_ref().map_or(0.0, |path| path.duration_s);
+    let floats = |line: &[f64]| line.iter().map(|value| *value as f32).collect();
+    let lines = dataset.inputs.lines().zip(dataset.outputs.lines());
+    let frames = lines.enumerate().map(|(number, (readings, outputs))| {
+        let start_s = match timetable {
+            Some(timetable) => start_s(timetable, duration_s, number),
+            None => number as f64 / USUAL_RATE,
+        };
+        Frame {
+            time_us: (start_s * 1e6).round() as u64,
+            number: number as u32,
+            readings: floats(readings),
+            truth: Some(floats(outputs)),
+            ..Frame::default()
+        }
+    });
+    recordings::write(&arguments.output, &layout, &extras, frames)?;
+    conclude(arguments, scene, dataset, common)
+}
+
+/// Says what was written.
+fn conclude(
+    arguments: &Arguments,
+    scene: &Experiment,
+    dataset: &Dataset,
+    common: &Common,
+) -> Result<()> {
     if let Some(warning) = Warning::not_positive(&dataset.inputs) {
         stderr::remark(warning);
     }

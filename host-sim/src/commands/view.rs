@@ -8,13 +8,12 @@ use clap::{Args, ValueEnum, value_parser};
 use serde::Serialize;
 use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
-use taxel_recording::Reader;
 use taxel_rig::device::serial;
 use taxel_view::View;
 
 use super::data_file::DataFileArguments;
 use super::scene_argument::DEFAULT_SCENE;
-use super::{Common, interruption, print, stderr};
+use super::{Common, interruption, print, recordings, stderr};
 use crate::experiment::{Experiment, names_a_scene};
 use crate::live::device::{DeviceFeed, Line, Protocol};
 use crate::live::feed::Feed;
@@ -151,7 +150,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             show(&mut feed, &Watched { blob: Some(&blob), scene: Some(text) }, arguments, common)
         }
         Source::Recording(path) => {
-            let reader = open_recording(&path)?;
+            let reader = recordings::open(&path)?;
             let mut feed = ReplayFeed::of_recording(reader, &path, blob.as_ref())?;
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, arguments, common)
         }
@@ -161,19 +160,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, arguments, common)
         }
     }
-}
-
-/// Opens a recording, and notes if it was cut.
-fn open_recording(path: &Path) -> Result<Reader> {
-    let reader = Reader::open(path)
-        .map_err(|cause| Error::Unfit { path: path.into(), message: cause.to_string() })?;
-    if reader.was_cut() {
-        stderr::remark(format_args!(
-            "note: {0} has no end, since whoever wrote it was killed: `host-sim recover {0}` mends it",
-            path.display()
-        ));
-    }
-    Ok(reader)
 }
 
 /// What the argument names, or what there is without one.
@@ -189,7 +175,7 @@ fn source(arguments: &Arguments) -> Result<Source> {
     if is_port(text) {
         return Ok(Source::Port(text.clone()));
     }
-    if path.extension().is_some_and(|it| it == "mcap") {
+    if recordings::is_recording(path) {
         return Ok(Source::Recording(path.into()));
     }
     if names_a_scene(text) {

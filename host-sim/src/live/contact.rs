@@ -94,7 +94,10 @@ mod tests {
         ]);
         let place = |index: usize| sheet.electrodes[index].place_mm.map(|it| it as f32);
         let found = contact(&sheet, &[0.0, 0.5, 0.5, 0.0, 0.02, f32::NAN], None, false).unwrap();
-        assert!((found.place_mm[0] - (place(1)[0] + place(2)[0]) / 2.0).abs() < 1e-4, "{found:?}");
+        assert!(
+            (found.place_mm[0] - f32::midpoint(place(1)[0], place(2)[0])).abs() < 1e-4,
+            "{found:?}"
+        );
         assert!((found.place_mm[1] - place(1)[1]).abs() < 1e-4 && found.place_mm[2] == 0.5);
         assert_eq!(found.force_n, None);
         assert!(contact(&sheet, &[0.0, 0.09, 0.0, 0.0, 0.0, 0.0], None, false).is_none());

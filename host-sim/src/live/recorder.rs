@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime};
 
 use taxel_recording::{Extras, Frame, Layout, Replace, Writer};
+use taxel_rig::scans::Scan;
 use taxel_view::message as page;
 
+use super::moment::Moment;
 use super::replay::BASELINE;
 use crate::{Error, Result};
 
@@ -15,6 +17,8 @@ pub struct Recorder {
     writer: Writer,
     path: PathBuf,
     start: Instant,
+    /// Number of readings of a frame.
+    readings: usize,
 }
 
 /// What goes with a recording.
@@ -46,7 +50,8 @@ impl Recorder {
         let writer = Writer::create(path, layout, &extras, SystemTime::now(), Replace::Recordings);
         let writer =
             writer.map_err(|cause| Error::failed(format!("{}: {cause}", path.display())))?;
-        Ok(Self { writer, path: path.into(), start: Instant::now() })
+        let readings = layout.readings.len();
+        Ok(Self { writer, path: path.into(), start: Instant::now(), readings })
     }
 
     /// A name that is free in the current folder.
@@ -63,6 +68,18 @@ impl Recorder {
     pub fn write(&mut self, frame: &Frame) -> Result<()> {
         let failed = |cause| Error::failed(format!("{}: {cause}", self.path.display()));
         self.writer.write(frame).map_err(failed)
+    }
+
+    /// Records a scan of a device. Readings that were lost on the line are missing.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_scan(&mut self, scan: &Scan) -> Result<()> {
+        let mut moment = Moment::from(scan.clone());
+        if moment.frame.readings.is_empty() {
+            moment.frame.readings = vec![f32::NAN; self.readings];
+        }
+        self.write(&moment.frame)
     }
 
     /// Its file, size and length, for the page.

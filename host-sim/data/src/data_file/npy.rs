@@ -123,7 +123,8 @@ fn unusable(path: &Path, cause: String) -> Error {
     Error::file(path, Problem::Array { cause })
 }
 
-fn data_file(
+/// A table of these `values`, line after line.
+pub(super) fn data_file(
     path: &Path,
     header: Vec<String>,
     names_columns: bool,

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crate::{Error, Result};
 use taxel_data::Progress;
 use taxel_rig::device::Device;
-use taxel_rig::scans::{Assembler, Scan, Sent};
+use taxel_rig::scans::{Assembler, Scan};
 
 use super::super::progress::Terminal;
 use super::scan::{Wanted, check_length};
@@ -19,21 +19,19 @@ pub fn values(scan: &Scan) -> Vec<f64> {
     values.copied().chain(estimate.novelty).map(f64::from).collect()
 }
 
-/// Receives the scans that the device sends, of `width` values each.
+/// Receives the scans that the device sends, of `width` values each, and passes each to `take` at once.
 pub fn hear_scans(
     device: &mut Device,
     count: usize,
     patience: Duration,
     wanted: Wanted,
     width: usize,
+    mut take: impl FnMut(&Scan) -> Result<()>,
 ) -> Result<Vec<Scan>> {
     let progress = Terminal::new();
     progress.stage("recording", count);
     let mut scans: Vec<Scan> = Vec::new();
-    let mut assembler = Assembler::new(Sent {
-        readings: wanted == Wanted::Readings,
-        estimates: wanted == Wanted::Estimates,
-    });
+    let mut assembler = Assembler::new(wanted.sent());
     let enough = device.hear(Instant::now() + patience, |_, report| {
         let scan = assembler.take(report)?;
         if let Err(error) = check_length(scan.number, values(&scan).len(), width) {
@@ -41,6 +39,9 @@ pub fn hear_scans(
         }
         if scans.last().is_some_and(|last| scan.is_after_restart(last)) {
             return Some(Err(Error::failed("the device has restarted meanwhile")));
+        }
+        if let Err(error) = take(&scan) {
+            return Some(Err(error));
         }
         scans.push(scan);
         progress.step();
@@ -58,7 +59,7 @@ pub fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted
     if missing < values.count() {
         return Ok(missing);
     }
-    let what = if wanted == Wanted::Estimates { "estimate" } else { "reading" };
+    let what = if wanted.sent().estimates { "estimate" } else { "reading" };
     Err(Error::failed(format!(
         "the device sent not a single {what}; `identify` shows failed samples: check the wiring of \
          converters and rows (docs/board.md)"

@@ -127,7 +127,9 @@ fn record_presses(
         // Paused first, so that no frame is from before the press.
         let scans = device.while_paused(|device| -> Result<_> {
             configure(device, scan, Wanted::Readings, Configuration::DEFAULT)?;
-            hear_scans(device, scan.frames.into(), patience, Wanted::Readings, names.len())
+            hear_scans(device, scan.frames.into(), patience, Wanted::Readings, names.len(), |_| {
+                Ok(())
+            })
         })?;
         let scanned = scans.iter().flat_map(frames::values).collect();
         let mut scanned = Table { names: names.clone(), values: scanned };

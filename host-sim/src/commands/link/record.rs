@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::live::recorder::{Beside, Recorder};
+use crate::live::sheet;
 use crate::verdict::sentences;
 use crate::{Error, Result};
 use clap::{Args, value_parser};
@@ -16,6 +18,7 @@ use taxel_rig::scans::{Scan, ScanEstimate};
 
 use super::super::filter_arguments::FilterArguments;
 use super::super::health::note_faults;
+use super::super::recordings::is_recording;
 use super::super::{Common, print};
 use super::frames::{hear_scans, missing, values};
 use super::scan::{
@@ -54,7 +57,8 @@ pub struct RecordArguments {
     /// Nothing touches the sensor: judge the noise on its readings (docs/noise.md).
     #[arg(long, conflicts_with = "confidence")]
     untouched: bool,
-    /// CSV file to write.
+    /// CSV file to write; or a recording (.mcap), with readings and estimates, which is written while they come and survives a
+    /// kill (docs/live.md).
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
@@ -93,17 +97,32 @@ struct Saved {
     file: PathBuf,
 }
 
-pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) -> Result<()> {
-    let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
+/// Checks before long work that the options go together, and that the file can be written.
+fn check_usage(action: &RecordArguments) -> Result<()> {
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
-    print::check_output(&action.output, &inputs)?;
+    if is_recording(&action.output) {
+        if action.time || action.untouched {
+            let message = "-o: a recording has the times of all scans, and noise at rest is judged on CSV files; leave \
+                           --time and --untouched out";
+            return Err(Error::Usage(message.into()));
+        }
+    } else {
+        print::check_output(&action.output, &inputs)?;
+    }
     if action.untouched && action.model.is_some() && !action.readings {
         let message =
             "--untouched: noise is judged by readings, and estimates are saved; add --readings";
         return Err(Error::Usage(message.into()));
     }
+    Ok(())
+}
+
+pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) -> Result<()> {
+    let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
+    check_usage(action)?;
     let identity = device.identify()?;
-    let model = model.as_ref().map(ModelBlob::parse);
+    let blob = model.as_ref();
+    let model = blob.map(ModelBlob::parse);
     if let Some(model) = &model {
         let is_it = if action.recalibrated {
             identity.is_made_of(model)
@@ -115,7 +134,9 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let (wanted, mut names) = match &model {
         Some(model) if !action.readings => {
             let names = model.metadata().output_names.iter().map(String::from).collect();
-            (Wanted::Estimates, names)
+            let wanted =
+                if is_recording(&action.output) { Wanted::Both } else { Wanted::Estimates };
+            (wanted, names)
         }
         _ => (Wanted::Readings, reading_names(&identity, model.as_ref())?),
     };
@@ -138,9 +159,16 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         report_every: every,
         ..Configuration::DEFAULT
     };
+    let mut recorder = is_recording(&action.output)
+        .then(|| recorder(&action.output, &identity, &names[..outputs], blob))
+        .transpose()?;
     let scans = device.while_paused(|device| -> Result<_> {
         configure(device, &action.scan, wanted, decoding)?;
-        hear_scans(device, action.scan.frames.into(), patience, wanted, names.len())
+        let count = action.scan.frames.into();
+        hear_scans(device, count, patience, wanted, names.len(), |scan| match &mut recorder {
+            Some(recorder) => recorder.write_scan(scan),
+            None => Ok(()),
+        })
     })?;
     let lines: Vec<Vec<f64>> = scans.iter().map(values).collect();
     let missing = missing(lines.iter().flat_map(|line| &line[..outputs]), wanted)?;
@@ -155,7 +183,10 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         time.into_iter().chain(line)
     });
     let header = time.into_iter().chain(names.iter().map(String::as_str));
-    csv_file::write(&action.output, header, lines)?;
+    match recorder {
+        Some(recorder) => drop(recorder.finish()?),
+        None => csv_file::write(&action.output, header, lines)?,
+    }
     let ends = scans.last().zip(scans.first());
     let steps = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number));
     let frames_lost = (steps / u32::from(every) + 1).saturating_sub(scans.len() as u32);
@@ -179,6 +210,27 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         file,
     };
     saved.print(common)
+}
+
+/// A recording of what a device sends: of the model in `blob`, or of all its readings, called `names`.
+fn recorder(
+    path: &Path,
+    identity: &DeviceIdentity,
+    names: &[String],
+    blob: Option<&ModelBlob>,
+) -> Result<Recorder> {
+    let layout = if let Some(blob) = blob {
+        sheet::of_model(blob.parse().metadata(), None)
+    } else {
+        let readings = sheet::columns(names.iter().map(String::as_str), []);
+        sheet::layout(&identity.board, readings, vec![], None)
+    };
+    let beside = Beside {
+        blob: blob.map(|blob| blob.bytes().to_vec()),
+        source: format!("{}, firmware {}", identity.board, identity.firmware),
+        ..Beside::default()
+    };
+    Recorder::start(path, &layout, beside)
 }
 
 /// Noise on the readings of these `scans`, in columns of these `names`. The device has sent `every` so many.

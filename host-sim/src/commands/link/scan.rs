@@ -9,6 +9,7 @@ use taxel_core::blob::Model;
 use taxel_firmware::link::message::{ConfidenceSent, Configuration};
 use taxel_firmware::timing::ScanPlan;
 use taxel_rig::device::{Device, DeviceIdentity};
+use taxel_rig::scans::Sent;
 
 #[derive(Args)]
 pub struct ScanArguments {
@@ -32,6 +33,18 @@ pub enum Wanted {
     Nothing,
     Readings,
     Estimates,
+    /// Readings and estimates.
+    Both,
+}
+
+impl Wanted {
+    /// What is sent of each scan.
+    pub fn sent(self) -> Sent {
+        Sent {
+            readings: matches!(self, Self::Readings | Self::Both),
+            estimates: matches!(self, Self::Estimates | Self::Both),
+        }
+    }
 }
 
 /// Part of a model's confidence that a device is to send with each estimate.
@@ -70,8 +83,8 @@ pub fn configure(
 ) -> taxel_rig::Result<()> {
     let mut configuration = Configuration {
         frame_period_us: scan.period_us,
-        send_readings: wanted == Wanted::Readings,
-        send_estimates: wanted == Wanted::Estimates,
+        send_readings: wanted.sent().readings,
+        send_estimates: wanted.sent().estimates,
         ..decoding
     };
     configuration.scan.settling_us = scan.settling_us;

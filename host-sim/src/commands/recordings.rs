@@ -1,0 +1,95 @@
+//! Recordings (.mcap) as files that commands read and write.
+
+use std::fs::File;
+use std::io;
+use std::path::Path;
+use std::time::SystemTime;
+
+use taxel_data::DataFile;
+use taxel_data::output::{Scratch, write_whole};
+use taxel_recording::{Extras, Frame, Layout, Reader, Replace, Writer};
+
+use super::stderr;
+use crate::{Error, Result};
+
+/// Name of the column with the time of each frame in s.
+const TIME: &str = "time_s";
+
+/// Whether `path` is that of a recording, by its extension.
+pub fn is_recording(path: &Path) -> bool {
+    path.extension().is_some_and(|it| it.eq_ignore_ascii_case("mcap"))
+}
+
+/// Error for the recording at `path`.
+fn unfit(path: &Path, cause: &taxel_recording::Error) -> Error {
+    Error::Unfit { path: path.into(), message: cause.to_string() }
+}
+
+/// Opens a recording, and notes if it was cut.
+pub fn open(path: &Path) -> Result<Reader> {
+    let reader = Reader::open(path).map_err(|cause| unfit(path, &cause))?;
+    if reader.was_cut() {
+        stderr::remark(format_args!(
+            "note: {0} has no end, since whoever wrote it was killed: `host-sim recover {0}` mends it",
+            path.display()
+        ));
+    }
+    Ok(reader)
+}
+
+/// Reads a recording as a table: the time of each frame, its readings, and its true outputs where these are known. Estimates are not
+/// taken for the truth: they stay out.
+pub fn read(path: &Path) -> Result<DataFile> {
+    let reader = open(path)?;
+    let layout = reader.layout().clone();
+    let mut header = vec![TIME.to_owned()];
+    header.extend(layout.readings.iter().map(|column| column.name.clone()));
+    let (mut values, mut has_truth) = (Vec::new(), None);
+    let mut first_us = None;
+    for frame in reader {
+        let frame = frame.map_err(|cause| unfit(path, &cause))?;
+        // Either all lines of a table have it or none.
+        let has_truth = *has_truth.get_or_insert(frame.truth.is_some());
+        let truth = match (frame.truth, has_truth) {
+            (Some(truth), true) => truth,
+            (None, true) => vec![f32::NAN; layout.outputs.len()],
+            (_, false) => vec![],
+        };
+        let since_us = frame.time_us.saturating_sub(*first_us.get_or_insert(frame.time_us));
+        values.push(since_us as f64 * 1e-6);
+        // Of an open wire, whose reading is infinite, a table holds none.
+        let known = |value: f32| if value.is_finite() { f64::from(value) } else { f64::NAN };
+        values.extend(frame.readings.into_iter().chain(truth).map(known));
+    }
+    if has_truth == Some(true) {
+        header.extend(layout.outputs.iter().map(|column| column.name.clone()));
+    } else if !layout.outputs.is_empty() {
+        stderr::remark(format_args!(
+            "note: {} holds no true outputs; its estimates are not taken for these",
+            path.display()
+        ));
+    }
+    Ok(DataFile::of_table(path, header, values)?)
+}
+
+/// Writes a recording of these frames to `path`, whole or not at all.
+pub fn write(
+    path: &Path,
+    layout: &Layout,
+    extras: &Extras,
+    frames: impl Iterator<Item = Frame>,
+) -> Result<()> {
+    let failed = |cause: io::Error| taxel_data::Error::write(path, cause);
+    let scratch = Scratch::new().map_err(failed)?;
+    let whole = scratch.path().join("whole.mcap");
+    let error = |cause: taxel_recording::Error| unfit(path, &cause);
+    let writer = Writer::create(&whole, layout, extras, SystemTime::now(), Replace::AnyFile);
+    let mut writer = writer.map_err(error)?;
+    for frame in frames {
+        writer.write(&frame).map_err(error)?;
+    }
+    writer.finish().map_err(error)?;
+    let mut written = File::open(&whole).map_err(failed)?;
+    write_whole(path, |to| io::copy(&mut written, to).map(drop).map_err(failed))?;
+    Ok(())
+}
