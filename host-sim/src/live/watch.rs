@@ -258,6 +258,9 @@ impl<'w, 'b> Watch<'w, 'b> {
     }
 
     fn start_recording(&mut self) -> std::result::Result<String, String> {
+        if !self.feed.about().can.record {
+            return Err("a recording is not recorded again".into());
+        }
         if self.recorder.is_some() {
             return Err("a recording is being written already".into());
         }

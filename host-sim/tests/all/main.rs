@@ -28,9 +28,12 @@ mod noise;
 #[cfg(unix)]
 mod output;
 mod readout;
+mod recordings;
 mod recursion;
 mod refusals;
 mod refused_readings;
 mod trade;
+#[cfg(target_os = "linux")]
+mod view;
 mod wires;
 mod workflow;

@@ -1,0 +1,88 @@
+//! Recordings as files of commands: the same numbers as in CSV files, and what a kill leaves.
+
+use std::fs;
+
+use taxel_recording::Reader;
+
+use crate::common::Folder;
+
+/// Fields of a CSV file.
+fn csv(folder: &Folder, name: &str) -> Vec<Vec<f64>> {
+    let text = fs::read_to_string(folder.path(name)).unwrap();
+    let number = |field: &str| field.parse().unwrap_or(f64::NAN);
+    text.lines().skip(1).map(|line| line.split(',').map(number).collect()).collect()
+}
+
+#[test]
+fn frames_in_a_recording_are_those_of_a_csv_file() {
+    let folder = Folder::new("recordings");
+    let synth = ["synth", "press", "-n", "40", "--seed", "3"];
+    folder.succeed(&[&synth[..], &["-o", "a.csv"]].concat());
+    folder.succeed(&[&synth[..], &["-o", "a.mcap"]].concat());
+    let mut reader = Reader::open(&folder.path("a.mcap")).unwrap();
+    assert!(reader.extras().unwrap().scene.unwrap().contains("name = \"press\""));
+    for (line, frame) in csv(&folder, "a.csv").iter().zip(&mut reader) {
+        let frame = frame.unwrap();
+        let values = frame.readings.into_iter().chain(frame.truth.unwrap());
+        assert!(line.iter().map(|value| *value as f32).eq(values));
+    }
+    let train = ["train", "press", "-n", "400", "--centres", "8", "--no-refine", "-o", "m.bin"];
+    folder.succeed(&train);
+    for (from, to) in [("a.csv", "b.csv"), ("a.mcap", "c.csv"), ("a.mcap", "d.mcap")] {
+        folder.succeed(&["decode", "m.bin", from, "-o", to]);
+    }
+    assert_eq!(fs::read(folder.path("b.csv")).unwrap(), fs::read(folder.path("c.csv")).unwrap());
+    let mut decoded = Reader::open(&folder.path("d.mcap")).unwrap();
+    let blob = fs::read(folder.path("m.bin")).unwrap();
+    assert_eq!(decoded.extras().unwrap().blob, Some(blob));
+    for (line, frame) in csv(&folder, "b.csv").iter().zip(&mut decoded) {
+        let outputs = frame.unwrap().outputs.unwrap();
+        assert!(line.iter().map(|value| *value as f32).take(144).eq(outputs));
+    }
+    let [of_csv, of_mcap] =
+        ["a.csv", "a.mcap"].map(|file| folder.succeed(&["eval", "m.bin", file, "--json"]));
+    let rmse = |text: &str, group: usize| {
+        let json: serde_json::Value = serde_json::from_str(text).unwrap();
+        json["decoders"][0]["errors"][group]["rmse"].as_f64().unwrap()
+    };
+    // A recording has readings as f32.
+    for group in 0..3 {
+        let [a, b] = [&of_csv, &of_mcap].map(|text| rmse(text, group));
+        assert!((a - b).abs() < 1e-6, "{a} mm, {b} mm");
+    }
+    folder.succeed(&["train", "a.mcap", "--centres", "2", "--no-refine", "-o", "t.bin"]);
+    // Estimates are no truth.
+    let said = folder.fail(&["eval", "m.bin", "d.mcap"], 2);
+    assert!(said.contains("d.mcap"), "{said}");
+    let keep = ["decode", "m.bin", "a.csv", "--keep", "r1c1_ohm", "-o", "e.mcap"];
+    assert!(folder.fail(&keep, 2).contains("--keep"));
+}
+
+#[test]
+fn a_recording_that_was_cut_is_named_and_mended() {
+    let folder = Folder::new("recordings_cut");
+    folder.succeed(&["synth", "press", "-n", "900", "-o", "a.mcap"]);
+    let bytes = fs::read(folder.path("a.mcap")).unwrap();
+    folder.write("cut.mcap", &bytes[..bytes.len() * 2 / 3]);
+    let train = ["train", "press", "-n", "400", "--centres", "8", "--no-refine", "-o", "m.bin"];
+    folder.succeed(&train);
+    let decode = ["decode", "m.bin", "cut.mcap", "-o", "b.csv"];
+    let output = folder.run(&decode);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success() && said.contains("`host-sim recover cut.mcap` mends it"),
+        "{said}"
+    );
+    let frames = csv(&folder, "b.csv").len();
+    assert!(frames > 100 && frames < 900, "{frames}");
+    let said = folder.succeed(&["recover", "cut.mcap"]);
+    assert!(said.contains(&format!("cut.mcap: {frames} frames recovered")), "{said}");
+    assert!(folder.succeed(&["recover", "cut.mcap"]).contains("is whole"));
+    folder.succeed(&["decode", "m.bin", "cut.mcap", "-o", "c.csv"]);
+    assert_eq!(csv(&folder, "c.csv").len(), frames);
+    folder.write("no.mcap", "not a recording");
+    for command in [&["recover", "no.mcap"][..], &["decode", "m.bin", "no.mcap", "-o", "d.csv"]] {
+        let said = folder.fail(command, 2);
+        assert!(said.contains("no.mcap"), "{said}");
+    }
+}
