@@ -5,6 +5,7 @@ mod call;
 mod model;
 mod scene;
 mod link;
+mod recording;
 
 use pyo3::prelude::*;
 
@@ -18,6 +19,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(call::main, module)?)?;
     module.add_function(wrap_pyfunction!(link::ports, module)?)?;
     module.add_function(wrap_pyfunction!(link::only_usb_port, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::read_recording, module)?)?;
     module.add_class::<model::Blob>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<link::Line>()

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use taxel_firmware::link::message::{ConfidenceSent, Configuration};
 use taxel_rig::Error;
 use taxel_rig::device::{Device, DeviceIdentity, serial};
-use taxel_rig::scans::{DeviceScans, Listener, Scan, Sent, Source};
+use taxel_rig::scans::{DeviceScans, Listener, MarkedBytes, NumberLines, Scan, Sent, Source};
 
 use crate::call::wait;
 
@@ -85,11 +85,14 @@ impl Line {
     /// Opens a port and listens. `send` is "readings", "estimates" or "both"; None takes estimates from a device with a model,
     /// and readings from another.
     #[new]
-    #[pyo3(signature = (port, baud, period_us, send, confidence, buffer))]
+    #[pyo3(signature = (port, protocol, baud, shape, period_us, send, confidence, buffer))]
+    #[expect(clippy::too_many_arguments, reason = "they are those of taxel.Link")]
     fn new(
         py: Python<'_>,
         port: String,
+        protocol: &str,
         baud: u32,
+        shape: (usize, usize),
         period_us: Option<u32>,
         send: Option<&str>,
         confidence: bool,
@@ -106,6 +109,16 @@ impl Line {
                 return Err(PyValueError::new_err(message));
             }
         };
+        let other = match protocol {
+            "taxel" => None,
+            "flexitac" => Some(true),
+            "csv" => Some(false),
+            other => {
+                let message =
+                    format!("protocol = {other:?}: give \"taxel\", \"flexitac\" or \"csv\"");
+                return Err(PyValueError::new_err(message));
+            }
+        };
         let usual = Configuration::DEFAULT;
         let configuration = Configuration {
             frame_period_us: period_us.unwrap_or(usual.frame_period_us),
@@ -113,7 +126,17 @@ impl Line {
             ..usual
         };
         let open = move |stop: &Arc<AtomicBool>| -> Result<(Box<dyn Source>, _), Error> {
-            let mut device = Device::new(serial::open(&port, baud)?)?;
+            let wire = serial::open(&port, baud)?;
+            if let Some(is_marked) = other {
+                let count = shape.0 * shape.1;
+                let source: Box<dyn Source> = if is_marked {
+                    Box::new(MarkedBytes::new(wire, count)?)
+                } else {
+                    Box::new(NumberLines::new(wire, count)?)
+                };
+                return Ok((source, ((port, String::new(), None), (shape.0, shape.1, 0))));
+            }
+            let mut device = Device::new(wire)?;
             device.stop = Some(Arc::clone(stop));
             let (scans, found) = DeviceScans::new(device, configuration, sent)?;
             Ok((Box::new(scans), identity(found)))

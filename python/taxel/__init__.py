@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from taxel._decoder import Decoder, Estimate
     from taxel._link import Link, Reading, list_ports
     from taxel._model import Model
+    from taxel._recording import Recording, read_recording
     from taxel._results import Limit, Trade, evaluate, limit, trade
     from taxel._scene import Frames, Scene, synth
 
@@ -23,6 +24,7 @@ _PLACES = {
     "_decoder": ("Decoder", "Estimate"),
     "_link": ("Link", "Reading", "list_ports"),
     "_model": ("Model",),
+    "_recording": ("Recording", "read_recording"),
     "_results": ("Limit", "Trade", "evaluate", "limit", "trade"),
     "_scene": ("Frames", "Scene", "synth"),
 }

@@ -48,7 +48,8 @@ class Reading:
 class Link:
     """A device, listened to in the background: an iterator over what it sends, and a context manager.
 
-    `port` None takes the one there is. `send` is "readings", "estimates" or "both"; None takes estimates from a device that
+    `port` None takes the one there is. `protocol` "flexitac" and "csv" listen to other sensors: FlexiTac's firmware, and lines of
+    numbers; they need `shape` (rows, columns), and know neither `zero` nor `upload`. `send` is "readings", "estimates" or "both"; None takes estimates from a device that
     has a model, and readings from another. `buffer` readings wait to be taken; older ones are dropped and counted.
     """
 
@@ -56,14 +57,19 @@ class Link:
         self,
         port: str | None = None,
         *,
-        baud: int = 921600,
+        protocol: str = "taxel",
+        baud: int | None = None,
+        shape: tuple[int, int] | None = None,
         period_us: int | None = None,
         send: str | None = None,
         confidence: bool = False,
         buffer: int = 1024,
     ):
         self.port = port or only_port()
-        self._options = (baud, period_us, send, confidence, buffer)
+        if protocol != "taxel" and shape is None:
+            raise ValueError(f'shape: protocol "{protocol}" does not tell rows and columns; give shape=(16, 32)')
+        usual_baud = 2_000_000 if protocol == "flexitac" else 921_600
+        self._options = (protocol, baud or usual_baud, shape or (0, 0), period_us, send, confidence, buffer)
         self._line: Any = _native.Line(self.port, *self._options)
         self._has_read = False
 
@@ -125,6 +131,19 @@ class Link:
                 model.save(path)
             self._apart(["upload", path])
 
+    def record(self, path: str | Path, seconds: float, model: Model | str | Path | None = None) -> None:
+        """Records for so many seconds to `path` (.mcap): readings, and estimates by the `model` that is active on the device, if it is
+        given. docs/live.md tells what a recording holds."""
+        period_us = self._options[3] or 10_000
+        frames = max(1, round(seconds * 1e6 / period_us))
+        with folder() as work:
+            blob = model
+            if hasattr(model, "save"):
+                blob = work / "model.bin"
+                model.save(blob)
+            given = [] if blob is None else [blob]
+            self._apart(["record", *given, "-n", frames, "--period-us", period_us, "-o", path])
+
     def close(self) -> None:
         """Stops listening: the device returns to its own configuration, and the port is free."""
         if self._line is not None:
@@ -144,9 +163,11 @@ class Link:
 
     def _apart(self, action: list[object]) -> None:
         """Lets a command have the port, and listens again."""
+        if self._options[0] != "taxel":
+            raise RuntimeError(f'a sensor of protocol "{self._options[0]}" only sends readings')
         self._opened().close()
         try:
-            call(["link", self.port, "--baud", self._options[0], *action])
+            call(["link", self.port, "--baud", self._options[1], *action])
         finally:
             self._line = _native.Line(self.port, *self._options)
 
