@@ -19,8 +19,7 @@ type Recording<'py> = (
 /// Reads a recording whole.
 #[pyfunction]
 pub fn read_recording<'py>(py: Python<'py>, path: &str) -> PyResult<Recording<'py>> {
-    let refused =
-        |cause: taxel_recording::Error| PyValueError::new_err(format!("{}: {cause}", path));
+    let refused = |cause: taxel_recording::Error| PyValueError::new_err(format!("{path}: {cause}"));
     let reader = Reader::open(Path::new(path)).map_err(refused)?;
     let layout = reader.layout().clone();
     let (width, outputs) = (layout.readings.len(), layout.outputs.len());
