@@ -21,6 +21,7 @@ const DESK: &[&str] = &[
     "taxel-learn",
     "taxel-limit",
     "taxel-rig",
+    "taxel-view",
     "taxel-evaluate",
     "host-sim",
     "taxel",
