@@ -8,6 +8,7 @@
 import { spawn } from "node:child_process";
 import { mkdtempSync, readdirSync, readFileSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
+import { connect, createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
@@ -192,6 +193,38 @@ for (const [show, id, pattern] of [
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);
   check(wide <= 390 && !noticed.errors.length && !noticed.dialogs && !noticed.foreign.length, `${show}: ${wide} px wide, quiet ${noticed.errors}`);
   await page.close();
+  await stop(feeder);
+}
+
+// ---- A slow way, such as a tunnel through a mobile phone: pictures become fewer, not older ----
+{
+  const [feeder, address] = await feed("show=simulation", "rate=500"), limit = 120_000;
+  const proxy = createServer((near) => {
+    const far = connect(new URL(address).port, "127.0.0.1"), waiting = [];
+    let [budget, isOver] = [0, false];
+    const clock = setInterval(() => {
+      budget = Math.min(budget + limit / 50, limit / 5);
+      while (waiting.length && budget > 0) {
+        budget -= waiting[0].length;
+        near.write(waiting.shift());
+      }
+      if (!waiting.length && isOver) near.end();
+      else if (!waiting.length) far.resume();
+    }, 20);
+    near.pipe(far);
+    far.on("data", (piece) => { waiting.push(piece); far.pause(); });
+    for (const end of [near, far]) end.on("error", () => { near.destroy(); far.destroy(); });
+    far.on("close", () => { isOver = true; });
+    near.on("close", () => { clearInterval(clock); far.destroy(); });
+  }).listen(0, "127.0.0.1");
+  await new Promise((resolve) => { proxy.on("listening", resolve); });
+  const [page] = await open(address.replace(new URL(address).port, proxy.address().port));
+  check(await page.waitForFunction(() => rate && rate < 30, { timeout: 30000 }).then(() => true, () => false), "behind 120 kB/s the page asks for fewer frames");
+  await wait(5000);
+  const [shown, age] = [+await text(page, "shown_rate"), +await text(page, "age")];
+  check(shown >= 4 && age < 1500, `and shows ${shown} pictures/s, ${age} ms old`);
+  await page.close();
+  proxy.close();
   await stop(feeder);
 }
 

@@ -97,7 +97,7 @@ function digits(value, places = 2) {
 /** Value with three significant digits. */
 function short(value) {
   const size = Math.abs(value);
-  return size === 0 ? "0" : digits(value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : size >= 0.9995 ? 2 : 3);
+  return value === 0 ? "0" : digits(value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : size >= 0.9995 ? 2 : 3);
 }
 /** Round number without idle zeros. */
 const plain = (value) => `${+value.toPrecision(3)}`.replace("-", "−");

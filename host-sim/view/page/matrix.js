@@ -26,7 +26,7 @@ function roundUp(value) {
 /** Change of a reading against its baseline, as a share of it. */
 function relative(frame, index) {
   const [now, rest] = [frame.readings[index], baseline?.[index]];
-  return now === null || now === undefined || !rest ? null : now / rest - 1;
+  return Number.isFinite(now) && rest ? now / rest - 1 : null;
 }
 
 /** Rows and columns; readings of no matrix fill lines of twelve at most. */

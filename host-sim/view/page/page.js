@@ -1,8 +1,8 @@
 // The page: what comes in, what is drawn when, and what buttons and keys do.
 
 const byId = (id) => document.getElementById(id);
-const token = new URLSearchParams(location.search).get("token") ?? "";
-const address = (path, more = "") => `${path}?token=${encodeURIComponent(token)}${more}`;
+/** Address of a path, with the page's token. */
+const address = (path, more = "") => path + location.search + more;
 const MOST_CHARTS = 12;
 const GONE = `The program at ${location.host} does not answer. Start it again: this page comes back by itself.`;
 /** Time in ms without an event after which the server is taken for gone. */
@@ -16,11 +16,11 @@ let arrived = 0, arrivedAge = 0;
 /** Pictures of the last two seconds: [time in ms, age in ms]. */
 let drawn = [];
 let contact = { trace: new Trace(2), chart: null, wasSeen: false, hasForce: false };
-let values = { trace: null, charts: [], numbers: [] };
+let values = { trace: new Trace(0), charts: [], numbers: [], outputs: [] };
 
 // ---- Events ----
 
-let source = null, lastEvent = 0, retry = 0, rate = null, trouble = "connecting";
+let source = null, lastEvent = 0, tick = 0, retry = 0, rate = null, trouble = "connecting";
 /** Least differences of the clocks in this half minute and the one before, and when it began. */
 let clocks = { now: Infinity, before: Infinity, since: 0 };
 
@@ -34,7 +34,6 @@ function connect() {
     lastEvent = performance.now();
     trouble = null;
     take(JSON.parse(event.data));
-    requestDraw();
   });
   on("layout", takeLayout);
   on("baseline", (readings) => {
@@ -42,8 +41,13 @@ function connect() {
     baseline = readings;
     resetMatrix();
     if (isFirst) setQuantity(true);
+    requestDraw();
   });
-  on("status", (next) => { status = next; showStatus(); });
+  on("status", (next) => {
+    if (JSON.stringify(next.wires) !== JSON.stringify(status?.wires)) showWires(next.wires);
+    status = next;
+    showStatus();
+  });
   on("frame", takeFrame);
   source.onerror = () => lose();
 }
@@ -69,8 +73,11 @@ function takeLayout(next) {
   document.title = `${layout.title} – Taxel`;
   setText("title", layout.title);
   setText("source", `${capital(layout.kind)}: ${layout.source}`);
+  // Outputs that belong to no electrode are values.
+  const held = new Set(layout.electrodes.flatMap((electrode) => electrode.outputs));
+  const others = layout.outputs.map((_, index) => index).filter((index) => !held.has(index));
   const { can, kind, readings } = layout, parts = {
-    zero: can.zero, record: can.record, transport: can.seek, sheet_card: shape, values_card: !shape, error_card: kind === "simulation",
+    zero: can.zero, record: can.record, transport: can.seek, sheet_card: shape, values_card: others.length, error_card: kind === "simulation",
   };
   for (const [id, isThere] of Object.entries(parts)) byId(id).hidden = !isThere;
   byId("position").max = layout.duration_s ?? 1;
@@ -80,9 +87,10 @@ function takeLayout(next) {
   const [rows, columns, isMatrix] = sizeOf(layout);
   setText("matrix_words", isMatrix ? `${rows} rows × ${columns} columns` : `${readings.length} readings`);
   contact = { trace: new Trace(2), chart: contact.chart, wasSeen: false, hasForce: false };
-  makeValues();
+  makeValues(others);
   resetSheet();
   resetMatrix();
+  requestDraw();
 }
 
 function takeFrame(next) {
@@ -91,8 +99,8 @@ function takeFrame(next) {
   clocks.now = Math.min(clocks.now, difference);
   const delay = difference - Math.min(clocks.now, clocks.before);
   if (delay > MOST_DELAY_MS) {
-    // The way is too slow for so many frames, or the page slept. What waits on the way is old: begin anew.
-    if (drawn.length && now - drawn.at(-1)[0] < 500) rate = Math.max(4, Math.round((rate ?? 60) / 2));
+    // What waits on the way is old: begin anew, with fewer frames unless the page slept.
+    if (now - tick < 1000) rate = Math.max(4, Math.round((rate ?? 60) / 2));
     return connect();
   }
   [frame, arrived, arrivedAge] = [next, now, next.age_ms + delay];
@@ -101,7 +109,8 @@ function takeFrame(next) {
   contact.wasSeen ||= !!at;
   contact.hasForce ||= Number.isFinite(at?.force_n);
   contact.trace.push(time, [at ? at.force_n : contact.hasForce ? 0 : null, at ? at.depth_mm : 0]);
-  values.trace?.push(time, frame.outputs.slice(0, MOST_CHARTS));
+  values.trace.push(time, values.outputs.slice(0, MOST_CHARTS).map((index) => frame.outputs[index]));
+  requestDraw();
 }
 
 // ---- Words ----
@@ -141,7 +150,7 @@ function showBanner() {
 }
 
 function bytes(count) {
-  const power = count < 1e3 ? 0 : count < 1e6 ? 1 : count < 1e9 ? 2 : 3;
+  const power = Math.min(3, Math.floor(Math.log10(count || 1) / 3));
   return `${power ? (count / 1e3 ** power).toFixed(1) : count} ${["B", "kB", "MB", "GB"][power]}`;
 }
 
@@ -163,13 +172,17 @@ function showStatus() {
     byId("speed").value = Math.log10(status.speed);
     setText("speed_words", `× ${plain(status.speed)}`);
   }
-  byId("wires").replaceChildren(...status.wires.map(({ wire, health, words }) => {
+  showBanner();
+}
+
+function showWires(wires) {
+  byId("wires").replaceChildren(...wires.map(({ wire, health, words }) => {
     const item = document.createElement("li"), name = document.createElement("b");
     name.textContent = `${capital(wire)}: ${health}`;
     item.append(name, ` – ${words}`);
     return item;
   }));
-  showBanner();
+  requestDraw();
 }
 
 function showPosition(position_s) {
@@ -178,7 +191,7 @@ function showPosition(position_s) {
 }
 
 function showRates() {
-  const now = performance.now();
+  const now = tick = performance.now();
   if (source && now - lastEvent > SILENCE_MS) lose();
   drawn = drawn.filter(([time]) => now - time < 2000);
   const last = drawn.filter(([time]) => now - time < 1000);
@@ -231,8 +244,8 @@ function showNumbers() {
   setText("peak", digits(peak));
   setText("peak_unit", hasForce ? "N" : "mm");
   values.numbers.forEach((number, index) => {
-    const [value, deviation] = [frame.outputs[index], frame.deviations?.[index]];
-    number.textContent = short(value) + (deviation === undefined || deviation === null ? "" : ` ± ${short(deviation)}`);
+    const [value, deviation] = [frame.outputs, frame.deviations].map((of) => of?.[values.outputs[index]]);
+    number.textContent = short(value) + (Number.isFinite(deviation) ? ` ± ${short(deviation)}` : "");
   });
   if (!frame.truth) return;
   byId("error_card").hidden = false;
@@ -249,18 +262,17 @@ function drawTraces() {
     ]);
     contact.chart.setData(contact.trace.data());
   }
-  if (!values.trace) return;
   const [times, ...series] = values.trace.data();
   values.charts.forEach((plot, index) => plot.setData([times, series[index]]));
 }
 
-/** Outputs that belong to no electrode: name, value and trace of each. */
-function makeValues() {
+/** Name, value and trace of each of some outputs. */
+function makeValues(outputs) {
   values.charts.forEach((plot) => plot.destroy());
-  values = { trace: shape ? null : new Trace(Math.min(MOST_CHARTS, layout.outputs.length)), charts: [], numbers: [] };
+  values = { trace: new Trace(Math.min(MOST_CHARTS, outputs.length)), charts: [], numbers: [], outputs };
   byId("values").replaceChildren();
-  if (shape) return;
-  layout.outputs.forEach(({ name, unit }, index) => {
+  outputs.forEach((output, index) => {
+    const { name, unit } = layout.outputs[output];
     const [card, line, title, value, number] = ["div", "p", "span", "span", "b"].map((tag) => document.createElement(tag));
     card.className = "value";
     title.textContent = name;

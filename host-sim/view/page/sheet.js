@@ -137,7 +137,7 @@ function drawFlat(context, area, layout, shape, frame, values, deviations, isDec
   for (let x = lowX; x <= shape.high[0] + 1e-6; x += step) write(context, `${+x.toFixed(6)}`, toX(x), originY + 11);
   for (let y = lowY; y <= shape.high[1] + 1e-6; y += step) write(context, `${+y.toFixed(6)}`, toX(shape.low[0]) - 7, toY(y), { align: "right" });
   write(context, "x, mm", toX(shape.high[0]), originY + 25, { align: "right" });
-  write(context, "y, mm", toX(shape.low[0]) - 7, area.y + 8, { align: "right" });
+  write(context, "y, mm", toX(shape.low[0]) - 3, area.y + 8, { align: "right" });
   if (isDecoded && frame?.contact) {
     const { x_mm, y_mm } = frame.contact;
     context.strokeStyle = theme.text;
