@@ -75,6 +75,8 @@ fn models_and_data_are_told_by_the_schema() {
     checked(&["train", "scene.toml", "--format", "f32-direct", "-o", "direct.bin"]);
     assert_eq!(checked(&["export", "direct.bin", "--rust", "direct.rs"])["rows"], 2);
     assert_eq!(checked(&["export", "m.bin", "--c", "lib"])["rows"], 2);
+    checked(&["synth", "scene.toml", "-n", "9", "-o", "data.mcap"]);
+    assert_eq!(checked(&["recover", "data.mcap"])["was_cut"], false);
     // The width that the scene gives, not the blob's rounded one.
     assert_eq!(inspected["networks"][0]["spread"], json!([0.8]));
     folder.write("a.csv", "t_s,a\n0,1\n1,2\n2,4\n");

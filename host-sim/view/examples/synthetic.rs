@@ -36,7 +36,10 @@ fn main() -> std::io::Result<()> {
     println!("{}", view.address());
 
     view.set_layout(layout(show));
-    view.set_baseline(readings(&[[0.0; 3]; ROWS * ELECTRODES[0]]));
+    view.set_baseline(match show {
+        "values" => vec![3.0; 16],
+        _ => readings(&[[0.0; 3]; ROWS * ELECTRODES[0]]),
+    });
     let mut source = Source::new(show, rate);
     let start = Instant::now();
     for tick in 0u32.. {
@@ -277,7 +280,7 @@ impl Source {
             time_us: (self.time_s * 1e6) as u64,
             age_ms: 1.0,
             readings,
-            novelty: Some(0.2 + 0.1 * depth_mm),
+            novelty: Some(depth_mm - 5.0),
             ..Frame::default()
         };
         let force_n = deformations.iter().map(|moved| moved[2] * N_PER_MM).sum();

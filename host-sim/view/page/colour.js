@@ -2,45 +2,45 @@
 
 /** Colours from one end of a scale to the other; both maps keep their order for colour-blind eyes. */
 const MAPS = {
-  diverging: {
-    light: ["#1d4f91", "#5d94c8", "#b5d3e7", "#f4f4f2", "#f6c39a", "#dc7a3c", "#94390c"],
-    dark: ["#9cc7f5", "#4f8fd0", "#27507c", "#1e252d", "#7a4420", "#d47c3d", "#ffd0a3"],
-  },
+  light: ["#1d4f91", "#5d94c8", "#b5d3e7", "#f4f4f2", "#f6c39a", "#dc7a3c", "#94390c"],
+  dark: ["#9cc7f5", "#4f8fd0", "#27507c", "#1e252d", "#7a4420", "#d47c3d", "#ffd0a3"],
   // Cividis.
-  sequential: {
-    light: ["#00224e", "#2a3f6d", "#575d6d", "#7d7c78", "#a59c74", "#d2c060", "#fee838"],
-    dark: ["#00224e", "#2a3f6d", "#575d6d", "#7d7c78", "#a59c74", "#d2c060", "#fee838"],
-  },
+  sequential: ["#00224e", "#2a3f6d", "#575d6d", "#7d7c78", "#a59c74", "#d2c060", "#fee838"],
 };
 const isDark = matchMedia("(prefers-color-scheme: dark)");
 
-const parts = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+/** 256 colours of each map, and the colour of text that can be read on each. */
+const TABLES = {};
+for (const [name, stops] of Object.entries(MAPS)) {
+  const parts = stops.map((hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16)));
+  TABLES[name] = Array.from({ length: 256 }, (_, index) => {
+    const at = index / 255 * (stops.length - 1), low = Math.min(Math.floor(at), stops.length - 2);
+    const rgb = parts[low].map((value, axis) => Math.round(value + (parts[low + 1][axis] - value) * (at - low)));
+    return { css: `rgb(${rgb})`, ink: 0.3 * rgb[0] + 0.59 * rgb[1] + 0.11 * rgb[2] > 135 ? "#10161c" : "#ffffff" };
+  });
+}
 
-/** Tables of 256 colours [r, g, b] by map and theme. */
-const TABLES = Object.fromEntries(Object.entries(MAPS).map(([name, themes]) => [name,
-  Object.fromEntries(Object.entries(themes).map(([theme, stops]) => [theme,
-    Array.from({ length: 256 }, (_, index) => {
-      const at = index / 255 * (stops.length - 1), low = Math.min(Math.floor(at), stops.length - 2);
-      const [from, to] = [parts(stops[low]), parts(stops[low + 1])];
-      return from.map((value, axis) => Math.round(value + (to[axis] - value) * (at - low)));
-    })]))]));
-
-/** Colour [r, g, b] at `share`, 0 to 1, of a map. */
-function shade(map, share) {
-  const table = TABLES[map][isDark.matches ? "dark" : "light"];
+/** Colour at `share`, 0 to 1, of the map for signed values or of the one for the others. */
+function shade(isSigned, share) {
+  const table = TABLES[!isSigned ? "sequential" : isDark.matches ? "dark" : "light"];
   return table[Math.max(0, Math.min(255, Math.round(share * 255)))];
 }
 
-const css = ([r, g, b], alpha = 1) => `rgba(${r},${g},${b},${alpha})`;
-/** Text colour that can be read on a colour. */
-const inkOn = ([r, g, b]) => 0.3 * r + 0.59 * g + 0.11 * b > 135 ? "#10161c" : "#ffffff";
-
-let theme = {};
+const theme = {};
 function readTheme() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["card", "line", "text", "quiet", "hatch", "arrow", "force", "depth", "grid", "accent", "bad", "warn"]) {
+  for (const name of ["line", "text", "quiet", "hatch", "force", "depth", "grid", "bad", "warn"]) {
     theme[name] = style.getPropertyValue(`--${name}`).trim();
   }
+  const tile = document.createElement("canvas"), context = tile.getContext("2d");
+  tile.width = tile.height = 6;
+  context.strokeStyle = theme.hatch;
+  for (const at of [-6, 0, 6]) {
+    context.moveTo(at - 1, 7);
+    context.lineTo(at + 7, -1);
+  }
+  context.stroke();
+  theme.hatched = context.createPattern(tile, "repeat");
 }
 
 const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif";
@@ -56,7 +56,7 @@ function prepare(canvas, height) {
   const context = canvas.getContext("2d");
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
-  return [context, width];
+  return context;
 }
 
 function write(context, text, x, y, { align = "center", colour = theme.quiet, size = 11.5, weight = 400 } = {}) {
@@ -67,44 +67,37 @@ function write(context, text, x, y, { align = "center", colour = theme.quiet, si
   context.fillText(text, x, y);
 }
 
-/** Hatched ground, which shows through where an output is uncertain. */
-function hatch(context, x, y, width, height) {
-  context.save();
-  context.beginPath();
-  context.rect(x, y, width, height);
-  context.clip();
-  context.strokeStyle = theme.hatch;
-  context.lineWidth = 1;
-  context.beginPath();
-  for (let at = x - height; at < x + width; at += 5) {
-    context.moveTo(at, y + height);
-    context.lineTo(at + height, y);
-  }
-  context.stroke();
-  context.restore();
+function box(context, fill, x, y, width, height) {
+  context.fillStyle = fill;
+  context.fillRect(x, y, width, height);
+}
+
+/** Line through points. */
+function line(context, points) {
+  points.forEach(([x, y], index) => index ? context.lineTo(x, y) : context.moveTo(x, y));
 }
 
 /** Bar with a map's colours, ticks below it and a title before it. */
-function legend(context, map, x, y, width, ticks, title) {
+function legend(context, isSigned, x, y, width, ticks, title) {
   write(context, title, x, y + 5, { align: "left" });
   const left = x + context.measureText(title).width + 8, length = width - (left - x);
-  for (let at = 0; at < length; at++) {
-    context.fillStyle = css(shade(map, at / (length - 1)));
-    context.fillRect(left + at, y, 1.5, 10);
-  }
+  const ramp = context.createLinearGradient(left, 0, left + length, 0);
+  for (let stop = 0; stop <= 12; stop++) ramp.addColorStop(stop / 12, shade(isSigned, stop / 12).css);
+  box(context, ramp, left, y, length, 10);
   ticks.forEach((tick, index) => {
     const align = index === 0 ? "left" : index === ticks.length - 1 ? "right" : "center";
     write(context, tick, left + length * index / (ticks.length - 1), y + 19, { align });
   });
 }
 
-/** Number with as many digits as are worth reading; a dash for what is missing. */
+/** Number with fixed digits; a dash for what is missing. */
 function digits(value, places = 2) {
-  return value === null || value === undefined || !isFinite(value) ? "–" : value.toFixed(places).replace("-", "−");
+  return Number.isFinite(value) ? value.toFixed(places).replace(/^-(?=[0.]*$)/, "").replace("-", "−") : "–";
 }
 /** Value with three significant digits. */
 function short(value) {
-  if (value === null || value === undefined || !isFinite(value)) return "–";
   const size = Math.abs(value);
-  return digits(value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : size >= 0.9995 ? 2 : 3);
+  return value === 0 ? "0" : digits(value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : size >= 0.9995 ? 2 : 3);
 }
+/** Round number without idle zeros. */
+const plain = (value) => `${+value.toPrecision(3)}`.replace("-", "−");

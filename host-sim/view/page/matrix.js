@@ -26,7 +26,7 @@ function roundUp(value) {
 /** Change of a reading against its baseline, as a share of it. */
 function relative(frame, index) {
   const [now, rest] = [frame.readings[index], baseline?.[index]];
-  return now === null || now === undefined || !rest ? null : now / rest - 1;
+  return Number.isFinite(now) && rest ? now / rest - 1 : null;
 }
 
 /** Rows and columns; readings of no matrix fill lines of twelve at most. */
@@ -41,29 +41,32 @@ function drawMatrix(canvas, layout, frame, wires) {
   const [rows, columns, isMatrix] = sizeOf(layout), width = canvas.clientWidth;
   const [left, top] = isMatrix ? [26, 18] : [0, 0];
   const cell = (width - left) / columns, tall = Math.max(13, Math.min(cell * 0.95, 30));
-  const [context] = prepare(canvas, top + tall * rows + 40);
-  const isRelative = matrix.isRelative && baseline;
+  const context = prepare(canvas, top + tall * rows + 40);
+  const isRelative = matrix.isRelative && !!baseline;
   frame?.readings.forEach((value, index) => {
     widen(value);
     const change = relative(frame, index);
     if (change !== null) matrix.most = Math.max(matrix.most, roundUp(Math.abs(change)));
   });
   const span = matrix.high - matrix.low || 1;
-  matrix.boxes = { left, top, cell, tall, rows, columns, isMatrix };
-  const map = isRelative ? "diverging" : "sequential";
+  // As in the sheet: the first row is the lowest.
+  const isUp = isMatrix && shape;
+  const topOf = (row) => top + (isUp ? rows - 1 - row : row) * tall;
+  matrix.boxes = { left, top, cell, tall, rows, columns, isMatrix, isUp };
   for (let index = 0; index < layout.readings.length; index++) {
-    const [x, y] = [left + (index % columns) * cell, top + Math.floor(index / columns) * tall];
+    const [x, y] = [left + (index % columns) * cell, topOf(Math.floor(index / columns))];
     const value = !frame ? null : isRelative ? relative(frame, index) : frame.readings[index] ?? null;
     if (value === null) {
-      hatch(context, x + 0.5, y + 0.5, cell - 1, tall - 1);
+      box(context, theme.hatched, x + 0.5, y + 0.5, cell - 1, tall - 1);
       continue;
     }
-    const colour = shade(map, isRelative ? 0.5 + value / matrix.most / 2 : (value - matrix.low) / span);
-    context.fillStyle = css(colour);
-    context.fillRect(x + 0.5, y + 0.5, cell - 1, tall - 1);
+    const colour = shade(isRelative, isRelative ? 0.5 + value / matrix.most / 2 : (value - matrix.low) / span);
+    box(context, colour.css, x + 0.5, y + 0.5, cell - 1, tall - 1);
     if (sheet.hasNumbers && cell > 19) {
       const text = isRelative ? digits(value * 100, Math.abs(value) < 0.0995 && cell > 24 ? 1 : 0) : short(value);
-      write(context, text, x + cell / 2, y + tall / 2, { size: Math.min(11, cell / 2.9), colour: inkOn(colour) });
+      write(context, text, x + cell / 2, y + tall / 2, { size: Math.min(11, cell / 2.9), colour: colour.ink });
+    } else if (!isMatrix && cell > 54) {
+      write(context, layout.readings[index].name.slice(0, cell / 7), x + cell / 2, y + tall / 2, { size: 11, colour: colour.ink });
     }
   }
   if (isMatrix) {
@@ -82,13 +85,13 @@ function drawMatrix(canvas, layout, frame, wires) {
     for (let column = 1; column <= columns; column++) {
       if ((column - 1) % every === 0 || ailing.has(`column ${column}`)) label("column", column, left + (column - 0.5) * cell, 8);
     }
-    for (let row = 1; row <= rows; row++) label("row", row, 12, top + (row - 0.5) * tall);
+    for (let row = 1; row <= rows; row++) label("row", row, 12, topOf(row - 1) + tall / 2);
   }
   const unit = layout.readings[0]?.unit ?? "";
   const ticks = isRelative
     ? [-matrix.most, 0, matrix.most].map((value) => `${digits(value * 100, matrix.most < 0.05 ? 1 : 0)} %`)
     : isFinite(matrix.low) ? [matrix.low, (matrix.low + matrix.high) / 2, matrix.high].map((value, index) => short(value) + (index === 2 ? ` ${unit}` : "")) : [];
-  legend(context, map, left, top + tall * rows + 10, Math.min(340, width - left), ticks, isRelative ? relativeName(layout) : absoluteName(layout));
+  legend(context, isRelative, left, top + tall * rows + 10, Math.min(340, width - left), ticks, isRelative ? relativeName(layout) : absoluteName(layout));
 }
 
 const isOhm = (layout) => ["Ω", "ohm", "kΩ"].includes(layout.readings[0]?.unit);
@@ -99,7 +102,8 @@ const absoluteName = (layout) => isOhm(layout) ? "R" : "value";
 function matrixWords(layout, frame, wires, x, y) {
   const boxes = matrix.boxes;
   if (!boxes || !frame) return null;
-  const [column, row] = [Math.floor((x - boxes.left) / boxes.cell), Math.floor((y - boxes.top) / boxes.tall)];
+  const column = Math.floor((x - boxes.left) / boxes.cell), down = Math.floor((y - boxes.top) / boxes.tall);
+  const row = boxes.isUp ? boxes.rows - 1 - down : down;
   const index = row * boxes.columns + column;
   if (column < 0 || row < 0 || column >= boxes.columns || row >= boxes.rows || index >= layout.readings.length) return null;
   const { name, unit } = layout.readings[index], value = frame.readings[index] ?? null;

@@ -1,9 +1,10 @@
 // The page: what comes in, what is drawn when, and what buttons and keys do.
 
 const byId = (id) => document.getElementById(id);
-const token = new URLSearchParams(location.search).get("token") ?? "";
-const address = (path, more = "") => `${path}?token=${encodeURIComponent(token)}${more}`;
+/** Address of a path, with the page's token. */
+const address = (path, more = "") => path + location.search + more;
 const MOST_CHARTS = 12;
+const GONE = `The program at ${location.host} does not answer. Start it again: this page comes back by itself.`;
 /** Time in ms without an event after which the server is taken for gone. */
 const SILENCE_MS = 3500;
 /** Longest time in ms that events may be held up on their way. */
@@ -15,29 +16,38 @@ let arrived = 0, arrivedAge = 0;
 /** Pictures of the last two seconds: [time in ms, age in ms]. */
 let drawn = [];
 let contact = { trace: new Trace(2), chart: null, wasSeen: false, hasForce: false };
-let values = { trace: null, charts: [], numbers: [] };
+let values = { trace: new Trace(0), charts: [], numbers: [], outputs: [] };
 
 // ---- Events ----
 
-let source = null, lastEvent = 0, retry = 0, rate = 60, trouble = "connecting";
+let source = null, lastEvent = 0, tick = 0, retry = 0, rate = null, trouble = "connecting";
 /** Least differences of the clocks in this half minute and the one before, and when it began. */
 let clocks = { now: Infinity, before: Infinity, since: 0 };
 
 function connect() {
   clearTimeout(retry);
   source?.close();
-  source = new EventSource(address("/events", `&rate=${rate === 60 ? 120 : rate}`));
+  source = new EventSource(address("/events", rate ? `&rate=${rate}` : ""));
   lastEvent = performance.now();
   clocks = { now: Infinity, before: Infinity, since: lastEvent };
   const on = (name, take) => source.addEventListener(name, (event) => {
     lastEvent = performance.now();
     trouble = null;
     take(JSON.parse(event.data));
-    requestDraw();
   });
   on("layout", takeLayout);
-  on("baseline", (readings) => { baseline = readings; resetMatrix(); });
-  on("status", (next) => { status = next; showStatus(); });
+  on("baseline", (readings) => {
+    const isFirst = !baseline;
+    baseline = readings;
+    resetMatrix();
+    if (isFirst) setQuantity(true);
+    requestDraw();
+  });
+  on("status", (next) => {
+    if (JSON.stringify(next.wires) !== JSON.stringify(status?.wires)) showWires(next.wires);
+    status = next;
+    showStatus();
+  });
   on("frame", takeFrame);
   source.onerror = () => lose();
 }
@@ -48,40 +58,39 @@ async function lose() {
   source = null;
   clearTimeout(retry);
   retry = setTimeout(connect, 1000);
-  trouble ??= `The program at ${location.host} does not answer. Start it again: this page comes back by itself.`;
+  trouble ??= GONE;
   showBanner();
-  try {
-    const asked = new AbortController(), answer = await fetch(address("/events"), { signal: asked.signal });
-    if (!answer.ok) trouble = `Refused: ${await answer.text()}.`;
-    asked.abort();
-  } catch {
-    trouble = `The program at ${location.host} does not answer. Start it again: this page comes back by itself.`;
-  }
-  if (!source) showBanner();
+  const asked = new AbortController(), answer = await fetch(address("/events"), { signal: asked.signal }).catch(() => null);
+  if (answer && !answer.ok) trouble = `Refused: ${await answer.text()}.`;
+  asked.abort();
 }
 
 function takeLayout(next) {
+  // After a reconnection all goes on as before.
+  if (JSON.stringify(next) === JSON.stringify(layout)) return;
   [layout, frame, baseline] = [next, null, null];
   shape = layout.electrodes.length ? shapeOf(layout) : null;
   document.title = `${layout.title} – Taxel`;
-  byId("title").textContent = layout.title;
-  byId("source").textContent = `${{ device: "Device", simulation: "Simulation", recording: "Recording" }[layout.kind]}: ${layout.source}`;
-  byId("zero").hidden = !layout.can.zero;
-  byId("record").hidden = !layout.can.record;
-  byId("transport").hidden = !layout.can.seek;
+  setText("title", layout.title);
+  setText("source", `${capital(layout.kind)}: ${layout.source}`);
+  // Outputs that belong to no electrode are values.
+  const held = new Set(layout.electrodes.flatMap((electrode) => electrode.outputs));
+  const others = layout.outputs.map((_, index) => index).filter((index) => !held.has(index));
+  const { can, kind, readings } = layout, parts = {
+    zero: can.zero, record: can.record, transport: can.seek, sheet_card: shape, values_card: others.length, error_card: kind === "simulation",
+  };
+  for (const [id, isThere] of Object.entries(parts)) byId(id).hidden = !isThere;
   byId("position").max = layout.duration_s ?? 1;
-  byId("sheet_card").hidden = !shape;
-  byId("values_card").hidden = !!shape;
-  byId("error_card").hidden = layout.kind !== "simulation";
-  byId("limit").textContent = digits(layout.limit_rmse_mm, 3);
-  byId("absolute").textContent = layout.readings[0]?.unit || "value";
-  byId("relative").textContent = relativeName(layout);
+  setText("limit", digits(layout.limit_rmse_mm, 3));
+  setText("absolute", readings[0]?.unit || "value");
+  setText("relative", relativeName(layout));
   const [rows, columns, isMatrix] = sizeOf(layout);
-  byId("matrix_words").textContent = isMatrix ? `${rows} rows × ${columns} columns` : `${layout.readings.length} readings`;
+  setText("matrix_words", isMatrix ? `${rows} rows × ${columns} columns` : `${readings.length} readings`);
   contact = { trace: new Trace(2), chart: contact.chart, wasSeen: false, hasForce: false };
-  makeValues();
+  makeValues(others);
   resetSheet();
   resetMatrix();
+  requestDraw();
 }
 
 function takeFrame(next) {
@@ -90,17 +99,18 @@ function takeFrame(next) {
   clocks.now = Math.min(clocks.now, difference);
   const delay = difference - Math.min(clocks.now, clocks.before);
   if (delay > MOST_DELAY_MS) {
-    // The way is too slow for so many frames, or the page slept. What waits on the way is old: begin anew.
-    if (drawn.length && now - drawn.at(-1)[0] < 500) rate = Math.max(4, Math.round(rate / 2));
+    // What waits on the way is old: begin anew, with fewer frames unless the page slept.
+    if (now - tick < 1000) rate = Math.max(4, Math.round((rate ?? 60) / 2));
     return connect();
   }
   [frame, arrived, arrivedAge] = [next, now, next.age_ms + delay];
   for (const flag of frame.flags) flags.set(flag, now);
   const time = frame.time_us / 1e6, at = frame.contact;
   contact.wasSeen ||= !!at;
-  contact.hasForce ||= at?.force_n !== null && at?.force_n !== undefined;
+  contact.hasForce ||= Number.isFinite(at?.force_n);
   contact.trace.push(time, [at ? at.force_n : contact.hasForce ? 0 : null, at ? at.depth_mm : 0]);
-  values.trace?.push(time, frame.outputs.slice(0, MOST_CHARTS));
+  values.trace.push(time, values.outputs.slice(0, MOST_CHARTS).map((index) => frame.outputs[index]));
+  requestDraw();
 }
 
 // ---- Words ----
@@ -108,65 +118,71 @@ function takeFrame(next) {
 /** When each flag was seen last: it is shown for a second at least, so that it can be read. */
 const flags = new Map();
 const FLAG_WORDS = {
-  novel: () => `Unlike anything the model was trained on${frame?.novelty ? ` (${digits(frame.novelty, 1)} times as far as it should be)` : ""}: do not trust the picture`,
+  novel: () => `Unlike anything the model was trained on${Number.isFinite(frame.novelty) ? ` (by ${plain(frame.novelty)} nats)` : ""}: do not trust the picture`,
   clamped: () => "Out of range: readings were moved to the end of what the model knows",
-  missing: () => {
-    const count = frame?.readings.filter((value) => value === null).length;
-    return count ? `${count} of ${frame.readings.length} readings are missing` : "Readings are missing";
-  },
+  missing: () => `${frame.readings.filter((value) => value === null).length} of ${frame.readings.length} readings are missing`,
 };
 
 function setText(id, text) {
   const element = byId(id);
-  if (element.textContent !== text) element.textContent = text;
+  if (element.textContent !== `${text}`) element.textContent = text;
 }
+
+const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
+const press = (id, isPressed) => byId(id).setAttribute("aria-pressed", isPressed);
 
 function showBanner() {
   let [level, words] = ["calm", status?.message || "All is well"];
-  const seen = Object.keys(FLAG_WORDS).filter((flag) => performance.now() - (flags.get(flag) ?? -Infinity) < 1000);
+  const seen = Object.keys(FLAG_WORDS).filter((flag) => frame && performance.now() - (flags.get(flag) ?? -Infinity) < 1000);
   if (trouble) [level, words] = [trouble === "connecting" ? "calm" : "bad", trouble];
   else if (status?.state === "no data") level = "bad";
   else if (seen.length) {
     const said = seen.map((flag) => FLAG_WORDS[flag]());
     if (status?.wires.length) said.push(status.message);
-    [level, words] = ["warn", said.join(". ") + "."];
+    [level, words] = ["warn", `${said.map(capital).join(". ")}.`];
   } else if (status?.wires.length) level = "warn";
-  setText("banner", words.charAt(0).toUpperCase() + words.slice(1));
+  setText("banner", capital(words));
   byId("banner").dataset.level = level;
   const state = trouble ? "gone" : status?.state ?? "live";
   const isAtRest = state === "live" && frame?.flags.includes("at rest");
-  setText("state", trouble ? trouble === "connecting" ? "connecting" : "no connection" : isAtRest ? "live, at rest" : state);
+  setText("state", trouble ? trouble === "connecting" ? "connecting" : "no connection" : isAtRest ? "live, at rest" : state === "live" && layout?.kind === "recording" ? "playing" : state);
   byId("state").dataset.state = state;
 }
 
 function bytes(count) {
-  const power = count < 1e3 ? 0 : count < 1e6 ? 1 : count < 1e9 ? 2 : 3;
+  const power = Math.min(3, Math.floor(Math.log10(count || 1) / 3));
   return `${power ? (count / 1e3 ** power).toFixed(1) : count} ${["B", "kB", "MB", "GB"][power]}`;
 }
 
 function showStatus() {
   const { recording } = status, isPaused = ["paused", "ended"].includes(status.state);
-  setText("scan_rate", status.scan_rate === null ? "–" : status.scan_rate.toFixed(0));
-  setText("decode_rate", status.decode_rate === null ? "–" : status.decode_rate.toFixed(0));
-  setText("lost", `${status.lost}`);
+  setText("scan_rate", digits(status.scan_rate, 0));
+  setText("decode_rate", digits(status.decode_rate, 0));
+  setText("lost", status.lost);
   byId("lost").style.color = status.lost ? theme.warn : "";
   setText("rmse", digits(status.rmse_mm, 3));
   setText("times_limit", digits(status.times_limit));
-  byId("pause").setAttribute("aria-pressed", isPaused);
+  press("pause", isPaused);
   byId("pause").firstElementChild.textContent = isPaused ? "Go on" : "Pause";
-  byId("record").setAttribute("aria-pressed", !!recording);
+  press("record", !!recording);
   byId("record").firstElementChild.textContent = recording ? "Stop" : "Record";
   setText("recording", recording ? `${recording.file}: ${bytes(recording.bytes)}, ${recording.seconds.toFixed(1)} s` : "");
   if (status.position_s !== null && !seek.isHeld) showPosition(status.position_s);
-  if (status.speed !== null && document.activeElement !== byId("speed")) byId("speed").value = Math.log10(status.speed);
-  if (status.speed !== null) setText("speed_words", `× ${+status.speed.toPrecision(2)}`);
-  byId("wires").replaceChildren(...status.wires.map(({ wire, health, words }) => {
+  if (status.speed !== null && document.activeElement !== byId("speed")) {
+    byId("speed").value = Math.log10(status.speed);
+    setText("speed_words", `× ${plain(status.speed)}`);
+  }
+  showBanner();
+}
+
+function showWires(wires) {
+  byId("wires").replaceChildren(...wires.map(({ wire, health, words }) => {
     const item = document.createElement("li"), name = document.createElement("b");
-    name.textContent = `${wire}: ${health}`;
+    name.textContent = `${capital(wire)}: ${health}`;
     item.append(name, ` – ${words}`);
     return item;
   }));
-  showBanner();
+  requestDraw();
 }
 
 function showPosition(position_s) {
@@ -175,20 +191,20 @@ function showPosition(position_s) {
 }
 
 function showRates() {
-  const now = performance.now();
+  const now = tick = performance.now();
   if (source && now - lastEvent > SILENCE_MS) lose();
   drawn = drawn.filter(([time]) => now - time < 2000);
   const last = drawn.filter(([time]) => now - time < 1000);
-  setText("shown_rate", `${last.length}`);
+  setText("shown_rate", last.length);
   const isWaiting = !frame || trouble || ["paused", "ended"].includes(status?.state);
   const age = last.length ? last.reduce((sum, [, age]) => sum + age, 0) / last.length : now - arrived + arrivedAge;
-  setText("age", isWaiting ? "–" : age.toFixed(0));
+  setText("age", digits(isWaiting ? null : age, 0));
   showBanner();
 }
 
 // ---- Drawing: only when something new came ----
 
-let isDrawing = false, tracesAt = 0;
+let isDrawing = false, slowAt = 0, slowTimer = 0;
 function requestDraw() {
   if (isDrawing) return;
   isDrawing = true;
@@ -201,12 +217,15 @@ function draw() {
   if (!layout) return;
   const now = performance.now();
   if (shape) drawSheet(byId("sheet"), layout, shape, frame);
-  drawMatrix(byId("matrix"), layout, frame, status?.wires ?? []);
-  if (frame) showNumbers();
-  // Charts cost more than the rest, and twenty pictures a second are smooth for lines.
-  if (now - tracesAt > 45 || !frame) {
-    tracesAt = now;
+  // Twenty pictures a second are enough for the rest.
+  clearTimeout(slowTimer);
+  if (now - slowAt > 45) {
+    slowAt = now;
+    drawMatrix(byId("matrix"), layout, frame, status?.wires ?? []);
+    if (frame) showNumbers();
     drawTraces();
+  } else {
+    slowTimer = setTimeout(requestDraw, 60);
   }
   showTip();
   if (frame && frame !== drawnFrame) {
@@ -225,8 +244,8 @@ function showNumbers() {
   setText("peak", digits(peak));
   setText("peak_unit", hasForce ? "N" : "mm");
   values.numbers.forEach((number, index) => {
-    const [value, deviation] = [frame.outputs[index], frame.deviations?.[index]];
-    number.textContent = short(value) + (deviation === undefined || deviation === null ? "" : ` ± ${short(deviation)}`);
+    const [value, deviation] = [frame.outputs, frame.deviations].map((of) => of?.[values.outputs[index]]);
+    number.textContent = short(value) + (Number.isFinite(deviation) ? ` ± ${short(deviation)}` : "");
   });
   if (!frame.truth) return;
   byId("error_card").hidden = false;
@@ -243,18 +262,17 @@ function drawTraces() {
     ]);
     contact.chart.setData(contact.trace.data());
   }
-  if (!values.trace) return;
   const [times, ...series] = values.trace.data();
   values.charts.forEach((plot, index) => plot.setData([times, series[index]]));
 }
 
-/** Outputs that belong to no electrode: name, value and trace of each. */
-function makeValues() {
+/** Name, value and trace of each of some outputs. */
+function makeValues(outputs) {
   values.charts.forEach((plot) => plot.destroy());
-  values = { trace: shape ? null : new Trace(Math.min(MOST_CHARTS, layout.outputs.length)), charts: [], numbers: [] };
+  values = { trace: new Trace(Math.min(MOST_CHARTS, outputs.length)), charts: [], numbers: [], outputs };
   byId("values").replaceChildren();
-  if (shape) return;
-  layout.outputs.forEach(({ name, unit }, index) => {
+  outputs.forEach((output, index) => {
+    const { name, unit } = layout.outputs[output];
     const [card, line, title, value, number] = ["div", "p", "span", "span", "b"].map((tag) => document.createElement(tag));
     card.className = "value";
     title.textContent = name;
@@ -271,7 +289,7 @@ function makeValues() {
 function fit() {
   contact.chart?.setSize({ width: byId("contact_plot").clientWidth, height: 150 });
   values.charts.forEach((plot) => plot.setSize({ width: plot.root.parentElement.clientWidth, height: 100 }));
-  tracesAt = 0;
+  slowAt = 0;
   requestDraw();
 }
 
@@ -313,7 +331,7 @@ function turn(across, down) {
 let answerTimer = 0;
 function say(words, isBad) {
   clearTimeout(answerTimer);
-  setText("answer", words);
+  setText("answer", capital(words));
   byId("answer").dataset.level = isBad ? "bad" : "good";
   answerTimer = setTimeout(() => setText("answer", ""), isBad ? 8000 : 3000);
 }
@@ -337,21 +355,20 @@ function resetSheet() {
 }
 
 function showScale() {
-  setText("sheet_words", `Δz of ±${short(sheet.scale)} mm${sheet.is3d ? ", exaggerated; drag to turn" : ""}`);
+  setText("sheet_words", `Δz within ±${plain(sheet.scale)} mm${sheet.is3d ? ", exaggerated; drag to turn" : ""}`);
 }
 
 function toggle(id, name) {
   sheet[name] = !sheet[name];
-  byId(id).setAttribute("aria-pressed", sheet[name]);
-  byId("sheet").classList.toggle("turns", sheet.is3d);
+  press(id, sheet[name]);
   showScale();
 }
 
 function setQuantity(isRelative) {
-  if (isRelative && !baseline) return say("There is no baseline yet: changes against it are unknown.", true);
+  if (isRelative && !baseline) return say("There is no baseline yet.", true);
   matrix.isRelative = isRelative;
-  byId("relative").setAttribute("aria-pressed", isRelative);
-  byId("absolute").setAttribute("aria-pressed", !isRelative);
+  press("relative", isRelative);
+  press("absolute", !isRelative);
 }
 
 function rescale(factor) {
@@ -359,11 +376,10 @@ function rescale(factor) {
   showScale();
 }
 
-const unable = (words) => say(words, true);
 const ACTIONS = {
-  zero: () => layout?.can.zero ? ask({ action: "zero" }) : unable("This source has no baseline to take."),
+  zero: () => layout?.can.zero ? ask({ action: "zero" }) : say("This source has no baseline to take.", true),
   pause: () => ask({ action: ["paused", "ended"].includes(status?.state) ? "resume" : "pause" }),
-  record: () => layout?.can.record ? ask({ action: status?.recording ? "stop_recording" : "record" }) : unable("This source is not recorded."),
+  record: () => layout?.can.record ? ask({ action: status?.recording ? "stop_recording" : "record" }) : say("This source cannot be recorded.", true),
   screenshot: () => saveScreenshot(),
   numbers: () => toggle("numbers", "hasNumbers"),
   third: () => toggle("third", "is3d"),
@@ -383,6 +399,7 @@ const KEYS = {
 for (const [id, act] of Object.entries(ACTIONS)) {
   byId(id).addEventListener("click", (event) => {
     act();
+    slowAt = 0;
     requestDraw();
     // After a click, space pauses again; who goes by keyboard stays on the button.
     if (event.detail) event.currentTarget.blur();
@@ -401,6 +418,7 @@ addEventListener("keydown", (event) => {
     if (!act) return;
     act();
   }
+  slowAt = 0;
   event.preventDefault();
   requestDraw();
 });
@@ -440,28 +458,24 @@ function saveScreenshot() {
   context.fillStyle = getComputedStyle(document.body).backgroundColor;
   context.fillRect(body.left, body.top, body.width, body.height);
   for (const element of document.querySelectorAll("#banner, .state, section, button, #wires li, canvas")) {
-    const box = element.getBoundingClientRect(), style = getComputedStyle(element);
-    if (!box.width) continue;
-    if (element instanceof HTMLCanvasElement) {
-      context.drawImage(element, box.left, box.top, box.width, box.height);
-      continue;
-    }
+    const { left, top, width, height } = element.getBoundingClientRect(), style = getComputedStyle(element);
+    if (!width) continue;
     context.fillStyle = style.backgroundColor;
     context.strokeStyle = style.borderTopColor;
     context.beginPath();
-    context.roundRect(box.left + 0.5, box.top + 0.5, box.width - 1, box.height - 1, Math.min(parseFloat(style.borderRadius) || 0, box.height / 2));
+    context.roundRect(left + 0.5, top + 0.5, width - 1, height - 1, Math.min(parseFloat(style.borderRadius) || 0, height / 2));
     context.fill();
     if (parseFloat(style.borderTopWidth)) context.stroke();
+    if (element.getContext) context.drawImage(element, left, top, width, height);
   }
   const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), range = document.createRange();
-  while (texts.nextNode()) {
-    const node = texts.currentNode, style = getComputedStyle(node.parentElement);
+  for (let node; (node = texts.nextNode());) {
     range.selectNodeContents(node);
-    const box = range.getBoundingClientRect();
+    const box = range.getBoundingClientRect(), style = getComputedStyle(node.parentElement);
     if (!box.width || !node.data.trim() || node.parentElement.id === "tip") continue;
     context.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
     [context.fillStyle, context.textAlign, context.textBaseline] = [style.color, "left", "middle"];
-    context.fillText(node.data.trim(), box.left, box.top + box.height / 2, box.width + 2);
+    context.fillText(node.data.replace(/\s+/g, " "), box.left, box.top + box.height / 2, box.width + 2);
   }
   picture.toBlob((blob) => {
     const link = document.createElement("a"), name = (layout?.title ?? "view").replace(/[^\w-]+/g, "-").slice(0, 40);

@@ -13,10 +13,8 @@ class Trace {
     // The source went back, or far ahead: what came before is of another time.
     if (time < last || time > last + WINDOW_S) this.rows.forEach((row) => { row.length = 0; });
     [time, ...values].forEach((value, index) => this.rows[index].push(value ?? null));
-    const old = times.findIndex((moment) => moment >= time - WINDOW_S);
-    // Frames of a fast recording lie far apart, those of a slow one close together: neither makes it grow.
-    const drop = Math.max(old, times.length - 2000);
-    if (drop > 60 || times.length > 2000) this.rows.forEach((row) => row.splice(0, drop));
+    // Frames of a slowed recording lie close together.
+    while (times[0] < time - WINDOW_S || times.length > 2000) this.rows.forEach((row) => row.shift());
   }
   most(series) {
     return this.rows[series].reduce((most, value) => value !== null && value > most ? value : most, -Infinity);
@@ -38,13 +36,13 @@ function chart(host, height, series) {
     scales[scale] = {
       range: (_, low, high) => {
         if (fromZero) return [0, roundUp(Math.max(high ?? 0, fromZero))];
-        const room = Math.max((high - low) * 0.1, Math.abs(high) * 0.01, 1e-6);
+        const room = Math.max((high - low) * 0.1, Math.abs(high) * 0.01) || 1;
         return low === null ? [0, 1] : [low - room, high + room];
       },
     };
   }
   return new uPlot({
-    width: Math.max(120, host.clientWidth), height, legend: { show: false }, cursor: { show: false }, padding: [8, series.length > 1 ? 0 : 8, 0, 0],
+    width: Math.max(120, host.clientWidth), height, legend: { show: false }, cursor: { show: false }, padding: [8, series.length > 1 ? 0 : 18, 0, 0],
     scales,
     axes: [
       axis({ values: (_, ticks) => ticks.map((tick) => tick === 0 ? "now" : `${tick} s`.replace("-", "−")), size: 22, space: 60 }),

@@ -99,7 +99,7 @@ pub struct Frame {
     /// What is to be said of each row-wire, if the model decodes row by row.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_status: Option<Vec<Option<Flag>>>,
-    /// Distance from what the model was trained on, if the model knows it; above 1 a frame is novel.
+    /// Novelty in nats, if the model knows it: above 0, the frame is unlike those of training.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub novelty: Option<f32>,
     /// What is to be said of the frame.

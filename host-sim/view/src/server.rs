@@ -172,9 +172,9 @@ impl Server {
         };
         self.lobby.leave(number);
         let rate = head.parameter("rate").and_then(|rate| rate.parse::<u32>().ok());
-        // A little less: what is printed 60 times a second is not to be missed because a thread woke late.
+        // Without a rate, whatever is printed is sent.
         let interval =
-            rate.map_or(LEAST_INTERVAL / 2, |rate| Duration::from_secs(1) / rate.clamp(1, 120));
+            rate.map_or(LEAST_INTERVAL / 2, |rate| Duration::from_secs(1) / rate.clamp(1, 60));
         let mut seen = Seen::nothing(interval);
         let mut write = || -> IoResult<()> {
             http::begin_events(&mut Timed::new(stream, EVENT))?;

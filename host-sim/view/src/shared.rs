@@ -100,8 +100,11 @@ impl Seen {
 
 impl Shared {
     pub fn new() -> Self {
+        let mut state = State::default();
+        // Pages see by the status that the server lives, whether or not the feeder sets one.
+        state.given.status = Some(Status::default());
         let (given, printed) = (Condvar::new(), Condvar::new());
-        Self { state: Mutex::default(), given, printed, start: Instant::now() }
+        Self { state: Mutex::new(state), given, printed, start: Instant::now() }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -238,11 +241,8 @@ impl Shared {
             if !texts.is_empty() {
                 return Some(texts);
             }
-            if wait.is_zero() {
-                // Nobody has set a status yet: a comment tells whether the other end is there.
-                seen.status = now;
-                return Some(vec![Arc::from(":\n\n")]);
-            }
+            // No status has been printed yet: it will be, since there is one from the start.
+            let wait = if wait.is_zero() { STATUS_INTERVAL } else { wait };
             state =
                 self.printed.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0;
         }
