@@ -115,9 +115,10 @@ impl<'b> SimulationFeed<'b> {
         let (sender, trajectories) = mpsc::sync_channel(1);
         let (world, rate) = (scene.world.clone(), frame_rate);
         spawn("synthesis", move || synthesise(&world, rate, &sender))?;
+        let in_mm = layout.outputs.iter().map(|column| column.unit == "mm").collect();
         let can = Can { zero: true, record: true, seek: false };
         let source = format!(
-            "simulation of scene {}, {} % noise, {frame_rate} frames a second",
+            "scene {}, {} % noise, {frame_rate} frames a second",
             scene.name,
             scene.world.noise.total_level() * 100.0
         );
@@ -132,7 +133,7 @@ impl<'b> SimulationFeed<'b> {
             period: Duration::from_secs_f64(1.0 / frame_rate),
             due: Instant::now(),
             has_truth,
-            judge: Judge::start(&scene.world, has_truth)?,
+            judge: Judge::start(&scene.world, has_truth, in_mm)?,
             baseline,
         };
         feed.decoder.set_baseline(&feed.baseline);
@@ -264,8 +265,8 @@ struct Judge {
 }
 
 impl Judge {
-    /// A judge by the limit of still frames of `world`; it does nothing if there is no limit, or no truth.
-    fn start(world: &World, has_truth: bool) -> Result<Self> {
+    /// A judge by the limit of still frames of `world`, of those outputs that are `in_mm`; it does nothing if there is no limit, or no truth.
+    fn start(world: &World, has_truth: bool, in_mm: Vec<bool>) -> Result<Self> {
         let (sums, last) = (Arc::<Mutex<Sums>>::default(), Instant::now());
         let still = World { path: None, ..world.clone() };
         let Ok(limit) = Limit::new(&still) else { return Ok(Self { sender: None, sums, last }) };
@@ -275,11 +276,12 @@ impl Judge {
             while let Ok((readings, frame)) = receiver.recv() {
                 let best = limit.posteriors(&readings, &Silent);
                 let (Some(outputs), Some(truth)) = (&frame.outputs, &frame.truth) else { continue };
-                let square = |a: f64, b: f32| (a - f64::from(b)).powi(2);
-                let of_best = best.iter().flat_map(|it| &it.mean).zip(truth);
-                let of_best: f64 = of_best.map(|(a, b)| square(*a, *b)).sum();
-                let decoded: f64 =
-                    outputs.iter().zip(truth).map(|(a, b)| square(f64::from(*a), *b)).sum();
+                let squares = |values: &mut dyn Iterator<Item = f64>| -> f64 {
+                    let pairs = values.zip(truth).zip(&in_mm).filter(|(_, in_mm)| **in_mm);
+                    pairs.map(|((a, b), _)| (a - f64::from(*b)).powi(2)).sum()
+                };
+                let of_best = squares(&mut best.iter().flat_map(|it| it.mean.iter().copied()));
+                let decoded = squares(&mut outputs.iter().copied().map(f64::from));
                 let mut sums = of_thread.lock().unwrap_or_else(PoisonError::into_inner);
                 sums.frames += 1;
                 sums.squares_mm2[0] += of_best;

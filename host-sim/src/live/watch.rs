@@ -304,7 +304,6 @@ impl<'w, 'b> Watch<'w, 'b> {
             outputs: layout.outputs.iter().map(channel).collect(),
             electrodes: layout.electrodes.iter().map(electrode).collect(),
             scale_mm: SCALE_MM,
-            limit_rmse_mm: None,
             can: about.can,
             duration_s: about.duration_s,
         });

@@ -116,7 +116,6 @@ fn layout(show: &str) -> Layout {
         },
         electrodes: if is_values { Vec::new() } else { electrodes.collect() },
         scale_mm: 1.0,
-        limit_rmse_mm: (kind == Kind::Simulation).then_some(0.0314),
         can: Can {
             zero: kind == Kind::Device,
             record: kind != Kind::Recording,

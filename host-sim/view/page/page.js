@@ -81,7 +81,6 @@ function takeLayout(next) {
   };
   for (const [id, isThere] of Object.entries(parts)) byId(id).hidden = !isThere;
   byId("position").max = layout.duration_s ?? 1;
-  setText("limit", digits(layout.limit_rmse_mm, 3));
   setText("absolute", readings[0]?.unit || "value");
   setText("relative", relativeName(layout));
   const [rows, columns, isMatrix] = sizeOf(layout);
@@ -237,7 +236,8 @@ function draw() {
 function showNumbers() {
   const at = frame.contact, { hasForce, trace } = contact;
   byId("contact_card").hidden = !shape && !contact.wasSeen;
-  setText("force", !hasForce ? "–" : digits(at?.force_n ?? 0));
+  byId("force_item").hidden = !hasForce;
+  setText("force", digits(at?.force_n ?? 0));
   setText("depth", digits(at?.depth_mm ?? 0));
   setText("place", at ? `${digits(at.x_mm, 1)}, ${digits(at.y_mm, 1)}` : "–");
   const peak = trace.most(hasForce ? 1 : 2);
@@ -256,11 +256,16 @@ function showNumbers() {
 
 function drawTraces() {
   if (!byId("contact_card").hidden) {
-    contact.chart ??= chart(byId("contact_plot"), 150, [
-      { scale: "force", unit: "N", colour: () => theme.force, fromZero: 1 },
-      { scale: "depth", unit: "mm", colour: () => theme.depth, fromZero: 0.2 },
-    ]);
-    contact.chart.setData(contact.trace.data());
+    const { hasForce } = contact, [times, ...both] = contact.trace.data(), shown = hasForce ? 0 : 1;
+    if (contact.chart?.hasForce !== hasForce) {
+      contact.chart?.destroy();
+      contact.chart = chart(byId("contact_plot"), 150, [
+        { scale: "force", unit: "N", colour: () => theme.force, fromZero: 1 },
+        { scale: "depth", unit: "mm", colour: () => theme.depth, fromZero: 0.2 },
+      ].slice(shown));
+      contact.chart.hasForce = hasForce;
+    }
+    contact.chart.setData([times, ...both.slice(shown)]);
   }
   const [times, ...series] = values.trace.data();
   values.charts.forEach((plot, index) => plot.setData([times, series[index]]));

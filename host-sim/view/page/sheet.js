@@ -45,7 +45,7 @@ function drawSheet(canvas, layout, shape, frame) {
   sheet.spots = [];
   panels.forEach(([title, values, deviations], index) => {
     const area = { x: (index % across) * panelWidth, y: Math.floor(index / across) * panelHeight, width: panelWidth, height: panelHeight };
-    if (panels.length > 1) write(context, title, area.x + 46, area.y + 8, { align: "left", colour: theme.text, weight: 600, size: 12.5 });
+    if (panels.length > 1) write(context, title, area.x + panelWidth / 2, area.y + 8, { colour: theme.text, weight: 600, size: 12.5 });
     (sheet.is3d ? drawSolid : drawFlat)(context, area, layout, shape, frame, values, deviations, index === 0);
   });
   drawKey(context, width, height, shape, frame?.deviations);

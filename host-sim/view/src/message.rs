@@ -25,8 +25,6 @@ pub struct Layout {
     pub electrodes: Vec<Electrode>,
     /// Δz in mm at the end of the colour scale.
     pub scale_mm: f32,
-    /// Least possible RMSE in mm of any decoder, if it is known.
-    pub limit_rmse_mm: Option<f32>,
     /// What the source can do.
     pub can: Can,
     /// Length of a recording in seconds.

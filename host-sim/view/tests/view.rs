@@ -226,7 +226,7 @@ fn the_page_is_told_in_the_agreed_json() {
     let text = events(port, |text| text.matches("event:").count() >= 4);
     let data: Vec<_> = text.lines().filter_map(|line| line.strip_prefix("data: ")).collect();
     let expected = [
-        r#"{"title":"</script><script>alert(1)</script>\n","kind":"device","source":"","rows":0,"columns":0,"readings":[{"name":"r1c1","unit":"Ω"}],"outputs":[{"name":"r1e1_dz","unit":"mm"}],"electrodes":[],"scale_mm":0.0,"limit_rmse_mm":null,"can":{"zero":false,"record":false,"seek":false},"duration_s":null}"#,
+        r#"{"title":"</script><script>alert(1)</script>\n","kind":"device","source":"","rows":0,"columns":0,"readings":[{"name":"r1c1","unit":"Ω"}],"outputs":[{"name":"r1e1_dz","unit":"mm"}],"electrodes":[],"scale_mm":0.0,"can":{"zero":false,"record":false,"seek":false},"duration_s":null}"#,
         "[100.0,null]",
         r#"{"state":"live","message":"all is well","scan_rate":null,"decode_rate":null,"lost":0,"wires":[],"recording":null,"rmse_mm":null,"times_limit":null,"position_s":null,"speed":null}"#,
     ];
