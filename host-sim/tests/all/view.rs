@@ -304,3 +304,37 @@ fn what_cannot_be_watched_is_refused_before_a_page_opens() {
         assert!(said.contains(says), "{arguments:?}: {said}");
     }
 }
+
+#[test]
+fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wrong() {
+    let folder = Folder::new("view_reconnects");
+    let port = folder.path("port");
+    // A port that is unplugged and plugged in again: a link to one terminal after another.
+    let plug = || {
+        let (name, near, mut far) = terminal();
+        drop(near);
+        let _ = std::fs::remove_file(&port);
+        std::os::unix::fs::symlink(name, &port).unwrap();
+        let (stop, stopped) = std::sync::mpsc::channel::<()>();
+        std::thread::spawn(move || {
+            let wait = Duration::from_millis(5);
+            while stopped.recv_timeout(wait) == Err(std::sync::mpsc::RecvTimeoutError::Timeout) {
+                let _ = far.write_all(b"1,2,3\n");
+            }
+        });
+        stop
+    };
+    let plugged = plug();
+    let page = Page::of(&folder, &[port.to_str().unwrap(), "--protocol", "csv"]);
+    let mut events = page.events();
+    events.any("frame");
+    drop(plugged);
+    let status = events.next("status", |status| status["state"].as_str() == Some("no data"));
+    let said = status["message"].as_str().unwrap();
+    assert!(said.contains("no data from ") && said.contains("is the cable in"), "{said}");
+    let _plugged = plug();
+    events.next("status", |status| status["state"].as_str() == Some("live"));
+    let frame = events.any("frame");
+    assert_eq!(numbers(&frame["readings"]), [1.0, 2.0, 3.0]);
+    page.end();
+}
