@@ -1,11 +1,13 @@
 """Recordings read by PyPI's readers: rosbags, and mcap with mcap-ros2-support.
 
 The example `record` writes a recording and the same frames as CSV; every message of every frame is compared with its line. Then
-it records frames at their times, and is killed; the example `recover` mends what is left, and that is compared, too.
+it records frames at their times, and is killed; the example `recover` mends what is left, and that is compared, too. So is what
+`recover` makes of a copy that PyPI's writer wrote, and that was cut.
 
     python compare/recording.py [number of kills]
 """
 
+import io
 import os
 import pathlib
 import re
@@ -17,6 +19,8 @@ import time
 
 import numpy as np
 from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -40,7 +44,11 @@ def by_mcap(path):
     """The same by the readers of the format's makers, which also tell frame numbers and the device's times."""
     numbers = {}
     with path.open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        # The checksums of all bytes and of chunks, by reading from the first byte to the last.
+        list(StreamReader(file, validate_crcs=True).records)
+        file.seek(0)
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        assert reader.get_summary().statistics.message_count > 0
         names = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
         assert names == {"model.bin": bytes([1, 2, 3, 4]), "scene.toml": b'name = "example"\n'}, names
         for _, channel, message, decoded in reader.iter_decoded_messages():
@@ -186,6 +194,28 @@ def kill(folder, after_s):
     return lost_s
 
 
+def copy(path, to):
+    """Writes a recording anew by PyPI's writer, but for the last byte."""
+    copied = io.BytesIO()
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        writer = Writer(copied, chunk_size=200_000, compression=CompressionType.NONE)
+        writer.start("ros2")
+        numbers = {}
+        for schema, channel, message in reader.iter_messages():
+            if channel.id not in numbers:
+                schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
+                numbers[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, schema_id)
+            number = numbers[channel.id]
+            writer.add_message(number, message.log_time, message.data, message.publish_time, message.sequence)
+        for record in reader.iter_metadata():
+            writer.add_metadata(record.name, record.metadata)
+        for it in reader.iter_attachments():
+            writer.add_attachment(it.create_time, it.log_time, it.name, it.media_type, it.data)
+        writer.finish()
+    to.write_bytes(copied.getvalue()[:-1])
+
+
 def main():
     subprocess.run(["cargo", "build", "--quiet", "-p", "taxel-recording", "--examples"], cwd=ROOT, check=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -196,6 +226,13 @@ def main():
             count, messages = compare(path, reader)
             assert count == len(lines(path.with_suffix(".csv")))
             print(f"{reader.__name__[3:]}: {count} frames, {messages} messages, all equal")
+        copied = folder / "copied.mcap"
+        copy(path, copied)
+        path.with_suffix(".csv").rename(copied.with_suffix(".csv"))
+        subprocess.run([EXAMPLES / "recover", copied], check=True, stdout=subprocess.DEVNULL)
+        for reader in (by_rosbags, by_mcap):
+            assert compare(copied, reader) == (count, messages)
+        print("a copy by PyPI's writer is recovered whole")
         kills = int(sys.argv[1]) if len(sys.argv) > 1 else 10
         lost_s = [kill(folder, 0.8 + 0.37 * number) for number in range(kills)]
         print(f"{kills} kills cost {max(lost_s):.2f} s at most, all before that is equal")

@@ -4,25 +4,8 @@ use std::collections::HashMap;
 
 use crate::bytes::Bytes;
 use crate::error::{Error, Result};
+use crate::record::{HEAD, kind};
 use crate::topic::{ENCODING, LANGUAGE, Topic};
-
-/// Bytes before a record's body.
-pub const HEAD: u64 = 9;
-
-/// Kinds of records.
-pub mod kind {
-    pub const FOOTER: u8 = 2;
-    pub const SCHEMA: u8 = 3;
-    pub const CHANNEL: u8 = 4;
-    pub const MESSAGE: u8 = 5;
-    pub const CHUNK: u8 = 6;
-    pub const CHUNK_INDEX: u8 = 8;
-    pub const ATTACHMENT: u8 = 9;
-    pub const ATTACHMENT_INDEX: u8 = 10;
-    pub const METADATA: u8 = 12;
-    pub const METADATA_INDEX: u8 = 13;
-    pub const DATA_END: u8 = 15;
-}
 
 /// Topics of channels, by their numbers.
 #[derive(Debug, Default)]

@@ -89,12 +89,3 @@ impl Error {
 pub(crate) fn at_most(most: u64, found: u64, what: &'static str) -> Result<()> {
     if found > most { Err(Error::TooMany { what, found, most }) } else { Ok(()) }
 }
-
-impl From<mcap::McapError> for Error {
-    fn from(cause: mcap::McapError) -> Self {
-        match cause {
-            mcap::McapError::Io(cause) => Self::Write(cause),
-            other => Self::Write(io::Error::other(other)),
-        }
-    }
-}

@@ -1,14 +1,13 @@
 //! Records of an MCAP file of any bytes, in bounded memory: where the parts of a recording are.
-//!
-//! A record is a byte that tells its kind, the length of its body in eight bytes, and the body.
 
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
 use crate::bytes::Bytes;
-use crate::chunk::{Channels, Chunk, HEAD, kind};
+use crate::chunk::{Channels, Chunk};
 use crate::error::{Error, Result, at_most};
 use crate::layout::{MOST_BLOB_BYTES, MOST_COLUMNS, MOST_SCENE_BYTES, MOST_TEXT_BYTES};
+use crate::record::{HEAD, MAGIC, kind};
 
 /// Metadata record with the layout, and that with further settings.
 pub const LAYOUT: &str = "taxel";
@@ -28,7 +27,6 @@ pub const MOST_CHUNKS: usize = 1 << 19;
 /// Largest size of names beside the data of a record.
 const MOST_NAME_BYTES: u64 = 64 << 10;
 
-const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// Bytes of the footer's record.
 const FOOTER_BYTES: u64 = HEAD + 20;
 

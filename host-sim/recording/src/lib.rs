@@ -7,6 +7,7 @@
 
 mod error;
 mod bytes;
+mod record;
 mod layout;
 mod frame;
 mod topic;
@@ -14,6 +15,8 @@ mod message;
 mod diagnostics;
 mod chunk;
 mod file;
+mod summary;
+mod mcap;
 mod output;
 mod writer;
 mod reader;

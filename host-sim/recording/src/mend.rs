@@ -75,13 +75,7 @@ pub fn mend<S: Read + Seek>(reader: &mut Reader<S>, to: &mut dyn Write) -> Resul
         while let Some(message) = chunk.message(&mut contents.channels).transpose() {
             let Ok(message) = message else { continue };
             frames += u64::from(message.topic == Topic::Readings);
-            output.put(
-                message.topic,
-                message.number,
-                message.ns,
-                message.device_ns,
-                message.data,
-            )?;
+            output.put(message.topic, message.number, message.ns, message.device_ns, message.data);
         }
         output.end_chunk()?;
     }

@@ -115,23 +115,23 @@ impl Writer {
         let layout = &self.layout;
         let mut put =
             |topic, data: Vec<u8>| self.output.put(topic, frame.number, ns, device_ns, &data);
-        put(Topic::Readings, message::image(ns, layout, &frame.readings))?;
+        put(Topic::Readings, message::image(ns, layout, &frame.readings));
         let decoded = (&frame.outputs, frame.deviations.as_deref(), Topic::Points, Topic::Outputs);
         let truth = (&frame.truth, None, Topic::Truth, Topic::TrueOutputs);
         for (outputs, deviations, points, array) in [decoded, truth] {
             let Some(outputs) = outputs else { continue };
             if self.free_outputs.len() < layout.outputs.len() {
-                put(points, message::points(ns, layout, outputs, deviations))?;
+                put(points, message::points(ns, layout, outputs, deviations));
             }
             // An empty one tells that there are outputs: none at all.
             if !self.free_outputs.is_empty() || layout.outputs.is_empty() {
-                put(array, message::array(layout, &self.free_outputs, outputs, deviations))?;
+                put(array, message::array(layout, &self.free_outputs, outputs, deviations));
             }
         }
         if let Some(contact) = &frame.contact {
-            put(Topic::Contact, message::point(ns, contact))?;
+            put(Topic::Contact, message::point(ns, contact));
             if let Some(force_n) = contact.force_n {
-                put(Topic::Wrench, message::wrench(ns, contact.place_mm, force_n))?;
+                put(Topic::Wrench, message::wrench(ns, contact.place_mm, force_n));
             }
         }
         if let Some(status) = &frame.status {
@@ -140,16 +140,16 @@ impl Writer {
                 .as_ref()
                 .is_some_and(|(last, at)| last == status && ns - at < STATUS_NS);
             if !is_said {
-                put(Topic::Diagnostics, diagnostics(ns, &layout.title, status))?;
+                put(Topic::Diagnostics, diagnostics(ns, &layout.title, status));
                 self.status = Some((status.clone(), ns));
             }
         }
         if is_first {
-            put(Topic::Transform, message::transform(ns, &self.parent_frame))?;
+            put(Topic::Transform, message::transform(ns, &self.parent_frame));
         }
         if self.flushed.elapsed() >= FLUSH {
             self.flush()?;
-        } else if self.output.pending_bytes >= CHUNK_BYTES {
+        } else if self.output.pending_bytes() >= CHUNK_BYTES {
             self.end_chunk()?;
         }
         Ok(())
