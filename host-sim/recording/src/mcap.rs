@@ -220,3 +220,55 @@ impl<W: Write> Drop for Mcap<W> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Disk that is full for a while: it refuses one write after so many bytes.
+    struct Disk<'d> {
+        bytes: &'d mut Vec<u8>,
+        full_at: Option<usize>,
+    }
+
+    impl Write for Disk<'_> {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let free = self.full_at.map_or(usize::MAX, |at| at - self.bytes.len());
+            if free == 0 {
+                self.full_at = None;
+                return Err(io::ErrorKind::StorageFull.into());
+            }
+            self.bytes.write(&bytes[..bytes.len().min(free)])
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// Writes a file whose disk is full at a byte; whether that went well.
+    fn write(bytes: &mut Vec<u8>, full_at: Option<usize>) -> Result<()> {
+        let mut file = Mcap::new(Disk { bytes, full_at }, "profile", "library")?;
+        file.attach("a", "text/plain", 1, b"attached")?;
+        let channel = file.add_channel("/topic", "cdr", "type", "ros2msg", "byte b\n");
+        let mut outcome = Ok(());
+        for sequence in 0..3 {
+            file.add_message(channel, sequence, 7, 8, b"message");
+            // Whoever does not heed a failure writes on.
+            outcome = outcome.and(file.flush());
+        }
+        outcome.and(file.finish().map(drop))
+    }
+
+    #[test]
+    fn nothing_follows_what_could_not_be_written() {
+        let mut whole = vec![];
+        write(&mut whole, None).unwrap();
+        for at in 0..whole.len() {
+            let mut bytes = vec![];
+            let outcome = write(&mut bytes, Some(at));
+            assert!(matches!(outcome, Err(Error::Write(_))));
+            assert_eq!(bytes, whole[..at]);
+        }
+    }
+}
