@@ -58,6 +58,11 @@ fn identity(identity: DeviceIdentity) -> Identity {
     ((identity.board, identity.firmware, crc), shape)
 }
 
+/// A time that somebody waits; none for what is no time.
+fn seconds(time_s: f64) -> Duration {
+    Duration::try_from_secs_f64(time_s.min(1e6)).unwrap_or_default()
+}
+
 /// A reading as Python takes it: frame, time, age in ms, and arrays.
 type Taken<'py> = (
     (u32, u64, f64, u64),
@@ -151,7 +156,7 @@ impl Line {
 
     /// The oldest reading that was not taken yet; None if none comes within so many seconds.
     fn next<'py>(&self, py: Python<'py>, within_s: f64) -> PyResult<Option<Taken<'py>>> {
-        let deadline = Instant::now() + Duration::from_secs_f64(within_s.clamp(0.0, 1e6));
+        let deadline = Instant::now() + seconds(within_s);
         loop {
             let left = deadline.saturating_duration_since(Instant::now()).min(WAIT);
             let scan = py.detach(|| self.listener.next(left)).map_err(|error| refused(&error))?;
@@ -167,7 +172,7 @@ impl Line {
 
     /// The newest reading; those before it are not taken any more. None if it is older than this, or none has come.
     fn newest<'py>(&self, py: Python<'py>, most_age_ms: f64) -> PyResult<Option<Taken<'py>>> {
-        let most_age = Duration::from_secs_f64((most_age_ms / 1e3).clamp(0.0, 1e6));
+        let most_age = seconds(most_age_ms / 1e3);
         let newest = self.listener.newest(most_age).map_err(|error| refused(&error))?;
         Ok(newest.map(|scan| taken(py, scan, self.listener.lost())))
     }

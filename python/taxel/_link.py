@@ -66,8 +66,12 @@ class Link:
         buffer: int = 1024,
     ):
         self.port = port or only_port()
-        if protocol != "taxel" and shape is None:
-            raise ValueError(f'shape: protocol "{protocol}" does not tell rows and columns; give shape=(16, 32)')
+        if protocol not in ("taxel", "flexitac", "csv"):
+            raise ValueError(f'protocol={protocol!r}: give "taxel", "flexitac" or "csv"')
+        if protocol != "taxel" and (shape is None or min(shape) < 1):
+            raise ValueError(f"shape={shape}: protocol {protocol!r} does not tell rows and columns; give such as shape=(16, 32)")
+        if buffer < 1 or (baud is not None and baud < 1):
+            raise ValueError(f"buffer={buffer}, baud={baud}: give whole numbers from 1 on")
         usual_baud = 2_000_000 if protocol == "flexitac" else 921_600
         self._options = (protocol, baud or usual_baud, shape or (0, 0), period_us, send, confidence, buffer)
         self._line: Any = _native.Line(self.port, *self._options)

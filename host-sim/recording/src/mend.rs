@@ -19,12 +19,13 @@ pub struct Recovered {
     pub bytes_left_out: u64,
 }
 
-/// Mends the recording at `path` if it was cut; `None` if it was not, and is as it was.
+/// Mends the recording at `path` if it was cut or a chunk is damaged; `None` if it is whole, and as it was.
 ///
 /// The mended recording is written beside it, and then takes its name.
 ///
 /// # Errors
-/// [`Error::InUse`] if it is being recorded; errors of [`Reader::open`]; [`Error::Data`] if the mended one cannot be written.
+/// [`Error::InUse`] if it is being recorded; errors of [`Reader::open`]; [`Error::Data`] if no frame is left, or the mended one
+/// cannot be written.
 /// The recording is then as it was.
 pub fn recover(path: &Path) -> Result<Option<Recovered>> {
     let file = File::open(path).map_err(Error::Read)?;
@@ -33,13 +34,21 @@ pub fn recover(path: &Path) -> Result<Option<Recovered>> {
     }
     let mut reader = Reader::open(path)?;
     if !reader.was_cut() {
-        return Ok(None);
+        match reader.by_ref().find_map(Result::err) {
+            None => return Ok(None),
+            Some(Error::Read(cause)) => return Err(Error::Read(cause)),
+            // A chunk is damaged: it is left out.
+            Some(_) => {}
+        }
     }
     let mut recovered = None;
     taxel_data::output::write_whole(path, |to| {
         let outcome = mend(&mut reader, to);
         recovered =
             Some(outcome.map_err(|cause| taxel_data::Error::write(path, io::Error::other(cause)))?);
+        if recovered.is_some_and(|it| it.frames == 0) {
+            return Err(taxel_data::Error::unfit("no frame in it is whole: it stays as it was"));
+        }
         Ok(())
     })?;
     Ok(recovered)

@@ -40,6 +40,10 @@ pub fn open(path: &Path) -> Result<Reader> {
 /// Reads a recording as a table: the time of each frame, its readings, and its true outputs where these are known. Estimates are not
 /// taken for the truth: they stay out.
 pub fn read(path: &Path) -> Result<DataFile> {
+    let damaged = |cause: &taxel_recording::Error| Error::Unfit {
+        path: path.into(),
+        message: format!("{cause}; `host-sim recover {}` keeps what is sound", path.display()),
+    };
     let reader = open(path)?;
     let layout = reader.layout().clone();
     let mut header = vec![TIME.to_owned()];
@@ -47,7 +51,7 @@ pub fn read(path: &Path) -> Result<DataFile> {
     let (mut values, mut has_truth) = (Vec::new(), None);
     let mut first_us = None;
     for frame in reader {
-        let frame = frame.map_err(|cause| unfit(path, &cause))?;
+        let frame = frame.map_err(|cause| damaged(&cause))?;
         // Either all lines of a table have it or none.
         let has_truth = *has_truth.get_or_insert(frame.truth.is_some());
         let truth = match (frame.truth, has_truth) {
@@ -60,6 +64,9 @@ pub fn read(path: &Path) -> Result<DataFile> {
         // Of an open wire, whose reading is infinite, a table holds none.
         let known = |value: f32| if value.is_finite() { f64::from(value) } else { f64::NAN };
         values.extend(frame.readings.into_iter().chain(truth).map(known));
+    }
+    if has_truth.is_none() {
+        return Err(Error::Unfit { path: path.into(), message: "no frame in it is whole".into() });
     }
     if has_truth == Some(true) {
         header.extend(layout.outputs.iter().map(|column| column.name.clone()));

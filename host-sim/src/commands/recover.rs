@@ -8,9 +8,10 @@ use serde::Serialize;
 use super::{Common, print};
 use crate::{Error, Result};
 
-/// Mend a recording that has no end, since whoever wrote it was killed or the disk was full.
+/// Mend a recording that has no end, since whoever wrote it was killed or the disk was full, or that is damaged.
 ///
-/// All that was written half a second before is kept. The file appears whole in its own place, or stays as it was.
+/// Frames are kept in parts of half a second; a part that is cut or damaged is left out. The mended file takes the place of the
+/// other at once, or that stays as it was: also if no part of it is whole.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim recover recording-1.mcap")]
 pub struct Arguments {
@@ -21,7 +22,7 @@ pub struct Arguments {
 #[derive(Serialize)]
 struct Summary {
     file: PathBuf,
-    /// Whether it was cut.
+    /// Whether it was cut or damaged.
     was_cut: bool,
     /// Frames that it holds now; `None` if it was whole.
     frames: Option<u64>,

@@ -1,16 +1,18 @@
 //! Command `view`: a sensor in the browser, live.
 
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{self, Stdio};
+use std::sync::mpsc::Receiver;
 
 use clap::{Args, ValueEnum, value_parser};
 use serde::Serialize;
 use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::serial;
-use taxel_view::View;
+use taxel_view::{Command, View};
 
+use super::arguments::refuse_given;
 use super::data_file::DataFileArguments;
 use super::scene_argument::DEFAULT_SCENE;
 use super::{Common, interruption, print, recordings, stderr};
@@ -49,9 +51,9 @@ pub struct Arguments {
     /// one.
     #[arg(long, value_name = "BLOB")]
     model: Option<PathBuf>,
-    /// How a sensor on a serial port tells its readings.
-    #[arg(long, value_enum, default_value = "taxel")]
-    protocol: SerialProtocol,
+    /// How a sensor on a serial port tells its readings [default: taxel].
+    #[arg(long, value_enum, value_name = "NAME")]
+    protocol: Option<SerialProtocol>,
     /// Speed of the line in bits a second [default: the board's; 2000000 of flexitac].
     #[arg(long, value_name = "BAUD", value_parser = value_parser!(u32).range(1..))]
     baud: Option<u32>,
@@ -117,9 +119,20 @@ enum Source {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = arguments.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
-    match source(arguments)? {
+    let source = source(arguments)?;
+    check_options(arguments, &source)?;
+    let view = View::start(arguments.http_port, arguments.token.as_deref());
+    let (view, commands) = view.map_err(|cause| {
+        let (port, token) = (arguments.http_port, arguments.token.as_deref().unwrap_or_default());
+        Error::Usage(match cause.kind() {
+            ErrorKind::InvalidInput => format!("--token {token}: {cause}"),
+            _ => format!("--http-port {port}: {cause}; give another, or leave it out"),
+        })
+    })?;
+    let view = (&view, &commands);
+    match source {
         Source::Port(port) => {
-            let (protocol, usual_baud) = match arguments.protocol {
+            let (protocol, usual_baud) = match arguments.protocol.unwrap_or(SerialProtocol::Taxel) {
                 SerialProtocol::Taxel => (Protocol::Taxel, NUCLEO_BAUD),
                 SerialProtocol::Flexitac => (Protocol::Flexitac, FLEXITAC_BAUD),
                 SerialProtocol::Csv => (Protocol::Csv, NUCLEO_BAUD),
@@ -133,7 +146,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
                 period_us: arguments.period_us,
             };
             let mut feed = DeviceFeed::open(line, blob.as_ref())?;
-            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, arguments, common)
+            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
         }
         Source::Scene(name) => {
             let mut scene = Experiment::load(&name)?;
@@ -147,19 +160,44 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let rate = arguments.frame_rate.unwrap_or(SIMULATED_RATE);
             let mut feed = SimulationFeed::new(&scene, &blob, rate)?;
             let text = Experiment::text(&name)?.into_owned();
-            show(&mut feed, &Watched { blob: Some(&blob), scene: Some(text) }, arguments, common)
+            show(
+                &mut feed,
+                &Watched { blob: Some(&blob), scene: Some(text) },
+                view,
+                arguments,
+                common,
+            )
         }
         Source::Recording(path) => {
             let reader = recordings::open(&path)?;
             let mut feed = ReplayFeed::of_recording(reader, &path, blob.as_ref())?;
-            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, arguments, common)
+            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
         }
         Source::Data(path) => {
             let file = arguments.file.read(&path)?;
             let mut feed = ReplayFeed::of_data(file, blob.as_ref(), arguments.frame_rate)?;
-            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, arguments, common)
+            show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
         }
     }
+}
+
+/// Error for an option that has no effect on such a source.
+fn check_options(arguments: &Arguments, source: &Source) -> Result<()> {
+    let is_port = matches!(source, Source::Port(_));
+    let of_port = [
+        ("--protocol", arguments.protocol.is_some()),
+        ("--baud", arguments.baud.is_some()),
+        ("--shape", arguments.shape.is_some()),
+        ("--period-us", arguments.period_us.is_some()),
+    ];
+    refuse_given(of_port.into_iter().filter(|_| !is_port), |option| {
+        format!("{option} is for a sensor on a serial port: leave it out")
+    })?;
+    let has_rate = matches!(source, Source::Scene(_) | Source::Data(_));
+    refuse_given([("--frame-rate", arguments.frame_rate.is_some() && !has_rate)], |option| {
+        format!("{option} is for a simulation or a data file: leave it out")
+    })?;
+    if matches!(source, Source::Data(_)) { Ok(()) } else { arguments.file.refuse_for_scene() }
 }
 
 /// What the argument names, or what there is without one.
@@ -210,13 +248,10 @@ fn is_port(text: &str) -> bool {
 fn show(
     feed: &mut dyn Feed,
     watched: &Watched<'_>,
+    (view, commands): (&View, &Receiver<Command>),
     arguments: &Arguments,
     common: &Common,
 ) -> Result<()> {
-    let view = View::start(arguments.http_port, arguments.token.as_deref());
-    let (view, commands) = view.map_err(|cause| {
-        Error::Usage(format!("--http-port {}, --token: {cause}", arguments.http_port))
-    })?;
     let address = view.address();
     if common.json {
         print::json(&Summary { address: address.clone() })?;
@@ -231,7 +266,7 @@ fn show(
         stderr::remark("no browser was found: open the address yourself");
     }
     stderr::remark("Ctrl-C ends it");
-    watch(feed, &view, &commands, watched, &interruption::flag())
+    watch(feed, view, commands, watched, &interruption::flag())
 }
 
 /// Opens `address` in the user's browser. Returns whether a program took it.
@@ -243,7 +278,7 @@ fn open_browser(address: &str) -> bool {
     } else {
         "xdg-open"
     };
-    let mut command = Command::new(program);
+    let mut command = process::Command::new(program);
     command.arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.spawn().is_ok()
 }

@@ -33,10 +33,10 @@ pub fn contact(
     if let (Some(x), Some(y)) = (named("contact_x_mm"), named("contact_y_mm")) {
         let depth = named("contact_depth_mm").unwrap_or(f32::NAN);
         let force_n = named("contact_force_n").map(|force| [0.0, 0.0, force]).or(force_n);
-        let touches = if depth.is_nan() {
-            force_n.is_some_and(|it| it[2] > share * LEAST_FORCE_N)
-        } else {
-            depth > share * LEAST_DEPTH_MM
+        let of_depth = layout.outputs.iter().position(|it| it.name == "contact_depth_mm");
+        let touches = match of_depth.filter(|_| depth.is_finite()) {
+            Some(output) => is_touched(depth, output),
+            None => force_n.is_some_and(|it| it[2] > share * LEAST_FORCE_N),
         };
         return touches.then_some(Contact { place_mm: [x, y, depth], force_n });
     }

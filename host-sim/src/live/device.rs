@@ -64,6 +64,8 @@ pub struct DeviceFeed<'b> {
     /// Scan that waits until the new layout is known to who asks.
     waiting: Option<Scan>,
     lost_before: u64,
+    /// Readings of the untouched sensor, for a decoder that divides by them.
+    baseline: Option<Vec<f32>>,
 }
 
 impl<'b> DeviceFeed<'b> {
@@ -74,9 +76,19 @@ impl<'b> DeviceFeed<'b> {
     pub fn open(line: Line, blob: Option<&'b ModelBlob>) -> Result<Self> {
         let layout = sheet::layout("", vec![], vec![], None);
         let (decoder, source, last) = (None, line.port.clone(), Instant::now());
-        let (listener, waiting, lost_before) = (None, None, 0);
-        let mut feed =
-            Self { line, blob, decoder, layout, source, listener, last, waiting, lost_before };
+        let (listener, waiting, lost_before, baseline) = (None, None, 0, None);
+        let mut feed = Self {
+            line,
+            blob,
+            decoder,
+            layout,
+            source,
+            listener,
+            last,
+            waiting,
+            lost_before,
+            baseline,
+        };
         feed.connect()?;
         Ok(feed)
     }
@@ -95,6 +107,8 @@ impl<'b> DeviceFeed<'b> {
                 (sheet::of_model(blob.parse().metadata(), None), decodes)
             }
             (Some((identity, decodes)), None) => (sheet::of_device(identity), *decodes),
+            // A line tells its count by its first scans; it is likely that of before.
+            (None, None) if !self.layout.readings.is_empty() => (self.layout.clone(), false),
             (None, None) => (self.shaped(self.line.shape.map_or(0, |[m, k]| m * k)), false),
         };
         self.source = match &opened {
@@ -107,6 +121,9 @@ impl<'b> DeviceFeed<'b> {
             Some(blob) if !device_decodes => Some(FrameByFrame::new(blob)?),
             _ => None,
         };
+        if let (Some(decoder), Some(baseline)) = (&mut self.decoder, &self.baseline) {
+            decoder.set_baseline(baseline);
+        }
         (self.listener, self.last) = (Some(listener), Instant::now());
         let has_changed = self.layout != layout;
         self.layout = layout;
@@ -232,8 +249,9 @@ impl Feed for DeviceFeed<'_> {
         match listener.next(within) {
             Ok(Some(scan)) => {
                 self.last = scan.heard;
-                // Lines of numbers tell their count by the first one.
-                if self.blob.is_none() && self.layout.readings.is_empty() {
+                // Lines of numbers tell their count themselves.
+                let is_other = scan.readings.len() != self.layout.readings.len();
+                if self.blob.is_none() && self.line.protocol == Protocol::Csv && is_other {
                     self.layout = self.shaped(scan.readings.len());
                     self.waiting = Some(scan);
                     return Ok(Next::Anew);
@@ -257,9 +275,17 @@ impl Feed for DeviceFeed<'_> {
     fn zero(&mut self, readings: &[f32]) -> std::result::Result<(), String> {
         if let Some(decoder) = &mut self.decoder {
             decoder.set_baseline(readings);
+            self.baseline = Some(readings.to_vec());
         }
         let listener = self.listener.as_ref().ok_or("the device is not connected")?;
         listener.set_baseline(readings.to_vec()).map_err(|cause| cause.to_string())
+    }
+
+    fn note(&self) -> Option<String> {
+        let lacks = self.decoder.as_ref().is_some_and(FrameByFrame::lacks_baseline);
+        lacks.then(|| {
+            "nothing is decoded yet: the model divides by the untouched sensor; zero it (b)".into()
+        })
     }
 
     fn lost(&self) -> u64 {

@@ -53,6 +53,16 @@ pub trait Feed {
         Err("not here".into())
     }
 
+    /// Whether it stands still because it was told to, or has come to its end.
+    fn is_paused(&self) -> bool {
+        false
+    }
+
+    /// What is to be said of its frames while they come, such as that something must be done first; with the fix.
+    fn note(&self) -> Option<String> {
+        None
+    }
+
     /// Number of frames that were lost so far.
     fn lost(&self) -> u64 {
         0

@@ -82,6 +82,15 @@ impl Recorder {
         self.write(&moment.frame)
     }
 
+    /// Makes all frames safe from a kill, if that was not done lately; call it while no frames come.
+    ///
+    /// # Errors
+    /// If the disk is full.
+    pub fn flush(&mut self) -> Result<()> {
+        let failed = |cause| Error::failed(format!("{}: {cause}", self.path.display()));
+        self.writer.flush().map_err(failed)
+    }
+
     /// Its file, size and length, for the page.
     pub fn for_page(&self) -> page::Recording {
         page::Recording {

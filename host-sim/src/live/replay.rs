@@ -83,7 +83,8 @@ pub struct ReplayFeed<'b> {
     frames: Box<dyn Still>,
     layout: Layout,
     about: About,
-    decoder: Option<FrameByFrame<'b>>,
+    /// Decoder, if frames are decoded anew, and the columns of their truth that are its outputs', if all are there.
+    decoder: Option<(FrameByFrame<'b>, Option<Vec<usize>>)>,
     baseline: Option<Vec<f32>>,
     speed: f64,
     is_paused: bool,
@@ -92,6 +93,8 @@ pub struct ReplayFeed<'b> {
     /// Frame that was read and is not due yet.
     ahead: Option<(Duration, Frame)>,
     at: Duration,
+    /// Time between the last two frames.
+    period_s: f64,
     /// Times of the last frames that were given.
     given: VecDeque<Duration>,
     /// Frames that are to be given at once, and paused after.
@@ -109,8 +112,8 @@ impl<'b> ReplayFeed<'b> {
         path: &Path,
         blob: Option<&'b ModelBlob>,
     ) -> Result<Self> {
-        let unreadable = |cause: taxel_recording::Error| Error::failed(cause.to_string());
-        let settings = reader.extras().map_err(unreadable)?.settings;
+        // Frames are worth more than a model that is damaged.
+        let settings = reader.extras().unwrap_or_default().settings;
         let baseline = settings
             .get(BASELINE)
             .map(|text| text.split(',').map(|number| number.parse().unwrap_or(f32::NAN)).collect());
@@ -122,10 +125,13 @@ impl<'b> ReplayFeed<'b> {
             Some(blob) => {
                 let model = blob.parse();
                 let own = sheet::of_model(model.metadata(), None);
+                let decoder = decoder_for(blob, &layout)?;
+                let recorded = |name: &str| sheet::names(&layout.outputs).position(|it| it == name);
+                let truth = sheet::names(&own.outputs).map(recorded).collect::<Option<Vec<_>>>();
                 if sheet::names(&own.outputs).ne(sheet::names(&layout.outputs)) {
                     (layout.outputs, layout.electrodes) = (own.outputs, own.electrodes);
                 }
-                Some(decoder_for(blob, &layout)?)
+                Some((decoder, truth))
             }
             None => None,
         };
@@ -167,7 +173,11 @@ impl<'b> ReplayFeed<'b> {
             let readings = file.columns(names.iter().copied())?;
             (sheet::layout(&title, sheet::columns(names, []), vec![], None), readings, vec![])
         };
-        let decoder = blob.map(|blob| decoder_for(blob, &layout)).transpose()?;
+        let own = Some((0..layout.outputs.len()).collect());
+        let decoder = match blob {
+            Some(blob) => Some((decoder_for(blob, &layout)?, own)),
+            None => None,
+        };
         let last_s = times_s.last().zip(times_s.first()).map_or(0.0, |(last, first)| last - first);
         let path = file.path.clone();
         let lines = Lines { file, readings, truth, times_s, next: 0 };
@@ -186,10 +196,10 @@ impl<'b> ReplayFeed<'b> {
         layout: Layout,
         path: &Path,
         duration: Duration,
-        mut decoder: Option<FrameByFrame<'b>>,
+        mut decoder: Option<(FrameByFrame<'b>, Option<Vec<usize>>)>,
         baseline: Option<Vec<f32>>,
     ) -> Self {
-        if let (Some(decoder), Some(baseline)) = (&mut decoder, &baseline) {
+        if let (Some((decoder, _)), Some(baseline)) = (&mut decoder, &baseline) {
             decoder.set_baseline(baseline);
         }
         let can = Can { zero: true, record: false, seek: true };
@@ -201,7 +211,7 @@ impl<'b> ReplayFeed<'b> {
         };
         let from = (Duration::ZERO, Instant::now());
         let (at, given) = (Duration::ZERO, VecDeque::new());
-        let (speed, is_paused, ahead, steps) = (1.0, false, None, 0);
+        let (speed, is_paused, ahead, steps, period_s) = (1.0, false, None, 0, 1.0 / USUAL_RATE);
         Self {
             frames,
             layout,
@@ -213,6 +223,7 @@ impl<'b> ReplayFeed<'b> {
             from,
             ahead,
             at,
+            period_s,
             given,
             steps,
         }
@@ -226,11 +237,24 @@ impl<'b> ReplayFeed<'b> {
     fn seek(&mut self, to: Duration) -> std::result::Result<(), String> {
         self.frames.seek(to).map_err(|cause| cause.to_string())?;
         (self.ahead, self.at) = (None, to);
-        self.given.clear();
         self.play_from(to);
         // Something is to be seen, also of one that is paused.
-        self.steps = self.steps.max(1);
+        self.steps = 1;
         Ok(())
+    }
+}
+
+impl ReplayFeed<'_> {
+    /// Goes so many frames back: to one that was given, or else as far before as so many frames last.
+    fn step_back(&mut self, frames: usize) -> std::result::Result<(), String> {
+        if let Some(place) = self.given.len().checked_sub(frames + 1) {
+            let to = self.given[place];
+            self.given.truncate(place);
+            return self.seek(to);
+        }
+        let before = Duration::from_secs_f64(frames as f64 * self.period_s);
+        self.given.clear();
+        self.seek(self.at.saturating_sub(before))
     }
 }
 
@@ -256,10 +280,14 @@ impl Feed for ReplayFeed<'_> {
 
     fn next(&mut self, within: Duration) -> Result<Next> {
         if self.ahead.is_none() {
-            self.ahead = self.frames.next()?;
+            match self.frames.next() {
+                Ok(next) => self.ahead = next,
+                // What follows a damaged part is played on.
+                Err(cause) => return Ok(Next::Trouble(cause.to_string())),
+            }
         }
         let Some((time, _)) = &self.ahead else {
-            self.is_paused = true;
+            (self.is_paused, self.steps) = (true, 0);
             std::thread::sleep(within);
             return Ok(Next::Ended);
         };
@@ -277,13 +305,20 @@ impl Feed for ReplayFeed<'_> {
             self.steps -= 1;
             self.play_from(time);
         }
+        if let Some(step) = time.checked_sub(self.at).filter(|step| !step.is_zero()) {
+            self.period_s = step.as_secs_f64();
+        }
         self.at = time;
         if self.given.len() == REMEMBERED {
             self.given.pop_front();
         }
         self.given.push_back(time);
         let mut moment = Moment::new(frame);
-        if let Some(decoder) = &mut self.decoder {
+        if let Some((decoder, columns)) = &mut self.decoder {
+            let pick =
+                |truth: Vec<f32>| Some(columns.as_ref()?.iter().map(|it| truth[*it]).collect());
+            moment.frame.truth = moment.frame.truth.take().and_then(pick);
+            moment.frame.contact = None;
             decoder.decode(&mut moment)?;
         } else {
             let status = moment.frame.status.as_ref();
@@ -299,7 +334,7 @@ impl Feed for ReplayFeed<'_> {
     }
 
     fn zero(&mut self, readings: &[f32]) -> std::result::Result<(), String> {
-        if let Some(decoder) = &mut self.decoder {
+        if let Some((decoder, _)) = &mut self.decoder {
             decoder.set_baseline(readings);
         }
         Ok(())
@@ -318,6 +353,7 @@ impl Feed for ReplayFeed<'_> {
                 self.is_paused = false;
             }
             Action::Seek { to_s } => {
+                self.given.clear();
                 let most = self.about.duration_s.unwrap_or(0.0);
                 self.seek(Duration::from_secs_f64(to_s.clamp(0.0, most)))?;
             }
@@ -327,11 +363,9 @@ impl Feed for ReplayFeed<'_> {
             }
             Action::Step { frames } => {
                 self.is_paused = true;
+                self.steps = 0;
                 if frames < 0 {
-                    let back = frames.unsigned_abs() as usize;
-                    let place = self.given.len().checked_sub(back + 1);
-                    let to = place.map(|place| self.given[place]);
-                    self.seek(to.unwrap_or(Duration::ZERO))?;
+                    self.step_back(frames.unsigned_abs() as usize)?;
                 } else {
                     self.steps = frames as usize;
                 }
@@ -339,6 +373,17 @@ impl Feed for ReplayFeed<'_> {
             _ => return Err("a recording cannot do that".into()),
         }
         Ok(String::new())
+    }
+
+    fn note(&self) -> Option<String> {
+        let lacks = self.decoder.as_ref().is_some_and(|(decoder, _)| decoder.lacks_baseline());
+        lacks.then(|| {
+            "nothing is decoded yet: the model divides by the untouched sensor; zero it (b)".into()
+        })
+    }
+
+    fn is_paused(&self) -> bool {
+        self.is_paused
     }
 
     fn position(&self) -> Option<(f64, f64)> {

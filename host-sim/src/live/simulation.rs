@@ -115,7 +115,9 @@ impl<'b> SimulationFeed<'b> {
         let (sender, trajectories) = mpsc::sync_channel(1);
         let (world, rate) = (scene.world.clone(), frame_rate);
         spawn("synthesis", move || synthesise(&world, rate, &sender))?;
-        let in_mm = layout.outputs.iter().map(|column| column.unit == "mm").collect();
+        let mut in_mm = vec![false; layout.outputs.len()];
+        let deformations = layout.electrodes.iter().flat_map(|it| it.outputs).flatten();
+        deformations.for_each(|output| in_mm[output] = true);
         let can = Can { zero: true, record: true, seek: false };
         let source = format!(
             "scene {}, {} % noise, {frame_rate} frames a second",
@@ -265,7 +267,7 @@ struct Judge {
 }
 
 impl Judge {
-    /// A judge by the limit of still frames of `world`, of those outputs that are `in_mm`; it does nothing if there is no limit, or no truth.
+    /// A judge by the limit of still frames of `world`, of those outputs that are deformations, `in_mm`; it does nothing if there is no limit, or no truth.
     fn start(world: &World, has_truth: bool, in_mm: Vec<bool>) -> Result<Self> {
         let (sums, last) = (Arc::<Mutex<Sums>>::default(), Instant::now());
         let still = World { path: None, ..world.clone() };

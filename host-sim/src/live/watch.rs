@@ -30,6 +30,8 @@ const WINDOW: Duration = Duration::from_secs(10);
 const SCALE_MM: f32 = 1.0;
 /// Least change of a reading, relative to itself, that tells of a touch.
 const LEAST_CHANGE: f32 = 0.05;
+/// Standard deviations that a difference of two means may have by chance, of hundreds of readings.
+const MOST_DEVIATIONS: f32 = 5.0;
 
 /// What goes with what is watched.
 pub struct Watched<'b> {
@@ -73,8 +75,10 @@ struct Watch<'w, 'b> {
     wires: Wires,
     recorder: Option<Recorder>,
     is_paused: bool,
-    state: State,
-    message: String,
+    /// Why no frames come.
+    trouble: Option<(State, String)>,
+    /// What happened to the last recording by itself.
+    remark: Option<String>,
     is_touched: bool,
     /// Times of the last frames, whether each was decoded, and squares of errors with their number.
     past: VecDeque<(Instant, bool, f64, usize)>,
@@ -94,8 +98,8 @@ impl<'w, 'b> Watch<'w, 'b> {
             wires,
             recorder: None,
             is_paused: false,
-            state: State::Live,
-            message: String::new(),
+            trouble: None,
+            remark: None,
             is_touched: false,
             past: VecDeque::new(),
             told: Instant::now(),
@@ -110,8 +114,11 @@ impl<'w, 'b> Watch<'w, 'b> {
             Next::Ended => self.say(State::Ended, "the end of the recording".into()),
             Next::Anew => {
                 // A recording has one layout from its beginning to its end.
-                if let Err(cause) = self.stop_recording() {
-                    self.message = cause;
+                if self.recorder.is_some() {
+                    let ended = self.stop_recording().unwrap_or_else(|cause| cause);
+                    self.remark = Some(format!(
+                        "the recording has ended, since the sensor sends other frames now: {ended}"
+                    ));
                 }
                 self.wires = Wires::new(&self.feed.layout().readings);
                 (self.baseline, self.newest) = (self.feed.baseline(), VecDeque::new());
@@ -120,6 +127,7 @@ impl<'w, 'b> Watch<'w, 'b> {
         }
         if self.told.elapsed() > STATUS {
             let model = self.watched.blob.map(ModelBlob::parse);
+            self.flush_recording();
             self.wires.judge(model.as_ref().and_then(taxel_core::blob::Model::fill));
             self.tell();
         }
@@ -127,10 +135,39 @@ impl<'w, 'b> Watch<'w, 'b> {
     }
 
     fn say(&mut self, state: State, message: String) {
-        if (self.state, &self.message) != (state, &message) {
-            (self.state, self.message) = (state, message);
+        let trouble = Some((state, message));
+        if self.trouble != trouble {
+            self.trouble = trouble;
             self.tell();
         }
+    }
+
+    /// Makes what was recorded safe, though no frames may come.
+    fn flush_recording(&mut self) {
+        if let Some(recorder) = &mut self.recorder
+            && let Err(cause) = recorder.flush()
+        {
+            self.recorder = None;
+            self.remark = Some(format!("the recording has ended: {cause}"));
+        }
+    }
+
+    /// State of what is watched, and what is to be said of it.
+    fn state(&self) -> (State, String) {
+        let remark = self.remark.clone().unwrap_or_default();
+        if self.is_paused || self.feed.is_paused() && self.trouble.is_none() {
+            return (State::Paused, if remark.is_empty() { "paused".into() } else { remark });
+        }
+        if let Some((state, message)) = &self.trouble {
+            return (*state, message.clone());
+        }
+        let wires = self.wires.for_page();
+        let said = self.feed.note().into_iter().chain(self.remark.clone());
+        let said = said.chain((!wires.is_empty()).then(|| {
+            let words: Vec<&str> = wires.iter().take(2).map(|wire| wire.words.as_str()).collect();
+            words.join("; ")
+        }));
+        (State::Live, said.collect::<Vec<_>>().join("; "))
     }
 
     fn take(&mut self, mut moment: Moment) {
@@ -157,9 +194,7 @@ impl<'w, 'b> Watch<'w, 'b> {
             self.past.pop_front();
         }
         self.record(&mut moment);
-        if self.state != State::Paused && self.state != State::Live {
-            (self.state, self.message) = (State::Live, String::new());
-        }
+        self.trouble = None;
         if !self.is_paused {
             self.view.show(for_page(&moment));
         }
@@ -178,7 +213,7 @@ impl<'w, 'b> Watch<'w, 'b> {
         if let Err(cause) = recorder.write(&moment.frame) {
             // What was written can be recovered.
             self.recorder = None;
-            self.message = format!("the recording has ended: {cause}");
+            self.remark = Some(format!("the recording has ended: {cause}"));
             self.tell();
         }
     }
@@ -190,22 +225,18 @@ impl<'w, 'b> Watch<'w, 'b> {
             Action::Record => self.start_recording(),
             Action::StopRecording => self.stop_recording(),
             Action::Pause | Action::Resume => {
-                self.is_paused = action == Action::Pause;
-                let (state, message) =
-                    if self.is_paused { (State::Paused, "paused") } else { (State::Live, "") };
-                (self.state, self.message) = (state, message.into());
+                self.trouble = None;
                 // A device goes on scanning, and a recording stands still.
                 if is_recording {
-                    self.is_paused = false;
-                    self.feed.act(action)?;
+                    return self.feed.act(action);
                 }
-                Ok(message.into())
+                self.is_paused = action == Action::Pause;
+                Ok(String::new())
             }
-            Action::Step { .. } => {
-                (self.state, self.message) = (State::Paused, "paused".into());
+            Action::Step { .. } | Action::Seek { .. } | Action::Speed { .. } => {
+                self.trouble = None;
                 self.feed.act(action)
             }
-            action => self.feed.act(action),
         }
     }
 
@@ -219,9 +250,10 @@ impl<'w, 'b> Watch<'w, 'b> {
                 self.newest.len()
             ));
         }
-        if let Some(share) = self.spread().filter(|share| *share > LEAST_CHANGE) {
+        if let Some((reading, share)) = self.drift() {
             return Err(format!(
-                "not zeroed: readings change by {:.0} %; let go of the sensor, and try again",
+                "not zeroed: {} changes by {:.0} %; let go of the sensor, and try again",
+                self.feed.layout().readings[reading].name,
                 share * 100.0
             ));
         }
@@ -231,19 +263,28 @@ impl<'w, 'b> Watch<'w, 'b> {
         Ok(format!("zeroed by the mean of {ZERO_FRAMES} frames"))
     }
 
-    /// Greatest drift of a reading over the newest frames, relative to its mean: between the means of the two halves.
-    fn spread(&self) -> Option<f32> {
+    /// The reading that drifts most over the newest frames, and by what share of it: between the means of the two halves, beyond
+    /// what noise would do. `None` if all stand still.
+    fn drift(&self) -> Option<(usize, f32)> {
         let half = self.newest.len() / 2;
-        let mean = |from: usize, to: usize, reading: usize| {
-            let values = self.newest.range(from..to).map(|frame| frame[reading]);
-            values.sum::<f32>() / (to - from) as f32
+        let mean = |from: usize, reading: usize| {
+            self.newest.range(from..from + half).map(|frame| frame[reading]).sum::<f32>()
+                / half as f32
         };
-        let readings = 0..self.newest.front()?.len();
-        let change = |reading| {
-            let (a, b) = (mean(0, half, reading), mean(half, self.newest.len(), reading));
-            ((a - b) / (0.5 * (a + b))).abs()
+        let change = |reading: usize| {
+            let means = [mean(0, reading), mean(half, reading)];
+            let squares = [0, half].into_iter().zip(means).map(|(from, mean)| {
+                self.newest
+                    .range(from..from + half)
+                    .map(|it| (it[reading] - mean).powi(2))
+                    .sum::<f32>()
+            });
+            let deviation = (squares.sum::<f32>() / (2 * half) as f32 * 2.0 / half as f32).sqrt();
+            let (step, size) = ((means[1] - means[0]).abs(), 0.5 * (means[0] + means[1]).abs());
+            (reading, if step > MOST_DEVIATIONS * deviation { step / size } else { 0.0 })
         };
-        readings.map(change).filter(|it| it.is_finite()).reduce(f32::max)
+        let changes = (0..self.newest.front()?.len()).map(change).filter(|it| it.1.is_finite());
+        changes.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|it| it.1 > LEAST_CHANGE)
     }
 
     fn set_baseline(&mut self) {
@@ -270,9 +311,13 @@ impl<'w, 'b> Watch<'w, 'b> {
             source: self.feed.about().source,
             baseline: self.baseline.clone(),
         };
+        if self.feed.layout().readings.is_empty() {
+            return Err("not recorded: no frame has come yet".into());
+        }
         let path = Recorder::free_path();
         let recorder = Recorder::start(&path, self.feed.layout(), beside);
         self.recorder = Some(recorder.map_err(|cause| cause.to_string())?);
+        self.remark = None;
         Ok(format!("recording {}", path.display()))
     }
 
@@ -325,9 +370,10 @@ impl<'w, 'b> Watch<'w, 'b> {
         let count: usize = self.past.iter().map(|it| it.3).sum();
         let judged = self.feed.judged();
         let (position_s, speed) = self.feed.position().unzip();
+        let (state, message) = self.state();
         self.view.set_status(Status {
-            state: self.state,
-            message: self.message.clone(),
+            state,
+            message,
             scan_rate: rate(self.past.len()),
             decode_rate: rate(decoded).filter(|_| decoded > 0),
             lost: self.feed.lost(),
@@ -341,7 +387,7 @@ impl<'w, 'b> Watch<'w, 'b> {
     }
 }
 
-/// Sum of the squared errors in mm² of outputs in mm, and their number.
+/// Sum of the squared errors in mm² of deformations, and their number.
 fn errors(layout: &Layout, outputs: Option<&[f32]>, truth: Option<&[f32]>) -> (f64, usize) {
     let (Some(outputs), Some(truth)) = (outputs, truth) else { return (0.0, 0) };
     let pairs = outputs.iter().zip(truth).zip(&layout.outputs);

@@ -210,6 +210,11 @@ fn a_recording_is_paused_sought_and_stepped_through() {
     events.next("frame", |frame| frame["time_us"].as_u64() == Some(1_530_000));
     assert_eq!(page.ask(r#"{"action":"step","frames":-2}"#).0, 200);
     events.next("frame", |frame| frame["time_us"].as_u64() == Some(1_510_000));
+    // Also behind a place that was sought, before which no frame was shown.
+    assert_eq!(page.ask(r#"{"action":"seek","to_s":2.5}"#).0, 200);
+    events.next("frame", |frame| frame["time_us"].as_u64() == Some(2_500_000));
+    assert_eq!(page.ask(r#"{"action":"step","frames":-1}"#).0, 200);
+    events.next("frame", |frame| frame["time_us"].as_u64() == Some(2_490_000));
     assert_eq!(page.ask(r#"{"action":"speed","factor":10.0}"#).0, 200);
     assert_eq!(page.ask(r#"{"action":"resume"}"#).0, 200);
     events.next("status", |status| status["state"].as_str() == Some("ended"));
@@ -298,7 +303,10 @@ fn what_cannot_be_watched_is_refused_before_a_page_opens() {
         (&["press.mcap", "--model", &blob], "--model: it takes other readings"),
         (&["press", "--shape", "0x4"], "--shape"),
         (&["press", "--frame-rate", "0"], "--frame-rate"),
-        (&["press.mcap", "--token", "short"], "--token"),
+        (&["press.mcap", "--token", "short"], "--token short"),
+        (&["press.mcap", "--protocol", "csv"], "--protocol is for a sensor on a serial port"),
+        (&["press.mcap", "--frame-rate", "5"], "--frame-rate is for a simulation"),
+        (&["press", "--separator", "tab"], "--separator"),
     ] {
         let said = folder.fail(&[&["view"], arguments, &["--no-browser"]].concat(), 2);
         assert!(said.contains(says), "{arguments:?}: {said}");

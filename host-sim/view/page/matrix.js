@@ -44,8 +44,10 @@ function drawMatrix(canvas, layout, frame, wires) {
   const context = prepare(canvas, top + tall * rows + 40);
   const isRelative = matrix.isRelative && !!baseline;
   frame?.readings.forEach((value, index) => {
-    widen(value);
     const change = relative(frame, index);
+    // A reading that trebled is of a broken wire, which would leave no colours for the others.
+    if (Math.abs(change) > 2) return;
+    widen(value);
     if (change !== null) matrix.most = Math.max(matrix.most, roundUp(Math.abs(change)));
   });
   const span = matrix.high - matrix.low || 1;

@@ -77,7 +77,7 @@ function takeLayout(next) {
   const held = new Set(layout.electrodes.flatMap((electrode) => electrode.outputs));
   const others = layout.outputs.map((_, index) => index).filter((index) => !held.has(index));
   const { can, kind, readings } = layout, parts = {
-    zero: can.zero, record: can.record, transport: can.seek, sheet_card: shape, values_card: others.length, error_card: kind === "simulation",
+    zero: can.zero, record: can.record, transport: can.seek, sheet_card: shape, values_card: others.length, error_card: kind === "simulation" && shape,
   };
   for (const [id, isThere] of Object.entries(parts)) byId(id).hidden = !isThere;
   byId("position").max = layout.duration_s ?? 1;
@@ -104,6 +104,7 @@ function takeFrame(next) {
   }
   [frame, arrived, arrivedAge] = [next, now, next.age_ms + delay];
   for (const flag of frame.flags) flags.set(flag, now);
+  if (frame.flags.includes("novel")) flags.set("nats", frame.novelty);
   const time = frame.time_us / 1e6, at = frame.contact;
   contact.wasSeen ||= !!at;
   contact.hasForce ||= Number.isFinite(at?.force_n);
@@ -117,7 +118,7 @@ function takeFrame(next) {
 /** When each flag was seen last: it is shown for a second at least, so that it can be read. */
 const flags = new Map();
 const FLAG_WORDS = {
-  novel: () => `Unlike anything the model was trained on${Number.isFinite(frame.novelty) ? ` (by ${plain(frame.novelty)} nats)` : ""}: do not trust the picture`,
+  novel: () => `Unlike anything the model was trained on${Number.isFinite(flags.get("nats")) ? ` (by ${plain(flags.get("nats"))} nats)` : ""}: do not trust the picture`,
   clamped: () => "Out of range: readings were moved to the end of what the model knows",
   missing: () => `${frame.readings.filter((value) => value === null).length} of ${frame.readings.length} readings are missing`,
 };
@@ -137,9 +138,9 @@ function showBanner() {
   else if (status?.state === "no data") level = "bad";
   else if (seen.length) {
     const said = seen.map((flag) => FLAG_WORDS[flag]());
-    if (status?.wires.length) said.push(status.message);
+    if (status?.message) said.push(status.message);
     [level, words] = ["warn", `${said.map(capital).join(". ")}.`];
-  } else if (status?.wires.length) level = "warn";
+  } else if (status?.message && status.state === "live") level = "warn";
   setText("banner", capital(words));
   byId("banner").dataset.level = level;
   const state = trouble ? "gone" : status?.state ?? "live";
@@ -245,10 +246,11 @@ function showNumbers() {
   setText("peak_unit", hasForce ? "N" : "mm");
   values.numbers.forEach((number, index) => {
     const [value, deviation] = [frame.outputs, frame.deviations].map((of) => of?.[values.outputs[index]]);
-    number.textContent = short(value) + (Number.isFinite(deviation) ? ` ± ${short(deviation)}` : "");
+    const truth = frame.truth?.[values.outputs[index]];
+    number.textContent = short(value) + (Number.isFinite(deviation) ? ` ± ${short(deviation)}` : "") + (Number.isFinite(truth) ? ` (true ${short(truth)})` : "");
   });
   if (!frame.truth) return;
-  byId("error_card").hidden = false;
+  byId("error_card").hidden = !shape;
   const pairs = layout.electrodes.map(({ outputs }) => outputs[2]).filter((index) => index !== null);
   const sum = pairs.reduce((sum, index) => sum + (frame.outputs[index] - frame.truth[index]) ** 2, 0);
   setText("frame_rmse", digits(pairs.length ? Math.sqrt(sum / pairs.length) : null, 3));

@@ -30,8 +30,11 @@ pub fn open(port: &str, baud: u32) -> Result<SerialPort> {
         } else {
             format!("there are {}", names.join(", "))
         };
-        let join = "on Linux you may have to join the group dialout";
-        Error::unfit_for("port", format!("{port}: {cause}; {known} ({join})"))
+        let join = match cause.kind() {
+            io::ErrorKind::PermissionDenied => " (on Linux you may have to join the group dialout)",
+            _ => "",
+        };
+        Error::unfit_for("port", format!("{port}: {cause}; {known}{join}"))
     })
 }
 

@@ -16,26 +16,38 @@ pub struct NumberLines {
     line: Vec<u8>,
     /// Whether the line began while somebody listened.
     is_whole: bool,
-    /// Numbers of a line; 0 before the first one.
+    /// Numbers of a line; 0 before two successive ones had as many.
     count: usize,
+    /// Numbers of the last line.
+    last: usize,
     start: Instant,
     scans: u32,
 }
 
 impl NumberLines {
-    /// Lines that come over `wire`, of `count` numbers each; 0 takes the count of the first line of numbers.
+    /// Lines that come over `wire`, of `count` numbers each; 0 takes that of two successive lines.
     pub fn new(mut wire: impl Wire + 'static, count: usize) -> Result<Self> {
         wire.set_read_timeout(look::GLANCE)?;
         let wire = Box::new(wire);
-        Ok(Self { wire, line: vec![], is_whole: false, count, start: Instant::now(), scans: 0 })
+        Ok(Self {
+            wire,
+            line: vec![],
+            is_whole: false,
+            count,
+            last: 0,
+            start: Instant::now(),
+            scans: 0,
+        })
     }
 
     /// The scan of a line that has ended, if it is one.
     fn scan(&mut self) -> Option<Scan> {
         let readings = numbers(str::from_utf8(&self.line).ok()?)?;
-        if self.count == 0 {
+        // A sensor may print other numbers while it starts.
+        if self.count == 0 && self.last == readings.len() {
             self.count = readings.len();
         }
+        self.last = readings.len();
         (readings.len() == self.count).then(|| {
             let number = self.scans;
             self.scans = number.wrapping_add(1);

@@ -75,7 +75,10 @@ impl Listener {
                 _ => "the link is closed".into(),
             };
             source.close();
-            of_thread.heard().ended = Some(cause);
+            let mut heard = of_thread.heard();
+            // Whoever waits for an answer gets none.
+            (heard.ended, heard.baseline) = (Some(cause), None);
+            drop(heard);
             of_thread.came.notify_all();
         })?;
         Ok((Self { shared, stop, thread: Mutex::new(Some(thread)) }, receiver))

@@ -31,9 +31,10 @@ fn lines_of_numbers_are_scans_and_all_other_lines_are_skipped() {
     far.write_all(b"3,4\nr1c1,r1c2,r1c3\n1,2,3\r\n\xff,1,2\n4;5;6\n 7 8  9 \n1,2\n\n10,,nan\n,,\n")
         .unwrap();
     far.write_all(b"11\t12\t").unwrap();
-    let scans = heard(&mut source, 4);
-    assert_eq!(scans[..3], [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]]);
-    assert!(scans[3][0] == 10.0 && scans[3][1].is_nan() && scans[3][2].is_nan());
+    // Two successive lines of as many numbers tell the count.
+    let scans = heard(&mut source, 3);
+    assert_eq!(scans[..2], [[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]]);
+    assert!(scans[2][0] == 10.0 && scans[2][1].is_nan() && scans[2][2].is_nan());
     far.write_all(b"13\n").unwrap();
     assert_eq!(heard(&mut source, 1), [[11.0, 12.0, 13.0]]);
     drop(far);
@@ -57,6 +58,21 @@ fn frames_between_marks_are_found_although_readings_look_like_marks() {
     let floats = |frame: [u8; 4]| frame.map(f32::from).to_vec();
     let expected: Vec<Vec<f32>> = [0, 1, 0, 1, 2].map(|at| floats(frames[at])).to_vec();
     assert_eq!(heard(&mut source, 5), expected);
+}
+
+#[test]
+fn a_question_that_comes_as_the_line_fails_is_answered() {
+    let (sender, receiver) = mpsc::channel();
+    let open = |_: &_| Ok((Box::new(Numbers(receiver, vec![])) as Box<dyn Source>, ()));
+    let (listener, _opened) = Listener::start(2, open).unwrap();
+    let asker = thread::spawn(move || while listener.set_baseline(vec![]).is_ok() {});
+    thread::sleep(Duration::from_millis(20));
+    drop(sender);
+    let end = Instant::now() + Duration::from_secs(20);
+    while !asker.is_finished() {
+        assert!(Instant::now() < end, "it waits for good");
+        thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// A source that sends the numbers that it is given, and ends with the sender.
