@@ -280,7 +280,7 @@ fn every_command_has_help_with_an_example() {
     let folder = Folder::new("help");
     for command in [
         "run", "synth", "forward", "train", "decode", "eval", "inspect", "table1", "emulate",
-        "link",
+        "link", "view", "recover",
     ] {
         let help = folder.succeed(&[command, "--help"]);
         assert!(help.contains(&format!("host-sim {command} ")), "{help}");
@@ -289,7 +289,7 @@ fn every_command_has_help_with_an_example() {
     let help = folder.succeed(&["trade", "-h"]);
     let options = |section: &str| section.lines().filter(|line| line.contains("--")).count();
     let (_, help) = help.split_once("\nOptions:\n").unwrap();
-    let (own, rest) = help.split_once("\nData files (CSV, .npy, .npz):\n").unwrap();
+    let (own, rest) = help.split_once("\nData files (CSV, .npy, .npz, .mcap):\n").unwrap();
     let (of_files, _) = rest.split_once("\nExamples:").unwrap();
     assert!((20..=31).contains(&options(own)) && own.contains("--seed"), "{own}");
     assert!(options(of_files) >= 10 && of_files.contains("--test"), "{of_files}");
