@@ -255,7 +255,7 @@ const FEWEST_JUDGED: usize = 10;
 #[derive(Default)]
 struct Sums {
     frames: usize,
-    /// Of the posterior mean, and of the decoder.
+    /// Sums for the posterior mean, and for the decoder.
     squares_mm2: [f64; 2],
 }
 
