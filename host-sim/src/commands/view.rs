@@ -7,6 +7,7 @@ use std::sync::mpsc::Receiver;
 
 use clap::{Args, ValueEnum, value_parser};
 use serde::Serialize;
+use taxel_data::Clock;
 use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::serial;
@@ -19,7 +20,7 @@ use super::{Common, interruption, print, recordings, stderr};
 use crate::experiment::{Experiment, names_a_scene};
 use crate::live::device::{DeviceFeed, Line, Protocol};
 use crate::live::feed::Feed;
-use crate::live::replay::ReplayFeed;
+use crate::live::replay::{ReplayFeed, USUAL_RATE};
 use crate::live::simulation::{self, SimulationFeed};
 use crate::live::watch::{Watched, watch};
 use crate::{Error, Result};
@@ -175,6 +176,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Source::Data(path) => {
             let file = arguments.file.read(&path)?;
+            if let Some(why) = Clock::of(&file, None)?.why_counted(&file) {
+                stderr::remark(format_args!(
+                    "note: {why}; frames follow one another {USUAL_RATE} times a second, or by --frame-rate"
+                ));
+            }
             let mut feed = ReplayFeed::of_data(file, blob.as_ref(), arguments.frame_rate)?;
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
         }
