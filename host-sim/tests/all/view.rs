@@ -149,6 +149,8 @@ fn a_device_is_shown_under_the_names_that_its_checksums_tell_and_recorded_and_ze
     events.next("status", |it| it["recording"]["seconds"].as_f64().is_some_and(|it| it > 0.3));
     let (status, said) = page.ask(r#"{"action":"stop_recording"}"#);
     assert!(status == 200 && said.starts_with("recording-1.mcap, "), "{said}");
+    let first = frame["number"].as_u64();
+    events.next("frame", |later| later["number"].as_u64() > first.map(|number| number + 40));
     // The small model sees a touch in these readings, or it does not; both are told.
     let is_touched = !frame["contact"].is_null();
     let (status, said) = page.ask(r#"{"action":"zero"}"#);
