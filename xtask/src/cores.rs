@@ -14,8 +14,8 @@ const CORES: [(&str, &[&str]); 6] = [
     ("wasm32-unknown-unknown", &DECODER),
 ];
 
-/// What runs on a device.
-const DEVICE: [&str; 4] = ["--package", "taxel-core", "--package", "taxel-firmware"];
+/// What runs on a device, with an oldest Rust of its own.
+pub const DEVICE: [&str; 4] = ["--package", "taxel-core", "--package", "taxel-firmware"];
 /// What a page in a browser needs of it.
 const DECODER: [&str; 2] = ["--package", "taxel-core"];
 

@@ -2,11 +2,9 @@
 
 use std::process::Command;
 
+use crate::cores::DEVICE;
 use crate::process::{Outcome, cargo, first_line, root, run as run_command, target_dir};
 use crate::structure::metadata;
-
-/// Crates that firmware takes, with an oldest Rust of their own.
-const DEVICE: [&str; 4] = ["--package", "taxel-core", "--package", "taxel-firmware"];
 
 /// What to try.
 #[derive(clap::Args)]

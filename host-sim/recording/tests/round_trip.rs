@@ -144,14 +144,12 @@ fn a_file_that_is_cut_anywhere_keeps_all_its_whole_chunks() {
     }
 }
 
-#[test]
-fn a_whole_file_with_a_damaged_chunk_is_mended_too() {
-    let folder = Folder::new("flipped");
-    let path = folder.path("flipped");
+/// Writes a recording of three chunks, each of one frame. Returns the frames, and the size of the file after each.
+fn three_chunks(path: &std::path::Path) -> (Vec<Frame>, Vec<usize>) {
     let layout = electrodes();
     let written = frames(&layout, 3);
     let mut writer =
-        Writer::create(&path, &layout, &extras(), start(), Replace::Recordings).unwrap();
+        Writer::create(path, &layout, &extras(), start(), Replace::Recordings).unwrap();
     let mut sizes = vec![];
     for frame in &written {
         writer.write(frame).unwrap();
@@ -159,6 +157,14 @@ fn a_whole_file_with_a_damaged_chunk_is_mended_too() {
         sizes.push(writer.bytes() as usize);
     }
     writer.finish().unwrap();
+    (written, sizes)
+}
+
+#[test]
+fn a_whole_file_with_a_damaged_chunk_is_mended_too() {
+    let folder = Folder::new("flipped");
+    let path = folder.path("flipped");
+    let (written, sizes) = three_chunks(&path);
     let mut bytes = fs::read(&path).unwrap();
     bytes[sizes[0] + 200] ^= 1;
     fs::write(&path, &bytes).unwrap();
@@ -172,17 +178,7 @@ fn a_whole_file_with_a_damaged_chunk_is_mended_too() {
 fn bytes_that_are_left_out_are_those_of_chunks_that_are_not_whole() {
     let folder = Folder::new("left-out");
     let path = folder.path("cut");
-    let layout = electrodes();
-    let mut writer =
-        Writer::create(&path, &layout, &extras(), start(), Replace::Recordings).unwrap();
-    let written = frames(&layout, 3);
-    let mut sizes = vec![];
-    for frame in &written {
-        writer.write(frame).unwrap();
-        writer.flush().unwrap();
-        sizes.push(writer.bytes() as usize);
-    }
-    drop(writer);
+    let (_, sizes) = three_chunks(&path);
     let mut bytes = fs::read(&path).unwrap();
     bytes.truncate(sizes[2]);
     // The second chunk is damaged, the third is not whole, and zeros follow that were never written.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::live::replay::USUAL_RATE;
+use crate::live::replay::times_s;
 use crate::live::sheet;
 use crate::verdict::Warning;
 use crate::{Error, Result};
@@ -113,8 +113,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baselines =
         arguments.untouched.baselines(metadata, &arguments.model, log, fields, limits)?;
     let mut readings = model_inputs(&model, &file)?;
-    let scanned =
-        is_recording(&arguments.output).then(|| (clock_us(&file), readings.values.clone()));
+    let scanned = is_recording(&arguments.output)
+        .then(|| Ok::<_, Error>((clock_us(&file)?, readings.values.clone())))
+        .transpose()?;
     let health = arguments.health.apply(&model, &mut readings)?;
     let (model, readings) = related(model, readings, baselines.as_ref());
     remark_on_range(&model, &readings);
@@ -262,14 +263,11 @@ fn write(
     Ok(csv_file::write_columns(path, columns, lines)?)
 }
 
-/// Time of each line of `file` in µs since the first; of a file without times, as many frames a second as usual.
-fn clock_us(file: &DataFile) -> Vec<u64> {
-    let clock =
-        Clock::of(file, None).ok().filter(|clock| clock.column.is_some() && clock.unit == "s");
-    let at_s = |line: usize| {
-        clock.as_ref().map_or(line as f64 / USUAL_RATE, |clock| clock.at[line] - clock.at[0])
-    };
-    (0..file.lines()).map(|line| (at_s(line) * 1e6).round() as u64).collect()
+/// Time of each line of `file` in µs since the first.
+fn clock_us(file: &DataFile) -> Result<Vec<u64>> {
+    let times_s = times_s(&Clock::of(file, None)?, None);
+    let since_first = times_s.iter().map(|time_s| (time_s - times_s[0]) * 1e6);
+    Ok(since_first.map(|time_us| time_us.round() as u64).collect())
 }
 
 /// Writes a recording of readings (frames × inputs) with the times of their scans, of the estimates, and of their deviations.

@@ -176,12 +176,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
         Source::Data(path) => {
             let file = arguments.file.read(&path)?;
-            if let Some(why) = Clock::of(&file, None)?.why_counted(&file) {
+            let clock = Clock::of(&file, None)?;
+            if let Some(why) = clock.why_counted(&file) {
                 stderr::remark(format_args!(
                     "note: {why}; frames follow one another {USUAL_RATE} times a second, or by --frame-rate"
                 ));
             }
-            let mut feed = ReplayFeed::of_data(file, blob.as_ref(), arguments.frame_rate)?;
+            let mut feed = ReplayFeed::of_data(file, blob.as_ref(), &clock, arguments.frame_rate)?;
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
         }
     }

@@ -38,9 +38,12 @@ impl<'b> FrameByFrame<'b> {
         Ok(Self { limits: in_ohm.then_some(Limits::USUAL), reciprocals, scratch, decoder })
     }
 
-    /// Whether the model divides readings by a baseline, and has none yet.
-    pub fn lacks_baseline(&self) -> bool {
-        !self.reciprocals.is_empty() && self.reciprocals.iter().all(|it| it.is_nan())
+    /// What is to be said while the model divides readings by a baseline, and has none yet.
+    pub fn note(&self) -> Option<String> {
+        let lacks = !self.reciprocals.is_empty() && self.reciprocals.iter().all(|it| it.is_nan());
+        let words =
+            "nothing is decoded yet: the model divides by the untouched sensor; zero it (b)";
+        lacks.then(|| words.into())
     }
 
     /// Takes the readings of the untouched sensor, if the model divides by them.

@@ -144,14 +144,11 @@ impl<'b> DeviceFeed<'b> {
     }
 
     fn moment(&mut self, scan: Scan) -> Result<Next> {
-        let mut moment = Moment::from(scan);
+        let mut moment = Moment::of_scan(scan, self.layout.readings.len());
         if let Some(decoder) = &mut self.decoder {
             decoder.decode(&mut moment)?;
         }
-        // Readings that were lost on the line, or a model that was exchanged.
-        if moment.frame.readings.is_empty() {
-            moment.frame.readings = vec![f32::NAN; self.layout.readings.len()];
-        }
+        // A model may have been exchanged.
         let outputs = moment.frame.outputs.as_ref().map_or(0, Vec::len);
         let fits = moment.frame.readings.len() == self.layout.readings.len()
             && (outputs == 0 || outputs == self.layout.outputs.len());
@@ -282,10 +279,7 @@ impl Feed for DeviceFeed<'_> {
     }
 
     fn note(&self) -> Option<String> {
-        let lacks = self.decoder.as_ref().is_some_and(FrameByFrame::lacks_baseline);
-        lacks.then(|| {
-            "nothing is decoded yet: the model divides by the untouched sensor; zero it (b)".into()
-        })
+        self.decoder.as_ref().and_then(FrameByFrame::note)
     }
 
     fn lost(&self) -> u64 {

@@ -31,10 +31,17 @@ impl Moment {
     pub fn has(&self, flag: u8) -> bool {
         self.flags & flag != 0
     }
-}
 
-impl From<Scan> for Moment {
-    fn from(scan: Scan) -> Self {
+    /// The frame of a scan of so many `readings`; those that were lost on the line are missing.
+    pub fn of_scan(scan: Scan, readings: usize) -> Self {
+        let mut moment = Self::of_heard(scan);
+        if moment.frame.readings.is_empty() {
+            moment.frame.readings = vec![f32::NAN; readings];
+        }
+        moment
+    }
+
+    fn of_heard(scan: Scan) -> Self {
         let Scan { number, start_us, heard, readings, estimate } = scan;
         let frame = Frame { time_us: start_us, number, readings, ..Frame::default() };
         let mut moment = Self { heard, ..Self::new(frame) };

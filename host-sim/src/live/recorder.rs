@@ -75,11 +75,7 @@ impl Recorder {
     /// # Errors
     /// As [`write`](Self::write).
     pub fn write_scan(&mut self, scan: &Scan) -> Result<()> {
-        let mut moment = Moment::from(scan.clone());
-        if moment.frame.readings.is_empty() {
-            moment.frame.readings = vec![f32::NAN; self.readings];
-        }
-        self.write(&moment.frame)
+        self.write(&Moment::of_scan(scan.clone(), self.readings).frame)
     }
 
     /// Makes all frames safe from a kill, if that was not done lately; call it while no frames come.

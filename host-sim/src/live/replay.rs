@@ -22,6 +22,15 @@ const REMEMBERED: usize = 1000;
 /// Frames a second of a data file that does not tell its times.
 pub const USUAL_RATE: f64 = 100.0;
 
+/// Time of each line of a data file in s: its `clock`'s, unless a rate is given or it tells none.
+pub fn times_s(clock: &Clock, frame_rate: Option<f64>) -> Vec<f64> {
+    if clock.column.is_some() && clock.unit == "s" && frame_rate.is_none() {
+        return clock.at.clone();
+    }
+    let rate = frame_rate.unwrap_or(USUAL_RATE);
+    (0..clock.at.len()).map(|line| line as f64 / rate).collect()
+}
+
 /// Frames that lie still: any of them can be gone to.
 trait Still {
     /// The next frame, with its time since the first one.
@@ -139,23 +148,17 @@ impl<'b> ReplayFeed<'b> {
     }
 
     /// Frames of the data `file`, decoded by the model in `blob` if there is one; otherwise all of its columns are readings.
-    /// A file without times has `frame_rate` frames a second.
+    /// `clock` is the file's. A file without times has `frame_rate` frames a second.
     ///
     /// # Errors
     /// If a column of the model is missing, or the times are not in order.
     pub fn of_data(
         file: DataFile,
         blob: Option<&'b ModelBlob>,
+        clock: &Clock,
         frame_rate: Option<f64>,
     ) -> Result<Self> {
-        let clock = Clock::of(&file, None)?;
-        let timed = clock.column.is_some() && clock.unit == "s" && frame_rate.is_none();
-        let rate = frame_rate.unwrap_or(USUAL_RATE);
-        let times_s: Vec<f64> = if timed {
-            clock.at.clone()
-        } else {
-            (0..file.lines()).map(|line| line as f64 / rate).collect()
-        };
+        let times_s = times_s(clock, frame_rate);
         let title = file.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let (layout, readings, truth) = if let Some(blob) = blob {
             let model = blob.parse();
@@ -376,10 +379,7 @@ impl Feed for ReplayFeed<'_> {
     }
 
     fn note(&self) -> Option<String> {
-        let lacks = self.decoder.as_ref().is_some_and(|(decoder, _)| decoder.lacks_baseline());
-        lacks.then(|| {
-            "nothing is decoded yet: the model divides by the untouched sensor; zero it (b)".into()
-        })
+        self.decoder.as_ref().and_then(|(decoder, _)| decoder.note())
     }
 
     fn is_paused(&self) -> bool {

@@ -16,7 +16,7 @@ use super::feed::{Feed, Next};
 use super::moment::Moment;
 use super::recorder::{Beside, Recorder};
 use super::wires::Wires;
-use crate::Result;
+use crate::{Error, Result};
 
 /// Time that one look for a frame takes, after which buttons are looked at.
 const LOOK: Duration = Duration::from_millis(10);
@@ -62,7 +62,7 @@ pub fn watch(
         }
         watch.step()?;
     }
-    watch.stop_recording().map(drop).map_err(crate::Error::failed)
+    watch.stop_recording().map(drop).map_err(Error::failed)
 }
 
 struct Watch<'w, 'b> {
@@ -142,18 +142,24 @@ impl<'w, 'b> Watch<'w, 'b> {
         }
     }
 
-    /// Makes what was recorded safe, though no frames may come.
+    /// Makes what was recorded safe while no frames come; frames do so themselves.
     fn flush_recording(&mut self) {
-        if let Some(recorder) = &mut self.recorder
+        let stalls = self.past.back().is_none_or(|it| it.0.elapsed() > STATUS);
+        if let Some(recorder) = self.recorder.as_mut().filter(|_| stalls)
             && let Err(cause) = recorder.flush()
         {
-            self.recorder = None;
-            self.remark = Some(format!("the recording has ended: {cause}"));
+            self.lose_recording(&cause);
         }
     }
 
+    /// Ends a recording that cannot be written any more. What was written can be recovered.
+    fn lose_recording(&mut self, cause: &Error) {
+        self.recorder = None;
+        self.remark = Some(format!("the recording has ended: {cause}"));
+    }
+
     /// State of what is watched, and what is to be said of it.
-    fn state(&self) -> (State, String) {
+    fn state(&self, wires: &[page::Wire]) -> (State, String) {
         let remark = self.remark.clone().unwrap_or_default();
         if self.is_paused || self.feed.is_paused() && self.trouble.is_none() {
             return (State::Paused, if remark.is_empty() { "paused".into() } else { remark });
@@ -161,7 +167,6 @@ impl<'w, 'b> Watch<'w, 'b> {
         if let Some((state, message)) = &self.trouble {
             return (*state, message.clone());
         }
-        let wires = self.wires.for_page();
         let said = self.feed.note().into_iter().chain(self.remark.clone());
         let said = said.chain((!wires.is_empty()).then(|| {
             let words: Vec<&str> = wires.iter().take(2).map(|wire| wire.words.as_str()).collect();
@@ -211,9 +216,7 @@ impl<'w, 'b> Watch<'w, 'b> {
             is_clamped: moment.has(EstimateReport::CLAMPED),
         });
         if let Err(cause) = recorder.write(&moment.frame) {
-            // What was written can be recovered.
-            self.recorder = None;
-            self.remark = Some(format!("the recording has ended: {cause}"));
+            self.lose_recording(&cause);
             self.tell();
         }
     }
@@ -370,14 +373,15 @@ impl<'w, 'b> Watch<'w, 'b> {
         let count: usize = self.past.iter().map(|it| it.3).sum();
         let judged = self.feed.judged();
         let (position_s, speed) = self.feed.position().unzip();
-        let (state, message) = self.state();
+        let wires = self.wires.for_page();
+        let (state, message) = self.state(&wires);
         self.view.set_status(Status {
             state,
             message,
             scan_rate: rate(self.past.len()),
             decode_rate: rate(decoded).filter(|_| decoded > 0),
             lost: self.feed.lost(),
-            wires: self.wires.for_page(),
+            wires,
             recording: self.recorder.as_ref().map(Recorder::for_page),
             rmse_mm: (count > 0).then(|| (squares / count as f64).sqrt() as f32),
             times_limit: judged.map(|[best, decoded]| (decoded / best).sqrt() as f32),
