@@ -20,5 +20,5 @@ pub mod program;
 
 pub use taxel_evaluate::{
     Error, Result, by_depth, error, evaluate, experiment, measurements, metrics, others, over_time,
-    run, subject, training_set, verdict,
+    run, subject, sweep, training_set, verdict,
 };

@@ -8,8 +8,8 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
-    self, Captured, Common, decode, emulate, eval, export, forward, gate, inspect, join, limit,
-    link, noise, recover, run, synth, table1, trade, train, view,
+    self, Captured, Common, compare, decode, emulate, eval, export, forward, gate, inspect, join,
+    limit, link, noise, recover, run, sweep, synth, table1, trade, train, view,
 };
 use crate::{Error, Result};
 
@@ -45,6 +45,8 @@ enum Command {
     Trade(trade::Arguments),
     Gate(gate::Arguments),
     Limit(limit::Arguments),
+    Compare(compare::Arguments),
+    Sweep(sweep::Arguments),
     Emulate(emulate::Arguments),
     Link(link::Arguments),
     View(view::Arguments),
@@ -80,6 +82,8 @@ impl Command {
             Self::Trade(_) => "trade",
             Self::Gate(_) => "gate",
             Self::Limit(_) => "limit",
+            Self::Compare(_) => "compare",
+            Self::Sweep(_) => "sweep",
             Self::Emulate(_) => "emulate",
             Self::Join(_) => "join",
             Self::View(_) => "view",
@@ -177,6 +181,8 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::Trade(arguments) => trade::execute(&arguments, common),
         Command::Gate(arguments) => gate::execute(&arguments, common),
         Command::Limit(arguments) => limit::execute(&arguments, common),
+        Command::Compare(arguments) => compare::execute(&arguments, common),
+        Command::Sweep(arguments) => sweep::execute(&arguments, common),
         Command::Emulate(arguments) => emulate::execute(&arguments, common),
         Command::Link(arguments) => link::execute(&arguments, common),
         Command::View(arguments) => view::execute(&arguments, common),

@@ -8,6 +8,7 @@ use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::printed::Cells;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
+use taxel_evaluate::sweep::Merged;
 
 pub mod format;
 pub mod ticks;
@@ -32,8 +33,10 @@ mod html;
 mod printed;
 mod trade;
 mod limit;
+mod points;
 mod learning_curve;
 
+pub use points::{evenly, result_text, setting_cells, setting_heads};
 pub use view::{Made, View};
 
 /// Page for `result`: no script, no file beside it, the same bytes for the same result.
@@ -69,6 +72,21 @@ pub fn directions_svg(limit: &LimitResult) -> String {
 /// Picture of what is known of each electrode, as a file of its own: light or dark like the viewer.
 pub fn known_svg(limit: &LimitResult) -> String {
     limit::known_svg(limit)
+}
+
+/// Page for the results of a sweep or a comparison, whose files begin with `stem`, with the `command` that made them.
+pub fn sweep_html(merged: &Merged, stem: &str, command: &str) -> String {
+    points::html(merged, stem, command)
+}
+
+/// Picture of a sweep's points and their front, as a file of its own: light or dark like the viewer.
+pub fn sweep_front_svg(merged: &Merged) -> String {
+    points::front_svg(merged)
+}
+
+/// Picture of what a sweep's axes explain, as a file of its own: light or dark like the viewer.
+pub fn sweep_effects_svg(merged: &Merged) -> String {
+    points::effects_svg(merged)
 }
 
 /// Picture of tables, each with its name, beside the paper's printed Table 1; a file of its own, light or dark like the

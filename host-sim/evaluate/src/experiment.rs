@@ -226,6 +226,23 @@ impl Experiment {
             .map_err(|cause| Error::of_scene(origin, cause))
     }
 
+    /// Checks that a scene's text has only fields that a scene may have, with values of their kinds.
+    ///
+    /// # Errors
+    /// The reason, in serde's words, with the line that is wrong.
+    pub fn check_fields(text: &str) -> std::result::Result<(), String> {
+        let checked = toml::from_str::<file::SceneFile>(text).map(drop);
+        checked.map_err(|cause| match cause.span().and_then(|span| text.get(..span.end)) {
+            // serde names the field where it is unknown, and else only what is wrong with the value.
+            Some(before) if !cause.message().starts_with("unknown field") => {
+                let start = before.trim_end().rfind('\n').map_or(0, |end| end + 1);
+                let line = text[start..].lines().next().unwrap_or_default();
+                format!("`{line}`: {}", cause.message())
+            }
+            _ => cause.message().into(),
+        })
+    }
+
     /// Options for training the scene's model.
     pub fn options(&self) -> Options {
         let t = &self.training;

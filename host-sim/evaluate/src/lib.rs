@@ -20,5 +20,6 @@ pub mod subject;
 pub mod others;
 pub mod evaluate;
 pub mod run;
+pub mod sweep;
 
 pub use error::{Error, Result};

@@ -35,7 +35,7 @@ mod system {
                     // A bar of progress stands on its line.
                     let bar = if std::io::stderr().is_terminal() { "\n" } else { "" };
                     eprintln!(
-                        "{bar}interrupted: no result was written; older files are as they were"
+                        "{bar}interrupted: nothing is half-written; files are whole, or as they were"
                     );
                     end();
                 }

@@ -52,6 +52,11 @@ impl SceneArgument {
         Ok(scene)
     }
 
+    /// Precision that was given.
+    pub fn precision(&self) -> Option<Precision> {
+        self.precision
+    }
+
     /// Path of the scene, as an input that must not be replaced.
     pub fn path(&self) -> &Path {
         Path::new(&self.scene)

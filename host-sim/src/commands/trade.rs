@@ -256,7 +256,7 @@ impl From<MemoryOption> for Memory {
 
 /// Value of `--readout`.
 #[derive(Clone, Copy, ValueEnum)]
-enum ReadoutOption {
+pub enum ReadoutOption {
     Spi,
     Onchip,
 }

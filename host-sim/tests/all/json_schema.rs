@@ -106,6 +106,26 @@ fn experiments_are_told_by_the_schema() {
 }
 
 #[test]
+fn sweeps_are_told_by_the_schema() {
+    let schema = &schema();
+    let folder = Folder::new("json_sweeps");
+    folder.write("scene.toml", crate::sweep::tiny_scene());
+    folder.write("plan.toml", crate::sweep::PLAN);
+    let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
+    assert_eq!(checked(&["sweep", "plan.toml", "--list"])["points"].as_array().unwrap().len(), 4);
+    assert_eq!(checked(&["sweep", "plan.toml", "--dry-run"])["points"], 4);
+    let shard = ["sweep", "plan.toml", "--shard", "1/2", "-o", "out/tiny"];
+    assert_eq!(checked(&shard)["there_already"], 0);
+    let all = checked(&["sweep", "plan.toml"]);
+    assert_eq!(all["settings"].as_array().unwrap().len(), 4);
+    check_file(&folder, schema, "out/tiny/results.json");
+    let compared = checked(&["compare", "scene.toml", "--centres", "4,6", "-o", "both"]);
+    assert_eq!(compared["points"].as_array().unwrap().len(), 2);
+    let limits = checked(&["limit", "scene.toml", "press", "--row", "4", "-n", "4"]);
+    assert_eq!(limits["scenes"][1]["subject"], "press");
+}
+
+#[test]
 fn recursions_are_told_by_the_schema() {
     let schema = &schema();
     let folder = prepared("json_recursions", schema);

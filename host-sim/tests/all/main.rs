@@ -32,6 +32,7 @@ mod recordings;
 mod recursion;
 mod refusals;
 mod refused_readings;
+mod sweep;
 mod trade;
 #[cfg(target_os = "linux")]
 mod view;

@@ -218,7 +218,9 @@ fn an_interrupted_run_leaves_no_folder_and_an_emulator_no_file() {
         assert_ne!(output.status.code(), Some(0));
         let told = String::from_utf8(output.stderr).unwrap();
         assert!(
-            told.ends_with("interrupted: no result was written; older files are as they were\n")
+            told.ends_with(
+                "interrupted: nothing is half-written; files are whole, or as they were\n"
+            )
         );
         assert!(folder.names().is_empty(), "{:?}", folder.names());
     }

@@ -46,12 +46,38 @@ struct SensorFile {
     electrodes_per_row_wire: usize,
     column_wires: usize,
     electrodes_per_column_wire: usize,
-    size_mm: Vector3,
+    size_mm: Option<Vector3>,
+    /// Distance of neighbouring wires in mm, which gives the face's extent instead of `size_mm`.
+    pitch_mm: Option<f64>,
+    /// Thickness in mm, instead of that of `size_mm`.
+    thickness_mm: Option<f64>,
     resistance_ohm_per_mm: f64,
     #[serde(default = "default_stiffness")]
     stiffness_n_per_mm: Vector3,
     upper_electrodes_mm: Option<Vec<Vector3>>,
     lower_electrodes_mm: Option<Vec<Vector3>>,
+}
+
+impl SensorFile {
+    /// Extent in mm, from `size_mm`, the pitch of the wires and the thickness.
+    fn extent_mm(&self) -> Result<Vector3, BadValue> {
+        let missing = |field: &str| {
+            let rule = "it is missing; give it, or sensor.size_mm with all three extents";
+            BadValue::new(format!("sensor.{field}"), "nothing", rule)
+        };
+        let given = |at: usize| self.size_mm.map(|size_mm| size_mm[at]);
+        let face = |at: usize, wires: usize| match self.pitch_mm {
+            Some(pitch_mm) => {
+                let allowed = pitch_mm.is_finite() && pitch_mm > 0.0;
+                require(allowed, "sensor.pitch_mm", pitch_mm, || "give a positive length".into())?;
+                Ok(wires as f64 * pitch_mm)
+            }
+            None => given(at).ok_or_else(|| missing("pitch_mm")),
+        };
+        let thickness_mm = self.thickness_mm.or_else(|| given(2));
+        let thickness_mm = thickness_mm.ok_or_else(|| missing("thickness_mm"))?;
+        Ok([face(0, self.column_wires)?, face(1, self.row_wires)?, thickness_mm])
+    }
 }
 
 fn default_seed() -> u64 {
@@ -113,19 +139,16 @@ impl SceneFile {
         let s = self.sensor;
         let of_columns = (s.column_wires, s.electrodes_per_column_wire);
         check_counts((s.row_wires, s.electrodes_per_row_wire), of_columns)?;
+        let size_mm = s.extent_mm()?;
         let sensor = Sensor {
             upper_electrodes_mm: s.upper_electrodes_mm.unwrap_or_else(|| {
-                sensor::default_upper_electrodes_mm(
-                    s.row_wires,
-                    s.electrodes_per_row_wire,
-                    s.size_mm,
-                )
+                sensor::default_upper_electrodes_mm(s.row_wires, s.electrodes_per_row_wire, size_mm)
             }),
             lower_electrodes_mm: s.lower_electrodes_mm.unwrap_or_else(|| {
                 sensor::default_lower_electrodes_mm(
                     s.column_wires,
                     s.electrodes_per_column_wire,
-                    s.size_mm,
+                    size_mm,
                 )
             }),
             row_wires: s.row_wires,
@@ -133,7 +156,7 @@ impl SceneFile {
             column_wires: s.column_wires,
             read_columns: None,
             electrodes_per_column_wire: s.electrodes_per_column_wire,
-            size_mm: s.size_mm,
+            size_mm,
             resistance_ohm_per_mm: s.resistance_ohm_per_mm,
             stiffness_n_per_mm: s.stiffness_n_per_mm,
         };

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use taxel_data::{BadValue, columns};
 use taxel_firmware::timing::{ONCHIP_READINGS_US, ONCHIP_SAMPLES, ONCHIP_SUMS_US, ScanPlan};
 use taxel_learn::cost::Cost;
@@ -15,7 +15,7 @@ use crate::moving::age_ms;
 pub const BOARD_CLOCK_MHZ: f64 = 180.0;
 
 /// Memory that a device runs its code from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Memory {
     /// Flash with the wait states of an STM32F446 at 180 MHz ([`Cost::flash_cycles`]).
@@ -26,7 +26,7 @@ pub enum Memory {
 }
 
 /// Readout of the NUCLEO-F446RE (docs/board.md): what samples columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Readout {
     /// MCP3208 converters on a bus. The processor scans, and decodes the frame afterwards.
@@ -47,7 +47,8 @@ impl Readout {
 }
 
 /// Device whose times are given.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Device {
     pub clock_mhz: f64,
     /// Memory that its code runs from.

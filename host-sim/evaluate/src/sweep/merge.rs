@@ -1,0 +1,293 @@
+//! Results of a whole plan, whoever computed them: all points, the best of them, and what the axes do.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::effects::{self, Effect, Law, Settings, Worth};
+use super::plan::{Bound, PartPrices, Plan, Point, SEED};
+use super::point::{is_error, place_of};
+use super::store::{Found, Record, Store};
+use crate::error::{Error, Result};
+
+/// Results of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Merged {
+    pub plan: String,
+    /// Program that computed them.
+    pub build: String,
+    /// Fields that points differ in.
+    pub fields: Vec<String>,
+    /// Names of all results, in the order of tables.
+    pub columns: Vec<String>,
+    pub objectives: Vec<String>,
+    pub bounds: BTreeMap<String, Bound>,
+    /// Points, in the plan's order.
+    pub points: Vec<Record>,
+    /// Identities of points without a result.
+    pub missing: Vec<String>,
+    /// Settings: points that differ at most in their seed, put together.
+    pub settings: Vec<Setting>,
+    pub effects: Vec<Effect>,
+    pub laws: Vec<Law>,
+    pub worth: Vec<Worth>,
+}
+
+/// Points that differ at most in their seed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Setting {
+    /// Fields, without the seed.
+    pub values: BTreeMap<String, Value>,
+    /// Number of points with results.
+    pub repeats: usize,
+    /// Means of their results.
+    pub results: BTreeMap<String, f64>,
+    /// Standard deviations between them; nothing without repeats.
+    pub deviations: BTreeMap<String, f64>,
+    /// Whether the means are within all bounds.
+    pub is_within: bool,
+    /// Whether no other setting within the bounds is as good in all objectives and better in one.
+    pub on_front: bool,
+    /// Scene of its first point, for settings on the front.
+    pub scene: Option<String>,
+}
+
+impl Setting {
+    /// Setting in words: its fields and their values.
+    pub fn in_words(&self) -> String {
+        let text = |value: &Value| match value {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        let fields = self.values.iter().map(|(field, value)| format!("{field} = {}", text(value)));
+        fields.collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Merged {
+    /// Reads the results of all `points` of a plan from a folder.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names every file that cannot be used.
+    pub fn read(plan: &Plan, points: &[Point], store: &Store) -> Result<Self> {
+        const NAMED: usize = 10;
+        let mut records = Vec::new();
+        let (mut missing, mut unusable) = (Vec::new(), Vec::new());
+        for point in points {
+            match store.find(plan, point)? {
+                Found::Whole(record) => records.push(*record),
+                Found::Missing => missing.push(point.id.clone()),
+                Found::Unusable(why) => {
+                    unusable.push(format!("{}: {why}", store.path(&point.id).display()));
+                }
+            }
+        }
+        if unusable.is_empty() {
+            return Ok(Self::new(plan, points, records, missing));
+        }
+        let more = unusable.len().saturating_sub(NAMED);
+        let more = if more > 0 { format!("\nand {more} more") } else { String::new() };
+        unusable.truncate(NAMED);
+        Err(Error::Usage(format!(
+            "{}{more}\nremove what is named here, and run the sweep again: it computes what is missing",
+            unusable.join("\n")
+        )))
+    }
+
+    /// Results in `records` of a plan's `points`, both in its order.
+    pub fn new(
+        plan: &Plan,
+        points: &[Point],
+        mut records: Vec<Record>,
+        missing: Vec<String>,
+    ) -> Self {
+        if let Some(prices) = &plan.prices {
+            records.iter_mut().for_each(|record| add_cost(record, prices));
+        }
+        let names: BTreeSet<&String> =
+            records.iter().flat_map(|record| record.results.keys()).collect();
+        let mut columns: Vec<String> = names.into_iter().cloned().collect();
+        columns.sort_by(|a, b| place_of(a).cmp(&place_of(b)));
+        let mut settings = settings(&records);
+        mark(&mut settings, &plan.objectives, &plan.bounds);
+        let scenes: BTreeMap<&str, &Point> =
+            points.iter().map(|point| (point.id.as_str(), point)).collect();
+        for setting in settings.iter_mut().filter(|setting| setting.on_front) {
+            let is_of = |record: &&Record| without_seed(&record.values) == setting.values;
+            let first =
+                records.iter().find(is_of).and_then(|record| scenes.get(record.id.as_str()));
+            setting.scene = first.map(|point| point.scene.clone());
+        }
+        let fields: Vec<String> =
+            plan.fields.iter().filter(|field| *field != SEED).cloned().collect();
+        let all = Settings {
+            fields: &fields,
+            is_drawn: plan.is_drawn,
+            values: settings.iter().map(|it| &it.values).collect(),
+        };
+        let result = |name: &String| {
+            settings.iter().map(|it| it.results.get(name).copied()).collect::<Vec<_>>()
+        };
+        let effects =
+            plan.objectives.iter().flat_map(|name| all.effects(name, &result(name))).collect();
+        let laws: Vec<Law> =
+            plan.objectives.iter().filter_map(|name| all.law(name, &result(name))).collect();
+        let (errors, costs): (Vec<&Law>, Vec<&Law>) =
+            laws.iter().partition(|law| is_error(&law.result));
+        let worth = errors
+            .iter()
+            .flat_map(|error| costs.iter().flat_map(|cost| effects::worth(error, cost)));
+        let worth = worth.collect();
+        Self {
+            plan: plan.name.clone(),
+            build: plan.build.clone(),
+            fields: plan.fields.clone(),
+            columns,
+            objectives: plan.objectives.clone(),
+            bounds: plan.bounds.clone(),
+            points: records,
+            missing,
+            settings,
+            effects,
+            laws,
+            worth,
+        }
+    }
+
+    /// Table of all points: their identities, the fields that they differ in, their results, and why there are none.
+    pub fn csv(&self) -> String {
+        let quoted = |text: &str| {
+            let plain = !text.contains(['"', ',', '\n', '\r']);
+            if plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
+        };
+        let text = |value: Option<&Value>| match value {
+            Some(Value::String(text)) => quoted(text),
+            Some(value) => quoted(&value.to_string()),
+            None => String::new(),
+        };
+        let heads =
+            ["id".to_owned()].into_iter().chain(self.fields.clone()).chain(self.columns.clone());
+        let mut csv = heads.chain(["failed".into()]).collect::<Vec<_>>().join(",") + "\n";
+        for point in &self.points {
+            let fields = self.fields.iter().map(|field| text(point.values.get(field)));
+            let results = self.columns.iter();
+            let results =
+                results.map(|name| point.results.get(name).map_or(String::new(), f64::to_string));
+            let failed = quoted(point.failed.as_deref().unwrap_or_default());
+            let line = [point.id.clone()].into_iter().chain(fields).chain(results).chain([failed]);
+            csv += &(line.collect::<Vec<_>>().join(",") + "\n");
+        }
+        csv
+    }
+
+    /// Settings on the front, from the cheapest by the last objective on.
+    pub fn front(&self) -> Vec<&Setting> {
+        let mut front: Vec<&Setting> =
+            self.settings.iter().filter(|setting| setting.on_front).collect();
+        let last = |setting: &Setting| {
+            let result = self.objectives.last().and_then(|name| setting.results.get(name));
+            result.copied().unwrap_or(f64::NAN)
+        };
+        front.sort_by(|a, b| last(a).total_cmp(&last(b)));
+        front
+    }
+
+    /// Errors that [`worth`](Self::worth) is told of, each once.
+    pub fn errors_of_worth(&self) -> Vec<&str> {
+        let mut errors: Vec<&str> = self.worth.iter().map(|worth| worth.error.as_str()).collect();
+        let mut seen = BTreeSet::new();
+        errors.retain(|error| seen.insert(*error));
+        errors
+    }
+
+    /// Points that could not be computed.
+    pub fn failed(&self) -> impl Iterator<Item = &Record> {
+        self.points.iter().filter(|point| point.failed.is_some())
+    }
+}
+
+/// Adds what the sensor's parts cost.
+fn add_cost(record: &mut Record, prices: &PartPrices) {
+    let of = |name: &str| record.results.get(name).copied();
+    let [Some(rows), Some(columns), Some(area_cm2)] = ["rows", "columns", "area_cm2"].map(of)
+    else {
+        return;
+    };
+    let cost_eur = prices.fixed_eur
+        + rows * prices.row_eur
+        + columns * prices.column_eur
+        + area_cm2 * prices.cm2_eur;
+    record.results.insert("cost_eur".into(), cost_eur);
+}
+
+fn without_seed(values: &BTreeMap<String, Value>) -> BTreeMap<String, Value> {
+    values
+        .iter()
+        .filter(|(field, _)| *field != SEED)
+        .map(|(field, value)| (field.clone(), value.clone()))
+        .collect()
+}
+
+/// Settings in the order of their first points; points that failed are in none.
+fn settings(records: &[Record]) -> Vec<Setting> {
+    let mut groups: Vec<Vec<&Record>> = Vec::new();
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    for record in records.iter().filter(|record| record.failed.is_none()) {
+        let key = format!("{:?}", without_seed(&record.values));
+        let place = *places.entry(key).or_insert(groups.len());
+        match groups.get_mut(place) {
+            Some(group) => group.push(record),
+            None => groups.push(vec![record]),
+        }
+    }
+    let setting = |group: Vec<&Record>| {
+        let names: BTreeSet<&String> =
+            group.iter().flat_map(|record| record.results.keys()).collect();
+        let (mut results, mut deviations) = (BTreeMap::new(), BTreeMap::new());
+        for name in names {
+            let values: Vec<f64> =
+                group.iter().filter_map(|record| record.results.get(name).copied()).collect();
+            let count = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / count;
+            results.insert(name.clone(), mean);
+            if values.len() > 1 {
+                let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+                deviations.insert(name.clone(), (squares / (count - 1.0)).sqrt());
+            }
+        }
+        Setting {
+            values: without_seed(&group[0].values),
+            repeats: group.len(),
+            results,
+            deviations,
+            is_within: false,
+            on_front: false,
+            scene: None,
+        }
+    };
+    groups.into_iter().map(setting).collect()
+}
+
+/// Marks the settings within the bounds, and the Pareto front of these.
+fn mark(settings: &mut [Setting], objectives: &[String], bounds: &BTreeMap<String, Bound>) {
+    for setting in settings.iter_mut() {
+        let allows = |(name, bound): (&String, &Bound)| {
+            setting.results.get(name).is_some_and(|value| bound.allows(*value))
+        };
+        setting.is_within = bounds.iter().all(allows);
+    }
+    let ranks = settings.iter().map(|setting| {
+        let values = objectives.iter().map(|name| setting.results.get(name).copied());
+        values.collect::<Option<Vec<f64>>>().filter(|_| setting.is_within)
+    });
+    let ranks: Vec<Option<Vec<f64>>> = ranks.collect();
+    for (setting, own) in settings.iter_mut().zip(&ranks) {
+        let Some(own) = own else { continue };
+        let beaten = ranks
+            .iter()
+            .flatten()
+            .any(|other| other != own && other.iter().zip(own).all(|(other, own)| other <= own));
+        setting.on_front = !beaten;
+    }
+}

@@ -1,0 +1,540 @@
+//! Plans: which points there are, and what is wanted of them.
+//!
+//! A plan is a TOML file; `docs/sweeps.md` explains every field.
+
+use std::collections::{BTreeMap, HashSet};
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use taxel_data::digest::digest;
+use taxel_data::{BadValue, columns, input, require};
+use toml::{Table, Value};
+
+use super::axis::{Axis, latin_hypercube};
+use super::fields::{self, require_known};
+use super::point::columns_of;
+use crate::error::{Error, Result};
+use crate::evaluate::trade::Device;
+use crate::experiment::{Experiment, names_a_scene};
+use crate::measurements::Measurements;
+use crate::subject::Subject;
+
+/// Fields, and lines of values of them.
+type Lines = (Vec<String>, Vec<Vec<Value>>);
+
+type Checked<T> = std::result::Result<T, BadValue>;
+
+/// Most points of a plan.
+const MOST_POINTS: usize = 100_000;
+/// Field of a point that says which scene it is of, where a plan has several.
+pub const SCENE: &str = "scene";
+/// Field of a point's seed, which repeats differ in.
+pub const SEED: &str = "seed";
+
+/// Plan as it stands in its file.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default)]
+struct PlanFile {
+    name: String,
+    /// Scenes: built-in ones, or files beside the plan.
+    scene: Option<OneOrMore>,
+    /// Measurements instead of a scene: a data file beside the plan, and the options that `train` takes for it.
+    data: Vec<String>,
+    #[serde(flatten)]
+    wanted: Wanted,
+}
+
+/// What is wanted of the points, and which there are.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct Wanted {
+    /// Number of test frames for the limit, instead of as many as suffice; none for no limit.
+    pub limit_frames: Option<usize>,
+    /// Whether models are trained.
+    pub train: bool,
+    /// Number of seeds that every point is computed with.
+    pub repeats: usize,
+    /// Results that are to be small.
+    pub objectives: Vec<String>,
+    /// Bounds on results.
+    pub bounds: BTreeMap<String, Bound>,
+    /// Device that scans and decodes, and `samples` averaged.
+    pub device: Table,
+    /// Prices of the parts of a sensor.
+    pub prices: Option<PartPrices>,
+    /// Fields that are changed in every point.
+    pub set: Table,
+    /// Axes that are crossed.
+    pub axes: Table,
+    /// Axes that are drawn together.
+    pub draw: Option<Draw>,
+}
+
+impl Default for Wanted {
+    fn default() -> Self {
+        Self {
+            limit_frames: None,
+            train: true,
+            repeats: 1,
+            objectives: vec![],
+            bounds: BTreeMap::new(),
+            device: Table::new(),
+            prices: None,
+            set: Table::new(),
+            axes: Table::new(),
+            draw: None,
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged)]
+enum OneOrMore {
+    One(String),
+    More(Vec<String>),
+}
+
+/// Latin hypercube of some axes.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Draw {
+    points: usize,
+    #[serde(default = "one")]
+    seed: u64,
+    axes: Table,
+}
+
+fn one() -> u64 {
+    1
+}
+
+/// Bound on a result: the most, or the least.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Bound {
+    Most(f64),
+    Least { least: f64 },
+}
+
+impl Bound {
+    /// Whether a result is within the bound.
+    pub fn allows(self, value: f64) -> bool {
+        match self {
+            Self::Most(most) => value <= most,
+            Self::Least { least } => value >= least,
+        }
+    }
+}
+
+/// Prices of the parts of a sensor, in €.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PartPrices {
+    pub fixed_eur: f64,
+    /// Price of a row-wire with what drives it.
+    pub row_eur: f64,
+    /// Price of a column-wire with what samples it.
+    pub column_eur: f64,
+    /// Price of a cm² of the mat.
+    pub cm2_eur: f64,
+}
+
+/// Scene, or measurements, that fields are changed in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Base {
+    /// Name in tables.
+    pub label: String,
+    /// Its fields; none of measurements.
+    pub document: Table,
+}
+
+/// Plan, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    pub name: String,
+    /// Fields that points differ in.
+    pub fields: Vec<String>,
+    pub objectives: Vec<String>,
+    pub bounds: BTreeMap<String, Bound>,
+    pub prices: Option<PartPrices>,
+    /// Measurements that all points are trained on, if it is no plan of scenes.
+    pub data: Option<Arc<Measurements>>,
+    /// Number of test frames for the limit, if not as many as suffice.
+    pub limit_frames: Option<usize>,
+    pub train: bool,
+    /// Whether axes are drawn.
+    pub is_drawn: bool,
+    /// Program that computes it: another one may compute something else.
+    pub build: String,
+    bases: Vec<Base>,
+    set: Vec<(String, Value)>,
+    device: Table,
+    /// Values of every axis: of those that are drawn together, one line a draw.
+    axes: Vec<Lines>,
+}
+
+/// Point of a plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Digest of all that decides its result, in hexadecimal.
+    pub id: String,
+    /// Fields that points differ in, and their values here.
+    pub values: Vec<(String, Value)>,
+    /// Scene's text; of measurements, the fields of training.
+    pub scene: String,
+    pub device: Device,
+    /// Number of samples averaged for each reading.
+    pub samples: usize,
+    /// Digest of all but training: points with the same one share their limit.
+    pub shares: u64,
+}
+
+impl Point {
+    /// Point in words: its values.
+    pub fn in_words(&self) -> String {
+        let values = self.values.iter().map(|(field, value)| format!("{field} = {value}"));
+        values.collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Plan {
+    /// Reads a plan for the program `build`. Scenes and data files stand beside it; `load` reads the latter, with options.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a file that cannot be read, and for its content.
+    pub fn read(
+        path: &Path,
+        build: &str,
+        load: &dyn Fn(&[String]) -> Result<Subject>,
+    ) -> Result<Self> {
+        let origin = path.display().to_string();
+        let of_plan = |cause: String| {
+            Error::from(taxel_data::Error::unfit(format!("plan {origin}: {cause}")))
+        };
+        let text = input::read_text(path)?;
+        check_top(&text).map_err(&of_plan)?;
+        let file: PlanFile =
+            toml::from_str(&text).map_err(|cause| of_plan(cause.to_string().trim_end().into()))?;
+        let beside = |name: &String| {
+            let beside = path.parent().map(|folder| folder.join(name));
+            let is_beside = beside.as_ref().is_some_and(|file| file.is_file());
+            if is_beside { beside.unwrap_or_default().display().to_string() } else { name.clone() }
+        };
+        let scenes = match (file.scene, file.data.is_empty()) {
+            (Some(_), false) => {
+                return Err(of_plan("it has scene and data: leave one of them out".into()));
+            }
+            (None, false) => vec![],
+            (None, true) => {
+                return Err(of_plan(
+                    "it has no scene: give one, such as scene = \"press\", or data".into(),
+                ));
+            }
+            (Some(OneOrMore::One(name)), _) => vec![name],
+            (Some(OneOrMore::More(names)), _) => names,
+        };
+        let bases = scenes.iter().map(|name| {
+            let built_in = taxel_scenes::ALL.iter().any(|(known, _)| known == name);
+            let file = if built_in { name.clone() } else { beside(name) };
+            Ok(Base { label: name.clone(), document: document(&file)? })
+        });
+        let bases: Vec<Base> = bases.collect::<Result<_>>()?;
+        let data = if file.data.is_empty() {
+            None
+        } else {
+            match load(&file.data.iter().map(beside).collect::<Vec<_>>())? {
+                Subject::Measured(data) => Some(Arc::from(data)),
+                Subject::Scene(_) => {
+                    return Err(of_plan("data is a scene: give it as scene".into()));
+                }
+            }
+        };
+        Self::new(&file.name, (bases, data), file.wanted, build)
+            .map_err(|bad| of_plan(bad.to_string()))
+    }
+
+    /// Plan of these scenes, or measurements.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a field that no scene has, and for a plan that asks for nothing, or too much.
+    pub fn new(
+        name: &str,
+        (mut bases, data): (Vec<Base>, Option<Arc<Measurements>>),
+        wanted: Wanted,
+        build: &str,
+    ) -> Checked<Self> {
+        let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let name_ok = (1..=100).contains(&name.len()) && name.chars().all(is_name);
+        require(name_ok, "name", format!("{name:?}"), || {
+            "it names files; use letters, digits, - and _, at most 100 of them".into()
+        })?;
+        require(wanted.repeats > 0, "repeats", 0, || "give at least 1".into())?;
+        require(wanted.limit_frames != Some(1), "limit_frames", 1, || {
+            "give at least 2, or 0 for no limit".into()
+        })?;
+        if let Some(data) = &data {
+            bases = vec![Base { label: data.name.clone(), document: Table::new() }];
+        }
+        let axes = axes(&bases, &wanted)?;
+        let mut plan = Self {
+            name: name.into(),
+            fields: axes.iter().flat_map(|(fields, _)| fields.clone()).collect(),
+            objectives: wanted.objectives,
+            bounds: wanted.bounds,
+            prices: wanted.prices,
+            data,
+            limit_frames: wanted.limit_frames,
+            train: wanted.train,
+            is_drawn: wanted.draw.is_some(),
+            build: build.into(),
+            bases,
+            set: fields::leaves(&wanted.set, &|_| false),
+            device: wanted.device,
+            axes,
+        };
+        let count =
+            plan.axes.iter().try_fold(1_usize, |all, (_, lines)| all.checked_mul(lines.len()));
+        let count = count.filter(|count| *count <= MOST_POINTS);
+        require(count.is_some(), "axes", "all values crossed", || {
+            format!("they are more than {MOST_POINTS} points; give fewer values, or draw some")
+        })?;
+        plan.check_fields()?;
+        plan.choose_objectives()?;
+        Ok(plan)
+    }
+
+    /// Checks the fields of the first point with every value of every axis in turn.
+    fn check_fields(&self) -> Checked<()> {
+        let check = |places: &[usize]| {
+            let (document, _) = self.document_at(places)?;
+            let (scene, device) = (text(&document.scene)?, document.device);
+            let checked = match &self.data {
+                None => Experiment::check_fields(&scene),
+                Some(data) => super::point::measured(data, &scene).map(drop),
+            };
+            let of = |message: String| {
+                let values =
+                    document.values.iter().map(|(field, value)| format!("{field} = {value}"));
+                let shown = values.collect::<Vec<_>>().join(", ");
+                BadValue::new(
+                    "axes, set",
+                    if shown.is_empty() { "base".into() } else { shown },
+                    message,
+                )
+            };
+            checked.map_err(|message| of(fields::with_nearest(&message)))?;
+            device_of(device).map(drop)
+        };
+        let first = vec![0; self.axes.len()];
+        check(&first)?;
+        for (axis, (_, lines)) in self.axes.iter().enumerate() {
+            for line in 1..lines.len().min(100) {
+                let mut places = first.clone();
+                places[axis] = line;
+                check(&places)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks objectives and bounds, and chooses objectives where none are given.
+    fn choose_objectives(&mut self) -> Checked<()> {
+        let names = if let Some(data) = &self.data {
+            data.training.outputs.names.clone()
+        } else {
+            // The first point may be impossible, and the base is not.
+            let (document, _) = self.document_at(&vec![0; self.axes.len()])?;
+            let base = self.bases.first().map_or(&document.scene, |base| &base.document);
+            let parse = |table: &Table| Experiment::parse(&self.name, &text(table).ok()?).ok();
+            let scene = parse(&document.scene).or_else(|| parse(base));
+            scene.map(|scene| scene.output_names()).unwrap_or_default()
+        };
+        let groups: Vec<&str> =
+            columns::groups(&names).into_iter().map(|(group, _)| group).collect();
+        let known = columns_of(self, &groups);
+        if self.objectives.is_empty() {
+            let error = if self.train { "rmse" } else { "limit" };
+            let of_last = groups.last().map(|group| format!("{error}_{group}"));
+            let time = if self.train { "frame_ms" } else { "scan_ms" };
+            self.objectives = of_last.into_iter().chain([time.into()]).collect();
+        }
+        let known: Vec<&str> = known.iter().map(String::as_str).collect();
+        if groups.is_empty() {
+            return Ok(());
+        }
+        for name in &self.objectives {
+            require_known("objectives", name, &known)?;
+        }
+        self.bounds.keys().try_for_each(|name| require_known("bounds", name, &known))
+    }
+
+    /// All points, each once.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a field that a scene of the plan cannot have.
+    pub fn points(&self) -> Checked<Vec<Point>> {
+        let mut seen = HashSet::new();
+        let mut points = Vec::new();
+        let mut places = vec![0; self.axes.len()];
+        loop {
+            let point = self.point(&places)?;
+            if seen.insert(point.id.clone()) {
+                points.push(point);
+            }
+            // The last axis is the fastest.
+            let Some(axis) =
+                (0..places.len()).rev().find(|axis| places[*axis] + 1 < self.axes[*axis].1.len())
+            else {
+                return Ok(points);
+            };
+            places[axis] += 1;
+            places[axis + 1..].fill(0);
+        }
+    }
+
+    fn point(&self, places: &[usize]) -> Checked<Point> {
+        let (document, mut shared) = self.document_at(places)?;
+        let scene = text(&document.scene)?;
+        shared.remove("training");
+        shared.remove("table1");
+        let (device, samples) = device_of(document.device)?;
+        let how = format!("{device:?} {samples} {:?} {}", self.limit_frames, self.train);
+        let data = self.data.as_ref().map_or(0, |data| data.digest);
+        let decides = format!("{}\n{how}\n{data:016x}\n{scene}", self.build);
+        Ok(Point {
+            id: format!("{:016x}", digest(decides.as_bytes())),
+            values: document.values,
+            shares: digest(format!("{how}\n{}", text(&shared)?).as_bytes()),
+            scene,
+            device,
+            samples,
+        })
+    }
+
+    /// Document of the point at these places of the axes, and its scene once more.
+    fn document_at(&self, places: &[usize]) -> Checked<(Document, Table)> {
+        let chosen = self.axes.iter().zip(places);
+        let values = chosen.flat_map(|((fields, lines), place)| {
+            fields.iter().cloned().zip(lines[*place].iter().cloned())
+        });
+        let values: Vec<(String, Value)> = values.collect();
+        let is_scene =
+            |base: &&Base| values.contains(&(SCENE.into(), Value::from(base.label.as_str())));
+        let base = self.bases.iter().find(is_scene).or(self.bases.first());
+        let mut document = base.map(|base| base.document.clone()).unwrap_or_default();
+        document.insert("device".into(), self.device.clone().into());
+        let changed = self.set.iter().chain(&values).filter(|(field, _)| field != SCENE);
+        for (field, value) in changed {
+            fields::set(&mut document, field, value.clone())?;
+        }
+        let device = match document.remove("device") {
+            Some(Value::Table(device)) => device,
+            _ => Table::new(),
+        };
+        Ok((Document { scene: document.clone(), device, values }, document))
+    }
+}
+
+/// Fields of a point.
+struct Document {
+    scene: Table,
+    device: Table,
+    values: Vec<(String, Value)>,
+}
+
+fn text(table: &Table) -> Checked<String> {
+    toml::to_string(table).map_err(|cause| BadValue::new("axes", "values", cause.to_string()))
+}
+
+/// Fields of a scene: a built-in one, or a file.
+pub fn document(name_or_path: &str) -> Result<Table> {
+    if !names_a_scene(name_or_path) {
+        // Its text is refused with the reason.
+        return Experiment::text(name_or_path).map(|_| Table::new());
+    }
+    let text = Experiment::text(name_or_path)?;
+    toml::from_str(&text)
+        .map_err(|cause| Error::of_scene(name_or_path, cause.to_string().trim_end()))
+}
+
+/// Device, and the number of samples averaged.
+fn device_of(mut table: Table) -> Checked<(Device, usize)> {
+    let samples = table.remove("samples").unwrap_or(Value::Integer(1));
+    let count = samples.as_integer().and_then(|count| usize::try_from(count).ok());
+    let count = count.filter(|count| (1..=usize::from(u16::MAX)).contains(count));
+    let count = count.ok_or_else(|| {
+        BadValue::new("device.samples", samples, "give a whole number, at least 1")
+    })?;
+    let shown = table.to_string().trim_end().replace('\n', ", ");
+    let device: Device = table.try_into().map_err(|cause: toml::de::Error| {
+        BadValue::new("device", shown, fields::with_nearest(cause.message()))
+    })?;
+    device.check().map_err(|bad| {
+        let field = format!("device.{}", bad.field.replace('-', "_"));
+        bad.named(&field)
+    })?;
+    Ok((device, count))
+}
+
+/// All axes: scenes, draws, seeds, and those that are crossed.
+fn axes(bases: &[Base], wanted: &Wanted) -> Checked<Vec<Lines>> {
+    let is_value = |value: &Value| value.get("from").is_some() || value.get("to").is_some();
+    let of = |table: &Table| {
+        let leaves = fields::leaves(table, &is_value).into_iter();
+        leaves.map(|(field, value)| Axis::new(&field, value)).collect::<Checked<Vec<Axis>>>()
+    };
+    let single = |field: &str, values: Vec<Value>| {
+        (vec![field.to_owned()], values.into_iter().map(|value| vec![value]).collect())
+    };
+    let mut axes = Vec::new();
+    if bases.len() > 1 {
+        let labels = bases.iter().map(|base| Value::from(base.label.as_str())).collect();
+        axes.push(single(SCENE, labels));
+    }
+    if let Some(draw) = &wanted.draw {
+        let drawn = of(&draw.axes)?;
+        require(!drawn.is_empty(), "draw.axes", "nothing", || "give at least one axis".into())?;
+        let allowed = (1..=MOST_POINTS).contains(&draw.points);
+        require(allowed, "draw.points", draw.points, || format!("give 1 to {MOST_POINTS}"))?;
+        let lines = latin_hypercube(&drawn, draw.points, draw.seed);
+        axes.push((drawn.into_iter().map(|axis| axis.field).collect(), lines));
+    }
+    if wanted.repeats > 1 {
+        let seed = |table: &Table| table.get(SEED).and_then(Value::as_integer);
+        let first = seed(&wanted.set).or_else(|| seed(&bases.first()?.document)).unwrap_or(1);
+        let seeds = (first..).take(wanted.repeats).map(Value::Integer).collect();
+        axes.push(single(SEED, seeds));
+    }
+    for axis in of(&wanted.axes)? {
+        axes.push(single(&axis.field, axis.all()?));
+    }
+    let fields: Vec<&String> = axes.iter().flat_map(|(fields, _)| fields).collect();
+    let twice = fields.iter().enumerate().find(|(at, field)| fields[..*at].contains(field));
+    match twice {
+        Some((_, field)) => Err(BadValue::new("axes", field, "it is an axis twice; give it once")),
+        None => Ok(axes),
+    }
+}
+
+/// Checks the names at the top of a plan: serde does not, where fields are flattened.
+fn check_top(text: &str) -> std::result::Result<(), String> {
+    const KNOWN: [&str; 13] = [
+        "name",
+        "scene",
+        "data",
+        "limit_frames",
+        "train",
+        "repeats",
+        "objectives",
+        "bounds",
+        "device",
+        "prices",
+        "set",
+        "axes",
+        "draw",
+    ];
+    let Ok(table) = toml::from_str::<Table>(text) else { return Ok(()) };
+    let known = table.keys().try_for_each(|key| require_known("field", key, &KNOWN));
+    known.map_err(|bad| bad.to_string())
+}

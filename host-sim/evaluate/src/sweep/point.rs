@@ -1,0 +1,217 @@
+//! What a point is worth: its scan, its limit, its model, and what that costs.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use taxel_core::rbf::Format;
+use taxel_data::Silent;
+use taxel_learn::Exponential;
+use taxel_learn::cost::{DecoderRam, Design, Prices};
+use taxel_learn::train::Widths;
+use taxel_limit::{Reference, Refusal};
+use taxel_simulate::World;
+
+use super::fields::nearest;
+use super::plan::{Plan, Point};
+use crate::error::Result;
+use crate::evaluate::trade::Wires;
+use crate::experiment::Experiment;
+use crate::measurements::Measurements;
+use crate::metrics::{self, Measure};
+use crate::subject::Subject;
+
+/// Results of a point by their names, such as `rmse_dz_mm`, and remarks on them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Results {
+    pub values: BTreeMap<String, f64>,
+    pub notes: Vec<String>,
+}
+
+impl Results {
+    fn add(&mut self, name: &str, value: Option<f64>) {
+        if let Some(value) = value.filter(|value| value.is_finite()) {
+            self.values.insert(name.into(), value);
+        }
+    }
+}
+
+/// Results that do not belong to a group of outputs, in the order of tables.
+const GENERAL: [&str; 12] = [
+    "rows",
+    "columns",
+    "area_cm2",
+    "cost_eur",
+    "scan_ms",
+    "decode_ms",
+    "frame_ms",
+    "frames_per_s",
+    "age_ms",
+    "cycles",
+    "blob_bytes",
+    "ram_bytes",
+];
+/// Results of each group of outputs, in the order of tables.
+const OF_GROUP: [&str; 4] = ["limit", "limit_standard_error", "rmse", "ratio_to_limit"];
+
+/// Names of all results that points of a plan may have, whose outputs are in these groups.
+pub fn columns_of(plan: &Plan, groups: &[&str]) -> Vec<String> {
+    let of_groups = groups.iter().flat_map(|group| OF_GROUP.map(|name| format!("{name}_{group}")));
+    let general = GENERAL.iter().filter(|name| plan.prices.is_some() || **name != "cost_eur");
+    general.map(|name| (*name).into()).chain(of_groups).collect()
+}
+
+/// Place of a result in tables.
+pub fn place_of(name: &str) -> (usize, &str, usize) {
+    if let Some(place) = GENERAL.iter().position(|known| *known == name) {
+        return (place, "", 0);
+    }
+    // The longest name that fits: `limit_standard_error_…` begins with `limit_…`.
+    let prefixes = OF_GROUP
+        .iter()
+        .enumerate()
+        .filter_map(|(place, prefix)| Some((place, name.strip_prefix(prefix)?.strip_prefix('_')?)));
+    let found = prefixes.min_by_key(|(_, group)| group.len());
+    found.map_or((usize::MAX, name, 0), |(place, group)| (GENERAL.len(), group, place))
+}
+
+/// Whether a result is an error of an estimate.
+pub fn is_error(name: &str) -> bool {
+    ["limit_", "rmse_", "ratio_to_limit_"].iter().any(|start| name.starts_with(start))
+}
+
+/// Limit of a world, which points share that differ only in their training.
+#[derive(Debug, Default)]
+pub struct Shared(Option<(World, usize, std::result::Result<Reference, Refusal>)>);
+
+impl Shared {
+    /// Limit on the first `frames` test frames of a world.
+    fn limit(&mut self, world: &World, frames: usize) -> std::result::Result<Reference, Refusal> {
+        match &self.0 {
+            Some((known, of, limit)) if known == world && *of == frames => limit.clone(),
+            _ => {
+                let limit = Reference::new(world, frames, &Silent);
+                self.0 = Some((world.clone(), frames, limit.clone()));
+                limit
+            }
+        }
+    }
+}
+
+/// Computes a point of the plan.
+///
+/// # Errors
+/// [`Error`](crate::Error) for a scene that does not hold, and for a model that cannot be trained.
+pub fn compute(plan: &Plan, point: &Point, shared: &mut Shared) -> Result<Results> {
+    let mut subject = match &plan.data {
+        None => Subject::Scene(Box::new(Experiment::parse("of the point", &point.scene)?)),
+        Some(data) => Subject::Measured(Box::new(
+            measured(data, &point.scene)
+                .map_err(|message| taxel_data::Error::unfit(format!("training: {message}")))?,
+        )),
+    };
+    let mut results = Results::default();
+    let wires = match &subject {
+        Subject::Scene(scene) => Some(Wires::of(&scene.world)),
+        Subject::Measured(data) => Wires::named(&data.training.inputs.names),
+    };
+    let scan_ms = point.device.scan_ms(wires, point.samples);
+    results.add("rows", wires.map(|wires| wires.rows as f64));
+    results.add("columns", wires.map(|wires| wires.columns as f64));
+    results.add("scan_ms", scan_ms);
+    let mut limit = None;
+    if let Subject::Scene(scene) = &mut subject {
+        let world = &mut scene.world;
+        let [x_mm, y_mm, _] = world.sensor.size_mm;
+        results.add("area_cm2", Some(x_mm * y_mm / 100.0));
+        world.noise = point.device.averaged(world.noise, wires, point.samples);
+        let frames = plan.limit_frames.unwrap_or_else(|| Reference::few_frames(world));
+        if frames > 0 && !scene.is_forward() {
+            match shared.limit(&scene.world, frames) {
+                Ok(found) => limit = Some(found),
+                Err(refusal) => results.notes.push(format!("no limit: {refusal}")),
+            }
+        }
+    }
+    for group in limit.iter().flat_map(Reference::limits) {
+        results.add(&format!("limit_{}", group.group), Some(group.limit));
+        results.add(
+            &format!("limit_standard_error_{}", group.group),
+            Some(group.limit_standard_error),
+        );
+    }
+    if !plan.train {
+        return Ok(results);
+    }
+    let own = match &subject {
+        Subject::Scene(scene) => scene.measure(),
+        Subject::Measured(data) => data.measure(),
+    };
+    let measure = Measure { limit, ..own };
+    let (training, test) = subject.sets(None);
+    let blob = training.blob(&subject.options(), &Silent)?;
+    let model = blob.prepare(Exponential::default()).of_inputs();
+    for errors in metrics::judge(&model, &test, &measure).errors {
+        results.add(&format!("rmse_{}", errors.group), Some(errors.rmse));
+        results.add(&format!("ratio_to_limit_{}", errors.group), errors.ratio_to_limit);
+    }
+    let design = Design::new(&blob);
+    let cost = Prices::accepted()?.frames(&design, Exponential::default())?.ungated;
+    let times = point.device.times(scan_ms, &cost);
+    results.add("decode_ms", Some(times.decode_ms));
+    results.add("frame_ms", Some(times.frame_ms));
+    results.add("frames_per_s", Some(times.frames_per_s));
+    results.add("age_ms", times.age_ms);
+    results.add("cycles", Some(point.device.cycles(&cost) as f64));
+    results.add("blob_bytes", Some(blob.bytes().len() as f64));
+    results.add("ram_bytes", Some(DecoderRam::new(&design).bytes() as f64));
+    Ok(results)
+}
+
+/// Fields that a plan may change in the training on measurements.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MeasuredFile {
+    seed: Option<u64>,
+    training: Option<TrainingFile>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct TrainingFile {
+    centres: Option<usize>,
+    spread: Option<f64>,
+    widths: Option<Widths>,
+    affine_tail: Option<bool>,
+    format: Option<String>,
+    whole_array: Option<bool>,
+    features: Option<usize>,
+    output_rank: Option<usize>,
+    refine: Option<bool>,
+    confidence: Option<bool>,
+}
+
+/// Measurements, trained on as the fields in `text` say.
+///
+/// # Errors
+/// The reason, in serde's words.
+pub fn measured(data: &Measurements, text: &str) -> std::result::Result<Measurements, String> {
+    let file: MeasuredFile = toml::from_str(text).map_err(|cause| cause.message().to_owned())?;
+    let mut data = data.clone();
+    let (t, options) = (file.training.unwrap_or_default(), &mut data.options);
+    options.seed = file.seed.unwrap_or(options.seed);
+    options.centres = t.centres.unwrap_or(options.centres);
+    options.spread = t.spread.unwrap_or(options.spread);
+    options.widths = t.widths.unwrap_or(options.widths);
+    options.affine_tail = t.affine_tail.unwrap_or(options.affine_tail);
+    if let Some(name) = &t.format {
+        let known = Format::ALL.map(Format::name);
+        let unknown = || format!("unknown format `{name}`; {}", nearest(name, &known));
+        options.format = Format::from_name(name).ok_or_else(unknown)?;
+    }
+    options.whole_array = t.whole_array.unwrap_or(options.whole_array);
+    options.features = t.features.or(options.features);
+    options.output_rank = t.output_rank.or(options.output_rank);
+    data.refine = t.refine.unwrap_or(data.refine);
+    data.confidence = t.confidence.unwrap_or(data.confidence);
+    Ok(data)
+}

@@ -1,0 +1,155 @@
+//! Work on the points of a shard, on all threads.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use std::time::Instant;
+
+use taxel_data::Progress;
+
+use super::plan::{Plan, Point};
+use super::point::{self, Shared};
+use super::store::{Found, Record, Store};
+use crate::error::{Error, Result};
+
+/// What came of the work on a shard.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Worked {
+    pub computed: usize,
+    /// Points that were there already.
+    pub skipped: usize,
+    /// Points that cannot be computed, and why.
+    pub failed: Vec<String>,
+    /// Files that were no results of their points, and are replaced.
+    pub replaced: Vec<String>,
+}
+
+/// Computes the points in `groups`, indices of `points`, and keeps each that is done; those that are there already are
+/// left alone. Points of a group share their limit.
+///
+/// Groups are worked on side by side. Threads that are left over compute within a group.
+///
+/// # Errors
+/// [`Error`] for a result that cannot be read or written; those of others are kept.
+pub fn run(
+    plan: &Plan,
+    points: &[Point],
+    groups: &[Vec<usize>],
+    store: &Store,
+    progress: &dyn Progress,
+) -> Result<Worked> {
+    let mut worked = Worked::default();
+    let mut left = Vec::new();
+    for group in groups {
+        let mut missing = Vec::new();
+        for index in group {
+            match store.find(plan, &points[*index])? {
+                Found::Whole(record) => {
+                    worked.skipped += 1;
+                    worked.failed.extend(of_failed(&points[*index], &record));
+                }
+                Found::Missing => missing.push(*index),
+                Found::Unusable(why) => {
+                    let path = store.path(&points[*index].id);
+                    worked.replaced.push(format!("{}: {why}", path.display()));
+                    missing.push(*index);
+                }
+            }
+        }
+        left.extend((!missing.is_empty()).then_some(missing));
+    }
+    let records = Mutex::new(&mut worked);
+    let keep = |index: usize, record: &Record| {
+        store.write(record)?;
+        progress.step();
+        let mut worked = records.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        worked.computed += 1;
+        worked.failed.extend(of_failed(&points[index], record));
+        Ok(())
+    };
+    progress.stage("sweep", left.iter().map(Vec::len).sum());
+    each(plan, points, &left, &keep)?;
+    Ok(worked)
+}
+
+/// Computes all points, and returns their records in their order.
+///
+/// # Errors
+/// [`Error`] for threads that cannot be started.
+pub fn in_memory(plan: &Plan, points: &[Point], progress: &dyn Progress) -> Result<Vec<Record>> {
+    let records = Mutex::new(vec![None; points.len()]);
+    progress.stage("compare", points.len());
+    let keep = |index: usize, record: &Record| {
+        progress.step();
+        records.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[index] =
+            Some(record.clone());
+        Ok(())
+    };
+    each(plan, points, &super::Shard::WHOLE.groups(points), &keep)?;
+    let records = records.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    Ok(records.into_iter().flatten().collect())
+}
+
+/// Seconds that a point takes on one core by itself, and its results: what others would share is counted.
+///
+/// # Errors
+/// [`Error`] for a thread that cannot be started.
+pub fn on_one_core(plan: &Plan, point: &Point) -> Result<(f64, Result<point::Results>)> {
+    let built = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let pool = built.map_err(|cause| Error::failed(format!("cannot start a thread: {cause}")))?;
+    let begun = Instant::now();
+    let outcome = pool.install(|| point::compute(plan, point, &mut Shared::default()));
+    Ok((begun.elapsed().as_secs_f64(), outcome))
+}
+
+/// Number of threads that work here.
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
+fn of_failed(point: &Point, record: &Record) -> Option<String> {
+    record.failed.as_ref().map(|why| format!("{} ({}): {why}", point.id, point.in_words()))
+}
+
+/// Computes the points of all groups, and hands each record to `keep` as soon as it is there.
+fn each(
+    plan: &Plan,
+    points: &[Point],
+    groups: &[Vec<usize>],
+    keep: &(dyn Fn(usize, &Record) -> Result<()> + Sync),
+) -> Result<()> {
+    let threads = rayon::current_num_threads();
+    let workers = threads.min(groups.len()).max(1);
+    let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let work = || -> Result<()> {
+        while let Some(group) = groups.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let mut shared = Shared::default();
+            for index in group {
+                if stop.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
+                let outcome = point::compute(plan, &points[*index], &mut shared);
+                let kept = keep(*index, &Record::new(plan, &points[*index], outcome));
+                if kept.is_err() {
+                    stop.store(true, Ordering::Relaxed);
+                    return kept;
+                }
+            }
+        }
+        Ok(())
+    };
+    let pool = |worker: usize| {
+        let own = threads / workers + usize::from(worker < threads % workers);
+        let built = rayon::ThreadPoolBuilder::new().num_threads(own).build();
+        built.map_err(|cause| Error::failed(format!("cannot start threads: {cause}")))
+    };
+    let pools = (0..workers).map(pool).collect::<Result<Vec<_>>>()?;
+    std::thread::scope(|scope| {
+        let running: Vec<_> = pools.iter().map(|pool| scope.spawn(|| pool.install(work))).collect();
+        let outcomes = running.into_iter().map(|thread| match thread.join() {
+            Ok(outcome) => outcome,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        outcomes.collect::<Vec<_>>().into_iter().collect()
+    })
+}

@@ -1,0 +1,168 @@
+//! Command `compare`: layouts side by side, by their least possible error, the best decoder, and what both cost.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::report::result_text;
+use crate::sweep::merge::Setting;
+use crate::sweep::plan::{Base, Bound, SCENE, SEED, Wanted};
+use crate::sweep::{Merged, Plan, layouts, work};
+use crate::{Error, Result};
+use clap::Args;
+use toml::Value;
+
+use super::merged::{self, Files};
+use super::progress::Terminal;
+use super::trade::ReadoutOption;
+use super::{Common, arguments, command_line, print};
+
+/// Compare layouts of a sensor: the least possible error, the best decoder, its scan and its cost.
+///
+/// A scene may have lists where a value is expected, such as `pitch_mm = [3, 4, 5]`: it is then as many layouts, all lists
+/// crossed. Of every layout the most accurate of its decoders is chosen, within the bound.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-sim compare thin.toml thick.toml
+  host-sim compare layouts.toml --centres 32,64,128 --average 1,4 --max-latency-ms 10 -o out/layouts")]
+pub struct Arguments {
+    /// Scenes: built-in ones (paper, press, contact, moving), or scene files (.toml).
+    #[arg(required = true)]
+    scenes: Vec<String>,
+    /// Centres K to try for each layout, instead of the scene's.
+    #[arg(long, value_name = "K,…", value_delimiter = ',')]
+    centres: Vec<usize>,
+    /// Numbers of samples averaged for each reading, to try.
+    #[arg(long, value_name = "N,…", value_delimiter = ',')]
+    average: Vec<usize>,
+    /// Readout of the board (docs/board.md).
+    #[arg(long, value_enum, default_value_t = ReadoutOption::Spi)]
+    readout: ReadoutOption,
+    /// Most time in ms from the start of a scan to its estimate.
+    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    max_latency_ms: Option<f64>,
+    /// Outputs that determine the choice, such as dz_mm [default: the last].
+    #[arg(long, value_name = "GROUP")]
+    group: Option<String>,
+    /// Train nothing: the least possible error and the scan alone.
+    #[arg(long, conflicts_with_all = ["centres", "max_latency_ms"])]
+    limit_only: bool,
+    /// Folder that receives compare.csv, compare.json, a page compare.html and pictures.
+    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
+    output: Option<PathBuf>,
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    let files = arguments
+        .output
+        .as_ref()
+        .map(|folder| Files::of(&folder.join("compare.csv")))
+        .transpose()?;
+    let inputs: Vec<&Path> = arguments.scenes.iter().map(Path::new).collect();
+    files.as_ref().map_or(Ok(()), |files| files.check(&inputs))?;
+    let bases = arguments.scenes.iter().map(|scene| layouts::of_scene(scene));
+    let bases: Vec<Base> = bases.collect::<Result<Vec<_>>>()?.concat();
+    let labels: BTreeSet<&str> = bases.iter().map(|base| base.label.as_str()).collect();
+    if labels.len() < bases.len() {
+        return Err(Error::Usage("a scene is given twice; give each once".into()));
+    }
+    let plan = Plan::new("compare", (bases, None), wanted(arguments, common), "")?;
+    let points = plan.points()?;
+    let records = work::in_memory(&plan, &points, &Terminal::new())?;
+    let merged = Merged::new(&plan, &points, records, vec![]);
+    if let Some(first) = merged.failed().next().filter(|_| merged.settings.is_empty()) {
+        return Err(Error::Usage(first.failed.clone().unwrap_or_default()));
+    }
+    if let Some(files) = &files {
+        files.write(&merged, &command_line::of_this_process("compare", &[], common.seed))?;
+    }
+    print::result(common, &merged, || {
+        let mut page = print::Page::default();
+        table(&mut page, &merged);
+        if let Some(files) = &files {
+            page.line(format_args!("\nwritten: {}", files.names()));
+        }
+        page
+    })
+}
+
+/// What is wanted of the layouts.
+fn wanted(arguments: &Arguments, common: &Common) -> Wanted {
+    let list = |values: &[usize]| {
+        Value::Array(
+            values
+                .iter()
+                .map(|it| Value::Integer(i64::try_from(*it).unwrap_or(i64::MAX)))
+                .collect(),
+        )
+    };
+    let mut wanted = Wanted { train: !arguments.limit_only, ..Wanted::default() };
+    let mut axes =
+        [("training.centres", &arguments.centres), ("device.samples", &arguments.average)];
+    axes.iter_mut().filter(|(_, values)| !values.is_empty()).for_each(|(field, values)| {
+        wanted.axes.insert((*field).into(), list(values));
+    });
+    if let ReadoutOption::Onchip = arguments.readout {
+        wanted.device.insert("readout".into(), "onchip".into());
+    }
+    if let Some(seed) = common.seed {
+        wanted.set.insert("seed".into(), Value::Integer(i64::try_from(seed).unwrap_or(i64::MAX)));
+    }
+    if let Some(group) = &arguments.group {
+        let [error, time] = if wanted.train { ["rmse", "frame_ms"] } else { ["limit", "scan_ms"] };
+        wanted.objectives = vec![format!("{error}_{group}"), time.into()];
+    }
+    wanted
+        .bounds
+        .extend(arguments.max_latency_ms.map(|most| ("frame_ms".into(), Bound::Most(most))));
+    wanted
+}
+
+/// Prints a line for each layout: its least possible errors, and its best decoder.
+fn table(page: &mut print::Page, merged: &Merged) {
+    let scene = |setting: &Setting| match setting.values.get(SCENE) {
+        Some(serde_json::Value::String(label)) => label.clone(),
+        _ => merged.settings.first().map_or(String::new(), |_| "the scene".into()),
+    };
+    let mut layouts: Vec<String> = Vec::new();
+    for setting in &merged.settings {
+        if !layouts.contains(&scene(setting)) {
+            layouts.push(scene(setting));
+        }
+    }
+    let limits: Vec<&String> = merged
+        .columns
+        .iter()
+        .filter(|name| name.starts_with("limit_") && !name.starts_with("limit_standard_error_"))
+        .collect();
+    let error = merged.objectives.first().map_or("", String::as_str);
+    let others = ["rows", "columns", "area_cm2", "scan_ms", "frame_ms", "blob_bytes"];
+    let others = others.iter().filter(|name| merged.columns.iter().any(|known| known == *name));
+    let limits = limits.into_iter().map(String::as_str);
+    let mut columns: Vec<&str> = others.copied().chain(limits).chain([error]).collect();
+    columns.dedup();
+    let mut fields: Vec<&str> = merged.fields.iter().map(String::as_str).collect();
+    fields.retain(|field| ![SCENE, SEED].contains(field));
+    let heads = ["layout"].into_iter().chain(columns.iter().copied()).chain(fields.iter().copied());
+    let mut lines: Vec<Vec<String>> = vec![heads.map(String::from).collect()];
+    for layout in &layouts {
+        let own = merged.settings.iter().filter(|setting| scene(setting) == *layout);
+        let within = own.filter(|setting| setting.is_within);
+        // A layout with other outputs has its limit and its first decoder.
+        let error_of =
+            |setting: &&Setting| setting.results.get(error).copied().unwrap_or(f64::INFINITY);
+        let best = within.min_by(|a, b| error_of(a).total_cmp(&error_of(b)));
+        let result = |name: &&str| best.map_or("-".into(), |best| result_text(best, name));
+        let value = |field: &&str| {
+            best.and_then(|best| best.values.get(*field)).map_or("-".into(), ToString::to_string)
+        };
+        let cells = columns.iter().map(result).chain(fields.iter().map(value));
+        lines.push([layout.clone()].into_iter().chain(cells).collect());
+    }
+    merged::table(page, &lines);
+    if lines.iter().any(|line| line.iter().skip(1).all(|cell| cell == "-")) {
+        page.line("-: no decoder of the layout is within the bound");
+    }
+    for failed in merged.failed() {
+        page.line(format_args!("failed: {}", failed.failed.as_deref().unwrap_or_default()));
+    }
+}

@@ -1,0 +1,236 @@
+//! Command `sweep`: all points of a plan, here or in shards on other machines.
+
+use std::path::{Path, PathBuf};
+
+use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
+use crate::{Error, Result};
+use clap::{Args, Parser};
+use serde::Serialize;
+use taxel_data::digest::digest;
+
+use super::merged::{self, Files};
+use super::progress::Terminal;
+use super::subject_argument::SubjectArgument;
+use super::{Common, arguments, command_line, print, stderr};
+
+mod schedule;
+mod estimate;
+
+/// Compute every point of a plan: many scenes, devices and models, here or on many machines.
+///
+/// A plan (docs/sweeps.md) has a scene and axes. Every point becomes a file in DIR/points, which is whole or not there. What is
+/// there already is not computed again, so a sweep that was stopped goes on. When all points are there, results.csv,
+/// results.json, results.html and two pictures are written to DIR.
+///
+/// On a cluster, every machine computes a shard (--shard, or --shards in an array of Slurm or HyperQueue, or in GNU parallel),
+/// and --merge reads what all of them wrote. Results do not depend on how the plan was cut.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-sim sweep cluster/plans/small.toml
+  host-sim sweep plan.toml --list
+  host-sim sweep plan.toml --dry-run
+  host-sim sweep plan.toml --shard 3/8 -o out/plan
+  host-sim sweep plan.toml --merge out/plan -o results.csv")]
+pub struct Arguments {
+    /// Plan (.toml).
+    plan: PathBuf,
+    /// Folder of the sweep [default: out/NAME, after the plan's name]; with --merge the file for the table of results
+    /// (.csv), beside which the others are written [default: results.csv in the folder].
+    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
+    output: Option<PathBuf>,
+    /// Print identity and fields of every point, and compute nothing.
+    #[arg(long, conflicts_with_all = ["merge", "dry_run", "output"])]
+    list: bool,
+    /// Compute only this part of the points, such as 3/8: the third of eight.
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["merge", "dry_run"])]
+    shard: Option<Shard>,
+    /// Compute only one of so many parts: the one that the scheduler names (`SLURM_ARRAY_TASK_ID`, `HQ_TASK_ID` or
+    /// `PARALLEL_SEQ`, from 1) [default, in an array of Slurm: its number of tasks].
+    #[arg(long, value_name = "N", conflicts_with_all = ["shard", "merge", "dry_run"])]
+    shards: Option<usize>,
+    /// Read the results in this folder of a sweep, and write them as a table, a page and pictures.
+    #[arg(long, value_name = "DIR", conflicts_with = "dry_run", value_parser = arguments::folder())]
+    merge: Option<PathBuf>,
+    /// Compute a few points, and say how long all would take and how much memory.
+    #[arg(long, conflicts_with = "output")]
+    dry_run: bool,
+}
+
+/// Options of measurements, as a plan has them.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct DataOptions {
+    #[command(flatten)]
+    subject: SubjectArgument,
+}
+
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+    if common.seed.is_some() {
+        let message = "--seed: a plan has its own seeds; give `repeats`, or `seed` in [set]";
+        return Err(Error::Usage(message.into()));
+    }
+    let load = |words: &[String]| {
+        let options = DataOptions::try_parse_from(words)
+            .map_err(|cause| Error::Usage(format!("data: {}", cause.to_string().trim_end())))?;
+        options.subject.load(common)
+    };
+    let plan = Plan::read(&arguments.plan, &build()?, &load)?;
+    let points = plan.points()?;
+    if arguments.dry_run {
+        return estimate::execute(&plan, &points, common);
+    }
+    if let Some(folder) = &arguments.merge {
+        let table = arguments.output.clone().unwrap_or_else(|| folder.join(RESULTS));
+        return merge(&plan, &points, folder, &table, arguments, common);
+    }
+    let shard = schedule::shard(arguments.shard, arguments.shards)?;
+    if arguments.list {
+        return list(&plan, &points, shard, common);
+    }
+    let folder = arguments.output.clone().unwrap_or_else(|| Path::new("out").join(&plan.name));
+    let store = store(&folder);
+    let table = folder.join(RESULTS);
+    if shard.is_none() {
+        Files::of(&table)?.check(&[&arguments.plan])?;
+    }
+    let groups = shard.unwrap_or(Shard::WHOLE).groups(&points);
+    let worked = work::run(&plan, &points, &groups, &store, &Terminal::new())?;
+    for replaced in &worked.replaced {
+        stderr::remark(format_args!("note: {replaced}; it is computed anew"));
+    }
+    match shard {
+        None => merge(&plan, &points, &folder, &table, arguments, common),
+        Some(shard) => {
+            worked
+                .failed
+                .iter()
+                .for_each(|failed| stderr::remark(format_args!("warning: {failed}")));
+            let summary = ShardSummary {
+                plan: &plan.name,
+                shard: shard.to_string(),
+                points: worked.computed + worked.skipped,
+                computed: worked.computed,
+                there_already: worked.skipped,
+                failed: worked.failed.len(),
+            };
+            print::result(common, &summary, || print::Page::of(&summary))
+        }
+    }
+}
+
+/// Table of results in the folder of a sweep.
+const RESULTS: &str = "results.csv";
+
+fn store(folder: &Path) -> Store {
+    Store::new(&folder.join("points"))
+}
+
+/// What came of a shard.
+#[derive(Serialize)]
+struct ShardSummary<'s> {
+    plan: &'s str,
+    shard: String,
+    points: usize,
+    computed: usize,
+    there_already: usize,
+    failed: usize,
+}
+
+impl std::fmt::Display for ShardSummary<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{}, shard {}: {} points, {} computed, {} there already, {} failed",
+            self.plan, self.shard, self.points, self.computed, self.there_already, self.failed
+        )
+    }
+}
+
+/// Version of this program, and a digest of it: another one may compute something else.
+fn build() -> Result<String> {
+    let failed = |cause| Error::failed(format!("cannot read the program's own file: {cause}"));
+    let bytes = std::env::current_exe().and_then(std::fs::read).map_err(failed)?;
+    Ok(format!("host-sim {} {:016x}", env!("CARGO_PKG_VERSION"), digest(&bytes)))
+}
+
+#[derive(Serialize)]
+struct Listed<'l> {
+    plan: &'l str,
+    points: Vec<ListedPoint<'l>>,
+}
+
+#[derive(Serialize)]
+struct ListedPoint<'l> {
+    id: &'l str,
+    values: std::collections::BTreeMap<&'l str, &'l toml::Value>,
+}
+
+fn list(plan: &Plan, points: &[Point], shard: Option<Shard>, common: &Common) -> Result<()> {
+    let shown: Vec<&Point> = match shard {
+        None => points.iter().collect(),
+        Some(shard) => shard.groups(points).concat().into_iter().map(|i| &points[i]).collect(),
+    };
+    let all = shown.iter().map(|point| ListedPoint {
+        id: &point.id,
+        values: point.values.iter().map(|(field, value)| (field.as_str(), value)).collect(),
+    });
+    let listed = Listed { plan: &plan.name, points: all.collect() };
+    print::result(common, &listed, || {
+        let mut page = print::Page::default();
+        shown
+            .iter()
+            .for_each(|point| page.line(format_args!("{}  {}", point.id, point.in_words())));
+        page
+    })
+}
+
+/// Writes the results of all points that are there, and names those that are not.
+fn merge(
+    plan: &Plan,
+    points: &[Point],
+    folder: &Path,
+    table: &Path,
+    arguments: &Arguments,
+    common: &Common,
+) -> Result<()> {
+    const NAMED: usize = 10;
+    let files = Files::of(table)?;
+    files.check(&[&arguments.plan])?;
+    let store = store(folder);
+    let merged = Merged::read(plan, points, &store)?;
+    let others = store.others(points);
+    if !others.is_empty() {
+        let first = others.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        stderr::remark(format_args!(
+            "note: {} files in {} belong to no point of this plan and program, and are left out: {first}{}",
+            others.len(),
+            folder.join("points").display(),
+            if others.len() > NAMED { ", …" } else { "" }
+        ));
+    }
+    for failed in merged.failed().take(NAMED) {
+        let why = failed.failed.as_deref().unwrap_or_default();
+        stderr::remark(format_args!("warning: point {} failed: {why}", failed.id));
+    }
+    if merged.points.iter().all(|point| point.failed.is_some()) && !merged.points.is_empty() {
+        return Err(Error::failed("every point failed; the warnings say why"));
+    }
+    let command = command_line::of_this_process("sweep", &[], None);
+    files.write(&merged, &command)?;
+    print::result(common, &merged, || {
+        let mut page = merged::page(&merged);
+        page.line(format_args!("\nwritten: {}", files.names()));
+        page
+    })?;
+    let missing = merged.missing.len();
+    if missing == 0 {
+        return Ok(());
+    }
+    let first =
+        merged.missing.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+    Err(Error::failed(format!(
+        "{missing} of {} points are missing, and the files have only the others: {first}{}; run their shards, then merge again",
+        points.len(),
+        if missing > NAMED { ", …" } else { "" }
+    )))
+}

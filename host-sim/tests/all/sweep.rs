@@ -1,0 +1,284 @@
+//! Sweeps: what comes out does not depend on how a plan was cut, and nothing is mixed that does not belong together.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use serde_json::Value;
+
+use crate::common::{Folder, small_scene};
+
+/// Plan of four points of `scene.toml`, two of which share their limit.
+pub const PLAN: &str = "name = \"tiny\"\nscene = \"scene.toml\"\nlimit_frames = 4\nobjectives = [\"rmse_dz_mm\", \"frame_ms\"]\n\
+                        [axes]\nnoise.level = [0.005, 0.02]\ntraining.centres = [4, 8]\n";
+
+pub fn tiny_scene() -> String {
+    small_scene()
+        .replace("frames = 3000", "frames = 200")
+        .replace("test_frames = 500", "test_frames = 50")
+}
+
+fn prepared(name: &str) -> Folder {
+    let folder = Folder::new(name);
+    folder.write("scene.toml", tiny_scene());
+    folder.write("plan.toml", PLAN);
+    folder
+}
+
+/// Files of points in a sweep's folder, by name.
+fn points(folder: &Folder, of: &str) -> BTreeMap<String, Vec<u8>> {
+    let entries = fs::read_dir(folder.path(of).join("points")).unwrap().map(Result::unwrap);
+    entries
+        .map(|it| (it.file_name().into_string().unwrap(), fs::read(it.path()).unwrap()))
+        .collect()
+}
+
+fn read(folder: &Folder, name: &str) -> String {
+    fs::read_to_string(folder.path(name)).unwrap()
+}
+
+#[test]
+fn any_shards_give_what_one_process_gives() {
+    let folder = prepared("sweep_shards");
+    let said = folder.succeed(&["sweep", "plan.toml", "-o", "whole"]);
+    assert!(said.contains("4 points, 4 settings"), "{said}");
+    let whole = points(&folder, "whole");
+    assert_eq!(whole.len(), 4);
+    for count in [2, 3, 7] {
+        let of = format!("of{count}");
+        for index in 1..=count {
+            // One thread here and two there: bits do not depend on it.
+            let shard = format!("{index}/{count}");
+            let out =
+                folder.run_with_threads(&["sweep", "plan.toml", "--shard", &shard, "-o", &of], 1);
+            assert!(out.status.success(), "{out:?}");
+        }
+        assert_eq!(points(&folder, &of), whole);
+        folder.succeed(&["sweep", "plan.toml", "--merge", &of, "-o", "merged.csv"]);
+        assert_eq!(read(&folder, "merged.csv"), read(&folder, "whole/results.csv"));
+    }
+    let table = read(&folder, "merged.csv");
+    assert!(
+        table.starts_with("id,noise.level,training.centres,rows,columns,area_cm2,scan_ms,"),
+        "{table}"
+    );
+    assert_eq!(table.lines().count(), 5);
+    for name in ["merged.json", "merged.html", "merged-front.svg", "merged-effects.svg"] {
+        assert!(read(&folder, name).len() > 400, "{name}");
+    }
+    let page = read(&folder, "merged.html");
+    assert!(page.contains("Pareto front") && page.contains("href=\"merged.csv\""));
+    // The scene of a setting on the front is a scene.
+    let merged: Value = serde_json::from_str(&read(&folder, "merged.json")).unwrap();
+    let front =
+        merged["settings"].as_array().unwrap().iter().find(|it| it["on_front"] == true).unwrap();
+    folder.write("best.toml", front["scene"].as_str().unwrap());
+    folder.succeed(&["synth", "best.toml", "-n", "2", "-o", "best.csv"]);
+}
+
+#[test]
+fn a_sweep_goes_on_where_it_was_stopped() {
+    let folder = prepared("sweep_resumed");
+    folder.succeed(&["sweep", "plan.toml", "--shard", "1/2"]);
+    let first = points(&folder, "out/tiny");
+    assert_eq!(first.len(), 2);
+    let missing = folder.fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1);
+    assert!(missing.contains("2 of 4 points are missing"), "{missing}");
+    let begun =
+        first.keys().map(|name| fs::metadata(folder.path("out/tiny/points").join(name)).unwrap());
+    let begun: Vec<_> = begun.map(|it| it.modified().unwrap()).collect();
+    let text = folder.succeed(&["sweep", "plan.toml", "--shard", "1/1", "--json"]);
+    let text: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&text["computed"], &text["there_already"]), (&2.into(), &2.into()));
+    let kept =
+        first.keys().map(|name| fs::metadata(folder.path("out/tiny/points").join(name)).unwrap());
+    assert_eq!(
+        kept.map(|it| it.modified().unwrap()).collect::<Vec<_>>(),
+        begun,
+        "not written again"
+    );
+    folder.succeed(&["sweep", "plan.toml", "--merge", "out/tiny"]);
+}
+
+#[test]
+fn a_file_that_is_no_result_is_refused_by_name_and_replaced() {
+    let folder = prepared("sweep_damaged");
+    folder.succeed(&["sweep", "plan.toml"]);
+    let whole = points(&folder, "out/tiny");
+    let names: Vec<&String> = whole.keys().collect();
+    let path = |name: &str| folder.path("out/tiny/points").join(name);
+    let mut flipped = whole[names[0]].clone();
+    flipped[200] ^= 1;
+    let cut = whole[names[1]][..300].to_vec();
+    let foreign = whole[names[3]].clone();
+    for (name, bytes, said) in [
+        (names[0], flipped, "its CRC is not that of its content"),
+        (names[1], cut, "its CRC is not that of its content"),
+        (names[2], foreign, "the result of another point"),
+        (names[2], vec![], "not a result of a sweep"),
+        (names[2], vec![0xFF, 0xFE], "not text"),
+    ] {
+        fs::write(path(name), &bytes).unwrap();
+        let message = folder.fail(&["sweep", "plan.toml", "--merge", "out/tiny", "-o", "x.csv"], 2);
+        assert!(message.contains(name.as_str()) && message.contains(said), "{message}");
+        assert!(!folder.path("x.csv").exists());
+        let out = folder.run(&["sweep", "plan.toml"]);
+        let remarks = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success() && remarks.contains(said), "{remarks}");
+        assert_eq!(points(&folder, "out/tiny"), whole);
+    }
+}
+
+#[test]
+fn another_plan_does_not_take_old_results() {
+    let folder = prepared("sweep_changed");
+    folder.succeed(&["sweep", "plan.toml"]);
+    let old = read(&folder, "out/tiny/results.csv");
+    // Half of the points stay the same, and are taken; the files of the others are left alone.
+    folder.write("plan.toml", PLAN.replace("[4, 8]", "[4, 6]"));
+    let out = folder.run(&["sweep", "plan.toml"]);
+    let remarks = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(
+        out.status.success() && remarks.contains("2 files in out/tiny/points belong to no point"),
+        "{remarks}"
+    );
+    let new = read(&folder, "out/tiny/results.csv");
+    let same = new.lines().filter(|line| old.lines().any(|known| known == *line)).count();
+    assert_eq!((same, points(&folder, "out/tiny").len()), (3, 6), "head and two points");
+    // Settings of all points change all of them, and so does a scene.
+    folder.write("plan.toml", PLAN.replace("limit_frames = 4", "limit_frames = 5"));
+    assert!(
+        folder.fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1).contains("4 of 4 points")
+    );
+    folder.write("plan.toml", PLAN);
+    folder.write("scene.toml", tiny_scene().replace("seed = 1", "seed = 2"));
+    assert!(
+        folder.fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1).contains("4 of 4 points")
+    );
+}
+
+#[test]
+fn points_that_cannot_be_are_named_and_the_others_computed() {
+    let folder = prepared("sweep_failed");
+    let deeper = "deformation.dent_depth_mm.1 = [1.0, 3.0]\nnoise.level";
+    folder.write("plan.toml", PLAN.replace("noise.level", deeper).replace("[4, 8]", "[4]"));
+    let out = folder.run(&["sweep", "plan.toml"]);
+    let remarks = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.success() && remarks.contains("20 % of the thickness"), "{remarks}");
+    let table = read(&folder, "out/tiny/results.csv");
+    assert_eq!(
+        table.lines().filter(|line| line.contains("20 % of the thickness")).count(),
+        2,
+        "{table}"
+    );
+}
+
+#[test]
+fn plans_that_cannot_be_used_are_refused_with_what_is_near() {
+    let folder = prepared("sweep_refused");
+    for (from, to, said) in [
+        ("training.centres", "training.centers", vec!["unknown field `centers`", "`centres`"]),
+        ("noise.level", "nois.level", vec!["unknown field `nois`", "`noise`"]),
+        ("[4, 8]", "[\"a\"]", vec!["invalid type"]),
+        ("[4, 8]", "{from = 1, to = 8}", vec!["training.centres.count"]),
+        ("rmse_dz_mm", "rmse_z_mm", vec!["objectives", "`rmse_dz_mm`"]),
+        ("[axes]", "[bound]\nframe_ms = 1\n[axes]", vec!["bound", "`bounds`"]),
+        ("[axes]", "[bounds]\nframe = 1\n[axes]", vec!["bounds = frame", "`frame_ms`"]),
+        ("[axes]", "[device]\nreadout = \"i2c\"\n[axes]", vec!["device", "`spi`"]),
+        ("[axes]", "[device]\nsamples = 0\n[axes]", vec!["device.samples = 0"]),
+        (
+            "[axes]",
+            "[set]\nnoise.level = 0.1\nseed = \"x\"\n[axes]",
+            vec!["`seed = \"x\"`", "invalid type"],
+        ),
+        ("scene.toml", "scene.tml", vec!["scene.tml"]),
+        ("name = \"tiny\"", "name = \"a/b\"", vec!["name"]),
+        ("limit_frames = 4", "repeats = 0", vec!["repeats = 0"]),
+    ] {
+        folder.write("plan.toml", PLAN.replace(from, to));
+        let message = folder.fail(&["sweep", "plan.toml", "--list"], 2);
+        for said in said {
+            assert!(message.contains(said), "{to}: {message}");
+        }
+    }
+    folder.write("plan.toml", PLAN);
+    for (words, said) in [
+        (vec!["--shard", "0/4"], "1/8 to 8/8"),
+        (vec!["--shards", "4"], "--shard I/4"),
+        (vec!["--merge", "out", "-o", "x.txt"], ".csv"),
+        (vec!["--seed", "3"], "repeats"),
+    ] {
+        let message = folder.fail(&[&["sweep", "plan.toml"], &words[..]].concat(), 2);
+        assert!(message.contains(said), "{message}");
+    }
+    assert_eq!(folder.names(), ["plan.toml", "scene.toml"]);
+}
+
+#[test]
+fn repeats_are_put_together_and_draws_are_the_same_everywhere() {
+    let folder = prepared("sweep_drawn");
+    let plan = "name = \"drawn\"\nscene = \"scene.toml\"\nlimit_frames = 0\nrepeats = 2\n[set]\ntraining.centres = 4\n\
+                [draw]\npoints = 3\n[draw.axes]\nsensor.pitch_mm = {from = 2.0, to = 4.0}\n";
+    folder.write("plan.toml", plan);
+    let all: Value =
+        serde_json::from_str(&folder.succeed(&["sweep", "plan.toml", "--json"])).unwrap();
+    let settings = all["settings"].as_array().unwrap();
+    assert_eq!((all["points"].as_array().unwrap().len(), settings.len()), (6, 3));
+    for setting in settings {
+        assert_eq!(setting["repeats"], 2);
+        assert!(setting["deviations"]["rmse_dz_mm"].as_f64().unwrap() > 0.0);
+        let [pitch_mm, area_cm2] =
+            [&setting["values"]["sensor.pitch_mm"], &setting["results"]["area_cm2"]];
+        let expected = 8.0 * 18.0 * pitch_mm.as_f64().unwrap().powi(2) / 100.0;
+        assert!((area_cm2.as_f64().unwrap() - expected).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn measurements_are_swept_by_the_settings_of_training() {
+    let folder = prepared("sweep_measured");
+    folder.succeed(&["synth", "scene.toml", "-n", "300", "-o", "data.csv"]);
+    folder.write(
+        "plan.toml",
+        "name = \"log\"\ndata = [\"data.csv\", \"--inputs\", \"r4c*_ohm\", \"--outputs\", \"r4e*_dz_mm\", \"--folds\", \"4\"]\n\
+         [set]\ntraining.refine = false\n[axes]\ntraining.centres = [4, 8]\ntraining.format = [\"f32\", \"fixed16\"]\n",
+    );
+    let all: Value =
+        serde_json::from_str(&folder.succeed(&["sweep", "plan.toml", "--json"])).unwrap();
+    assert_eq!(all["objectives"][0], "rmse_dz_mm");
+    let points = all["points"].as_array().unwrap();
+    assert_eq!(points.len(), 4);
+    assert!(points.iter().all(|it| it["results"]["rmse_dz_mm"].as_f64().unwrap() > 0.0 && it["failed"].is_null()));
+    let other = fs::read_to_string(folder.path("plan.toml"))
+        .unwrap()
+        .replace("training.centres", "sensor.row_wires");
+    folder.write("plan.toml", other);
+    let message = folder.fail(&["sweep", "plan.toml"], 2);
+    assert!(message.contains("unknown field `sensor`"), "{message}");
+}
+
+#[test]
+fn layouts_are_compared_and_the_best_decoder_is_chosen() {
+    let folder = prepared("sweep_compared");
+    let lists = tiny_scene().replace("row_wires = 8", "pitch_mm = [1.5, 3]\nrow_wires = 8");
+    folder.write("lists.toml", lists);
+    let said =
+        folder.succeed(&["compare", "lists.toml", "scene.toml", "--centres", "4,8", "-o", "out"]);
+    let lines: Vec<&str> = said.lines().collect();
+    for (line, layout) in
+        lines[1..4].iter().zip(["lists.toml pitch_mm=1.5", "lists.toml pitch_mm=3", "scene.toml"])
+    {
+        assert!(
+            line.starts_with(layout)
+                && line.split_whitespace().next_back().is_some_and(|k| ["4", "8"].contains(&k)),
+            "{said}"
+        );
+    }
+    let table = read(&folder, "out/compare.csv");
+    assert_eq!(table.lines().count(), 7, "{table}");
+    let limit = folder.succeed(&["compare", "scene.toml", "press", "--limit-only", "--json"]);
+    let limit: Value = serde_json::from_str(&limit).unwrap();
+    assert_eq!(limit["objectives"][0], "limit_dz_mm");
+    assert!(folder.fail(&["compare", "scene.toml", "scene.toml"], 2).contains("twice"));
+    let none = folder.succeed(&["compare", "scene.toml", "--max-latency-ms", "0.001"]);
+    assert!(none.contains("no decoder of the layout is within the bound"), "{none}");
+}
