@@ -83,6 +83,9 @@ pub fn page(merged: &Merged) -> print::Page {
         merged.front().len(),
         merged.objectives.join(", ")
     ));
+    for (note, count) in merged.notes() {
+        page.line(format_args!("{count} points have {note}; the JSON says why of each"));
+    }
     front(&mut page, merged);
     if !merged.effects.is_empty() {
         page.line("\nShare of the variance that each axis explains");

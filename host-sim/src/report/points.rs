@@ -238,6 +238,9 @@ pub fn html(merged: &Merged, stem: &str, command: &str) -> String {
     {
         let _ = write!(lacking, "; {count} {what}");
     }
+    for (note, count) in merged.notes() {
+        let _ = write!(lacking, "; {count} with {note}");
+    }
     let mut body = format!(
         "<header>\n<h1>{}</h1>\n<p>{} points{lacking}; {} settings; <a href=\"{stem}.csv\">all points as a table</a></p>\n</header>\n",
         escape(&title),
@@ -294,7 +297,7 @@ fn in_bound(name: &str, bound: taxel_evaluate::sweep::plan::Bound) -> String {
 fn table(caption: &str, first: &str, heads: impl Iterator<Item = String>, lines: &str) -> String {
     format!(
         "<figure class=\"table\">\n<figcaption>{caption}</figcaption>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" \
-         aria-label=\"{first}\">\n<table>\n<thead><tr><th>{first}</th>{}</tr></thead>\n<tbody>\n{lines}</tbody>\n</table>\n</div>\n\
+         aria-label=\"{first}\">\n<table class=\"wrap\">\n<thead><tr><th>{first}</th>{}</tr></thead>\n<tbody>\n{lines}</tbody>\n</table>\n</div>\n\
          </figure>\n",
         numbers("th", heads)
     )
@@ -416,7 +419,7 @@ fn worth(merged: &Merged) -> String {
                 Some(match worth.change_percent {
                     None => "free".into(),
                     Some([change, error]) => {
-                        format!("{} ± {} %", signed(change), significant(error, 1))
+                        format!("{} ± {} %", signed(change), fixed(error, 2))
                     }
                 })
             });
@@ -441,6 +444,6 @@ fn worth(merged: &Merged) -> String {
 }
 
 fn signed(value: f64) -> String {
-    let text = significant(value, 2);
+    let text = fixed(value, 2);
     if value > 0.0 { format!("+{text}") } else { text }
 }

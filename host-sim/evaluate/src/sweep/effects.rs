@@ -8,8 +8,8 @@ use serde_json::Value;
 
 /// Most levels of an axis; more values are put together, in equal numbers.
 const MOST_LEVELS: usize = 8;
-/// Exponents below this are taken for none.
-const LEAST_EXPONENT: f64 = 0.02;
+/// Exponents below this are taken for none: a law that does not hold exactly makes as much of axes that do nothing.
+const LEAST_EXPONENT: f64 = 0.04;
 
 /// What an axis does to a result, whatever the other axes are.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -201,6 +201,15 @@ impl Merged {
         errors
     }
 
+    /// Remarks on points, without their reasons, such as `no limit`, and the number of points that have each.
+    pub fn notes(&self) -> BTreeMap<&str, usize> {
+        let mut notes = BTreeMap::new();
+        for note in self.points.iter().flat_map(|point| &point.notes) {
+            *notes.entry(note.split(':').next().unwrap_or(note)).or_default() += 1;
+        }
+        notes
+    }
+
     /// Points that could not be computed.
     pub fn failed(&self) -> impl Iterator<Item = &Record> {
         self.points.iter().filter(|point| point.failed.is_some())
