@@ -198,6 +198,12 @@ fn merge(
     files.check(&[&arguments.plan])?;
     let store = store(folder);
     let merged = Merged::read(plan, points, &store)?;
+    if merged.points.is_empty() {
+        return Err(Error::failed(format!(
+            "{} has no result of this plan by this program, and nothing is written; give the folder that its shards wrote to",
+            folder.display()
+        )));
+    }
     let others = store.others(points);
     if !others.is_empty() {
         let first = others.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");

@@ -81,6 +81,8 @@ fn a_sweep_goes_on_where_it_was_stopped() {
     folder.succeed(&["sweep", "plan.toml", "--shard", "1/2"]);
     let first = points(&folder, "out/tiny");
     assert_eq!(first.len(), 2);
+    let none = folder.fail(&["sweep", "plan.toml", "--merge", "elsewhere"], 1);
+    assert!(none.contains("nothing is written") && !folder.path("elsewhere").exists(), "{none}");
     let missing = folder.fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1);
     assert!(missing.contains("2 of 4 points are missing"), "{missing}");
     let begun =
@@ -147,12 +149,16 @@ fn another_plan_does_not_take_old_results() {
     // Settings of all points change all of them, and so does a scene.
     folder.write("plan.toml", PLAN.replace("limit_frames = 4", "limit_frames = 5"));
     assert!(
-        folder.fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1).contains("4 of 4 points")
+        folder
+            .fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1)
+            .contains("no result of this plan")
     );
     folder.write("plan.toml", PLAN);
     folder.write("scene.toml", tiny_scene().replace("seed = 1", "seed = 2"));
     assert!(
-        folder.fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1).contains("4 of 4 points")
+        folder
+            .fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1)
+            .contains("no result of this plan")
     );
 }
 

@@ -8,7 +8,8 @@ use serde_json::Value;
 
 /// Most levels of an axis; more values are put together, in equal numbers.
 const MOST_LEVELS: usize = 8;
-/// Exponents below this are taken for none: a law that does not hold exactly makes as much of axes that do nothing.
+/// Exponents below this are taken for none, unless they are known much better than that: a law that does not hold exactly
+/// makes as much of axes that do nothing.
 const LEAST_EXPONENT: f64 = 0.04;
 
 /// What an axis does to a result, whatever the other axes are.
@@ -49,6 +50,13 @@ pub struct Exponent {
     pub field: String,
     pub exponent: f64,
     pub standard_error: f64,
+}
+
+impl Exponent {
+    /// Whether it stands out of what a law that does not hold exactly makes of axes that do nothing.
+    fn is_some_effect(&self) -> bool {
+        self.exponent.abs() > (20.0 * self.standard_error).clamp(1e-6, LEAST_EXPONENT)
+    }
 }
 
 /// What an error gains where an axis is changed until a cost has risen by one unit, at the geometric mean of the cost.
@@ -186,7 +194,9 @@ fn share(is_drawn: bool, values: &[f64], groups: &[Vec<usize>]) -> Option<(f64, 
     let all = mean(&mut values.iter().copied());
     let total: f64 = values.iter().map(|value| (value - all).powi(2)).sum();
     let (points, levels) = (values.len() as f64, groups.len() as f64);
-    if groups.len() < 2 || total <= 0.0 {
+    // Rounding is no variation, and as many levels as points explain everything.
+    let least = points * (1e-9 * all).abs().max(1e-12).powi(2);
+    if groups.len() < 2 || total <= least || (is_drawn && groups.len() >= values.len()) {
         return None;
     }
     let means: Vec<f64> =
@@ -198,8 +208,7 @@ fn share(is_drawn: bool, values: &[f64], groups: &[Vec<usize>]) -> Option<(f64, 
         .sum();
     // What levels explain by chance is taken off.
     let within = (total - between).max(0.0);
-    let is_free = is_drawn && points > levels;
-    let chance = if is_free { (levels - 1.0) * within / (points - levels) } else { 0.0 };
+    let chance = if is_drawn { (levels - 1.0) * within / (points - levels) } else { 0.0 };
     Some((((between - chance) / total).clamp(0.0, 1.0), means))
 }
 
@@ -215,7 +224,7 @@ pub fn worth(error: &Law, cost: &Law) -> Vec<Worth> {
             error: error.result.clone(),
             cost: cost.result.clone(),
             unit: unit.clone(),
-            change_percent: (of_cost.exponent.abs() > LEAST_EXPONENT).then_some(change),
+            change_percent: of_cost.is_some_effect().then_some(change),
         })
     });
     pairs.collect()

@@ -39,7 +39,7 @@ fn of_document(label: &str, document: &Table) -> Result<Vec<Base>> {
                 break;
             }
             // What is wrong besides the lists.
-            Err(message) if !message.contains("sequence") => wrong = message,
+            Err(message) if !is_of_list(&message) && is_of_list(&wrong) => wrong = message,
             Err(_) => {}
         }
     }
@@ -67,6 +67,11 @@ fn of_document(label: &str, document: &Table) -> Result<Vec<Base>> {
 
 fn check(document: &Table) -> std::result::Result<(), String> {
     Experiment::check_fields(&toml::to_string(document).map_err(|cause| cause.to_string())?)
+}
+
+/// Whether a list stands where a value is expected, or the other way round.
+fn is_of_list(message: &str) -> bool {
+    message.contains("sequence") || message.contains("array of length")
 }
 
 /// List of plain values, which may be an axis.
