@@ -43,6 +43,16 @@ pub fn names_a_scene(name_or_path: &str) -> bool {
         || path.extension().map_or(!path.exists(), |end| end.eq_ignore_ascii_case("toml"))
 }
 
+/// Checks the name of a scene or a plan, which names a folder.
+pub(crate) fn check_name(name: &str) -> Check {
+    const LONGEST_NAME: usize = 100;
+    let name_ok = (1..=LONGEST_NAME).contains(&name.len())
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+    require(name_ok, "name", format!("{name:?}"), || {
+        format!("it names a folder; use letters, digits, - and _, at most {LONGEST_NAME} of them")
+    })
+}
+
 /// Experiment of a scene, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
@@ -364,14 +374,7 @@ impl Experiment {
     }
 
     fn check(&self) -> Check {
-        const LONGEST_NAME: usize = 100;
-        let name_ok = (1..=LONGEST_NAME).contains(&self.name.len())
-            && self.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
-        require(name_ok, "name", format!("{:?}", self.name), || {
-            format!(
-                "it names a folder; use letters, digits, - and _, at most {LONGEST_NAME} of them"
-            )
-        })?;
+        check_name(&self.name)?;
         self.world.check()?;
         check_spread("training.spread", self.training.spread)?;
         self.table1.as_ref().map_or(Ok(()), check_table1)?;

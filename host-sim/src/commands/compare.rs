@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::report::result_text;
+use crate::sweep::file::{Bound, Wanted};
 use crate::sweep::merge::Setting;
-use crate::sweep::plan::{Base, Bound, SCENE, SEED, Wanted};
+use crate::sweep::plan::{Base, SCENE, SEED};
 use crate::sweep::{Merged, Plan, layouts, work};
 use crate::{Error, Result};
 use clap::Args;
@@ -87,25 +88,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// What is wanted of the layouts.
 fn wanted(arguments: &Arguments, common: &Common) -> Wanted {
-    let list = |values: &[usize]| {
-        Value::Array(
-            values
-                .iter()
-                .map(|it| Value::Integer(i64::try_from(*it).unwrap_or(i64::MAX)))
-                .collect(),
-        )
-    };
+    let whole = |value: u64| Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
     let mut wanted = Wanted { train: !arguments.limit_only, ..Wanted::default() };
-    let mut axes =
-        [("training.centres", &arguments.centres), ("device.samples", &arguments.average)];
-    axes.iter_mut().filter(|(_, values)| !values.is_empty()).for_each(|(field, values)| {
-        wanted.axes.insert((*field).into(), list(values));
-    });
+    let axes = [("training.centres", &arguments.centres), ("device.samples", &arguments.average)];
+    for (field, values) in axes.into_iter().filter(|(_, values)| !values.is_empty()) {
+        let values = values.iter().map(|value| whole(*value as u64)).collect();
+        wanted.axes.insert(field.into(), Value::Array(values));
+    }
     if let ReadoutOption::Onchip = arguments.readout {
         wanted.device.insert("readout".into(), "onchip".into());
     }
     if let Some(seed) = common.seed {
-        wanted.set.insert("seed".into(), Value::Integer(i64::try_from(seed).unwrap_or(i64::MAX)));
+        wanted.set.insert(SEED.into(), whole(seed));
     }
     if let Some(group) = &arguments.group {
         let [error, time] = if wanted.train { ["rmse", "frame_ms"] } else { ["limit", "scan_ms"] };
@@ -121,7 +115,7 @@ fn wanted(arguments: &Arguments, common: &Common) -> Wanted {
 fn table(page: &mut print::Page, merged: &Merged) {
     let scene = |setting: &Setting| match setting.values.get(SCENE) {
         Some(serde_json::Value::String(label)) => label.clone(),
-        _ => merged.settings.first().map_or(String::new(), |_| "the scene".into()),
+        _ => "the scene".into(),
     };
     let mut layouts: Vec<String> = Vec::new();
     for setting in &merged.settings {
@@ -129,15 +123,12 @@ fn table(page: &mut print::Page, merged: &Merged) {
             layouts.push(scene(setting));
         }
     }
-    let limits: Vec<&String> = merged
-        .columns
-        .iter()
-        .filter(|name| name.starts_with("limit_") && !name.starts_with("limit_standard_error_"))
-        .collect();
+    let is_limit =
+        |name: &&str| name.starts_with("limit_") && !name.starts_with("limit_standard_error_");
+    let limits = merged.columns.iter().map(String::as_str).filter(is_limit);
     let error = merged.objectives.first().map_or("", String::as_str);
     let others = ["rows", "columns", "area_cm2", "scan_ms", "frame_ms", "blob_bytes"];
     let others = others.iter().filter(|name| merged.columns.iter().any(|known| known == *name));
-    let limits = limits.into_iter().map(String::as_str);
     let mut columns: Vec<&str> = others.copied().chain(limits).chain([error]).collect();
     columns.dedup();
     let mut fields: Vec<&str> = merged.fields.iter().map(String::as_str).collect();

@@ -1,6 +1,5 @@
 //! Results of a sweep or a comparison: the files that they are written to, and the page on the terminal.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -89,26 +88,20 @@ pub fn page(merged: &Merged) -> print::Page {
     front(&mut page, merged);
     if !merged.effects.is_empty() {
         page.line("\nShare of the variance that each axis explains");
-        by_field(&mut page, merged, &merged.objectives, |field, objective| {
-            let mut of_field = merged.effects.iter().filter(|effect| effect.field == field);
-            let effect = of_field.find(|effect| effect.result == objective)?;
+        let shares = |field: &str, place: usize| {
+            let effect = merged.effect(field, &merged.objectives[place])?;
             Some(format!("{:.0} %", 100.0 * effect.share))
-        });
+        };
+        by_field(&mut page, merged, &merged.objectives, shares);
     }
-    for error in merged.errors_of_worth() {
-        let of_error = || merged.worth.iter().filter(|worth| worth.error == error);
-        let mut heads: Vec<String> =
-            of_error().map(|worth| format!("{} of {}", worth.unit, worth.cost)).collect();
-        let mut seen = BTreeSet::new();
-        heads.retain(|head| seen.insert(head.clone()));
+    for (error, costs) in merged.errors_and_costs() {
         page.line(format_args!(
             "\nChange of {error} where an axis is changed until a cost has risen by"
         ));
-        by_field(&mut page, merged, &heads, |field, head| {
-            let mut of_field = of_error().filter(|worth| worth.field == field);
-            let worth =
-                of_field.find(|worth| format!("{} of {}", worth.unit, worth.cost) == head)?;
-            Some(match worth.change_percent {
+        let heads: Vec<String> =
+            costs.iter().map(|[cost, unit]| format!("{unit} of {cost}")).collect();
+        by_field(&mut page, merged, &heads, |field, place| {
+            Some(match merged.worth_of(field, error, costs[place][0])?.change_percent {
                 Some([change, error]) => format!("{change:+.2} ± {error:.2} %"),
                 None => "free".into(),
             })
@@ -117,17 +110,17 @@ pub fn page(merged: &Merged) -> print::Page {
     page
 }
 
-/// Table with a line for each field.
+/// Table with a line for each field; `cell` takes a field, and the place of a head.
 fn by_field(
     page: &mut print::Page,
     merged: &Merged,
     heads: &[String],
-    cell: impl Fn(&str, &str) -> Option<String>,
+    cell: impl Fn(&str, usize) -> Option<String>,
 ) {
     let mut lines =
         vec![[String::new()].into_iter().chain(heads.iter().cloned()).collect::<Vec<_>>()];
     for field in &merged.fields {
-        let cells: Vec<Option<String>> = heads.iter().map(|head| cell(field, head)).collect();
+        let cells: Vec<Option<String>> = (0..heads.len()).map(|place| cell(field, place)).collect();
         if cells.iter().any(Option::is_some) {
             let cells = cells.into_iter().map(|cell| cell.unwrap_or("-".into()));
             lines.push([field.clone()].into_iter().chain(cells).collect());

@@ -194,7 +194,7 @@ fn bars(merged: &Merged, width: f64) -> (String, [f64; 2]) {
         svg.text(0.0, y + TEXT_PX, Anchor::Start, "label strong", &name(objective));
         y += 24.0;
         for field in &fields {
-            let share = effect(merged, field, objective).map_or(0.0, |effect| effect.share);
+            let share = merged.effect(field, objective).map_or(0.0, |effect| effect.share);
             let full = width - label - value;
             svg.text(label - 8.0, y + 14.0, Anchor::End, "tick", field);
             svg.rect([label, y + 3.0], [full, LINE - 8.0], "face", "");
@@ -215,10 +215,6 @@ fn bars(merged: &Merged, width: f64) -> (String, [f64; 2]) {
 
 fn has_effect(merged: &Merged, field: &str) -> bool {
     merged.effects.iter().any(|effect| effect.field == field)
-}
-
-fn effect<'m>(merged: &'m Merged, field: &str, objective: &str) -> Option<&'m Effect> {
-    merged.effects.iter().find(|effect| effect.field == field && effect.result == objective)
 }
 
 /// Picture of what the axes explain, as a file of its own.
@@ -285,8 +281,8 @@ pub fn html(merged: &Merged, stem: &str, command: &str) -> String {
     document(&title, &body)
 }
 
-fn in_bound(name: &str, bound: taxel_evaluate::sweep::plan::Bound) -> String {
-    use taxel_evaluate::sweep::plan::Bound;
+fn in_bound(name: &str, bound: taxel_evaluate::sweep::file::Bound) -> String {
+    use taxel_evaluate::sweep::file::Bound;
     match bound {
         Bound::Most(most) => format!("{name} at most {most}"),
         Bound::Least { least } => format!("{name} at least {least}"),
@@ -344,7 +340,7 @@ fn levels(merged: &Merged) -> String {
     let mut lines = String::new();
     for field in &merged.fields {
         let of_field: Vec<Option<&Effect>> =
-            merged.objectives.iter().map(|objective| effect(merged, field, objective)).collect();
+            merged.objectives.iter().map(|objective| merged.effect(field, objective)).collect();
         let Some(first) = of_field.iter().flatten().next() else { continue };
         let _ = writeln!(
             lines,
@@ -402,20 +398,11 @@ fn laws(merged: &Merged) -> String {
 
 fn worth(merged: &Merged) -> String {
     let mut html = String::new();
-    for error in merged.errors_of_worth() {
-        let of_error = || merged.worth.iter().filter(|worth| worth.error == error);
-        let mut costs: Vec<(&str, &str)> = Vec::new();
-        for worth in of_error() {
-            let cost = (worth.cost.as_str(), worth.unit.as_str());
-            if !costs.contains(&cost) {
-                costs.push(cost);
-            }
-        }
+    for (error, costs) in merged.errors_and_costs() {
         let mut lines = String::new();
         for field in &merged.fields {
-            let cells = costs.iter().map(|(cost, _)| {
-                let mut of_field = of_error().filter(|worth| worth.field == *field);
-                let worth = of_field.find(|worth| worth.cost == *cost)?;
+            let cells = costs.iter().map(|[cost, _]| {
+                let worth = merged.worth_of(field, error, cost)?;
                 Some(match worth.change_percent {
                     None => "free".into(),
                     Some([change, error]) => {
@@ -430,7 +417,7 @@ fn worth(merged: &Merged) -> String {
                     writeln!(lines, "<tr><td>{}</td>{}</tr>", escape(field), numbers("td", cells));
             }
         }
-        let heads = costs.iter().map(|(cost, unit)| format!("{unit}, {}", escape(&name(cost))));
+        let heads = costs.iter().map(|[cost, unit]| format!("{unit}, {}", escape(&name(cost))));
         html += &table(&format!("Change of the {}.", escape(&name(error))), "axis", heads, &lines);
     }
     if html.is_empty() {

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 /// # Errors
 /// [`BadValue`] for a path through a value that is neither table nor list, or to a place that a list does not have.
 pub fn set(document: &mut Table, path: &str, value: Value) -> Result<(), BadValue> {
-    let (first, rest) = path.split_once('.').map_or((path, None), |(a, b)| (a, Some(b)));
+    let (first, rest) = first_of(path);
     let Some(rest) = rest else {
         document.insert(first.into(), value);
         return Ok(());
@@ -17,11 +17,16 @@ pub fn set(document: &mut Table, path: &str, value: Value) -> Result<(), BadValu
     set_in(inner, rest, value).map_err(|bad| bad.named(path))
 }
 
+/// First part of a path, and the rest of it, if there is any.
+fn first_of(path: &str) -> (&str, Option<&str>) {
+    path.split_once('.').map_or((path, None), |(first, rest)| (first, Some(rest)))
+}
+
 fn set_in(outer: &mut Value, path: &str, value: Value) -> Result<(), BadValue> {
     match outer {
         Value::Table(table) => set(table, path, value),
         Value::Array(list) => {
-            let (first, rest) = path.split_once('.').map_or((path, None), |(a, b)| (a, Some(b)));
+            let (first, rest) = first_of(path);
             let length = list.len();
             let place = first.parse().ok().filter(|place| *place < length);
             let place: usize = place.ok_or_else(|| {

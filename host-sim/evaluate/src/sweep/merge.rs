@@ -6,7 +6,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::effects::{self, Effect, Law, Settings, Worth};
-use super::plan::{Bound, PartPrices, Plan, Point, SEED};
+use super::file::{Bound, PartPrices};
+use super::plan::{Plan, Point, SEED};
 use super::point::{is_error, place_of};
 use super::store::{Found, Record, Store};
 use crate::error::{Error, Result};
@@ -109,15 +110,14 @@ impl Merged {
             records.iter().flat_map(|record| record.results.keys()).collect();
         let mut columns: Vec<String> = names.into_iter().cloned().collect();
         columns.sort_by(|a, b| place_of(a).cmp(&place_of(b)));
-        let mut settings = settings(&records);
+        let (mut settings, first): (Vec<Setting>, Vec<String>) =
+            settings(&records).into_iter().unzip();
         mark(&mut settings, &plan.objectives, &plan.bounds);
         let scenes: BTreeMap<&str, &Point> =
             points.iter().map(|point| (point.id.as_str(), point)).collect();
-        for setting in settings.iter_mut().filter(|setting| setting.on_front) {
-            let is_of = |record: &&Record| without_seed(&record.values) == setting.values;
-            let first =
-                records.iter().find(is_of).and_then(|record| scenes.get(record.id.as_str()));
-            setting.scene = first.map(|point| point.scene.clone());
+        for (setting, id) in settings.iter_mut().zip(&first).filter(|(setting, _)| setting.on_front)
+        {
+            setting.scene = scenes.get(id.as_str()).map(|point| point.scene.clone());
         }
         let fields: Vec<String> =
             plan.fields.iter().filter(|field| *field != SEED).cloned().collect();
@@ -193,12 +193,29 @@ impl Merged {
         front
     }
 
-    /// Errors that [`worth`](Self::worth) is told of, each once.
-    pub fn errors_of_worth(&self) -> Vec<&str> {
-        let mut errors: Vec<&str> = self.worth.iter().map(|worth| worth.error.as_str()).collect();
-        let mut seen = BTreeSet::new();
-        errors.retain(|error| seen.insert(*error));
+    /// Effect of the axis of this field on a result.
+    pub fn effect(&self, field: &str, result: &str) -> Option<&Effect> {
+        self.effects.iter().find(|effect| effect.field == field && effect.result == result)
+    }
+
+    /// Errors that [`worth`](Self::worth) is told of, and the costs of each with their units.
+    pub fn errors_and_costs(&self) -> Vec<(&str, Vec<[&str; 2]>)> {
+        let mut errors: Vec<(&str, Vec<[&str; 2]>)> = Vec::new();
+        for worth in &self.worth {
+            let cost = [worth.cost.as_str(), worth.unit.as_str()];
+            match errors.iter_mut().find(|(error, _)| *error == worth.error) {
+                None => errors.push((&worth.error, vec![cost])),
+                Some((_, costs)) if !costs.contains(&cost) => costs.push(cost),
+                Some(_) => {}
+            }
+        }
         errors
+    }
+
+    /// What the axis of this field is worth to an error, for a cost.
+    pub fn worth_of(&self, field: &str, error: &str, cost: &str) -> Option<&Worth> {
+        let is_it = |it: &&Worth| it.field == field && it.error == error && it.cost == cost;
+        self.worth.iter().find(is_it)
     }
 
     /// Remarks on points, without their reasons, such as `no limit`, and the number of points that have each.
@@ -238,8 +255,8 @@ fn without_seed(values: &BTreeMap<String, Value>) -> BTreeMap<String, Value> {
         .collect()
 }
 
-/// Settings in the order of their first points; points that failed are in none.
-fn settings(records: &[Record]) -> Vec<Setting> {
+/// Settings in the order of their first points, whose identities stand beside them; points that failed are in none.
+fn settings(records: &[Record]) -> Vec<(Setting, String)> {
     let mut groups: Vec<Vec<&Record>> = Vec::new();
     let mut places: BTreeMap<String, usize> = BTreeMap::new();
     for record in records.iter().filter(|record| record.failed.is_none()) {
@@ -265,7 +282,7 @@ fn settings(records: &[Record]) -> Vec<Setting> {
                 deviations.insert(name.clone(), (squares / (count - 1.0)).sqrt());
             }
         }
-        Setting {
+        let setting = Setting {
             values: without_seed(&group[0].values),
             repeats: group.len(),
             results,
@@ -273,7 +290,8 @@ fn settings(records: &[Record]) -> Vec<Setting> {
             is_within: false,
             on_front: false,
             scene: None,
-        }
+        };
+        (setting, group[0].id.clone())
     };
     groups.into_iter().map(setting).collect()
 }

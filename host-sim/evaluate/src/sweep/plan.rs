@@ -6,17 +6,17 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
 use taxel_data::digest::digest;
 use taxel_data::{BadValue, columns, input, require};
 use toml::{Table, Value};
 
 use super::axis::{Axis, latin_hypercube};
 use super::fields::{self, require_known};
+use super::file::{Bound, OneOrMore, PartPrices, PlanFile, Wanted};
 use super::point::columns_of;
 use crate::error::{Error, Result};
 use crate::evaluate::trade::Device;
-use crate::experiment::{Experiment, names_a_scene};
+use crate::experiment::{Experiment, check_name, names_a_scene};
 use crate::measurements::Measurements;
 use crate::subject::Subject;
 
@@ -31,114 +31,6 @@ const MOST_POINTS: usize = 100_000;
 pub const SCENE: &str = "scene";
 /// Field of a point's seed, which repeats differ in.
 pub const SEED: &str = "seed";
-
-/// Plan as it stands in its file.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(default)]
-struct PlanFile {
-    name: String,
-    /// Scenes: built-in ones, or files beside the plan.
-    scene: Option<OneOrMore>,
-    /// Measurements instead of a scene: a data file beside the plan, and the options that `train` takes for it.
-    data: Vec<String>,
-    #[serde(flatten)]
-    wanted: Wanted,
-}
-
-/// What is wanted of the points, and which there are.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(default)]
-pub struct Wanted {
-    /// Number of test frames for the limit, instead of as many as suffice; none for no limit.
-    pub limit_frames: Option<usize>,
-    /// Whether models are trained.
-    pub train: bool,
-    /// Number of seeds that every point is computed with.
-    pub repeats: usize,
-    /// Results that are to be small.
-    pub objectives: Vec<String>,
-    /// Bounds on results.
-    pub bounds: BTreeMap<String, Bound>,
-    /// Device that scans and decodes, and `samples` averaged.
-    pub device: Table,
-    /// Prices of the parts of a sensor.
-    pub prices: Option<PartPrices>,
-    /// Fields that are changed in every point.
-    pub set: Table,
-    /// Axes that are crossed.
-    pub axes: Table,
-    /// Axes that are drawn together.
-    pub draw: Option<Draw>,
-}
-
-impl Default for Wanted {
-    fn default() -> Self {
-        Self {
-            limit_frames: None,
-            train: true,
-            repeats: 1,
-            objectives: vec![],
-            bounds: BTreeMap::new(),
-            device: Table::new(),
-            prices: None,
-            set: Table::new(),
-            axes: Table::new(),
-            draw: None,
-        }
-    }
-}
-
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(untagged)]
-enum OneOrMore {
-    One(String),
-    More(Vec<String>),
-}
-
-/// Latin hypercube of some axes.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Draw {
-    points: usize,
-    #[serde(default = "one")]
-    seed: u64,
-    axes: Table,
-}
-
-fn one() -> u64 {
-    1
-}
-
-/// Bound on a result: the most, or the least.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Bound {
-    Most(f64),
-    Least { least: f64 },
-}
-
-impl Bound {
-    /// Whether a result is within the bound.
-    pub fn allows(self, value: f64) -> bool {
-        match self {
-            Self::Most(most) => value <= most,
-            Self::Least { least } => value >= least,
-        }
-    }
-}
-
-/// Prices of the parts of a sensor, in €.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PartPrices {
-    pub fixed_eur: f64,
-    /// Price of a row-wire with what drives it.
-    pub row_eur: f64,
-    /// Price of a column-wire with what samples it.
-    pub column_eur: f64,
-    /// Price of a cm² of the mat.
-    pub cm2_eur: f64,
-}
 
 /// Scene, or measurements, that fields are changed in.
 #[derive(Debug, Clone, PartialEq)]
@@ -193,9 +85,13 @@ pub struct Point {
 impl Point {
     /// Point in words: its values.
     pub fn in_words(&self) -> String {
-        let values = self.values.iter().map(|(field, value)| format!("{field} = {value}"));
-        values.collect::<Vec<_>>().join(", ")
+        in_words(&self.values)
     }
+}
+
+fn in_words(values: &[(String, Value)]) -> String {
+    let values = values.iter().map(|(field, value)| format!("{field} = {value}"));
+    values.collect::<Vec<_>>().join(", ")
 }
 
 impl Plan {
@@ -213,9 +109,7 @@ impl Plan {
             Error::from(taxel_data::Error::unfit(format!("plan {origin}: {cause}")))
         };
         let text = input::read_text(path)?;
-        check_top(&text).map_err(&of_plan)?;
-        let file: PlanFile =
-            toml::from_str(&text).map_err(|cause| of_plan(cause.to_string().trim_end().into()))?;
+        let file = PlanFile::parse(&text).map_err(&of_plan)?;
         let beside = |name: &String| {
             let beside = path.parent().map(|folder| folder.join(name));
             let is_beside = beside.as_ref().is_some_and(|file| file.is_file());
@@ -264,11 +158,7 @@ impl Plan {
         wanted: Wanted,
         build: &str,
     ) -> Checked<Self> {
-        let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        let name_ok = (1..=100).contains(&name.len()) && name.chars().all(is_name);
-        require(name_ok, "name", format!("{name:?}"), || {
-            "it names files; use letters, digits, - and _, at most 100 of them".into()
-        })?;
+        check_name(name)?;
         require(wanted.repeats > 0, "repeats", 0, || "give at least 1".into())?;
         require(wanted.limit_frames != Some(1), "limit_frames", 1, || {
             "give at least 2, or 0 for no limit".into()
@@ -307,16 +197,14 @@ impl Plan {
     /// Checks the fields of the first point with every value of every axis in turn.
     fn check_fields(&self) -> Checked<()> {
         let check = |places: &[usize]| {
-            let (document, _) = self.document_at(places)?;
+            let document = self.document_at(places)?;
             let (scene, device) = (text(&document.scene)?, document.device);
             let checked = match &self.data {
                 None => Experiment::check_fields(&scene),
                 Some(data) => super::point::measured(data, &scene).map(drop),
             };
             let of = |message: String| {
-                let values =
-                    document.values.iter().map(|(field, value)| format!("{field} = {value}"));
-                let shown = values.collect::<Vec<_>>().join(", ");
+                let shown = in_words(&document.values);
                 BadValue::new(
                     "axes, set",
                     if shown.is_empty() { "base".into() } else { shown },
@@ -344,7 +232,7 @@ impl Plan {
             data.training.outputs.names.clone()
         } else {
             // The first point may be impossible, and the base is not.
-            let (document, _) = self.document_at(&vec![0; self.axes.len()])?;
+            let document = self.document_at(&vec![0; self.axes.len()])?;
             let base = self.bases.first().map_or(&document.scene, |base| &base.document);
             let parse = |table: &Table| Experiment::parse(&self.name, &text(table).ok()?).ok();
             let scene = parse(&document.scene).or_else(|| parse(base));
@@ -394,8 +282,9 @@ impl Plan {
     }
 
     fn point(&self, places: &[usize]) -> Checked<Point> {
-        let (document, mut shared) = self.document_at(places)?;
+        let document = self.document_at(places)?;
         let scene = text(&document.scene)?;
+        let mut shared = document.scene;
         shared.remove("training");
         shared.remove("table1");
         let (device, samples) = device_of(document.device)?;
@@ -412,8 +301,8 @@ impl Plan {
         })
     }
 
-    /// Document of the point at these places of the axes, and its scene once more.
-    fn document_at(&self, places: &[usize]) -> Checked<(Document, Table)> {
+    /// Fields of the point at these places of the axes.
+    fn document_at(&self, places: &[usize]) -> Checked<Document> {
         let chosen = self.axes.iter().zip(places);
         let values = chosen.flat_map(|((fields, lines), place)| {
             fields.iter().cloned().zip(lines[*place].iter().cloned())
@@ -432,7 +321,7 @@ impl Plan {
             Some(Value::Table(device)) => device,
             _ => Table::new(),
         };
-        Ok((Document { scene: document.clone(), device, values }, document))
+        Ok(Document { scene: document, device, values })
     }
 }
 
@@ -515,26 +404,4 @@ fn axes(bases: &[Base], wanted: &Wanted) -> Checked<Vec<Lines>> {
         Some((_, field)) => Err(BadValue::new("axes", field, "it is an axis twice; give it once")),
         None => Ok(axes),
     }
-}
-
-/// Checks the names at the top of a plan: serde does not, where fields are flattened.
-fn check_top(text: &str) -> std::result::Result<(), String> {
-    const KNOWN: [&str; 13] = [
-        "name",
-        "scene",
-        "data",
-        "limit_frames",
-        "train",
-        "repeats",
-        "objectives",
-        "bounds",
-        "device",
-        "prices",
-        "set",
-        "axes",
-        "draw",
-    ];
-    let Ok(table) = toml::from_str::<Table>(text) else { return Ok(()) };
-    let known = table.keys().try_for_each(|key| require_known("field", key, &KNOWN));
-    known.map_err(|bad| bad.to_string())
 }

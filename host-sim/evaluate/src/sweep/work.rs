@@ -1,8 +1,7 @@
 //! Work on the points of a shard, on all threads.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use taxel_data::Progress;
@@ -62,7 +61,7 @@ pub fn run(
     let keep = |index: usize, record: &Record| {
         store.write(record)?;
         progress.step();
-        let mut worked = records.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut worked = records.lock().unwrap_or_else(PoisonError::into_inner);
         worked.computed += 1;
         worked.failed.extend(of_failed(&points[index], record));
         Ok(())
@@ -81,12 +80,11 @@ pub fn in_memory(plan: &Plan, points: &[Point], progress: &dyn Progress) -> Resu
     progress.stage("compare", points.len());
     let keep = |index: usize, record: &Record| {
         progress.step();
-        records.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[index] =
-            Some(record.clone());
+        records.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(record.clone());
         Ok(())
     };
     each(plan, points, &super::Shard::WHOLE.groups(points), &keep)?;
-    let records = records.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let records = records.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok(records.into_iter().flatten().collect())
 }
 
@@ -95,8 +93,7 @@ pub fn in_memory(plan: &Plan, points: &[Point], progress: &dyn Progress) -> Resu
 /// # Errors
 /// [`Error`] for a thread that cannot be started.
 pub fn on_one_core(plan: &Plan, point: &Point) -> Result<(f64, Result<point::Results>)> {
-    let built = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let pool = built.map_err(|cause| Error::failed(format!("cannot start a thread: {cause}")))?;
+    let pool = pool(1)?;
     let begun = Instant::now();
     let outcome = pool.install(|| point::compute(plan, point, &mut Shared::default()));
     Ok((begun.elapsed().as_secs_f64(), outcome))
@@ -105,6 +102,11 @@ pub fn on_one_core(plan: &Plan, point: &Point) -> Result<(f64, Result<point::Res
 /// Number of threads that work here.
 pub fn threads() -> usize {
     rayon::current_num_threads()
+}
+
+fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let built = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    built.map_err(|cause| Error::failed(format!("cannot start threads: {cause}")))
 }
 
 fn of_failed(point: &Point, record: &Record) -> Option<String> {
@@ -138,12 +140,8 @@ fn each(
         }
         Ok(())
     };
-    let pool = |worker: usize| {
-        let own = threads / workers + usize::from(worker < threads % workers);
-        let built = rayon::ThreadPoolBuilder::new().num_threads(own).build();
-        built.map_err(|cause| Error::failed(format!("cannot start threads: {cause}")))
-    };
-    let pools = (0..workers).map(pool).collect::<Result<Vec<_>>>()?;
+    let own = |worker: usize| threads / workers + usize::from(worker < threads % workers);
+    let pools = (0..workers).map(|worker| pool(own(worker))).collect::<Result<Vec<_>>>()?;
     std::thread::scope(|scope| {
         let running: Vec<_> = pools.iter().map(|pool| scope.spawn(|| pool.install(work))).collect();
         let outcomes = running.into_iter().map(|thread| match thread.join() {
