@@ -1,10 +1,27 @@
 //! Digests of files and tables: tie a model to the scene or data that it was trained on.
 
+use std::fmt;
+
 /// CRC-64/XZ of `bytes`: tells versions of a file apart, but does not protect against forgery.
 pub fn digest(bytes: &[u8]) -> u64 {
     let mut digest = crc64fast::Digest::new();
     digest.write(bytes);
     digest.sum64()
+}
+
+/// CRC-64/XZ of a value's `Debug` text: of all that the value has, as long as the program is the same.
+pub fn of_debug(value: &impl fmt::Debug) -> u64 {
+    struct Text(crc64fast::Digest);
+    impl fmt::Write for Text {
+        fn write_str(&mut self, text: &str) -> fmt::Result {
+            self.0.write(text.as_bytes());
+            Ok(())
+        }
+    }
+    let mut text = Text(crc64fast::Digest::new());
+    // Only the writer could fail, and it does not.
+    let _ = fmt::write(&mut text, format_args!("{value:?}"));
+    text.0.sum64()
 }
 
 /// Digest of a table's names and numbers, line after line: that of the same numbers in any kind of file.
@@ -34,7 +51,7 @@ impl TableDigest {
 
 #[cfg(test)]
 mod tests {
-    use super::{TableDigest, digest};
+    use super::{TableDigest, digest, of_debug};
 
     #[test]
     fn a_table_has_the_same_digest_however_its_lines_are_added() {
@@ -51,6 +68,7 @@ mod tests {
 
     #[test]
     fn the_digest_is_crc_64_xz() {
+        assert_eq!(of_debug(&vec![1, 2]), digest(b"[1, 2]"));
         let reference = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
         assert_eq!(digest(b"123456789"), 0x995d_c9bb_df19_39fa); // the catalogue's check value
         let bytes: Vec<u8> = (0..5000_u32).map(|i| ((i * i) >> 3) as u8).collect();

@@ -228,8 +228,11 @@ impl Experiment {
 
     /// Reads a scene from its text, but does not check its sizes.
     fn parse_open(origin: &str, text: &str) -> Result<Self> {
-        let file: file::SceneFile = toml::from_str(text)
-            .map_err(|cause| Error::of_scene(origin, shortened(cause.to_string().trim_end())))?;
+        let file: file::SceneFile = toml::from_str(text).map_err(|cause| {
+            let is_list = cause.message().starts_with("invalid type: sequence");
+            let advice = if is_list { "; `compare` takes a scene with lists" } else { "" };
+            Error::of_scene(origin, shortened(cause.to_string().trim_end()) + advice)
+        })?;
         let experiment = file.into_experiment(digest(text.as_bytes()));
         experiment
             .and_then(|experiment| experiment.check().map(|()| experiment))

@@ -1,11 +1,12 @@
 //! Command `compare`: layouts side by side, by their least possible error, the best decoder, and what both cost.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::report::result_text;
+use crate::sweep::fields::require_known;
 use crate::sweep::file::{Bound, Wanted};
-use crate::sweep::merge::Setting;
+use crate::sweep::merge::{PointResult, Setting};
 use crate::sweep::plan::{Base, SCENE, SEED};
 use crate::sweep::{Merged, Plan, layouts, work};
 use crate::{Error, Result};
@@ -66,19 +67,26 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if labels.len() < bases.len() {
         return Err(Error::Usage("a scene is given twice; give each once".into()));
     }
-    let plan = Plan::new("compare", (bases, None), wanted(arguments, common), "")?;
+    let first = bases.first().map_or(String::new(), |base| base.label.clone());
+    let mut plan = Plan::new("compare", (bases, None), wanted(arguments, common)?, "")?;
+    if let Some(group) = &arguments.group {
+        let groups = plan.groups();
+        require_known("--group", group, &groups.iter().map(String::as_str).collect::<Vec<_>>())?;
+        let error = if plan.train { "rmse" } else { "limit" };
+        plan.objectives[0] = format!("{error}_{group}");
+    }
     let points = plan.points()?;
     let records = work::in_memory(&plan, &points, &Terminal::new())?;
-    let merged = Merged::new(&plan, &points, records, vec![]);
-    if let Some(first) = merged.failed().next().filter(|_| merged.settings.is_empty()) {
-        return Err(Error::Usage(first.failed.clone().unwrap_or_default()));
+    let merged = Merged::new(&plan, &points, records);
+    if let Some(failed) = merged.failed().next().filter(|_| merged.settings.is_empty()) {
+        return Err(Error::Usage(reason(failed, &first)));
     }
     if let Some(files) = &files {
         files.write(&merged, &command_line::of_this_process("compare", &[], common.seed))?;
     }
     print::result(common, &merged, || {
         let mut page = print::Page::default();
-        table(&mut page, &merged);
+        table(&mut page, &merged, &first);
         if let Some(files) = &files {
             page.line(format_args!("\nwritten: {}", files.names()));
         }
@@ -87,36 +95,32 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 /// What is wanted of the layouts.
-fn wanted(arguments: &Arguments, common: &Common) -> Wanted {
-    let whole = |value: u64| Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
+fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
+    let whole = |value: usize| Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
     let mut wanted = Wanted { train: !arguments.limit_only, ..Wanted::default() };
     let axes = [("training.centres", &arguments.centres), ("device.samples", &arguments.average)];
     for (field, values) in axes.into_iter().filter(|(_, values)| !values.is_empty()) {
-        let values = values.iter().map(|value| whole(*value as u64)).collect();
+        let values = values.iter().map(|value| whole(*value)).collect();
         wanted.axes.insert(field.into(), Value::Array(values));
     }
     if let ReadoutOption::Onchip = arguments.readout {
         wanted.device.insert("readout".into(), "onchip".into());
     }
     if let Some(seed) = common.seed {
-        wanted.set.insert(SEED.into(), whole(seed));
-    }
-    if let Some(group) = &arguments.group {
-        let [error, time] = if wanted.train { ["rmse", "frame_ms"] } else { ["limit", "scan_ms"] };
-        wanted.objectives = vec![format!("{error}_{group}"), time.into()];
+        let seed = i64::try_from(seed).map_err(|_| {
+            Error::Usage(format!("--seed {seed}: give at most {}, the most of a scene", i64::MAX))
+        })?;
+        wanted.set.insert(SEED.into(), Value::Integer(seed));
     }
     wanted
         .bounds
         .extend(arguments.max_latency_ms.map(|most| ("frame_ms".into(), Bound::Most(most))));
-    wanted
+    Ok(wanted)
 }
 
 /// Prints a line for each layout: its least possible errors, and its best decoder.
-fn table(page: &mut print::Page, merged: &Merged) {
-    let scene = |setting: &Setting| match setting.values.get(SCENE) {
-        Some(serde_json::Value::String(label)) => label.clone(),
-        _ => "the scene".into(),
-    };
+fn table(page: &mut print::Page, merged: &Merged, first: &str) {
+    let scene = |setting: &Setting| label(&setting.values, first);
     let mut layouts: Vec<String> = Vec::new();
     for setting in &merged.settings {
         if !layouts.contains(&scene(setting)) {
@@ -154,6 +158,18 @@ fn table(page: &mut print::Page, merged: &Merged) {
         page.line("-: no decoder of the layout is within the bound");
     }
     for failed in merged.failed() {
-        page.line(format_args!("failed: {}", failed.failed.as_deref().unwrap_or_default()));
+        page.line(format_args!("failed: {}", reason(failed, first)));
     }
+}
+
+/// Name of a layout; of one alone it is that of the `first`.
+fn label(values: &BTreeMap<String, serde_json::Value>, first: &str) -> String {
+    let label = values.get(SCENE).and_then(serde_json::Value::as_str);
+    label.unwrap_or(first).into()
+}
+
+/// Reason why a layout has no result.
+fn reason(point: &PointResult, first: &str) -> String {
+    let why = point.failed.as_deref().unwrap_or_default();
+    format!("{}: {}", label(&point.values, first), why.replace("scene of the point: ", ""))
 }

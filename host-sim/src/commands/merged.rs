@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use crate::report::format::counted;
 use crate::sweep::Merged;
 use crate::{Error, Result, report};
 use taxel_data::output::{self, check_writable};
@@ -74,16 +75,24 @@ pub fn page(merged: &Merged) -> print::Page {
     } else {
         format!(", {within} within the bounds")
     };
+    let failed = match merged.failed().count() {
+        0 => String::new(),
+        failed => format!(", {failed} failed"),
+    };
     page.line(format_args!(
-        "{}: {} points, {} settings{bounds}, {} on the front of {}",
+        "{}: {}{failed}, {}{bounds}, {} on the front of {}",
         merged.plan,
-        merged.points.len(),
-        merged.settings.len(),
+        counted(merged.points.len(), "point"),
+        counted(merged.settings.len(), "setting"),
         merged.front().len(),
         merged.objectives.join(", ")
     ));
+    if let Some(sentence) = merged.none_within() {
+        page.line(sentence);
+    }
     for (note, count) in merged.notes() {
-        page.line(format_args!("{count} points have {note}; the JSON says why of each"));
+        let points = counted(count, "point");
+        page.line(format_args!("{points} with {note}; the JSON says why of each"));
     }
     front(&mut page, merged);
     if !merged.effects.is_empty() {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::report::format::counted;
 use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
 use crate::{Error, Result};
 use clap::{Args, Parser};
@@ -140,8 +141,13 @@ impl std::fmt::Display for ShardSummary<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "{}, shard {}: {} points, {} computed, {} there already, {} failed",
-            self.plan, self.shard, self.points, self.computed, self.there_already, self.failed
+            "{}, shard {}: {}, {} computed, {} there already, {} failed",
+            self.plan,
+            self.shard,
+            counted(self.points, "point"),
+            self.computed,
+            self.there_already,
+            self.failed
         )
     }
 }
@@ -179,7 +185,7 @@ fn list(plan: &Plan, points: &[Point], shard: Option<Shard>, common: &Common) ->
         let mut page = print::Page::default();
         shown
             .iter()
-            .for_each(|point| page.line(format_args!("{}  {}", point.id, point.in_words())));
+            .for_each(|point| page.line(format_args!("{}  {}", point.id, plan.in_words(point))));
         page
     })
 }

@@ -40,6 +40,11 @@ pub fn grouped(count: usize) -> String {
     text
 }
 
+/// Number of things, and their noun: `1 point`, `1 200 points`.
+pub fn counted(count: usize, noun: &str) -> String {
+    format!("{} {noun}{}", grouped(count), if count == 1 { "" } else { "s" })
+}
+
 /// Text of a fraction in per cent, without needless digits.
 pub fn percent(fraction: f64) -> String {
     if !fraction.is_finite() {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::axes::Axis;
 use super::chart::{Chart, Mark, Series};
-use super::format::{fixed, grouped, significant, symbol};
+use super::format::{counted, fixed, significant, symbol};
 use super::html::document;
 use super::svg::{Anchor, Shape, Svg, TEXT_PX, escape, standalone, text_width};
 use super::tables::numbers;
@@ -238,11 +238,14 @@ pub fn html(merged: &Merged, stem: &str, command: &str) -> String {
         let _ = write!(lacking, "; {count} with {note}");
     }
     let mut body = format!(
-        "<header>\n<h1>{}</h1>\n<p>{} points{lacking}; {} settings; <a href=\"{stem}.csv\">all points as a table</a></p>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n<p>{}{lacking}; {}; <a href=\"{stem}.csv\">all points as a table</a></p>\n</header>\n",
         escape(&title),
-        grouped(merged.points.len()),
-        grouped(merged.settings.len()),
+        counted(merged.points.len(), "point"),
+        counted(merged.settings.len(), "setting"),
     );
+    if let Some(sentence) = merged.none_within() {
+        let _ = writeln!(body, "<p>{}</p>", escape(&sentence));
+    }
     if let Some(chart) = front(merged) {
         let bounds: Vec<String> =
             merged.bounds.iter().map(|(name, bound)| in_bound(name, *bound)).collect();

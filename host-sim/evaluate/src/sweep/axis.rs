@@ -84,6 +84,15 @@ impl Axis {
                 let mut values: Vec<Value> =
                     (0..count).map(|step| range.at(step as f64 / steps)).collect();
                 values.dedup();
+                // Only whole numbers can be the same.
+                let rule = || {
+                    let fewer = values.len();
+                    format!(
+                        "these are {fewer} whole numbers; give count = {fewer}, or {}.0 for fractions",
+                        range.from
+                    )
+                };
+                require(values.len() == count, format!("{}.count", self.field), count, rule)?;
                 Ok(values)
             }
         }
@@ -196,11 +205,6 @@ mod tests {
         assert_eq!(all("{from = 0.0, to = 1.0, count = 5}"), [0.0, 0.25, 0.5, 0.75, 1.0]);
         assert_eq!(all("{from = 0.005, to = 0.08, count = 3, log = true}"), [0.005, 0.02, 0.08]);
         assert_eq!(all("{from = 4, to = 32, count = 4, log = true}"), [4.0, 8.0, 16.0, 32.0]);
-        assert_eq!(
-            all("{from = 1, to = 3, count = 9}"),
-            [1.0, 2.0, 3.0],
-            "whole numbers, once each"
-        );
     }
 
     #[test]
@@ -217,8 +221,13 @@ mod tests {
             let message = axis(value).unwrap_err().to_string();
             assert!(message.contains(said) && message.contains('x'), "{value}: {message}");
         }
-        let message = axis("{from = 1, to = 9}").unwrap().all().unwrap_err().to_string();
-        assert!(message.contains("count"), "{message}");
+        for (value, said) in [
+            ("{from = 1, to = 9}", "needs a count"),
+            ("{from = 1, to = 3, count = 9}", "3 whole numbers; give count = 3, or 1.0"),
+        ] {
+            let message = axis(value).unwrap().all().unwrap_err().to_string();
+            assert!(message.contains("x.count") && message.contains(said), "{message}");
+        }
     }
 
     #[test]

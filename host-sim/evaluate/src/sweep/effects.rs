@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use serde_json::Value;
 
-/// Most levels of an axis; more values are put together, in equal numbers.
+/// Most levels of an axis; neighbouring values are put together where there are more.
 const MOST_LEVELS: usize = 8;
 /// Exponents below this are taken for none, unless they are known much better than that: a law that does not hold exactly
 /// makes as much of axes that do nothing.
@@ -53,9 +53,10 @@ pub struct Exponent {
 }
 
 impl Exponent {
-    /// Whether it stands out of what a law that does not hold exactly makes of axes that do nothing.
+    /// Whether it stands out of chance, and of what a law that does not hold exactly makes of axes that do nothing.
     fn is_some_effect(&self) -> bool {
-        self.exponent.abs() > (20.0 * self.standard_error).clamp(1e-6, LEAST_EXPONENT)
+        let least = (20.0 * self.standard_error).clamp(1e-6, LEAST_EXPONENT);
+        self.exponent.abs() > least.max(3.0 * self.standard_error)
     }
 }
 
@@ -124,22 +125,39 @@ impl Settings<'_> {
         if let Some(numbers) = &numbers {
             order.sort_by(|a, b| numbers[known[*a]].total_cmp(&numbers[known[*b]]));
         }
+        let mut places: BTreeMap<String, usize> = BTreeMap::new();
         let mut levels: Vec<(String, Vec<usize>)> = Vec::new();
-        for place in order.iter().copied() {
+        for place in order {
             let name = text(known[place]);
-            match levels.iter_mut().find(|(level, _)| *level == name) {
-                Some((_, members)) => members.push(place),
-                None => levels.push((name, vec![place])),
+            let level = *places.entry(name.clone()).or_insert(levels.len());
+            if level == levels.len() {
+                levels.push((name, vec![]));
             }
+            levels[level].1.push(place);
         }
         if levels.len() <= MOST_LEVELS || numbers.is_none() {
             return levels;
         }
-        let bins = order.chunks(order.len().div_ceil(MOST_LEVELS));
-        let name = |bin: &[usize]| {
-            format!("{} … {}", text(known[bin[0]]), text(known[bin[bin.len() - 1]]))
+        // A level is full with its part of all settings, and equal values are in one level.
+        let mut bins: Vec<Vec<(String, Vec<usize>)>> = Vec::new();
+        let (mut before, mut last_bin) = (0, None);
+        for level in levels {
+            let (bin, count) = (before * MOST_LEVELS / known.len(), level.1.len());
+            match bins.last_mut() {
+                Some(last) if last_bin == Some(bin) => last.push(level),
+                _ => bins.push(vec![level]),
+            }
+            last_bin = Some(bin);
+            before += count;
+        }
+        let joined = |bin: Vec<(String, Vec<usize>)>| {
+            let name = match (&bin[0].0, &bin[bin.len() - 1].0) {
+                (first, last) if first == last => first.clone(),
+                (first, last) => format!("{first} … {last}"),
+            };
+            (name, bin.into_iter().flat_map(|(_, members)| members).collect())
         };
-        bins.map(|bin| (name(bin), bin.to_vec())).collect()
+        bins.into_iter().map(joined).collect()
     }
 
     /// Power law of a positive result on all axes of positive numbers that vary.
@@ -217,8 +235,13 @@ pub fn worth(error: &Law, cost: &Law) -> Vec<Worth> {
     let (unit, step) = unit_of(&cost.result);
     let pairs = error.exponents.iter().filter_map(|of_error| {
         let of_cost = cost.exponents.iter().find(|exponent| exponent.field == of_error.field)?;
-        let factor = 100.0 * step / (of_cost.exponent * cost.mean);
-        let change = [of_error.exponent * factor, (of_error.standard_error * factor).abs()];
+        // The cost rises from its mean by one step, and the error follows the axis that this takes.
+        let ratio = of_error.exponent / of_cost.exponent;
+        let log_rise = (step / cost.mean).ln_1p();
+        let factor = (ratio * log_rise).exp();
+        let standard_error = 100.0 * factor * log_rise / of_cost.exponent.abs()
+            * of_error.standard_error.hypot(ratio * of_cost.standard_error);
+        let change = [100.0 * (factor - 1.0), standard_error];
         Some(Worth {
             field: of_error.field.clone(),
             error: error.result.clone(),
@@ -302,12 +325,16 @@ mod tests {
             mean,
             exponents: vec![exponent(of)],
         };
-        // 1 ms of 10 ms is 10 % of the cost, 5 % of the axis, and −2.5 % of the error.
+        // 10 ms become 11 ms, so the axis is 1.1^(1/2) as much, and the error 1.1^(−1/4).
         let found = worth(&law("rmse_dz_mm", 0.1, -0.5), &law("frame_ms", 10.0, 2.0));
         let [change, error] = found[0].change_percent.unwrap();
-        assert!(
-            (change + 2.5).abs() < 1e-12 && (error - 0.5).abs() < 1e-12 && found[0].unit == "1 ms"
-        );
+        let left = 1.1_f64.powf(-0.25);
+        assert!((change - 100.0 * (left - 1.0)).abs() < 1e-12 && found[0].unit == "1 ms");
+        // Both exponents have an error of 0.1: of their ratio it is 0.1/2 and 0.25·0.1/2.
+        let expected = 100.0 * left * 1.1_f64.ln() * 0.05_f64.hypot(0.0125);
+        assert!((error - expected).abs() < 1e-12, "{error}");
+        let barely = worth(&law("e", 1.0, -0.5), &law("scan_ms", 1.0, 0.29));
+        assert_eq!(barely[0].change_percent, None, "less than three standard errors");
         assert_eq!(
             worth(&law("e", 1.0, -0.5), &law("scan_ms", 1.0, 0.001))[0].change_percent,
             None
@@ -315,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn many_values_are_put_together_in_equal_numbers() {
+    fn many_values_are_put_together_in_about_equal_numbers() {
         let settings: Vec<BTreeMap<String, Value>> = (0..80)
             .map(|i| BTreeMap::from([("a".to_owned(), Value::from(f64::from((i * 37) % 80)))]))
             .collect();
@@ -331,5 +358,16 @@ mod tests {
         assert_eq!(effect.levels.iter().map(|it| it.points).collect::<Vec<_>>(), [10; 8]);
         assert_eq!(effect.levels[1].name, "10.0 … 19.0");
         assert!(effect.share > 0.97);
+        // Of nine values none is in two levels, however many settings have it.
+        let counts = [1, 1, 30, 5, 5, 5, 5, 20, 8];
+        let values = counts.iter().zip(1..).flat_map(|(count, value)| vec![value; *count]);
+        let settings: Vec<BTreeMap<String, Value>> =
+            values.map(|value| BTreeMap::from([("a".to_owned(), Value::from(value))])).collect();
+        let all = Settings { fields: &fields, is_drawn: false, values: settings.iter().collect() };
+        let rising: Vec<Option<f64>> = settings.iter().map(|it| it["a"].as_f64()).collect();
+        let levels = &all.effects("x", &rising)[0].levels;
+        let found: Vec<(&str, usize)> =
+            levels.iter().map(|it| (it.name.as_str(), it.points)).collect();
+        assert_eq!(found, [("1 … 3", 32), ("4 … 5", 10), ("6 … 7", 10), ("8", 20), ("9", 8)]);
     }
 }

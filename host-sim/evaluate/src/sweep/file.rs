@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use taxel_data::{BadValue, require};
 use toml::Table;
 
 use super::fields::require_known;
@@ -15,7 +16,7 @@ pub(super) struct PlanFile {
     /// Scenes: built-in ones, or files beside the plan.
     pub scene: Option<OneOrMore>,
     /// Measurements instead of a scene: a data file beside the plan, and the options that `train` takes for it.
-    pub data: Vec<String>,
+    pub data: Option<OneOrMore>,
     #[serde(flatten)]
     pub wanted: Wanted,
 }
@@ -81,26 +82,69 @@ pub(super) enum OneOrMore {
     More(Vec<String>),
 }
 
+impl OneOrMore {
+    pub fn all(self) -> Vec<String> {
+        match self {
+            Self::One(name) => vec![name],
+            Self::More(names) => names,
+        }
+    }
+}
+
 /// Latin hypercube of some axes.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Draw {
     pub(super) points: usize,
-    #[serde(default = "one")]
     pub(super) seed: u64,
     pub(super) axes: Table,
 }
 
-fn one() -> u64 {
-    1
+impl Default for Draw {
+    fn default() -> Self {
+        Self { points: 0, seed: 1, axes: Table::new() }
+    }
 }
 
 /// Bound on a result: the most, or the least.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "BoundFile")]
 #[serde(untagged)]
 pub enum Bound {
     Most(f64),
     Least { least: f64 },
+}
+
+/// Bound as it stands in a plan: a number is the most.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "give the most, such as 10, or { least = 10 }")]
+enum BoundFile {
+    Number(f64),
+    Named(NamedBound),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NamedBound {
+    most: Option<f64>,
+    least: Option<f64>,
+}
+
+impl TryFrom<BoundFile> for Bound {
+    type Error = &'static str;
+
+    fn try_from(file: BoundFile) -> std::result::Result<Self, Self::Error> {
+        match file {
+            BoundFile::Number(most)
+            | BoundFile::Named(NamedBound { most: Some(most), least: None }) => {
+                Ok(Self::Most(most))
+            }
+            BoundFile::Named(NamedBound { most: None, least: Some(least) }) => {
+                Ok(Self::Least { least })
+            }
+            BoundFile::Named(_) => Err("a bound is the most or the least; give one of them"),
+        }
+    }
 }
 
 impl Bound {
@@ -110,6 +154,15 @@ impl Bound {
             Self::Most(most) => value <= most,
             Self::Least { least } => value >= least,
         }
+    }
+
+    /// Logarithm of the factor by which a value misses the bound, or the difference where there is no factor.
+    pub fn missed_by(self, value: f64) -> f64 {
+        if self.allows(value) {
+            return 0.0;
+        }
+        let (Self::Most(bound) | Self::Least { least: bound }) = self;
+        if bound > 0.0 && value > 0.0 { (value / bound).ln().abs() } else { (value - bound).abs() }
     }
 }
 
@@ -124,6 +177,21 @@ pub struct PartPrices {
     pub column_eur: f64,
     /// Price of a cm² of the mat.
     pub cm2_eur: f64,
+}
+
+impl PartPrices {
+    pub(super) fn check(&self) -> std::result::Result<(), BadValue> {
+        let all = [
+            ("prices.fixed_eur", self.fixed_eur),
+            ("prices.row_eur", self.row_eur),
+            ("prices.column_eur", self.column_eur),
+            ("prices.cm2_eur", self.cm2_eur),
+        ];
+        all.into_iter().try_for_each(|(field, price)| {
+            let rule = || "give a price in €, 0 or more".into();
+            require(price.is_finite() && price >= 0.0, field, price, rule)
+        })
+    }
 }
 
 /// Checks the names at the top of a plan: serde does not, where fields are flattened.

@@ -1,5 +1,6 @@
 //! Results of a whole plan, whoever computed them: all points, the best of them, and what the axes do.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
@@ -24,8 +25,8 @@ pub struct Merged {
     pub columns: Vec<String>,
     pub objectives: Vec<String>,
     pub bounds: BTreeMap<String, Bound>,
-    /// Points, in the plan's order.
-    pub points: Vec<Record>,
+    /// Points with a result, in the plan's order.
+    pub points: Vec<PointResult>,
     /// Identities of points without a result.
     pub missing: Vec<String>,
     /// Settings: points that differ at most in their seed, put together.
@@ -33,6 +34,30 @@ pub struct Merged {
     pub effects: Vec<Effect>,
     pub laws: Vec<Law>,
     pub worth: Vec<Worth>,
+}
+
+/// Result of a point, with the fields that this plan's points differ in.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointResult {
+    pub id: String,
+    pub values: BTreeMap<String, Value>,
+    pub results: BTreeMap<String, f64>,
+    /// Remarks on them.
+    pub notes: Vec<String>,
+    /// Reason why there are none.
+    pub failed: Option<String>,
+}
+
+impl PointResult {
+    fn new(point: &Point, record: Record, prices: Option<&PartPrices>) -> Self {
+        let value = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
+        let values = point.values.iter().map(|(field, it)| (field.clone(), value(it))).collect();
+        let Record { id, mut results, notes, failed, .. } = record;
+        if let Some(prices) = prices {
+            add_cost(&mut results, prices);
+        }
+        Self { id, values, results, notes, failed }
+    }
 }
 
 /// Points that differ at most in their seed.
@@ -73,19 +98,19 @@ impl Merged {
     /// [`Error::Usage`] that names every file that cannot be used.
     pub fn read(plan: &Plan, points: &[Point], store: &Store) -> Result<Self> {
         const NAMED: usize = 10;
-        let mut records = Vec::new();
-        let (mut missing, mut unusable) = (Vec::new(), Vec::new());
+        let (mut records, mut unusable) = (Vec::new(), Vec::new());
         for point in points {
-            match store.find(plan, point)? {
-                Found::Whole(record) => records.push(*record),
-                Found::Missing => missing.push(point.id.clone()),
+            records.push(match store.find(plan, point)? {
+                Found::Whole(record) => Some(*record),
+                Found::Missing => None,
                 Found::Unusable(why) => {
                     unusable.push(format!("{}: {why}", store.path(&point.id).display()));
+                    None
                 }
-            }
+            });
         }
         if unusable.is_empty() {
-            return Ok(Self::new(plan, points, records, missing));
+            return Ok(Self::new(plan, points, records));
         }
         let more = unusable.len().saturating_sub(NAMED);
         let more = if more > 0 { format!("\nand {more} more") } else { String::new() };
@@ -96,28 +121,27 @@ impl Merged {
         )))
     }
 
-    /// Results in `records` of a plan's `points`, both in its order.
-    pub fn new(
-        plan: &Plan,
-        points: &[Point],
-        mut records: Vec<Record>,
-        missing: Vec<String>,
-    ) -> Self {
-        if let Some(prices) = &plan.prices {
-            records.iter_mut().for_each(|record| add_cost(record, prices));
+    /// Results of a plan's `points`, those that there are.
+    pub fn new(plan: &Plan, points: &[Point], records: Vec<Option<Record>>) -> Self {
+        let (mut results, mut scenes, mut missing) = (Vec::new(), Vec::new(), Vec::new());
+        for (point, record) in points.iter().zip(records) {
+            match record {
+                None => missing.push(point.id.clone()),
+                Some(record) => {
+                    results.push(PointResult::new(point, record, plan.prices.as_ref()));
+                    scenes.push(point.scene.as_str());
+                }
+            }
         }
         let names: BTreeSet<&String> =
-            records.iter().flat_map(|record| record.results.keys()).collect();
+            results.iter().flat_map(|point| point.results.keys()).collect();
         let mut columns: Vec<String> = names.into_iter().cloned().collect();
         columns.sort_by(|a, b| place_of(a).cmp(&place_of(b)));
-        let (mut settings, first): (Vec<Setting>, Vec<String>) =
-            settings(&records).into_iter().unzip();
+        let (mut settings, first): (Vec<Setting>, Vec<usize>) =
+            settings(&results).into_iter().unzip();
         mark(&mut settings, &plan.objectives, &plan.bounds);
-        let scenes: BTreeMap<&str, &Point> =
-            points.iter().map(|point| (point.id.as_str(), point)).collect();
-        for (setting, id) in settings.iter_mut().zip(&first).filter(|(setting, _)| setting.on_front)
-        {
-            setting.scene = scenes.get(id.as_str()).map(|point| point.scene.clone());
+        for (setting, point) in settings.iter_mut().zip(first) {
+            setting.scene = setting.on_front.then(|| scenes[point].to_owned());
         }
         let fields: Vec<String> =
             plan.fields.iter().filter(|field| *field != SEED).cloned().collect();
@@ -146,7 +170,7 @@ impl Merged {
             columns,
             objectives: plan.objectives.clone(),
             bounds: plan.bounds.clone(),
-            points: records,
+            points: results,
             missing,
             settings,
             effects,
@@ -193,6 +217,29 @@ impl Merged {
         front
     }
 
+    /// Sentence for results none of which is within the bounds: it names the setting that misses the worst of them least.
+    pub fn none_within(&self) -> Option<String> {
+        if self.settings.iter().any(|setting| setting.is_within) {
+            return None;
+        }
+        let misses = |setting: &Setting| {
+            let of = |(name, bound): (&String, &Bound)| {
+                setting.results.get(name).map_or(f64::INFINITY, |value| bound.missed_by(*value))
+            };
+            self.bounds.iter().map(of).fold(0.0, f64::max)
+        };
+        let nearest = self.settings.iter().min_by(|a, b| misses(a).total_cmp(&misses(b)))?;
+        let results = self.bounds.keys().map(|name| match nearest.results.get(name) {
+            Some(value) => format!("{name} = {value:.4}"),
+            None => format!("no {name}"),
+        });
+        let results = results.collect::<Vec<_>>().join(", ");
+        Some(format!(
+            "no setting is within the bounds; the nearest is {} with {results}",
+            nearest.in_words()
+        ))
+    }
+
     /// Effect of the axis of this field on a result.
     pub fn effect(&self, field: &str, result: &str) -> Option<&Effect> {
         self.effects.iter().find(|effect| effect.field == field && effect.result == result)
@@ -228,14 +275,14 @@ impl Merged {
     }
 
     /// Points that could not be computed.
-    pub fn failed(&self) -> impl Iterator<Item = &Record> {
+    pub fn failed(&self) -> impl Iterator<Item = &PointResult> {
         self.points.iter().filter(|point| point.failed.is_some())
     }
 }
 
 /// Adds what the sensor's parts cost.
-fn add_cost(record: &mut Record, prices: &PartPrices) {
-    let of = |name: &str| record.results.get(name).copied();
+fn add_cost(results: &mut BTreeMap<String, f64>, prices: &PartPrices) {
+    let of = |name: &str| results.get(name).copied();
     let [Some(rows), Some(columns), Some(area_cm2)] = ["rows", "columns", "area_cm2"].map(of)
     else {
         return;
@@ -244,7 +291,7 @@ fn add_cost(record: &mut Record, prices: &PartPrices) {
         + rows * prices.row_eur
         + columns * prices.column_eur
         + area_cm2 * prices.cm2_eur;
-    record.results.insert("cost_eur".into(), cost_eur);
+    results.insert("cost_eur".into(), cost_eur);
 }
 
 fn without_seed(values: &BTreeMap<String, Value>) -> BTreeMap<String, Value> {
@@ -255,25 +302,26 @@ fn without_seed(values: &BTreeMap<String, Value>) -> BTreeMap<String, Value> {
         .collect()
 }
 
-/// Settings in the order of their first points, whose identities stand beside them; points that failed are in none.
-fn settings(records: &[Record]) -> Vec<(Setting, String)> {
-    let mut groups: Vec<Vec<&Record>> = Vec::new();
+/// Settings in the order of their first points, whose places stand beside them; points that failed are in none.
+fn settings(points: &[PointResult]) -> Vec<(Setting, usize)> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
     let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    for record in records.iter().filter(|record| record.failed.is_none()) {
-        let key = format!("{:?}", without_seed(&record.values));
+    for (point, result) in points.iter().enumerate().filter(|(_, it)| it.failed.is_none()) {
+        let key = format!("{:?}", without_seed(&result.values));
         let place = *places.entry(key).or_insert(groups.len());
         match groups.get_mut(place) {
-            Some(group) => group.push(record),
-            None => groups.push(vec![record]),
+            Some(group) => group.push(point),
+            None => groups.push(vec![point]),
         }
     }
-    let setting = |group: Vec<&Record>| {
+    let setting = |members: Vec<usize>| {
+        let group: Vec<&PointResult> = members.iter().map(|point| &points[*point]).collect();
         let names: BTreeSet<&String> =
-            group.iter().flat_map(|record| record.results.keys()).collect();
+            group.iter().flat_map(|point| point.results.keys()).collect();
         let (mut results, mut deviations) = (BTreeMap::new(), BTreeMap::new());
         for name in names {
             let values: Vec<f64> =
-                group.iter().filter_map(|record| record.results.get(name).copied()).collect();
+                group.iter().filter_map(|point| point.results.get(name).copied()).collect();
             let count = values.len() as f64;
             let mean = values.iter().sum::<f64>() / count;
             results.insert(name.clone(), mean);
@@ -291,7 +339,7 @@ fn settings(records: &[Record]) -> Vec<(Setting, String)> {
             on_front: false,
             scene: None,
         };
-        (setting, group[0].id.clone())
+        (setting, members[0])
     };
     groups.into_iter().map(setting).collect()
 }
@@ -304,17 +352,30 @@ fn mark(settings: &mut [Setting], objectives: &[String], bounds: &BTreeMap<Strin
         };
         setting.is_within = bounds.iter().all(allows);
     }
-    let ranks = settings.iter().map(|setting| {
+    let ranks = settings.iter().enumerate().filter_map(|(place, setting)| {
         let values = objectives.iter().map(|name| setting.results.get(name).copied());
-        values.collect::<Option<Vec<f64>>>().filter(|_| setting.is_within)
+        Some((place, values.collect::<Option<Vec<f64>>>().filter(|_| setting.is_within)?))
     });
-    let ranks: Vec<Option<Vec<f64>>> = ranks.collect();
-    for (setting, own) in settings.iter_mut().zip(&ranks) {
-        let Some(own) = own else { continue };
-        let beaten = ranks
-            .iter()
-            .flatten()
-            .any(|other| other != own && other.iter().zip(own).all(|(other, own)| other <= own));
-        setting.on_front = !beaten;
+    let mut ranks: Vec<(usize, Vec<f64>)> = ranks.collect();
+    // What beats a setting stands before it in this order, and so does one on the front that beats it.
+    ranks.sort_by(|(_, a), (_, b)| {
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| a.total_cmp(b))
+            .find(|it| it.is_ne())
+            .unwrap_or(Ordering::Equal)
+    });
+    let mut front: Vec<&Vec<f64>> = Vec::new();
+    for (place, own) in &ranks {
+        let beats = |other: &&Vec<f64>| {
+            *other != own && other.iter().zip(own).all(|(other, own)| other <= own)
+        };
+        if front.iter().any(beats) {
+            continue;
+        }
+        settings[*place].on_front = true;
+        if front.last() != Some(&own) {
+            front.push(own);
+        }
     }
 }

@@ -6,14 +6,14 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use taxel_data::digest::digest;
+use taxel_data::digest::{digest, of_debug};
 use taxel_data::{BadValue, columns, input, require};
 use toml::{Table, Value};
 
 use super::axis::{Axis, latin_hypercube};
 use super::fields::{self, require_known};
 use super::file::{Bound, OneOrMore, PartPrices, PlanFile, Wanted};
-use super::point::columns_of;
+use super::point::{columns_of, not_computed};
 use crate::error::{Error, Result};
 use crate::evaluate::trade::Device;
 use crate::experiment::{Experiment, check_name, names_a_scene};
@@ -52,6 +52,8 @@ pub struct Plan {
     pub prices: Option<PartPrices>,
     /// Measurements that all points are trained on, if it is no plan of scenes.
     pub data: Option<Arc<Measurements>>,
+    /// Digest of these, of the frames that they are judged by, and of all options.
+    data_digest: u64,
     /// Number of test frames for the limit, if not as many as suffice.
     pub limit_frames: Option<usize>,
     pub train: bool,
@@ -82,13 +84,6 @@ pub struct Point {
     pub shares: u64,
 }
 
-impl Point {
-    /// Point in words: its values.
-    pub fn in_words(&self) -> String {
-        in_words(&self.values)
-    }
-}
-
 fn in_words(values: &[(String, Value)]) -> String {
     let values = values.iter().map(|(field, value)| format!("{field} = {value}"));
     values.collect::<Vec<_>>().join(", ")
@@ -115,35 +110,35 @@ impl Plan {
             let is_beside = beside.as_ref().is_some_and(|file| file.is_file());
             if is_beside { beside.unwrap_or_default().display().to_string() } else { name.clone() }
         };
-        let scenes = match (file.scene, file.data.is_empty()) {
-            (Some(_), false) => {
+        let scenes = match (file.scene, &file.data) {
+            (Some(_), Some(_)) => {
                 return Err(of_plan("it has scene and data: leave one of them out".into()));
             }
-            (None, false) => vec![],
-            (None, true) => {
+            (None, Some(_)) => vec![],
+            (None, None) => {
                 return Err(of_plan(
                     "it has no scene: give one, such as scene = \"press\", or data".into(),
                 ));
             }
-            (Some(OneOrMore::One(name)), _) => vec![name],
-            (Some(OneOrMore::More(names)), _) => names,
+            (Some(scenes), None) => scenes.all(),
         };
+        if let Some((_, name)) =
+            scenes.iter().enumerate().find(|(at, it)| scenes[..*at].contains(it))
+        {
+            return Err(of_plan(format!("scene {name} is given twice: give it once")));
+        }
         let bases = scenes.iter().map(|name| {
             let built_in = taxel_scenes::ALL.iter().any(|(known, _)| known == name);
             let file = if built_in { name.clone() } else { beside(name) };
             Ok(Base { label: name.clone(), document: document(&file)? })
         });
         let bases: Vec<Base> = bases.collect::<Result<_>>()?;
-        let data = if file.data.is_empty() {
-            None
-        } else {
-            match load(&file.data.iter().map(beside).collect::<Vec<_>>())? {
-                Subject::Measured(data) => Some(Arc::from(data)),
-                Subject::Scene(_) => {
-                    return Err(of_plan("data is a scene: give it as scene".into()));
-                }
-            }
-        };
+        let load_all =
+            |words: OneOrMore| match load(&words.all().iter().map(beside).collect::<Vec<_>>())? {
+                Subject::Measured(data) => Ok(Arc::from(data)),
+                Subject::Scene(_) => Err(of_plan("data is a scene: give it as scene".into())),
+            };
+        let data = file.data.map(load_all).transpose()?;
         Self::new(&file.name, (bases, data), file.wanted, build)
             .map_err(|bad| of_plan(bad.to_string()))
     }
@@ -159,7 +154,9 @@ impl Plan {
         build: &str,
     ) -> Checked<Self> {
         check_name(name)?;
-        require(wanted.repeats > 0, "repeats", 0, || "give at least 1".into())?;
+        let allowed = (1..=MOST_POINTS).contains(&wanted.repeats);
+        require(allowed, "repeats", wanted.repeats, || format!("give 1 to {MOST_POINTS}"))?;
+        wanted.prices.iter().try_for_each(PartPrices::check)?;
         require(wanted.limit_frames != Some(1), "limit_frames", 1, || {
             "give at least 2, or 0 for no limit".into()
         })?;
@@ -173,6 +170,7 @@ impl Plan {
             objectives: wanted.objectives,
             bounds: wanted.bounds,
             prices: wanted.prices,
+            data_digest: data.as_deref().map_or(0, digest_of),
             data,
             limit_frames: wanted.limit_frames,
             train: wanted.train,
@@ -189,30 +187,46 @@ impl Plan {
         require(count.is_some(), "axes", "all values crossed", || {
             format!("they are more than {MOST_POINTS} points; give fewer values, or draw some")
         })?;
+        let is_axis = |field: &&String| plan.fields.contains(field);
+        let is_first_seed = |field: &String| field == SEED && wanted.repeats > 1;
+        let mut set = plan.set.iter().map(|(field, _)| field);
+        if let Some(field) = set.find(|field| is_axis(field) && !is_first_seed(field)) {
+            return Err(BadValue::new("set", field, "it is an axis as well; give it once"));
+        }
         plan.check_fields()?;
         plan.choose_objectives()?;
         Ok(plan)
     }
 
-    /// Checks the fields of the first point with every value of every axis in turn.
+    /// Checks the fields of every scene, with [set], and those of the first point with every value of every axis in turn.
     fn check_fields(&self) -> Checked<()> {
-        let check = |places: &[usize]| {
-            let document = self.document_at(places)?;
-            let (scene, device) = (text(&document.scene)?, document.device);
+        let check_scene = |field: &str, shown: &str, scene: &Table| {
+            let scene = text(scene)?;
             let checked = match &self.data {
                 None => Experiment::check_fields(&scene),
                 Some(data) => super::point::measured(data, &scene).map(drop),
             };
-            let of = |message: String| {
-                let shown = in_words(&document.values);
-                BadValue::new(
-                    "axes, set",
-                    if shown.is_empty() { "base".into() } else { shown },
-                    message,
-                )
-            };
-            checked.map_err(|message| of(fields::with_nearest(&message)))?;
-            device_of(device).map(drop)
+            checked.map_err(|message| {
+                let advice = match field {
+                    _ if !super::layouts::is_of_list(&message) => "",
+                    "scene" => {
+                        "; `compare` takes a scene with lists, and in a plan they stand in [axes]"
+                    }
+                    "set" => "; several values stand in [axes]",
+                    _ => "",
+                };
+                BadValue::new(field, shown, fields::with_nearest(&message) + advice)
+            })
+        };
+        for base in &self.bases {
+            check_scene("scene", &base.label, &base.document)?;
+            let document = self.changed(Some(base), &[])?;
+            check_scene("set", &in_words(&self.set), &document.scene)?;
+        }
+        let check = |places: &[usize]| {
+            let document = self.document_at(places)?;
+            check_scene("axes", &in_words(&document.values), &document.scene)?;
+            device_of(document.device).map(drop)
         };
         let first = vec![0; self.axes.len()];
         check(&first)?;
@@ -226,35 +240,55 @@ impl Plan {
         Ok(())
     }
 
+    /// Groups of outputs, such as `dz_mm`; none where only some points of the plan can be.
+    pub fn groups(&self) -> Vec<String> {
+        let names = match &self.data {
+            Some(data) => data.training.outputs.names.clone(),
+            None => self.output_names().unwrap_or_default(),
+        };
+        columns::groups(&names).into_iter().map(|(group, _)| group.to_owned()).collect()
+    }
+
+    /// Outputs of the first point's scene, or, if it is impossible, of the plan's first scene.
+    fn output_names(&self) -> Option<Vec<String>> {
+        let document = self.document_at(&vec![0; self.axes.len()]).ok()?;
+        let parse = |table: &Table| Experiment::parse(&self.name, &text(table).ok()?).ok();
+        let scene = parse(&document.scene).or_else(|| parse(&self.bases.first()?.document))?;
+        Some(scene.output_names())
+    }
+
     /// Checks objectives and bounds, and chooses objectives where none are given.
     fn choose_objectives(&mut self) -> Checked<()> {
-        let names = if let Some(data) = &self.data {
-            data.training.outputs.names.clone()
-        } else {
-            // The first point may be impossible, and the base is not.
-            let document = self.document_at(&vec![0; self.axes.len()])?;
-            let base = self.bases.first().map_or(&document.scene, |base| &base.document);
-            let parse = |table: &Table| Experiment::parse(&self.name, &text(table).ok()?).ok();
-            let scene = parse(&document.scene).or_else(|| parse(base));
-            scene.map(|scene| scene.output_names()).unwrap_or_default()
-        };
-        let groups: Vec<&str> =
-            columns::groups(&names).into_iter().map(|(group, _)| group).collect();
-        let known = columns_of(self, &groups);
+        let groups = self.groups();
         if self.objectives.is_empty() {
             let error = if self.train { "rmse" } else { "limit" };
             let of_last = groups.last().map(|group| format!("{error}_{group}"));
             let time = if self.train { "frame_ms" } else { "scan_ms" };
             self.objectives = of_last.into_iter().chain([time.into()]).collect();
         }
-        let known: Vec<&str> = known.iter().map(String::as_str).collect();
         if groups.is_empty() {
             return Ok(());
         }
-        for name in &self.objectives {
-            require_known("objectives", name, &known)?;
+        let groups: Vec<&str> = groups.iter().map(String::as_str).collect();
+        let known = columns_of(self, &groups);
+        let known: Vec<&str> = known.iter().map(String::as_str).collect();
+        let objectives = self.objectives.iter().map(|name| ("objectives", name));
+        for (field, name) in objectives.chain(self.bounds.keys().map(|name| ("bounds", name))) {
+            let lacking = not_computed(self, name).filter(|_| !known.contains(&name.as_str()));
+            if let Some(why) = lacking {
+                return Err(BadValue::new(field, name, why));
+            }
+            require_known(field, name, &known)?;
         }
-        self.bounds.keys().try_for_each(|name| require_known("bounds", name, &known))
+        Ok(())
+    }
+
+    /// Point in words: its values, or the only scene.
+    pub fn in_words(&self, point: &Point) -> String {
+        match (point.values.is_empty(), self.bases.first()) {
+            (true, Some(base)) => base.label.clone(),
+            _ => in_words(&point.values),
+        }
     }
 
     /// All points, each once.
@@ -262,12 +296,13 @@ impl Plan {
     /// # Errors
     /// [`BadValue`] for a field that a scene of the plan cannot have.
     pub fn points(&self) -> Checked<Vec<Point>> {
+        // Scenes with different names may be the same, and are then shown as two.
         let mut seen = HashSet::new();
         let mut points = Vec::new();
         let mut places = vec![0; self.axes.len()];
         loop {
             let point = self.point(&places)?;
-            if seen.insert(point.id.clone()) {
+            if seen.insert((point.id.clone(), in_words(&point.values))) {
                 points.push(point);
             }
             // The last axis is the fastest.
@@ -289,8 +324,7 @@ impl Plan {
         shared.remove("table1");
         let (device, samples) = device_of(document.device)?;
         let how = format!("{device:?} {samples} {:?} {}", self.limit_frames, self.train);
-        let data = self.data.as_ref().map_or(0, |data| data.digest);
-        let decides = format!("{}\n{how}\n{data:016x}\n{scene}", self.build);
+        let decides = format!("{}\n{how}\n{:016x}\n{scene}", self.build, self.data_digest);
         Ok(Point {
             id: format!("{:016x}", digest(decides.as_bytes())),
             values: document.values,
@@ -311,9 +345,14 @@ impl Plan {
         let is_scene =
             |base: &&Base| values.contains(&(SCENE.into(), Value::from(base.label.as_str())));
         let base = self.bases.iter().find(is_scene).or(self.bases.first());
+        self.changed(base, &values)
+    }
+
+    /// Fields of a scene with those in [set], and then these `values`.
+    fn changed(&self, base: Option<&Base>, values: &[(String, Value)]) -> Checked<Document> {
         let mut document = base.map(|base| base.document.clone()).unwrap_or_default();
         document.insert("device".into(), self.device.clone().into());
-        let changed = self.set.iter().chain(&values).filter(|(field, _)| field != SCENE);
+        let changed = self.set.iter().chain(values).filter(|(field, _)| field != SCENE);
         for (field, value) in changed {
             fields::set(&mut document, field, value.clone())?;
         }
@@ -321,8 +360,13 @@ impl Plan {
             Some(Value::Table(device)) => device,
             _ => Table::new(),
         };
-        Ok(Document { scene: document, device, values })
+        Ok(Document { scene: document, device, values: values.to_vec() })
     }
+}
+
+/// Digest of all that decides what measurements give: of the frames and the options, whatever the files are called.
+fn digest_of(data: &Measurements) -> u64 {
+    of_debug(&Measurements { name: String::new(), test_choice: String::new(), ..data.clone() })
 }
 
 /// Fields of a point.
@@ -357,7 +401,9 @@ fn device_of(mut table: Table) -> Checked<(Device, usize)> {
     })?;
     let shown = table.to_string().trim_end().replace('\n', ", ");
     let device: Device = table.try_into().map_err(|cause: toml::de::Error| {
-        BadValue::new("device", shown, fields::with_nearest(cause.message()))
+        // `samples` is taken out before, and belongs to the names as well.
+        let message = cause.message().replace("expected one of ", "expected one of `samples`, ");
+        BadValue::new("device", shown, fields::with_nearest(&message))
     })?;
     device.check().map_err(|bad| {
         let field = format!("device.{}", bad.field.replace('-', "_"));

@@ -50,14 +50,38 @@ const GENERAL: [&str; 12] = [
     "blob_bytes",
     "ram_bytes",
 ];
+/// First of these that only a model has.
+const MODEL_FROM: usize = 5;
 /// Results of each group of outputs, in the order of tables.
 const OF_GROUP: [&str; 4] = ["limit", "limit_standard_error", "rmse", "ratio_to_limit"];
 
 /// Names of all results that points of a plan may have, whose outputs are in these groups.
 pub fn columns_of(plan: &Plan, groups: &[&str]) -> Vec<String> {
     let of_groups = groups.iter().flat_map(|group| OF_GROUP.map(|name| format!("{name}_{group}")));
-    let general = GENERAL.iter().filter(|name| plan.prices.is_some() || **name != "cost_eur");
-    general.map(|name| (*name).into()).chain(of_groups).collect()
+    let all = GENERAL.iter().map(|name| (*name).into()).chain(of_groups);
+    all.filter(|name| not_computed(plan, name).is_none()).collect()
+}
+
+/// Reason why a plan does not compute the result called `name`, and what to give for it; `None` if it does, and for a
+/// name that no result has.
+pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
+    let is_of_scene = ["area_cm2", "cost_eur"].contains(&name) || name.starts_with("limit_");
+    let is_of_model = ["rmse_", "ratio_to_limit_"].iter().any(|start| name.starts_with(start))
+        || GENERAL[MODEL_FROM..].contains(&name);
+    if plan.data.is_some() && (is_of_scene || name.starts_with("ratio_")) {
+        return Some("measurements have no such result; a scene has");
+    }
+    let is_of_limit = name.starts_with("limit_") || name.starts_with("ratio_");
+    match name {
+        "cost_eur" if plan.prices.is_none() => Some("the plan has no [prices]; give them"),
+        _ if is_of_limit && plan.limit_frames == Some(0) => {
+            Some("the plan computes no limit; leave limit_frames = 0 out")
+        }
+        _ if is_of_model && !plan.train => {
+            Some("the plan trains no model; leave train = false out")
+        }
+        _ => None,
+    }
 }
 
 /// Place of a result in tables.

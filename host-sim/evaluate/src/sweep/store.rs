@@ -23,8 +23,6 @@ pub struct Record {
     pub id: String,
     /// Program that computed it.
     pub build: String,
-    /// Fields that points differ in, and their values here.
-    pub values: BTreeMap<String, serde_json::Value>,
     /// Results by their names.
     pub results: BTreeMap<String, f64>,
     /// Remarks on them.
@@ -51,9 +49,6 @@ pub struct Store {
 impl Record {
     /// Record of what became of a point.
     pub fn new(plan: &Plan, point: &Point, outcome: Result<super::point::Results>) -> Self {
-        let values = point.values.iter().map(|(field, value)| {
-            (field.clone(), serde_json::to_value(value).unwrap_or(serde_json::Value::Null))
-        });
         let (outcome, failed) = match outcome {
             Ok(results) => (results, None),
             Err(error) => (super::point::Results::default(), Some(error.to_string())),
@@ -61,7 +56,6 @@ impl Record {
         Self {
             id: point.id.clone(),
             build: plan.build.clone(),
-            values: values.collect(),
             results: outcome.values,
             notes: outcome.notes,
             failed,

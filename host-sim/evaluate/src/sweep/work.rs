@@ -1,5 +1,6 @@
 //! Work on the points of a shard, on all threads.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -45,7 +46,7 @@ pub fn run(
             match store.find(plan, &points[*index])? {
                 Found::Whole(record) => {
                     worked.skipped += 1;
-                    worked.failed.extend(of_failed(&points[*index], &record));
+                    worked.failed.extend(of_failed(plan, &points[*index], &record));
                 }
                 Found::Missing => missing.push(*index),
                 Found::Unusable(why) => {
@@ -63,7 +64,7 @@ pub fn run(
         progress.step();
         let mut worked = records.lock().unwrap_or_else(PoisonError::into_inner);
         worked.computed += 1;
-        worked.failed.extend(of_failed(&points[index], record));
+        worked.failed.extend(of_failed(plan, &points[index], record));
         Ok(())
     };
     progress.stage("sweep", left.iter().map(Vec::len).sum());
@@ -75,7 +76,11 @@ pub fn run(
 ///
 /// # Errors
 /// [`Error`] for threads that cannot be started.
-pub fn in_memory(plan: &Plan, points: &[Point], progress: &dyn Progress) -> Result<Vec<Record>> {
+pub fn in_memory(
+    plan: &Plan,
+    points: &[Point],
+    progress: &dyn Progress,
+) -> Result<Vec<Option<Record>>> {
     let records = Mutex::new(vec![None; points.len()]);
     progress.stage("compare", points.len());
     let keep = |index: usize, record: &Record| {
@@ -84,8 +89,7 @@ pub fn in_memory(plan: &Plan, points: &[Point], progress: &dyn Progress) -> Resu
         Ok(())
     };
     each(plan, points, &super::Shard::WHOLE.groups(points), &keep)?;
-    let records = records.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok(records.into_iter().flatten().collect())
+    Ok(records.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// Seconds that a point takes on one core by itself, and its results: what others would share is counted.
@@ -95,7 +99,7 @@ pub fn in_memory(plan: &Plan, points: &[Point], progress: &dyn Progress) -> Resu
 pub fn on_one_core(plan: &Plan, point: &Point) -> Result<(f64, Result<point::Results>)> {
     let pool = pool(1)?;
     let begun = Instant::now();
-    let outcome = pool.install(|| point::compute(plan, point, &mut Shared::default()));
+    let outcome = pool.install(|| compute(plan, point, &mut Shared::default()));
     Ok((begun.elapsed().as_secs_f64(), outcome))
 }
 
@@ -109,8 +113,28 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     built.map_err(|cause| Error::failed(format!("cannot start threads: {cause}")))
 }
 
-fn of_failed(point: &Point, record: &Record) -> Option<String> {
-    record.failed.as_ref().map(|why| format!("{} ({}): {why}", point.id, point.in_words()))
+fn of_failed(plan: &Plan, point: &Point, record: &Record) -> Option<String> {
+    record.failed.as_ref().map(|why| format!("{} ({}): {why}", point.id, plan.in_words(point)))
+}
+
+/// Computes a point; a panic is a failure of this point, and not of all others.
+fn compute(plan: &Plan, point: &Point, shared: &mut Shared) -> Result<point::Results> {
+    let mut own = std::mem::take(shared);
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        let outcome = point::compute(plan, point, &mut own);
+        (outcome, own)
+    }));
+    match outcome {
+        Ok((outcome, own)) => {
+            *shared = own;
+            outcome
+        }
+        Err(panic) => {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+            Err(Error::failed(format!("a fault of the program: {text}")))
+        }
+    }
 }
 
 /// Computes the points of all groups, and hands each record to `keep` as soon as it is there.
@@ -130,7 +154,7 @@ fn each(
                 if stop.load(Ordering::Relaxed) {
                     return Ok(());
                 }
-                let outcome = point::compute(plan, &points[*index], &mut shared);
+                let outcome = compute(plan, &points[*index], &mut shared);
                 let kept = keep(*index, &Record::new(plan, &points[*index], outcome));
                 if kept.is_err() {
                     stop.store(true, Ordering::Relaxed);

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::super::progress::Terminal;
 use super::super::{Common, print};
 use crate::Result;
+use crate::report::format::counted;
 use crate::sweep::{Plan, Point, work};
 
 /// Points that are computed.
@@ -41,7 +42,7 @@ pub fn execute(plan: &Plan, points: &[Point], common: &Common) -> Result<()> {
         let (seconds, outcome) = work::on_one_core(plan, point)?;
         tried_s.push(seconds);
         failed.extend(
-            outcome.err().map(|cause| format!("{} ({}): {cause}", point.id, point.in_words())),
+            outcome.err().map(|cause| format!("{} ({}): {cause}", point.id, plan.in_words(point))),
         );
         taxel_data::Progress::step(&terminal);
     }
@@ -71,9 +72,9 @@ fn page(estimate: &Estimate<'_>, mean_s: f64) -> print::Page {
     };
     let ends = estimate.tried_s.iter().fold([f64::INFINITY, 0.0], |[a, b], s| [s.min(a), s.max(b)]);
     page.line(format_args!(
-        "{}: {} points. {} of them took {:.1} to {:.1} s on one core, {mean_s:.1} s on average.",
+        "{}: {}. {} of them took {:.1} to {:.1} s on one core, {mean_s:.1} s on average.",
         estimate.plan,
-        estimate.points,
+        counted(estimate.points, "point"),
         estimate.tried_s.len(),
         ends[0],
         ends[1]

@@ -5,8 +5,8 @@ use crate::{Error, Result};
 
 use super::super::stderr;
 
-/// Variables in which schedulers say which task this is.
-const INDICES: [&str; 3] = ["SLURM_ARRAY_TASK_ID", "HQ_TASK_ID", "PARALLEL_SEQ"];
+/// Variables in which schedulers say which task this is; one that may run inside another stands before it.
+const INDICES: [&str; 3] = ["PARALLEL_SEQ", "HQ_TASK_ID", "SLURM_ARRAY_TASK_ID"];
 
 /// Shard that was asked for, or that the scheduler names; `None` for the whole plan.
 ///
@@ -90,6 +90,10 @@ mod tests {
         assert_eq!(text(of(None, Some(16), &slurm)), "3/16");
         assert_eq!(text(of(None, Some(4), &[("HQ_TASK_ID", "4")])), "4/4");
         assert_eq!(text(of(None, Some(4), &[("PARALLEL_SEQ", "1")])), "1/4");
+        // GNU parallel, and workers of HyperQueue, run inside tasks of Slurm.
+        let inside = |name| [slurm[0], slurm[1], slurm[2], slurm[3], (name, "5")];
+        assert_eq!(text(of(None, Some(8), &inside("PARALLEL_SEQ"))), "5/8");
+        assert_eq!(text(of(None, Some(8), &inside("HQ_TASK_ID"))), "5/8");
         // Others tell no number: without --shards it is no part.
         assert_eq!(text(of(None, None, &[("HQ_TASK_ID", "4"), ("PARALLEL_SEQ", "2")])), "whole");
         assert_eq!(text(of(None, None, &[])), "whole");
