@@ -120,11 +120,13 @@ fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
 
 /// Prints a line for each layout: its least possible errors, and its best decoder.
 fn table(page: &mut print::Page, merged: &Merged, first: &str) {
-    let scene = |setting: &Setting| label(&setting.values, first);
-    let mut layouts: Vec<String> = Vec::new();
+    let mut layouts: Vec<(&str, Vec<&Setting>)> = Vec::new();
     for setting in &merged.settings {
-        if !layouts.contains(&scene(setting)) {
-            layouts.push(scene(setting));
+        // The decoders of a layout follow each other.
+        let label = label(&setting.values, first);
+        match layouts.last_mut().filter(|(last, _)| *last == label) {
+            Some((_, own)) => own.push(setting),
+            None => layouts.push((label, vec![setting])),
         }
     }
     let is_limit =
@@ -134,24 +136,25 @@ fn table(page: &mut print::Page, merged: &Merged, first: &str) {
     let others = ["rows", "columns", "area_cm2", "scan_ms", "frame_ms", "blob_bytes"];
     let others = others.iter().filter(|name| merged.columns.iter().any(|known| known == *name));
     let mut columns: Vec<&str> = others.copied().chain(limits).chain([error]).collect();
-    columns.dedup();
+    // Layouts that cannot be have no error, and its place is taken by a time.
+    let mut seen = BTreeSet::new();
+    columns.retain(|column| seen.insert(*column));
     let mut fields: Vec<&str> = merged.fields.iter().map(String::as_str).collect();
     fields.retain(|field| ![SCENE, SEED].contains(field));
     let heads = ["layout"].into_iter().chain(columns.iter().copied()).chain(fields.iter().copied());
     let mut lines: Vec<Vec<String>> = vec![heads.map(String::from).collect()];
-    for layout in &layouts {
-        let own = merged.settings.iter().filter(|setting| scene(setting) == *layout);
-        let within = own.filter(|setting| setting.is_within);
+    for (layout, own) in &layouts {
+        let within = own.iter().filter(|setting| setting.is_within);
         // A layout with other outputs has its limit and its first decoder.
         let error_of =
-            |setting: &&Setting| setting.results.get(error).copied().unwrap_or(f64::INFINITY);
+            |setting: &&&Setting| setting.results.get(error).copied().unwrap_or(f64::INFINITY);
         let best = within.min_by(|a, b| error_of(a).total_cmp(&error_of(b)));
         let result = |name: &&str| best.map_or("-".into(), |best| result_text(best, name));
         let value = |field: &&str| {
             best.and_then(|best| best.values.get(*field)).map_or("-".into(), ToString::to_string)
         };
         let cells = columns.iter().map(result).chain(fields.iter().map(value));
-        lines.push([layout.clone()].into_iter().chain(cells).collect());
+        lines.push([(*layout).to_owned()].into_iter().chain(cells).collect());
     }
     merged::table(page, &lines);
     if lines.iter().any(|line| line.iter().skip(1).all(|cell| cell == "-")) {
@@ -163,13 +166,15 @@ fn table(page: &mut print::Page, merged: &Merged, first: &str) {
 }
 
 /// Name of a layout; of one alone it is that of the `first`.
-fn label(values: &BTreeMap<String, serde_json::Value>, first: &str) -> String {
-    let label = values.get(SCENE).and_then(serde_json::Value::as_str);
-    label.unwrap_or(first).into()
+fn label<'l>(values: &'l BTreeMap<String, serde_json::Value>, first: &'l str) -> &'l str {
+    values.get(SCENE).and_then(serde_json::Value::as_str).unwrap_or(first)
 }
 
-/// Reason why a layout has no result.
+/// Reason why a decoder of a layout has no result.
 fn reason(point: &PointResult, first: &str) -> String {
-    let why = point.failed.as_deref().unwrap_or_default();
-    format!("{}: {}", label(&point.values, first), why.replace("scene of the point: ", ""))
+    let why = point.failed.as_deref().unwrap_or_default().replace("scene of the point: ", "");
+    let others = point.values.iter().filter(|(field, _)| ![SCENE, SEED].contains(&field.as_str()));
+    let name = [label(&point.values, first).to_owned()].into_iter();
+    let name = name.chain(others.map(|(field, value)| format!("{field} = {value}")));
+    format!("{}: {why}", name.collect::<Vec<_>>().join(", "))
 }

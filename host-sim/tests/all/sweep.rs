@@ -234,6 +234,9 @@ fn plans_that_cannot_be_used_are_refused_with_what_is_near() {
             "[bounds]\nframe_ms = { most = 1, least = 1 }\n[axes]",
             vec!["give one of them"],
         ),
+        ("[axes]", "[bounds]\nframe_ms = nan\n[axes]", vec!["as a number"]),
+        ("\"scene.toml\"", "[]", vec!["scene is an empty list"]),
+        ("\"scene.toml\"", "5", vec!["a name, or a list of names"]),
         ("[axes]", "[draw]\npoints = 3\n[axes]", vec!["draw.axes", "at least one axis"]),
         ("[axes]", "[prices]\nrow_eur = -1\n[axes]", vec!["prices.row_eur = -1"]),
         ("frame_ms", "cost_eur", vec!["objectives = cost_eur", "[prices]"]),
@@ -323,14 +326,14 @@ fn measurements_are_swept_by_the_settings_of_training() {
     let plan = read(&folder, "plan.toml");
     folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "9", "-o", "test.csv"]);
     folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "8", "-o", "other.csv"]);
-    fs::copy(folder.path("data.csv"), folder.path("copy.csv")).unwrap();
+    fs::copy(folder.path("data.csv"), folder.path("a-longer-name.csv")).unwrap();
     let mut seen = Vec::new();
     for (from, to) in [
         ("", ""),
         ("\"--folds\", \"4\"", "\"--folds\", \"5\""),
         ("\"--folds\", \"4\"", "\"--test\", \"test.csv\""),
         ("\"--folds\", \"4\"", "\"--test\", \"other.csv\""),
-        ("\"data.csv\"", "\"copy.csv\""),
+        ("\"data.csv\"", "\"a-longer-name.csv\""),
     ] {
         folder.write("plan.toml", plan.replace(from, to));
         let listed: Value =
@@ -381,10 +384,10 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
         "bad.toml",
         tiny_scene().replace("row_wires = 8", "thickness_mm = 0.5\nrow_wires = 8"),
     );
-    let said = folder.succeed(&["compare", "scene.toml", "same.toml", "bad.toml"]);
+    let said = folder.succeed(&["compare", "bad.toml", "scene.toml", "same.toml"]);
     let lines: Vec<&str> = said.lines().collect();
     assert!(lines[1].starts_with("scene.toml") && lines[2].starts_with("same.toml"), "{said}");
-    assert!(said.contains("failed: bad.toml: "), "{said}");
+    assert!(lines[0].contains("rmse_dz_mm") && said.contains("failed: bad.toml: "), "{said}");
     let unknown = folder.fail(&["compare", "scene.toml", "--group", "dy"], 2);
     assert!(unknown.contains("--group = dy") && unknown.contains("`dz_mm`"), "{unknown}");
 }

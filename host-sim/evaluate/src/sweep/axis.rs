@@ -84,13 +84,13 @@ impl Axis {
                 let mut values: Vec<Value> =
                     (0..count).map(|step| range.at(step as f64 / steps)).collect();
                 values.dedup();
-                // Only whole numbers can be the same.
                 let rule = || {
-                    let fewer = values.len();
-                    format!(
-                        "these are {fewer} whole numbers; give count = {fewer}, or {}.0 for fractions",
-                        range.from
-                    )
+                    let (kind, advice) = if range.is_whole() {
+                        ("whole", format!("fewer, or {}.0 for fractions", range.from))
+                    } else {
+                        ("different (of five digits)", "fewer, or a list".into())
+                    };
+                    format!("these are {} {kind} numbers; give {advice}", values.len())
                 };
                 require(values.len() == count, format!("{}.count", self.field), count, rule)?;
                 Ok(values)
@@ -158,7 +158,8 @@ impl Range {
     }
 }
 
-fn rounded(value: f64) -> f64 {
+/// Value with five digits.
+pub fn rounded(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 
@@ -223,7 +224,8 @@ mod tests {
         }
         for (value, said) in [
             ("{from = 1, to = 9}", "needs a count"),
-            ("{from = 1, to = 3, count = 9}", "3 whole numbers; give count = 3, or 1.0"),
+            ("{from = 1, to = 3, count = 9}", "3 whole numbers; give fewer, or 1.0"),
+            ("{from = 1.0, to = 1.0001, count = 9}", "2 different"),
         ] {
             let message = axis(value).unwrap().all().unwrap_err().to_string();
             assert!(message.contains("x.count") && message.contains(said), "{message}");

@@ -76,7 +76,7 @@ impl Default for Wanted {
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "give a name, or a list of names")]
 pub(super) enum OneOrMore {
     One(String),
     More(Vec<String>),
@@ -136,13 +136,15 @@ impl TryFrom<BoundFile> for Bound {
     fn try_from(file: BoundFile) -> std::result::Result<Self, Self::Error> {
         match file {
             BoundFile::Number(most)
-            | BoundFile::Named(NamedBound { most: Some(most), least: None }) => {
+            | BoundFile::Named(NamedBound { most: Some(most), least: None })
+                if !most.is_nan() =>
+            {
                 Ok(Self::Most(most))
             }
-            BoundFile::Named(NamedBound { most: None, least: Some(least) }) => {
+            BoundFile::Named(NamedBound { most: None, least: Some(least) }) if !least.is_nan() => {
                 Ok(Self::Least { least })
             }
-            BoundFile::Named(_) => Err("a bound is the most or the least; give one of them"),
+            _ => Err("a bound is the most or the least; give one of them, as a number"),
         }
     }
 }

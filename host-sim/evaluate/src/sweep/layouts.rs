@@ -70,7 +70,7 @@ fn check(document: &Table) -> std::result::Result<(), String> {
 }
 
 /// Whether a list stands where a value is expected, or the other way round.
-pub(super) fn is_of_list(message: &str) -> bool {
+fn is_of_list(message: &str) -> bool {
     message.contains("sequence") || message.contains("array of length")
 }
 

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::axis::rounded;
 use super::effects::{self, Effect, Law, Settings, Worth};
 use super::file::{Bound, PartPrices};
 use super::plan::{Plan, Point, SEED};
@@ -230,14 +231,17 @@ impl Merged {
         };
         let nearest = self.settings.iter().min_by(|a, b| misses(a).total_cmp(&misses(b)))?;
         let results = self.bounds.keys().map(|name| match nearest.results.get(name) {
-            Some(value) => format!("{name} = {value:.4}"),
+            // Five digits, or all of a count.
+            Some(value) if value.abs() < 1000.0 => format!("{name} = {}", rounded(*value)),
+            Some(value) => format!("{name} = {value:.0}"),
             None => format!("no {name}"),
         });
         let results = results.collect::<Vec<_>>().join(", ");
-        Some(format!(
-            "no setting is within the bounds; the nearest is {} with {results}",
-            nearest.in_words()
-        ))
+        let words = match nearest.in_words() {
+            words if words.is_empty() => results,
+            words => format!("{words} with {results}"),
+        };
+        Some(format!("no setting is within the bounds; the nearest is {words}"))
     }
 
     /// Effect of the axis of this field on a result.
@@ -365,17 +369,57 @@ fn mark(settings: &mut [Setting], objectives: &[String], bounds: &BTreeMap<Strin
             .find(|it| it.is_ne())
             .unwrap_or(Ordering::Equal)
     });
+    // Of two objectives the second falls along the front, so its last setting beats whatever any of it beats.
+    let looked_at = if objectives.len() <= 2 { 1 } else { usize::MAX };
     let mut front: Vec<&Vec<f64>> = Vec::new();
     for (place, own) in &ranks {
         let beats = |other: &&Vec<f64>| {
             *other != own && other.iter().zip(own).all(|(other, own)| other <= own)
         };
-        if front.iter().any(beats) {
+        if front.iter().rev().take(looked_at).any(beats) {
             continue;
         }
         settings[*place].on_front = true;
         if front.last() != Some(&own) {
             front.push(own);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_is_that_of_all_pairs() {
+        for objectives in [1, 2, 3_usize] {
+            let names: Vec<String> = (0..objectives).map(|it| format!("o{it}")).collect();
+            let value = |i: u32, it: usize| f64::from((i * [7, 11, 29][it] + 3) % [13, 17, 19][it]);
+            let setting = |i: u32| Setting {
+                values: BTreeMap::new(),
+                repeats: 1,
+                results: names
+                    .iter()
+                    .enumerate()
+                    .map(|(it, name)| (name.clone(), value(i, it)))
+                    .collect(),
+                deviations: BTreeMap::new(),
+                is_within: false,
+                on_front: false,
+                scene: None,
+            };
+            let mut settings: Vec<Setting> = (0..300).map(setting).collect();
+            let bounds = BTreeMap::from([("o0".to_owned(), Bound::Least { least: 2.0 })]);
+            mark(&mut settings, &names, &bounds);
+            let of = |it: &Setting| -> Vec<f64> { it.results.values().copied().collect() };
+            let beats = |a: &Setting, b: &Setting| {
+                of(a) != of(b) && of(a).iter().zip(of(b)).all(|(a, b)| *a <= b)
+            };
+            for it in &settings {
+                let is_beaten = settings.iter().any(|other| other.is_within && beats(other, it));
+                assert_eq!(it.on_front, it.is_within && !is_beaten, "{it:?}");
+            }
+            assert!(settings.iter().any(|it| !it.is_within));
         }
     }
 }

@@ -122,6 +122,9 @@ impl Plan {
             }
             (Some(scenes), None) => scenes.all(),
         };
+        if scenes.is_empty() && file.data.is_none() {
+            return Err(of_plan("scene is an empty list: name at least one".into()));
+        }
         if let Some((_, name)) =
             scenes.iter().enumerate().find(|(at, it)| scenes[..*at].contains(it))
         {
@@ -132,24 +135,33 @@ impl Plan {
             let file = if built_in { name.clone() } else { beside(name) };
             Ok(Base { label: name.clone(), document: document(&file)? })
         });
-        let bases: Vec<Base> = bases.collect::<Result<_>>()?;
-        let load_all =
-            |words: OneOrMore| match load(&words.all().iter().map(beside).collect::<Vec<_>>())? {
-                Subject::Measured(data) => Ok(Arc::from(data)),
+        let mut bases: Vec<Base> = bases.collect::<Result<_>>()?;
+        let mut load_all = |words: OneOrMore| {
+            let words: Vec<String> = words.all().iter().map(beside).collect();
+            require(!words.is_empty(), "data", "[]", || "name a file".into())
+                .map_err(|bad| of_plan(bad.to_string()))?;
+            match load(&words)? {
+                Subject::Measured(mut data) => {
+                    // The name is in the blob, and no result must depend on it.
+                    let label = std::mem::replace(&mut data.name, "data".into());
+                    bases.push(Base { label, document: Table::new() });
+                    Ok(Arc::from(data))
+                }
                 Subject::Scene(_) => Err(of_plan("data is a scene: give it as scene".into())),
-            };
-        let data = file.data.map(load_all).transpose()?;
+            }
+        };
+        let data = file.data.map(&mut load_all).transpose()?;
         Self::new(&file.name, (bases, data), file.wanted, build)
             .map_err(|bad| of_plan(bad.to_string()))
     }
 
-    /// Plan of these scenes, or measurements.
+    /// Plan of these scenes, or of measurements: then there is one base, with their name and no fields.
     ///
     /// # Errors
     /// [`BadValue`] for a field that no scene has, and for a plan that asks for nothing, or too much.
     pub fn new(
         name: &str,
-        (mut bases, data): (Vec<Base>, Option<Arc<Measurements>>),
+        (bases, data): (Vec<Base>, Option<Arc<Measurements>>),
         wanted: Wanted,
         build: &str,
     ) -> Checked<Self> {
@@ -160,9 +172,6 @@ impl Plan {
         require(wanted.limit_frames != Some(1), "limit_frames", 1, || {
             "give at least 2, or 0 for no limit".into()
         })?;
-        if let Some(data) = &data {
-            bases = vec![Base { label: data.name.clone(), document: Table::new() }];
-        }
         let axes = axes(&bases, &wanted)?;
         let mut plan = Self {
             name: name.into(),
@@ -198,35 +207,14 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Checks the fields of every scene, with [set], and those of the first point with every value of every axis in turn.
+    /// Checks the fields of the first point with every value of every axis in turn.
     fn check_fields(&self) -> Checked<()> {
-        let check_scene = |field: &str, shown: &str, scene: &Table| {
-            let scene = text(scene)?;
-            let checked = match &self.data {
-                None => Experiment::check_fields(&scene),
-                Some(data) => super::point::measured(data, &scene).map(drop),
-            };
-            checked.map_err(|message| {
-                let advice = match field {
-                    _ if !super::layouts::is_of_list(&message) => "",
-                    "scene" => {
-                        "; `compare` takes a scene with lists, and in a plan they stand in [axes]"
-                    }
-                    "set" => "; several values stand in [axes]",
-                    _ => "",
-                };
-                BadValue::new(field, shown, fields::with_nearest(&message) + advice)
-            })
-        };
-        for base in &self.bases {
-            check_scene("scene", &base.label, &base.document)?;
-            let document = self.changed(Some(base), &[])?;
-            check_scene("set", &in_words(&self.set), &document.scene)?;
-        }
         let check = |places: &[usize]| {
             let document = self.document_at(places)?;
-            check_scene("axes", &in_words(&document.values), &document.scene)?;
-            device_of(document.device).map(drop)
+            match self.check_scene(&document.scene) {
+                Ok(()) => device_of(document.device).map(drop),
+                Err(message) => Err(self.blamed(&document, &message)),
+            }
         };
         let first = vec![0; self.axes.len()];
         check(&first)?;
@@ -240,6 +228,38 @@ impl Plan {
         Ok(())
     }
 
+    /// Checks that a scene has only fields that it may have, with values of their kinds; the reason is in serde's words.
+    fn check_scene(&self, scene: &Table) -> std::result::Result<(), String> {
+        let scene = text(scene).map_err(|bad| bad.to_string())?;
+        match &self.data {
+            None => Experiment::check_fields(&scene),
+            Some(data) => super::point::measured(data, &scene).map(drop),
+        }
+    }
+
+    /// Error for what is wrong with a point's fields, by who gave them: the scene, [set] or the axes.
+    fn blamed(&self, document: &Document, message: &str) -> BadValue {
+        let base = self.base_of(&document.values);
+        let is_wrong = |scene: &Table| self.check_scene(scene).is_err_and(|it| it == message);
+        let is_list = message.contains("invalid type: sequence");
+        let (field, shown, advice) = match base {
+            Some(base) if is_wrong(&base.document) => (
+                "scene",
+                base.label.clone(),
+                "; `compare` takes a scene with lists, and in a plan they stand in [axes]",
+            ),
+            _ if self.changed(base, &[]).is_ok_and(|it| is_wrong(&it.scene)) => {
+                ("set", in_words(&self.set), "; several values stand in [axes]")
+            }
+            _ => ("axes", in_words(&document.values), ""),
+        };
+        BadValue::new(
+            field,
+            shown,
+            fields::with_nearest(message) + if is_list { advice } else { "" },
+        )
+    }
+
     /// Groups of outputs, such as `dz_mm`; none where only some points of the plan can be.
     pub fn groups(&self) -> Vec<String> {
         let names = match &self.data {
@@ -249,11 +269,15 @@ impl Plan {
         columns::groups(&names).into_iter().map(|(group, _)| group.to_owned()).collect()
     }
 
-    /// Outputs of the first point's scene, or, if it is impossible, of the plan's first scene.
+    /// Outputs of the first point's scene, or, if it is impossible, of the first scene that is not.
     fn output_names(&self) -> Option<Vec<String>> {
-        let document = self.document_at(&vec![0; self.axes.len()]).ok()?;
         let parse = |table: &Table| Experiment::parse(&self.name, &text(table).ok()?).ok();
-        let scene = parse(&document.scene).or_else(|| parse(&self.bases.first()?.document))?;
+        let of_base = |base: &Base| {
+            let changed = self.changed(Some(base), &[]).ok()?;
+            parse(&changed.scene).or_else(|| parse(&base.document))
+        };
+        let document = self.document_at(&vec![0; self.axes.len()]).ok()?;
+        let scene = parse(&document.scene).or_else(|| self.bases.iter().find_map(of_base))?;
         Some(scene.output_names())
     }
 
@@ -264,6 +288,7 @@ impl Plan {
             let error = if self.train { "rmse" } else { "limit" };
             let of_last = groups.last().map(|group| format!("{error}_{group}"));
             let time = if self.train { "frame_ms" } else { "scan_ms" };
+            let of_last = of_last.filter(|name| not_computed(self, name).is_none());
             self.objectives = of_last.into_iter().chain([time.into()]).collect();
         }
         if groups.is_empty() {
@@ -274,8 +299,7 @@ impl Plan {
         let known: Vec<&str> = known.iter().map(String::as_str).collect();
         let objectives = self.objectives.iter().map(|name| ("objectives", name));
         for (field, name) in objectives.chain(self.bounds.keys().map(|name| ("bounds", name))) {
-            let lacking = not_computed(self, name).filter(|_| !known.contains(&name.as_str()));
-            if let Some(why) = lacking {
+            if let Some(why) = not_computed(self, name) {
                 return Err(BadValue::new(field, name, why));
             }
             require_known(field, name, &known)?;
@@ -342,10 +366,15 @@ impl Plan {
             fields.iter().cloned().zip(lines[*place].iter().cloned())
         });
         let values: Vec<(String, Value)> = values.collect();
-        let is_scene =
-            |base: &&Base| values.contains(&(SCENE.into(), Value::from(base.label.as_str())));
-        let base = self.bases.iter().find(is_scene).or(self.bases.first());
-        self.changed(base, &values)
+        self.changed(self.base_of(&values), &values)
+    }
+
+    /// Scene that a point with these values changes.
+    fn base_of(&self, values: &[(String, Value)]) -> Option<&Base> {
+        let label = values.iter().find(|(field, _)| field == SCENE);
+        let label = label.and_then(|(_, label)| label.as_str());
+        let is_it = |base: &&Base| label == Some(&base.label);
+        self.bases.iter().find(is_it).or(self.bases.first())
     }
 
     /// Fields of a scene with those in [set], and then these `values`.
@@ -364,9 +393,9 @@ impl Plan {
     }
 }
 
-/// Digest of all that decides what measurements give: of the frames and the options, whatever the files are called.
+/// Digest of all that decides what measurements give: of the frames and the options, whatever the file of the test frames is called.
 fn digest_of(data: &Measurements) -> u64 {
-    of_debug(&Measurements { name: String::new(), test_choice: String::new(), ..data.clone() })
+    of_debug(&Measurements { test_choice: String::new(), ..data.clone() })
 }
 
 /// Fields of a point.

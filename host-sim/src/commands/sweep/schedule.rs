@@ -56,6 +56,11 @@ fn chosen(
                 )),
             }
         }
+        (None, Some((from, _))) if number("SLURM_ARRAY_TASK_ID").is_some() => {
+            Err(Error::Usage(format!(
+                "{from} is set inside a task of a Slurm array; give --shards N, or --shard 1/1 for all of the plan"
+            )))
+        }
         (None, _) => Ok(None),
     }
 }
@@ -112,6 +117,7 @@ mod tests {
             (Some(4), &again[..], "5, and shards are 1 to 4"),
             (Some(4), &[("HQ_TASK_ID", "0")][..], "0, and shards"),
             (Some(4), &[][..], "--shard I/4"),
+            (None, &[again[0], ("PARALLEL_SEQ", "1")][..], "inside a task of a Slurm array"),
         ] {
             let message = of(None, shards, variables).unwrap_err().to_string();
             assert!(message.contains(said), "{message}");
