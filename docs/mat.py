@@ -1,4 +1,4 @@
-"""Makes the log of a mat with 16 x 16 cells, for docs/your-sensor.md: python3 docs/mat.py > out/mat.csv
+"""Makes the log of a mat with 16 x 16 cells, for docs/gallery.md: python3 docs/mat.py > out/mat.csv
 
 Ten minutes at 25 frames a second, in counts of a 12-bit converter. Presses of 1 to 2 seconds at random places, of 2 to
 20 N, with pauses between them. x_mm and y_mm are empty while nothing touches. One cell is dead, the others' gains drift

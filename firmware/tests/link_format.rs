@@ -1,4 +1,4 @@
-//! The link's bytes, compared with those in `docs/link.md`.
+//! The link's bytes, compared with those in `testdata/link-examples.txt` and in `docs/link.md`.
 
 use mock_board::request_bytes;
 use taxel_core::blob::Floats;
@@ -14,14 +14,13 @@ use taxel_firmware::seal::{Key, tag};
 
 const START_US: u64 = 3_000_000;
 
+const EXAMPLES: &str = include_str!("../../testdata/link-examples.txt");
 const SPECIFICATION: &str = include_str!("../../docs/link.md");
 
-/// Frames of the marked table, with the names of their messages.
+/// Names of messages and their frames: lines `NAME = 03 0a …`.
 fn specified() -> Vec<(&'static str, String)> {
-    let table = SPECIFICATION.split("<!-- worked examples -->").nth(1).expect("the marked table");
-    let lines = table.lines().filter(|line| line.starts_with('|')).skip(2);
-    let cells = lines.map(|line| line.trim_matches('|').split('|').map(str::trim));
-    cells.map(|mut c| (c.next().unwrap(), c.next().unwrap().trim_matches('`').into())).collect()
+    let lines = EXAMPLES.lines().filter(|line| !line.starts_with('#'));
+    lines.map(|line| line.split_once(" = ").expect(line)).map(|(n, hex)| (n, hex.into())).collect()
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -253,8 +252,20 @@ fn reports() -> Vec<Example> {
 fn messages_give_the_specifications_worked_bytes() {
     let found = [requests(), reports(), about_settings().to_vec()].concat();
     let found: Vec<_> = found.iter().map(|(name, bytes)| (*name, hex(bytes))).collect();
-    let table: Vec<_> = found.iter().map(|(name, hex)| format!("| {name} | `{hex}` |")).collect();
-    assert!(found == specified(), "docs/link.md should say\n{}", table.join("\n"));
+    let lines: Vec<_> = found.iter().map(|(name, hex)| format!("{name} = {hex}")).collect();
+    assert!(found == specified(), "testdata/link-examples.txt should say\n{}", lines.join("\n"));
+}
+
+#[test]
+fn the_example_of_the_page_is_one_of_those() {
+    let table = SPECIFICATION.split("<!-- worked example -->").nth(1).expect("the marked table");
+    let lines = table.lines().filter(|line| line.starts_with('|')).skip(2);
+    let cells = lines.map(|line| line.trim_matches('|').split('|').map(str::trim));
+    let page: Vec<(_, String)> = cells
+        .map(|mut c| (c.next().unwrap(), c.next().unwrap().trim_matches('`').into()))
+        .collect();
+    let specified = specified();
+    assert!(!page.is_empty() && page.iter().all(|it| specified.contains(it)), "{page:?}");
 }
 
 #[test]

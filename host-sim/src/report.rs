@@ -3,6 +3,7 @@
 //! The figures are drawn here rather than by a chart crate because their colours are CSS classes:
 //! one page serves light and dark.
 
+use taxel_data::output::Inner;
 use taxel_evaluate::evaluate::learning_curve::LearningCurve;
 use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::printed::Cells;
@@ -14,14 +15,15 @@ pub mod format;
 pub mod ticks;
 pub mod svg;
 pub mod axes;
+mod data;
 pub mod chart;
+mod figures;
 mod colour;
 mod voronoi;
 mod view;
 mod face;
 mod face_map;
 mod plot;
-mod figures;
 mod errors;
 mod frames;
 mod sketch;
@@ -36,57 +38,40 @@ mod limit;
 mod points;
 mod learning_curve;
 
+pub use figures::{FOLDER as FIGURES, Page};
 pub use points::{evenly, result_text, setting_cells, setting_heads};
-pub use view::{Made, View};
+pub use view::{Made, View, in_words};
 
-/// Page for `result`: no script, no file beside it, the same bytes for the same result.
-pub fn html(result: &RunResult, made: &Made) -> String {
-    html::page(&View::of_run(result, made))
+use figures::Figures;
+
+/// Files of figures of these names.
+pub const fn figures_named(names: &'static [&'static str]) -> Inner {
+    Inner { folder: FIGURES, names, endings: &["svg", "csv"] }
 }
 
-/// Page for a model, whatever its result is from: as [`html`].
+/// Page for `result`: no script, nothing that is loaded, the same bytes for the same result.
+pub fn html(result: &RunResult, made: &Made) -> Page {
+    html::page(&View::of_run(result, made), Figures::in_files(""))
+}
+
+/// Page for a model, whatever its result is from: as [`html`], without files beside it.
 pub fn view_html(view: &View<'_>) -> String {
-    html::page(view)
+    html::page(view, Figures::default()).html
 }
 
 /// Page for a trade between speed and accuracy, with the `command` that computed it.
-pub fn trade_html(trade: &Trade, command: &str) -> String {
+pub fn trade_html(trade: &Trade, command: &str) -> Page {
     trade::html(trade, command)
 }
 
-/// Picture of a trade, as a file of its own: light or dark like the viewer.
-pub fn trade_svg(trade: &Trade) -> String {
-    trade::svg(trade)
-}
-
-/// Page for a limit: what the sensor can know, with pictures.
-pub fn limit_html(limit: &LimitResult) -> String {
-    limit::html(limit)
-}
-
-/// Picture of the directions that a sensor shows, as a file of its own: light or dark like the viewer.
-pub fn directions_svg(limit: &LimitResult) -> String {
-    limit::directions_svg(limit)
-}
-
-/// Picture of what is known of each electrode, as a file of its own: light or dark like the viewer.
-pub fn known_svg(limit: &LimitResult) -> String {
-    limit::known_svg(limit)
+/// Page for a limit, with the `command` that computed it: what the sensor can know.
+pub fn limit_html(limit: &LimitResult, command: &str) -> Page {
+    limit::html(limit, command)
 }
 
 /// Page for the results of a sweep or a comparison, whose files begin with `stem`, with the `command` that made them.
-pub fn sweep_html(merged: &Merged, stem: &str, command: &str) -> String {
+pub fn sweep_html(merged: &Merged, stem: &str, command: &str) -> Page {
     points::html(merged, stem, command)
-}
-
-/// Picture of a sweep's points and their front, as a file of its own: light or dark like the viewer.
-pub fn sweep_front_svg(merged: &Merged) -> String {
-    points::front_svg(merged)
-}
-
-/// Picture of what a sweep's axes explain, as a file of its own: light or dark like the viewer.
-pub fn sweep_effects_svg(merged: &Merged) -> String {
-    points::effects_svg(merged)
 }
 
 /// Picture of tables, each with its name, beside the paper's printed Table 1; a file of its own, light or dark like the

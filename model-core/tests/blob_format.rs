@@ -1,4 +1,4 @@
-//! The blob format, compared with its specification in `docs/blob.md`.
+//! The blob format, compared with its specification in `docs/blob.md` and its examples in `testdata/blob-examples.txt`.
 
 use crate::common::{seal, worked_bytes};
 use taxel_core::blob::{

@@ -24,16 +24,20 @@ pub fn network(weights: &[f32]) -> Network<'_> {
     direct::Network::try_new(shape, parameters).unwrap().into()
 }
 
-/// The blob's specification.
-const SPECIFICATION: &str = include_str!("../../docs/blob.md");
+/// Examples of the blob's specification, each behind a line `[NAME]`: lines like `0 | 54 41 … | magic`.
+const EXAMPLES: &str = include_str!("../../testdata/blob-examples.txt");
 
-/// Hexadecimal bytes of the specification's table between two comments `<!-- MARK -->`: lines like `| 0 | 54 41 … | … |`.
-pub fn worked_bytes(mark: &str) -> Vec<u8> {
-    let mark = format!("<!-- {mark} -->");
-    let table = SPECIFICATION.split(&mark).nth(1).expect("the marked table");
+/// Bytes of the example of that name.
+pub fn worked_bytes(name: &str) -> Vec<u8> {
+    let behind = EXAMPLES.split(&format!("[{name}]")).nth(1).expect("the named example");
+    bytes_of_table(behind.lines().take_while(|line| !line.starts_with('[')))
+}
+
+/// Bytes of lines that begin with an offset, ` | ` and bytes in hexadecimal. Other lines are skipped.
+pub fn bytes_of_table<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<u8> {
     let mut bytes = Vec::new();
-    for line in table.lines().filter(|line| line.starts_with('|')) {
-        let mut cells = line.split('|').map(str::trim).skip(1);
+    for line in lines {
+        let mut cells = line.trim_start_matches('|').split('|').map(str::trim);
         let (Some(offset), Some(hex)) = (cells.next(), cells.next()) else { continue };
         let Ok(offset) = offset.parse::<usize>() else { continue };
         assert_eq!(offset, bytes.len(), "offset of the line {line:?}");

@@ -1,6 +1,6 @@
 //! Sections of the blob that a model may have besides its networks: their bytes, and what damage of them is called.
 
-use crate::common::{PROJECTION, seal, worked_bytes};
+use crate::common::{PROJECTION, bytes_of_table, seal, worked_bytes};
 use crate::{blob_format, confidence, expansion, fill, projection};
 use proptest::prelude::*;
 use taxel_core::blob::{DecodeError, Model};
@@ -59,6 +59,13 @@ fn sections_have_the_specifications_worked_bytes() {
         let bytes = worked_bytes(mark);
         assert_eq!(sample.blob[sample.start..][..bytes.len()], bytes, "{mark}");
     }
+}
+
+#[test]
+fn the_example_of_the_page_is_the_specifications() {
+    let page = include_str!("../../docs/blob.md");
+    let table = page.split("<!-- worked expansion -->").nth(1).expect("the marked table");
+    assert_eq!(bytes_of_table(table.lines()), worked_bytes("worked expansion"));
 }
 
 #[test]

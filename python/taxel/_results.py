@@ -84,7 +84,7 @@ def trade(
         return Trade(
             result,
             (made / "trade.html").read_text(encoding="utf-8"),
-            (made / "trade.svg").read_text(encoding="utf-8"),
+            (made / "figures" / "error-by-time.svg").read_text(encoding="utf-8"),
             blob.read_bytes() if blob.exists() else None,
         )
 

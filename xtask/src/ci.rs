@@ -81,6 +81,8 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             // Docs need what clippy has checked.
             ("clippy", clippy),
             ("docs", docs),
+            // With the program that the tests have built.
+            own("pages", &["docs"]),
             own("publish", &["publish", "--short"]),
             own("python", &["python"]),
         ],

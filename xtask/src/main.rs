@@ -30,6 +30,8 @@ mod python;
 
 mod publish;
 
+mod docs;
+
 mod release;
 
 mod ci;
@@ -100,8 +102,12 @@ enum Command {
     Study(Rest),
     /// Build the wheel of the Python module, install it in an environment of its own, and run its tests (docs/python.md).
     Python,
-    /// Build what is given to those who have no Rust, into target/release-files: a static program, a wheel of Python, its sources,
-    /// and the licences of what both hold.
+    /// Check links and words of README and docs, and make their figures and pictures again (docs/made.toml).
+    Docs(docs::Options),
+    /// Build the docs as a site with search, into target/site; needs mdBook (`cargo install mdbook`).
+    Site,
+    /// Build a release into target/release-files: crates, a static program, a wheel of Python and its sources, images, the site,
+    /// licences and an SBOM of what they hold, and checksums.
     Release,
     /// Pack every crate that is published, and build it from its package; those of a device with their oldest Rust, too.
     /// Nothing is published (docs/crates.md).
@@ -164,6 +170,8 @@ fn main() -> ExitCode {
         Command::Study(rest) => study(&rest.all()),
         Command::Publish(options) => publish::run(&options).map(success),
         Command::Python => python::test().map(success),
+        Command::Docs(options) => docs::run(&options).map(success),
+        Command::Site => docs::site::build(&process::target_dir().join("site")).map(success),
         Command::Release => release::run().map(success),
         Command::Torture(rest) => torture::run(&rest.all()),
         Command::Mutants(options) => mutants::run(&options).map(success),

@@ -202,6 +202,11 @@ impl UnusedInputs {
         if rows > 1 {
             return Ok(Self::default());
         }
+        Ok(Self::among(file, columns))
+    }
+
+    /// Those of these columns of `file` that can tell nothing. There are none if no other would be left.
+    pub fn among(file: &DataFile, columns: impl IntoIterator<Item = usize>) -> Self {
         let mut unused = Self::default();
         // Readings as bits, so that equal columns are found by looking each one up.
         let mut known: HashMap<Vec<u64>, &str> = HashMap::new();
@@ -223,7 +228,7 @@ impl UnusedInputs {
                 }
             }
         }
-        Ok(if known.is_empty() { Self::default() } else { unused })
+        if known.is_empty() { Self::default() } else { unused }
     }
 
     /// Names of all of them.

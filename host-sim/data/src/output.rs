@@ -87,6 +87,33 @@ pub fn is_stdout(path: &Path) -> bool {
 pub struct FileSet {
     /// Names of all files that there may be.
     pub files: &'static [&'static str],
+    /// Files in a folder of the folder.
+    pub inner: Inner,
+}
+
+/// Files of a set that stand in a folder of its folder, where others have theirs, too.
+#[derive(Debug, Clone, Copy)]
+pub struct Inner {
+    pub folder: &'static str,
+    /// Names of all files that there may be, without their endings. One that ends with `*` stands for all that begin so.
+    pub names: &'static [&'static str],
+    pub endings: &'static [&'static str],
+}
+
+impl Inner {
+    /// Whether a file in this folder is of the set.
+    fn has(&self, path: &Path) -> bool {
+        let text =
+            |part: Option<&std::ffi::OsStr>| part.and_then(|it| it.to_str()).map(str::to_owned);
+        let (Some(stem), Some(ending)) = (text(path.file_stem()), text(path.extension())) else {
+            return false;
+        };
+        let is_name = |name: &&str| match name.strip_suffix('*') {
+            Some(start) => stem.starts_with(start),
+            None => stem == **name,
+        };
+        self.endings.contains(&ending.as_str()) && self.names.iter().any(is_name)
+    }
 }
 
 impl FileSet {
@@ -104,7 +131,9 @@ impl FileSet {
                 other => other,
             });
         }
-        for path in self.files.iter().map(|name| folder.join(name)) {
+        let inner = folder.join(self.inner.folder);
+        let inner = inner.exists().then(|| inner.join("new"));
+        for path in self.files.iter().map(|name| folder.join(name)).chain(inner) {
             place::file(&path)?;
             check_writable(&path, inputs)?;
         }
@@ -114,10 +143,17 @@ impl FileSet {
     /// Writes files, by name and content, to `folder`, which is made if it is not there. Other files of the set
     /// are removed: they are from an earlier run.
     pub fn write(&self, folder: &Path, contents: &[(&str, &[u8])]) -> Result<()> {
+        let is_of_set = |name: &str| {
+            let inner =
+                name.strip_prefix(self.inner.folder).and_then(|name| name.strip_prefix('/'));
+            inner.map_or(self.files.contains(&name), |name| self.inner.has(Path::new(name)))
+        };
+        debug_assert!(contents.iter().all(|(name, _)| is_of_set(name)), "unknown file");
         let written = written_in(folder, contents)?;
-        let is_earlier = |name: &&&str| contents.iter().all(|(new, _)| new != *name);
-        let earlier: Vec<PathBuf> =
-            self.files.iter().filter(is_earlier).map(|name| folder.join(name)).collect();
+        let mut earlier: Vec<PathBuf> = self.files.iter().map(|name| folder.join(name)).collect();
+        let inner = fs::read_dir(folder.join(self.inner.folder)).into_iter().flatten().flatten();
+        earlier.extend(inner.map(|entry| entry.path()).filter(|path| self.inner.has(path)));
+        earlier.retain(|path| contents.iter().all(|(new, _)| folder.join(new) != *path));
         temporary::put_in_place(written, &earlier)
     }
 }
@@ -138,17 +174,27 @@ pub fn write_folder(folder: &Path, contents: &[(String, String)]) -> Result<()> 
     new.put_in_place()
 }
 
-/// Writes temporary files beside those of these paths in `folder`. It is made if it is not there, as are folders in it.
+/// Writes temporary files beside those of these paths in `folder`. It is made if it is not there, as are folders in it;
+/// after an error those in it go again.
 fn written_in(folder: &Path, contents: &[(&str, &[u8])]) -> Result<Vec<Temporary>> {
+    let mut made = Vec::new();
     let write = |(name, bytes): &(&str, &[u8])| {
         let path = folder.join(name);
         let around = path.parent().unwrap_or(folder);
+        if around != folder && !around.exists() {
+            made.push(around.to_path_buf());
+        }
         fs::create_dir_all(around).map_err(|cause| Error::write(around, cause))?;
         Temporary::written(place::file(&path)?, |file| {
             file.write_all(bytes).map_err(|cause| Error::write(&path, cause))
         })
     };
-    contents.iter().map(write).collect()
+    let written: Result<Vec<Temporary>> = contents.iter().map(write).collect();
+    if written.is_err() {
+        // One that has a file of somebody else by now stays.
+        made.iter().for_each(|inner| drop(fs::remove_dir(inner)));
+    }
+    written
 }
 
 #[cfg(test)]

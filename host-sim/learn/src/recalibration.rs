@@ -19,7 +19,7 @@
 //!    that they have not seen. Errors before and after are judged as a device decodes, with the clamp. A network whose
 //!    Σ ln(1 + 3eₚ²) falls by less than a tenth keeps its inputs.
 //!
-//! docs/recalibration.md has what it reaches, and what was tried besides.
+//! docs/drift.md has what it reaches.
 
 use rayon::prelude::*;
 use taxel_core::blob::Model;

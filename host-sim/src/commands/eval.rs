@@ -9,12 +9,14 @@ use crate::evaluate::distribution::{Distribution, Reference};
 use crate::measurements::{Log, Spread};
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 use crate::over_time::{self, Decoded, OverTime, RestOverTime};
+use crate::report::format::grouped;
 use crate::report::{self, Made, View};
 use crate::verdict::{Verdict, Warning};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
 use taxel_core::blob::Metadata;
+use taxel_data::dataset::UnusedInputs;
 use taxel_data::{Clock, DataFile, output};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
@@ -129,6 +131,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     for (truth, estimate) in truth.values.iter_mut().zip(&estimate.values) {
         *truth = if estimate.is_nan() { f64::NAN } else { *truth };
     }
+    let is_empty = |line: &&[f64]| line.iter().all(|value| value.is_nan());
+    let without_reading = estimate.lines().filter(is_empty).count();
     let means = truth.means().repeat(truth.len());
     let judged = Decoded { log: &log, outputs: &truth, estimates: &estimate.values };
     let over_time = OverTime::new(None, &judged, at_rest);
@@ -184,7 +188,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let reference =
             if metadata.relative_inputs { Reference::Relative } else { Reference::Median };
         let distribution = Distribution::new(&truth, &estimate, &readings, reference);
-        let page = page_of(arguments, &blob, &summary, &distribution)?;
+        let page = page_of(arguments, (&blob, &file), &summary, (&distribution, without_reading))?;
         output::write_bytes(html, page.as_bytes())?;
     }
     print::result(common, &summary, || text_of(&summary))
@@ -240,30 +244,56 @@ fn text_of(summary: &Summary) -> print::Page {
 /// Page of the evaluation.
 fn page_of(
     arguments: &Arguments,
-    blob: &ModelBlob,
+    (blob, file): (&ModelBlob, &DataFile),
     summary: &Summary,
-    distribution: &Distribution,
+    (distribution, without_reading): (&Distribution, usize),
 ) -> Result<String> {
     let limit = LimitSummary::new(&Err(Refusal::Measured));
     let model = blob.parse();
     let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let [model_file, data_file] = [&arguments.model, &arguments.data].map(|path| name_of(path));
+    let unused = UnusedInputs::among(file, file.columns(model.metadata().input_names.iter())?);
+    let (frames, health) = (summary.frames, &summary.health);
+    let without_output = frames - summary.frames_evaluated - without_reading;
+    let counted = |counts: &[(usize, &str)]| {
+        let counts = counts.iter().filter(|(count, _)| *count > 0);
+        counts.map(|(count, what)| format!("{} {what}", grouped(*count))).collect::<Vec<_>>()
+    };
+    let lines = counted(&[
+        (without_reading, "lack a reading"),
+        (without_output, "lack all outputs"),
+        (file.lines_left_out().count(), "are not chosen by the options"),
+    ]);
+    let readings = counted(&[
+        (health.readings_missing, "missing"),
+        (health.readings_shorted, "shorted"),
+        (health.readings_open, "open"),
+        (health.readings_filled, "of these filled from the others"),
+    ]);
     let facts = vec![
-        ("Data", format!("{data_file}: {} frames", summary.frames)),
+        ("Data", format!("{data_file}: {} frames", grouped(frames))),
         (
             "Values",
-            format!("{} of {} true outputs count", summary.values_evaluated, summary.values),
+            format!(
+                "{} of {} true outputs count",
+                grouped(summary.values_evaluated),
+                grouped(summary.values)
+            ),
         ),
         (
             "Model",
             format!(
-                "{model_file}, trained on {:?}, {} frames",
+                "{model_file}, trained on “{}”, {} frames",
                 model.metadata().name,
-                model.metadata().training_frames
+                grouped(model.metadata().training_frames as usize)
             ),
         ),
-        ("Blob", format!("{} bytes, CRC-32 {:08x}", blob.bytes().len(), model.crc())),
+        ("Blob", format!("{} bytes, CRC-32 {:08x}", grouped(blob.bytes().len()), model.crc())),
+        ("Lines left out", lines.join("; ")),
+        ("Faulty readings", readings.join("; ")),
+        ("Inputs that tell nothing", report::in_words(&unused)),
     ];
+    let facts = facts.into_iter().filter(|(_, fact)| !fact.is_empty()).collect();
     let view = View {
         title: format!("{model_file} on {data_file}"),
         facts,

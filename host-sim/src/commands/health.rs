@@ -51,11 +51,11 @@ fn limits(text: &str) -> std::result::Result<Believed, String> {
 /// Health of the readings in a data file.
 #[derive(Debug, Serialize)]
 pub struct Health {
-    readings_missing: usize,
-    readings_shorted: usize,
-    readings_open: usize,
+    pub readings_missing: usize,
+    pub readings_shorted: usize,
+    pub readings_open: usize,
     /// Readings that the model filled from the others.
-    readings_filled: usize,
+    pub readings_filled: usize,
     frames_filled: usize,
     /// Columns with a faulty reading.
     columns: Vec<ColumnHealth>,

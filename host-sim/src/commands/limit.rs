@@ -15,11 +15,13 @@ use taxel_limit::identify::Observability;
 
 use super::progress::Terminal;
 use super::scene_argument::{SceneArgument, read_one_row};
-use super::{Common, arguments, print};
+use super::{Common, arguments, command_line, print};
 
 /// All files that `-o` writes.
-const FILES: FileSet =
-    FileSet { files: &["limit.json", "limit.html", "directions.svg", "known.svg"] };
+const FILES: FileSet = FileSet {
+    files: &["limit.json", "limit.html"],
+    inner: report::figures_named(&["limit-by-noise", "directions*", "known*"]),
+};
 /// Singular values that are printed of each row.
 const PRINTED_VALUES: usize = 6;
 
@@ -54,8 +56,8 @@ pub struct Arguments {
     /// Models of the scene to judge on the same frames: their errors, and the ratios of these to the limit.
     #[arg(long, value_name = "FILE,…", value_delimiter = ',')]
     model: Vec<PathBuf>,
-    /// Folder that receives limit.json, a page limit.html with pictures, and two pictures by themselves; of several scenes
-    /// a folder each, by its name.
+    /// Folder that receives limit.json, a page limit.html, and its figures/ by themselves; of several scenes a folder each,
+    /// by its name.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
     output: Option<PathBuf>,
 }
@@ -161,10 +163,10 @@ fn refusal(result: &LimitResult) -> Result<()> {
 
 fn write_files(folder: &Path, result: &LimitResult) -> Result<()> {
     let json = print::json_text(result)?;
-    let page = report::limit_html(result);
-    let (directions, known) = (report::directions_svg(result), report::known_svg(result));
-    let contents = [&json, &page, &directions, &known].map(String::as_bytes);
-    let files: Vec<(&str, &[u8])> = FILES.files.iter().copied().zip(contents).collect();
+    let command = command_line::of_this_process("limit", &["-o", "--output"], Some(result.seed));
+    let page = report::limit_html(result, &command);
+    let mut files = vec![("limit.json", json.as_bytes()), ("limit.html", page.html.as_bytes())];
+    files.extend(page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes())));
     Ok(FILES.write(folder, &files)?)
 }
 
@@ -187,7 +189,11 @@ fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
         geometry(&mut page, result);
     }
     if let Some(folder) = folder {
-        page.line(format_args!("\nwritten to {}: {}", folder.display(), FILES.files.join(", ")));
+        page.line(format_args!(
+            "\nwritten to {}: {}",
+            folder.display(),
+            [FILES.files, &["figures/"]].concat().join(", ")
+        ));
     }
     page
 }

@@ -87,7 +87,7 @@ enum Action {
     /// Mend the device's model after the sensor has changed, from reference presses, and upload it.
     ///
     /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, these are taken;
-    /// otherwise the device scans, and you are asked for one press after the other. docs/recalibration.md says more.
+    /// otherwise the device scans, and you are asked for one press after the other. docs/drift.md says more.
     #[command(
         after_help = "Example: host-sim link /dev/ttyACM0 recalibrate press.bin presses.csv -o mended.bin"
     )]

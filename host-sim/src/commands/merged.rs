@@ -11,7 +11,7 @@ use taxel_data::output::{self, check_writable};
 use super::print;
 
 /// Ends of the files' names, after the table's name.
-const ENDS: [&str; 5] = [".csv", ".json", ".html", "-front.svg", "-effects.svg"];
+const ENDS: [&str; 3] = [".csv", ".json", ".html"];
 /// Settings that are printed.
 const PRINTED: usize = 12;
 
@@ -47,21 +47,18 @@ impl Files {
 
     /// Writes them; `command` is what the user typed.
     pub fn write(&self, merged: &Merged, command: &str) -> Result<()> {
-        let texts = [
-            merged.csv(),
-            print::json_text(merged)?,
-            report::sweep_html(merged, &self.stem, command),
-            report::sweep_front_svg(merged),
-            report::sweep_effects_svg(merged),
-        ];
+        let page = report::sweep_html(merged, &self.stem, command);
+        let texts = [merged.csv(), print::json_text(merged)?, page.html];
         let files = ENDS.iter().zip(texts).map(|(end, text)| (format!("{}{end}", self.stem), text));
-        Ok(output::write_folder(&self.folder, &files.collect::<Vec<_>>())?)
+        let files: Vec<_> = files.chain(page.figures).collect();
+        Ok(output::write_folder(&self.folder, &files)?)
     }
 
     /// Names in words.
     pub fn names(&self) -> String {
         let first = self.folder.join(format!("{}{}", self.stem, ENDS[0]));
         let others = ENDS[1..].iter().map(|end| format!("{}{end}", self.stem));
+        let others = others.chain([format!("{}/{}-…", report::FIGURES, self.stem)]);
         format!("{}, and beside it {}", first.display(), others.collect::<Vec<_>>().join(", "))
     }
 }

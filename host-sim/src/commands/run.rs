@@ -19,14 +19,30 @@ use super::{Common, arguments, command_line, print, refused_readings, stderr};
 
 const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
-const FILES: FileSet =
-    FileSet { files: &["model.bin", "metrics.json", "table1.csv", "report.html"] };
+const FILES: FileSet = FileSet {
+    files: &["model.bin", "metrics.json", "table1.csv", "report.html"],
+    inner: report::figures_named(&[
+        "decoded-against-true",
+        "sizes-of-errors",
+        "errors-by-electrode",
+        "errors-over-time",
+        "readings-at-rest",
+        "noise-by-averaging",
+        "trajectory",
+        "readings",
+        "frames",
+        "arrows",
+        "places",
+        "sensor",
+        "error-by-noise",
+        "error-by-spread",
+    ]),
+};
 
 /// Do the whole job for a scene or a CSV file: train, write the blob, evaluate, report.
 ///
-/// Writes model.bin, metrics.json, table1.csv and report.html to `out/<name>/`, all together at the end; those of an
-/// earlier run go. Frames of a scene are synthesised. Of a
-/// CSV file, the last fifth is held out to judge by.
+/// Writes model.bin, metrics.json, table1.csv, report.html and its figures/ to `out/<name>/`, all together at the end;
+/// those of an earlier run go. Frames of a scene are synthesised. Of a CSV file, the last fifth is held out to judge by.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim run press --noise 0.01 -o out/noise-1
@@ -100,12 +116,13 @@ fn write_files(
     let table = result.table1.as_ref().map(Table1::to_csv);
     let mut files = vec![("model.bin", blob.bytes()), ("metrics.json", metrics.as_bytes())];
     files.extend(table.as_ref().map(|table| ("table1.csv", table.as_bytes())));
-    let mut names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
+    let mut names: Vec<&'static str> = files.iter().map(|(name, _)| *name).collect();
     let made = Made { command, files: names.iter().map(|name| (*name).to_owned()).collect() };
     let page = report::html(result, &made);
-    files.push(("report.html", page.as_bytes()));
-    names.push("report.html");
-    FILES.write(folder, &files)?;
+    let figures = page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes()));
+    let page = [("report.html", page.html.as_bytes())];
+    FILES.write(folder, &files.into_iter().chain(page).chain(figures).collect::<Vec<_>>())?;
+    names.extend(["report.html", "figures/"]);
     Ok(names)
 }
 

@@ -30,8 +30,8 @@ mod page;
 /// gate, and on contacts that move filter in time. Marks the Pareto front of error and time from the start of a scan to its
 /// estimate, and chooses the best point within your bounds.
 ///
-/// Writes trade.csv, trade.json, trade.svg and trade.html to `out/<scene>/`, and with a bound chosen.bin, all together at
-/// the end; those of an earlier trade go.
+/// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/`, and with a bound chosen.bin, all together
+/// at the end; those of an earlier trade go.
 /// That time is the scan's, by the plan of the board's firmware for either readout (docs/board.md), and the decoding's, by
 /// the price list of the firmware's code (docs/cycles.md). Behind a gate cycles are the mean over the test frames, by the
 /// share of untouched rows (docs/trade.md). Bounds that nothing can meet are refused before anything is trained.

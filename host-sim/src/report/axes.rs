@@ -97,7 +97,7 @@ impl Panel {
         let at = self.x.ticks.at.iter().map(|(value, label)| (self.x(*value), label.as_str()));
         draw_level_ticks(svg, &at.collect::<Vec<_>>(), bottom, 1.0);
         let middle = f64::midpoint(left, right);
-        svg.text(middle, bottom + 38.0, Anchor::Middle, "tick", &self.x.label);
+        svg.label(middle, bottom + 38.0, Anchor::Middle, "tick", &self.x.label);
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::axes::{Axis, BELOW_PX, Panel, Upright, label_width};
+use super::data::{Data, number};
 use super::format::significant;
 use super::svg::{Anchor, Px, Shape, Svg, TEXT_PX, text_width};
 
@@ -28,8 +29,9 @@ pub const STYLES: [(&str, Shape); 4] =
 /// Series of values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Name in the legend; none if empty.
     pub name: String,
+    /// Whether the name stands in the legend.
+    pub is_listed: bool,
     /// CSS class, which decides on the colour.
     pub class: &'static str,
     /// Opacity, for series that are graded.
@@ -42,7 +44,13 @@ pub struct Series {
 impl Series {
     /// Series in full colour.
     pub fn new(name: &str, class: &'static str, mark: Mark, points: Vec<[f64; 2]>) -> Self {
-        Self { name: name.into(), class, opacity: 1.0, mark, points }
+        Self { name: name.into(), is_listed: true, class, opacity: 1.0, mark, points }
+    }
+
+    /// The series with a name that the legend does not have.
+    #[must_use]
+    pub fn unlisted(self) -> Self {
+        Self { is_listed: false, ..self }
     }
 }
 
@@ -81,9 +89,9 @@ impl Chart {
     /// Draws the chart in this size.
     pub fn draw(&self, [width, height]: [f64; 2]) -> String {
         let mut svg = Svg::new(width, height, &self.title);
-        let named = self.series.iter().filter(|series| !series.name.is_empty());
+        let named = self.series.iter().filter(|series| series.is_listed);
         let end_width = named.map(|s| text_width(&s.name)).fold(0.0, f64::max) + LEADER_PX;
-        svg.text(0.0, TEXT_PX, Anchor::Start, "label", &self.y.label);
+        svg.label(0.0, TEXT_PX, Anchor::Start, "label", &self.y.label);
         let top = if self.end_labels {
             LINE_PX + 6.0
         } else {
@@ -111,13 +119,14 @@ impl Chart {
         svg.finish()
     }
 
-    /// Draws the chart twice, for wide and for narrow windows: text keeps its size on both.
-    pub fn draw_responsive(&self, wide: [f64; 2], narrow: [f64; 2]) -> String {
-        format!(
-            "<div class=\"wide\">{}</div><div class=\"narrow\">{}</div>\n",
-            self.draw(wide),
-            self.draw(narrow)
-        )
+    /// All points, by series.
+    pub fn data(&self) -> Data {
+        let mut data = Data::new(&["series", &self.x.label, &self.y.label]);
+        for series in &self.series {
+            let line = |[x, y]: &[f64; 2]| vec![series.name.clone(), number(*x), number(*y)];
+            data.lines.extend(series.points.iter().map(line));
+        }
+        data
     }
 }
 
@@ -132,7 +141,7 @@ fn opacity(series: &Series) -> String {
 /// Draws names and marks: beside the label of the y axis where there is room, otherwise below it.
 /// Returns the y coordinate at which the legend ends.
 pub fn legend(svg: &mut Svg, series: &[Series], width: f64, label_width: f64) -> f64 {
-    let named: Vec<_> = series.iter().filter(|series| !series.name.is_empty()).collect();
+    let named: Vec<_> = series.iter().filter(|series| series.is_listed).collect();
     let entry = |series: &Series| SWATCH_PX + text_width(&series.name) + 14.0;
     let total: f64 = named.iter().map(|series| entry(series)).sum();
     let beside = label_width + 24.0 + total <= width;
@@ -237,7 +246,7 @@ impl Frame<'_> {
     /// Writes names at the last points of their lines, moved apart where they would overlap.
     fn draw_end_labels(&self, svg: &mut Svg) {
         const GAP: f64 = TEXT_PX + 3.0;
-        let named = self.chart.series.iter().filter(|series| !series.name.is_empty());
+        let named = self.chart.series.iter().filter(|series| series.is_listed);
         // Place of the line's end, height of its name, and the series.
         let mut labels: Vec<([f64; 2], f64, &Series)> = named
             .filter_map(|series| {
@@ -294,9 +303,22 @@ mod tests {
             title: "a chart".into(),
             x: Axis::linear("x", ticks::linear([0.0, 4.0], 4)),
             y: Axis::linear("y", ticks::linear([-1.0, 1.0], 4)),
-            series: vec![Series::new("", "c1", mark, points)],
+            series: vec![Series::new("values", "c1", mark, points).unlisted()],
             end_labels: false,
         }
+    }
+
+    #[test]
+    fn data_has_every_point_of_every_series() {
+        let mut chart = chart(Mark::Line, &[0.5, f64::NAN, 0.1 + 0.2]);
+        let other = Series::new("bars, of it", "c2", Mark::Bars(1.0), vec![[7.0, -1.0]]);
+        chart.series.push(other);
+        chart.y.label = "RMSE of Δz (mm)".into();
+        let data = chart.data();
+        assert_eq!(data.heads, ["series", "x", "RMSE of Δz (mm)"]);
+        let lines: Vec<String> = data.lines.iter().map(|line| line.join("|")).collect();
+        let all = ["values|0|0.5", "values|1|", "values|2|0.30000000000000004", "bars, of it|7|-1"];
+        assert_eq!(lines, all);
     }
 
     #[test]

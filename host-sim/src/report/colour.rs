@@ -24,6 +24,17 @@ impl ColourScale {
         Self { low, high, diverging: true }
     }
 
+    /// Scale of differences between values of this scale: as full at the same distance from zero.
+    pub fn of_differences(&self) -> Self {
+        let most = self.farthest();
+        Self { low: -most, high: most, diverging: true }
+    }
+
+    /// Distance of the farther end from zero.
+    fn farthest(&self) -> f64 {
+        self.low.abs().max(self.high.abs())
+    }
+
     /// Scale from the least to the greatest of `values`, so that small differences show.
     pub fn sequential(values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = ticks::extent(values).unwrap_or((0.0, 1.0));
@@ -39,7 +50,7 @@ impl ColourScale {
     /// CSS class and opacity for `value`.
     pub fn colour(&self, value: f64) -> (&'static str, f64) {
         if self.diverging {
-            let most = self.low.abs().max(self.high.abs());
+            let most = self.farthest();
             (if value < 0.0 { "below" } else { "above" }, (value.abs() / most).min(1.0))
         } else {
             let place = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
@@ -49,7 +60,7 @@ impl ColourScale {
 
     /// Decimals with which values of the scale are told apart, and are not longer than cells are wide.
     pub fn decimals(&self) -> usize {
-        match self.low.abs().max(self.high.abs()) {
+        match self.farthest() {
             most if most < 0.1 => 3,
             most if most < 10.0 => 2,
             most if most < 100.0 => 1,
@@ -75,7 +86,7 @@ impl ColourScale {
         let at: Vec<_> =
             ticks.at.iter().map(|(value, text)| (place(*value), text.as_str())).collect();
         draw_level_ticks(svg, &at, top + height, 1.0);
-        svg.text(f64::midpoint(left, right), top + height + 36.0, Anchor::Middle, "tick", label);
+        svg.label(f64::midpoint(left, right), top + height + 36.0, Anchor::Middle, "tick", label);
     }
 }
 
@@ -90,6 +101,9 @@ mod tests {
         assert_eq!(scale.colour(0.5), ("above", 1.0));
         assert_eq!(scale.colour(-0.1), ("below", 0.2));
         assert_eq!(ColourScale::diverging([0.1, -0.5]).colour(-0.1), ("below", 0.2));
+        let differences = ColourScale::diverging([0.0, 0.5]).of_differences();
+        assert_eq!(differences.colour(-0.17), ("below", 0.34));
+        assert_eq!(differences.colour(0.6), ("above", 1.0), "beyond the ends");
         let scale = ColourScale::sequential([0.04, 0.06]);
         assert_eq!(scale.colour(0.06), ("above", 1.0));
         assert!(scale.colour(0.04).1 < 0.1);

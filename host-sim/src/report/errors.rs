@@ -3,7 +3,7 @@
 use super::colour::ColourScale;
 use super::face::Face;
 use super::face_map::{Map, Values};
-use super::figures::Figure;
+use super::figures::{Figure, Panel};
 use super::format::{grouped, percent, symbol, with_unit};
 use super::plot;
 use super::view::View;
@@ -11,13 +11,14 @@ use super::view::View;
 /// Figure of decoded against true outputs, one panel a group.
 pub fn density(view: &View<'_>) -> Figure {
     let groups = &view.distribution.groups;
-    let panels: Vec<String> = groups.iter().map(plot::density).collect();
+    let panels: Vec<Panel> = groups.iter().map(plot::density).collect();
     let outside: usize = groups.iter().map(|group| group.density.outside).sum();
     let outside = match outside {
         0 => String::new(),
         count => format!(" {} estimates lie beyond the plots.", grouped(count)),
     };
     Figure::of_panels(
+        "decoded-against-true",
         format!(
             "Decoded against true outputs of all {} frames. On the line both are the same; a model that has learnt \
              nothing gives a level band. The fuller a square, the more pairs it holds, on a logarithmic scale.{outside}",
@@ -30,7 +31,7 @@ pub fn density(view: &View<'_>) -> Figure {
 /// Figure of the sizes of errors, one panel a group.
 pub fn histogram(view: &View<'_>) -> Figure {
     let groups = &view.distribution.groups;
-    let panels: Vec<String> = groups.iter().map(plot::histogram).collect();
+    let panels: Vec<Panel> = groups.iter().map(plot::histogram).collect();
     let (beyond, count) = groups.iter().fold((0, 0), |(beyond, count), group| {
         (beyond + group.histogram.beyond, count + group.count)
     });
@@ -41,6 +42,7 @@ pub fn histogram(view: &View<'_>) -> Figure {
         format!(" {} of all errors lie beyond the plots.", percent((share * 1e5).ceil() / 1e5))
     };
     Figure::of_panels(
+        "sizes-of-errors",
         format!(
             "How large errors are: share of |decoded − true| in bins of equal width, on a logarithmic scale, over all \
              outputs and frames. Dashed: the median, and what 95 % of the errors do not exceed.{beyond}"
@@ -57,10 +59,11 @@ pub fn by_electrode(view: &View<'_>, face: &Face) -> Figure {
         let scale = ColourScale::sequential(values.iter().copied());
         let name = format!("RMSE of {}", symbol(&group.group));
         let label = with_unit(&name, &group.unit);
-        let values = Values { of_cells: &values, scale: &scale, label: &label, unit: &group.unit };
+        let (scale, label, unit) = (&scale, &label, &group.unit);
+        let values = Values { of_cells: &values, scale, label, unit, shown: 3 };
         Map::new(face, &format!("{name} by electrode"), &name, BAR_PX).values(&values)
     };
-    let panels: Vec<String> = view.distribution.groups.iter().map(map).collect();
+    let panels: Vec<Panel> = view.distribution.groups.iter().map(map).collect();
     let unread = view.sensor.is_some_and(|sensor| sensor.row_wires.iter().any(|row| !row.read));
     let cells = match (face.outline, unread) {
         (Some(_), true) => {
@@ -71,6 +74,7 @@ pub fn by_electrode(view: &View<'_>, face: &Face) -> Figure {
         (None, _) => "Electrodes are drawn in a grid, since their places are not known.",
     };
     Figure::of_panels(
+        "errors-by-electrode",
         format!(
             "RMSE by electrode, over all frames. Each map has a scale of its own, from the least to the largest \
              value. {cells}"

@@ -6,14 +6,13 @@ use taxel_evaluate::evaluate::distribution::{Distribution, ShownReadings};
 use taxel_evaluate::run::SensorSketch;
 
 use super::axes::Axis;
+use super::data::{Data, number};
 use super::ticks::{self, Ticks};
 use super::voronoi::{self, Polygon};
 
 /// Place of one value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
-    /// Name in the hover text.
-    pub name: String,
     /// Middle, where its number stands.
     pub middle: [f64; 2],
     pub outline: Polygon,
@@ -33,6 +32,8 @@ pub struct Face {
     pub cells: Vec<Cell>,
     /// Row-wire and electrode (or column-wire) of each place, from 1.
     pub wires: Vec<[usize; 2]>,
+    /// What the second of these numbers counts.
+    pub along_row: &'static str,
 }
 
 impl Face {
@@ -54,20 +55,19 @@ impl Face {
         });
         match known {
             Some(sensor) => Some(Self::of_sensor(sensor, wires)),
-            None => (!wires.is_empty()).then(|| Self::of_grid(wires, "electrode", electrode_name)),
+            None => (!wires.is_empty()).then(|| Self::of_grid(wires, "electrode")),
         }
     }
 
     /// Face for readings, row-wire over column-wire. `None` if their names do not tell wires.
     pub fn of_readings(readings: &ShownReadings) -> Option<Self> {
-        let name = |[row, column]: [usize; 2]| format!("row-wire {row}, column-wire {column}");
         let [rows, columns] =
             [0, 1].map(|of| with_gaps(readings.wires.iter().map(|wire| wire[of]).collect()));
         // Cells that are not read come last: they have no value.
         let mut wires = readings.wires.clone();
         let all = rows.iter().flat_map(|row| columns.iter().map(|column| [*row, *column]));
         wires.extend(all.filter(|cell| !readings.wires.contains(cell)));
-        (!wires.is_empty()).then(|| Self::of_grid(wires, "column-wire", name))
+        (!wires.is_empty()).then(|| Self::of_grid(wires, "column-wire"))
     }
 
     /// Face without places of values, in mm, for marks that lie anywhere.
@@ -79,6 +79,7 @@ impl Face {
             height_over_width: ((high[1] - low[1]) / (high[0] - low[0])).clamp(0.25, 2.0),
             cells: vec![],
             wires: vec![],
+            along_row: "electrode",
         }
     }
 
@@ -91,12 +92,9 @@ impl Face {
     ) -> Self {
         let per_row = (places.len() / row_wires.len().max(1)).max(1);
         let number = |i: usize| [row_wires[i / per_row], i % per_row + 1];
-        let cell = |(i, middle): (usize, &[f64; 2])| {
-            let [row, electrode] = number(i);
-            let outline = rectangle(*middle, size_mm);
-            Cell { name: electrode_name([row, electrode]), middle: *middle, outline }
-        };
-        let cells: Vec<Cell> = places.iter().enumerate().map(cell).collect();
+        let cell =
+            |middle: &[f64; 2]| Cell { middle: *middle, outline: rectangle(*middle, size_mm) };
+        let cells: Vec<Cell> = places.iter().map(cell).collect();
         // Electrodes may be listed outside the face.
         let extent = |axis: usize| {
             let corners = cells.iter().flat_map(|cell| cell.outline.iter().map(|at| at[axis]));
@@ -127,11 +125,7 @@ impl Face {
         let outlines = voronoi::cells(&sites, low, high);
         let cell = |wires: &[usize; 2]| {
             let site = first[wires[0] - 1] + wires[1] - 1;
-            Cell {
-                name: electrode_name(*wires),
-                middle: sites[site],
-                outline: outlines[site].clone(),
-            }
+            Cell { middle: sites[site], outline: outlines[site].clone() }
         };
         Self {
             row_wires: row_wires(sensor),
@@ -141,11 +135,7 @@ impl Face {
         }
     }
 
-    fn of_grid(
-        wires: Vec<[usize; 2]>,
-        along_x: &'static str,
-        name: impl Fn([usize; 2]) -> String,
-    ) -> Self {
+    fn of_grid(wires: Vec<[usize; 2]>, along_row: &'static str) -> Self {
         // Wires that are not read have no place.
         let numbers = |axis: usize| {
             let mut numbers: Vec<usize> = wires.iter().map(|wires| wires[axis]).collect();
@@ -159,7 +149,7 @@ impl Face {
         };
         let cell = |wires: &[usize; 2]| {
             let middle = [place(&columns, wires[1]), place(&rows, wires[0])];
-            Cell { name: name(*wires), middle, outline: rectangle(middle, [1.0, 1.0]) }
+            Cell { middle, outline: rectangle(middle, [1.0, 1.0]) }
         };
         let axis = |label: &str, numbers: &[usize]| {
             let at = numbers.iter().map(|number| (place(numbers, *number), number.to_string()));
@@ -168,13 +158,34 @@ impl Face {
         };
         let share = rows.len() as f64 / columns.len() as f64;
         Self {
-            axes: [axis(along_x, &columns), axis("row-wire", &rows)],
+            axes: [axis(along_row, &columns), axis("row-wire", &rows)],
             outline: None,
             row_wires: vec![],
             height_over_width: share.clamp(0.25, 0.8),
             cells: wires.iter().map(cell).collect(),
             wires,
+            along_row,
         }
+    }
+
+    /// Name of a place in hover texts.
+    pub fn name(&self, place: usize) -> String {
+        let [row, number] = self.wires[place];
+        format!("row-wire {row}, {} {number}", self.along_row)
+    }
+
+    /// Table with a line for each place: its numbers, where it is if that is known, and what `values` has for it under
+    /// these `heads`.
+    pub fn data(&self, heads: &[&str], values: impl Fn(usize) -> Vec<String>) -> Data {
+        let is_known = self.outline.is_some();
+        let where_it_is: &[&str] = if is_known { &["x (mm)", "y (mm)"] } else { &[] };
+        let mut data = Data::new(&[&["row-wire", self.along_row], where_it_is, heads].concat());
+        for (place, (numbers, cell)) in self.wires.iter().zip(&self.cells).enumerate() {
+            let numbers = numbers.iter().map(ToString::to_string);
+            let middle = cell.middle.iter().filter(|_| is_known).map(|at| number(*at));
+            data.lines.push(numbers.chain(middle).chain(values(place)).collect());
+        }
+        data
     }
 
     /// Values of one `group`, by place, from a `line` of outputs; NaN where the group has none.
@@ -199,10 +210,6 @@ impl Face {
 fn rectangle([x, y]: [f64; 2], [width, height]: [f64; 2]) -> Polygon {
     let corner = |dx: f64, dy: f64| [x + dx * width, y + dy * height];
     vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)]
-}
-
-fn electrode_name([row, electrode]: [usize; 2]) -> String {
-    format!("row-wire {row}, electrode {electrode}")
 }
 
 /// Least and greatest x and y of a sensor: its face, and electrodes that lie beside it, with some room around them.

@@ -2,7 +2,9 @@
 
 use super::axes::{Panel, Upright};
 use super::colour::ColourScale;
+use super::data::{Data, number};
 use super::face::Face;
+use super::figures::Panel as Drawn;
 use super::format::{fixed, significant};
 use super::svg::{Anchor, Px, Svg, TEXT_PX, escape, polyline, text_width};
 use super::ticks;
@@ -10,14 +12,15 @@ use super::voronoi;
 
 /// Width of a map in px.
 pub const WIDTH: f64 = 310.0;
-/// Cells that have a hover text at most: more would make the page large.
-const MOST_HOVERS: usize = 600;
+/// Cells of maps of a kind that have a hover text at most: more would make the page large.
+const MOST_HOVERS: usize = 3000;
 /// Width of a number in a cell relative to other text.
 const SMALL: f64 = 11.0 / TEXT_PX;
 
 /// Drawing of a face, to which values are added.
 pub struct Map<'f> {
     face: &'f Face,
+    heading: String,
     svg: Svg,
     panel: Panel,
 }
@@ -32,6 +35,8 @@ pub struct Values<'v> {
     pub label: &'v str,
     /// Unit, for hover texts.
     pub unit: &'v str,
+    /// Number of maps of this kind on the page: with many, those of many cells have no hover texts.
+    pub shown: usize,
 }
 
 impl<'f> Map<'f> {
@@ -40,10 +45,11 @@ impl<'f> Map<'f> {
         let (left, right, top) = (34.0, WIDTH - 28.0, 42.0);
         let bottom = top + (right - left) * face.height_over_width;
         let mut svg = Svg::new(WIDTH, bottom + 46.0 + below, title);
-        svg.text(left, TEXT_PX, Anchor::Start, "label", heading);
+        svg.label(left, TEXT_PX, Anchor::Start, "label", heading);
         svg.text(0.0, top - 9.0, Anchor::Start, "tick", &face.axes[1].label);
         let [x, y] = face.axes.clone();
-        let mut map = Self { face, svg, panel: Panel { x, y, left, right, top, bottom } };
+        let heading = heading.to_owned();
+        let mut map = Self { face, heading, svg, panel: Panel { x, y, left, right, top, bottom } };
         if let Some([x, y]) = face.outline {
             let (corner, end) = (map.place([0.0, y]), map.place([x, 0.0]));
             map.svg.rect(corner, [end[0] - corner[0], end[1] - corner[1]], "face", "");
@@ -62,17 +68,18 @@ impl<'f> Map<'f> {
     }
 
     /// Draws coloured cells, and the bar of their colours below.
-    pub fn values(mut self, values: &Values<'_>) -> String {
+    pub fn values(mut self, values: &Values<'_>) -> Drawn {
         let decimals = values.scale.decimals();
-        let hover = self.face.cells.len() <= MOST_HOVERS;
-        let of_cells = values.of_cells.iter().chain(std::iter::repeat(&f64::NAN));
-        for (cell, value) in self.face.cells.iter().zip(of_cells) {
+        let hover = values.shown * self.face.cells.len() <= MOST_HOVERS;
+        let value_of = |place: usize| values.of_cells.get(place).copied().unwrap_or(f64::NAN);
+        for (place, cell) in self.face.cells.iter().enumerate() {
+            let value = value_of(place);
             let outline: Vec<[f64; 2]> = cell.outline.iter().map(|p| self.place(*p)).collect();
             let middle = self.place(cell.middle);
             let title = if hover {
                 let value =
-                    if value.is_finite() { significant(*value, 3) } else { "missing".into() };
-                format!("<title>{}: {value} {}</title>", escape(&cell.name), escape(values.unit))
+                    if value.is_finite() { significant(value, 3) } else { "missing".into() };
+                format!("<title>{}: {value} {}</title>", self.face.name(place), escape(values.unit))
             } else {
                 String::new()
             };
@@ -84,17 +91,23 @@ impl<'f> Map<'f> {
                 ));
                 continue;
             }
-            let (class, opacity) = values.scale.colour(*value);
-            let d = polyline(&outline);
+            let (class, opacity) = values.scale.colour(value);
+            // Corners where more than two cells meet stand twice.
+            let mut corners = outline.clone();
+            corners.dedup_by(|a, b| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 0.1);
+            let d = polyline(&corners);
             self.svg.add(format_args!(
                 r#"<path d="{d}Z" class="{class} cell-of-map" fill-opacity="{opacity:.2}">{title}</path>"#
             ));
-            self.number(&outline, middle, &fixed(*value, decimals), opacity);
+            self.number(&outline, middle, &fixed(value, decimals), opacity);
         }
         self.axes();
         let (left, right, top) = (self.panel.left, self.panel.right, self.panel.bottom + 50.0);
         values.scale.draw_bar(&mut self.svg, [left, right], top, values.label);
-        self.svg.finish()
+        let data = self.face.data(&["value", "unit"], |place| {
+            vec![number(value_of(place)), values.unit.to_owned()]
+        });
+        self.drawn(data)
     }
 
     /// Writes the number of a cell where it fits into the outline.
@@ -107,7 +120,8 @@ impl<'f> Map<'f> {
         }
         let y = middle[1].clamp(above + 7.0, below - 6.0) + TEXT_PX * 0.3;
         let class = if opacity > 0.68 { "cell full" } else { "cell" };
-        self.svg.text(x, y, Anchor::Middle, class, number);
+        let (x, y) = (Px(x), Px(y));
+        self.svg.add(format_args!(r#"<text x="{x}" y="{y}" class="{class}">{number}</text>"#));
     }
 
     /// Draws an arrow for each cell and finishes the map: one of `truth` and one of `estimate`, x and y. The `longest`
@@ -117,11 +131,11 @@ impl<'f> Map<'f> {
         [truth, estimate]: [[&[f64]; 2]; 2],
         longest: f64,
         unit: &str,
-    ) -> String {
+    ) -> Drawn {
         let px_per_mm = self.panel.x(1.0) - self.panel.x(0.0);
         let scale = 0.95 * self.face.spacing() * px_per_mm / longest;
         let scale = scale * self.room([truth, estimate], scale);
-        let hover = self.face.cells.len() <= MOST_HOVERS;
+        let hover = 3 * self.face.cells.len() <= MOST_HOVERS;
         for (i, cell) in self.face.cells.iter().enumerate() {
             let from = self.place(cell.middle);
             let mut vectors = vec![];
@@ -133,8 +147,10 @@ impl<'f> Map<'f> {
                 }
             }
             if hover && let [truth, estimate] = &vectors[..] {
-                let text =
-                    escape(&format!("{}: true {truth}; decoded {estimate} {unit}", cell.name));
+                let text = escape(&format!(
+                    "{}: true {truth}; decoded {estimate} {unit}",
+                    self.face.name(i)
+                ));
                 self.svg.circle(from, 9.0, "sensitive", &format!("<title>{text}</title>"));
             }
         }
@@ -153,7 +169,13 @@ impl<'f> Map<'f> {
         self.svg.line([start, y], [start + full, y], "axis");
         self.svg.line([start + full, y - 4.0], [start + full, y + 4.0], "axis");
         self.svg.text(self.panel.right + 20.0, y + TEXT_PX * 0.35, Anchor::End, "tick", &length);
-        self.svg.finish()
+        let heads =
+            ["true", "decoded"].map(|of| ["x", "y"].map(|axis| format!("{of} {axis} ({unit})")));
+        let heads: Vec<&str> = heads.as_flattened().iter().map(String::as_str).collect();
+        let data = self.face.data(&heads, |place| {
+            [truth, estimate].as_flattened().iter().map(|of| number(of[place])).collect()
+        });
+        self.drawn(data)
     }
 
     /// Factor, at most 1, with which all arrows of this `scale` in px end inside the map; never less than a half, lest one
@@ -196,7 +218,7 @@ impl<'f> Map<'f> {
     }
 
     /// Draws the outline, ticks and labels.
-    pub fn axes(&mut self) {
+    fn axes(&mut self) {
         let Face { outline, row_wires, .. } = self.face;
         let Panel { left, right, top, bottom, .. } = self.panel;
         let (corner, end) = match outline {
@@ -216,8 +238,12 @@ impl<'f> Map<'f> {
     }
 
     /// Finishes a map whose marks were added by hand.
-    pub fn finish(mut self) -> String {
+    pub fn finish(mut self, data: Data) -> Drawn {
         self.axes();
-        self.svg.finish()
+        self.drawn(data)
+    }
+
+    fn drawn(self, data: Data) -> Drawn {
+        Drawn { heading: self.heading, drawing: self.svg.finish(), data }
     }
 }

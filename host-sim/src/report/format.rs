@@ -63,6 +63,24 @@ pub fn symbol(group: &str) -> String {
     }
 }
 
+/// Text in which no number is parted from its unit at the end of a line.
+pub fn unbroken(text: &str) -> String {
+    const UNITS: [&str; 20] = [
+        "%", "mm", "mm/s", "µs", "ms", "s", "min", "h", "Hz", "MHz", "N", "Ω", "B", "kB", "bytes",
+        "cycles", "€", "cm²", "frames/s", "×",
+    ];
+    let mut whole = String::with_capacity(text.len());
+    for (i, word) in text.split(' ').enumerate() {
+        let unit = word.trim_end_matches(['.', ',', ';', ':', ')', '”', '!']);
+        let after_number = whole.ends_with(|last: char| last.is_ascii_digit());
+        if i > 0 {
+            whole.push(if after_number && UNITS.contains(&unit) { '\u{a0}' } else { ' ' });
+        }
+        whole += word;
+    }
+    whole
+}
+
 /// Text `symbol (unit)`, for axes and headers.
 pub fn with_unit(symbol: &str, unit: &str) -> String {
     if unit.is_empty() { symbol.into() } else { format!("{symbol} ({unit})") }
@@ -98,6 +116,13 @@ mod tests {
         assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(percent(0.07), "7\u{a0}%");
         assert_eq!(percent(0.005), "0.5\u{a0}%");
+    }
+
+    #[test]
+    fn a_number_is_not_parted_from_its_unit() {
+        let text = "0.05 mm (at 180 MHz), 3 % of 20 frames a second; K 16 ms.";
+        let whole = "0.05_mm (at 180_MHz), 3_% of 20 frames a second; K 16_ms.";
+        assert_eq!(unbroken(text), whole.replace('_', "\u{a0}"));
     }
 
     #[test]

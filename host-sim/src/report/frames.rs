@@ -1,10 +1,11 @@
-//! Figures of single frames: of median, high and largest error.
+//! Figures of single frames, by the rank of their errors.
 
 use super::colour::ColourScale;
+use super::data::{Data, number};
 use super::errors::BAR_PX;
 use super::face::Face;
 use super::face_map::{Map, Values};
-use super::figures::Figure;
+use super::figures::{Figure, Panel, Step};
 use super::format::{fixed, significant, symbol, with_unit};
 use super::svg::{Anchor, TEXT_PX};
 use super::ticks;
@@ -15,20 +16,22 @@ use taxel_evaluate::evaluate::distribution::{Rank, RelativeTo, ShownFrame};
 const PLACES: [[&str; 2]; 2] = [["contact_x_mm", "contact_y_mm"], ["x_mm", "y_mm"]];
 
 /// Name of a frame in headings.
-pub fn name(frame: &ShownFrame) -> &'static str {
+pub fn name(frame: &ShownFrame) -> String {
     match frame.rank {
-        Rank::Median => "median frame",
-        Rank::High => "95 % frame",
-        Rank::Worst => "worst frame",
+        Rank::Median => "median frame".into(),
+        Rank::Worst => "worst frame".into(),
+        Rank::Percent(0) => "best frame".into(),
+        rank => format!("{} % frame", rank.percent()),
     }
 }
 
 /// Words about a frame for captions: its number, its rank, and its error.
 fn described(view: &View<'_>, frame: &ShownFrame) -> String {
     let rank = match frame.rank {
-        Rank::Median => "The frame of median error",
-        Rank::High => "The frame with a larger error than 95 % of all",
-        Rank::Worst => "The frame with the largest error",
+        Rank::Median => "The frame of median error".into(),
+        Rank::Worst => "The frame with the largest error".into(),
+        Rank::Percent(0) => "The frame with the least error".into(),
+        rank => format!("The frame with a larger error than {} % of all", rank.percent()),
     };
     let errors = view.distribution.groups.iter().zip(&frame.rmse);
     let errors: Vec<String> = errors
@@ -66,22 +69,29 @@ pub fn readings(view: &View<'_>) -> Option<Figure> {
     let map = |frame: &ShownFrame, what: &str, values: &[f64]| {
         let heading = format!("{}, {what}", name(frame));
         let title = format!("Readings of the {heading}");
-        let values = Values { of_cells: values, scale: &scale, label, unit };
+        let values = Values { of_cells: values, scale: &scale, label, unit, shown: 6 };
         Map::new(&face, &title, &heading, BAR_PX).values(&values)
     };
     let frames = &view.distribution.frames;
     let read = frames.iter().map(|frame| map(frame, "as read", &frame.change));
     let ideal = frames.iter().zip(view.ideal_changes);
     let ideal = ideal.map(|(frame, ideal)| map(frame, "without noise", ideal));
-    let panels: Vec<String> = read.chain(ideal).collect();
+    let panels: Vec<Panel> = read.chain(ideal).collect();
     let below = match &view.noise {
         Some(noise) if !view.ideal_changes.is_empty() => {
             format!(" Above as the model received them, with {noise}; below without it.")
         }
         _ => String::new(),
     };
-    let caption = format!("{words}. All maps share one scale.{below} {ORDER}");
-    Some(Figure::of_panels(caption, &panels))
+    let missing = if changes().flatten().any(|change| change.is_nan())
+        || face.cells.len() > shown.names.len()
+    {
+        " × marks a reading that is missing or left out."
+    } else {
+        ""
+    };
+    let caption = format!("{words}. All maps share one scale.{missing}{below} {ORDER}");
+    Some(Figure::of_panels("readings", caption, &panels))
 }
 
 /// Figure of readings whose names tell no wires: bars in the order of the columns.
@@ -99,10 +109,10 @@ fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
     let at = names
         .map(|(i, name)| (i as f64 + 1.0, if short { name.clone() } else { (i + 1).to_string() }));
     let at: Vec<(f64, String)> = at.collect();
-    let axis = if short { "reading" } else { "reading, as the model's inputs" };
+    let axis = if short { "reading" } else { "reading, as the model’s inputs" };
     let panel = |frame: &ShownFrame| {
         let points = frame.change.iter().enumerate().map(|(i, y)| [i as f64 + 1.0, *y]).collect();
-        Chart {
+        let chart = Chart {
             title: format!("Readings of the {}", name(frame)),
             x: Axis::linear(
                 axis,
@@ -112,42 +122,65 @@ fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
                 format!("{}: {label}", name(frame)),
                 ticks::linear(all().chain([0.0]), 4),
             ),
-            series: vec![Series::new("", "c1", Mark::Bars(0.7), points)],
+            series: vec![Series::new("readings", "c1", Mark::Bars(0.7), points).unlisted()],
             end_labels: false,
-        }
-        .draw([310.0, 230.0])
+        };
+        let mut data = Data::new(&["reading", label]);
+        let lines = shown.names.iter().zip(&frame.change);
+        data.lines.extend(lines.map(|(reading, change)| vec![reading.clone(), number(*change)]));
+        Panel { heading: name(frame), drawing: chart.draw([310.0, 230.0]), data }
     };
-    let panels: Vec<String> = frames.iter().map(panel).collect();
-    (!panels.is_empty())
-        .then(|| Figure::of_panels(format!("{words}. All axes share one scale. {ORDER}"), &panels))
+    let panels: Vec<Panel> = frames.iter().map(panel).collect();
+    let caption = format!("{words}. All axes share one scale. {ORDER}");
+    (!panels.is_empty()).then(|| Figure::of_panels("readings", caption, &panels))
 }
 
-/// Figure of maps of a frame: true, decoded and their difference, of one group of outputs.
-pub fn maps(view: &View<'_>, face: &Face, frame: &ShownFrame) -> Option<Figure> {
-    let group = view.distribution.main_group()?;
+/// Frames to step through: of all ranks, or of a sensor with many electrodes those that matter most.
+fn steps<'v>(view: &'v View<'_>, face: &Face) -> Vec<&'v ShownFrame> {
+    /// Cells of all maps at most: more would make the page large.
+    const MOST_CELLS: usize = 6000;
+    const BY_WORTH: [u8; 13] = [50, 95, 100, 0, 90, 99, 80, 20, 70, 30, 60, 40, 10];
+    let count = (MOST_CELLS / (3 * face.cells.len().max(1))).clamp(3, BY_WORTH.len());
+    let all = view.distribution.steps.iter();
+    all.filter(|frame| BY_WORTH[..count].contains(&frame.rank.percent())).collect()
+}
+
+/// Figure of maps of frames of all ranks, to step through: true, decoded and their difference, of one group of outputs.
+pub fn maps(view: &View<'_>, face: &Face) -> Option<Figure> {
+    let (group, frames) = (view.distribution.main_group()?, steps(view, face));
     let (symbol, unit) = (symbol(&group.group), &group.unit);
     let of_line = |line: &[f64]| face.values(view.distribution, &group.group, line);
-    let (truth, estimate) = (of_line(&frame.truth), of_line(&frame.estimate));
-    let error: Vec<f64> = estimate.iter().zip(&truth).map(|(a, b)| a - b).collect();
-    let signal = ColourScale::diverging(truth.iter().chain(&estimate).copied());
-    let of_error = ColourScale::diverging(error.iter().copied());
-    let panel = |what: &str, values: &[f64], scale: &ColourScale, label: &str| {
-        let title = format!("Map of {symbol}, {what}, {}", name(frame));
-        let label = with_unit(label, unit);
-        let values = Values { of_cells: values, scale, label: &label, unit };
-        Map::new(face, &title, &format!("{}: {symbol}, {what}", name(frame)), BAR_PX)
-            .values(&values)
+    let values: Vec<[Vec<f64>; 2]> = frames
+        .iter()
+        .map(|frame| [&frame.truth, &frame.estimate].map(|line| of_line(line)))
+        .collect();
+    let signal = ColourScale::diverging(values.iter().flatten().flatten().copied());
+    let of_error = signal.of_differences();
+    let step = |(&frame, [truth, estimate]): (&&ShownFrame, &[Vec<f64>; 2])| {
+        let error: Vec<f64> = estimate.iter().zip(truth).map(|(a, b)| a - b).collect();
+        let panel = |what: &str, of_cells: &[f64], scale: &ColourScale, label: &str| {
+            let heading = format!("{}: {symbol}, {what}", name(frame));
+            let title = format!("Map of {symbol}, {what}, {}", name(frame));
+            let (label, shown) = (&with_unit(label, unit), 3 * frames.len());
+            let values = Values { of_cells, scale, label, unit, shown };
+            Map::new(face, &title, &heading, BAR_PX).values(&values)
+        };
+        let panels = vec![
+            panel("true", truth, &signal, &symbol),
+            panel("decoded", estimate, &signal, &symbol),
+            panel("decoded − true", &error, &of_error, &format!("error of {symbol}")),
+        ];
+        let label = format!("{}\u{a0}%", frame.rank.percent());
+        Step { label, words: described(view, frame), panels }
     };
-    let panels = [
-        panel("true", &truth, &signal, &symbol),
-        panel("decoded", &estimate, &signal, &symbol),
-        panel("decoded − true", &error, &of_error, &format!("error of {symbol}")),
-    ];
+    let steps: Vec<Step> = frames.iter().zip(&values).map(step).collect();
+    let median = frames.iter().position(|frame| frame.rank.percent() >= 50)?;
     let caption = format!(
-        "{} Maps of {symbol}: true and decoded on one scale, their difference on its own.",
-        described(view, frame)
+        "Maps of {symbol} in frames of growing error: true and decoded on one scale in all frames, their difference on a \
+         scale with ends at ± the largest value of that one, so that a colour is the same distance from zero on all maps. {ORDER}"
     );
-    Some(Figure::of_panels(caption, &panels))
+    let question = "Share of the frames with no larger error";
+    Some(Figure::of_steps("frames", caption, question, &steps, median))
 }
 
 /// Figure of x and y of all shown frames as arrows, true and decoded. `None` if they are not decoded both.
@@ -176,14 +209,14 @@ pub fn arrows(view: &View<'_>, face: &Face) -> Option<Figure> {
         Map::new(face, &format!("Arrows of {heading}"), &heading, 28.0)
             .arrows(slices, longest, unit)
     };
-    let panels: Vec<String> = view.distribution.frames.iter().zip(&vectors).map(panel).collect();
+    let panels: Vec<Panel> = view.distribution.frames.iter().zip(&vectors).map(panel).collect();
     let caption = format!(
-        "{} and {} of every electrode in the same frames, as arrows: true and decoded. Each panel has a scale of its \
+        "{} and {} of every electrode in the frames of median, high and largest error, as arrows: true and decoded. Each panel has a scale of its \
          own, which the bar below it gives.",
         symbol(x),
         symbol(y)
     );
-    (!panels.is_empty()).then(|| Figure::of_panels(caption, &panels))
+    (!panels.is_empty()).then(|| Figure::of_panels("arrows", caption, &panels))
 }
 
 /// Figure of true and decoded places in the shown frames. `None` for outputs without a place.
@@ -202,7 +235,7 @@ pub fn places(view: &View<'_>) -> Option<Figure> {
         Face::blank([x.low, y.low], [x.high, y.high], None)
     };
     let panel = |frame: &ShownFrame| {
-        let heading = name(frame).to_owned();
+        let heading = name(frame);
         let mut map = Map::new(&face, &format!("Place in the {heading}"), &heading, 46.0);
         for row in view.sensor.into_iter().flat_map(|sensor| &sensor.row_wires) {
             for electrode in &row.electrodes_mm {
@@ -228,9 +261,15 @@ pub fn places(view: &View<'_>) -> Option<Figure> {
         let depth =
             column("contact_depth_mm").map(|depth| [frame.truth[depth], frame.estimate[depth]]);
         legend(&mut map, &face, depth);
-        map.finish()
+        let mut data = Data::new(&["output", "true", "decoded", "unit"]);
+        let named = [("x", truth[0], estimate[0]), ("y", truth[1], estimate[1])];
+        let depth = depth.map(|[truth, estimate]| ("depth", truth, estimate));
+        for (name, truth, estimate) in named.into_iter().chain(depth) {
+            data.lines.push(vec![name.into(), number(truth), number(estimate), "mm".into()]);
+        }
+        map.finish(data)
     };
-    let panels: Vec<String> = view.distribution.frames.iter().map(panel).collect();
+    let panels: Vec<Panel> = view.distribution.frames.iter().map(panel).collect();
     let face_of = if view.sensor.is_some() {
         "Small dots are the upper electrodes."
     } else {
@@ -240,7 +279,7 @@ pub fn places(view: &View<'_>) -> Option<Figure> {
         "Place of the contact, true and decoded, seen from above. A line joins the two. {face_of} A place beyond \
          the frame is drawn at its edge."
     );
-    (!panels.is_empty()).then(|| Figure::of_panels(caption, &panels))
+    (!panels.is_empty()).then(|| Figure::of_panels("places", caption, &panels))
 }
 
 fn mark(map: &mut Map<'_>, place: [f64; 2], class: &str, radius: f64, hover: &str) {

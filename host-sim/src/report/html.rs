@@ -3,8 +3,8 @@
 use std::fmt::{Display, Write as _};
 
 use super::face::Face;
-use super::figures::Figure;
-use super::format::{grouped, significant, symbol};
+use super::figures::{Figure, Figures, Page, link};
+use super::format::{grouped, significant, symbol, unbroken};
 use super::svg::escape;
 use super::view::View;
 use super::{errors, frames, moving, over_time, sketch, sweep, tables};
@@ -14,7 +14,7 @@ use super::{errors, frames, moving, over_time, sketch, sweep, tables};
 struct Body {
     html: String,
     headings: Vec<(&'static str, &'static str)>,
-    figures: usize,
+    figures: Figures,
     tables: usize,
 }
 
@@ -30,13 +30,7 @@ impl Body {
     }
 
     fn figure(&mut self, figure: &Figure) {
-        self.figures += 1;
-        let (number, caption) = (self.figures, escape(&figure.caption));
-        self.add(format_args!(
-            "<figure id=\"figure-{number}\">\n{}<figcaption><b>Figure {number}.</b> {caption}\
-             </figcaption>\n</figure>\n",
-            figure.drawing
-        ));
+        self.html += &self.figures.html(figure);
     }
 
     /// Adds a numbered table; `caption` is HTML.
@@ -51,9 +45,9 @@ impl Body {
     }
 }
 
-/// Whole page of a model.
-pub fn page(view: &View<'_>) -> String {
-    let mut body = Body::default();
+/// Whole page of a model, whose `figures` are to be numbered.
+pub fn page(view: &View<'_>, figures: Figures) -> Page {
+    let mut body = Body { figures, ..Body::default() };
     let face = Face::of_electrodes(view.distribution, view.sensor);
     error_section(&mut body, view, face.as_ref());
     if let Some(log) = view.over_time {
@@ -94,7 +88,8 @@ pub fn page(view: &View<'_>) -> String {
     body.heading("made", "How this was made");
     body.html += &made(view);
     let top = header(view) + &contents(&body.headings);
-    document(&format!("Taxel: {}", view.title), &(top + &body.html))
+    let html = document(&format!("Taxel: {}", view.title), &(top + &body.html));
+    Page { html, figures: body.figures.files }
 }
 
 fn error_section(body: &mut Body, view: &View<'_>, face: Option<&Face>) {
@@ -125,8 +120,13 @@ fn error_section(body: &mut Body, view: &View<'_>, face: Option<&Face>) {
     if let Some(others) = view.others {
         let caption = format!(
             "RMSE and R² on contacts that the model was not trained on, {} frames each; mean: RMSE of always predicting the \
-             mean of training; novel: share of the frames that a confidence notices.",
-            grouped(others.frames)
+             mean of training{}.",
+            grouped(others.frames),
+            if tables::knows_novel(others) {
+                "; novel: share of the frames that a confidence notices"
+            } else {
+                ""
+            }
         );
         body.table(&caption, &tables::others(others, view.decoders), "");
     }
@@ -136,15 +136,13 @@ fn frame_section(body: &mut Body, view: &View<'_>, face: Option<&Face>) {
     if view.distribution.frames.is_empty() {
         return;
     }
-    body.heading("frames", "Three frames: median, 95 % and worst");
+    body.heading("frames", "Single frames");
     if let Some(readings) = frames::readings(view) {
         body.figure(&readings);
     }
     if let Some(face) = face {
-        for frame in &view.distribution.frames {
-            if let Some(maps) = frames::maps(view, face, frame) {
-                body.figure(&maps);
-            }
+        if let Some(maps) = frames::maps(view, face) {
+            body.figure(&maps);
         }
         if let Some(arrows) = frames::arrows(view, face) {
             body.figure(&arrows);
@@ -208,10 +206,11 @@ fn header(view: &View<'_>) -> String {
 /// Sentence in which groups of outputs have their symbols.
 fn named(view: &View<'_>, sentence: &str) -> String {
     let groups = view.distribution.groups.iter();
-    let text = groups
-        .fold(sentence.to_owned(), |text, group| text.replace(&group.group, &symbol(&group.group)));
-    // A number and its sign stay on one line.
-    text.replace(" %", "\u{a0}%")
+    unbroken(
+        &groups.fold(sentence.to_owned(), |text, group| {
+            text.replace(&group.group, &symbol(&group.group))
+        }),
+    )
 }
 
 /// HTML in which commands between backticks are code.
@@ -234,10 +233,10 @@ fn cost(view: &View<'_>) -> String {
     let fits = if device.fits_slot { "fits" } else { "does not fit" };
     let least = if device.weights_in_ram { "" } else { "at least " };
     format!(
-        "<dl>\n<div><dt>Decoding a frame</dt><dd>{least}{} <span>µs</span></dd><dd class=\"small\">{least}{} cycles \
-         from flash at 180 MHz; {} without waiting</dd></div>\n\
-         <div><dt>RAM</dt><dd>{ram} <span>B</span></dd><dd class=\"small\">{of_ram}</dd></div>\n\
-         <div><dt>Blob</dt><dd>{} <span>B</span></dd><dd class=\"small\">{fits} a slot of {} B</dd></div>\n</dl>\n",
+        "<dl>\n<div><dt>Decoding a frame</dt><dd>{least}{}\u{a0}<span>µs</span></dd><dd class=\"small\">{least}{} cycles \
+         from flash at 180\u{a0}MHz; {} without waiting</dd></div>\n\
+         <div><dt>RAM</dt><dd>{ram}\u{a0}<span>B</span></dd><dd class=\"small\">{of_ram}</dd></div>\n\
+         <div><dt>Blob</dt><dd>{}\u{a0}<span>B</span></dd><dd class=\"small\">{fits} a slot of {}\u{a0}B</dd></div>\n</dl>\n",
         significant(device.flash_us, 3),
         grouped(device.flash_cycles as usize),
         grouped(device.cycles as usize),
@@ -262,8 +261,7 @@ fn made(view: &View<'_>) -> String {
         let _ = writeln!(html, "<div><dt>{name}</dt><dd>{}</dd></div>", escape(value));
     }
     if !view.made.files.is_empty() {
-        let link = |file: &String| format!("<a href=\"{0}\">{0}</a>", escape(file));
-        let links: Vec<String> = view.made.files.iter().map(link).collect();
+        let links: Vec<String> = view.made.files.iter().map(|file| link(file, file)).collect();
         let _ = writeln!(html, "<div><dt>Files</dt><dd>{}</dd></div>", links.join(", "));
     }
     let version = env!("CARGO_PKG_VERSION");

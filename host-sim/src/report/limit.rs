@@ -10,16 +10,19 @@ use super::colour::ColourScale;
 use super::errors::BAR_PX;
 use super::face::Face;
 use super::face_map::{Map, Values};
+use super::figures::{Figure, Figures, Page, Panel};
 use super::format::{percent, significant, symbol, with_unit};
 use super::html::document;
-use super::svg::{Shape, Svg, escape, standalone};
+use super::svg::{Shape, escape};
 use super::tables::numbers;
 use super::ticks;
-use taxel_evaluate::evaluate::limit::{Figures, Level, LimitResult};
+use taxel_evaluate::evaluate::limit::{Figures as Limits, Level, LimitResult};
 use taxel_evaluate::metrics::DecoderErrors;
 
 /// Signal-to-noise ratios below this are not drawn.
 const LEAST_RATIO: f64 = 1e-3;
+/// Sizes of charts in wide and in narrow windows.
+const SIZES: [[f64; 2]; 2] = [[920.0, 400.0], [480.0, 400.0]];
 /// Directions that are drawn at most.
 const MOST_DIRECTIONS: usize = 60;
 
@@ -31,10 +34,13 @@ fn directions(level: &Level) -> Chart {
     };
     let mut series = Vec::new();
     for (i, row) in level.by_row.iter().enumerate() {
-        let name = if i == 0 { "each row by itself" } else { "" };
-        let mut row = Series::new(name, "c2", Mark::LineAnd(Shape::Circle), line(row));
-        row.opacity = 0.45;
-        series.push(row);
+        let name = match &row.row_wires[..] {
+            _ if i == 0 => "each row by itself".into(),
+            [wire] => format!("row {wire}"),
+            wires => format!("{} rows", wires.len()),
+        };
+        let line = Series::new(&name, "c2", Mark::LineAnd(Shape::Circle), line(row));
+        series.push(Series { opacity: 0.45, is_listed: i == 0, ..line });
     }
     if level.by_row.len() > 1 {
         let all = line(&level.observability);
@@ -61,48 +67,68 @@ fn directions(level: &Level) -> Chart {
     }
 }
 
-/// Picture of the directions at the first noise level, as a file of its own.
-pub fn directions_svg(result: &LimitResult) -> String {
-    let size = [920.0, 400.0];
-    result.levels.first().map_or(String::new(), |l| standalone(&directions(l).draw(size), size))
-}
-
-/// Page of a limit.
-pub fn html(result: &LimitResult) -> String {
+/// Page of a limit, with the `command` that computed it.
+pub fn html(result: &LimitResult, command: &str) -> Page {
     let title = format!("Taxel: what the sensor can know, {}", result.subject);
+    let mut figures = Figures::in_files("");
     let mut body = format!(
-        "<header>\n<h1>{}</h1>\n<p>{} noise; {} test frames; seed {}</p>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n<p>{} noise; {} test frames; seed {}</p>\n{}</header>\n",
         escape(&title),
         escape(&result.noise_kind),
         result.frames,
-        result.seed
+        result.seed,
+        least(result)
     );
-    body += &limits(result);
     if result.levels.len() > 1 {
-        let _ = write!(
-            body,
-            "<figure>\n{}<figcaption>Least possible RMSE from all readings against the noise, both logarithmic. \
-             Dashed: predicting the mean.</figcaption>\n</figure>\n",
-            by_noise(result).draw_responsive([920.0, 400.0], [480.0, 400.0])
-        );
+        let caption = "Least possible RMSE from all readings against the noise, both logarithmic. Dashed: predicting the mean.";
+        body += &figures.html(&Figure::of_chart(
+            "limit-by-noise",
+            caption.into(),
+            &by_noise(result),
+            SIZES,
+        ));
     }
     for level in &result.levels {
         let seen = &level.observability;
         let noise = percent(level.noise_level);
-        let _ = write!(
-            body,
-            "<h2>What {noise} noise leaves visible</h2>\n<figure>\n{}<figcaption>Signal-to-noise ratio of every \
-             direction: how far one standard deviation of the prior moves the readings, in standard deviations of \
-             the noise. {} of {} directions are observable, above the dashed line. Ratios below {LEAST_RATIO} are \
-             not drawn.</figcaption>\n</figure>\n",
-            directions(level).draw_responsive([920.0, 400.0], [480.0, 400.0]),
-            seen.observable,
-            seen.unknowns
+        let of_level = match result.levels.len() {
+            1 => String::new(),
+            _ => format!("-at-{}-percent", noise.trim_end_matches(['\u{a0}', '%'])),
+        };
+        let _ = writeln!(body, "<h2>What {noise} noise leaves visible</h2>");
+        let caption = format!(
+            "Signal-to-noise ratio of every direction: how far one standard deviation of the prior moves the readings, in \
+             standard deviations of the noise. {} of {} directions are observable, above the dashed line. Ratios below \
+             {LEAST_RATIO} are not drawn.",
+            seen.observable, seen.unknowns
         );
-        body += &maps(result, seen);
+        let name = format!("directions{of_level}");
+        body += &figures.html(&Figure::of_chart(&name, caption, &directions(level), SIZES));
+        let caption = "Share of the prior's variance of each electrode's Δx, Δy and Δz that all readings take away, for a sensor \
+                       linearised at the mean deformation: 0 is invisible, 1 is known.";
+        let name = format!("known{of_level}");
+        body += &figures.html(&Figure::of_panels(&name, caption.into(), &known(result, seen)));
     }
+    body += &limits(result);
     body += &geometry(result);
-    document(&title, &body)
+    let _ = writeln!(body, "<p class=\"note\">Made by <code>{}</code></p>", escape(command));
+    Page { html: document(&title, &body), figures: figures.files }
+}
+
+/// Least possible errors of all readings at the first noise level.
+fn least(result: &LimitResult) -> String {
+    let noise = result.levels.first().map_or(String::new(), |level| percent(level.noise_level));
+    let figures = result.levels.first().and_then(|level| level.limits.first());
+    let groups = figures.iter().flat_map(|figures| &figures.groups).map(|group| {
+        format!(
+            "<div><dt>Least possible RMSE of {} at {noise} noise</dt><dd>{}\u{a0}<span>{}</span></dd></div>\n",
+            escape(&symbol(&group.group)),
+            significant(group.limit, 3),
+            escape(&group.unit)
+        )
+    });
+    let groups: String = groups.collect();
+    if groups.is_empty() { groups } else { format!("<dl>\n{groups}</dl>\n") }
 }
 
 /// Line of the table for a model: its errors, and their ratios to the limit.
@@ -119,7 +145,7 @@ fn model_row(level: &Level, model: &DecoderErrors) -> String {
 /// Table of the limits.
 fn limits(result: &LimitResult) -> String {
     let mut html = String::from(
-        "<figure class=\"table\">\n<figcaption>Least possible RMSE of any decoder, ± its standard error. ESS: smallest \
+        "<h2>Least possible errors</h2>\n<figure class=\"table\">\n<figcaption>Least possible RMSE of any decoder, ± its standard error. ESS: smallest \
          and median effective sample size of the posteriors. Of a model: RMSE on these frames, and its ratio to the \
          limit of all readings.</figcaption>\n<div class=\"scroll\" tabindex=\"0\" \
          role=\"region\" aria-label=\"Limits\">\n<table>\n<thead><tr><th>noise</th><th>readings</th>",
@@ -155,7 +181,7 @@ fn limits(result: &LimitResult) -> String {
     html + "</tbody>\n</table>\n</div>\n</figure>\n"
 }
 
-fn name(figures: &Figures) -> String {
+fn name(figures: &Limits) -> String {
     match &figures.row_wires[..] {
         [row] => format!("row {row}"),
         rows => format!("all {} rows", rows.len()),
@@ -177,13 +203,11 @@ fn by_noise(result: &LimitResult) -> Chart {
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
             points
         };
-        series.push(Series::new("", class, Mark::Dashed, line(&|g| g.prior_rmse)));
-        series.push(Series::new(
-            &symbol(&group.group),
-            class,
-            Mark::LineAnd(shape),
-            line(&|g| g.limit),
-        ));
+        let name = symbol(&group.group);
+        let mean =
+            Series::new(&format!("{name}, the mean"), class, Mark::Dashed, line(&|g| g.prior_rmse));
+        series.push(mean.unlisted());
+        series.push(Series::new(&name, class, Mark::LineAnd(shape), line(&|g| g.limit)));
     }
     let all = |axis: usize| series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
     let (x, y) = (
@@ -200,7 +224,7 @@ fn by_noise(result: &LimitResult) -> Chart {
 }
 
 /// Maps of what is known of each electrode, one an axis.
-fn known(result: &LimitResult, seen: &Observability) -> [String; 3] {
+fn known(result: &LimitResult, seen: &Observability) -> [Panel; 3] {
     let per_row = seen.electrodes.len() / seen.row_wires.len().max(1);
     let [x_mm, y_mm, _] = result.size_mm;
     let size_mm = [x_mm / per_row.max(1) as f64, y_mm / result.row_wires.max(1) as f64];
@@ -210,32 +234,11 @@ fn known(result: &LimitResult, seen: &Observability) -> [String; 3] {
         let axis = usize::from(letter as u8 - b'x');
         let of_cells: Vec<f64> = seen.electrodes.iter().map(|e| e.known[axis]).collect();
         let title = format!("Map over the face of what the readings tell about Δ{letter}");
-        let label = "share of the prior's variance";
-        let values =
-            Values { of_cells: &of_cells, scale: &ColourScale::of_shares(), label, unit: "" };
+        let (label, scale) = ("share of the prior's variance", &ColourScale::of_shares());
+        let shown = 3 * result.levels.len();
+        let values = Values { of_cells: &of_cells, scale, label, unit: "", shown };
         Map::new(&face, &title, &format!("Δ{letter}: share known"), BAR_PX).values(&values)
     })
-}
-
-/// Picture of what is known of each electrode at the first noise level, as a file of its own.
-pub fn known_svg(result: &LimitResult) -> String {
-    const MAP: [f64; 2] = [310.0, 376.0];
-    let Some(level) = result.levels.first() else { return String::new() };
-    let mut picture = Svg::new(3.0 * MAP[0] + 40.0, MAP[1], "What the readings tell");
-    for (i, map) in known(result, &level.observability).iter().enumerate() {
-        picture.place([i as f64 * (MAP[0] + 20.0), 0.0], map);
-    }
-    standalone(&picture.finish(), [3.0 * MAP[0] + 40.0, MAP[1]])
-}
-
-/// Figure of what is known of each electrode, by axis.
-fn maps(result: &LimitResult, seen: &Observability) -> String {
-    format!(
-        "<figure>\n<div class=\"panels\">\n{}</div>\n<figcaption>Share of the prior's variance of each electrode's Δx, \
-         Δy and Δz that all readings take away, for a sensor linearised at the mean deformation: 0 is invisible, 1 is \
-         known.</figcaption>\n</figure>\n",
-        known(result, seen).concat()
-    )
 }
 
 /// Table of other geometries.

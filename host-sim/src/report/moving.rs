@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use taxel_data::columns;
 use taxel_evaluate::evaluate::moving_contacts::MovingContacts;
 
 use super::axes::Axis;
@@ -18,6 +19,11 @@ const NARROW: [f64; 2] = [360.0, 280.0];
 /// Figure of one output over a trajectory.
 pub fn trajectory(moving: &MovingContacts) -> Figure {
     let shown = &moving.shown;
+    let group = columns::group_of(&shown.output);
+    let name = match shown.output.strip_suffix(group) {
+        None | Some("") => symbol(group),
+        Some(electrode) => format!("{} of {}", symbol(group), electrode.trim_end_matches('_')),
+    };
     let points = |values: &[f64]| {
         shown.time_s.iter().zip(values).map(|(time, value)| [*time, *value]).collect::<Vec<_>>()
     };
@@ -31,20 +37,21 @@ pub fn trajectory(moving: &MovingContacts) -> Figure {
     let (first, last) = (shown.time_s.first(), shown.time_s.last());
     let (first, last) = (first.copied().unwrap_or(0.0), last.copied().unwrap_or(1.0));
     let chart = Chart {
-        title: format!("{} over a trajectory", shown.output),
+        title: format!("{name} over a trajectory"),
         x: Axis::linear("time in s".to_owned(), ticks::within(first, last, 8)),
-        y: Axis::linear(with_unit(&symbol(&shown.output), &shown.unit), y),
+        y: Axis::linear(with_unit(&name, &shown.unit), y),
         series,
         end_labels: false,
     };
-    Figure {
-        caption: format!(
-            "{} while a contact slides and presses, every ms: the newest finished estimate, what a filter makes of it, and \
-             the truth. Estimates come in steps, one a frame, and late.",
-            symbol(&shown.output)
+    Figure::of_chart(
+        "trajectory",
+        format!(
+            "{name} while a contact slides and presses, every ms: the newest finished estimate, what a filter makes of it, and \
+             the truth. Estimates come in steps, one a frame, and late."
         ),
-        drawing: chart.draw_responsive(WIDE, NARROW),
-    }
+        &chart,
+        [WIDE, NARROW],
+    )
 }
 
 /// Table of errors with and without a filter and of the baselines, beside the age of an estimate.

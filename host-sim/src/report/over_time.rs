@@ -52,7 +52,8 @@ pub fn errors(log: &OverTime) -> Figure {
             series.push(if held_out {
                 Series::new(&symbol(name), class, Mark::LineAnd(shape), points)
             } else {
-                Series::new("", class, Mark::Dashed, points)
+                let name = format!("{}, trained on", symbol(name));
+                Series::new(&name, class, Mark::Dashed, points).unlisted()
             });
         }
     }
@@ -76,14 +77,16 @@ pub fn errors(log: &OverTime) -> Figure {
         series,
         end_labels: false,
     };
-    Figure {
-        caption: format!(
+    Figure::of_chart(
+        "errors-over-time",
+        format!(
             "Errors over time, in stretches of equally many lines: RMSE as a share of that of always predicting the mean. \
              An error that rises steadily comes from a sensor that changes, a single peak from presses that training \
              lacks.{dashed}{more}"
         ),
-        drawing: chart.draw_responsive(WIDE, NARROW),
-    }
+        &chart,
+        [WIDE, NARROW],
+    )
 }
 
 /// Figure of readings of the untouched sensor over time.
@@ -96,7 +99,7 @@ pub fn at_rest(log: &OverTime, rest: &RestOverTime) -> Figure {
     let percentile = |at: usize| points(&move |it| it.percentiles_percent[at]);
     let mut series = vec![
         Series::new("10 to 90 % of readings", "muted", Mark::Dashed, percentile(0)),
-        Series::new("", "muted", Mark::Dashed, percentile(2)),
+        Series::new("90 % of readings", "muted", Mark::Dashed, percentile(2)).unlisted(),
         Series::new("median", "c1", Mark::LineAnd(Shape::Circle), percentile(1)),
     ];
     let most = points(&|it| it.most_percent);
@@ -115,8 +118,9 @@ pub fn at_rest(log: &OverTime, rest: &RestOverTime) -> Figure {
         series,
         end_labels: false,
     };
-    Figure {
-        caption: format!(
+    Figure::of_chart(
+        "readings-at-rest",
+        format!(
             "Readings of the untouched sensor over time: change since the first stretch, in per cent of {of}, in the mean \
              over stretches of the {} lines at rest. {} changes most. {}",
             grouped(rest.lines),
@@ -131,8 +135,9 @@ pub fn at_rest(log: &OverTime, rest: &RestOverTime) -> Figure {
                 )
             }
         ),
-        drawing: chart.draw_responsive(WIDE, NARROW),
-    }
+        &chart,
+        [WIDE, NARROW],
+    )
 }
 
 /// Figure of how far averaging frames at rest lowers their noise.
@@ -161,12 +166,14 @@ pub fn averaging(noise: &Spectrum) -> Figure {
         series,
         end_labels: false,
     };
-    Figure {
-        caption: format!(
+    Figure::of_chart(
+        "noise-by-averaging",
+        format!(
             "Noise at rest by averaging time: Allan deviation of {} readings, and error of means by the fitted parts. {}",
             noise.readings,
             sentences(noise).join(" ")
         ),
-        drawing: chart.draw_responsive(WIDE, NARROW),
-    }
+        &chart,
+        [WIDE, NARROW],
+    )
 }

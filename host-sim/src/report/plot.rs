@@ -1,6 +1,8 @@
 //! Small plots with two linear axes: histograms and densities.
 
 use super::axes::{Axis, BELOW_PX, Panel, Upright, label_width};
+use super::data::{Data, number};
+use super::figures::Panel as Drawn;
 use super::format::{fixed, grouped, significant, symbol, with_unit};
 use super::svg::{Anchor, Svg, TEXT_PX, text_width};
 use super::ticks::{self, Ticks};
@@ -27,7 +29,7 @@ fn decades(shares: impl Iterator<Item = f64>) -> Ticks {
 }
 
 /// Histogram of a group's errors, with median, 95 % and largest.
-pub fn histogram(group: &GroupDistribution) -> String {
+pub fn histogram(group: &GroupDistribution) -> Drawn {
     let (name, histogram) = (symbol(&group.group), &group.histogram);
     let width = histogram.bin_width;
     let share = |count: usize| 100.0 * count as f64 / group.count.max(1) as f64;
@@ -37,7 +39,7 @@ pub fn histogram(group: &GroupDistribution) -> String {
     let y = Axis::logarithmic(format!("{name}: share of errors (%)"), y);
     let mut svg = Svg::new(WIDTH, 272.0, &format!("Histogram of the error of {name}"));
     let panel = panel([x, y], 272.0, 68.0);
-    svg.text(0.0, TEXT_PX, Anchor::Start, "label", &panel.y.label);
+    svg.label(0.0, TEXT_PX, Anchor::Start, "label", &panel.y.label);
     panel.draw_axes(&mut svg, Upright::Grid);
     for (bin, count) in histogram.counts.iter().enumerate().filter(|(_, count)| **count > 0) {
         let (from, to) = (width * bin as f64, width * (bin + 1) as f64);
@@ -66,13 +68,18 @@ pub fn histogram(group: &GroupDistribution) -> String {
         }
         let end = from + 4.0 + text_width(&label) > panel.right;
         let (x, anchor) = if end { (from - 4.0, Anchor::End) } else { (from + 4.0, Anchor::Start) };
-        svg.text(x, y + 4.0, anchor, "tick", &label);
+        svg.text(x, y + 4.0, anchor, "tick halo", &label);
     }
-    svg.finish()
+    let mut data = Data::new(&["error from", "error to", "unit", "errors"]);
+    for (bin, count) in histogram.counts.iter().enumerate() {
+        let [from, to] = [bin, bin + 1].map(|edge| number(width * edge as f64));
+        data.lines.push(vec![from, to, group.unit.clone(), count.to_string()]);
+    }
+    Drawn { heading: name, drawing: svg.finish(), data }
 }
 
 /// Density of a group's truths and estimates: the fuller a bin, the more pairs of them it has.
-pub fn density(group: &GroupDistribution) -> String {
+pub fn density(group: &GroupDistribution) -> Drawn {
     let (name, density) = (symbol(&group.group), &group.density);
     let axis = |what: &str| {
         let ticks = ticks::within(density.low, density.high, 4);
@@ -90,7 +97,7 @@ pub fn density(group: &GroupDistribution) -> String {
     for (i, count) in density.counts.iter().enumerate().filter(|(_, count)| **count > 0) {
         let (x, y) = ((i % density.bins) as f64, (i / density.bins) as f64);
         // By orders of magnitude: most frames hardly move most electrodes.
-        let opacity = 0.1 + 0.9 * (*count as f64).ln() / most.ln().max(1.0);
+        let opacity = 0.15 + 0.85 * (*count as f64).ln() / most.ln().max(1.0);
         let corner = [panel.left + x * bin, panel.bottom - (y + 1.0) * bin];
         let fill = format!(r#" fill-opacity="{opacity:.2}""#);
         svg.rect(corner, [bin, bin], "above strip", &fill);
@@ -98,7 +105,16 @@ pub fn density(group: &GroupDistribution) -> String {
     let [from, to] = [density.low, density.high].map(|end| panel.at([end, end]));
     svg.line(from, to, "truth thin");
     svg.rect([panel.left, panel.top], [side, side], "outline", "");
-    svg.text(0.0, TEXT_PX, Anchor::Start, "label", &panel.y.label);
+    svg.label(0.0, TEXT_PX, Anchor::Start, "label", &panel.y.label);
     panel.draw_axes(&mut svg, Upright::Marks);
-    svg.finish()
+    let mut data = Data::new(&["true", "decoded", "unit", "pairs"]);
+    let middle = |bin: usize| {
+        let width = (density.high - density.low) / density.bins as f64;
+        number(density.low + (bin as f64 + 0.5) * width)
+    };
+    for (i, count) in density.counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let [x, y] = [i % density.bins, i / density.bins].map(middle);
+        data.lines.push(vec![x, y, group.unit.clone(), count.to_string()]);
+    }
+    Drawn { heading: name, drawing: svg.finish(), data }
 }

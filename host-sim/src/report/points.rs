@@ -4,9 +4,11 @@ use std::fmt::Write as _;
 
 use super::axes::Axis;
 use super::chart::{Chart, Mark, Series};
+use super::data::{Data, number};
+use super::figures::{Figure, Figures, Page, link};
 use super::format::{counted, fixed, significant, symbol};
 use super::html::document;
-use super::svg::{Anchor, Shape, Svg, TEXT_PX, escape, standalone, text_width};
+use super::svg::{Anchor, Shape, Svg, TEXT_PX, escape, text_width};
 use super::tables::numbers;
 use super::ticks;
 use taxel_evaluate::metrics::unit_of_rmse;
@@ -143,14 +145,14 @@ fn front(merged: &Merged) -> Option<Chart> {
         Mark::Points(Shape::Diamond),
         points(&|it| !it.is_within),
     );
-    outside.opacity = 0.3;
+    outside.opacity = 0.45;
     let mut beaten = Series::new(
         "other settings",
         "c1",
         Mark::Points(Shape::Circle),
         points(&|it| it.is_within && !it.on_front),
     );
-    beaten.opacity = 0.4;
+    beaten.opacity = 0.6;
     // A line through the front holds for two objectives only.
     let mark = if merged.objectives.len() == 2 {
         Mark::LineAnd(Shape::Square)
@@ -169,13 +171,8 @@ fn front(merged: &Merged) -> Option<Chart> {
     })
 }
 
-/// Picture of the points and their front, as a file of its own.
-pub fn front_svg(merged: &Merged) -> String {
-    front(merged).map_or_else(|| standalone("", WIDE), |chart| standalone(&chart.draw(WIDE), WIDE))
-}
-
 /// Bars of what each axis explains of each objective.
-fn bars(merged: &Merged, width: f64) -> (String, [f64; 2]) {
+fn bars(merged: &Merged, width: f64) -> String {
     const LINE: f64 = 22.0;
     let fields: Vec<&String> =
         merged.fields.iter().filter(|field| has_effect(merged, field)).collect();
@@ -210,21 +207,26 @@ fn bars(merged: &Merged, width: f64) -> (String, [f64; 2]) {
         }
         y += 20.0;
     }
-    (svg.finish(), [width, height.max(LINE)])
+    svg.finish()
 }
 
 fn has_effect(merged: &Merged, field: &str) -> bool {
     merged.effects.iter().any(|effect| effect.field == field)
 }
 
-/// Picture of what the axes explain, as a file of its own.
-pub fn effects_svg(merged: &Merged) -> String {
-    let (drawing, size) = bars(merged, WIDE[0]);
-    standalone(&drawing, size)
+/// What the axes explain, as a table.
+fn shares(merged: &Merged) -> Data {
+    let mut data = Data::new(&["result", "axis", "share of the variance (%)"]);
+    for effect in &merged.effects {
+        let share = number(100.0 * effect.share);
+        data.lines.push(vec![effect.result.clone(), effect.field.clone(), share]);
+    }
+    data
 }
 
 /// Page of a sweep.
-pub fn html(merged: &Merged, stem: &str, command: &str) -> String {
+pub fn html(merged: &Merged, stem: &str, command: &str) -> Page {
+    let mut figures = Figures::in_files(&format!("{stem}-"));
     let title = format!("Taxel: sweep {}", merged.plan);
     let failed = merged.failed().count();
     let missing = merged.missing.len();
@@ -238,10 +240,11 @@ pub fn html(merged: &Merged, stem: &str, command: &str) -> String {
         let _ = write!(lacking, "; {count} with {note}");
     }
     let mut body = format!(
-        "<header>\n<h1>{}</h1>\n<p>{}{lacking}; {}; <a href=\"{stem}.csv\">all points as a table</a></p>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n<p>{}{lacking}; {}; {}</p>\n</header>\n",
         escape(&title),
         counted(merged.points.len(), "point"),
         counted(merged.settings.len(), "setting"),
+        link(&format!("{stem}.csv"), "all points as a table"),
     );
     if let Some(sentence) = merged.none_within() {
         let _ = writeln!(body, "<p>{}</p>", escape(&sentence));
@@ -252,25 +255,27 @@ pub fn html(merged: &Merged, stem: &str, command: &str) -> String {
         let bounds = if bounds.is_empty() {
             String::new()
         } else {
-            format!(" Bounds: {}.", escape(&bounds.join(", ")))
+            format!(" Bounds: {}.", bounds.join(", "))
         };
-        let _ = write!(
-            body,
-            "<figure>\n{}<figcaption>Every setting. On the Pareto front of {} no other setting within the bounds is as good in all and \
-             better in one.{bounds}</figcaption>\n</figure>\n",
-            chart.draw_responsive(WIDE, NARROW),
-            escape(&merged.objectives.join(", ")),
+        let caption = format!(
+            "Every setting. On the Pareto front of {} no other setting within the bounds is as good in all and better in \
+             one.{bounds}",
+            merged.objectives.iter().map(|it| name(it)).collect::<Vec<_>>().join(" and ")
         );
+        body += &figures.html(&Figure::of_chart("front", caption, &chart, [WIDE, NARROW]));
     }
     body += &front_table(merged);
     if !merged.effects.is_empty() {
-        let (wide, narrow) = (bars(merged, WIDE[0]).0, bars(merged, NARROW[0]).0);
-        let _ = write!(
-            body,
-            "<h2>What the axes do</h2>\n<figure>\n<div class=\"wide\">{wide}</div><div class=\"narrow\">{narrow}</div>\n\
-             <figcaption>Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of \
-             its logarithm where all values are positive. What is left belongs to axes together, and to chance.</figcaption>\n</figure>\n"
-        );
+        let drawings = [WIDE, NARROW].map(|size| bars(merged, size[0]));
+        let caption = "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of \
+                       its logarithm where all values are positive. What is left belongs to axes together, and to chance.";
+        body += "<h2>What the axes do</h2>\n";
+        body += &figures.html(&Figure::of_drawings(
+            "effects",
+            caption.into(),
+            drawings,
+            shares(merged),
+        ));
         body += &levels(merged);
     }
     body += &laws(merged);
@@ -281,7 +286,7 @@ pub fn html(merged: &Merged, stem: &str, command: &str) -> String {
         escape(command),
         escape(&merged.build)
     );
-    document(&title, &body)
+    Page { html: document(&title, &body), figures: figures.files }
 }
 
 fn in_bound(name: &str, bound: taxel_evaluate::sweep::file::Bound) -> String {

@@ -1,6 +1,7 @@
 //! Sketch of a sensor in plan view: wires and electrodes.
 
 use super::axes::{BELOW_PX, Panel, Upright};
+use super::data::{Data, number};
 use super::face;
 use super::figures::Figure;
 use super::svg::{Anchor, Svg, TEXT_PX, polyline, text_width};
@@ -106,12 +107,33 @@ pub fn figure(sensor: &SensorSketch) -> Figure {
         0 => format!("{all} row-wires"),
         _ => format!("{read} of {all} row-wires, which are read"),
     };
+    let drawing = draw(sensor, 480.0);
     Figure {
+        name: "sensor".into(),
         caption: format!(
             "The sensor from above, at rest: {rows}, and {} column-wires below them. Dots are the upper electrodes, \
              which move; squares the lower ones. A reading is the resistance between a row-wire and a column-wire.",
             sensor.column_wires_mm.len()
         ),
-        drawing: format!("<div class=\"sketch\">\n{}</div>\n", draw(sensor, 480.0)),
+        html: format!("<div class=\"sketch\">\n{drawing}</div>\n"),
+        picture: drawing,
+        data: data(sensor),
     }
+}
+
+/// Places of all electrodes.
+fn data(sensor: &SensorSketch) -> Data {
+    let mut data = Data::new(&["wire", "number", "read", "electrode", "x (mm)", "y (mm)"]);
+    let rows = sensor.row_wires.iter().enumerate();
+    let rows = rows.map(|(m, row)| ("row-wire", m + 1, row.read, &row.electrodes_mm));
+    let columns = sensor.column_numbers.iter().zip(&sensor.column_wires_mm);
+    let columns = columns.map(|(k, electrodes)| ("column-wire", *k, true, electrodes));
+    for (wire, number_of_it, is_read, electrodes) in rows.chain(columns) {
+        for (i, [x, y]) in electrodes.iter().enumerate() {
+            let first = [wire.to_owned(), number_of_it.to_string(), is_read.to_string()];
+            let place = [(i + 1).to_string(), number(*x), number(*y)];
+            data.lines.push(first.into_iter().chain(place).collect());
+        }
+    }
+    data
 }

@@ -62,6 +62,15 @@ pub fn standalone(drawing: &str, [width, height]: [f64; 2]) -> String {
     drawing.replacen("<title>", &format!("{css}<title>"), 1)
 }
 
+/// Width and height of a finished drawing.
+pub fn size(drawing: &str) -> [f64; 2] {
+    let numbers = drawing.split_once("viewBox=\"0 0 ").and_then(|(_, rest)| rest.split_once('"'));
+    let numbers = numbers.and_then(|(numbers, _)| numbers.split_once(' '));
+    numbers.map_or([0.0; 2], |(width, height)| {
+        [width, height].map(|number| number.parse().unwrap_or(0.0))
+    })
+}
+
 /// Drawing under construction.
 #[derive(Debug, Clone)]
 pub struct Svg {
@@ -79,6 +88,17 @@ impl Svg {
 
     /// Adds text whose baseline is at y.
     pub fn text(&mut self, x: f64, y: f64, anchor: Anchor, class: &str, text: &str) {
+        self.text_with([x, y], anchor, class, text, "");
+    }
+
+    fn text_with(
+        &mut self,
+        [x, y]: [f64; 2],
+        anchor: Anchor,
+        class: &str,
+        text: &str,
+        attributes: &str,
+    ) {
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
@@ -86,8 +106,25 @@ impl Svg {
         };
         let (x, y, text) = (Px(x), Px(y), escape(text));
         self.add(format_args!(
-            r#"<text x="{x}" y="{y}" text-anchor="{anchor}" class="{class}">{text}</text>"#
+            r#"<text x="{x}" y="{y}" text-anchor="{anchor}" class="{class}"{attributes}>{text}</text>"#
         ));
+    }
+
+    /// Adds text as [`text`](Self::text) does, squeezed where it would reach beyond the drawing.
+    pub fn label(&mut self, x: f64, y: f64, anchor: Anchor, class: &str, text: &str) {
+        /// Share of the estimated width that text has in usual fonts.
+        const USUAL: f64 = 0.92;
+        let room = match anchor {
+            Anchor::Start => self.width - x,
+            Anchor::Middle => 2.0 * x.min(self.width - x),
+            Anchor::End => x,
+        };
+        let squeezed = if USUAL * text_width(text) > room {
+            format!(r#" textLength="{}" lengthAdjust="spacingAndGlyphs""#, Px(room))
+        } else {
+            String::new()
+        };
+        self.text_with([x, y], anchor, class, text, &squeezed);
     }
 
     /// Adds a line.
@@ -238,6 +275,19 @@ mod tests {
              <title>a &lt; b &amp; &quot;c&quot;</title>\n\
              <text x=\"1.2\" y=\"0\" text-anchor=\"end\" class=\"tick\">&lt;script&gt;</text>\n\
              </svg>\n"
+        );
+    }
+
+    #[test]
+    fn labels_stay_within_the_drawing() {
+        let mut svg = Svg::new(100.0, 50.0, "labels");
+        svg.label(20.0, 10.0, Anchor::Start, "tick", "short");
+        svg.label(40.0, 20.0, Anchor::Middle, "tick", "time of a frame (ms)");
+        let svg = svg.finish();
+        assert!(svg.contains("class=\"tick\">short<"), "{svg}");
+        assert!(
+            svg.contains(" textLength=\"80\" lengthAdjust=\"spacingAndGlyphs\">time of"),
+            "{svg}"
         );
     }
 

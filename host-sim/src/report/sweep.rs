@@ -113,8 +113,9 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     } else {
         ""
     };
-    Figure {
-        caption: format!(
+    Figure::of_chart(
+        "error-by-noise",
+        format!(
             "RMSE of {name} in {unit} against noise level (logarithmic). Network: K = {} \
              centres{tail}, {} training frames. Standard: the standard RBF network, one centre for \
              each of its {} training frames. Both are shown at their best spread of the table, \
@@ -124,8 +125,9 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
             super::format::grouped(table.training_frames),
             table.standard_frames
         ),
-        drawing: chart.draw_responsive(WIDE, NARROW),
-    }
+        &chart,
+        [WIDE, NARROW],
+    )
 }
 
 /// Figure of error against spread, one line a noise level.
@@ -151,13 +153,15 @@ pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
         series,
         end_labels: true,
     };
-    Figure {
-        caption: format!(
+    Figure::of_chart(
+        "error-by-spread",
+        format!(
             "RMSE of {name} in {unit} of the network (K = {}) against its spread, one line for \
              each noise level. Dashed: always the training mean, which noise does not change. \
              The scale need not start at zero.",
             table.centres
         ),
-        drawing: chart.draw_responsive(WIDE, NARROW),
-    }
+        &chart,
+        [WIDE, NARROW],
+    )
 }

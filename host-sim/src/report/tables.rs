@@ -197,6 +197,11 @@ pub fn by_depth(ranges: &[DepthErrors]) -> String {
     )
 }
 
+/// Whether the model has a confidence, which tells what is novel.
+pub fn knows_novel(others: &Others) -> bool {
+    others.own_percent_novel.is_some()
+}
+
 /// Table of errors on contacts that the model was not trained on, below those on its own.
 pub fn others(others: &Others, decoders: &[DecoderErrors]) -> String {
     let [own, own_mean] = [NETWORK, mean::NAME].map(|name| metrics::of_decoder(decoders, name));
@@ -207,15 +212,16 @@ pub fn others(others: &Others, decoders: &[DecoderErrors]) -> String {
             let r_squared = errors.r_squared.map_or(UNDEFINED.into(), |it| fixed(it, 2));
             [fixed(errors.rmse, decimals), r_squared, fixed(mean.rmse, decimals)]
         });
-        let novel = novel.map_or(UNDEFINED.into(), |percent| fixed(percent, 1));
-        line(&escape(label), cells.chain([novel]))
+        let novel = knows_novel(others)
+            .then(|| novel.map_or(UNDEFINED.into(), |percent| fixed(percent, 1)));
+        line(&escape(label), cells.chain(novel))
     };
     let own = of("As trained", own, own_mean, others.own_percent_novel);
     let contacts = others.contacts.iter();
     let lines = contacts.map(|it| of(&it.name, &it.errors, &it.mean, it.percent_novel));
     format!(
         "<table>\n<thead><tr><th>Contact</th>{}</tr></thead>\n<tbody>\n{own}{}</tbody>\n</table>\n",
-        numbers("th", heads.chain(["Novel, %".into()])),
+        numbers("th", heads.chain(knows_novel(others).then(|| "Novel, %".into()))),
         lines.collect::<String>()
     )
 }

@@ -23,7 +23,7 @@ fn made() -> Made {
 }
 
 fn html(result: &RunResult) -> String {
-    super::html(result, &made())
+    super::html(result, &made()).html
 }
 
 const ROW_WIRES: usize = 3;
@@ -204,8 +204,8 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
     let page = html(&result);
     assert_eq!(page, html(&result));
     assert!(is_drawable(&page));
-    // Density, histogram, by electrode; readings, three frames, arrows; sensor; two of Table 1.
-    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (11, 2));
+    // Density, histogram, by electrode; readings, frames, arrows; sensor; two of Table 1.
+    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (9, 2));
     for text in [
         "seed 7",
         "K = 9",
@@ -215,9 +215,9 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
         "<small>paper 6.75\u{a0}%</small>",
         "It is a &lt;good&gt; model of Δz.",
         "<li>Few frames for Δz.</li>",
-        "200 <span>µs</span>",
-        "14\u{202f}345 <span>B</span>",
-        "fits a slot of 131\u{202f}072 B",
+        "200\u{a0}<span>µs</span>",
+        "14\u{202f}345\u{a0}<span>B</span>",
+        "fits a slot of 131\u{202f}072\u{a0}B",
         "host-sim run &#39;by &lt;hand&gt;.toml&#39; --seed 7",
         "<a href=\"model.bin\">model.bin</a>",
         env!("CARGO_PKG_VERSION"),
@@ -237,6 +237,62 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
 }
 
 #[test]
+fn every_figure_is_a_picture_and_a_table_of_its_values() {
+    let result = result(&["dx_mm", "dy_mm", "dz_mm"]);
+    let page = super::html(&result, &made());
+    let links =
+        page.html.split("href=\"figures/").skip(1).map(|rest| rest.split('"').next().unwrap());
+    let links: Vec<String> = links.map(|name| format!("figures/{name}")).collect();
+    let files: Vec<String> = page.figures.iter().map(|(path, _)| path.clone()).collect();
+    assert_eq!((links, files.len()), (files.clone(), 2 * figures(&page.html)));
+    let text = |name: &str| {
+        let path = format!("figures/{name}");
+        page.figures.iter().find(|(known, _)| *known == path).unwrap().1.clone()
+    };
+    for (path, text) in &page.figures {
+        if text.starts_with("<svg") {
+            assert!(is_drawable(text) && text.matches("<svg").count() == 1, "{path}");
+            assert!(
+                path.contains(".svg")
+                    && text.starts_with("<svg xmlns")
+                    && text.ends_with("</svg>\n"),
+                "{path}"
+            );
+        } else {
+            let columns = |line: &str| line.matches(',').count() - line.matches(", ").count();
+            let all = columns(text.lines().next().unwrap());
+            assert!(all > 1 && text.lines().all(|line| columns(line) == all), "{path}: {text}");
+        }
+    }
+    let csv = text("errors-by-electrode.csv");
+    let mut lines = csv.lines();
+    assert_eq!(lines.next(), Some("panel,row-wire,electrode,x (mm),y (mm),value,unit"));
+    assert_eq!(lines.count(), 3 * ELECTRODES);
+    let rmse = &result.distribution.outputs[2].rmse;
+    assert!(csv.contains(&format!("RMSE of Δz,2,1,5,5.5,{rmse},mm\n")), "{csv}");
+    let csv = text("frames.csv");
+    assert_eq!(csv.lines().count(), 1 + 12 * 3 * ELECTRODES);
+    let csv = text("error-by-noise.csv");
+    assert!(
+        csv.starts_with("series,noise level p,RMSE of Δz (mm)\n")
+            && csv.contains("network,0.01,0.2\n"),
+        "{csv}"
+    );
+}
+
+#[test]
+fn frames_of_all_ranks_are_stepped_through_from_the_median() {
+    let page = html(&result(&["dz_mm"]));
+    // Of 20 frames, the worst is at 99 %, too.
+    assert_eq!(page.matches("<input type=\"radio\" name=\"frames\"").count(), 12);
+    assert_eq!(page.matches(" checked>").count(), 1);
+    assert!(page.contains(" checked><label for=\"frames-5\">50\u{a0}%</label>"), "{page}");
+    assert!(page.contains("<label for=\"frames-11\">100\u{a0}%</label>\n<div class=\"step\">"));
+    assert!(page.contains("The frame with a larger error than 95\u{a0}% of all: number "));
+    assert!(page.contains("ends at ± the largest value"));
+}
+
+#[test]
 fn one_panel_for_every_group_of_outputs() {
     for (groups, arrows) in
         [(&["dz_mm"][..], 0), (&["dx_mm", "dy_mm", "dz_mm"], 3), (&["fx_n", "fz_n"], 0)]
@@ -248,7 +304,7 @@ fn one_panel_for_every_group_of_outputs() {
             let sweeps = if title == "<title>RMSE of " { 4 } else { 0 };
             assert_eq!(titled(title), groups.len() + sweeps, "{title}");
         }
-        assert_eq!(titled("<title>Map of"), 9, "one group, three frames");
+        assert_eq!(titled("<title>Map of"), 36, "one group, frames of twelve ranks");
         assert_eq!(titled("<title>Readings of"), 6, "as read and without noise");
         assert_eq!(titled("<title>Arrows of"), arrows);
     }
@@ -294,15 +350,14 @@ fn errors_on_other_contacts_stand_below_those_of_the_scene() {
 fn a_missing_value_is_drawn_nowhere() {
     let mut result = result(&["dz_mm"]);
     let whole = html(&result);
-    let frame = &mut result.distribution.frames[0];
-    frame.estimate[1] = f64::NAN;
-    frame.change[2] = f64::NAN;
+    result.distribution.steps[5].estimate[1] = f64::NAN;
+    result.distribution.frames[0].change[2] = f64::NAN;
     result.distribution.outputs[0].rmse = f64::NAN;
     let page = html(&result);
     assert!(is_drawable(&page));
     let count = |page: &str| page.matches("cell-of-map").count();
     let styles = 1;
-    assert_eq!(count(&whole) - styles, 3 * 3 * ELECTRODES + ELECTRODES + 6 * 6);
+    assert_eq!(count(&whole) - styles, 12 * 3 * ELECTRODES + ELECTRODES + 6 * 6);
     assert_eq!(count(&whole) - count(&page), 2 + 1 + 1, "decoded, difference, reading, RMSE");
     assert_eq!(page.matches(": missing ").count(), 4);
 }
@@ -314,7 +369,7 @@ fn a_scene_without_a_sweep_has_a_page_without_it() {
     result.scene.as_mut().unwrap().sensor = None;
     let page = html(&result);
     assert!(is_drawable(&page));
-    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (7, 1));
+    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (5, 1));
     assert!(page.contains("drawn in a grid") && !page.contains("Noise and spread"));
 }
 

@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::format::{fixed, grouped, percent, significant, symbol};
+use super::figures::{Figure, Figures, Page};
+use super::format::{fixed, grouped, percent, significant, symbol, unbroken};
 use super::html::document;
-use super::svg::{escape, standalone};
+use super::svg::escape;
 use taxel_evaluate::evaluate::trade::{Memory, Trade};
 
 mod scales;
@@ -13,14 +14,8 @@ mod words;
 mod plot;
 mod table;
 
-/// Picture of a trade, as a file of its own.
-pub fn svg(trade: &Trade) -> String {
-    let size = [960.0, 560.0];
-    standalone(&plot::draw(trade, size).0, size)
-}
-
 /// Page of a trade, with the `command` that computed it.
-pub fn html(trade: &Trade, command: &str) -> String {
+pub fn html(trade: &Trade, command: &str) -> Page {
     let title = format!("Taxel: speed against accuracy, {}", trade.subject);
     let tested = match &trade.test_choice {
         Some(choice) => format!("{} measured test frames ({choice})", grouped(trade.test_frames)),
@@ -42,29 +37,34 @@ pub fn html(trade: &Trade, command: &str) -> String {
         Memory::Ram => "memory that never waits",
     };
     let mut body = format!(
-        "<header>\n<h1>{}</h1>\n<p>{}; {} ways to decode on a Cortex-M4F at {} MHz, {memory}.</p>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n<p>{}; {} ways to decode on a Cortex-M4F at {}\u{a0}MHz, {memory}.</p>\n</header>\n",
         escape(&title),
-        escape(&tested),
+        escape(&unbroken(&tested)),
         trade.points.len(),
         trade.device.clock_mhz,
     );
     body += &answer(trade);
     let (wide, outside) = plot::draw(trade, [920.0, 540.0]);
-    let (narrow, _) = plot::draw(trade, [480.0, 520.0]);
+    let (narrow, _) = plot::draw(trade, [480.0, 600.0]);
     let outside = match outside {
         0 => String::new(),
         1 => " One dominated point lies outside.".into(),
         outside => format!(" {outside} dominated points lie outside."),
     };
-    let _ = write!(
-        body,
-        "<figure id=\"figure-1\">\n<div class=\"wide\">{wide}</div><div class=\"narrow\">{narrow}</div>\n\
-         <figcaption><b>Figure 1.</b> RMSE of {} against the time of a frame, both logarithmic. The line joins the Pareto \
-         front: no other point is as good in both and better in one. Hover over its points for all their settings. Pale: \
-         dominated points.{outside}{}</figcaption>\n</figure>\n",
+    let networks = if trade.points.iter().any(|point| point.whole_array) {
+        " Rows: a network for each row-wire; array: one for all of them."
+    } else {
+        ""
+    };
+    let caption = format!(
+        "RMSE of {} against the time of a frame, both logarithmic. The line joins the Pareto front: no other point is as good \
+         in both and better in one. Hover over its points for all their settings.{networks}{outside}{}",
         symbol(&trade.group),
-        hidden_bounds(trade),
+        hidden_bounds(trade)
     );
+    let mut figures = Figures::in_files("");
+    let figure = Figure::of_drawings("error-by-time", caption, [wide, narrow], plot::data(trade));
+    body += &figures.html(&figure);
     let _ = write!(
         body,
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> The Pareto front, from fast to slow. \
@@ -74,12 +74,12 @@ pub fn html(trade: &Trade, command: &str) -> String {
          <p class=\"note\">Made by <code>{}</code></p>\n",
         grouped(trade.points.len()),
         table::of_front(trade),
-        escape(&references(trade)),
+        escape(&named(trade, &references(trade))),
         escape(&trade.compiler),
-        scan(trade),
+        unbroken(&scan(trade)),
         escape(command),
     );
-    document(&title, &body)
+    Page { html: document(&title, &body), figures: figures.files }
 }
 
 /// What was chosen, what it is worth and what it costs.
@@ -90,20 +90,24 @@ fn answer(trade: &Trade) -> String {
         } else {
             "Nothing is chosen: no bound was given.".into()
         };
-        return format!("<section class=\"summary\">\n<p>{}</p>\n</section>\n", escape(&why));
+        return format!(
+            "<section class=\"summary\">\n<p>{}</p>\n</section>\n",
+            escape(&unbroken(&why))
+        );
     };
     let point = &trade.points[chosen];
     let verdict = trade.verdict_on(chosen);
     let times = &point.times;
     let mut html = format!(
         "<section class=\"summary\">\n<p><b>Chosen for {}: {}.</b> {}</p>\n<dl>\n",
-        escape(&words::bounds(&trade.bounds)),
-        escape(&point.name()),
-        escape(&verdict.sentence)
+        escape(&unbroken(&words::bounds(&trade.bounds))),
+        escape(&unbroken(&point.name())),
+        escape(&named(trade, &verdict.sentence))
     );
     let mut fact = |name: &str, value: String, unit: &str| {
         let (name, unit) = (escape(name), escape(unit));
-        let _ = writeln!(html, "<div><dt>{name}</dt><dd>{value} <span>{unit}</span></dd></div>");
+        let _ =
+            writeln!(html, "<div><dt>{name}</dt><dd>{value}\u{a0}<span>{unit}</span></dd></div>");
     };
     let rmse = significant(point.rmse(&trade.group), 3);
     fact(&format!("RMSE of {}", symbol(&trade.group)), rmse, &trade.unit);
@@ -119,9 +123,15 @@ fn answer(trade: &Trade) -> String {
     html += "</dl>\n";
     let warnings = verdict.warnings.iter().map(ToString::to_string);
     for note in std::iter::once(trade.line_note()).chain(warnings) {
-        let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(&note));
+        let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(&named(trade, &note)));
     }
     html + "</section>\n"
+}
+
+/// Sentence in which the outputs have their symbol, and no number is parted from its unit.
+fn named(trade: &Trade, sentence: &str) -> String {
+    let name = |text: String, (group, _): (&str, _)| text.replace(group, &symbol(group));
+    unbroken(&trade.groups().fold(sentence.to_owned(), name))
 }
 
 /// Errors to compare with, and what they are of if readings differ.
@@ -146,7 +156,7 @@ fn hidden_bounds(trade: &Trade) -> String {
         ..Default::default()
     };
     if bounds.any() {
-        format!(" Not drawn: the bounds of {}.", escape(&words::bounds(&bounds)))
+        format!(" Not drawn: the bounds of {}.", words::bounds(&bounds))
     } else {
         String::new()
     }

@@ -1,6 +1,7 @@
 //! What the page of a model shows, whichever result it is from.
 
 use taxel_data::columns;
+use taxel_data::dataset::UnusedInputs;
 use taxel_evaluate::by_depth::DepthErrors;
 use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::distribution::Distribution;
@@ -147,6 +148,16 @@ fn left_out(data: &DataSummary) -> Vec<(&'static str, String)> {
     let lines = lines.iter().filter(|(count, _)| *count > 0);
     let lines: Vec<String> =
         lines.map(|(count, why)| format!("{} {why}", grouped(*count))).collect();
+    let facts = [
+        ("Lines left out", lines.join("; ")),
+        ("Inputs left out", in_words(unused)),
+        ("Constant inputs", columns::some_names(&data.constant_inputs)),
+    ];
+    facts.into_iter().filter(|(_, of)| !of.is_empty()).collect()
+}
+
+/// Inputs that can tell nothing, and why; empty if there are none.
+pub fn in_words(unused: &UnusedInputs) -> String {
     let twins: Vec<String> =
         unused.duplicated.iter().map(|(name, of)| format!("{name} = {of}")).collect();
     let inputs = [
@@ -157,10 +168,5 @@ fn left_out(data: &DataSummary) -> Vec<(&'static str, String)> {
     let inputs = inputs.iter().filter(|(names, _)| !names.is_empty());
     let inputs: Vec<String> =
         inputs.map(|(names, why)| format!("{} ({why})", columns::some_names(names))).collect();
-    let facts = [("Lines left out", lines), ("Inputs left out", inputs)];
-    facts
-        .into_iter()
-        .filter(|(_, of)| !of.is_empty())
-        .map(|(what, of)| (what, of.join("; ")))
-        .collect()
+    inputs.join("; ")
 }

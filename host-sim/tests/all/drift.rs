@@ -97,7 +97,7 @@ fn a_run_with_relative_inputs_says_so_and_shows_changes_from_rest() {
     let best = column.decoders.iter().filter(|entry| entry.spread.is_some());
     let best = best.map(|entry| z(&entry.errors)).fold(f64::INFINITY, f64::min);
     assert!(best < 0.5 * z(column.errors("mean", None)), "{best}");
-    let page = host_sim::report::html(&result, &host_sim::report::Made::default());
+    let page = host_sim::report::html(&result, &host_sim::report::Made::default()).html;
     assert!(page.contains("18 relative readings") && page.contains("gain drift ±2"), "report");
 }
 

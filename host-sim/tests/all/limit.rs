@@ -39,8 +39,11 @@ fn the_command_prints_the_same_bytes_on_any_number_of_threads_and_writes_its_fil
     assert!(z(0) < z(1), "less noise, less error");
     let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
     assert!(page.contains("observable, above the dashed line") && !page.contains("NaN"));
-    for picture in ["out/directions.svg", "out/known.svg"] {
-        let picture = std::fs::read_to_string(folder.path(picture)).unwrap();
+    assert!(page.find("<svg") < page.find("<table"), "the picture stands before the table");
+    assert!(page.contains("<p class=\"note\">Made by <code>host-sim limit "));
+    for figure in ["limit-by-noise", "directions-at-1-percent", "known-at-10-percent"] {
+        let picture = folder.path(&format!("out/figures/{figure}.svg"));
+        let picture = std::fs::read_to_string(picture).unwrap();
         assert!(picture.starts_with("<svg xmlns=") && picture.ends_with("</svg>\n"));
         assert_eq!(picture.matches("<svg").count(), 1);
     }
@@ -136,6 +139,6 @@ fn the_page_tells_of_other_geometries() {
     let plan = Plan { noise_levels: &[0.05], frames: 3, geometry: true, models: &[] };
     let result = compute(&experiment, &plan, &Silent).unwrap();
     assert!(result.geometry.len() > 10);
-    let page = report::limit_html(&result);
+    let page = report::limit_html(&result, "limit paper").html;
     assert!(page.contains("36 column-wires") && page.contains("sensor model holds up to 20 %"));
 }

@@ -63,6 +63,26 @@ fn a_mat_of_numbered_columns_is_named_after_its_wires_and_told_its_image() {
         page.contains("row-wire 16, column-wire 16") && page.contains("column-wire 3: missing"),
         "{page}"
     );
+    assert!(
+        page.contains("× marks a reading that is missing or left out.")
+            && !page.contains("href=\"figures")
+    );
+    // What the data lack stands on the page.
+    let log = log([16, 16], 200);
+    let (head, lines) = log.split_once('\n').unwrap();
+    let lines = lines.lines().enumerate().map(|(i, line)| {
+        let rest = line.splitn(3, ',').nth(2).unwrap();
+        format!("9,{},{rest}\n", if (100..103).contains(&i) { "" } else { "400" })
+    });
+    folder.write("frozen.csv", format!("{head}\n{}", lines.collect::<String>()));
+    let eval = ["eval", "m.bin", "frozen.csv", "--last-share", "0.9", "--html", "frozen.html"];
+    folder.succeed(&eval);
+    let page = std::fs::read_to_string(folder.path("frozen.html")).unwrap();
+    let lines = "<dd>3 lack a reading; 20 are not chosen by the options</dd>";
+    assert!(
+        page.contains(lines) && page.contains("<dd>adc_0, adc_1 (never change)</dd>"),
+        "{page}"
+    );
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Where outputs go, and what is left when the work is interrupted or the disk is full.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
@@ -257,12 +258,11 @@ fn a_folder_has_the_files_of_one_run_also_when_the_disk_is_full() {
         names
     };
     folder.succeed(&["run", "with.toml"]);
-    assert_eq!(names(), ["metrics.json", "model.bin", "report.html", "table1.csv"]);
+    assert_eq!(names(), ["figures", "metrics.json", "model.bin", "report.html", "table1.csv"]);
     let contents = || {
-        names()
-            .iter()
-            .map(|name| fs::read(folder.path("out/small").join(name)).unwrap())
-            .collect::<Vec<_>>()
+        let of = |path| fs::read_dir(folder.path(path)).unwrap().map(|entry| entry.unwrap().path());
+        let paths = of("out/small").chain(of("out/small/figures"));
+        paths.map(|path| (fs::read(&path).ok(), path)).collect::<BTreeSet<_>>()
     };
     let old = contents();
     // The model and the figures fit, the report does not.
@@ -273,6 +273,8 @@ fn a_folder_has_the_files_of_one_run_also_when_the_disk_is_full() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("cannot write out/small/report.html: File too large"), "{message}");
     assert!(contents() == old);
+    assert!(folder.path("out/small/figures/error-by-noise.csv").exists());
     folder.succeed(&["run", "without.toml"]);
-    assert_eq!(names(), ["metrics.json", "model.bin", "report.html"]);
+    assert_eq!(names(), ["figures", "metrics.json", "model.bin", "report.html"]);
+    assert!(!folder.path("out/small/figures/error-by-noise.csv").exists(), "of the run before");
 }

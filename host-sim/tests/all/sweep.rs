@@ -62,11 +62,14 @@ fn any_shards_give_what_one_process_gives() {
         "{table}"
     );
     assert_eq!(table.lines().count(), 5);
-    for name in ["merged.json", "merged.html", "merged-front.svg", "merged-effects.svg"] {
+    for name in
+        ["merged.json", "merged.html", "figures/merged-front.svg", "figures/merged-effects.svg"]
+    {
         assert!(read(&folder, name).len() > 400, "{name}");
     }
     let page = read(&folder, "merged.html");
     assert!(page.contains("Pareto front") && page.contains("href=\"merged.csv\""));
+    assert!(page.contains("href=\"figures/merged-front.svg\">SVG</a>"));
     // The scene of a setting on the front is a scene.
     let merged: Value = serde_json::from_str(&read(&folder, "merged.json")).unwrap();
     let front =

@@ -239,9 +239,29 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     let json: serde_json::Value = serde_json::from_str(&read("out/few/trade.json")).unwrap();
     assert_eq!(json["points"][0]["gate_k"], serde_json::Value::Null);
     assert_eq!(json["points"][1]["gate_k"], 3.0);
-    assert!(read("out/few/trade.svg").contains("c1 hollow mark"));
+    assert!(read("out/few/figures/error-by-time.svg").contains("c1 hollow mark"));
     let html = read("out/few/trade.html");
     assert!(html.contains("gate k</th>") && !html.contains("<script"));
+    assert!(html.contains(">time of a frame, scan to estimate (ms)</text>"), "{html}");
+    // The legend has every kind of mark, and no column has dashes alone.
+    let (legend, plot) = html.split_once("frames a second</text>").unwrap();
+    let plot = plot.split_once("</svg>").unwrap().0;
+    let marks = |part: &str| -> BTreeSet<String> {
+        let paths = part.split("<path ").skip(1);
+        let classes = paths.filter_map(|path| path.split("class=\"").nth(1)?.split('"').next());
+        classes.filter(|class| class.ends_with(" mark")).map(str::to_owned).collect()
+    };
+    let mut in_plot = marks(plot);
+    assert!(in_plot.len() > 3 && plot.contains("<g class=\"dominated\">"), "{in_plot:?}");
+    in_plot.insert("muted dominated mark".into());
+    assert_eq!(marks(legend), in_plot);
+    let cells = html.split("data-name=\"").skip(1);
+    let columns: BTreeSet<&str> =
+        cells.clone().map(|cell| cell.split('"').next().unwrap()).collect();
+    for column in columns {
+        let told = |cell: &str| cell.starts_with(&format!("{column}\">")) && !cell.contains(">–<");
+        assert!(cells.clone().any(told), "{column}");
+    }
     // Each point of the front tells its settings, in the wide picture and in the narrow one.
     let front = json["points"].as_array().unwrap().iter().filter(|p| p["on_front"] == true).count();
     assert_eq!(
@@ -250,7 +270,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     );
     assert!(html.matches("<tr class=\"chosen-row\">").count() == 1 && html.contains(">chosen: K"));
     assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
-    assert!(html.contains("at most 2\u{202f}500 cycles at zero wait"), "the bound");
+    assert!(html.contains("at most 2\u{202f}500\u{a0}cycles at zero wait"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());
     // Measurements are kept where no point is chosen, and another run's choice is not left beside them.
@@ -260,7 +280,7 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(stderr.contains("train and measure …\n"), "a log shows what runs: {stderr}");
     let page = String::from_utf8(output.stdout).unwrap();
     assert!(page.contains("\n* fixed16 ") && !page.contains("Chosen:"), "{page}");
-    assert!(!read("out/few/trade.svg").contains("c1 hollow mark"), "{page}");
+    assert!(!read("out/few/figures/error-by-time.svg").contains("c1 hollow mark"), "{page}");
     assert!(!folder.path("out/few/chosen.bin").exists());
     // Without noise there is no gate, and the note gives the reason.
     let output = folder.run(&[&few[..], &["--noise", "0"]].concat());

@@ -235,13 +235,13 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
             assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         }
         let small = folder.path(&out).join("small");
-        let mut written: Vec<_> = std::fs::read_dir(&small).unwrap().map(|e| e.unwrap()).collect();
-        written.sort_by_key(std::fs::DirEntry::file_name);
+        let in_folder = |path| std::fs::read_dir(path).unwrap().map(|e| e.unwrap().path());
+        let mut written: Vec<_> =
+            in_folder(small.clone()).chain(in_folder(small.join("figures"))).collect();
+        written.retain(|path| path.is_file());
+        written.sort();
         let files = [csv, scene_blob, csv_blob].into_iter().map(|f| folder.path(&f));
-        files
-            .chain(written.iter().map(std::fs::DirEntry::path))
-            .map(|f| std::fs::read(f).unwrap())
-            .collect()
+        files.chain(written).map(|f| std::fs::read(f).unwrap()).collect()
     };
     let two = all(2);
     let one = all(1);
@@ -270,6 +270,14 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     assert_eq!(table.lines().count(), 1 + (2 + 20) * 3 * 7);
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("<code>host-sim run scene.toml --seed ") && page.contains("table1.csv"));
+    let links: Vec<&str> =
+        page.split("href=\"").skip(1).map(|it| it.split('"').next().unwrap()).collect();
+    assert!(links.contains(&"figures/errors-by-electrode.svg"), "{links:?}");
+    for link in links.iter().filter(|link| !link.starts_with('#')) {
+        assert!(out.join(link).is_file(), "{link}");
+    }
+    let figures = std::fs::read_dir(out.join("figures")).unwrap().count();
+    assert_eq!(figures, links.iter().filter(|link| link.starts_with("figures/")).count());
     let before = folder.names();
     folder.succeed(&["run", "scene.toml"]); // again, over what is there
     assert_eq!(folder.names(), before);

@@ -1,8 +1,7 @@
 //! What instructions cost on a Cortex-M4 with floating point whose memory never waits, from their text as QEMU lists it.
 //!
 //! The source is the Cortex-M4 Technical Reference Manual (ARM DDI 0439D): tables 3-1, 3-2 and 7-1, section 3.3.2.
-//! Where the manual gives a range, the larger number is taken. `docs/cycles.md` has this as a table, with its
-//! sources. It was not checked on hardware. An unknown instruction is rejected, never guessed.
+//! Where the manual gives a range, the larger number is taken. It was not checked on hardware. An unknown instruction is rejected, never guessed.
 
 use std::ops::Range;
 

@@ -19,16 +19,19 @@ const ARRAY_HEAD: &str = "\
 |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
 ";
 
-const SAVED_HEAD: &str = "\
-| kernel | K | inference, compiled | assembly | of it |
-|---|--:|--:|--:|--:|
-";
-
-/// Suffix to a kernel's name that names its compiled twin.
-const TWIN: &str = "-portable";
+/// Kernels and numbers of centres that the tables show; the file of figures has all.
+const SHOWN: ([&str; 2], [u64; 3]) = (["f32", "fixed16"], [16, 64, 256]);
 
 /// All figures of one kernel and K.
 type Group<'f> = &'f [Figure];
+
+/// Groups that the tables show.
+fn shown(figures: &[Figure]) -> impl Iterator<Item = Group<'_>> {
+    let (kernels, centres) = SHOWN;
+    groups(figures).filter(move |group| {
+        kernels.contains(&group[0].kernel.as_str()) && centres.contains(&group[0].centres)
+    })
+}
 
 /// The groups in `figures`, which must be sorted by kernel and K.
 fn groups(figures: &[Figure]) -> impl Iterator<Item = Group<'_>> {
@@ -72,10 +75,10 @@ fn line(group: Group<'_>, cells: &[Cell<'_>]) -> String {
     format!("| {} | {} |{}\n", group[0].kernel, group[0].centres, cells.collect::<String>())
 }
 
-/// Markdown tables of all figures, and of what assembly saves. Numbers without a unit are cycles.
+/// Markdown tables of what a network costs that is one of rows, or that of the whole array. Numbers without a unit are cycles.
 pub fn markdown(figures: &[Figure]) -> String {
     let has = |group: Group<'_>, scope| count(group, false, scope).is_some();
-    let rows = groups(figures).filter(|group| has(group, "inference")).map(|group| {
+    let rows = shown(figures).filter(|group| has(group, "inference")).map(|group| {
         line(
             group,
             &[
@@ -93,7 +96,7 @@ pub fn markdown(figures: &[Figure]) -> String {
             ],
         )
     });
-    let arrays = groups(figures).filter(|group| has(group, "array-frame")).map(|group| {
+    let arrays = shown(figures).filter(|group| has(group, "array-frame")).map(|group| {
         line(
             group,
             &[
@@ -108,29 +111,10 @@ pub fn markdown(figures: &[Figure]) -> String {
             ],
         )
     });
-    let saved = groups(figures).filter_map(|group| {
-        let (kernel, centres) = (&group[0].kernel, group[0].centres);
-        let is_twin = |other: &Group<'_>| {
-            (other[0].kernel.strip_suffix(TWIN), other[0].centres) == (Some(kernel), centres)
-        };
-        let compiled = count(groups(figures).find(is_twin)?, false, "inference")?.cycles;
-        let assembly = count(group, false, "inference")?.cycles;
-        let percent = 100.0 * assembly as f64 / compiled as f64;
-        Some(format!("| {kernel} | {centres} | {compiled} | {assembly} | {percent:.0} % |\n"))
-    });
-    let exponentials = groups(figures).filter_map(|group| {
-        let all = count(group, false, "exponential")?.cycles;
-        let (kernel, centres) = (&group[0].kernel, group[0].centres);
-        let each = all as f64 / centres as f64;
-        Some(format!("- {kernel}, K = {centres}: {each:.1} cycles\n"))
-    });
     format!(
-        "{HEAD}{}\nOne network for the whole array ([projection.md](projection.md)):\n\n{ARRAY_HEAD}{}\n\
-         What assembly saves:\n\n{SAVED_HEAD}{}\nOne exponential:\n\n{}",
+        "{HEAD}{}\nOne network for the whole array ([projection.md](projection.md)):\n\n{ARRAY_HEAD}{}",
         rows.collect::<String>(),
         arrays.collect::<String>(),
-        saved.collect::<String>(),
-        exponentials.collect::<String>(),
     )
 }
 

@@ -174,8 +174,8 @@ impl Counter {
         }
         let it = instruction.ok_or_else(|| {
             format!(
-                "the instruction at {address:#010x} is not known, or stops the core; teach it to \
-                 xtask/src/cycles/instruction.rs, and docs/cycles.md what it costs"
+                "the instruction at {address:#010x} is not known, or stops the core; teach \
+                 xtask/src/cycles/instruction.rs what it costs"
             )
         })?;
         let branched = next != address.wrapping_add(it.bytes);

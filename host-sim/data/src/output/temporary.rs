@@ -1,5 +1,6 @@
 //! Temporary files and folders, which go if the work fails or is interrupted.
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Write};
@@ -90,7 +91,7 @@ impl Write for Temporary {
 pub fn put_in_place(written: Vec<Temporary>, earlier: &[PathBuf]) -> Result<()> {
     // An interruption waits until all is done.
     let mut pending = pending();
-    let folders: Vec<PathBuf> = written.iter().map(|it| folder_of(&it.target.real)).collect();
+    let folders: BTreeSet<PathBuf> = written.iter().map(|it| folder_of(&it.target.real)).collect();
     for Temporary { file, target } in written {
         let error = |cause| Error::write(&target.named, cause);
         step(Step::Rename(file.path(), &target.real)).map_err(error)?;

@@ -8,7 +8,8 @@ use tempfile::TempDir;
 
 use super::*;
 
-const SET: FileSet = FileSet { files: &["model", "metrics", "table"] };
+const SET: FileSet = FileSet { files: &["model", "metrics", "table"], inner: INNER };
+const INNER: Inner = Inner { folder: "inner", names: &["a", "level-*"], endings: &["svg", "csv"] };
 
 /// Names and contents of everything in a folder.
 fn contents(folder: &TempDir) -> Vec<(String, String)> {
@@ -190,6 +191,37 @@ fn links_are_followed_permissions_are_kept_and_read_only_files_are_refused() {
     symlink("/dev/null", path("metrics")).unwrap();
     let refused = SET.check(folder.path(), &[]).unwrap_err().to_string();
     assert!(refused.contains("it is no file"), "{refused}");
+}
+
+#[test]
+fn files_of_an_inner_folder_belong_to_the_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| -> PathBuf { folder.path().join(name) };
+    let files =
+        |text: &'static [u8]| [("model", text), ("inner/a.svg", text), ("inner/a.csv", text)];
+    // Nothing is left of a folder whose files could not be written.
+    let (_, outcome) = steps_of(5, || SET.write(folder.path(), &files(b"old")));
+    outcome.unwrap_err();
+    assert!(contents(&folder).is_empty());
+    SET.write(folder.path(), &files(b"old")).unwrap();
+    for other in ["inner/b.svg", "inner/a.pdf", "inner/level-3.csv"] {
+        fs::write(path(other), "other").unwrap();
+    }
+    let (steps, outcome) = steps_of(8, || SET.write(folder.path(), &files(b"new")));
+    outcome.unwrap_err();
+    assert!(steps.iter().all(|step| !step.starts_with("rename")), "{steps:?}");
+    SET.write(folder.path(), &files(b"new")[..2]).unwrap();
+    assert_eq!(fs::read(path("inner/a.svg")).unwrap(), b"new");
+    assert!(
+        !path("inner/a.csv").exists() && !path("inner/level-3.csv").exists(),
+        "of the run before"
+    );
+    assert!(path("inner/b.svg").exists() && path("inner/a.pdf").exists(), "of others");
+    SET.check(folder.path(), &[]).unwrap();
+    assert_eq!(fs::read_dir(path("inner")).unwrap().count(), 3);
+    fs::remove_dir_all(path("inner")).unwrap();
+    fs::write(path("inner"), "a file").unwrap();
+    assert!(SET.check(folder.path(), &[]).unwrap_err().to_string().contains("cannot write"));
 }
 
 fn texts(text: &str) -> Vec<(String, String)> {

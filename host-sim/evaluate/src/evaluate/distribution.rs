@@ -25,6 +25,9 @@ pub struct Distribution {
     pub readings: ShownReadings,
     /// Frames of median, high and largest error; fewer if two of them are the same frame.
     pub frames: Vec<ShownFrame>,
+    /// Frames of these and of other ranks, from the least to the largest error, without their readings: for pictures.
+    #[serde(skip)]
+    pub steps: Vec<ShownFrame>,
 }
 
 /// Distribution of the errors e = estimate − truth of one group of outputs.
@@ -76,9 +79,10 @@ impl Distribution {
         assert_eq!(truth.values.len(), estimate.values.len(), "an estimate for every truth");
         assert_eq!(truth.len(), readings.len(), "readings for every truth");
         let groups = columns::groups(&truth.names);
-        let shown = frames::shown(truth, estimate, &groups);
-        let (readings, changes) = readings::changes(readings, reference, &shown);
-        let mut frames = shown;
+        let ranked = frames::ranked(truth, estimate, &groups);
+        let named = ranked.iter().filter(|frame| frame.rank.is_named());
+        let mut frames = frames::distinct(named.cloned());
+        let (readings, changes) = readings::changes(readings, reference, &frames);
         for (frame, change) in frames.iter_mut().zip(changes) {
             frame.change = change;
         }
@@ -87,6 +91,7 @@ impl Distribution {
             outputs: outputs(truth, estimate),
             readings,
             frames,
+            steps: frames::distinct(ranked),
         }
     }
 
@@ -194,6 +199,9 @@ mod tests {
         assert_eq!(found.outputs[1].electrode, Some([1, 2]));
         let frames: Vec<_> = found.frames.iter().map(|f| (f.rank, f.frame)).collect();
         assert_eq!(frames, [(Rank::Median, 49), (Rank::High, 94), (Rank::Worst, 99)]);
+        let steps: Vec<_> = found.steps.iter().map(|f| (f.rank.percent(), f.frame)).collect();
+        assert_eq!((steps.len(), steps[0], steps[1]), (13, (0, 0), (10, 9)));
+        assert_eq!((steps[5], steps[10], steps[12]), ((50, 49), (95, 94), (100, 99)));
         close(found.frames[0].change[0], -100.0 * 4.9 / 50.0);
         close(found.frames[2].rmse[0], 0.99 / 2.0_f64.sqrt());
     }
@@ -218,6 +226,8 @@ mod tests {
         let frames: Vec<_> = found.frames.iter().map(|f| f.frame).collect();
         assert_eq!(frames, [1, 2], "the worst is also the one at 95 %");
         assert_eq!(found.frames[1].rank, Rank::Worst);
+        let steps: Vec<_> = found.steps.iter().map(|f| (f.rank.percent(), f.frame)).collect();
+        assert_eq!(steps, [(30, 0), (60, 1), (100, 2)], "each frame once");
         assert_eq!(found.readings.relative_to, RelativeTo::MedianInDeviations);
         assert!((found.frames[1].change[0] - 1.5_f64.sqrt()).abs() < 1e-12);
     }

@@ -1,4 +1,4 @@
-//! `cargo test -p taxel-learn recalibration -- --include-ignored --nocapture` prints the figures of docs/recalibration.md.
+//! `cargo test -p taxel-learn recalibration -- --include-ignored --nocapture` prints the figures of docs/drift.md.
 
 use taxel_core::blob::{Floats, Metadata, ModelParts, encode_to_vec};
 use taxel_core::rbf::{Format, Shape};
@@ -18,7 +18,7 @@ struct Size {
     frames: [usize; 2],
 }
 
-/// As docs/recalibration.md says, and enough to see a fault.
+/// As docs/drift.md says, and enough to see a fault.
 const ALL: Size = Size { rows: 8, frames: [10_000, 3000] };
 const SOME: Size = Size { rows: 4, frames: [4000, 1000] };
 

@@ -11,21 +11,22 @@ use taxel_data::output::FileSet;
 use super::super::print;
 
 /// All files that the command may write.
-pub const FILES: FileSet =
-    FileSet { files: &["trade.csv", "trade.json", "trade.svg", "trade.html", "chosen.bin"] };
+pub const FILES: FileSet = FileSet {
+    files: &["trade.csv", "trade.json", "trade.html", "chosen.bin"],
+    inner: report::figures_named(&["error-by-time"]),
+};
 
 /// Writes them to `folder`; `command` is what the user typed.
 pub fn write(folder: &Path, trade: &Trade, command: &str) -> Result<()> {
     let csv = csv_of(trade);
     let json = print::json_text(trade)?;
-    let picture = report::trade_svg(trade);
     let page = report::trade_html(trade, command);
     let mut files = vec![
         ("trade.csv", csv.as_bytes()),
         ("trade.json", json.as_bytes()),
-        ("trade.svg", picture.as_bytes()),
-        ("trade.html", page.as_bytes()),
+        ("trade.html", page.html.as_bytes()),
     ];
+    files.extend(page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes())));
     files.extend(trade.chosen.map(|point| ("chosen.bin", trade.blob(point))));
     Ok(FILES.write(folder, &files)?)
 }

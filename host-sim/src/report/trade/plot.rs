@@ -9,6 +9,7 @@ use super::scales::{Axes, AxisOfTimes, levels};
 use super::words;
 use crate::report::axes::{BELOW_PX, Panel, Upright, draw_level_ticks, label_width};
 use crate::report::chart::{LINE_PX, Mark, Series, legend};
+use crate::report::data::{Data, number};
 use crate::report::format::symbol;
 use crate::report::svg::{Anchor, Px, Shape, Svg, TEXT_PX, escape, text_width};
 use crate::report::ticks::spread_out;
@@ -35,10 +36,11 @@ fn class(point: &Point) -> &'static str {
 
 /// Picture in this size, and the number of points that lie outside it.
 pub fn draw(trade: &Trade, [width, height]: [f64; 2]) -> (String, usize) {
-    let Axes { times, x, y } = Axes::new(trade);
+    let axes = Axes::new(trade);
     let title = format!("RMSE of {} against the time of a frame", symbol(&trade.group));
     let mut svg = Svg::new(width, height, &title);
-    let legend_end = legend(&mut svg, &marks(trade), width, text_width(&y.label));
+    let legend_end = legend(&mut svg, &marks(trade, &axes), width, text_width(&axes.y.label));
+    let Axes { times, x, y } = axes;
     let (left, right) = (label_width(&y.ticks) + 10.0, width - 10.0);
     let (top, bottom) = (legend_end + 2.0 * LINE_PX + 10.0, height - BELOW_PX);
     let place = Place { times, panel: Panel { x, y, left, right, top, bottom } };
@@ -51,28 +53,52 @@ pub fn draw(trade: &Trade, [width, height]: [f64; 2]) -> (String, usize) {
     (svg.finish(), outside)
 }
 
-/// Series for the legend: what marks mean, as far as they occur on the front.
-fn marks(trade: &Trade) -> Vec<Series> {
-    let shown = |of: &dyn Fn(&Point) -> bool| {
-        let chosen = trade.chosen.map(|chosen| &trade.points[chosen]);
-        trade.points.iter().filter(|p| p.on_front).chain(chosen).any(of)
+/// Series for the legend: every mark that the picture of these `axes` has.
+fn marks(trade: &Trade, axes: &Axes) -> Vec<Series> {
+    let mut shown: Vec<&Point> = trade.points.iter().filter(|it| axes.hold(trade, it)).collect();
+    let style = |point: &Point| {
+        let format = Format::ALL.iter().rev().position(|it| *it == point.arithmetic.format);
+        (point.whole_array, point.gate_k.is_some(), format)
     };
-    let (of_rows, of_array) = (shown(&|p| !p.whole_array), shown(&|p| p.whole_array));
-    let colour = if of_array { "c4" } else { "c1" };
-    let has = |format| shown(&|p| p.arithmetic.format == format);
-    let hollow = if of_rows { "c1 hollow" } else { "c4 hollow" };
-    let entries = [
-        (of_rows, "a network a row", "c1", Shape::Circle),
-        (of_array, "one for the array", "c4", Shape::Circle),
-        (has(Format::F32), "f32", colour, shape(Format::F32)),
-        (has(Format::F32Direct), "f32-direct", colour, shape(Format::F32Direct)),
-        (shown(&|p| p.gate_k.is_some()), "gate", hollow, Shape::Circle),
-        (trade.chosen.is_some(), "chosen", "chosen", Shape::Ring),
-    ];
-    let entries = entries.into_iter().filter(|(shown, ..)| *shown);
-    entries
-        .map(|(_, name, class, shape)| Series::new(name, class, Mark::Points(shape), vec![]))
-        .collect()
+    let chosen = trade.chosen.map(|i| &trade.points[i]);
+    let is_pale = |point: &Point| {
+        !point.on_front && !chosen.is_some_and(|chosen| std::ptr::eq(point, chosen))
+    };
+    let pale =
+        shown.iter().find(|point| is_pale(point)).map(|point| shape(point.arithmetic.format));
+    let both = shown.iter().any(|p| p.whole_array) && shown.iter().any(|p| !p.whole_array);
+    let is_chosen_shown = chosen.is_some_and(|chosen| axes.hold(trade, chosen));
+    shown.sort_by_key(|point| style(point));
+    shown.dedup_by_key(|point| style(point));
+    let of_point = |point: &&Point| {
+        let network = match (both, point.whole_array) {
+            (false, _) => "",
+            (true, false) => " rows",
+            (true, true) => " array",
+        };
+        let gate = if point.gate_k.is_some() { ", gate" } else { "" };
+        let format = point.arithmetic.format;
+        let class = class(point).trim_end_matches(" mark");
+        let name = format!("{}{network}{gate}", format.name());
+        Series::new(&name, class, Mark::Points(shape(format)), vec![])
+    };
+    let line = Series::new("Pareto front", "front", Mark::Line, vec![]);
+    let ring = Series::new("chosen", "chosen", Mark::Points(Shape::Ring), vec![]);
+    let pale = pale.map(|of| Series::new("dominated", "muted dominated", Mark::Points(of), vec![]));
+    let points = shown.iter().map(of_point).chain(pale);
+    [line].into_iter().chain(points).chain(is_chosen_shown.then_some(ring)).collect()
+}
+
+/// All points, as a table.
+pub fn data(trade: &Trade) -> Data {
+    let Axes { x, y, .. } = Axes::new(trade);
+    let mut data = Data::new(&["point", "on the front", "chosen", &x.label, &y.label]);
+    for (i, point) in trade.points.iter().enumerate() {
+        let told = [point.on_front, trade.chosen == Some(i)].map(|it| it.to_string());
+        let at = [point.times.frame_ms, point.rmse(&trade.group)].map(number);
+        data.lines.push([point.name()].into_iter().chain(told).chain(at).collect());
+    }
+    data
 }
 
 /// Place of the picture in px.
@@ -83,7 +109,7 @@ struct Place {
 
 impl Place {
     fn of(&self, trade: &Trade, point: &Point) -> Option<[f64; 2]> {
-        let (x, y) = (self.times.of_point(&point.times), point.rmse(&trade.group));
+        let (x, y) = (point.times.frame_ms, point.rmse(&trade.group));
         let inside = self.panel.x.holds(x) && self.panel.y.holds(y);
         inside.then(|| self.panel.at([x, y]))
     }
@@ -91,7 +117,7 @@ impl Place {
     fn draw_axes(&self, svg: &mut Svg) {
         let panel @ Panel { left, right, top, .. } = &self.panel;
         panel.draw_axes(svg, Upright::Grid);
-        svg.text(0.0, TEXT_PX, Anchor::Start, "label", &panel.y.label);
+        svg.label(0.0, TEXT_PX, Anchor::Start, "label", &panel.y.label);
         svg.text(*right, top - LINE_PX - 6.0, Anchor::End, "tick", self.times.rate_label());
         svg.line([*left, *top], [*right, *top], "axis");
         let rates = self.times.rates(&panel.x);
@@ -103,9 +129,9 @@ impl Place {
     fn draw_dominated(&self, svg: &mut Svg, trade: &Trade) -> usize {
         let mut outside = 0;
         svg.open(" class=\"dominated\"");
-        for point in &trade.points {
+        for (i, point) in trade.points.iter().enumerate() {
             match self.of(trade, point) {
-                Some(at) if !point.on_front => {
+                Some(at) if !point.on_front && trade.chosen != Some(i) => {
                     svg.path(&shape(point.arithmetic.format).path(at, 0.7), class(point));
                 }
                 Some(_) => {}

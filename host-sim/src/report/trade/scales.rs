@@ -1,7 +1,7 @@
 //! Axes of the picture: time of a frame against error, both logarithmic.
 
 use crate::report::axes::Axis;
-use crate::report::format::{grouped, significant, symbol};
+use crate::report::format::{grouped, significant, symbol, with_unit};
 use crate::report::ticks::{self, Ticks, extent};
 use taxel_evaluate::evaluate::trade::{Point, Times, Trade};
 
@@ -30,12 +30,10 @@ fn ticks_between(
     ticks.at.into_iter().filter(|(value, _)| (low..=high).contains(value)).collect()
 }
 
-/// What the level axis shows: decoding in µs if all scans take the same time, else the time from the start of a scan to its
-/// estimate in ms.
+/// What the level axis tells besides the time of a frame.
 pub struct AxisOfTimes {
-    /// Time of all scans, if it is the same for all points.
-    scan_ms: Option<f64>,
-    is_decoding: bool,
+    /// Whether the time of the scans is known, and that of a frame is more than that of its decoding.
+    has_scans: bool,
     /// Whether the next scan starts only when the estimate is finished: then the axis tells the rate as well.
     in_turn: bool,
 }
@@ -50,18 +48,17 @@ pub struct Axes {
 impl Axes {
     /// Axes that show the front, the chosen point, and what is not far from them.
     pub fn new(trade: &Trade) -> Self {
-        let scan_ms = trade.points.first().and_then(|point| point.times.scan_ms);
-        let is_decoding = trade.points.iter().all(|point| point.times.scan_ms == scan_ms);
+        let has_scans = trade.points.iter().all(|point| point.times.scan_ms.is_some());
         let in_turn = |times: &Times| (times.period_ms() / times.frame_ms - 1.0).abs() < 1e-9;
         let in_turn = trade.points.iter().all(|point| in_turn(&point.times));
-        let times = AxisOfTimes { scan_ms, is_decoding, in_turn };
+        let times = AxisOfTimes { has_scans, in_turn };
         let shown = || {
             let chosen = |i: usize| trade.chosen == Some(i);
             let points = trade.points.iter().enumerate();
             points.filter(move |(i, p)| p.on_front || chosen(*i)).map(|(_, point)| point)
         };
-        let [least_x, most_x] = range(shown().map(|point| times.of_point(&point.times)));
-        let all_x = trade.points.iter().map(|point| times.of_point(&point.times));
+        let [least_x, most_x] = range(shown().map(|point| point.times.frame_ms));
+        let all_x = trade.points.iter().map(|point| point.times.frame_ms);
         let most_x = all_x.filter(|x| *x <= BEYOND * most_x).fold(most_x, f64::max);
         let error_of = |point: &Point| point.rmse(&trade.group);
         let [least, most] = range(shown().map(error_of));
@@ -74,42 +71,33 @@ impl Axes {
         let label =
             |x: f64| if x < 1000.0 { significant(x, 2) } else { grouped(x.round() as usize) };
         let x = Axis::logarithmic(times.label(), around(least_x, most_x, label));
-        let unit = if trade.unit.is_empty() { String::new() } else { format!(", {}", trade.unit) };
         let y = around(least, most, |error| significant(error, 2));
-        let y = Axis::logarithmic(format!("RMSE of {}{unit}", symbol(&trade.group)), y);
+        let y = Axis::logarithmic(
+            with_unit(&format!("RMSE of {}", symbol(&trade.group)), &trade.unit),
+            y,
+        );
         Self { times, x, y }
+    }
+
+    /// Whether a point lies in the picture.
+    pub fn hold(&self, trade: &Trade, point: &Point) -> bool {
+        self.x.holds(point.times.frame_ms) && self.y.holds(point.rmse(&trade.group))
     }
 }
 
 impl AxisOfTimes {
-    /// Level coordinate of a point.
-    pub fn of_point(&self, times: &Times) -> f64 {
-        if self.is_decoding { 1000.0 * times.decode_ms } else { times.frame_ms }
-    }
-
-    /// Level coordinate of a time in ms from the start of a scan to its estimate.
-    fn of_frame(&self, frame_ms: f64) -> f64 {
-        if self.is_decoding {
-            1000.0 * (frame_ms - self.scan_ms.unwrap_or(0.0)).max(0.0)
+    fn label(&self) -> &'static str {
+        if self.has_scans {
+            "time of a frame, scan to estimate (ms)"
         } else {
-            frame_ms
-        }
-    }
-
-    fn label(&self) -> String {
-        match (self.is_decoding, self.scan_ms) {
-            (false, _) => "time from the start of a scan to its estimate, ms".into(),
-            (true, Some(ms)) => {
-                format!("time of decoding a frame, µs; each scan takes {ms} ms before")
-            }
-            (true, None) => "time of decoding a frame, µs; the scan’s is unknown".into(),
+            "time of decoding a frame (ms); the scan’s is unknown"
         }
     }
 
     pub fn rate_label(&self) -> &'static str {
         if !self.in_turn {
             "scans go on while the frame before is decoded"
-        } else if self.scan_ms.is_some() || !self.is_decoding {
+        } else if self.has_scans {
             "frames a second"
         } else {
             "frames a second, by decoding alone"
@@ -121,20 +109,18 @@ impl AxisOfTimes {
         if !self.in_turn {
             return Vec::new();
         }
-        let scan_ms = if self.is_decoding { self.scan_ms.unwrap_or(0.0) } else { 0.0 };
-        let unit = if self.is_decoding { 1000.0 } else { 1.0 };
-        let rate = |x: f64| 1000.0 / (scan_ms + x / unit);
-        let (most, least) = (rate(x.ticks.low), rate(x.ticks.high));
-        let ticks = ticks_between(least, most, 24, |rate| grouped(rate.round() as usize));
-        ticks.into_iter().map(|(rate, label)| (self.of_frame(1000.0 / rate), label)).collect()
+        let ticks = ticks_between(1000.0 / x.ticks.high, 1000.0 / x.ticks.low, 24, |rate| {
+            grouped(rate.round() as usize)
+        });
+        ticks.into_iter().map(|(rate, label)| (1000.0 / rate, label)).collect()
     }
 
     /// Bounds on time: what they are, and their level coordinate.
     pub fn uprights(&self, trade: &Trade) -> Vec<(String, f64)> {
         let rate = trade.bounds.frame_rate_hz.filter(|_| self.in_turn);
-        let rate = rate.map(|hz| (format!("at least {hz} frames/s"), self.of_frame(1000.0 / hz)));
+        let rate = rate.map(|hz| (format!("at least {hz} frames/s"), 1000.0 / hz));
         let latency = trade.bounds.latency_ms;
-        let latency = latency.map(|ms| (format!("at most {ms} ms"), self.of_frame(ms)));
+        let latency = latency.map(|ms| (format!("at most {ms} ms"), ms));
         rate.into_iter().chain(latency).collect()
     }
 }

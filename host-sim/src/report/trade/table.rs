@@ -1,5 +1,6 @@
 //! Table of the front.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::words::rate;
@@ -11,14 +12,20 @@ use taxel_evaluate::evaluate::trade::{Point, Trade};
 pub fn of_front(trade: &Trade) -> String {
     let mut shown = trade.front();
     shown.extend(trade.chosen.filter(|chosen| !shown.contains(chosen)));
-    let columns = columns(trade);
-    let mut html = String::from("<table class=\"front-table\">\n<thead><tr>");
+    let mut columns = columns(trade);
+    columns.retain(|column| {
+        shown.iter().any(|point| (column.text)(trade, &trade.points[*point]) != UNDEFINED)
+    });
+    let mut html = String::from(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table 1\">\n\
+         <table class=\"front-table\">\n<thead><tr>",
+    );
     for column in &columns {
         let class = if column.is_text { "" } else { " class=\"number\"" };
         let _ = write!(html, "<th{class}>{}</th>", escape(&column.name));
     }
     html += "</tr></thead>\n<tbody>\n";
-    for i in shown {
+    for &i in &shown {
         let point = &trade.points[i];
         html += if trade.chosen == Some(i) { "<tr class=\"chosen-row\">" } else { "<tr>" };
         for (place, column) in columns.iter().enumerate() {
@@ -29,7 +36,17 @@ pub fn of_front(trade: &Trade) -> String {
         }
         html += "</tr>\n";
     }
-    html + "</tbody>\n</table>\n"
+    html += "</tbody>\n</table>\n</div>\n";
+    let worst: BTreeSet<&str> = shown
+        .iter()
+        .filter_map(|point| trade.points[*point].worst_other())
+        .map(|worst| worst.name.as_ref())
+        .collect();
+    if !worst.is_empty() {
+        let names = escape(&worst.into_iter().collect::<Vec<_>>().join(", "));
+        let _ = writeln!(html, "<p class=\"note\">Worst of other contacts: {names}.</p>");
+    }
+    html
 }
 
 /// Column of the table.
@@ -39,9 +56,8 @@ struct Column {
     text: fn(&Trade, &Point) -> String,
 }
 
-/// Columns that tell points apart.
+/// All columns that there may be.
 fn columns(trade: &Trade) -> Vec<Column> {
-    let any = |of: fn(&Point) -> bool| trade.points.iter().any(of);
     let number = |name: &str, text: fn(&Trade, &Point) -> String| Column {
         name: name.into(),
         is_text: false,
@@ -53,48 +69,36 @@ fn columns(trade: &Trade) -> Vec<Column> {
         "decode, ms"
     };
     let rmse = format!("RMSE of {}", with_unit(&symbol(&trade.group), &trade.unit));
-    let columns = [
-        Some(Column { name: "format".into(), is_text: true, text: |_, p| p.way() }),
-        Some(number("K", |_, p| p.centres.to_string())),
-        any(|p| p.output_rank.is_some()).then(|| {
-            number("rank", |_, p| p.output_rank.map_or(UNDEFINED.into(), |rank| rank.to_string()))
+    vec![
+        Column { name: "format".into(), is_text: true, text: |_, p| p.way() },
+        number("K", |_, p| p.centres.to_string()),
+        number("rank", |_, p| known(p.output_rank, |rank| rank.to_string())),
+        number("tail", |_, p| if p.affine_tail { "yes" } else { "no" }.into()),
+        number("columns", |_, p| known(p.columns, |columns| columns.to_string())),
+        number("samples", |trade, p| {
+            let averaged = trade.points.iter().any(|p| p.samples_averaged > 1);
+            known(averaged.then_some(p.samples_averaged), |samples| samples.to_string())
         }),
-        Some(number("tail", |_, p| if p.affine_tail { "yes" } else { "no" }.into())),
-        any(|p| p.columns.is_some()).then(|| {
-            number("columns", |_, p| p.columns.map_or(UNDEFINED.into(), |it| it.to_string()))
+        number("gate k", |_, p| known(p.gate_k, |k| k.to_string())),
+        number("filter, ms", |_, p| known(p.filter, |filter| fixed(filter.time_constant_ms, 1))),
+        number(&rmse, |trade, p| significant(p.rmse(&trade.group), 3)),
+        number("worst of other contacts", |_, p| {
+            known(p.worst_other(), |worst| significant(worst.rmse, 3))
         }),
-        any(|p| p.samples_averaged > 1)
-            .then(|| number("samples", |_, p| p.samples_averaged.to_string())),
-        any(|p| p.gate_k.is_some())
-            .then(|| number("gate k", |_, p| p.gate_k.map_or(UNDEFINED.into(), |k| k.to_string()))),
-        any(|p| p.filter.is_some()).then(|| {
-            number("filter, ms", |_, p| {
-                p.filter.map_or(UNDEFINED.into(), |filter| fixed(filter.time_constant_ms, 1))
-            })
+        number("× limit", |trade, p| {
+            known(p.ratio_to_limit(&trade.group), |ratio| fixed(ratio, 2))
         }),
-        Some(number(&rmse, |trade, p| significant(p.rmse(&trade.group), 3))),
-        any(|p| !p.others.is_empty()).then(|| {
-            number("worst of other contacts", |_, p| {
-                let worst = p.worst_other();
-                worst.map_or(UNDEFINED.into(), |it| {
-                    format!("{} ({})", significant(it.rmse, 3), it.name)
-                })
-            })
-        }),
-        any(|p| p.errors.iter().any(|e| e.ratio_to_limit.is_some())).then(|| {
-            number("× limit", |trade, p| {
-                p.ratio_to_limit(&trade.group).map_or(UNDEFINED.into(), |ratio| fixed(ratio, 2))
-            })
-        }),
-        Some(number(time, |_, p| fixed(p.times.frame_ms, 3))),
-        any(|p| p.times.age_ms.is_some()).then(|| {
-            number("age, ms", |_, p| p.times.age_ms.map_or(UNDEFINED.into(), |ms| fixed(ms, 3)))
-        }),
-        Some(number("frames/s", |_, p| rate(p.times.frames_per_s))),
-        Some(number("cycles", |_, p| grouped(p.frame.cycles as usize))),
-        Some(number("from flash", |_, p| grouped(p.frame.flash_cycles as usize))),
-        Some(number("blob, B", |_, p| grouped(p.blob_bytes))),
-        Some(number("RAM, B", |_, p| grouped(p.ram_bytes))),
-    ];
-    columns.into_iter().flatten().collect()
+        number(time, |_, p| fixed(p.times.frame_ms, 3)),
+        number("age, ms", |_, p| known(p.times.age_ms, |ms| fixed(ms, 3))),
+        number("frames/s", |_, p| rate(p.times.frames_per_s)),
+        number("cycles", |_, p| grouped(p.frame.cycles as usize)),
+        number("from flash", |_, p| grouped(p.frame.flash_cycles as usize)),
+        number("blob, B", |_, p| grouped(p.blob_bytes)),
+        number("RAM, B", |_, p| grouped(p.ram_bytes)),
+    ]
+}
+
+/// Text of a value, or that there is none.
+fn known<T>(value: Option<T>, text: impl Fn(T) -> String) -> String {
+    value.map_or(UNDEFINED.into(), text)
 }

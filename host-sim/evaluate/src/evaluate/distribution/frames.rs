@@ -1,4 +1,6 @@
-//! Frames to look at: of median, high and largest error.
+//! Frames to look at, by the rank of their errors.
+
+use std::collections::BTreeSet;
 
 use serde::Serialize;
 use taxel_data::{Table, columns};
@@ -15,10 +17,41 @@ pub enum Rank {
     High,
     /// No frame has a larger error.
     Worst,
+    /// So many per cent of the frames have no larger error; of 0, it has the least error.
+    Percent(u8),
 }
 
 impl Rank {
-    const ALL: [(Self, f64); 3] = [(Self::Median, 0.5), (Self::High, 0.95), (Self::Worst, 1.0)];
+    const ALL: [Self; 13] = [
+        Self::Percent(0),
+        Self::Percent(10),
+        Self::Percent(20),
+        Self::Percent(30),
+        Self::Percent(40),
+        Self::Median,
+        Self::Percent(60),
+        Self::Percent(70),
+        Self::Percent(80),
+        Self::Percent(90),
+        Self::High,
+        Self::Percent(99),
+        Self::Worst,
+    ];
+
+    /// Share of the frames that have no larger error, in per cent.
+    pub fn percent(self) -> u8 {
+        match self {
+            Self::Median => 50,
+            Self::High => 95,
+            Self::Worst => 100,
+            Self::Percent(percent) => percent,
+        }
+    }
+
+    /// Whether the frame stands for many, and is shown with its readings.
+    pub(super) fn is_named(self) -> bool {
+        !matches!(self, Self::Percent(_))
+    }
 }
 
 /// Frame to look at.
@@ -37,12 +70,13 @@ pub struct ShownFrame {
     pub truth: Vec<f64>,
     /// Decoded outputs, in the order of the columns.
     pub estimate: Vec<f64>,
-    /// Readings relative to their reference: see [`RelativeTo`](super::RelativeTo).
+    /// Readings relative to their reference: see [`RelativeTo`](super::RelativeTo). None in a
+    /// [step](super::Distribution::steps).
     pub change: Vec<f64>,
 }
 
-/// Frames of median, high and largest error, without their readings.
-pub(super) fn shown(
+/// Frames of all ranks in ascending order, without their readings. Of few frames one may have several ranks.
+pub(super) fn ranked(
     truth: &Table,
     estimate: &Table,
     groups: &[(&str, Vec<usize>)],
@@ -55,21 +89,28 @@ pub(super) fn shown(
     let mut order: Vec<(f64, usize)> =
         errors.enumerate().filter(|(_, e)| !e.is_nan()).map(|(frame, e)| (e, frame)).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut frames: Vec<ShownFrame> = Vec::new();
-    for (rank, share) in Rank::ALL {
-        let Some(place) = nearest_rank(order.len(), share) else { continue };
-        let frame = order[place].1;
+    let of_rank = |rank: Rank| {
+        let share = f64::from(rank.percent()) / 100.0;
+        let frame = order[nearest_rank(order.len(), share)?].1;
         let line = |table: &Table| table.lines().nth(frame).unwrap_or_default().to_vec();
         let (truth, estimate) = (line(truth), line(estimate));
         let of_group = |(_, columns): &(&str, Vec<usize>)| {
             root_mean_square(columns.iter().map(|column| estimate[*column] - truth[*column]))
         };
         let rmse = groups.iter().map(of_group).collect();
-        // Of few frames one may have two ranks: the higher one counts.
-        frames.retain(|known| known.frame != frame);
-        frames.push(ShownFrame { rank, frame, rmse, truth, estimate, change: vec![] });
-    }
-    frames
+        Some(ShownFrame { rank, frame, rmse, truth, estimate, change: vec![] })
+    };
+    Rank::ALL.into_iter().filter_map(of_rank).collect()
+}
+
+/// Each of `frames` once: the higher one of its ranks counts.
+pub(super) fn distinct(frames: impl IntoIterator<Item = ShownFrame>) -> Vec<ShownFrame> {
+    let mut all: Vec<ShownFrame> = frames.into_iter().collect();
+    all.reverse();
+    let mut known = BTreeSet::new();
+    all.retain(|frame| known.insert(frame.frame));
+    all.reverse();
+    all
 }
 
 /// Root mean square of all values that are not missing; NaN without one.
