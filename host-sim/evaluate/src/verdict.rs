@@ -191,8 +191,15 @@ impl<'e> Others<'e> {
             if shares.is_empty() {
                 return None;
             }
-            let (most, least) = (below(low), below(high));
+            let [most, least] = [low, high].map(|share| (100.0 * (1.0 - share)).round() as i32);
             Some(match (least, most) {
+                (least, most) if least < 0 && most > 0 => {
+                    format!("{} % above to {most} % below {name}", -least)
+                }
+                (least, most) if least < 0 => match (-most, -least) {
+                    (least, most) if least == most => format!("{most} % above {name}"),
+                    (least, most) => format!("{least} to {most} % above {name}"),
+                },
                 (0, 0) => format!("no better than {name}"),
                 (least, most) if least == most => format!("{most} % below {name}"),
                 (least, most) => format!("{least} to {most} % below {name}"),

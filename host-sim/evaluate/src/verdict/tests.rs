@@ -166,6 +166,27 @@ fn a_model_that_is_as_good_as_linear_is_warned_of() {
 }
 
 #[test]
+fn a_model_that_is_worse_than_linear_is_told_by_how_much() {
+    let gains = |errors: [f64; 2]| {
+        let all = decoders(&[
+            ("network", &[("f_n", errors[0]), ("g_n", errors[1])]),
+            ("mean", &[("f_n", 1.0), ("g_n", 1.0)]),
+            ("linear", &[("f_n", 0.5), ("g_n", 0.5)]),
+        ]);
+        let verdict = Verdict::new(&all, &no_limit());
+        assert_eq!(names(&verdict), ["no-gain-over-linear"]);
+        verdict.sentence
+    };
+    for (errors, said) in [
+        ([0.63, 0.30], "26 % above to 40 % below the best linear decoder"),
+        ([0.63, 0.60], "20 to 26 % above the best linear decoder"),
+        ([0.60, 0.60], "20 % above the best linear decoder"),
+    ] {
+        assert!(gains(errors).contains(said), "{}", gains(errors));
+    }
+}
+
+#[test]
 fn outputs_that_do_not_change_or_have_no_frames_are_named() {
     let all = decoders(&[
         ("network", &[("f_n", 0.0), ("g_n", f64::NAN), ("h_n", 0.1)]),

@@ -64,12 +64,13 @@ impl Warning {
         })
     }
 
-    /// Groups of outputs that a linear decoder decodes as well.
+    /// Groups of outputs that a linear decoder decodes as well, or better.
     pub fn no_gain_over_linear(groups: &[&str]) -> Option<Self> {
         Self::when(!groups.is_empty(), "no-gain-over-linear", || {
             let groups = groups.join(", ");
             format!(
-                "{groups}: at most 2 % better than a linear decoder, so a network gains next to nothing there"
+                "{groups}: at most 2 % better than a linear decoder, or worse, so a network gains nothing there; a larger \
+                 --penalty may help"
             )
         })
     }
