@@ -44,7 +44,9 @@ pub fn run(options: &Options) -> Outcome {
             .push(format!("README and docs show {pictures} pictures, less than {LEAST_PICTURES}"));
     }
     for run in made.chosen(&options.names)? {
-        faults.extend(made::again(run, options.accept).unwrap_or_else(|cause| vec![cause]));
+        let wrong = made::again(run, options.accept).unwrap_or_else(|cause| vec![cause]);
+        wrong.iter().for_each(|fault| println!("  {fault}"));
+        faults.extend(wrong);
     }
     if faults.is_empty() { Ok(()) } else { Err(faults.join("\n")) }
 }
