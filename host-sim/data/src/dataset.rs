@@ -205,7 +205,7 @@ impl UnusedInputs {
         Ok(Self::among(file, columns))
     }
 
-    /// Those of these columns of `file` that can tell nothing. There are none if no other would be left.
+    /// Columns of `file`, among these, that can tell nothing. There are none if no other would be left.
     pub fn among(file: &DataFile, columns: impl IntoIterator<Item = usize>) -> Self {
         let mut unused = Self::default();
         // Readings as bits, so that equal columns are found by looking each one up.

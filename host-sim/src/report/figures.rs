@@ -41,7 +41,7 @@ pub struct Figure {
     pub caption: String,
     /// Drawings of the figure, as HTML.
     pub html: String,
-    /// The same as one drawing.
+    /// All drawings as one.
     pub picture: String,
     pub data: Data,
 }
