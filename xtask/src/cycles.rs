@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 use crate::emulate::qemu;
 use crate::images::{BENCH, build_image};
-use crate::process::{Outcome, root, target_dir};
+use crate::process::{Outcome, read, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
 use figures::{Accepted, Figure};
 use image::Image;
@@ -145,10 +145,6 @@ fn in_document(document: &str, accepted: &Accepted) -> Outcome<String> {
     let start = document.find(HEADING).ok_or(format!("{DOCUMENT} lacks {}", HEADING.trim()))?;
     let head = &document[..start + HEADING.len()];
     Ok(format!("{head}\n### {}\n\n{}", accepted.compiler, table::markdown(&accepted.figures)))
-}
-
-fn read(file: &str) -> Outcome<String> {
-    fs::read_to_string(root().join(file)).map_err(|cause| format!("{file}: {cause}"))
 }
 
 #[cfg(test)]

@@ -6,9 +6,8 @@ mod made;
 pub mod site;
 
 use std::collections::BTreeSet;
-use std::fs;
 
-use crate::process::{Outcome, root};
+use crate::process::Outcome;
 use made::Made;
 use pages::Page;
 
@@ -63,11 +62,6 @@ fn counts(pages: &[Page]) -> (usize, usize) {
 fn words(text: &str) -> usize {
     let parts = text.split(|letter: char| letter.is_whitespace() || letter == '|');
     parts.filter(|part| part.contains(char::is_alphanumeric)).count()
-}
-
-/// Text of a file of the project.
-fn read(path: &str) -> Outcome<String> {
-    fs::read_to_string(root().join(path)).map_err(|cause| format!("{path}: {cause}"))
 }
 
 #[cfg(test)]

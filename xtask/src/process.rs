@@ -1,6 +1,7 @@
 //! Running other programs.
 
 use std::env;
+use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
@@ -21,6 +22,12 @@ pub const PROOF_TESTED: [&str; 6] =
 /// Folder for cargo's builds for the host.
 pub fn target_dir() -> PathBuf {
     root().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
+}
+
+/// Text of a file, by its path from the root or an absolute one.
+pub fn read(path: impl AsRef<Path>) -> Outcome<String> {
+    let path = path.as_ref();
+    fs::read_to_string(root().join(path)).map_err(|cause| format!("{}: {cause}", path.display()))
 }
 
 /// Command with the cargo that runs this program.

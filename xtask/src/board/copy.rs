@@ -4,15 +4,14 @@
 //! Both are built in one folder, so that the libraries of others are built once. So the copy's packages have another
 //! version: cargo would take packages of one name and version for the same, wherever they lie.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 use super::ONCHIP;
 use super::mutants::Mutant;
 use crate::copy::{update, write_if_new};
 use crate::images::SEAL;
-use crate::process::{Outcome, run, target_dir, watch};
+use crate::process::{Outcome, read, run, target_dir, watch};
 use crate::toolchain::{Toolchain, elf};
 
 /// The version of the project's packages, and that of the copy's.
@@ -99,19 +98,14 @@ pub fn image() -> PathBuf {
     elf(IMAGE)
 }
 
-fn read(file: &Path) -> Outcome<String> {
-    fs::read_to_string(file).map_err(|cause| format!("{}: {cause}", file.display()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::process::root;
 
     #[test]
     fn what_differs_stands_in_its_manifest_and_names_of_images_once() {
         for (file, text, _) in MANIFESTS {
-            let count = read(&root().join(file)).unwrap().matches(text).count();
+            let count = read(file).unwrap().matches(text).count();
             assert!(if text == VERSION { count >= 1 } else { count == 1 }, "{file}: {count}");
         }
     }

@@ -12,8 +12,7 @@ use serde_json::Value;
 
 use super::numbers::{find, like, value};
 use super::pages::Page;
-use super::read;
-use crate::process::{Outcome, capture, cargo, root, run as run_command, target_dir};
+use crate::process::{Outcome, capture, cargo, read, root, run as run_command, target_dir};
 
 const LIST: &str = "docs/made.toml";
 /// Longest time of a command that runs unasked, in minutes on two cores.

@@ -5,8 +5,7 @@ use std::path::{Component, Path, PathBuf};
 
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 
-use super::read;
-use crate::process::{Outcome, capture, root};
+use crate::process::{Outcome, capture, read, root};
 
 /// Page of the project, in Markdown.
 pub struct Page {
