@@ -1,4 +1,4 @@
-"""Draws the circuit of docs/board.md: python3 wiring.py wiring.svg"""
+"""Draws a circuit of docs/board.md: python3 wiring.py wiring.svg, or wiring-onchip.svg --onchip"""
 
 import sys
 
@@ -42,8 +42,8 @@ def op_amp(x, y):
     text(x + 5, y + 17, "+")
 
 
-def main(path):
-    # The board and what drives the rows.
+def converters_around():
+    """A shift register drives the rows, three converters read the columns."""
     box(0, 30, 130, 470, "NUCLEO-", "F446RE", "pin (CN10)")
     box(270, 30, 120, 110, "74HC595", "control of rows")
     for at, (pin, to) in enumerate([("PC6 (4)", "SER"), ("PC8 (2)", "SRCLK"), ("PC9 (1)", "RCLK")]):
@@ -51,10 +51,44 @@ def main(path):
         line("row", (130, y), (270, y))
         text(136, y - 5, pin, kind="small")
         text(264, y - 5, to, "end", "small")
-    box(480, 30, 130, 110, "8 switches", "4 × TS3A24159", "COM to row-wire")
     line("row", (390, 60), (480, 60))
     text(435, 54, "Q_A … Q_H", "middle", "small")
     text(435, 76, "to IN", "middle", "small")
+    box(440, 285, 170, 130, "3 × MCP3208", "columns 1–8,", "9–16, 17–18", "V_REF: 3.3 V")
+    pins = ["PB13 (30): CLK", "PB14 (28): D_OUT", "PB15 (26): D_IN", "PB12 (16): CS 1", "PB1 (24): CS 2", "PC4 (34): CS 3"]
+    for at, pin in enumerate(pins):
+        y = 300 + 20 * at
+        line("wire", (130, y), (440, y))
+        text(136, y - 4, pin, kind="small")
+
+
+def own_converters():
+    """Pins drive the rows, the board's own converters read the columns by three double-throw switches."""
+    box(0, 30, 130, 470, "NUCLEO-", "F446RE")
+    line("row", (130, 60), (480, 60))
+    text(136, 54, "PB5–PB10, PB12, PB13: to IN 1 … 8", kind="small")
+    dot(370, 60)
+    line("row", (370, 60), (370, 76))
+    resistor(370, 98, "10 kΩ each", upright=True)
+    line("wire", (370, 120), (370, 132))
+    ground(370, 132)
+    box(440, 285, 170, 130, "3 × 74HC4053", "X0 … Z0: odd columns", "X1 … Z1: even ones", "V_EE, /INH: ground")
+    pins = [
+        "PA0, PA1, PA4: X, Y, Z of the first, columns 1–6",
+        "PA6, PA7, PB0: of the second, columns 7–12",
+        "PC0, PC1, PC2: of the third, columns 13–18",
+        "PB14: A, B, C of each; 10 kΩ to ground",
+    ]
+    for at, pin in enumerate(pins):
+        y = 305 + 30 * at
+        line("wire", (130, y), (440, y))
+        text(136, y - 5, pin, kind="small")
+
+
+def main(path, onchip=False):
+    # The board, what drives the rows, and what reads the columns.
+    (own_converters if onchip else converters_around)()
+    box(480, 30, 130, 110, "8 switches", "4 × TS3A24159", "COM to row-wire")
     line("wire", (545, 140), (545, 158))
     ground(545, 158)
     text(552, 154, "NO: active row", kind="small")
@@ -88,12 +122,6 @@ def main(path):
     text(806, 336, "18 of these:", kind="small")
     text(806, 352, "5 × MCP6024", kind="small")
     text(806, 368, "(2 are followers)", kind="small")
-    box(440, 285, 170, 130, "3 × MCP3208", "columns 1–8,", "9–16, 17–18", "V_REF: 3.3 V")
-    pins = ["PB13 (30): CLK", "PB14 (28): D_OUT", "PB15 (26): D_IN", "PB12 (16): CS 1", "PB1 (24): CS 2", "PC4 (34): CS 3"]
-    for at, pin in enumerate(pins):
-        y = 300 + 20 * at
-        line("wire", (130, y), (440, y))
-        text(136, y - 4, pin, kind="small")
     # V_b, from a divider and two followers.
     text(210, 445, "3.3 V", "end")
     line("wire", (214, 440), (234, 440))
@@ -127,4 +155,4 @@ def main(path):
         file.write("\n".join(parts) + "\n</svg>\n")
 
 
-main(sys.argv[1])
+main(sys.argv[1], onchip="--onchip" in sys.argv)

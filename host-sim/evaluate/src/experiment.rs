@@ -287,6 +287,7 @@ impl Experiment {
             seed: self.world.seed,
             thickness_mm: Some(self.world.sensor.size_mm[2]),
             full_scale: self.full_scales(),
+            linear_rmse: vec![],
         }
     }
 

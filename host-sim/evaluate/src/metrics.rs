@@ -2,6 +2,7 @@
 //! more than the decoders do, so all of them are always given.
 
 use serde::Serialize;
+use taxel_core::blob::Metadata;
 use taxel_data::{Dataset, Table, columns};
 use taxel_learn::Decoder;
 use taxel_limit::reference::GroupLimit;
@@ -99,6 +100,32 @@ pub fn pooled(groups: &[(&str, Vec<usize>)], rmse: &[f64]) -> Vec<f64> {
         (squares / members.len() as f64).sqrt()
     };
     groups.iter().map(|(_, members)| of_group(members)).collect()
+}
+
+/// Root mean square error of one group of outputs, in its unit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroupRmse {
+    pub group: String,
+    pub unit: String,
+    pub rmse: f64,
+}
+
+/// RMSE of the best linear decoder by group of outputs, on frames of the model's training that it was not fitted to. Empty
+/// if the model does not tell it.
+pub fn linear_at_training(metadata: &Metadata<'_>) -> Vec<GroupRmse> {
+    let rmse: Vec<f64> = metadata.linear_rmse.iter().map(f64::from).collect();
+    if rmse.is_empty() {
+        return vec![];
+    }
+    let names: Vec<String> = metadata.output_names.iter().map(str::to_owned).collect();
+    let groups = columns::groups(&names);
+    let pooled = pooled(&groups, &rmse).into_iter().zip(&groups);
+    let of = |(rmse, (group, _)): (f64, &(&str, Vec<usize>))| GroupRmse {
+        group: (*group).to_owned(),
+        unit: columns::unit_of(group).to_owned(),
+        rmse,
+    };
+    pooled.map(of).collect()
 }
 
 /// Limit of a scene that results are given beside.

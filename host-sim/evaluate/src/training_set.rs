@@ -4,7 +4,9 @@ use std::borrow::Cow;
 
 use taxel_data::{BadValue, Dataset, Progress, Stream};
 use taxel_learn::confidence::{self, Density, HeldOut};
+use taxel_learn::decoders::LINEAR;
 use taxel_learn::fill;
+use taxel_learn::select;
 use taxel_learn::train::stream::{self, Frames, Learned, Pieces};
 use taxel_learn::train::{Examples, Refinement, resolution, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
@@ -111,7 +113,8 @@ impl<'s> TrainingSet<'s> {
         options: &Options,
         progress: &dyn Progress,
     ) -> Result<ModelBlob> {
-        let blob = pack(trained, &self.frames, &self.origin)?;
+        let origin = Origin { linear_rmse: self.linear_rmse(), ..self.origin.clone() };
+        let blob = pack(trained, &self.frames, &origin)?;
         let blob =
             if self.confidence { self.with_confidence(&blob, options, progress)? } else { blob };
         if !self.fill {
@@ -121,6 +124,23 @@ impl<'s> TrainingSet<'s> {
         let blob = fill::add(&blob, &self.frames.inputs)?;
         progress.step();
         Ok(blob)
+    }
+
+    /// RMSE of the best linear decoder for each output, one fold after the other held out. Empty with a single fold, or if an
+    /// output has no value.
+    fn linear_rmse(&self) -> Vec<f64> {
+        /// Folds of a scene's frames: successive ones, since those of a moving touch resemble each other.
+        const FOLDS: usize = 5;
+        let frames = self.frames.frames();
+        let fold_of = match &self.more {
+            More::Scene(_) => Cow::Owned(select::block_folds(frames, FOLDS)),
+            More::Folds(fold_of) => Cow::Borrowed(*fold_of),
+        };
+        if fold_of.iter().all(|fold| *fold == 0) {
+            return vec![];
+        }
+        let rmse = select::baseline_rmse(&LINEAR, &self.frames, &fold_of);
+        if rmse.iter().all(|error| error.is_finite()) { rmse } else { vec![] }
     }
 
     /// Adds a confidence to the model in `blob`, calibrated on frames that it was not trained on: as many other frames
@@ -173,7 +193,7 @@ impl<'s> TrainingSet<'s> {
         let folds: Vec<usize> = rest.iter().map(|frame| fold_of[*frame]).collect();
         let mut of_rest = TrainingSet::of_folds(&seen, &folds, self.origin.clone());
         of_rest.refine = self.refine;
-        let blob = of_rest.blob(options, progress)?;
+        let blob = pack(&of_rest.train(options, progress)?, &seen, &self.origin)?;
         let settings = confidence::Settings { seed: options.seed, ..Default::default() };
         held_out.add(&blob, &Density::fit(&seen, &settings), &self.frames.subset(&held));
         Ok(())

@@ -34,6 +34,9 @@ pub struct Origin {
     pub thickness_mm: Option<f64>,
     /// Full scale of each output, in its unit.
     pub full_scale: Vec<f64>,
+    /// RMSE of the best linear decoder for each output, in its unit, on frames that it was not fitted to. Empty if it is
+    /// not known.
+    pub linear_rmse: Vec<f64>,
 }
 
 impl Origin {
@@ -47,6 +50,7 @@ impl Origin {
             seed,
             thickness_mm: None,
             full_scale: full_scale.collect(),
+            linear_rmse: vec![],
         }
     }
 }
@@ -68,9 +72,6 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
     let units = |names: &[String]| {
         names.iter().map(|name| columns::unit_of(name)).collect::<Vec<_>>().join("\n")
     };
-    let floats = |values: &[f64]| -> Vec<u8> {
-        values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect()
-    };
     let (input_names, output_names) = (lines(&dataset.inputs.names), lines(&dataset.outputs.names));
     let output_units = units(&dataset.outputs.names);
     let input_units = if dataset.relative_inputs {
@@ -84,7 +85,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
         Some(it) => training_rmse(&views, expansion, &train::projection::apply(it, dataset)),
         None => training_rmse(&views, None, dataset),
     });
-    let full_scale = floats(&origin.full_scale);
+    let [full_scale, linear_rmse] = [&origin.full_scale, &origin.linear_rmse].map(|it| floats(it));
     let parts = ModelParts {
         projection,
         expansion,
@@ -107,9 +108,15 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
             output_units: Columns(&output_units),
             training_rmse: Floats(&training_rmse),
             full_scale: Floats(&full_scale),
+            linear_rmse: Floats(&linear_rmse),
         },
     };
     Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(not_packed)? })
+}
+
+/// Values as a blob holds them.
+fn floats(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect()
 }
 
 fn training_rmse(

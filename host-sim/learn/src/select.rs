@@ -213,18 +213,23 @@ impl<'d> Judge<'d> {
 
     /// Baselines on the same folds.
     fn baselines(&self) -> Vec<BaselineScore> {
-        let score = |baseline: &Baseline| {
-            let squares = parallel::map(self.folds, &|fold| {
-                baseline_squares(baseline, self.dataset, self.fold_of, fold)
-            });
-            let rmse = |(output, count): (usize, usize)| {
-                root_mean(squares.iter().map(|fold| fold[output]).sum(), count)
-            };
-            let outputs = self.dataset.outputs.counts().into_iter().enumerate();
-            BaselineScore { decoder: baseline.name, rmse: outputs.map(rmse).collect() }
+        let score = |it: &Baseline| BaselineScore {
+            decoder: it.name,
+            rmse: baseline_rmse(it, self.dataset, self.fold_of),
         };
         BASELINES.iter().map(score).collect()
     }
+}
+
+/// RMSE of a baseline on folds that it was not fitted to, for each output, in its unit. `fold_of` gives each frame's fold,
+/// numbered from 0. It is NaN for an output without a value.
+pub fn baseline_rmse(baseline: &Baseline, dataset: &Dataset, fold_of: &[usize]) -> Vec<f64> {
+    let folds = fold_of.iter().max().map_or(0, |last| last + 1);
+    let squares = parallel::map(folds, &|fold| baseline_squares(baseline, dataset, fold_of, fold));
+    let rmse = |(output, count): (usize, usize)| {
+        root_mean(squares.iter().map(|fold| fold[output]).sum(), count)
+    };
+    dataset.outputs.counts().into_iter().enumerate().map(rmse).collect()
 }
 
 fn root_mean(squares: f64, count: usize) -> f64 {

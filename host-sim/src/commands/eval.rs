@@ -7,9 +7,9 @@ use crate::evaluate::confidence::{Coverage, coverage};
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
 use crate::measurements::{Log, Spread};
-use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::metrics::{self, DecoderErrors, Errors, GroupRmse, LimitSummary, Measure};
 use crate::over_time::{self, Decoded, OverTime, RestOverTime};
-use crate::report::format::grouped;
+use crate::report::format::{grouped, significant};
 use crate::report::{self, Made, View};
 use crate::verdict::{Verdict, Warning};
 use crate::{Error, Result};
@@ -80,6 +80,9 @@ struct Summary {
     health: Health,
     /// Errors of the model, and of always predicting the mean of these outputs.
     decoders: Vec<DecoderErrors>,
+    /// RMSE of the best linear decoder on frames of the model's training that it was not fitted to; empty if the model does
+    /// not tell it.
+    linear_at_training: Vec<GroupRmse>,
     /// Errors of the model by the depth of the contact, if that is an output.
     by_depth: Vec<DepthErrors>,
     /// Errors and readings at rest by time; `None` if lines are in no order of time.
@@ -171,6 +174,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         data_file: arguments.data.clone(),
         verdict,
         decoders,
+        linear_at_training: metrics::linear_at_training(metadata),
         coverage: deviations.map_or(vec![], |deviations: Vec<f64>| {
             coverage(&truth, &estimate.values, &deviations, ratios_95)
         }),
@@ -229,6 +233,16 @@ fn text_of(summary: &Summary) -> print::Page {
         summary.decoders.iter().map(|it| (it.decoder.as_str(), it.errors.as_slice())).collect();
     print::errors(&mut page, &decoders);
     print::errors_legend(&mut page);
+    let linear = &summary.linear_at_training;
+    if !linear.is_empty() {
+        let of = |it: &GroupRmse| {
+            format!("{} {} {}", it.group, significant(it.rmse, 3), it.unit).trim_end().to_owned()
+        };
+        page.line(format_args!(
+            "Best linear decoder in training, on frames that it was not fitted to, RMSE: {}.",
+            linear.iter().map(of).collect::<Vec<_>>().join(", ")
+        ));
+    }
     page.line(LimitSummary::new(&Err(Refusal::Measured)).note());
     print::by_depth(&mut page, &summary.by_depth);
     if let Some(percent) = summary.percent_novel {
@@ -300,6 +314,7 @@ fn page_of(
         verdict: &summary.verdict,
         device: &DeviceCost::new(blob)?,
         decoders: &summary.decoders,
+        linear_at_training: &summary.linear_at_training,
         limit: &limit,
         by_depth: &summary.by_depth,
         others: None,

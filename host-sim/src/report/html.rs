@@ -191,8 +191,10 @@ fn header(view: &View<'_>) -> String {
     };
     let linear = if view.decoders.iter().any(|decoder| decoder.decoder == "linear") {
         " Linear: the best linear decoder, which shows how much needs no network."
-    } else {
+    } else if view.linear_at_training.is_empty() {
         ""
+    } else {
+        " Linear in training: the best linear decoder, on frames of training that it was not fitted to."
     };
     let _ = writeln!(
         html,

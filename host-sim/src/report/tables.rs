@@ -102,18 +102,24 @@ fn name(group: &Errors) -> String {
 
 /// Small table of RMSE by group and decoder, beside the least possible one.
 pub fn headline(view: &View<'_>) -> String {
-    let (decoders, limits) = (view.decoders, &view.limit.groups);
+    let (decoders, linear, limits) = (view.decoders, view.linear_at_training, &view.limit.groups);
+    let trained = (!linear.is_empty()).then(|| "Linear in training".to_owned());
     // Columns of the limit, where there is one.
     let known = |cells: [String; 2]| cells.into_iter().filter(|_| !limits.is_empty());
     let heads = decoders.iter().map(|decoder| escape(short_name(decoder)));
-    let heads = heads.chain(known(["Least possible", "×\u{a0}limit"].map(String::from)));
+    let heads =
+        heads.chain(trained).chain(known(["Least possible", "×\u{a0}limit"].map(String::from)));
     let lines = groups(decoders).iter().map(|group| {
         let decimals = rmse_decimals(decoders, &group.group);
         let cells = decoders.iter().map(|it| fixed(rmse(&it.errors, &group.group), decimals));
+        let linear = (!linear.is_empty()).then(|| {
+            let of_group = linear.iter().find(|it| it.group == group.group);
+            of_group.map_or(UNDEFINED.into(), |it| fixed(it.rmse, decimals))
+        });
         let limit = limits.iter().find(|limit| limit.group == group.group);
         let limit = limit.map_or(UNDEFINED.into(), |limit| fixed(limit.limit, decimals));
         let ratio = group.ratio_to_limit.map_or(UNDEFINED.into(), |ratio| fixed(ratio, 2));
-        line(&name(group), cells.chain(known([limit, ratio])))
+        line(&name(group), cells.chain(linear).chain(known([limit, ratio])))
     });
     format!(
         "<table class=\"headline\">\n<thead><tr><th>RMSE</th>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table>\n",

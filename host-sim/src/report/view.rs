@@ -7,7 +7,7 @@ use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::distribution::Distribution;
 use taxel_evaluate::evaluate::moving_contacts::MovingContacts;
 use taxel_evaluate::evaluate::table1::Table1;
-use taxel_evaluate::metrics::{DecoderErrors, LimitSummary};
+use taxel_evaluate::metrics::{DecoderErrors, GroupRmse, LimitSummary};
 use taxel_evaluate::others::Others;
 use taxel_evaluate::over_time::OverTime;
 use taxel_evaluate::run::{DataSummary, RunResult, SensorSketch};
@@ -36,6 +36,8 @@ pub struct View<'a> {
     pub device: &'a DeviceCost,
     /// Errors of the model, and of decoders beside it.
     pub decoders: &'a [DecoderErrors],
+    /// RMSE of the best linear decoder in the model's training, beside frames that came later; empty if it is not known.
+    pub linear_at_training: &'a [GroupRmse],
     /// Least possible errors.
     pub limit: &'a LimitSummary,
     /// Errors by the depth of the contact; empty for other outputs.
@@ -74,6 +76,7 @@ impl<'a> View<'a> {
             verdict: &result.verdict,
             device: &result.device_cost,
             decoders: &result.decoders,
+            linear_at_training: &[],
             limit: &result.limit,
             by_depth: &result.by_depth,
             others: result.others.as_ref(),

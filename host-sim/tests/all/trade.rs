@@ -444,6 +444,14 @@ fn a_choice_of_columns_tells_how_to_use_it_and_what_the_line_carries() {
     assert!(refused.contains("lower the bound") && !refused.contains("--column-step"), "{refused}");
     let page = folder.succeed(&ask("100", "18"));
     assert!(page.contains(", 1 column.") && !page.contains("decode fewer outputs"), "{page}");
+
+    // Six columns of two rows have 12 readings, and so fewer features than the scene asks for.
+    let whole = "[training]\nwhole_array = true\nfeatures = 20";
+    folder.write("whole.toml", few_frames_of_two_rows().replacen("[training]", whole, 1));
+    let steps = ["trade", "whole.toml", "--no-refine", "--centres", "16", "--column-step", "1,3"];
+    let page = folder.succeed(&steps);
+    let is_narrow = |line: &str| line.contains("fixed16 array ") && line.contains("  6   1 ");
+    assert!(page.lines().any(is_narrow), "{page}");
 }
 
 #[test]

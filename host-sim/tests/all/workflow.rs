@@ -43,6 +43,19 @@ fn a_csv_file_trains_decodes_and_evaluates() {
         z["rmse"].as_f64().unwrap()
     };
     assert!(rmse(0) < 0.4 * rmse(1), "{evaluated}");
+
+    // The model tells what a linear decoder reached on frames that it was not fitted to: as on fresh frames.
+    let run = ["run", "train.csv", "--test", "test.csv", "--centres", "12", "--no-refine"];
+    let run = json(&folder.succeed(&[&run[..], &["--json"]].concat()));
+    let fresh = run["decoders"].as_array().unwrap().iter().find(|it| it["decoder"] == "linear");
+    let groups = evaluated["linear_at_training"].as_array().unwrap();
+    assert_eq!(groups.len(), 3);
+    for (group, fresh) in groups.iter().zip(fresh.unwrap()["errors"].as_array().unwrap()) {
+        assert_eq!((&group["group"], &group["unit"]), (&fresh["group"], &fresh["unit"]));
+        let ratio = group["rmse"].as_f64().unwrap() / fresh["rmse"].as_f64().unwrap();
+        assert!((0.8..1.25).contains(&ratio), "{group} {fresh}");
+    }
+    assert!(page.contains("Linear in training"));
 }
 
 #[test]

@@ -7,8 +7,8 @@ use super::format::{
 };
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use super::sections::{
-    check_count, cut_fill, take, take_block, take_confidence, take_expansion, take_projection,
-    take_relative_inputs,
+    check_count, cut_fill, take, take_block, take_confidence, take_expansion, take_linear,
+    take_projection, take_relative_inputs,
 };
 use crate::checksum::CRC_32;
 use crate::confidence::{Confidence, Sizes};
@@ -65,7 +65,8 @@ impl<'a> Model<'a> {
 
         let (section, rest) = take::<MetadataSection>(rest, "metadata")?;
         let (relative_inputs, rest) = take_relative_inputs(rest);
-        let metadata = checked_metadata(&section, relative_inputs, shape)?;
+        let (linear_rmse, rest) = take_linear(rest, shape)?;
+        let metadata = checked_metadata(&section, relative_inputs, linear_rmse, shape)?;
         let (projection, rest) = take_projection(rest, shape)?;
         if projection.is_some() {
             check_count("networks behind a projection", 1, networks.into())?;
@@ -291,6 +292,7 @@ fn check_tag(expected: u8, found: u8) -> Result<(), DecodeError> {
 fn checked_metadata<'a>(
     section: &MetadataSection<'a>,
     relative_inputs: bool,
+    linear_rmse: &'a [u8],
     shape: ModelShape,
 ) -> Result<Metadata<'a>, DecodeError> {
     check_tag(TAG_METADATA, section.tag)?;
@@ -309,6 +311,7 @@ fn checked_metadata<'a>(
         output_units: Columns(section.output_units),
         training_rmse: Floats(section.training_rmse),
         full_scale: Floats(section.full_scale),
+        linear_rmse: Floats(linear_rmse),
     };
     let (inputs, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
     check_count("input names", inputs, metadata.input_names.iter().count())?;
@@ -323,6 +326,7 @@ fn checked_metadata<'a>(
         ("thickness", in_range(metadata.thickness_mm)),
         ("training error", metadata.training_rmse.iter().all(in_range)),
         ("full scale", metadata.full_scale.iter().all(in_range)),
+        ("linear error", metadata.linear_rmse.iter().all(in_range)),
     ] {
         if !ok {
             return Err(DecodeError::InvalidMetadata { field });

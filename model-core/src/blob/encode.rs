@@ -8,8 +8,9 @@ use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, FillHeader,
-    MAGIC, MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_CONFIDENCE,
-    TAG_EXPANSION, TAG_FILL, TAG_METADATA, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
+    LinearSection, MAGIC, MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField,
+    TAG_CONFIDENCE, TAG_EXPANSION, TAG_FILL, TAG_LINEAR, TAG_METADATA, TAG_PROJECTION,
+    TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::Metadata;
 use crate::checksum::CRC_32;
@@ -57,7 +58,8 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
         + m.input_units.0.len()
         + m.output_names.0.len()
         + m.output_units.0.len();
-    let numbers = m.training_rmse.0.len() + m.full_scale.0.len() + parts.row_network.len();
+    let errors = m.training_rmse.0.len() + m.linear_rmse.0.len();
+    let numbers = errors + m.full_scale.0.len() + parts.row_network.len();
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
     let blocks = [
         parts.projection.map(|it| it.block()),
@@ -137,6 +139,9 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     })?;
     if m.relative_inputs {
         writer.put(&TAG_RELATIVE_INPUTS)?;
+    }
+    if !m.linear_rmse.0.is_empty() {
+        writer.put(&LinearSection { tag: TAG_LINEAR, rmse: m.linear_rmse.0 })?;
     }
     if let Some(projection) = parts.projection {
         if projection.features() == inputs {

@@ -29,6 +29,7 @@ pub(super) const TAG_CONFIDENCE: u8 = 7;
 /// Tag of a projection to another number of features than a row has readings.
 pub(super) const TAG_PROJECTION_TO: u8 = 8;
 pub(super) const TAG_FILL: u8 = 9;
+pub(super) const TAG_LINEAR: u8 = 10;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -69,6 +70,15 @@ pub(super) struct MetadataSection<'a> {
     // Little-endian f32.
     pub training_rmse: &'a [u8],
     pub full_scale: &'a [u8],
+}
+
+/// Held-out errors of the linear decoder.
+#[derive(Serialize, Deserialize)]
+pub(super) struct LinearSection<'a> {
+    pub tag: u8,
+    // Little-endian f32.
+    #[serde(borrow)]
+    pub rmse: &'a [u8],
 }
 
 /// Header of a network section; padding and the block of words follow.
@@ -140,7 +150,8 @@ mod tests {
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
         let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION];
-        for tag in others.into_iter().chain([TAG_CONFIDENCE, TAG_PROJECTION_TO, TAG_FILL]) {
+        let newer = [TAG_CONFIDENCE, TAG_PROJECTION_TO, TAG_FILL, TAG_LINEAR];
+        for tag in others.into_iter().chain(newer) {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

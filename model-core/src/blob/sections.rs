@@ -2,9 +2,9 @@
 
 use super::error::DecodeError;
 use super::format::{
-    ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FillHeader, ProjectionHeader,
-    TAG_CONFIDENCE, TAG_EXPANSION, TAG_FILL, TAG_PROJECTION, TAG_PROJECTION_TO,
-    TAG_RELATIVE_INPUTS,
+    ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FillHeader, LinearSection,
+    ProjectionHeader, TAG_CONFIDENCE, TAG_EXPANSION, TAG_FILL, TAG_LINEAR, TAG_PROJECTION,
+    TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::ModelShape;
 use crate::confidence::{Confidence, Sizes};
@@ -65,6 +65,16 @@ pub(super) fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
         Some((&TAG_RELATIVE_INPUTS, rest)) => (true, rest),
         _ => (false, bytes),
     }
+}
+
+/// Cuts the errors of the linear decoder from the front of `bytes`: four bytes an output, or nothing without the section.
+pub(super) fn take_linear(bytes: &[u8], shape: ModelShape) -> Result<(&[u8], &[u8]), DecodeError> {
+    if bytes.first() != Some(&TAG_LINEAR) {
+        return Ok((&[], bytes));
+    }
+    let (section, rest) = take::<LinearSection>(bytes, "linear section")?;
+    check_count("bytes of linear errors", shape.rows * shape.outputs * 4, section.rmse.len())?;
+    Ok((section.rmse, rest))
 }
 
 /// Cuts the projection from the front of `bytes` if there is one, and checks it.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use taxel_data::dataset::Dataset;
 use taxel_learn::Options;
-use taxel_learn::train::projection;
+use taxel_learn::train::projection::{self, features_at_most};
 use taxel_simulate::Synthesis;
 use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
@@ -83,7 +83,11 @@ impl<'s> Frames<'s> {
             let passes = plan.device.passes(samples_averaged);
             Some(Touches::new(scene, synthesis, (scene.world.path?, passes), group))
         });
-        let options = subject.options();
+        let mut options = subject.options();
+        if subject.scene().is_some_and(|scene| scene.world.sensor.read_columns.is_some()) {
+            // Fewer columns than the scene's features were chosen for have no more than these.
+            options.features = options.features.map(|wanted| features_at_most(&set.frames, wanted));
+        }
         let arrays: &[bool] = match (of_array, set.frames.rows) {
             (true, _) => &[true],
             (false, 1) => &[false],
