@@ -184,7 +184,8 @@ fn why(refusal: Refusal) -> String {
             "its board lacks wires that the model's inputs name; `inspect` names the first".into()
         }
         Refusal::BadModel(fault) => {
-            format!("the model is faulty ({fault:?}); `inspect` shows more")
+            format!("the model is faulty ({fault:?}), or of a newer version than the device's program: if `inspect` finds nothing, flash the \
+                 program again (docs/board.md)")
         }
         Refusal::Flash => "its flash could not be written".into(),
         Refusal::Constants(ConstantsFault::Fixed) => "its circuit's constants are fixed".into(),

@@ -116,8 +116,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scanned = is_recording(&arguments.output)
         .then(|| Ok::<_, Error>((clock_us(&file)?, readings.values.clone())))
         .transpose()?;
-    let health = arguments.health.apply(&model, &mut readings)?;
-    let (model, readings) = related(model, readings, baselines.as_ref());
+    let mut health = arguments.health.apply(&model, &mut readings)?;
+    let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
     remark_on_range(&model, &readings);
     let mut estimate = model.decode_table(&readings);
     let settings = arguments.filter.settings();

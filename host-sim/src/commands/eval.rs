@@ -119,10 +119,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let of_lines = (rest.as_ref(), file.lines());
     let baselines =
         arguments.untouched.baselines(metadata, &arguments.model, of_lines, fields, limits)?;
-    let health = arguments.health.apply(&model, &mut readings)?;
+    let mut health = arguments.health.apply(&model, &mut readings)?;
     let at_rest =
         rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &Spread::of(&readings)));
-    let (model, readings) = related(model, readings, baselines.as_ref());
+    let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
     let estimate = model.decode_table(&readings);
     let thickness_mm = f64::from(metadata.thickness_mm);
     let measure = Measure {
@@ -143,9 +143,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if errors.iter().all(|group| group.count == 0) {
         return Err(Error::Unfit {
             path: arguments.data.clone(),
-            message: "no line has both the model's readings and a true output: fill them in, or see --limits, and \
-                      train --fill"
-                .into(),
+            message: nothing_counts(metadata.relative_inputs).into(),
         });
     }
     let (deviations, novelty) = model.assess(&readings.values).unzip();
@@ -196,6 +194,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         output::write_bytes(html, page.as_bytes())?;
     }
     print::result(common, &summary, || text_of(&summary))
+}
+
+/// Reason why no line can be judged, and what helps.
+fn nothing_counts(relative_inputs: bool) -> &'static str {
+    if relative_inputs {
+        "no line has both the model's inputs and a true output: fill readings in, or train without those that have no \
+         baseline (--inputs)"
+    } else {
+        "no line has both the model's readings and a true output: fill them in, or see --limits, and train --fill"
+    }
 }
 
 /// Whether a model that was trained on lines of `file` knows some of those that are kept: it was trained on more lines than

@@ -57,7 +57,7 @@ struct Summary {
     weights_in_ram: bool,
     /// Why the images as they are cannot decode the model.
     needs: Vec<String>,
-    /// Its scan on the NUCLEO-F446RE; `None` if that cannot scan it.
+    /// Its scan on the NUCLEO-F446RE; `None` if that cannot scan it, or readings are not in Ω.
     scan: Option<ScanSummary>,
     /// What decoding a frame costs a Cortex-M4F.
     frame_costs: Frames<Cost>,
@@ -196,6 +196,9 @@ fn other_unit(model: &Model<'_>) -> Option<String> {
 
 /// Scan for a `model`, with one sample a reading.
 fn scan(model: &Model<'_>) -> Option<ScanSummary> {
+    if other_unit(model).is_some() {
+        return None;
+    }
     let room = image::capacity_for(model, Capacity::PAPER).ok()?;
     let cells = room.cells(model.metadata().input_names, model.shape());
     let cells: Vec<_> = cells.collect::<std::result::Result<_, _>>().ok()?;
@@ -311,7 +314,7 @@ fn page_of(s: &Summary) -> print::Page {
         line(
             "scan",
             format!(
-                "{rows} × {columns} wires, {mean_us} µs on a NUCLEO-F446RE, {longest_us} µs at most"
+                "{rows} × {columns} wires, {mean_us} µs by converters around a NUCLEO-F446RE, {longest_us} µs at most"
             ),
         );
     }

@@ -6,6 +6,7 @@ use crate::{Error, Result};
 use clap::Args;
 use taxel_core::blob::Metadata;
 use taxel_core::health::Limits;
+use taxel_data::rest::is_zero_at_rest;
 use taxel_data::{DataFile, Dataset, Table, columns};
 use taxel_learn::health::judge;
 use taxel_learn::{PreparedModel, outliers, relative};
@@ -62,7 +63,9 @@ impl BaselineArgument {
             ),
             (Some(file), true) => {
                 let names = metadata.input_names.iter();
-                let baseline = baseline(&fields.read(file)?, names, limits)?;
+                let untouched = fields.read(file)?;
+                warn_of_touches(&untouched, metadata)?;
+                let baseline = baseline(&untouched, names, limits)?;
                 let missing = unusable(&baseline);
                 if !missing.is_empty() {
                     stderr::remark(format_args!(
@@ -120,6 +123,33 @@ fn usual_lines<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Res
     Ok(frames.subset(&outliers.kept).inputs)
 }
 
+/// Warns of lines that are no baseline: `file` has outputs of a model with this `metadata`, and they are not zero there.
+fn warn_of_touches(file: &DataFile, metadata: &Metadata<'_>) -> Result<()> {
+    /// Share of an output's full scale from which on the sensor is touched.
+    const TOUCHED: f64 = 0.05;
+    let mut touched = vec![false; file.lines()];
+    for (name, full_scale) in metadata.output_names.iter().zip(metadata.full_scale.iter()) {
+        if !is_zero_at_rest(name) || file.column_of_any(name).is_err() {
+            continue;
+        }
+        for column in file.columns([name])? {
+            for (line, touched) in touched.iter_mut().enumerate() {
+                *touched |= file.value(line, column).abs() > TOUCHED * f64::from(full_scale);
+            }
+        }
+    }
+    let count = touched.iter().filter(|touched| **touched).count();
+    if count > 0 {
+        stderr::remark(format_args!(
+            "warning: the sensor is touched in {count} of {} lines of {}, by its outputs: errors will be large. Leave those \
+             lines out of a baseline",
+            file.lines(),
+            file.path.display()
+        ));
+    }
+    Ok(())
+}
+
 /// Names of the columns of `baseline` that no reading can be divided by.
 fn unusable(baseline: &Table) -> Vec<String> {
     let ratios = relative::inputs(baseline, baseline);
@@ -127,16 +157,37 @@ fn unusable(baseline: &Table) -> Vec<String> {
     columns.filter(|(ratio, _)| ratio.is_nan()).map(|(_, name)| name.clone()).collect()
 }
 
-/// Model and what it is given of `readings`: their ratios to the `baselines`, if it has any.
+/// Model and what it is given of `readings`: their ratios to the `baselines`, if it has any. A frame is faulty, too, if one
+/// of its readings has no baseline.
 pub fn related<'b>(
     model: PreparedModel<'b>,
     readings: Table,
     baselines: Option<&Table>,
+    is_faulty: &mut [bool],
 ) -> (PreparedModel<'b>, Table) {
-    match baselines {
-        Some(baselines) => (model.of_inputs(), relative::inputs(&readings, baselines)),
-        None => (model, readings),
+    let Some(baselines) = baselines else { return (model, readings) };
+    let inputs = relative::inputs(&readings, baselines);
+    let mut lost = vec![0; inputs.names.len()];
+    for ((line, readings), is_faulty) in inputs.lines().zip(readings.lines()).zip(is_faulty) {
+        for ((input, reading), lost) in line.iter().zip(readings).zip(&mut lost) {
+            if input.is_nan() && !reading.is_nan() {
+                (*is_faulty, *lost) = (true, *lost + 1);
+            }
+        }
     }
+    // A baseline of its own file was judged when it was read.
+    let of_log = baselines.len() > 1;
+    if let Some(most) = lost.iter().max().filter(|count| of_log && **count > 0) {
+        let columns = inputs.names.iter().zip(&lost).filter(|(_, count)| **count > 0);
+        let names: Vec<String> = columns.map(|(name, _)| name.clone()).collect();
+        stderr::remark(format_args!(
+            "warning: {} cannot be divided by its baseline in {most} of {} lines: at rest it is zero, negative or missing, as of a \
+             dead cell. Nothing that needs it is decoded there; a model trained without it needs none (--inputs)",
+            columns::some_names(&names),
+            inputs.len()
+        ));
+    }
+    (model.of_inputs(), inputs)
 }
 
 /// Columns of `file` with the model's readings.

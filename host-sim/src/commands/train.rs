@@ -11,20 +11,19 @@ use crate::subject::Subject;
 use crate::{Error, Result, report};
 use clap::Args;
 use serde::Serialize;
-use taxel_core::rbf::Format;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
-use taxel_data::{Dataset, Silent, columns, output};
+use taxel_data::{columns, output};
+use taxel_learn::fill;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
-use taxel_learn::train::{Widths, projection};
-use taxel_learn::{Options, fill};
+use taxel_learn::train::Widths;
 
 use super::data_argument::JudgedBy;
 use super::model_argument::ModelArguments;
 use super::model_outputs::{self, ModelOutput};
 use super::scene_argument::Sizes;
 use super::subject_argument::SubjectOptions;
-use super::{Common, print, refused_readings, stderr};
+use super::{Common, direct_format, print, refused_readings};
 
 mod choice;
 mod recursion;
@@ -183,11 +182,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
-    if options.format == Format::F32
-        && model.networks().any(|network| network.format() == Format::F32Direct)
-    {
-        stderr::remark(format_args!("note: {}", why_direct(&options, &set.frames)));
-    }
+    direct_format::note(&model, &options, Some(&set.frames));
     let summary = Summary {
         subject: subject.name().into(),
         seed: set.origin.seed,
@@ -223,32 +218,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             .unwrap_or_default(),
     };
     print::result(common, &summary, || page_of(&summary, options.centres))
-}
-
-/// Reason for direct distances in a model that was to be in f32, and what is faster. Whether fixed16 holds such a network is
-/// tried on some of the `frames`.
-fn why_direct(options: &Options, frames: &Dataset) -> String {
-    /// Frames that tell whether centres and widths fit a format.
-    const TRIED: usize = 1000;
-    if options.widths == Widths::Neighbours {
-        return "only the exact formula for distances (f32-direct) has a width for each centre; it takes a device more than \
-                twice as long as one width in f32 (docs/formats.md)"
-            .into();
-    }
-    let few: Vec<usize> = (0..frames.frames()).step_by(frames.frames().div_ceil(TRIED)).collect();
-    let fixed = Options { format: Format::Fixed16, ..*options };
-    let fix = match taxel_learn::train::train(&frames.subset(&few), &fixed, &Silent) {
-        Ok(_) => "use --format fixed16".to_owned(),
-        Err(_) => format!(
-            "--format fixed16 does not hold it either at this --spread; --whole-array --features {} gives the network \
-             fewer inputs",
-            projection::features_at_most(frames, 16)
-        ),
-    };
-    format!(
-        "the fast formula for distances could lose accuracy in f32 with this model (little noise, many centres or a large \
-         spread), so the exact one is used, which takes a device more than twice as long; {fix}"
-    )
 }
 
 /// Scene or CSV file that is trained on: all frames of a file, or so many of a scene.

@@ -125,6 +125,22 @@ fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes(
     // Another column may tell it.
     folder.succeed(&["decode", "m.bin", "log.csv", "--rest", "f_n", "-o", "e.csv"]);
     assert_eq!(of_force("e.csv", 1), of_force("estimates.csv", 1));
+
+    // A dead cell has no baseline, so no line is sound; and lines that are touched are no baseline.
+    let dead = text.lines().enumerate().map(|(number, line)| {
+        let mut fields: Vec<&str> = line.split(',').collect();
+        fields[1] = if number == 0 { fields[1] } else { "0" };
+        fields.join(",") + "\n"
+    });
+    folder.write("dead.csv", dead.collect::<String>());
+    let output = folder.run(&["decode", "m.bin", "dead.csv", "-o", "dead-estimates.csv"]);
+    let notes = String::from_utf8(output.stderr).unwrap();
+    assert!(notes.contains("cannot be divided by its baseline in 3000 of 3000 lines"), "{notes}");
+    let estimates = std::fs::read_to_string(folder.path("dead-estimates.csv")).unwrap();
+    assert!(estimates.lines().skip(1).all(|line| line.ends_with(",2")));
+    let output = folder.run(&["eval", "m.bin", "log.csv", "--baseline", "log.csv"]);
+    let notes = String::from_utf8(output.stderr).unwrap();
+    assert!(notes.contains("warning: the sensor is touched in 1"), "{notes}");
 }
 
 #[test]

@@ -17,7 +17,7 @@ use taxel_simulate::path::Path;
 
 use super::gate;
 use crate::error::{Error, NoPoint, Result};
-use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::metrics::{self, DecoderErrors, LimitSummary, Measure};
 use crate::subject::Subject;
 use crate::verdict::Verdict;
 
@@ -153,27 +153,16 @@ impl Trade {
         front.into_iter().find(|i| rmse(i) <= SAME_ERROR * least)
     }
 
-    /// Verdict on a point by the errors of the chosen group, with what its blob gives reason to beware of, and outputs of
-    /// any group without a gain over the mean or the linear decoder.
+    /// Verdict on a point by the errors of all groups, with what its blob gives reason to beware of.
     ///
     /// # Panics
     /// If there is no such point.
     pub fn verdict_on(&self, point: usize) -> Verdict {
         let Point { errors, readings, .. } = &self.points[point];
         let Readings { decoders, limit, .. } = &self.readings[*readings];
-        let of_groups = |is_wanted: &dyn Fn(&Errors) -> bool| {
-            let of = |decoder: &str, errors: &[Errors]| DecoderErrors {
-                decoder: decoder.into(),
-                errors: errors.iter().filter(|errors| is_wanted(errors)).cloned().collect(),
-            };
-            let baselines = decoders.iter().map(|baseline| of(&baseline.decoder, &baseline.errors));
-            let all: Vec<_> = std::iter::once(of("network", errors)).chain(baselines).collect();
-            Verdict::new(&all, limit)
-        };
-        let verdict = Verdict {
-            warnings: of_groups(&|_| true).warnings,
-            ..of_groups(&|errors| self.group == metrics::ALL || errors.group == self.group)
-        };
+        let network = DecoderErrors::new(metrics::NETWORK, errors.clone());
+        let all: Vec<_> = std::iter::once(network).chain(decoders.iter().cloned()).collect();
+        let verdict = Verdict::new(&all, limit);
         match ModelBlob::of_bytes(self.blob(point)) {
             Ok(blob) => verdict.of_blob(&blob, self.training_frames),
             Err(_) => verdict,

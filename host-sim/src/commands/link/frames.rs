@@ -19,7 +19,8 @@ pub fn values(scan: &Scan) -> Vec<f64> {
     values.copied().chain(estimate.novelty).map(f64::from).collect()
 }
 
-/// Receives the scans that the device sends, of `width` values each, and passes each to `take` at once.
+/// Receives the scans that the device sends, of `width` values each, and passes each to `take` at once. It waits for the next
+/// one as long as its `patience` lasts.
 pub fn hear_scans(
     device: &mut Device,
     count: usize,
@@ -32,25 +33,25 @@ pub fn hear_scans(
     progress.stage("recording", count);
     let mut scans: Vec<Scan> = Vec::new();
     let mut assembler = Assembler::new(wanted.sent());
-    let enough = device.hear(Instant::now() + patience, |_, report| {
-        let scan = assembler.take(report)?;
-        if let Err(error) = check_length(scan.number, values(&scan).len(), width) {
-            return Some(Err(error));
-        }
+    while scans.len() < count {
+        let next = device.hear(Instant::now() + patience, |_, report| assembler.take(report))?;
+        let Some(scan) = next else {
+            return Err(Error::failed(format!(
+                "{} of {count} frames came, and then none for {:.0} s: does the line carry them? --period-us or --report-every \
+                 makes fewer",
+                scans.len(),
+                patience.as_secs_f64()
+            )));
+        };
+        check_length(scan.number, values(&scan).len(), width)?;
         if scans.last().is_some_and(|last| scan.is_after_restart(last)) {
-            return Some(Err(Error::failed("the device has restarted meanwhile")));
+            return Err(Error::failed("the device has restarted meanwhile"));
         }
-        if let Err(error) = take(&scan) {
-            return Some(Err(error));
-        }
+        take(&scan)?;
         scans.push(scan);
         progress.step();
-        (scans.len() == count).then_some(Ok(()))
-    })?;
-    match enough {
-        Some(outcome) => outcome.map(|()| scans),
-        None => Err(Error::failed(format!("only {} of {count} frames came in time", scans.len()))),
     }
+    Ok(scans)
 }
 
 /// Number of missing values; if all are missing, that is a failure.

@@ -20,7 +20,7 @@ use super::super::readings::{BaselineArgument, table_of};
 use super::super::{Common, print};
 use super::activate;
 use super::frames::{self, hear_scans};
-use super::scan::{ScanArguments, Wanted, configure, patience, reading_names};
+use super::scan::{ScanArguments, Wanted, configure, patience_for_next, reading_names};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -120,7 +120,8 @@ fn record_presses(
     scan: &ScanArguments,
     outputs: &Table,
 ) -> Result<Table> {
-    let (names, patience) = (reading_names(identity, Some(model))?, patience(scan, identity));
+    let (names, patience) =
+        (reading_names(identity, Some(model))?, patience_for_next(scan, identity));
     let mut values = Vec::new();
     for number in 0..outputs.len() {
         ask_for_press(number, outputs)?;

@@ -22,7 +22,8 @@ use super::super::recordings::is_recording;
 use super::super::{Common, print};
 use super::frames::{hear_scans, missing, values};
 use super::scan::{
-    Confidence, ScanArguments, Wanted, check_length, configure, patience, reading_names, tolerance,
+    Confidence, ScanArguments, Wanted, check_length, configure, patience, patience_for_next,
+    reading_names, tolerance,
 };
 
 #[derive(Args)]
@@ -145,7 +146,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         names.extend(confidence_names(model, action.confidence, &names)?);
     }
     let every = action.report_every;
-    let patience = patience(&action.scan, &identity) * every.into();
+    let patience = patience_for_next(&action.scan, &identity) * every.into();
     let filter = action.filter.settings();
     if filter.is_on() && wanted == Wanted::Readings {
         let message = "--filter-ms filters estimates, and readings are saved: name the MODEL, without --readings";

@@ -95,8 +95,18 @@ pub fn configure(
 /// Longest time of a sample, with any converter that the readout is written for.
 const SLOWEST_SAMPLE_NS: u32 = 100_000;
 
-/// Time within which so many frames must have come.
+/// Time within which all frames must have come.
 pub fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
+    Duration::from_secs(2) + 4 * u32::from(scan.frames) * longest_period(scan, identity)
+}
+
+/// Longest time without a frame. Some are lost where the line cannot carry all.
+pub fn patience_for_next(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
+    Duration::from_secs(3) + 40 * longest_period(scan, identity)
+}
+
+/// Longest time from scan to scan.
+fn longest_period(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
     let plan = ScanPlan {
         rows: identity.rows as u16,
         columns: identity.columns as u16,
@@ -110,8 +120,7 @@ pub fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
         row_ns: SLOWEST_SAMPLE_NS,
         between_passes_ns: 0,
     };
-    let period = Duration::from_micros(scan.period_us.max(plan.longest_us()).into());
-    Duration::from_secs(2) + 4 * u32::from(scan.frames) * period
+    Duration::from_micros(scan.period_us.max(plan.longest_us()).into())
 }
 
 /// Names of the readings in a frame: those of the `model` that is active on the device, or else of its wires.

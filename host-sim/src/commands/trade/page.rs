@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::evaluate::trade::{Memory, Point, Trade, Wires};
 use crate::metrics;
+use crate::report::format::significant;
 use crate::verdict::Verdict;
 
 use super::others;
@@ -224,6 +225,7 @@ fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
         (point.samples_averaged > 1).then(|| format!(" --oversampling {}", point.samples_averaged));
     let tolerance = trade
         .rest_tolerance(chosen)
+        .map(|tolerance| significant(tolerance, 3))
         .map(|tolerance| format!(" --rest-tolerance {tolerance} (once it has a baseline)"));
     let filter = point.filter.map(|filter| {
         format!(" --filter-ms {} --lead-ms {}", filter.time_constant_ms, filter.lead_ms)

@@ -52,7 +52,12 @@ impl Exponents {
     pub(super) fn new(samples: &Samples<'_>, centres: &[f64], options: &Options) -> Result<Self> {
         let (inputs, outputs) = (samples.inputs(), samples.table.outputs.names.len());
         let refused = |why: String| {
-            let rule = format!("{why}; give a larger spread, or another format (f32)");
+            let array = if options.whole_array {
+                ""
+            } else {
+                ", or one network for the whole array, which has fewer inputs (--whole-array)"
+            };
+            let rule = format!("{why}; give a larger spread, or another format (f32){array}");
             Error::from(BadValue::new("spread", options.spread, rule))
         };
         if inputs > MOST_INPUTS {
