@@ -85,6 +85,9 @@ struct Saved {
     /// Frames a second that the device scanned: fewer than it was asked for if it misses some, such as those that the line
     /// cannot carry. `None` for a baseline.
     frames_per_s: Option<f64>,
+    /// Time from scan to scan that was asked for.
+    #[serde(skip)]
+    asked_period_us: u32,
     /// Frame numbers missing between the first frame and the last: lost on the line.
     frames_lost: u32,
     /// Readings or outputs that are empty.
@@ -97,6 +100,9 @@ struct Saved {
     noise: Option<Spectrum>,
     file: PathBuf,
 }
+
+/// Share of the frames that were asked for below which the device misses some.
+const MISSED: f64 = 0.98;
 
 /// Checks before long work that the options go together, and that the file can be written.
 fn check_usage(action: &RecordArguments) -> Result<()> {
@@ -203,6 +209,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let saved = Saved {
         frames,
         frames_per_s,
+        asked_period_us: action.scan.period_us,
         frames_lost,
         values_missing,
         rows_at_rest,
@@ -320,6 +327,7 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
     let saved = Saved {
         frames: frames.into(),
         frames_per_s: None,
+        asked_period_us: action.scan.period_us,
         frames_lost: 0,
         values_missing,
         rows_at_rest: 0,
@@ -344,7 +352,16 @@ impl Saved {
             self.values_missing
         ));
         if let Some(rate) = self.frames_per_s {
-            page.line(format_args!("{rate:.1} frames a second were scanned"));
+            let asked = 1e6 / f64::from(self.asked_period_us.max(1));
+            page.line(if rate < MISSED * asked {
+                format!(
+                    "{rate:.1} frames a second were scanned, of the {asked:.1} asked for: scanning, decoding and sending take longer \
+                     than --period-us {}",
+                    self.asked_period_us
+                )
+            } else {
+                format!("{rate:.1} frames a second were scanned")
+            });
         }
         if self.rows_at_rest > 0 {
             page.line(format_args!("{} rows were untouched, and not decoded", self.rows_at_rest));
