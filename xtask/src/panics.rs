@@ -10,8 +10,8 @@ use object::{Object, ObjectSection};
 use crate::process::{Outcome, root};
 
 /// Where the files are listed that may panic, since that cannot be reached: others' files alone.
-const LIST: &str = "docs/board.md";
-const HEADING: &str = "### Panics that cannot be reached";
+const LIST: &str = "firmware/README.md";
+const HEADING: &str = "## Panics that cannot be reached";
 
 /// Fails if `image` has a place of a panic that is not listed, or none at one that is, if it has `all` that are listed.
 pub fn check(image: &Path, all: bool) -> Outcome {
@@ -101,7 +101,7 @@ mod tests {
             compare(&found, &["firmware/src/gone.rs".to_owned()]),
             [
                 "firmware/src/link.rs can panic, in lines [12]",
-                "docs/board.md lists firmware/src/gone.rs, which cannot panic"
+                "firmware/README.md lists firmware/src/gone.rs, which cannot panic"
             ]
         );
     }
