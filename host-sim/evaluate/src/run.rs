@@ -197,7 +197,8 @@ pub fn run(
         over_time = of_log(data, &network, &estimate, at_rest);
         let last_lines = data.log.lines.last() < data.test_log.lines.first();
         if over_time.is_some() && last_lines && data.is_one_log {
-            verdict = verdict.at_the_end_of_a_log();
+            let rest = data.test_rest.as_ref().filter(|_| data.training.relative_inputs);
+            verdict = verdict.at_the_end_of_a_log(rest.is_some_and(|rest| rest.lines.is_some()));
         }
     }
     let mut result = RunResult {

@@ -128,7 +128,7 @@ impl<'s> TrainingSet<'s> {
 
     /// RMSE of the best linear decoder for each output, one fold after the other held out. Empty with a single fold, or if an
     /// output has no value.
-    fn linear_rmse(&self) -> Vec<f64> {
+    pub(crate) fn linear_rmse(&self) -> Vec<f64> {
         /// Folds of a scene's frames: successive ones, since those of a moving touch resemble each other.
         const FOLDS: usize = 5;
         let frames = self.frames.frames();

@@ -113,10 +113,13 @@ impl Verdict {
             .with(at_rest.and_then(Warning::correlated_noise))
     }
 
-    /// Adds that the frames to judge by are the end of a log.
+    /// Adds that the frames to judge by are the end of a log, and whether their baseline is `renewed` in each of its pauses.
     #[must_use]
-    pub fn at_the_end_of_a_log(mut self) -> Self {
+    pub fn at_the_end_of_a_log(mut self, renewed: bool) -> Self {
         self.sentence += " These are errors at the end of the log, later than all that the model was trained on.";
+        if renewed {
+            self.sentence += " The baseline was renewed in each pause; a device keeps one until it takes another.";
+        }
         self
     }
 

@@ -95,6 +95,10 @@ fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes(
     let judged = checked(&folder, &schema(), &eval);
     let run = [&["run", "log.csv", "--relative-inputs", "--json"], &COLUMNS[..]].concat();
     let run: Value = serde_json::from_str(&folder.succeed(&run)).unwrap();
+    assert!(
+        run["verdict"]["sentence"].as_str().unwrap().contains("renewed in each pause"),
+        "{run}"
+    );
     let ratio = force_rmse(&judged) / force_rmse(&run);
     assert!((0.8..1.25).contains(&ratio), "{ratio}");
     assert!(std::fs::read_to_string(folder.path("eval.html")).unwrap().contains("Over time"));

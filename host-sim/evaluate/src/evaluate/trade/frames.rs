@@ -77,7 +77,8 @@ impl<'s> Frames<'s> {
         let noise = subject
             .scene()
             .map(|scene| plan.device.averaged(scene.world.noise, wires, samples_averaged));
-        let (set, test) = subject.sets(noise);
+        let (mut set, test) = subject.sets(noise);
+        set.origin.linear_rmse = set.linear_rmse();
         let touches = subject.scene().and_then(|scene| {
             let synthesis = Synthesis::new(&scene.world).noise(noise?);
             let passes = plan.device.passes(samples_averaged);
