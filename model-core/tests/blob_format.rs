@@ -47,7 +47,6 @@ fn metadata() -> Metadata<'static> {
         output_units: Columns("mm\nmm"),
         training_rmse: Floats(&[0, 0, 0x80, 0x3d, 0, 0, 0x80, 0x3d]), // 0.0625 twice
         full_scale: Floats(&[0, 0, 0x80, 0x3f, 0, 0, 0x80, 0x3f]),    // 1 twice
-        linear_rmse: Floats(&[]),
     }
 }
 
@@ -91,20 +90,17 @@ fn relative_inputs_are_a_section_of_one_byte_before_all_others() {
     assert_eq!((&blob[131..136], &blob[139..176]), (&plain[130..135], &plain[139..176]));
 }
 
-fn with_linear_errors(rmse: &[u8]) -> Metadata<'_> {
-    Metadata { linear_rmse: Floats(rmse), ..metadata() }
-}
-
 #[test]
-fn errors_of_the_linear_decoder_are_a_section_behind_the_metadata() {
+fn errors_of_the_linear_decoder_are_a_section_before_the_networks() {
     let (mut plain, mut buffer) = (Aligned([0; 512]), Aligned([0; 512]));
     let networks = [network()];
     let rmse = [0, 0, 0, 0x3e, 0, 0, 0x40, 0x3e]; // 0.125, 0.1875
-    let parts = ModelParts::new(&networks, &[0, 0], with_linear_errors(&rmse));
+    let without = ModelParts::new(&networks, &[0, 0], metadata());
+    let parts = ModelParts { linear_rmse: Floats(&rmse), ..without };
     let blob = encode(&parts, &mut buffer.0).unwrap();
     assert!(blob.len() <= encoded_length_bound(&parts));
     let model = Model::decode(blob).unwrap();
-    assert_eq!(model.metadata().linear_rmse.iter().collect::<Vec<_>>(), [0.125, 0.1875]);
+    assert_eq!(model.linear_rmse().iter().collect::<Vec<_>>(), [0.125, 0.1875]);
     assert_eq!(model.networks().collect::<Vec<_>>(), [network()]);
     // Tag and length; the errors; then the network's section, as without them.
     let plain = small_model(&mut plain.0);
@@ -112,7 +108,7 @@ fn errors_of_the_linear_decoder_are_a_section_behind_the_metadata() {
     assert_eq!(&blob[140..145], &plain[130..135]);
 
     let mut refused = |rmse: &[u8]| {
-        let parts = ModelParts::new(&networks, &[0, 0], with_linear_errors(rmse));
+        let parts = ModelParts { linear_rmse: Floats(rmse), ..without };
         encode(&parts, &mut buffer.0).unwrap_err()
     };
     let what = "bytes of linear errors";

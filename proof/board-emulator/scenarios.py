@@ -548,7 +548,7 @@ def serve(make, files):
     """A board for you: its serial port stays open until Ctrl-C."""
     bench = make()
     terminal = Terminal(bench.board)
-    # They hang on the settling and the samples, which a user may configure.
+    # Both depend on the settling time and the number of samples, which a user may configure.
     bench.board.rules.waived = {"row-left", "wait-short"}
     bench.board.note(f"the image nucleo-f446re, resistances that never change: host-sim link {terminal.path} identify")
     stopped = []

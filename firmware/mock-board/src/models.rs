@@ -125,15 +125,7 @@ pub fn parts<'a>(
     row_network: &'a [u8],
     metadata: Metadata<'a>,
 ) -> ModelParts<'a> {
-    ModelParts {
-        projection: None,
-        expansion: None,
-        confidence: None,
-        fill: None,
-        networks,
-        row_network,
-        metadata,
-    }
+    ModelParts::new(networks, row_network, metadata)
 }
 
 /// A blob of one network with this `shape`, which has one row, and this `metadata`.

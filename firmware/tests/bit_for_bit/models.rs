@@ -261,10 +261,7 @@ fn encoded_with(
         projection,
         expansion,
         confidence,
-        fill: None,
-        networks,
-        row_network,
-        metadata,
+        ..ModelParts::new(networks, row_network, metadata)
     };
     encode_to_vec(&parts).unwrap()
 }

@@ -2,7 +2,7 @@
 //! more than the decoders do, so all of them are always given.
 
 use serde::Serialize;
-use taxel_core::blob::Metadata;
+use taxel_core::blob::Model;
 use taxel_data::{Dataset, Table, columns};
 use taxel_learn::Decoder;
 use taxel_limit::reference::GroupLimit;
@@ -112,12 +112,12 @@ pub struct GroupRmse {
 
 /// RMSE of the best linear decoder by group of outputs, on frames of the model's training that it was not fitted to. Empty
 /// if the model does not tell it.
-pub fn linear_at_training(metadata: &Metadata<'_>) -> Vec<GroupRmse> {
-    let rmse: Vec<f64> = metadata.linear_rmse.iter().map(f64::from).collect();
+pub fn linear_at_training(model: &Model<'_>) -> Vec<GroupRmse> {
+    let rmse: Vec<f64> = model.linear_rmse().iter().map(f64::from).collect();
     if rmse.is_empty() {
         return vec![];
     }
-    let names: Vec<String> = metadata.output_names.iter().map(str::to_owned).collect();
+    let names: Vec<String> = model.metadata().output_names.iter().map(str::to_owned).collect();
     let groups = columns::groups(&names);
     let pooled = pooled(&groups, &rmse).into_iter().zip(&groups);
     let of = |(rmse, (group, _)): (f64, &(&str, Vec<usize>))| GroupRmse {

@@ -90,6 +90,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
         projection,
         expansion,
         confidence: None,
+        linear_rmse: Floats(&linear_rmse),
         fill: None,
         networks: &views,
         row_network: &row_network,
@@ -108,7 +109,6 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
             output_units: Columns(&output_units),
             training_rmse: Floats(&training_rmse),
             full_scale: Floats(&full_scale),
-            linear_rmse: Floats(&linear_rmse),
         },
     };
     Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(not_packed)? })
@@ -226,6 +226,7 @@ pub(crate) fn rebuild(
         projection: model.projection(),
         expansion: model.expansion(),
         confidence,
+        linear_rmse: model.linear_rmse(),
         fill,
         networks,
         row_network: &row_network,

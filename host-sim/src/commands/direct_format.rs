@@ -27,17 +27,23 @@ fn why(options: &Options, frames: Option<&Dataset>) -> String {
                 twice as long as one width in f32 (docs/formats.md)"
             .into();
     }
-    let fix = frames.map_or("--format fixed16 or --whole-array may avoid it".into(), |frames| {
+    let fix = frames.map_or("--format fixed16 may hold it".into(), |frames| {
         let step = frames.frames().div_ceil(TRIED);
         let few: Vec<usize> = (0..frames.frames()).step_by(step).collect();
         let fixed = Options { format: Format::Fixed16, ..*options };
+        if few.len() <= options.centres {
+            return "--format fixed16 may hold it".to_owned();
+        }
         if taxel_learn::train::train(&frames.subset(&few), &fixed, &Silent).is_ok() {
             return "use --format fixed16".to_owned();
         }
+        let fewer = projection::features_at_most(frames, 16);
+        if options.whole_array || fewer == 0 {
+            return "--format fixed16 does not hold it either at this --spread".to_owned();
+        }
         format!(
-            "--format fixed16 does not hold it either at this --spread; --whole-array --features {} gives the network \
-             fewer inputs",
-            projection::features_at_most(frames, 16)
+            "--format fixed16 does not hold it either at this --spread; --whole-array --features {fewer} gives the network \
+             fewer inputs"
         )
     });
     format!(

@@ -7,7 +7,7 @@ use crate::evaluate::confidence::{Coverage, coverage};
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
 use crate::measurements::{Log, Spread};
-use crate::metrics::{self, DecoderErrors, Errors, GroupRmse, LimitSummary, Measure};
+use crate::metrics::{self, DecoderErrors, Errors, GroupRmse, LimitSummary, Measure, NETWORK};
 use crate::over_time::{self, Decoded, OverTime, RestOverTime};
 use crate::report::format::{grouped, significant};
 use crate::report::{self, Made, View};
@@ -18,6 +18,7 @@ use serde::Serialize;
 use taxel_core::blob::Metadata;
 use taxel_data::dataset::UnusedInputs;
 use taxel_data::{Clock, DataFile, output};
+use taxel_learn::decoders::mean;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
@@ -156,10 +157,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         metadata.input_names.iter().chain(metadata.output_names.iter()).collect();
     let same_file = metadata.scene_digest == file.digest(&names)? && knows(metadata, &file)?;
     let values_evaluated = errors.iter().map(|group| group.count).sum();
-    let of = |decoder: &str, errors| DecoderErrors { decoder: decoder.into(), errors };
     let mean_errors = metrics::by_group(&truth, &means, &measure);
     let at_rest = over_time.as_ref().and_then(|log| log.rest.as_ref());
-    let decoders = vec![of("network", errors), of("mean", mean_errors)];
+    let decoders =
+        vec![DecoderErrors::new(NETWORK, errors), DecoderErrors::new(mean::NAME, mean_errors)];
     let verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
@@ -172,7 +173,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         data_file: arguments.data.clone(),
         verdict,
         decoders,
-        linear_at_training: metrics::linear_at_training(metadata),
+        linear_at_training: metrics::linear_at_training(&parsed),
         coverage: deviations.map_or(vec![], |deviations: Vec<f64>| {
             coverage(&truth, &estimate.values, &deviations, ratios_95)
         }),

@@ -64,7 +64,7 @@ impl BaselineArgument {
             (Some(file), true) => {
                 let names = metadata.input_names.iter();
                 let untouched = fields.read(file)?;
-                warn_of_touches(&untouched, metadata)?;
+                warn_of_touches(&untouched, metadata);
                 let baseline = baseline(&untouched, names, limits)?;
                 let missing = unusable(&baseline);
                 if !missing.is_empty() {
@@ -124,18 +124,17 @@ fn usual_lines<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Res
 }
 
 /// Warns of lines that are no baseline: `file` has outputs of a model with this `metadata`, and they are not zero there.
-fn warn_of_touches(file: &DataFile, metadata: &Metadata<'_>) -> Result<()> {
+fn warn_of_touches(file: &DataFile, metadata: &Metadata<'_>) {
     /// Share of an output's full scale from which on the sensor is touched.
     const TOUCHED: f64 = 0.05;
     let mut touched = vec![false; file.lines()];
     for (name, full_scale) in metadata.output_names.iter().zip(metadata.full_scale.iter()) {
-        if !is_zero_at_rest(name) || file.column_of_any(name).is_err() {
+        let Ok(column) = file.column_of_any(name) else { continue };
+        if !is_zero_at_rest(name) {
             continue;
         }
-        for column in file.columns([name])? {
-            for (line, touched) in touched.iter_mut().enumerate() {
-                *touched |= file.value(line, column).abs() > TOUCHED * f64::from(full_scale);
-            }
+        for (line, touched) in touched.iter_mut().enumerate() {
+            *touched |= file.value(line, column).abs() > TOUCHED * f64::from(full_scale);
         }
     }
     let count = touched.iter().filter(|touched| **touched).count();
@@ -147,7 +146,6 @@ fn warn_of_touches(file: &DataFile, metadata: &Metadata<'_>) -> Result<()> {
             file.path.display()
         ));
     }
-    Ok(())
 }
 
 /// Names of the columns of `baseline` that no reading can be divided by.

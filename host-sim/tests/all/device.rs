@@ -56,10 +56,7 @@ fn with_confidence(model: &ModelBlob) -> ModelBlob {
         projection: model.projection(),
         expansion: model.expansion(),
         confidence: Some(Confidence::new(sizes, &block).unwrap()),
-        fill: None,
-        networks: &networks,
-        row_network: &row_network,
-        metadata: *model.metadata(),
+        ..ModelParts::new(&networks, &row_network, *model.metadata())
     };
     ModelBlob::of_bytes(&encode_to_vec(&parts).unwrap()).unwrap()
 }

@@ -34,7 +34,8 @@ pub struct Model<'a> {
     /// Directions and components of the confidence.
     confidence_sizes: [u16; 2],
     networks: u8,
-    /// The fill's section, if there is one, and those of the networks: nothing else is kept of the fill, to save RAM.
+    /// The sections of the linear decoder's errors and of the fill, if there are any, and those of the networks: nothing else
+    /// is kept of the first two, to save RAM.
     last_sections: &'a [u8],
 }
 
@@ -65,8 +66,7 @@ impl<'a> Model<'a> {
 
         let (section, rest) = take::<MetadataSection>(rest, "metadata")?;
         let (relative_inputs, rest) = take_relative_inputs(rest);
-        let (linear_rmse, rest) = take_linear(rest, shape)?;
-        let metadata = checked_metadata(&section, relative_inputs, linear_rmse, shape)?;
+        let metadata = checked_metadata(&section, relative_inputs, shape)?;
         let (projection, rest) = take_projection(rest, shape)?;
         if projection.is_some() {
             check_count("networks behind a projection", 1, networks.into())?;
@@ -77,7 +77,11 @@ impl<'a> Model<'a> {
         };
         let (confidence, rest) = take_confidence(rest, shape)?;
         let last_sections = rest;
-        let (fill, network_sections) = cut_fill(last_sections, shape)?;
+        let (linear_rmse, rest) = take_linear(last_sections, shape)?;
+        if !linear_rmse.iter().all(in_range) {
+            return Err(DecodeError::InvalidMetadata { field: "linear error" });
+        }
+        let (fill, network_sections) = cut_fill(rest, shape)?;
         if let Some(fill) = fill {
             if relative_inputs {
                 return Err(DecodeError::Malformed { section: "fill of relative inputs" });
@@ -195,9 +199,17 @@ impl<'a> Model<'a> {
         self.cut_fill().0
     }
 
+    /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if the
+    /// model does not tell it.
+    pub fn linear_rmse(&self) -> Floats<'a> {
+        take_linear(self.last_sections, self.shape).map_or(Floats(&[]), |(rmse, _)| rmse)
+    }
+
     /// The fill, and the sections of the networks.
     fn cut_fill(&self) -> (Option<Fill<'a>>, &'a [u8]) {
-        cut_fill(self.last_sections, self.shape).unwrap_or_default()
+        let rest =
+            take_linear(self.last_sections, self.shape).map_or(self.last_sections, |it| it.1);
+        cut_fill(rest, self.shape).unwrap_or_default()
     }
 
     /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows, or the
@@ -289,10 +301,14 @@ fn check_tag(expected: u8, found: u8) -> Result<(), DecodeError> {
     if expected == found { Ok(()) } else { Err(DecodeError::SectionOrder { expected, found }) }
 }
 
+/// Whether an error, or what else cannot be negative, is one.
+fn in_range(value: f32) -> bool {
+    value.is_finite() && value >= 0.0
+}
+
 fn checked_metadata<'a>(
     section: &MetadataSection<'a>,
     relative_inputs: bool,
-    linear_rmse: &'a [u8],
     shape: ModelShape,
 ) -> Result<Metadata<'a>, DecodeError> {
     check_tag(TAG_METADATA, section.tag)?;
@@ -311,7 +327,6 @@ fn checked_metadata<'a>(
         output_units: Columns(section.output_units),
         training_rmse: Floats(section.training_rmse),
         full_scale: Floats(section.full_scale),
-        linear_rmse: Floats(linear_rmse),
     };
     let (inputs, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
     check_count("input names", inputs, metadata.input_names.iter().count())?;
@@ -320,13 +335,11 @@ fn checked_metadata<'a>(
     check_count("output units", outputs, metadata.output_units.iter().count())?;
     check_count("bytes of training errors", outputs * 4, section.training_rmse.len())?;
     check_count("bytes of full scales", outputs * 4, section.full_scale.len())?;
-    let in_range = |v: f32| v.is_finite() && v >= 0.0;
     for (field, ok) in [
         ("noise level", in_range(metadata.noise_level)),
         ("thickness", in_range(metadata.thickness_mm)),
         ("training error", metadata.training_rmse.iter().all(in_range)),
         ("full scale", metadata.full_scale.iter().all(in_range)),
-        ("linear error", metadata.linear_rmse.iter().all(in_range)),
     ] {
         if !ok {
             return Err(DecodeError::InvalidMetadata { field });

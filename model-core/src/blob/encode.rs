@@ -12,7 +12,7 @@ use super::format::{
     TAG_CONFIDENCE, TAG_EXPANSION, TAG_FILL, TAG_LINEAR, TAG_METADATA, TAG_PROJECTION,
     TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
-use super::metadata::Metadata;
+use super::metadata::{Floats, Metadata};
 use crate::checksum::CRC_32;
 use crate::confidence::Confidence;
 use crate::expansion::Expansion;
@@ -29,6 +29,9 @@ pub struct ModelParts<'a> {
     pub expansion: Option<Expansion<'a>>,
     /// Confidence in the outputs.
     pub confidence: Option<Confidence<'a>>,
+    /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if it
+    /// is not known.
+    pub linear_rmse: Floats<'a>,
     /// What fills missing readings from the others; only for readings as they are.
     pub fill: Option<Fill<'a>>,
     /// The networks; all have the same number of inputs and of outputs.
@@ -43,7 +46,17 @@ impl<'a> ModelParts<'a> {
     /// Networks that decode rows from their readings, and nothing else. Each row has an index into `networks`.
     pub fn new(networks: &'a [Network<'a>], row_network: &'a [u8], metadata: Metadata<'a>) -> Self {
         let (projection, expansion, confidence, fill) = (None, None, None, None);
-        Self { projection, expansion, confidence, fill, networks, row_network, metadata }
+        let linear_rmse = Floats(&[]);
+        Self {
+            projection,
+            expansion,
+            confidence,
+            linear_rmse,
+            fill,
+            networks,
+            row_network,
+            metadata,
+        }
     }
 }
 
@@ -58,7 +71,7 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
         + m.input_units.0.len()
         + m.output_names.0.len()
         + m.output_units.0.len();
-    let errors = m.training_rmse.0.len() + m.linear_rmse.0.len();
+    let errors = m.training_rmse.0.len() + parts.linear_rmse.0.len();
     let numbers = errors + m.full_scale.0.len() + parts.row_network.len();
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
     let blocks = [
@@ -140,9 +153,6 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     if m.relative_inputs {
         writer.put(&TAG_RELATIVE_INPUTS)?;
     }
-    if !m.linear_rmse.0.is_empty() {
-        writer.put(&LinearSection { tag: TAG_LINEAR, rmse: m.linear_rmse.0 })?;
-    }
     if let Some(projection) = parts.projection {
         if projection.features() == inputs {
             writer.put(&TAG_PROJECTION)?;
@@ -163,6 +173,9 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         let components = fit("number of components", sizes.components, u16::MAX)?;
         writer.put(&ConfidenceHeader { tag: TAG_CONFIDENCE, directions, components })?;
         writer.put_block(&[bytemuck::cast_slice(confidence.block())])?;
+    }
+    if !parts.linear_rmse.0.is_empty() {
+        writer.put(&LinearSection { tag: TAG_LINEAR, rmse: parts.linear_rmse.0 })?;
     }
     if let Some(fill) = parts.fill {
         let factors = fit("number of factors", fill.factors(), u16::MAX)?;

@@ -97,9 +97,6 @@ pub struct Metadata<'a> {
     pub training_rmse: Floats<'a>,
     /// Full scale of each output for %FS, in the output's unit.
     pub full_scale: Floats<'a>,
-    /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to. Empty if
-    /// it is not known.
-    pub linear_rmse: Floats<'a>,
 }
 
 /// Largest number of inputs, and of outputs, in all rows that [`Metadata::unnamed`] serves.
@@ -155,7 +152,6 @@ impl Metadata<'static> {
             output_units: columns(&NO_UNITS, outputs),
             training_rmse: Floats(&ZEROS[..4 * outputs]),
             full_scale: Floats(&ZEROS[..4 * outputs]),
-            linear_rmse: Floats(&[]),
         }
     }
 }

@@ -6,7 +6,7 @@ use super::format::{
     ProjectionHeader, TAG_CONFIDENCE, TAG_EXPANSION, TAG_FILL, TAG_LINEAR, TAG_PROJECTION,
     TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
-use super::metadata::ModelShape;
+use super::metadata::{Floats, ModelShape};
 use crate::confidence::{Confidence, Sizes};
 use crate::expansion::Expansion;
 use crate::fill::{self, Fill};
@@ -68,13 +68,17 @@ pub(super) fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
 }
 
 /// Cuts the errors of the linear decoder from the front of `bytes`: four bytes an output, or nothing without the section.
-pub(super) fn take_linear(bytes: &[u8], shape: ModelShape) -> Result<(&[u8], &[u8]), DecodeError> {
+pub(super) fn take_linear(
+    bytes: &[u8],
+    shape: ModelShape,
+) -> Result<(Floats<'_>, &[u8]), DecodeError> {
     if bytes.first() != Some(&TAG_LINEAR) {
-        return Ok((&[], bytes));
+        return Ok((Floats(&[]), bytes));
     }
     let (section, rest) = take::<LinearSection>(bytes, "linear section")?;
-    check_count("bytes of linear errors", shape.rows * shape.outputs * 4, section.rmse.len())?;
-    Ok((section.rmse, rest))
+    let bytes = shape.rows.saturating_mul(shape.outputs).saturating_mul(4);
+    check_count("bytes of linear errors", bytes, section.rmse.len())?;
+    Ok((Floats(section.rmse), rest))
 }
 
 /// Cuts the projection from the front of `bytes` if there is one, and checks it.

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::expansion::Expansion;
 use taxel_core::projection::Projection;
 use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
@@ -95,6 +95,7 @@ pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
         projection: design.projection.then_some(projection),
         expansion: design.components.map(|_| expansion.map_err(|it| failed(&it))).transpose()?,
         confidence: None,
+        linear_rmse: Floats(&[]),
         fill: None,
         networks: &[network],
         row_network: &vec![0; rows],

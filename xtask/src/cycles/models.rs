@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use taxel_core::blob::{ModelParts, encode_to_vec};
+use taxel_core::blob::{Floats, ModelParts, encode_to_vec};
 use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Silent, Stream};
 use taxel_learn::{ModelBlob, Options, Origin, pack, train as trainer};
@@ -92,6 +92,7 @@ fn blob(dataset: &Dataset, options: &Options, origin: &Origin) -> Outcome<Vec<u8
         projection: model.projection(),
         expansion: model.expansion(),
         confidence: None,
+        linear_rmse: Floats(&[]),
         fill: None,
         networks: &[first],
         row_network: &vec![0; model.shape().rows],

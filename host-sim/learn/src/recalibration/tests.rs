@@ -386,6 +386,7 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
         let parsed = model.model();
         let rmse = [rmse; 36].iter().flat_map(|rmse| rmse.to_le_bytes()).collect::<Vec<u8>>();
         let parts = ModelParts {
+            linear_rmse: Floats(&[]),
             projection: None,
             expansion: None,
             confidence: None,

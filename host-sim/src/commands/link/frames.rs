@@ -36,9 +36,12 @@ pub fn hear_scans(
     while scans.len() < count {
         let next = device.hear(Instant::now() + patience, |_, report| assembler.take(report))?;
         let Some(scan) = next else {
+            let why = match scans.len() {
+                0 => "does it scan? `identify` counts its frames",
+                _ => "does the line carry them? Give a longer --period-us",
+            };
             return Err(Error::failed(format!(
-                "{} of {count} frames came, and then none for {:.0} s: does the line carry them? --period-us or --report-every \
-                 makes fewer",
+                "{} of {count} frames came, and then none for {:.0} s: {why}",
                 scans.len(),
                 patience.as_secs_f64()
             )));

@@ -121,7 +121,7 @@ fn record_presses(
     outputs: &Table,
 ) -> Result<Table> {
     let (names, patience) =
-        (reading_names(identity, Some(model))?, patience_for_next(scan, identity));
+        (reading_names(identity, Some(model))?, patience_for_next(scan, identity, 1));
     let mut values = Vec::new();
     for number in 0..outputs.len() {
         ask_for_press(number, outputs)?;

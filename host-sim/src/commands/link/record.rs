@@ -152,7 +152,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         names.extend(confidence_names(model, action.confidence, &names)?);
     }
     let every = action.report_every;
-    let patience = patience_for_next(&action.scan, &identity) * every.into();
+    let patience = patience_for_next(&action.scan, &identity, every);
     let filter = action.filter.settings();
     if filter.is_on() && wanted == Wanted::Readings {
         let message = "--filter-ms filters estimates, and readings are saved: name the MODEL, without --readings";
@@ -355,8 +355,8 @@ impl Saved {
             let asked = 1e6 / f64::from(self.asked_period_us.max(1));
             page.line(if rate < MISSED * asked {
                 format!(
-                    "{rate:.1} frames a second were scanned, of the {asked:.1} asked for: scanning, decoding and sending take longer \
-                     than --period-us {}",
+                    "{rate:.1} frames a second were scanned, of the {asked:.1} asked for: scanning and decoding take longer than \
+                     --period-us {}, at least in every 16th frame",
                     self.asked_period_us
                 )
             } else {

@@ -100,9 +100,10 @@ pub fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
     Duration::from_secs(2) + 4 * u32::from(scan.frames) * longest_period(scan, identity)
 }
 
-/// Longest time without a frame. Some are lost where the line cannot carry all.
-pub fn patience_for_next(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
-    Duration::from_secs(3) + 40 * longest_period(scan, identity)
+/// Longest time without a frame, if one of `every` so many is sent. Some are lost where the line cannot carry all.
+pub fn patience_for_next(scan: &ScanArguments, identity: &DeviceIdentity, every: u16) -> Duration {
+    let periods = 40.max(4 * u32::from(every));
+    Duration::from_secs(3) + periods * longest_period(scan, identity)
 }
 
 /// Longest time from scan to scan.

@@ -86,8 +86,9 @@ impl<'s> Frames<'s> {
         });
         let mut options = subject.options();
         if subject.scene().is_some_and(|scene| scene.world.sensor.read_columns.is_some()) {
-            // Fewer columns than the scene's features were chosen for have no more than these.
-            options.features = options.features.map(|wanted| features_at_most(&set.frames, wanted));
+            // A choice of fewer columns has fewer features: as many as there are.
+            let possible = |wanted| features_at_most(&set.frames, wanted).max(1);
+            options.features = options.features.map(possible);
         }
         let arrays: &[bool] = match (of_array, set.frames.rows) {
             (true, _) => &[true],

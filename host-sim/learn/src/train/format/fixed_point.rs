@@ -31,6 +31,8 @@ const ONE: f64 = 32_768.0;
 const ACTIVATION_ERROR: f64 = 2.0e-4;
 /// Largest magnitude of a 16-bit weight.
 const MOST: f64 = 32_767.0;
+/// Inputs with which exponents stay small at usual widths.
+const FEW_INPUTS: usize = 16;
 /// Largest magnitude of a sum: a little below 2³¹.
 const MOST_SUM: f64 = 2_147_000_000.0;
 
@@ -52,12 +54,7 @@ impl Exponents {
     pub(super) fn new(samples: &Samples<'_>, centres: &[f64], options: &Options) -> Result<Self> {
         let (inputs, outputs) = (samples.inputs(), samples.table.outputs.names.len());
         let refused = |why: String| {
-            let array = if options.whole_array {
-                ""
-            } else {
-                ", or one network for the whole array, which has fewer inputs (--whole-array)"
-            };
-            let rule = format!("{why}; give a larger spread, or another format (f32){array}");
+            let rule = format!("{why}; give a larger spread, or another format (f32)");
             Error::from(BadValue::new("spread", options.spread, rule))
         };
         if inputs > MOST_INPUTS {
@@ -96,7 +93,12 @@ impl Exponents {
             let square: u64 = a.iter().map(|a| u64::from(a.unsigned_abs()).pow(2)).sum();
             let b = (u128::from(square) << 32).div_ceil(decay as u128) as u64;
             let b = u32::try_from(b + u64::from(EXPONENT_MARGIN) + 1);
-            let too_far = |_| refused("exponents of fixed16 end at 64".into());
+            let fewer = if options.whole_array || inputs <= FEW_INPUTS {
+                String::new()
+            } else {
+                format!(" (--whole-array --features {FEW_INPUTS} gives a network fewer inputs)")
+            };
+            let too_far = |_| refused(format!("exponents of fixed16 end at 64{fewer}"));
             lines.push(b.map_err(too_far)?);
             lines.extend(a.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
         }
