@@ -7,7 +7,7 @@ use std::path::Path;
 
 use object::{Object, ObjectSection};
 
-use crate::process::{Outcome, root};
+use crate::process::{Outcome, read};
 
 /// Where the files are listed that may panic, since that cannot be reached: others' files alone.
 const LIST: &str = "firmware/README.md";
@@ -20,7 +20,7 @@ pub fn check(image: &Path, all: bool) -> Outcome {
     let file = object::File::parse(&*bytes).map_err(|cause| failed(cause.to_string()))?;
     let section = file.section_by_name(".rodata").ok_or(failed("there is no .rodata".into()))?;
     let constants = section.data().map_err(|cause| failed(cause.to_string()))?;
-    let page = fs::read_to_string(root().join(LIST)).map_err(|cause| format!("{LIST}: {cause}"))?;
+    let page = read(LIST)?;
     let found = places(constants, section.address());
     let mut listed = listed(&page);
     listed.retain(|file| all || found.contains_key(file));

@@ -41,7 +41,6 @@ pub use host::{
 };
 pub use models::{
     blob, blob_of, blob_of_a_row, blob_of_components, blob_of_length, blob_with_confidence, crc_of,
-    parts,
 };
 pub use shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
 pub use source::Source;

@@ -67,7 +67,7 @@ pub fn blob_of_length(bytes: usize) -> AlignedBytes {
     let networks: Vec<_> = model.networks().collect();
     let named = |length: usize| {
         let name = &"x".repeat(length);
-        let parts = parts(&networks, &[0; ROWS], Metadata { name, ..*model.metadata() });
+        let parts = ModelParts::new(&networks, &[0; ROWS], Metadata { name, ..*model.metadata() });
         encode_to_vec(&parts).unwrap()
     };
     (0..bytes).map(named).find(|blob| blob.len() == bytes).unwrap()
@@ -82,7 +82,7 @@ fn blob_with(
     let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
     let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
     let networks = [network];
-    let parts = ModelParts { confidence, ..parts(&networks, &[0; ROWS], metadata) };
+    let parts = ModelParts { confidence, ..ModelParts::new(&networks, &[0; ROWS], metadata) };
     encode_to_vec(&parts).unwrap()
 }
 
@@ -114,18 +114,9 @@ pub fn blob_of_components(components: usize) -> AlignedBytes {
     let parts = ModelParts {
         projection: Projection::new(readings, COLS, &projection).ok(),
         expansion: Expansion::new(components, outputs, &expansion).ok(),
-        ..parts(&networks, &[0; ROWS], metadata)
+        ..ModelParts::new(&networks, &[0; ROWS], metadata)
     };
     encode_to_vec(&parts).unwrap()
-}
-
-/// Parts of a blob without anything else than these.
-pub fn parts<'a>(
-    networks: &'a [Network<'a>],
-    row_network: &'a [u8],
-    metadata: Metadata<'a>,
-) -> ModelParts<'a> {
-    ModelParts::new(networks, row_network, metadata)
 }
 
 /// A blob of one network with this `shape`, which has one row, and this `metadata`.
@@ -148,7 +139,7 @@ pub fn blob_of_a_row(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes 
         },
     );
     let networks = &[network.unwrap().into()];
-    encode_to_vec(&parts(networks, &[0], metadata)).unwrap()
+    encode_to_vec(&ModelParts::new(networks, &[0], metadata)).unwrap()
 }
 
 /// The CRC-32 that closes a blob.

@@ -1,6 +1,6 @@
 //! Capturing a baseline, and what is told against it.
 
-use taxel_core::blob::{Floats, Metadata, Model, encode_to_vec};
+use taxel_core::blob::{Floats, Metadata, Model, ModelParts, encode_to_vec};
 use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 
@@ -55,7 +55,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     let model = Model::decode(&absolute).unwrap();
     let networks: Vec<_> = model.networks().collect();
     let metadata = Metadata { relative_inputs: true, ..Metadata::unnamed(model.shape()) };
-    let parts = parts(&networks, &[0; ROWS], metadata);
+    let parts = ModelParts::new(&networks, &[0; ROWS], metadata);
     let mut slots = Flash::slots_with(&encode_to_vec(&parts).unwrap());
     let mut bench = Bench::new(quiet());
     let board = bench.board.clone();

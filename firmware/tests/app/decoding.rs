@@ -47,7 +47,7 @@ fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
     let block = [[60.0, 61.0, 62.0, 63.0, 64.0, 65.0], [10.0; 6], [0.4; 6]];
     let parts = ModelParts {
         fill: Fill::new(6, 1, block.as_flattened()).ok(),
-        ..parts(&networks, &[0; ROWS], *model.metadata())
+        ..ModelParts::new(&networks, &[0; ROWS], *model.metadata())
     };
     let filling = encode_to_vec(&parts).unwrap();
     let mut slots = Flash::slots_with(&filling);

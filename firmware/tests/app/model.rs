@@ -1,6 +1,6 @@
 //! The model in force: its identity, its shape, and the memory that it is decoded from.
 
-use taxel_core::blob::{Columns, Floats, Metadata, Model, ModelShape, encode_to_vec};
+use taxel_core::blob::{Columns, Floats, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::checksum::CRC_32;
 use taxel_core::{AlignedBytes, Decoder};
 use taxel_firmware::app::Session;
@@ -17,7 +17,7 @@ fn the_identity_tells_what_the_model_was_trained_on() {
         let network = blob_of_one_row(3, 2);
         let model = Model::decode(&network).unwrap();
         let networks: Vec<_> = model.networks().collect();
-        let parts = parts(&networks, &[0], metadata);
+        let parts = ModelParts::new(&networks, &[0], metadata);
         encode_to_vec(&parts).unwrap()
     };
     let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });

@@ -82,8 +82,7 @@ pub struct BaselineArguments {
 #[derive(Serialize)]
 struct Saved {
     frames: usize,
-    /// Frames a second that the device scanned: fewer than it was asked for if it misses some, such as those that the line
-    /// cannot carry. `None` for a baseline.
+    /// Frames a second that the device scanned: fewer than it was asked for if it misses some. `None` for a baseline.
     frames_per_s: Option<f64>,
     /// Time from scan to scan that was asked for.
     #[serde(skip)]

@@ -93,12 +93,14 @@ impl Exponents {
             let square: u64 = a.iter().map(|a| u64::from(a.unsigned_abs()).pow(2)).sum();
             let b = (u128::from(square) << 32).div_ceil(decay as u128) as u64;
             let b = u32::try_from(b + u64::from(EXPONENT_MARGIN) + 1);
-            let fewer = if options.whole_array || inputs <= FEW_INPUTS {
-                String::new()
-            } else {
-                format!(" (--whole-array --features {FEW_INPUTS} gives a network fewer inputs)")
+            let too_far = |_| {
+                let fewer = if options.whole_array || inputs <= FEW_INPUTS {
+                    String::new()
+                } else {
+                    format!(" (--whole-array --features {FEW_INPUTS} gives a network fewer inputs)")
+                };
+                refused(format!("exponents of fixed16 end at 64{fewer}"))
             };
-            let too_far = |_| refused(format!("exponents of fixed16 end at 64{fewer}"));
             lines.push(b.map_err(too_far)?);
             lines.extend(a.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
         }
