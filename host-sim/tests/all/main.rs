@@ -13,6 +13,7 @@ mod dialects;
 mod directions;
 mod drift;
 mod export;
+mod frozen;
 mod gate;
 mod health;
 #[cfg(target_os = "linux")]
