@@ -25,7 +25,6 @@ const DESK: &[&str] = &[
     "taxel-view",
     "taxel-evaluate",
     "host-sim",
-    "taxel",
     "taxel-python",
     "device-log",
     "xtask",
