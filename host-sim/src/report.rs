@@ -74,10 +74,9 @@ pub fn sweep_html(merged: &Merged, stem: &str, command: &str) -> Page {
     points::html(merged, stem, command)
 }
 
-/// Picture of tables, each with its name, beside the paper's printed Table 1; a file of its own, light or dark like the
-/// viewer.
-pub fn printed_svg(tables: &[(&str, Cells)]) -> String {
-    printed::svg(tables)
+/// Picture of a computed table beside the paper's printed Table 1; a file of its own, light or dark like the viewer.
+pub fn printed_svg(computed: &Cells) -> String {
+    printed::svg(computed)
 }
 
 /// Picture of a recursion's learning curve on `subject`, as a file of its own: light or dark like the viewer.

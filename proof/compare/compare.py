@@ -1,7 +1,7 @@
 """Times the same work in Taxel and in numpy or scikit-learn, and prints times and ratios.
 
-    python compare/compare.py                # every subject
-    python compare/compare.py synthesis      # one
+    python proof/compare/compare.py                # every subject
+    python proof/compare/compare.py synthesis      # one
 
 Times and `ratio` are of medians, `fastest` is the ratio of the fastest runs. Progress goes to stderr, the
 table to stdout.

@@ -1,4 +1,4 @@
-"""Reading a data file: numpy's C parser, and a plain pass over the bytes, against Taxel."""
+"""Reading a data file: numpy's C parser against Taxel."""
 
 import subprocess
 
@@ -18,12 +18,5 @@ def rows() -> list[Row]:
     subprocess.run(command, cwd=ROOT, check=True, stdout=2)
     megabytes = path.stat().st_size / 1e6
     parse_s = timed(lambda: np.loadtxt(path, delimiter=",", skiprows=1), repeats=3)
-    bytes_s = timed(path.read_bytes)
     path.unlink()
-    work = f"reading {megabytes:.0f} MB of CSV"
-    taxel_s = by_criterion("csv/read")
-    return [
-        Row(work, "numpy.loadtxt", parse_s, taxel_s),
-        Row(work, "its bytes alone, Python", bytes_s, taxel_s),
-        Row(work, "its bytes alone, Rust", by_criterion("csv/copy_file"), taxel_s),
-    ]
+    return [Row(f"reading {megabytes:.0f} MB of CSV", "numpy.loadtxt", parse_s, by_criterion("csv/read"))]

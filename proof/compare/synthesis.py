@@ -40,17 +40,6 @@ def draw_paper(generator: np.random.Generator, frames: int) -> np.ndarray:
     return generator.uniform(low, high, (frames, ROWS, UPPER, 3))
 
 
-def draw_press(generator: np.random.Generator, frames: int) -> np.ndarray:
-    """Deformations of the scene `press`, laid out likewise."""
-    by_frame = (frames, 1, 1)
-    x, y = generator.uniform(0, X_MM, by_frame), generator.uniform(0, Y_MM, by_frame)
-    radius, depth = generator.uniform(2, 5, by_frame), generator.uniform(0, 1, by_frame)
-    ratio, angle = generator.uniform(0, 0.5, by_frame), generator.uniform(0, 2 * np.pi, by_frame)
-    squared = (UPPER_MM[..., 0] - x) ** 2 + (UPPER_MM[..., 1] - y) ** 2
-    dz = depth * np.exp(-squared / (2 * radius**2))
-    return np.stack([ratio * np.cos(angle) * dz, ratio * np.sin(angle) * dz, dz], axis=-1)
-
-
 def by_the_formula(deformation_mm: np.ndarray) -> np.ndarray:
     """Readings in Ω: frames × rows × columns."""
     moved = (UPPER_MM - deformation_mm)[:, :, :, None, None, :]
@@ -70,37 +59,32 @@ def axes_apart(deformation_mm: np.ndarray) -> np.ndarray:
     return 1 / node.sum(axis=(2, 3))
 
 
-def synthesise(draw, readings, frames: int, batch: int) -> tuple:
+def synthesise(readings, frames: int, batch: int) -> tuple:
     """Deformations and noisy readings of `frames`, computed `batch` at a time."""
     generator = np.random.default_rng(1)
     all_mm = np.empty((frames, ROWS, UPPER, 3))
     all_ohm = np.empty((frames, ROWS, COLUMNS))
     for start in range(0, frames, batch):
         part = slice(start, start + batch)
-        all_mm[part] = draw(generator, batch)
+        all_mm[part] = draw_paper(generator, batch)
         ideal_ohm = readings(all_mm[part])
         all_ohm[part] = ideal_ohm * (1 + NOISE * generator.standard_normal(ideal_ohm.shape))
     return all_mm, all_ohm
 
 
 def rows() -> list[Row]:
-    """Frames of both scenes, each against both ways to write numpy."""
+    """Frames of `paper`, against both ways to write numpy."""
     bench("synthesis")
+    taxel_s = by_criterion("synthesis/paper").over(FRAMES)
     table = []
-    for scene, draw in [("paper", draw_paper), ("press", draw_press)]:
-        taxel_s = by_criterion(f"synthesis/{scene}").over(FRAMES)
-        for how, readings, batches in [
-            ("as the formula", by_the_formula, [8, 512]),
-            ("axes apart", axes_apart, [16, 32, 64, 128]),
-        ]:
-            taken = {}
-            for batch in batches:
-                work = lambda: synthesise(draw, readings, FEWER, batch)
-                taken[batch] = timed(work, repeats=5).over(FEWER)
-            batch, fastest = fastest_of(taken)
-            reference = f"numpy, {how}, batches of {batch}"
-            table.append(Row(f"a frame of {scene}", reference, fastest, taxel_s))
-            if readings is axes_apart:
-                single_s = by_criterion(f"synthesis/{scene}_f32").over(FRAMES)
-                table.append(Row("the same, f32 in Taxel", reference, fastest, single_s))
+    for how, readings, batches in [
+        ("as the formula", by_the_formula, [8, 512]),
+        ("axes apart", axes_apart, [16, 32, 64, 128]),
+    ]:
+        taken = {}
+        for batch in batches:
+            work = lambda: synthesise(readings, FEWER, batch)
+            taken[batch] = timed(work, repeats=5).over(FEWER)
+        batch, fastest = fastest_of(taken)
+        table.append(Row("a frame of paper", f"numpy, {how}, batches of {batch}", fastest, taxel_s))
     return table

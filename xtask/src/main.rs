@@ -42,7 +42,6 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
-use process::{Outcome, cargo, status};
 
 /// Everything that people and CI run. `bash firmware/setup.sh` installs on Debian what the commands need.
 #[derive(Parser)]
@@ -97,9 +96,6 @@ enum Command {
     /// Export models as C, compile them with gcc, clang and arm-none-eabi-gcc in many ways, and compare all bits with
     /// taxel-core's, on this machine and in QEMU. Then count what a frame costs a Cortex-M4F. docs/c.md has the tables.
     C(c::Options),
-    /// Answer a question about the sensor, the paper's method or a part of Taxel: `study --help`.
-    #[command(disable_help_flag = true)]
-    Study(Rest),
     /// Build the wheel of the Python module, install it in an environment of its own, and run its tests (docs/python.md).
     Python,
     /// Check links and words of README and docs, and make their figures and pictures again (docs/made.toml).
@@ -167,7 +163,6 @@ fn main() -> ExitCode {
         Command::Size => size::run().map(success),
         Command::Cycles(options) => cycles::run(&options).map(success),
         Command::C(options) => c::run(&options).map(success),
-        Command::Study(rest) => study(&rest.all()),
         Command::Publish(options) => publish::run(&options).map(success),
         Command::Python => python::test().map(success),
         Command::Docs(options) => docs::run(&options).map(success),
@@ -180,12 +175,6 @@ fn main() -> ExitCode {
         eprintln!("error: {cause}");
         ExitCode::FAILURE
     })
-}
-
-/// Runs a study of `proof/studies`, which says itself what is wrong with `options`.
-fn study(options: &[&str]) -> Outcome<ExitCode> {
-    let run = ["run", "--release", "--package", "studies", "--"];
-    status(cargo(&run).args(options)).map(torture::code)
 }
 
 #[cfg(test)]

@@ -16,8 +16,7 @@ pub fn root() -> &'static Path {
 }
 
 /// Packages of what proves the product that have tests.
-pub const PROOF_TESTED: [&str; 6] =
-    ["--package", "hostile", "--package", "studies", "--package", "torture"];
+pub const PROOF_TESTED: [&str; 4] = ["--package", "hostile", "--package", "torture"];
 
 /// Folder for cargo's builds for the host.
 pub fn target_dir() -> PathBuf {

@@ -30,7 +30,7 @@ const DESK: &[&str] = &[
     "xtask",
 ];
 /// Crates that prove the product, and are no part of it.
-const PROOF: &[&str] = &["hostile", "torture", "studies", "taxel-fuzz", "benchmarks"];
+const PROOF: &[&str] = &["hostile", "torture", "taxel-fuzz", "benchmarks"];
 
 /// Number of crates of the product, which depends on none that proves it.
 const PRODUCT: usize = DEVICE.len() + MOCKS.len() + DESK.len();

@@ -88,13 +88,6 @@ impl Prior {
         }
         Self { mean_mm, covariance_mm2 }
     }
-
-    /// Mean of the row that is read as number `place`, with so many unknowns, and a factor L of its covariance L·Lᵀ.
-    pub fn of_row(&self, place: usize, unknowns: usize) -> (Vec<f64>, DMatrix<f64>) {
-        let from = place * unknowns;
-        let covariance = self.covariance_mm2.view((from, from), (unknowns, unknowns)).into_owned();
-        (self.mean_mm[from..from + unknowns].to_vec(), factor(&covariance))
-    }
 }
 
 /// Directions of the deformation that the readings of `row_wires` (from 0) show.

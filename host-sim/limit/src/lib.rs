@@ -18,7 +18,6 @@ pub mod limit;
 pub mod reference;
 pub mod identify;
 pub mod geometry;
-pub mod solve;
 
 pub use error::Refusal;
 pub use limit::Limit;

@@ -210,7 +210,7 @@ fn noise(noise: &Noise) -> Check {
 }
 
 /// Checks the largest relative change of a drifting gain; `field` names it in the message.
-pub fn check_gain(field: &str, gain: f64) -> Check {
+fn check_gain(field: &str, gain: f64) -> Check {
     require((0.0..1.0).contains(&gain), field, gain, || {
         "it is a fraction from 0 to below 1 (0.02 is ±2 %)".into()
     })

@@ -87,7 +87,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         output::write_bytes(path, table.to_csv().as_bytes())?;
     }
     if let (Some(path), Some(nearest)) = (&arguments.svg, table.nearest_formula()) {
-        let picture = report::printed_svg(&[("computed", nearest.cells)]);
+        let picture = report::printed_svg(&nearest.cells);
         output::write_bytes(path, picture.as_bytes())?;
     }
     if common.json {

@@ -1,4 +1,4 @@
-//! Picture of tables beside the paper's printed Table 1: one panel a noise level, error against spread.
+//! Picture of a table beside the paper's printed Table 1: one panel a noise level, error against spread.
 
 use taxel_evaluate::evaluate::printed::{CELLS, Cells, NOISE_LEVELS, SPREADS};
 
@@ -11,9 +11,9 @@ use super::ticks;
 const PANEL: [f64; 2] = [440.0, 300.0];
 const GAP_PX: f64 = 28.0;
 
-/// Picture of `tables`, each with its name, beside the printed cells; a file of its own, light or dark like the viewer.
-pub fn svg(tables: &[(&str, Cells)]) -> String {
-    let all = tables.iter().flat_map(|(_, cells)| cells.as_flattened()).chain(CELLS.as_flattened());
+/// Picture of the `computed` cells beside the printed ones; a file of its own, light or dark like the viewer.
+pub fn svg(computed: &Cells) -> String {
+    let all = [computed, &CELLS].into_iter().flat_map(|cells| cells.as_flattened());
     // Cells that would leave no room for the others are off the scale; marks at the edge say so.
     let most = 2.0 * ticks::extent(CELLS.as_flattened().iter().copied()).map_or(1.0, |it| it.1);
     let heights: Vec<f64> = all.copied().filter(|cell| *cell <= most).collect();
@@ -23,15 +23,13 @@ pub fn svg(tables: &[(&str, Cells)]) -> String {
         let points = |cells: &Cells| -> Vec<[f64; 2]> {
             SPREADS.into_iter().zip(cells).map(|(spread, line)| [spread, line[j]]).collect()
         };
-        let printed = Mark::LineAnd(Shape::Circle);
-        let mut series = vec![Series::new("printed", "muted", printed, points(&CELLS))];
-        for ((name, cells), (class, shape)) in tables.iter().zip([
-            ("c1", Shape::Square),
-            ("c2", Shape::Triangle),
-            ("c3", Shape::Diamond),
-        ]) {
-            series.push(Series::new(name, class, Mark::LineAnd(shape), points(cells)));
-        }
+        let series = |name, class, shape, cells| {
+            Series::new(name, class, Mark::LineAnd(shape), points(cells))
+        };
+        let series = vec![
+            series("printed", "muted", Shape::Circle, &CELLS),
+            series("computed", "c1", Shape::Square, computed),
+        ];
         let chart = Chart {
             title: format!("Error in z against spread at {} noise", percent(level)),
             x: Axis::linear("spread", ticks::linear(SPREADS, 5)),

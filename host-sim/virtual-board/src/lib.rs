@@ -45,7 +45,7 @@ pub use board::{Transactions, VirtualBoard};
 pub use fault::BoardFault;
 pub use handles::{VirtualAdc, VirtualDelay, VirtualPin, VirtualSpi};
 pub use pin::Pin;
-pub use scan::{all_readings, scan, untouched_readings};
+pub use scan::{all_readings, scan};
 pub use scanner::{FrameScanner, SeriesResistance};
 pub use violation::Violation;
 

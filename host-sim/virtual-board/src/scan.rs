@@ -10,16 +10,7 @@ use taxel_simulate::world::World;
 /// Ideal readings in Ω of all row-wires of the sensor, whichever the world reads, without noise and drift: the input
 /// of a board.
 pub fn all_readings(world: &World, frames: usize) -> Table {
-    ideal(world).frames(Stream::Test, frames).inputs
-}
-
-/// Ideal readings in Ω of all row-wires of the untouched sensor, so many times.
-pub fn untouched_readings(world: &World, frames: usize) -> Table {
-    ideal(world).untouched().frames(Stream::Test, frames).inputs
-}
-
-fn ideal(world: &World) -> Synthesis<'_> {
-    Synthesis::new(world).ideal().drift(None).all_rows()
+    Synthesis::new(world).ideal().drift(None).all_rows().frames(Stream::Test, frames).inputs
 }
 
 /// Scans every line of `readings` (Ω, all row-wires) by the firmware's scanner on `board`.

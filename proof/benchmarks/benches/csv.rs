@@ -1,4 +1,4 @@
-//! Data files: reading and writing of CSV, compared with a single pass over the same bytes.
+//! Data files: reading and writing of CSV.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -22,9 +22,6 @@ fn csv(criterion: &mut Criterion) {
     let length = || std::fs::metadata(&path).expect("the file written above").len();
     let mut group = criterion.benchmark_group("csv");
     group.sample_size(20).throughput(Throughput::Bytes(length()));
-    group.bench_function("copy_file", |bencher| {
-        bencher.iter(|| std::fs::read(black_box(&path)).expect("the file written above"));
-    });
     group.bench_function("read", |bencher| {
         bencher.iter(|| DataFile::read(black_box(&path)).expect("the file written above"));
     });

@@ -4,7 +4,6 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use taxel_data::random::Stream;
-use taxel_simulate::sensor::Precision;
 use taxel_simulate::{World, synthesise};
 
 /// Frames in one measurement; `compare/synthesis.py` divides by it.
@@ -14,12 +13,9 @@ fn frames_of_a_scene(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("synthesis");
     group.sample_size(20).throughput(Throughput::Elements(FRAMES as u64));
     for (name, world) in [("paper", World::paper()), ("press", World::press())] {
-        for (suffix, precision) in [("", Precision::F64), ("_f32", Precision::F32)] {
-            let world = World { precision, ..world.clone() };
-            group.bench_function(format!("{name}{suffix}"), |bencher| {
-                bencher.iter(|| synthesise(black_box(&world), Stream::Training, FRAMES));
-            });
-        }
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| synthesise(black_box(&world), Stream::Training, FRAMES));
+        });
     }
     group.finish();
 }

@@ -10,7 +10,7 @@ use std::time::Instant;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::numbers::{find, like, value};
+use super::numbers::{find, like, values};
 use super::pages::Page;
 use crate::process::{Outcome, capture, cargo, read, root, run as run_command, target_dir};
 
@@ -22,6 +22,8 @@ const SHORT_MINUTES: f64 = 0.2;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Made {
+    /// Pictures of revisions that their pages name.
+    kept: Vec<String>,
     run: Vec<Run>,
 }
 
@@ -49,7 +51,7 @@ struct Figure {
     page: String,
     /// The page's words, with `{}` for each number.
     says: String,
-    /// Where each number stands in what the commands print.
+    /// Where the numbers stand in what the commands print: patterns whose groups are numbers, and pointers into JSON.
     values: Vec<String>,
 }
 
@@ -78,20 +80,19 @@ impl Made {
                 let page = pages.iter().find(|page| page.path == figure.page);
                 let found = page.ok_or("there is no such page".into()).and_then(|page| {
                     let found = find(&page.text, &figure.says)?;
-                    let (numbers, values) = (found.numbers.len(), figure.values.len());
-                    let differ = format!("{numbers} numbers and {values} values: {}", figure.says);
-                    if numbers == values { Ok(()) } else { Err(differ) }
+                    if found.is_empty() {
+                        Err(format!("no number: {}", figure.says))
+                    } else {
+                        Ok(())
+                    }
                 });
                 faults.extend(
                     found.err().map(|why| format!("{LIST}: {}: {}: {why}", run.name, figure.page)),
                 );
             }
         }
-        let made: BTreeSet<&str> = self
-            .run
-            .iter()
-            .flat_map(|run| run.picture.iter().map(|picture| picture.file.as_str()))
-            .collect();
+        let made = self.run.iter().flat_map(|run| &run.picture).map(|picture| &picture.file);
+        let made: BTreeSet<&str> = made.chain(&self.kept).map(String::as_str).collect();
         let shown = pages.iter().filter(|page| page.is_documentation());
         let shown: BTreeSet<&str> =
             shown.flat_map(|page| page.pictures.iter().map(String::as_str)).collect();
@@ -137,7 +138,8 @@ pub fn again(run: &Run, accept: bool) -> Outcome<Vec<String>> {
     let all = format!("{}\n{}", said.out, said.err);
     let mut faults = Vec::new();
     for figure in &run.figure {
-        faults.extend(figure.compared(&all, json.as_ref(), accept)?);
+        let compared = figure.compared(&all, json.as_ref(), accept);
+        faults.extend(compared.unwrap_or_else(|cause| vec![cause]));
     }
     for picture in &run.picture {
         let (old, new) = (root().join(&picture.file), folder.join(&picture.from));
@@ -151,9 +153,9 @@ pub fn again(run: &Run, accept: bool) -> Outcome<Vec<String>> {
         }
     }
     println!(
-        "{:20} {:4} figures, {:2} pictures, {:4.0} s",
+        "{:20} {:4} sentences, {:2} pictures, {:4.0} s",
         run.name,
-        run.figure.iter().map(|figure| figure.values.len()).sum::<usize>(),
+        run.figure.len(),
         run.picture.len(),
         begun.elapsed().as_secs_f64()
     );
@@ -171,16 +173,17 @@ impl Figure {
     fn compared(&self, said: &str, json: Option<&Value>, accept: bool) -> Outcome<Vec<String>> {
         let text = read(&self.page)?;
         let found = find(&text, &self.says)?;
+        let given = self.values.iter().map(|way| values(said, json, way));
+        let given = given.collect::<Outcome<Vec<_>>>();
+        let given = given.map_err(|cause| format!("{}: {cause}", self.page))?.concat();
+        if given.len() != found.len() {
+            let counts = format!("{} numbers and {} values", found.len(), given.len());
+            return Err(format!("{}: {counts}: {}", self.page, self.says));
+        }
         let (mut faults, mut changed) = (Vec::new(), text.clone());
         // From the end on, so that places before stay.
-        for ((shown, place), way) in found.numbers.into_iter().zip(&self.values).rev() {
-            let is = match value(said, json, way) {
-                Ok(value) => like(shown, value),
-                Err(cause) => {
-                    faults.push(format!("{}: {cause}", self.page));
-                    continue;
-                }
-            };
+        for ((shown, place), value) in found.into_iter().zip(given).rev() {
+            let is = like(shown, value);
             if is != shown {
                 changed.replace_range(place, &is);
                 if !accept {

@@ -325,7 +325,7 @@ fn textbook_networks(
     let each = settings.spreads.par_iter().map(|&spread| {
         let fit = |hidden: &Arc<Textbook>, table, initial_covariance| {
             let decay = open.spread_is.decay(spread);
-            hidden.fit(table, decay, open.bias, &[initial_covariance]).swap_remove(0)
+            hidden.fit(table, decay, open.bias, initial_covariance)
         };
         (fit(&network, &table, open.initial_covariance), Some(fit(&standard, &few, INTERPOLATING)))
     });

@@ -8,7 +8,7 @@ use taxel_data::{Random, RowTable, Table};
 
 use super::RowDecoder;
 use crate::train::kmeans;
-use crate::train::least_squares::{Decomposed, Design, Regressors};
+use crate::train::least_squares::{Design, Factor, Regressors};
 
 /// What each input is scaled by. All are idioms of the toolboxes of the paper's time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -85,31 +85,31 @@ impl Textbook {
         readings.chunks_exact(self.inputs()).flat_map(of_line).collect()
     }
 
-    /// Fits the weights of networks with this `decay` to `table`, one network for each of the `initial_covariances` δ:
-    /// the penalty on squared weights is 1/δ.
+    /// Fits the weights of a network with this `decay` to `table`. The penalty on squared weights is 1/δ, one over the
+    /// `initial_covariance`.
     pub fn fit(
         self: &Arc<Self>,
         table: &RowTable,
         decay: f64,
         bias: bool,
-        initial_covariances: &[f64],
-    ) -> Vec<TextbookNetwork> {
+        initial_covariance: f64,
+    ) -> TextbookNetwork {
         let (scaled, outputs) = (self.scaled(&table.inputs.values), table.outputs.names.len());
         let regressors = self.regressors(&decay);
         let gaussians = regressors.of(&scaled);
-        let decomposed = if bias {
-            Decomposed::new(&gaussians, &table.outputs.values, outputs)
+        let targets = &table.outputs.values;
+        let factor = if bias {
+            Factor::new(&gaussians, targets, outputs, initial_covariance)
         } else {
-            Decomposed::new(&WithoutBias(&gaussians), &table.outputs.values, outputs)
+            Factor::new(&WithoutBias(&gaussians), targets, outputs, initial_covariance)
         };
-        let network = |covariance: &f64| TextbookNetwork {
+        TextbookNetwork {
             hidden: Arc::clone(self),
             decay,
             bias,
-            weights: decomposed.factor(*covariance).weights(),
+            weights: factor.weights(),
             outputs,
-        };
-        initial_covariances.iter().map(network).collect()
+        }
     }
 
     fn regressors<'s>(&'s self, decay: &'s f64) -> Regressors<'s> {
@@ -170,75 +170,31 @@ pub struct TextbookNetwork {
     outputs: usize,
 }
 
-impl TextbookNetwork {
-    /// Predicts the outputs for one line of `inputs`, and writes their slopes by each input (`outputs × inputs`).
-    ///
-    /// # Panics
-    /// If a slice has another length.
-    pub fn predict_with_slopes(&self, inputs: &[f64], predicted: &mut [f64], slopes: &mut [f64]) {
-        let (scaled, count) = (self.hidden.scaled(inputs), inputs.len());
-        let mut activations = vec![0.0; self.hidden.centres.len() / count + 1];
-        self.hidden.regressors(&self.decay).evaluate(&scaled, &mut activations);
-        predicted.fill(0.0);
-        slopes.fill(0.0);
-        let centres = self.hidden.centres.chunks_exact(count);
-        let weights = self.weights.chunks_exact(self.outputs);
-        for ((centre, activation), weights) in centres.zip(&activations).zip(weights) {
-            for ((y, slopes), w) in
-                predicted.iter_mut().zip(slopes.chunks_exact_mut(count)).zip(weights)
-            {
-                *y += activation * w;
-                let steep = -2.0 * self.decay * activation * w;
-                let offsets = scaled.iter().zip(centre).zip(&self.hidden.scale);
-                for (slope, ((x, c), [_, factor])) in slopes.iter_mut().zip(offsets) {
-                    *slope += steep * (x - c) * factor;
-                }
-            }
-        }
-        if self.bias {
-            let bias = &self.weights[self.weights.len() - self.outputs..];
-            predicted.iter_mut().zip(bias).for_each(|(y, b)| *y += b);
-        }
-    }
-}
-
-/// Predictions (`lines × outputs`) of each of the `networks`, which differ in their weights alone.
-pub fn predict_each(networks: &[TextbookNetwork], readings: &[f64]) -> Vec<Vec<f64>> {
-    /// Lines whose activations stay in the first cache.
-    const LINES: usize = 16;
-    let Some(first) = networks.first() else { return Vec::new() };
-    let scaled = first.hidden.scaled(readings);
-    let regressors = first.hidden.regressors(&first.decay);
-    let design = regressors.of(&scaled);
-    let (lines, n) = (readings.len() / first.hidden.inputs(), design.regressors());
-    let mut predicted = vec![Vec::with_capacity(lines * first.outputs); networks.len()];
-    let mut activations = vec![0.0; LINES * n];
-    for start in (0..lines).step_by(LINES) {
-        let run = start..lines.min(start + LINES);
-        let activations = &mut activations[..run.len() * n];
-        design.fill(run, activations);
-        for (network, predicted) in networks.iter().zip(&mut predicted) {
-            for line in activations.chunks_exact(n) {
-                let from = predicted.len();
-                predicted.resize(from + network.outputs, 0.0);
-                let used = &line[..if network.bias { n } else { n - 1 }];
-                for (activation, weights) in
-                    used.iter().zip(network.weights.chunks_exact(network.outputs))
-                {
-                    predicted[from..]
-                        .iter_mut()
-                        .zip(weights)
-                        .for_each(|(y, w)| *y += activation * w);
-                }
-            }
-        }
-    }
-    predicted
-}
-
 impl RowDecoder for TextbookNetwork {
     fn predict(&self, readings: &[f64]) -> Vec<f64> {
-        predict_each(std::slice::from_ref(self), readings).swap_remove(0)
+        /// Lines whose activations stay in the first cache.
+        const LINES: usize = 16;
+        let scaled = self.hidden.scaled(readings);
+        let regressors = self.hidden.regressors(&self.decay);
+        let design = regressors.of(&scaled);
+        let (lines, n) = (readings.len() / self.hidden.inputs(), design.regressors());
+        let used = if self.bias { n } else { n - 1 };
+        let mut predicted = vec![0.0; lines * self.outputs];
+        let mut activations = vec![0.0; LINES * n];
+        for (block, outputs) in predicted.chunks_mut(LINES * self.outputs).enumerate() {
+            let start = block * LINES;
+            let run = start..lines.min(start + LINES);
+            let activations = &mut activations[..run.len() * n];
+            design.fill(run, activations);
+            let outputs = outputs.chunks_exact_mut(self.outputs);
+            for (line, outputs) in activations.chunks_exact(n).zip(outputs) {
+                let weights = self.weights.chunks_exact(self.outputs);
+                for (activation, weights) in line[..used].iter().zip(weights) {
+                    outputs.iter_mut().zip(weights).for_each(|(y, w)| *y += activation * w);
+                }
+            }
+        }
+        predicted
     }
 }
 
@@ -291,29 +247,12 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_those_of_the_predictions() {
-        let table = table();
-        let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
-        let hidden = Arc::new(Textbook::new(&table, Scaling::Maximum, 7, &mut random));
-        let network = hidden.fit(&table, 40.0, true, &[1e4]).swap_remove(0);
-        let (mut predicted, mut slopes) = ([0.0; 2], [0.0; 4]);
-        network.predict_with_slopes(&[55.0, 70.0], &mut predicted, &mut slopes);
-        let at = |a, b| network.predict(&[a, b]);
-        assert!(predicted.iter().zip(at(55.0, 70.0)).all(|(a, b)| (a - b).abs() < 1e-12));
-        for o in 0..2 {
-            let by_a = (at(55.001, 70.0)[o] - at(54.999, 70.0)[o]) / 0.002;
-            let by_b = (at(55.0, 70.001)[o] - at(55.0, 69.999)[o]) / 0.002;
-            assert!((slopes[2 * o] - by_a).abs() < 1e-6 && (slopes[2 * o + 1] - by_b).abs() < 1e-6);
-        }
-    }
-
-    #[test]
     fn each_output_has_the_weights_of_a_network_for_it_alone() {
         let both = table();
         let random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
         let fit = |table: &RowTable| {
             let hidden = Textbook::new(table, Scaling::Range, 7, &mut random.clone());
-            Arc::new(hidden).fit(table, 40.0, true, &[1e6]).swap_remove(0)
+            Arc::new(hidden).fit(table, 40.0, true, 1e6)
         };
         let together = fit(&both);
         for output in 0..2 {
@@ -331,15 +270,15 @@ mod tests {
         let table = table();
         let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
         let hidden = Arc::new(Textbook::new(&table, Scaling::Range, 40, &mut random));
-        let networks = hidden.fit(&table, 5000.0, false, &[1e12, 1e-12]);
-        let [exact, nothing] = &predict_each(&networks, &table.inputs.values)[..] else { panic!() };
+        let fit = |covariance| hidden.fit(&table, 5000.0, false, covariance);
+        let [exact, nothing] = [1e12, 1e-12].map(|it| fit(it).predict(&table.inputs.values));
         let far = |predicted: &[f64]| {
             let pairs = predicted.iter().zip(&table.outputs.values);
             pairs.map(|(p, y)| (p - y).abs()).fold(0.0, f64::max)
         };
-        assert!(far(exact) < 1e-6, "{}", far(exact));
+        assert!(far(&exact) < 1e-6, "{}", far(&exact));
         assert!(nothing.iter().all(|p| p.abs() < 1e-9));
-        let with_bias = hidden.fit(&table, 5000.0, true, &[1e12]);
-        assert!(far(&with_bias[0].predict(&table.inputs.values)) < 1e-6);
+        let with_bias = hidden.fit(&table, 5000.0, true, 1e12);
+        assert!(far(&with_bias.predict(&table.inputs.values)) < 1e-6);
     }
 }
