@@ -1,4 +1,4 @@
-//! The application: scan → health → gate → decode → filter → report, and the link, in one loop without waits.
+//! The application: scan → health → decode → filter → report, and the link, in one loop without waits.
 //!
 //! A board's program makes an [`App`] of its parts and calls [`App::run`], which returns only when the program
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
@@ -76,7 +76,6 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             reciprocals,
             scratch,
             estimate,
-            rest,
             tracks,
             deviations,
         } = buffers;
@@ -105,7 +104,6 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             has_reciprocals: false,
             scratch: scratch.as_flattened_mut().as_flattened_mut(),
             estimate: estimate.whole(),
-            rest: rest.whole(),
             filter: State::new(tracks.as_flattened_mut()),
             deviations: deviations.as_flattened_mut(),
         };

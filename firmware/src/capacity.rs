@@ -75,8 +75,7 @@ impl Capacity {
         self.rows * self.outputs
     }
 
-    /// Number of floats of working space for decoding: more than the readings of a frame and of two rows. What these
-    /// leave is room for the components of an [`Expansion`](taxel_core::expansion::Expansion).
+    /// Number of floats of working space for decoding: more than the readings of a frame and of two rows.
     pub const fn scratch_floats(self) -> usize {
         2 * self.rows * self.columns
     }
@@ -101,12 +100,12 @@ impl Capacity {
     /// About the bytes of RAM that an image's buffers take, a little too many.
     pub const fn buffer_bytes(self) -> usize {
         let (readings, outputs) = (self.rows * self.columns, self.all_outputs());
-        // The frame, its baseline with the reciprocals, working space, places; two estimates, deviations, the filter, and statuses.
+        // The frame, its baseline with the reciprocals, working space, places; the estimate, deviations, the filter, and statuses.
         let frames = readings * (4 * size_of::<f32>() + size_of::<u16>())
             + 4 * self.scratch_floats()
             - 4 * readings;
-        let of_output = if cfg!(feature = "filter") { 5 } else { 3 };
-        frames + of_output * outputs * size_of::<f32>() + 2 * self.rows + 2 * self.message_bytes()
+        let of_output = if cfg!(feature = "filter") { 4 } else { 2 };
+        frames + of_output * outputs * size_of::<f32>() + self.rows + 2 * self.message_bytes()
     }
 
     /// Whether there is room for the readings and outputs of a model of this `shape`.

@@ -66,11 +66,11 @@ fn requests() -> Vec<Example> {
         ("configuration?", request_bytes(3, &Request::Configuration)),
         ("configure", request_bytes(300, &configure(Configuration::DEFAULT, 0))),
         (
-            "configure: rest tolerance 0.0175, for 10 s",
+            "configure: contact threshold 0.0175, for 10 s",
             request_bytes(
                 300,
                 &configure(
-                    Configuration { rest_tolerance: 0.0175, ..Configuration::DEFAULT },
+                    Configuration { contact_threshold: 0.0175, ..Configuration::DEFAULT },
                     10_000,
                 ),
             ),
@@ -174,7 +174,7 @@ fn reports() -> Vec<Example> {
         frame: 300,
         start_us: START_US,
         flags: 2,
-        row_status: &[3, 1],
+        row_status: &[0, 1],
         outputs: readings_ohm,
         novelty: None,
         deviation: Floats(&[]),
@@ -196,7 +196,6 @@ fn reports() -> Vec<Example> {
     };
     let statistics = Statistics {
         frames_scanned: 1,
-        rows_at_rest: 8,
         longest_decode_us: 2,
         slot_erases: 1,
         model_checks: 300,
@@ -237,8 +236,8 @@ fn reports() -> Vec<Example> {
         ("restarting", report_bytes(7, &Report::Restarting)),
         ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
         (
-            "refused: rest tolerance",
-            refused(Refusal::Configuration(ConfigurationField::RestTolerance)),
+            "refused: contact threshold",
+            refused(Refusal::Configuration(ConfigurationField::ContactThreshold)),
         ),
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),

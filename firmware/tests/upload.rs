@@ -237,12 +237,12 @@ fn an_upload_without_requests_ends() {
     assert_eq!(upload(&mut session, &board, &steps[3..4]).0, Err(Refusal::NoUpload));
 }
 
-/// Working space has room for 12 numbers, of which two rows' inputs take 6.
+/// Working space has room for 12 numbers: two for each feature.
 #[test]
-fn a_model_of_more_components_than_there_is_room_for_is_refused() {
+fn a_model_of_more_features_than_there_is_room_for_is_refused() {
     let old = blob(1, 3);
     let mut device = Device::new(Flash::slots_with(&old));
-    let (many, few) = (blob_of_components(7), blob_of_components(6));
+    let (many, few) = (blob_of_features(7), blob_of_features(6));
     let shape = Err(Refusal::BadModel(ModelFault::Shape));
     assert_eq!(device.install(&many), shape);
     assert_eq!(device.restart(), Some(crc_of(&old)));

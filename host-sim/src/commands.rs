@@ -39,7 +39,6 @@ pub mod export;
 pub mod join;
 pub mod table1;
 pub mod trade;
-pub mod gate;
 pub mod limit;
 mod merged;
 pub mod sweep;

@@ -8,8 +8,8 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
-    self, Captured, Common, compare, decode, emulate, eval, export, forward, gate, inspect, join,
-    limit, link, noise, recover, run, sweep, synth, table1, trade, train, view,
+    self, Captured, Common, compare, decode, emulate, eval, export, forward, inspect, join, limit,
+    link, noise, recover, run, sweep, synth, table1, trade, train, view,
 };
 use crate::{Error, Result};
 
@@ -43,7 +43,6 @@ enum Command {
     Export(export::Arguments),
     Table1(table1::Arguments),
     Trade(trade::Arguments),
-    Gate(gate::Arguments),
     Limit(limit::Arguments),
     Compare(compare::Arguments),
     Sweep(sweep::Arguments),
@@ -80,7 +79,6 @@ impl Command {
             Self::Export(_) => "export",
             Self::Table1(_) => "table1",
             Self::Trade(_) => "trade",
-            Self::Gate(_) => "gate",
             Self::Limit(_) => "limit",
             Self::Compare(_) => "compare",
             Self::Sweep(_) => "sweep",
@@ -179,7 +177,6 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::Export(arguments) => export::execute(&arguments, common),
         Command::Table1(arguments) => table1::execute(&arguments, common),
         Command::Trade(arguments) => trade::execute(&arguments, common),
-        Command::Gate(arguments) => gate::execute(&arguments, common),
         Command::Limit(arguments) => limit::execute(&arguments, common),
         Command::Compare(arguments) => compare::execute(&arguments, common),
         Command::Sweep(arguments) => sweep::execute(&arguments, common),

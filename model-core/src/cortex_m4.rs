@@ -7,7 +7,7 @@
 mod routines;
 
 #[cfg(cortex_m4f)]
-pub(crate) use routines::{Inputs, density, expanded, fixed16, give_rest, project, sqrt};
+pub(crate) use routines::{Inputs, density, expanded, fixed16, project, sqrt};
 
 /// Inputs a row of the paper's sensor; inner loops are made for this number, in assembly or compiled.
 pub(crate) const INPUTS: usize = 18;

@@ -3,7 +3,6 @@
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
 use crate::estimate::{Estimate, RowStatus};
 use crate::exp::{ExpKernel, Polynomial};
-use crate::gate::Gate;
 use crate::projection::Projection;
 use crate::rbf::expanded::Expanded;
 use crate::rbf::fixed16::Fixed16;
@@ -22,18 +21,14 @@ pub struct Frame<'f> {
     /// `rows × inputs` readings in Ω, row after row; NaN is missing.
     pub readings_ohm: &'f [f32],
     /// [Reciprocals](crate::relative::reciprocal) of the baseline, one a reading, for a model with relative inputs.
-    /// A reading without one is missing. Other models ignore
-    /// them.
+    /// A reading without one is missing. Other models ignore them.
     pub reciprocals: &'f [f32],
-    /// Gate that skips rows at rest: they get the outputs at rest. All other rows are decoded as without a gate, to
-    /// the bit. Behind a [`Projection`], all rows are at rest, or all are decoded.
-    pub gate: Option<Gate<'f>>,
 }
 
 impl<'f> From<&'f [f32]> for Frame<'f> {
-    /// Readings in Ω, without baseline and gate.
+    /// Readings in Ω, without a baseline.
     fn from(readings_ohm: &'f [f32]) -> Self {
-        Self { readings_ohm, reciprocals: &[], gate: None }
+        Self { readings_ohm, reciprocals: &[] }
     }
 }
 
@@ -205,8 +200,8 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     /// [confidence](crate::confidence). Returns its novelty in nats: above 0, it is unlike the frames of training. `None`
     /// if the model has no confidence; nothing is written then.
     ///
-    /// `deviation` takes a standard deviation for each of the `rows × outputs` outputs, in their units: they hold
-    /// whether or not a gate skips rows. If a reading of the frame is missing, all of them and the novelty are NaN.
+    /// `deviation` takes a standard deviation for each of the `rows × outputs` outputs, in their units. If a reading
+    /// of the frame is missing, all of them and the novelty are NaN.
     /// `scratch` is working space of [`scratch_floats`](Self::scratch_floats).
     ///
     /// # Errors
@@ -286,12 +281,6 @@ fn decode(
     let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
     let relative = model.metadata().relative_inputs;
     let projection = model.projection();
-    if let Some(gate) = frame.gate {
-        let sizes = [inputs, outputs];
-        if gate.give_rest(frame.readings_ohm, sizes, estimate, projection.is_some()) == 0 {
-            return Ok(false);
-        }
-    }
     let Some(projection) = projection else {
         let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
         let rows = Rows { networks, inputs, outputs, exp };
@@ -303,22 +292,10 @@ fn decode(
     };
     let of_network = projection.features();
     let (scaled, more) = scratch.split_at_mut_checked(of_network).ok_or(too_short)?;
-    let (features, more) = more.split_at_mut_checked(of_network).ok_or(too_short)?;
+    let (features, ratios) = more.split_at_mut_checked(of_network).ok_or(too_short)?;
     let Some(network) = networks.first() else { return Ok(false) };
     let array = Array { projection, network, relative };
-    let Some(expansion) = model.expansion() else {
-        return Ok(array.decode(exp, frame, [scaled, features, more], estimate));
-    };
-    let (components, ratios) =
-        more.split_at_mut_checked(expansion.components()).ok_or(too_short)?;
-    let mut inferred = Estimate { outputs: components, status: estimate.status };
-    let clamped = array.decode(exp, frame, [scaled, features, ratios], &mut inferred);
-    if inferred.status.first() == Some(&RowStatus::Decoded) {
-        expansion.expand(components, estimate.outputs);
-    } else {
-        estimate.outputs.fill(f32::NAN);
-    }
-    Ok(clamped)
+    Ok(array.decode(exp, frame, [scaled, features, ratios], estimate))
 }
 
 /// Networks that decode a frame row by row.
@@ -332,9 +309,8 @@ struct Rows<'d, 'a> {
 }
 
 impl Rows<'_, '_> {
-    /// Decodes the rows of a frame, but for those that a gate has marked as at rest. The scratch is room for scaled
-    /// inputs, and for readings relative to the baseline if the networks take them (`RELATIVE`). Returns whether an
-    /// input was clamped.
+    /// Decodes the rows of a frame. The scratch is room for scaled inputs, and for readings relative to the baseline if
+    /// the networks take them (`RELATIVE`). Returns whether an input was clamped.
     #[cfg_attr(cortex_m4f, inline(never))]
     #[cfg_attr(not(cortex_m4f), inline(always))]
     fn decode<const RELATIVE: bool>(
@@ -344,16 +320,12 @@ impl Rows<'_, '_> {
         estimate: &mut Estimate<'_>,
     ) -> bool {
         let mut any_clamped = false;
-        let gated = frame.gate.is_some();
         // A model has at least one input and one output a row; `max` tells the compiler.
         let readings = frame.readings_ohm.chunks_exact(self.inputs.max(1));
         let outputs = estimate.outputs.chunks_exact_mut(self.outputs.max(1));
         let places = outputs.zip(estimate.status.iter_mut());
         let rows = self.networks.iter().zip(readings).zip(places);
         for (row, ((network, readings), (outputs, status))) in rows.enumerate() {
-            if gated && *status == RowStatus::AtRest {
-                continue;
-            }
             let given = if RELATIVE {
                 let start = row.saturating_mul(self.inputs);
                 divide(readings, frame.reciprocals.get(start..).unwrap_or_default(), ratios);
@@ -393,7 +365,7 @@ fn decoding_floats(model: &Model<'_>) -> usize {
         None => (inputs, inputs),
     };
     let extra = if relative { given } else { 0 };
-    scaled.saturating_add(extra).saturating_add(model.components())
+    scaled.saturating_add(extra)
 }
 
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {
@@ -447,7 +419,7 @@ struct Array<'d, 'a> {
 
 impl Array<'_, '_> {
     /// Decodes all rows of a frame at once; `scratch` is room for scaled inputs, for features and for readings relative
-    /// to the baseline. The estimate's outputs are the network's. Returns whether a feature was clamped, and the rows
+    /// to the baseline. Returns whether a feature was clamped, and the rows
     /// were decoded. Not inlined, because decoding by rows would need its stack too.
     #[inline(never)]
     fn decode(

@@ -2,7 +2,6 @@
 
 /// How the decoding of one row of a frame ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)] // assembly reads and writes it
 pub enum RowStatus {
     /// The row was decoded; its outputs are valid.
     Decoded,
@@ -11,9 +10,6 @@ pub enum RowStatus {
     MissingReading,
     /// Readings or weights were so large that an output overflowed; the outputs are NaN.
     Overflow,
-    /// The row is untouched: its readings are near those at rest ([`Gate`](crate::Gate)). The row was skipped; the
-    /// outputs are those at rest.
-    AtRest,
 }
 
 /// Where a decoder writes the outputs of a frame, and the status of each row.

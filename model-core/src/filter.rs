@@ -150,7 +150,6 @@ fn advance(tracks: &mut [Track], step: Option<Step>, lead_s: f32, estimate: &mut
                     *output += 0.0; // −0 becomes 0, as it does if the frame is repeated
                 }
             }),
-            RowStatus::AtRest => of_row.for_each(|(track, output)| *track = [*output, 0.0]),
             RowStatus::MissingReading | RowStatus::Overflow => {
                 of_row.for_each(|(track, _)| *track = [f32::NAN; 2]);
             }

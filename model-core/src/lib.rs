@@ -33,11 +33,9 @@ mod frame;
 mod estimate;
 mod cortex_m4;
 pub mod health;
-pub mod gate;
 pub mod filter;
 pub mod rbf;
 pub mod projection;
-pub mod expansion;
 pub mod confidence;
 pub mod fill;
 pub mod blob;
@@ -55,7 +53,6 @@ pub use estimate::{Estimate, RowStatus};
 #[cfg(feature = "f32-direct")]
 pub use fixed::Fixed;
 pub use frame::{ColumnWire, ColumnWires, RowWire, Wires};
-pub use gate::Gate;
 
 /// The README's example is a test.
 #[cfg(doctest)]

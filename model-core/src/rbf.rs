@@ -91,11 +91,6 @@ impl<'a> Network<'a> {
         each!(self, inner => inner.check_values())
     }
 
-    /// A bound on the magnitude of every output, for any inputs; infinite if it is beyond f32.
-    pub(crate) fn largest_output(&self) -> f32 {
-        each!(self, inner => inner.largest_output())
-    }
-
     /// All words of the network, in slices that follow each other.
     pub(crate) fn block(&self) -> [&'a [u32]; 7] {
         match self {

@@ -2,11 +2,10 @@
 
 use proptest::prelude::*;
 use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
-use taxel_core::gate::Rest;
 use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use taxel_core::relative::{reciprocal, relative};
 use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS};
-use taxel_core::{AlignedBytes, Decoder, Estimate, Frame, Gate, RowStatus};
+use taxel_core::{AlignedBytes, Decoder, Estimate, Frame, RowStatus};
 
 const ROWS: usize = 2;
 const INPUTS: usize = 3;
@@ -154,18 +153,6 @@ fn only_rows_that_are_decoded_are_told_of() {
             let status = [RowStatus::MissingReading, RowStatus::Decoded];
             assert_eq!(clamps(&decoder, frame[..].into()), (false, status), "{format:?}");
         }
-        // A row at rest is not decoded, however far its baseline is.
-        let frame = [90.0, 90.0, 90.0, 54.0, 54.0, 54.0];
-        let rest =
-            Rest { baseline_ohm: &frame, outputs: &[1.0; 2], status: &[RowStatus::Decoded; 2] };
-        let gate = Gate::new(rest, 0.02);
-        assert!(gate.is_some());
-        let mut touched = frame;
-        touched[4] = 56.0;
-        let gated = Frame { gate, ..touched[..].into() };
-        let status = [RowStatus::AtRest, RowStatus::Decoded];
-        assert_eq!(clamps(&decoder, gated), (false, status), "{format:?}");
-        assert!(clamps(&decoder, touched[..].into()).0, "{format:?}");
     }
 }
 

@@ -70,7 +70,7 @@ fn readings_are_relative_where_the_models_are() {
     let decoder = Decoder::<1>::load(&buffer.0[..length]).unwrap();
     let (mut scratch, mut deviation) = ([0.0; 5], [0.0]);
     let mut assess = |readings_ohm: &[f32], reciprocals: &[f32]| {
-        let frame = Frame { readings_ohm, reciprocals, gate: None };
+        let frame = Frame { readings_ohm, reciprocals };
         decoder.assess_into(frame, &mut scratch, &mut deviation)
     };
     // 116/2 and 244/4.

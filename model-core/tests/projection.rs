@@ -4,10 +4,9 @@ use crate::common::{NEAR_CENTRE, PROJECTION, network};
 use taxel_core::blob::{
     DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
-use taxel_core::gate::Rest;
 use taxel_core::projection::Projection;
 use taxel_core::rbf::Network;
-use taxel_core::{Aligned, Decoder, Estimate, Frame, Gate, OwnedEstimate, RowStatus};
+use taxel_core::{Aligned, Decoder, Estimate, Frame, RowStatus};
 
 fn encoded<'b>(
     block: &[f32],
@@ -85,28 +84,6 @@ fn features_that_overflow_are_told_from_missing_readings() {
     let estimate = decoder.decode(&frame[..]).unwrap();
     assert_eq!(estimate.status, [RowStatus::Overflow; 2]);
     assert!(estimate.outputs.iter().all(|output| output.is_nan()));
-}
-
-#[test]
-fn an_array_is_at_rest_as_a_whole_or_not_at_all() {
-    let mut buffer = Aligned([0; 1024]);
-    let decoder = Decoder::<2>::load(array(&mut buffer.0)).unwrap();
-    let rest = decoder.decode(&NEAR_CENTRE[..]).unwrap();
-    let OwnedEstimate { outputs, status } = &rest;
-    let gate = Gate::new(Rest { baseline_ohm: &NEAR_CENTRE, outputs, status }, 0.02);
-    let mut estimate = rest.clone();
-    let mut scratch = [0.0; 4];
-    let mut frame = NEAR_CENTRE;
-    frame[0] *= 1.01;
-    let gated = Frame { gate, ..Frame::from(&frame[..]) };
-    decoder.decode_into(gated, &mut scratch, &mut estimate.borrowed()).unwrap();
-    assert_eq!((&estimate.status[..], &estimate.outputs), (&[RowStatus::AtRest; 2][..], outputs));
-    // A touch of the last row makes the first one be decoded too.
-    frame[3] *= 1.03;
-    let gated = Frame { gate, ..Frame::from(&frame[..]) };
-    decoder.decode_into(gated, &mut scratch, &mut estimate.borrowed()).unwrap();
-    assert_eq!(estimate, decoder.decode(&frame[..]).unwrap());
-    assert_eq!(estimate.status, [RowStatus::Decoded; 2]);
 }
 
 /// A model of one row: four readings, two features, three outputs.

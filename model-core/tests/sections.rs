@@ -1,7 +1,7 @@
 //! Sections of the blob that a model may have besides its networks: their bytes, and what damage of them is called.
 
 use crate::common::{PROJECTION, bytes_of_table, seal, worked_bytes};
-use crate::{blob_format, confidence, expansion, fill, projection};
+use crate::{blob_format, confidence, fill, projection};
 use proptest::prelude::*;
 use taxel_core::blob::{DecodeError, Model};
 use taxel_core::rbf::{Network, NetworkError};
@@ -24,16 +24,15 @@ fn sample(blob: &[u8], header: &[u8], block: &[f32]) -> Sample {
     Sample { blob: AlignedBytes::copy_of(blob), start, floats, count: block.len() }
 }
 
-/// A projection, an expansion, a confidence and a fill.
-fn samples() -> [Sample; 4] {
+/// A projection, a confidence and a fill.
+fn samples() -> [Sample; 3] {
     let mut buffer = Aligned([0; 1024]);
     let of_projection = sample(projection::of_one_row(&mut buffer.0), &[8, 2], &PROJECTION);
-    let of_expansion = sample(expansion::small(&mut buffer.0), &[6, 1], &expansion::EXPANSION);
     let (blob, length) = confidence::small(false);
     let of_confidence = sample(&blob.0[..length], &[7, 1, 1], &confidence::BLOCK);
     let blob = fill::blob(Some(fill::fill()), false).unwrap();
     let of_fill = sample(&blob, &[9, 1], fill::BLOCK.as_flattened());
-    [of_projection, of_expansion, of_confidence, of_fill]
+    [of_projection, of_confidence, of_fill]
 }
 
 impl Sample {
@@ -53,39 +52,33 @@ impl Sample {
 }
 
 #[test]
-fn sections_have_the_specifications_worked_bytes() {
-    let [_, expansion, confidence, _] = samples();
-    for (sample, mark) in [(expansion, "worked expansion"), (confidence, "worked confidence")] {
-        let bytes = worked_bytes(mark);
-        assert_eq!(sample.blob[sample.start..][..bytes.len()], bytes, "{mark}");
-    }
+fn a_confidence_has_the_specifications_worked_bytes() {
+    let [_, confidence, _] = samples();
+    let bytes = worked_bytes("worked confidence");
+    assert_eq!(confidence.blob[confidence.start..][..bytes.len()], bytes);
 }
 
 #[test]
 fn the_example_of_the_page_is_the_specifications() {
     let page = include_str!("../../docs/blob.md");
-    let table = page.split("<!-- worked expansion -->").nth(1).expect("the marked table");
-    assert_eq!(bytes_of_table(table.lines()), worked_bytes("worked expansion"));
+    let table = page.split("<!-- worked confidence -->").nth(1).expect("the marked table");
+    assert_eq!(bytes_of_table(table.lines()), worked_bytes("worked confidence"));
 }
 
 #[test]
 fn every_damage_of_a_section_has_its_own_error() {
-    let [projection, expansion, confidence, fill] = samples();
+    let [projection, confidence, fill] = samples();
     let count = |what, expected, found| DecodeError::CountMismatch { what, expected, found };
     let malformed = |section| DecodeError::Malformed { section };
     for (sample, place, byte, error) in [
         (&projection, 1, 1, count("bytes of projection", 20, 40)),
         (&projection, 1, 3, count("bytes of projection", 60, 40)),
-        // 0 components need the means alone, 2 another eight bytes.
-        (&expansion, 1, 0, count("bytes of expansion", 8, 16)),
-        (&expansion, 1, 2, count("bytes of expansion", 24, 16)),
         (
-            &expansion,
-            expansion.floats - expansion.start - 1,
-            15,
-            count("bytes of expansion", 16, 15),
+            &confidence,
+            confidence.floats - confidence.start - 1,
+            63,
+            count("bytes of confidence", 64, 63),
         ),
-        (&expansion, 2, 4, malformed("padding")),
         // Two directions take 4·(1 + 2 + 1 + 3) bytes more; two components 4·(1 + 2 + 3 + 1).
         (&confidence, 1, 2, count("bytes of confidence", 92, 64)),
         (&confidence, 2, 2, count("bytes of confidence", 92, 64)),
@@ -95,21 +88,19 @@ fn every_damage_of_a_section_has_its_own_error() {
     ] {
         assert_eq!(sample.damaged(sample.start + place, &[byte]), error, "{place} {byte}");
     }
-    // With any other tag these are no fields of a network, whose section must follow.
-    for tag in [0, 1, 3, 4, 5, 8, 0xff] {
-        assert_eq!(expansion.damaged(expansion.start, &[tag]), malformed("network section"));
+    // With a tag of no section that may follow, the section of a network is missed.
+    for tag in [0, 6, 200] {
+        assert_eq!(confidence.damaged(confidence.start, &[tag]), malformed("network section"));
     }
-    assert_eq!(confidence.damaged(confidence.start, &[200]), malformed("network section"));
 }
 
 #[test]
 fn every_number_that_cannot_be_is_refused_by_its_section() {
-    let [projection, expansion, confidence, fill] = samples();
+    let [projection, confidence, fill] = samples();
     let not_finite = |what| NetworkError::NotFinite { what };
     let not_positive = |what| NetworkError::NotPositive { what };
     for (sample, error) in [
         (&projection, DecodeError::Projection { cause: not_finite("projection") }),
-        (&expansion, DecodeError::Expansion { cause: not_finite("expansion") }),
         (&confidence, DecodeError::Confidence { cause: not_finite("confidence") }),
         (&fill, DecodeError::Fill { cause: not_finite("fill") }),
     ] {
@@ -117,9 +108,6 @@ fn every_number_that_cannot_be_is_refused_by_its_section() {
             assert_eq!(sample.with(number, *value), error, "number {number}");
         }
     }
-    // 3e38 is a number, but outputs would leave f32.
-    let cause = not_finite("the largest output");
-    assert_eq!(expansion.with(2, 3e38), DecodeError::Expansion { cause });
     let cause = not_finite("confidence");
     assert_eq!(confidence.with(13, 2e38), DecodeError::Confidence { cause });
     let cause = not_positive("confidence");
@@ -133,7 +121,7 @@ proptest! {
     /// marked; where readings are numbers, so is the novelty.
     #[test]
     fn hostile_bytes_under_a_valid_crc_never_panic(
-        which in 0..5_usize,
+        which in 0..4_usize,
         changes in prop::collection::vec((9_usize..500, any::<u8>()), 1..6),
         frame in prop::array::uniform4(any::<f32>()),
     ) {

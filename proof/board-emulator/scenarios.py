@@ -462,7 +462,7 @@ def ask_statistics(bench):
     """The device's counters that matter here."""
     answer, _ = bench.ask(STATISTICS, COUNTERS)
     rest, counters = answer[1:], {}
-    for name in ("frames_scanned", "frames_decoded", "rows_at_rest", "frames_missed", "failed_samples", "requests",
+    for name in ("frames_scanned", "frames_decoded", "frames_missed", "failed_samples", "requests",
                  "bad_packets", "lost_reports", "bad_loops", "longest_scan_us", "longest_decode_us"):
         counters[name], rest = taken(rest)
     return counters

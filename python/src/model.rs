@@ -215,11 +215,8 @@ impl Blob {
         let decoder = &self.ways().frames;
         let mut scratch = vec![0.0; decoder.scratch_floats()];
         let filled = decoder.fill(readings.as_slice_mut()?, &mut scratch);
-        let frame = Frame {
-            readings_ohm: readings.as_slice()?,
-            reciprocals: reciprocals.as_slice()?,
-            gate: None,
-        };
+        let frame =
+            Frame { readings_ohm: readings.as_slice()?, reciprocals: reciprocals.as_slice()? };
         let status = status.as_slice_mut()?;
         let mut rows = vec![RowStatus::MissingReading; status.len()];
         let mut estimate = Estimate { outputs: outputs.as_slice_mut()?, status: &mut rows };

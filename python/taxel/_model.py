@@ -68,8 +68,8 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
     whole_array : bool
         One network behind a projection of all readings. For columns named as wires (`r1c1_ohm`), whose outputs belong to
         rows, this is instead of a network for each row.
-    features, output_rank : int or None
-        Features of that projection, and components that are expanded to all outputs.
+    features : int or None
+        Features of that projection.
     grid : (int, int) or None
         Rows and columns of a mat whose cells are the columns of X, row by row. Without it, names of a DataFrame may tell a mat
         (`r1c1`, or numbers that fill a square).
@@ -104,7 +104,6 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         format: str | None = None,
         whole_array: bool = False,
         features: int | None = None,
-        output_rank: int | None = None,
         grid: tuple[int, int] | None = None,
         relative_inputs: bool = False,
         confidence: bool = False,
@@ -119,7 +118,6 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.format = format
         self.whole_array = whole_array
         self.features = features
-        self.output_rank = output_rank
         self.grid = grid
         self.relative_inputs = relative_inputs
         self.confidence = confidence
@@ -160,8 +158,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         arguments += option("--penalty", self.penalty) + option("--no-affine", not self.affine_tail)
         arguments += option("--no-refine", not self.refine) + option("--format", self.format)
         arguments += option("--whole-array", self.whole_array) + option("--features", self.features)
-        arguments += option("--output-rank", self.output_rank) + option("--fill", self.fill)
-        arguments += option("--grid", grid)
+        arguments += option("--fill", self.fill) + option("--grid", grid)
         if self.relative_inputs:
             arguments += ["--relative-inputs", *option("--rest", [pattern(names_y)])]
         arguments += option("--confidence", self.confidence) + option("--seed", self.random_state)

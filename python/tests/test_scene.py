@@ -33,12 +33,12 @@ def test_frames_are_those_of_the_command(tmp_path):
 
 def test_a_trade_has_points_a_front_and_what_was_chosen():
     scene = taxel.Scene("press").replace(**SMALL)
-    trade = taxel.trade(scene, centres=[4, 8], output_rank="none", refine=False, max_error=1.0)
+    trade = taxel.trade(scene, centres=[4, 8], refine=False, max_error=1.0)
     assert trade.chosen in trade.front and trade.chosen in trade.points
     assert trade.model.blob_.centres == trade.chosen["centres"]
     assert len(trade.to_pandas()) == len(trade.points) and "<svg" in trade._repr_html_()
     with pytest.raises(ValueError, match="--max-error"):
-        taxel.trade(scene, centres=[4], output_rank="none", refine=False, max_error=-1.0)
+        taxel.trade(scene, centres=[4], refine=False, max_error=-1.0)
 
 
 def test_errors_of_a_model_are_those_of_the_command():

@@ -40,7 +40,7 @@ pub use host::{
     request_bytes, sealed, send, settle, statistics, undo, upload, upload_step, upload_steps,
 };
 pub use models::{
-    blob, blob_of, blob_of_a_row, blob_of_components, blob_of_length, blob_with_confidence, crc_of,
+    blob, blob_of, blob_of_a_row, blob_of_features, blob_of_length, blob_with_confidence, crc_of,
 };
 pub use shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
 pub use source::Source;

@@ -3,7 +3,6 @@
 use taxel_core::AlignedBytes;
 use taxel_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::confidence::{Confidence, Sizes};
-use taxel_core::expansion::Expansion;
 use taxel_core::projection::Projection;
 use taxel_core::rbf::direct::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
@@ -86,34 +85,32 @@ fn blob_with(
     encode_to_vec(&parts).unwrap()
 }
 
-/// A blob whose one network for both rows computes so many `components`, which are expanded to all outputs.
-pub fn blob_of_components(components: usize) -> AlignedBytes {
+/// A blob of one network for both rows, behind a projection to so many `features`.
+pub fn blob_of_features(features: usize) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
-    let (weights, bias) = (vec![0.5; components], vec![0.25; components]);
-    let network = Network::from(
-        direct::Network::try_new(
-            Shape { inputs: COLS, centres: 1, outputs: components },
-            Parameters {
-                input_minimum: &[50.0; COLS],
-                input_per_span: &[0.05; COLS],
-                centres: &[0.5; COLS],
-                decay: &[1.5],
-                output_weights: &weights,
-                bias: &bias,
-                affine: &[],
-            },
-        )
-        .unwrap(),
-    );
+    let all = |count: usize, value: f32| vec![value; count];
+    let (minimum, per_span) = (all(features, 50.0), all(features, 0.05));
+    let (centre, weights, bias) = (all(features, 0.5), all(outputs, 0.5), all(outputs, 0.25));
+    let network = direct::Network::try_new(
+        Shape { inputs: features, centres: 1, outputs },
+        Parameters {
+            input_minimum: &minimum,
+            input_per_span: &per_span,
+            centres: &centre,
+            decay: &[1.5],
+            output_weights: &weights,
+            bias: &bias,
+            affine: &[],
+        },
+    )
+    .unwrap();
     // Every feature is the mean reading.
-    let mut projection = vec![1.0 / readings as f32; (1 + readings) * COLS];
-    projection[..COLS].fill(0.0);
-    let expansion = vec![0.125; (1 + components) * outputs];
-    let networks = [network];
+    let mut projection = vec![1.0 / readings as f32; (1 + readings) * features];
+    projection[..features].fill(0.0);
+    let networks = [network.into()];
     let metadata = Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS });
     let parts = ModelParts {
-        projection: Projection::new(readings, COLS, &projection).ok(),
-        expansion: Expansion::new(components, outputs, &expansion).ok(),
+        projection: Projection::new(readings, features, &projection).ok(),
         ..ModelParts::new(&networks, &[0; ROWS], metadata)
     };
     encode_to_vec(&parts).unwrap()

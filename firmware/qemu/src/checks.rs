@@ -8,11 +8,10 @@ use taxel_core::blob::Model;
 use taxel_core::confidence::{Confidence, Sizes};
 use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use taxel_core::filter::{Settings, State};
-use taxel_core::gate::{Rest, is_at_rest};
 use taxel_core::rbf::{Format, Network};
 use taxel_core::rls::Rls;
 use taxel_core::scale::{CLAMP, saturates};
-use taxel_core::{Decoder, Estimate, Gate, RowStatus};
+use taxel_core::{Decoder, Estimate, RowStatus};
 
 /// Number of row-wires, as in the paper's sensor.
 pub const ROWS: usize = 8;
@@ -22,8 +21,6 @@ pub const COLS: usize = 18;
 pub const OUTPUTS: usize = 18;
 /// Number of row-wires of a small sensor that one network decodes, behind a projection.
 pub const ARRAY_ROWS: usize = 2;
-/// Number of components that such a network may compute, which are expanded to the outputs.
-pub const ARRAY_COMPONENTS: usize = 7;
 
 const FRAMES: usize = 6;
 const CRC: Crc<u32, Table<0>> = Crc::<u32, Table<0>>::new(&CRC_32_ISO_HDLC);
@@ -70,16 +67,11 @@ impl<const R: usize> Decoded<R> {
     };
 
     /// Decodes `frame` into `self`; `None` if the model has another shape.
-    fn decode<E: ExpKernel>(
-        &mut self,
-        decoder: &Decoder<'_, R>,
-        frame: &Frame<R>,
-        gate: Option<Gate<'_>>,
-    ) -> Option<()> {
+    fn decode<E: ExpKernel>(&mut self, decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<()> {
         let outputs = self.outputs.as_flattened_mut();
         let mut estimate = Estimate { outputs, status: &mut self.status };
-        let mut scratch = [0.0; 2 * COLS + ARRAY_COMPONENTS];
-        let frame = taxel_core::Frame { gate, ..frame.as_flattened().into() };
+        let mut scratch = [0.0; 2 * COLS];
+        let frame = frame.as_flattened().into();
         self.clamped = decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).ok()?;
         Some(())
     }
@@ -87,7 +79,7 @@ impl<const R: usize> Decoded<R> {
     /// What `decoder` makes of `frame`.
     fn new(decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<Self> {
         let mut outcome = Self::NOTHING;
-        outcome.decode::<Polynomial>(decoder, frame, None)?;
+        outcome.decode::<Polynomial>(decoder, frame)?;
         Some(outcome)
     }
 }
@@ -107,7 +99,7 @@ pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
         if frame == 1 {
             readings[2][3] = f32::NAN;
         }
-        outcome.decode::<E>(&decoder, &readings, None)?;
+        outcome.decode::<E>(&decoder, &readings)?;
         add(&mut digest, outcome.outputs.as_flattened());
     }
     Some(digest.finalize())
@@ -163,7 +155,7 @@ fn decoding_all<E: ExpKernel, const R: usize>(
     let mut numbers = Numbers::new(4);
     let mut outcome = Decoded::NOTHING;
     for index in 0..frames {
-        outcome.decode::<E>(&decoder, &frame(index, &mut numbers), None)?;
+        outcome.decode::<E>(&decoder, &frame(index, &mut numbers))?;
         for (outputs, status) in outcome.outputs.iter().zip(outcome.status) {
             outputs.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
             digest.update(&[status as u8]);
@@ -321,70 +313,6 @@ fn assessing_sizes() -> Option<Assessed> {
     Some(Assessed { crc: digest.finalize(), ..assessed })
 }
 
-/// Tolerance of the gate, relative to the baseline.
-const TOLERANCE: f32 = 0.02;
-
-/// Readings about as far from the `baseline` as the gate allows, each by itself or all together. Now and then one
-/// reading is beyond, NaN or infinite.
-fn nearly_at_rest(
-    index: usize,
-    baseline: &[f32; COLS],
-    most: [f32; 2],
-    numbers: &mut Numbers,
-) -> [f32; COLS] {
-    let [most_alone, most_together] = most;
-    let together = 1.05 * most_together * numbers.draw();
-    let mut readings =
-        baseline.map(|ohm| ohm * (1.0 + together) * (1.0 + 0.4 * most_alone * numbers.draw()));
-    let odd_ones = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, 1.0, 1.0, 1.0, 1.0];
-    if let (0, Some(reading)) = (index % 3, readings.get_mut(index / 3 % COLS)) {
-        *reading *= odd_ones[index / 3 % odd_ones.len()] + 1.2 * most_alone * numbers.draw();
-    }
-    readings
-}
-
-/// Number of rows in [`MANY`] frames near the baseline, how many of them are at rest, and how many the gate treats
-/// wrongly: otherwise than [`is_at_rest`] says, or with other outputs. `None` if the blob does not load.
-#[inline(never)]
-fn gating(blob: &[u8]) -> Option<[usize; 3]> {
-    let decoder = Decoder::<ROWS>::load(blob).ok()?;
-    let mut numbers = Numbers::new(5);
-    let mut baseline: Frame<ROWS> = [[f32::NAN; COLS]; ROWS];
-    let readings = baseline.as_flattened_mut().iter_mut();
-    readings.for_each(|ohm| *ohm = 60.0 + 5.0 * numbers.draw());
-    let rest = Decoded::new(&decoder, &baseline)?;
-    // √18 as a number, because `core` has no square root.
-    let most = [TOLERANCE, TOLERANCE / 4.242_640_7];
-    let [mut at_rest, mut otherwise] = [0; 2];
-    for index in 0..MANY {
-        let mut frame: Frame<ROWS> = [[f32::NAN; COLS]; ROWS];
-        let rows = frame.iter_mut();
-        rows.zip(&baseline).enumerate().for_each(|(row, (to, from))| {
-            *to = nearly_at_rest(index * ROWS + row, from, most, &mut numbers);
-        });
-        let ungated = Decoded::new(&decoder, &frame)?;
-        let mut outcome = Decoded { outputs: [[f32::NAN; OUTPUTS]; ROWS], ..ungated };
-        let outputs = rest.outputs.as_flattened();
-        let rest_of_all =
-            Rest { baseline_ohm: baseline.as_flattened(), outputs, status: &rest.status };
-        let gate = Gate::new(rest_of_all, TOLERANCE)?;
-        outcome.decode::<Polynomial>(&decoder, &frame, Some(gate))?;
-        for row in 0..ROWS {
-            let readings = &frame[row];
-            let expected = if is_at_rest(readings, &baseline[row], TOLERANCE) {
-                at_rest += 1;
-                (RowStatus::AtRest, rest.outputs[row])
-            } else {
-                (ungated.status[row], ungated.outputs[row])
-            };
-            let same = outcome.status[row] == expected.0
-                && outcome.outputs[row].map(f32::to_bits) == expected.1.map(f32::to_bits);
-            otherwise += usize::from(!same);
-        }
-    }
-    Some([MANY * ROWS, at_rest, otherwise])
-}
-
 /// Where lines of a log go.
 pub type Say<'s> = &'s mut dyn FnMut(Arguments<'_>);
 
@@ -396,18 +324,15 @@ const KERNELS: [(Format, &str); 3] = [
 ];
 
 /// The models of one network for all rows, behind a projection.
-const ARRAYS: [(&str, &str); 8] = [
+const ARRAYS: [(&str, &str); 5] = [
     ("f32", "array-f32.bin"),
     ("f32 without tail", "array-f32-no-tail.bin"),
     ("fixed16", "array-fixed16.bin"),
     ("fixed16 without tail", "array-fixed16-no-tail.bin"),
     ("f32-direct", "array-f32-direct.bin"),
-    ("f32 of components", "array-f32-components.bin"),
-    ("fixed16 of components", "array-fixed16-components.bin"),
-    ("f32-direct of components", "array-f32-direct-components.bin"),
 ];
 
-/// Says what every number format and exponential decodes of [`MANY`] frames, what a gate and a clamp find, and what frames
+/// Says what every number format and exponential decodes of [`MANY`] frames, what a clamp finds, and what frames
 /// are by a confidence. `None` if one of the models in testdata, which `model` gives by name, does not load.
 pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()> {
     for (format, file) in KERNELS {
@@ -422,10 +347,6 @@ pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()>
             "clamp, {name}: {clamped} of {frames} frames clamped, {otherwise} otherwise than the twin's"
         ));
     }
-    let [rows, at_rest, otherwise] = gating(model("kernels-fixed16.bin"))?;
-    say(format_args!(
-        "gate: {at_rest} of {rows} rows at rest, {otherwise} otherwise than the twin's"
-    ));
     for (name, file) in ARRAYS {
         let crc = decoding_all::<Polynomial, ARRAY_ROWS>(model(file), MANY, one_of_many)?;
         say(format_args!("array, {name}: {crc:08x}"));
@@ -443,7 +364,7 @@ pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()>
 }
 
 /// CRC-32 of all bits of outputs that a filter in time gives, and how often it starts anew: frames are late, missed and
-/// repeated; rows are at rest and faulty; the settings are drawn now and then.
+/// repeated; rows are faulty; the settings are drawn now and then.
 fn filtering() -> (u32, usize) {
     const OUTPUTS: usize = 3;
     let (crc, mut numbers) = (CRC, Numbers::new(7));
@@ -463,9 +384,8 @@ fn filtering() -> (u32, usize) {
         let mut status = [RowStatus::Decoded; ROWS];
         for (outputs, status) in outputs.iter_mut().zip(&mut status) {
             outputs.fill_with(|| draw(2e6) as f32 * 1e-6 - 1.0);
-            *status = [RowStatus::AtRest, RowStatus::MissingReading, RowStatus::Decoded]
-                [draw(30.0).min(2) as usize];
-            if *status == RowStatus::MissingReading {
+            if draw(30.0) == 1 {
+                *status = RowStatus::MissingReading;
                 outputs.fill(f32::NAN);
             }
         }

@@ -1,4 +1,4 @@
-//! Networks, projections and gates of many shapes, by assembly and by its compiled twins.
+//! Networks and projections of many shapes, by assembly and by its compiled twins.
 //!
 //! What assembly reads lies directly before a place where reads fault. What it writes is followed by numbers that
 //! must stay.
@@ -8,11 +8,9 @@ use core::{ptr, slice};
 use cortex_m::peripheral::MPU;
 
 use taxel_core::exp::Polynomial;
-use taxel_core::gate::{Rest, is_at_rest};
 use taxel_core::projection::Projection;
 use taxel_core::rbf::{Format, Network, Shape, expanded, fixed16};
 use taxel_core::scale::UNITS;
-use taxel_core::{Estimate, Gate, RowStatus};
 
 use crate::checks::Numbers;
 
@@ -260,107 +258,4 @@ pub fn projections(memory: &mut Memory) -> Option<Comparison> {
         comparison.add(same && found.is_untouched_from(features));
     }
     Some(comparison)
-}
-
-/// Number of rows of a gated frame.
-const GATED_ROWS: usize = 3;
-
-/// Compares gates of frames whose rows have `COLS` readings and `OUTPUTS` outputs.
-#[inline(never)]
-fn gate<const COLS: usize, const OUTPUTS: usize>(
-    comparison: &mut Comparison,
-    numbers: &mut Numbers,
-) {
-    const TOLERANCE: f32 = 0.02;
-    for index in 0..8 * COLS.max(8) {
-        let baseline =
-            [(); GATED_ROWS].map(|()| [(); COLS].map(|()| MIDDLE_OHM + 5.0 * numbers.draw()));
-        let outputs = [(); GATED_ROWS].map(|()| [(); OUTPUTS].map(|()| numbers.draw()));
-        let mut known = [RowStatus::Decoded; GATED_ROWS];
-        if let (0, Some(status)) = (index % 7, known.get_mut(index / 7 % GATED_ROWS)) {
-            *status = RowStatus::Overflow;
-        }
-        let rest = Rest {
-            baseline_ohm: baseline.as_flattened(),
-            outputs: outputs.as_flattened(),
-            status: &known,
-        };
-        // Mostly at rest; now and then one reading of a row is far off, or all are by a little.
-        let mut readings = baseline;
-        for (row, readings) in readings.iter_mut().enumerate() {
-            let index = index + row;
-            let together = if index % 4 == 0 { 0.02 * numbers.draw() } else { 0.0 };
-            readings.iter_mut().for_each(|ohm| *ohm *= 1.0 + together + 0.004 * numbers.draw());
-            if let (1, Some(reading)) = (index % 4, readings.get_mut(index / 4 % COLS)) {
-                *reading *= [1.03, 0.97, f32::NAN, f32::INFINITY][index / 4 % 4];
-            }
-        }
-        let Some(gate) = Gate::new(rest, TOLERANCE) else {
-            return comparison.add(false);
-        };
-        let mut found = [[f32::from_bits(UNTOUCHED); OUTPUTS]; GATED_ROWS];
-        let mut status = [RowStatus::Overflow; GATED_ROWS];
-        let mut estimate = Estimate { outputs: found.as_flattened_mut(), status: &mut status };
-        let awake = gate.give_rest(readings.as_flattened(), [COLS, OUTPUTS], &mut estimate, false);
-        let first_awake = status.iter().position(|it| *it != RowStatus::AtRest);
-        let until = until_awake(&gate, readings.as_flattened(), &found, status, first_awake);
-        let mut same =
-            until && awake == status.iter().filter(|it| **it != RowStatus::AtRest).count();
-        for row in 0..GATED_ROWS {
-            let at_rest = known[row] == RowStatus::Decoded
-                && is_at_rest(&readings[row], &baseline[row], TOLERANCE);
-            let (expected, of_row) = if at_rest {
-                (RowStatus::AtRest, outputs[row])
-            } else {
-                (RowStatus::MissingReading, [f32::from_bits(UNTOUCHED); OUTPUTS])
-            };
-            same &= status[row] == expected && same_bits(&found[row], &of_row);
-        }
-        comparison.add(same);
-    }
-}
-
-/// Whether a gate that ends with the first row that is awake gives the same up to there as one for `all` rows, and
-/// leaves the others untouched.
-fn until_awake<const OUTPUTS: usize>(
-    gate: &Gate<'_>,
-    readings: &[f32],
-    all: &[[f32; OUTPUTS]; GATED_ROWS],
-    all_status: [RowStatus; GATED_ROWS],
-    first_awake: Option<usize>,
-) -> bool {
-    let mut found = [[f32::from_bits(UNTOUCHED); OUTPUTS]; GATED_ROWS];
-    let mut status = [RowStatus::Overflow; GATED_ROWS];
-    let mut estimate = Estimate { outputs: found.as_flattened_mut(), status: &mut status };
-    let sizes = [readings.len() / GATED_ROWS, OUTPUTS];
-    let awake = gate.give_rest(readings, sizes, &mut estimate, true);
-    let mut same = awake == usize::from(first_awake.is_some());
-    for row in 0..GATED_ROWS {
-        let reached = first_awake.is_none_or(|first| row <= first);
-        let (expected, of_row) = if reached {
-            (all_status[row], all[row])
-        } else {
-            (RowStatus::Overflow, [f32::from_bits(UNTOUCHED); OUTPUTS])
-        };
-        same &= status[row] == expected && same_bits(&found[row], &of_row);
-    }
-    same
-}
-
-/// Compares gates of rows of many sizes.
-pub fn gates() -> Comparison {
-    let (mut comparison, mut numbers) = (Comparison::default(), Numbers::new(8));
-    let (c, n) = (&mut comparison, &mut numbers);
-    gate::<1, 1>(c, n);
-    gate::<2, 17>(c, n);
-    gate::<4, 4>(c, n);
-    gate::<12, 5>(c, n);
-    gate::<17, 19>(c, n);
-    gate::<18, 6>(c, n);
-    gate::<18, 18>(c, n);
-    gate::<19, 36>(c, n);
-    gate::<32, 24>(c, n);
-    gate::<36, 37>(c, n);
-    gate::<40, 2>(c, n);
-    comparison
 }

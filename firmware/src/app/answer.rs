@@ -95,7 +95,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             }
             Request::SetBaseline { readings_ohm } => sensor.set_frame(readings_ohm).map(|()| {
                 sensor.take_baseline(link);
-                work.decode_baseline(&sensor.baseline, model.decoder.as_ref());
+                work.take_baseline(&sensor.baseline);
                 Some(Report::Baseline { readings_ohm: Floats::new(sensor.baseline.mean()) })
             }),
             Request::Upload(step) => models
@@ -116,7 +116,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::SetConstants(constants) => match sensor.set_constants(constants, link) {
                 Ok(changed) => {
                     if changed {
-                        work.decode_baseline(&sensor.baseline, model.decoder.as_ref());
+                        work.take_baseline(&sensor.baseline);
                     }
                     Ok(sensor.source.constants().map(Report::Constants))
                 }

@@ -24,7 +24,6 @@ pub struct Buffers<
     /// Working space of a decoder ([`Capacity::scratch_floats`](crate::capacity::Capacity::scratch_floats)).
     pub(super) scratch: [[[f32; COLUMNS]; ROWS]; 2],
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
-    pub(super) rest: Outcome<ROWS, OUTPUTS>,
     /// State of the filter in time.
     #[cfg(feature = "filter")]
     pub(super) tracks: [[Track; OUTPUTS]; ROWS],
@@ -80,7 +79,6 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             reciprocals: [[0.0; COLUMNS]; ROWS],
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
-            rest: Outcome::NOTHING,
             tracks: [[[0.0; 2]; OUTPUTS]; _],
             deviations: [[0.0; OUTPUTS]; _],
         }

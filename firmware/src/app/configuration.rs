@@ -16,7 +16,7 @@ impl Configuration {
     pub const FRAME_PERIOD_US: RangeInclusive<u32> = 100..=1_000_000_000;
 
     /// The default configuration: 100 frames a second, estimates are sent without confidence, limits for rubber of about
-    /// 60 Ω, every row is decoded, and nothing is filtered.
+    /// 60 Ω, and nothing is filtered.
     pub const DEFAULT: Self = Self {
         frame_period_us: 10_000,
         scan: ScanSettings { settling_us: 20, oversampling: 1 },
@@ -26,7 +26,6 @@ impl Configuration {
         shorted_below_ohm: Limits::USUAL.shorted_below_ohm,
         open_above_ohm: Limits::USUAL.open_above_ohm,
         contact_threshold: 0.02,
-        rest_tolerance: 0.0,
         filter_time_constant_us: 0,
         filter_lead_us: 0,
         report_every: 1,
@@ -57,7 +56,6 @@ impl Configuration {
             // False for NaN. An infinite limit is none.
             (limits[0] < limits[1], ConfigurationField::Limits),
             (positive(self.contact_threshold), ConfigurationField::ContactThreshold),
-            ((0.0..1.0).contains(&self.rest_tolerance), ConfigurationField::RestTolerance),
             (
                 self.filter_time_constant_us <= MOST_TIME_CONSTANT_US,
                 ConfigurationField::FilterTimeConstant,
@@ -92,9 +90,6 @@ mod tests {
                 Configuration { contact_threshold: 0.0, ..good },
                 ConfigurationField::ContactThreshold,
             ),
-            (Configuration { rest_tolerance: -0.01, ..good }, ConfigurationField::RestTolerance),
-            (Configuration { rest_tolerance: 1.0, ..good }, ConfigurationField::RestTolerance),
-            (Configuration { rest_tolerance: f32::NAN, ..good }, ConfigurationField::RestTolerance),
             (
                 Configuration { filter_time_constant_us: 1_000_001, ..good },
                 ConfigurationField::FilterTimeConstant,

@@ -130,11 +130,6 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
         (frame, health)
     }
 
-    /// Whether there is a baseline, and none is being captured.
-    pub fn has_baseline(&self) -> bool {
-        self.capture.is_none() && self.baseline.frames() > 0
-    }
-
     /// Whether the last frame differs from the baseline as under a contact.
     pub fn is_touched(&self) -> bool {
         let change = self.baseline.largest_relative_deviation(self.frame);

@@ -120,8 +120,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
 }
 
 impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
-    /// Makes frames and estimates as long as the model's, and decodes the baseline with it. A baseline of other
-    /// wires is replaced by the one that is kept, if that fits.
+    /// Makes frames and estimates as long as the model's, and takes the baseline. A baseline of other wires is replaced by the one that is kept, if that fits.
     fn take_shape_of(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
         let Self { sensor, models, link, work } = self;
         let capacity = models.capacity;
@@ -133,7 +132,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         if sensor.baseline.frames() == 0 && sensor.capture.is_none() {
             sensor.load_baseline(link);
         }
-        work.decode_baseline(&sensor.baseline, decoder);
+        work.take_baseline(&sensor.baseline);
     }
 
     /// Scans frames, decodes the one that is complete and reports on it.
@@ -147,7 +146,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let sent = sensor.configuration.confidence;
         let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
         if let Some(number) = sensor.feed_baseline() {
-            work.decode_baseline(&sensor.baseline, decoder);
+            work.take_baseline(&sensor.baseline);
             let readings_ohm = Floats::new(sensor.baseline.mean());
             link.send(number, &Report::Baseline { readings_ohm });
         }

@@ -4,10 +4,9 @@ use core::mem;
 
 use taxel_core::blob::Floats;
 use taxel_core::filter::{State, Track};
-use taxel_core::gate::Rest;
 use taxel_core::health::Health;
 use taxel_core::relative::reciprocal;
-use taxel_core::{Decoder, Estimate, Frame, Gate, RowStatus};
+use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 
 use super::buffers::cut;
 use super::link::Link;
@@ -29,8 +28,6 @@ pub struct Work<'m, const ROWS: usize> {
     /// Working space of a decoder.
     pub scratch: &'m mut [f32],
     pub estimate: Estimate<'m>,
-    /// The baseline, decoded by the model in force; valid once a baseline is captured.
-    pub rest: Estimate<'m>,
     /// State of the filter in time.
     pub filter: State<&'m mut [Track]>,
     /// Standard deviations of the outputs, for a model with a confidence.
@@ -48,28 +45,15 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         decoder: Option<&Decoder<'_, ROWS>>,
     ) -> (u8, Health) {
         let (start_us, start_cycles) = now(link);
-        let has_baseline = sensor.has_baseline();
-        let tolerance = sensor.configuration.rest_tolerance;
         let (frame, health) = sensor.judge_frame();
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
         if let Some(decoder) = decoder {
             if !health.is_good() {
                 decoder.fill(frame, self.scratch);
             }
-            let rest = cut(&mut self.rest, self.rows, self.outputs);
-            let rest = Rest {
-                baseline_ohm: sensor.baseline.mean(),
-                outputs: rest.outputs,
-                status: rest.status,
-            };
-            let gate = has_baseline.then(|| Gate::new(rest, tolerance));
             let mut estimate = cut(&mut self.estimate, self.rows, self.outputs);
             let decoded = decoder.decode_into(
-                Frame {
-                    readings_ohm: sensor.frame(),
-                    reciprocals: self.reciprocals,
-                    gate: gate.flatten(),
-                },
+                Frame { readings_ohm: sensor.frame(), reciprocals: self.reciprocals },
                 self.scratch,
                 &mut estimate,
             );
@@ -106,10 +90,8 @@ impl<const ROWS: usize> Work<'_, ROWS> {
 
     fn count_decoded(&mut self, us: u32, cycles: u32, s: &mut Statistics) {
         let status = cut(&mut self.estimate, self.rows, 0).status;
-        let at_rest = status.iter().filter(|status| **status == RowStatus::AtRest);
         // A row without a reading is not decoded, which takes no time.
         let is_whole = !status.contains(&RowStatus::MissingReading);
-        s.rows_at_rest = s.rows_at_rest.saturating_add(at_rest.count() as u32);
         s.frames_decoded = s.frames_decoded.saturating_add(1);
         s.longest_decode_us = s.longest_decode_us.max(us);
         s.longest_decode_cycles = s.longest_decode_cycles.max(cycles);
@@ -131,7 +113,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         let decoder = decoder.filter(|_| wanted != ConfidenceSent::Nothing)?;
         let (start_us, start_cycles) = now(link);
         let reciprocals = self.reciprocals.get(..frame_ohm.len()).unwrap_or_default();
-        let frame = Frame { readings_ohm: frame_ohm, reciprocals, gate: None };
+        let frame = Frame { readings_ohm: frame_ohm, reciprocals };
         let deviation = self.deviations.get_mut(..self.outputs).unwrap_or_default();
         // The model's sizes were found to fit when it came into force.
         let novelty = decoder.assess_into(frame, self.scratch, deviation).ok().flatten()?;
@@ -164,7 +146,6 @@ impl<const ROWS: usize> Work<'_, ROWS> {
                 RowStatus::Decoded => 0,
                 RowStatus::MissingReading => 1,
                 RowStatus::Overflow => 2,
-                RowStatus::AtRest => EstimateReport::ROW_AT_REST,
             };
         }
         let row_status = codes.get(..self.rows).unwrap_or_default();
@@ -182,13 +163,8 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         }
     }
 
-    /// Takes the baseline's reciprocals, decodes it with the model in force, and keeps the outputs for rows at rest. The
-    /// filter starts anew.
-    pub fn decode_baseline(
-        &mut self,
-        baseline: &Baseline<'_>,
-        decoder: Option<&Decoder<'_, ROWS>>,
-    ) {
+    /// Takes the baseline's reciprocals. The filter starts anew.
+    pub fn take_baseline(&mut self, baseline: &Baseline<'_>) {
         let known = baseline.frames() > 0;
         self.reciprocals.fill(f32::NAN);
         for (place, mean) in self.reciprocals.iter_mut().zip(baseline.mean()).filter(|_| known) {
@@ -196,15 +172,6 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         }
         self.filter.restart();
         self.has_reciprocals = self.reciprocals.iter().any(|reciprocal| !reciprocal.is_nan());
-        let mut rest = cut(&mut self.rest, self.rows, self.outputs);
-        let decoded = decoder.filter(|_| known).is_some_and(|decoder| {
-            let readings_ohm = baseline.mean();
-            let frame = Frame { readings_ohm, reciprocals: self.reciprocals, gate: None };
-            decoder.decode_into(frame, self.scratch, &mut rest).is_ok()
-        });
-        if !decoded {
-            rest.status.fill(RowStatus::MissingReading);
-        }
     }
 }
 

@@ -333,10 +333,6 @@ pub struct Configuration {
     pub open_above_ohm: f32,
     /// Smallest relative change against the baseline that sets [`EstimateReport::CONTACT`].
     pub contact_threshold: f32,
-    /// Tolerance of the gate ([`taxel_core::gate`]): relative change against the baseline within which a row is at
-    /// rest. Such a row is skipped, and gets the outputs of the baseline. With 0, or without a baseline, every row
-    /// is decoded.
-    pub rest_tolerance: f32,
     /// Time constant in µs of the filter in time ([`taxel_core::filter`]) that outputs pass; with 0, none.
     pub filter_time_constant_us: u32,
     /// Time in µs by which the filter extrapolates outputs.
@@ -392,7 +388,7 @@ pub struct EstimateReport<'a> {
     pub start_us: u64,
     /// Sum of the flags below.
     pub flags: u8,
-    /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow, 3 at rest.
+    /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow.
     pub row_status: &'a [u8],
     /// `rows × outputs` numbers in the units of the model's outputs, NaN where a row is not decoded; none without a
     /// model. Filtered, if the configuration says so.
@@ -409,8 +405,6 @@ pub struct EstimateReport<'a> {
 }
 
 impl EstimateReport<'_> {
-    /// Row status of a row at rest: its outputs are those of the baseline.
-    pub const ROW_AT_REST: u8 = 3;
     /// Flag: no model is in force, so no row is decoded.
     pub const NO_MODEL: u8 = 1;
     /// Flag: at least one reading is missing, shorted or open.
@@ -454,8 +448,6 @@ pub struct Statistics {
     pub frames_scanned: u32,
     /// Number of frames decoded, scanned or on request.
     pub frames_decoded: u32,
-    /// Number of rows of decoded frames that were at rest, and so were skipped.
-    pub rows_at_rest: u32,
     /// Number of frames that could not be scanned in time.
     pub frames_missed: u32,
     /// Number of samples that the converter did not give.
@@ -632,8 +624,6 @@ pub enum ConfigurationField {
     Limits,
     /// The threshold for contact: positive and finite.
     ContactThreshold,
-    /// The tolerance of the gate: at least 0, and below 1.
-    RestTolerance,
     /// The filter's time constant: at most 1 s; 0 in an image that was built without the feature `filter`.
     FilterTimeConstant,
     /// The filter's lead: at most 1 s.

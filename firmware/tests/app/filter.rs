@@ -136,26 +136,6 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
 }
 
 #[test]
-fn a_row_at_rest_has_the_outputs_at_rest_and_a_touch_starts_from_there() {
-    let mut own = Own::new(3);
-    let mut slots = Flash::slots_with(&own.blob);
-    let mut bench = Bench::new(Configuration { rest_tolerance: 0.02, ..filtering() });
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let rest = frame_at_rest();
-    let set_baseline = Request::SetBaseline { readings_ohm: Floats::new(rest.as_flattened()) };
-    ask(&mut session, &bench.board, &set_baseline, |_| ());
-    let at_rest = bits(expected(&own.blob, &rest).into_iter().flatten());
-    let near = rest.map(|row| row.map(|ohm| ohm * 1.001));
-    for frame in 0..3 {
-        let (status, found) = decode_at(&mut session, &bench.board, 1000 * frame, &near);
-        assert_eq!((&status[..], &found), (&[3, 3][..], &at_rest));
-        own.bits(1000 * frame, &rest);
-    }
-    let (status, found) = decode_at(&mut session, &bench.board, 3000, &touch(8));
-    assert_eq!((&status[..], found), (&[0, 0][..], own.bits(3000, &touch(8))));
-}
-
-#[test]
 fn scans_are_filtered_and_no_request_between_them_changes_that() {
     let mut own = Own::new(3);
     let mut slots = Flash::slots_with(&own.blob);

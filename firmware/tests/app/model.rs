@@ -8,7 +8,7 @@ use taxel_firmware::link::message::{
     Configuration, EstimateReport, ModelFault, Refusal, Report, Request, Setting,
 };
 
-use super::requests::{bits, capture, decode, expected};
+use super::requests::{bits, decode, expected};
 use mock_board::*;
 
 #[test]
@@ -229,27 +229,4 @@ fn behind_a_damaged_model_the_other_slots_is_decoded_from_there() {
     assert_eq!(in_force(&mut slots), (Some((1, true)), outputs(&second)));
     slots[1].decay(second.len() / 8, 1);
     assert_eq!(in_force(&mut slots), (Some((0, false)), outputs(&first)));
-}
-
-#[test]
-fn another_model_gives_its_own_answer_for_rest() {
-    let (first, second) = (blob(3, 4), blob(5, 4));
-    let mut slots = Flash::slots_with(&first);
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut nearly = frame_at_rest();
-    nearly[1][2] = 64.5;
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    capture(&mut session, &board, 1);
-    let rest = |blob: &[u8]| bits(expected(blob, &frame_at_rest()).into_iter().flatten());
-    let (_, status, found) = decode(&mut session, &board, &nearly);
-    assert_eq!((&status[..], found), (&[3, 3][..], rest(&first)));
-    for step in upload_steps(&second, 64) {
-        ask(&mut session, &board, &Request::Upload(step), |_| ());
-    }
-    let _ = session;
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&second)));
-    let (_, status, found) = decode(&mut session, &board, &nearly);
-    assert_eq!((&status[..], found), (&[3, 3][..], rest(&second)));
 }

@@ -37,8 +37,7 @@ pub fn decode(
     .0
 }
 
-/// Captures a baseline of `frames` scans. Then sets a configuration that scans only on request, in which rows are
-/// at rest within 2 %.
+/// Captures a baseline of `frames` scans. Then sets a configuration that scans only on request.
 pub fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
     let scanning = Configuration { frame_period_us: 100, ..quiet() };
     ask(session, board, &configure(scanning), |_| ());
@@ -49,6 +48,5 @@ pub fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
         assert_eq!(session.step(), None);
         assert!(board.pins.borrow().now_us < 1_000_000, "no answer");
     }
-    let gating = Configuration { rest_tolerance: 0.02, ..quiet() };
-    ask(session, board, &configure(gating), |_| ());
+    ask(session, board, &configure(quiet()), |_| ());
 }

@@ -3,7 +3,6 @@
 use taxel_core::AlignedBytes;
 use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::confidence::Confidence;
-use taxel_core::expansion::Expansion;
 use taxel_core::projection::Projection;
 use taxel_core::rbf::direct::Parameters;
 use taxel_core::rbf::fixed16::{
@@ -12,9 +11,7 @@ use taxel_core::rbf::fixed16::{
 use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
-use crate::checks::{
-    ARRAY_COMPONENTS, ARRAY_CONFIDENCE, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_confidence,
-};
+use crate::checks::{ARRAY_CONFIDENCE, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_confidence};
 
 /// Decay log₂e/(2σ²) for σ = 0.8.
 const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8);
@@ -22,24 +19,18 @@ const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8
 /// Function that makes a model's blob.
 type Maker = fn() -> AlignedBytes;
 
-/// Components of an array's network whose outputs are expanded.
-const COMPONENTS: Option<usize> = Some(ARRAY_COMPONENTS);
-
 /// Every model: the name of its file, and the function that makes it.
-pub const FILES: [(&str, Maker); 13] = [
+pub const FILES: [(&str, Maker); 10] = [
     ("hand-made.bin", hand_made),
     ("kernels-f32.bin", || of_format(Format::F32)),
     ("kernels-fixed16.bin", || of_format(Format::Fixed16)),
     ("kernels-f32-direct.bin", || of_format(Format::F32Direct)),
-    ("array-f32.bin", || of_array(Format::F32, 131, true, None)),
-    ("array-f32-no-tail.bin", || of_array(Format::F32, 130, false, None)),
-    ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true, None)),
-    ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false, None)),
-    ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true, None)),
-    ("array-f32-components.bin", || of_array(Format::F32, 9, true, COMPONENTS)),
-    ("array-fixed16-components.bin", || of_array(Format::Fixed16, 17, false, COMPONENTS)),
+    ("array-f32.bin", || of_array(Format::F32, 131, true)),
+    ("array-f32-no-tail.bin", || of_array(Format::F32, 130, false)),
+    ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true)),
+    ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false)),
+    ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true)),
     ("array-fixed16-confidence.bin", of_confidence),
-    ("array-f32-direct-components.bin", || of_array(Format::F32Direct, 6, true, COMPONENTS)),
 ];
 
 fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32> {
@@ -53,7 +44,7 @@ fn hand_made() -> AlignedBytes {
     let mut words = || direct_words(&mut numbers, shape, true, 12);
     let (even, odd) = (words(), words());
     let networks = [&even, &odd].map(|words| network(Format::F32Direct, shape, false, true, words));
-    encoded("hand-made", (None, None), &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
+    encoded("hand-made", None, &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
 }
 
 fn row_shape(centres: usize) -> Shape {
@@ -72,17 +63,11 @@ fn of_format(format: Format) -> AlignedBytes {
         let (centres, affine) = kinds[index];
         network(format, row_shape(centres), true, affine, &words[index])
     });
-    encoded(format.name(), (None, None), &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
+    encoded(format.name(), None, &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
 }
 
-/// A model of one network for all rows behind a projection, whose features vary about as much as single readings. The
-/// network computes all outputs, or so many components of them.
-fn of_array(
-    format: Format,
-    centres: usize,
-    affine: bool,
-    components: Option<usize>,
-) -> AlignedBytes {
+/// A model of one network for all rows behind a projection, whose features vary about as much as single readings.
+fn of_array(format: Format, centres: usize, affine: bool) -> AlignedBytes {
     let mut numbers = Numbers::new(6);
     let readings = ARRAY_ROWS * COLS;
     let parts = draw(&mut numbers, readings * COLS, 0.0, 0.35);
@@ -90,15 +75,10 @@ fn of_array(
     let start = (0..COLS).map(|feature| 60.0 - 60.0 * sum(feature));
     let block: Vec<f32> = start.chain(parts.iter().copied()).collect();
     let projection = Projection::new(readings, COLS, &block).unwrap();
-    let outputs = ARRAY_ROWS * OUTPUTS;
-    let shape = Shape { inputs: COLS, centres, outputs: components.unwrap_or(outputs) };
+    let shape = Shape { inputs: COLS, centres, outputs: ARRAY_ROWS * OUTPUTS };
     let words = words_of(format, &mut numbers, shape, affine);
     let network = network(format, shape, true, affine, &words);
-    let block = draw(&mut numbers, (1 + shape.outputs) * outputs, 0.0, 1.0);
-    let expansion =
-        components.map(|components| Expansion::new(components, outputs, &block).unwrap());
-    let linear = (Some(projection), expansion);
-    encoded(format.name(), linear, &[network], &[0; ARRAY_ROWS])
+    encoded(format.name(), Some(projection), &[network], &[0; ARRAY_ROWS])
 }
 
 fn words_of(format: Format, numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
@@ -233,21 +213,21 @@ fn of_confidence() -> AlignedBytes {
     let mut block = vec![0.0; ARRAY_CONFIDENCE.block_floats()];
     write_confidence(ARRAY_CONFIDENCE, &mut block, &mut numbers);
     let confidence = Confidence::new(ARRAY_CONFIDENCE, &block).unwrap();
-    encoded_with("confidence", (None, None), &[network], &[0; ARRAY_ROWS], Some(confidence))
+    encoded_with("confidence", None, &[network], &[0; ARRAY_ROWS], Some(confidence))
 }
 
 fn encoded(
     name: &str,
-    linear: (Option<Projection<'_>>, Option<Expansion<'_>>),
+    projection: Option<Projection<'_>>,
     networks: &[Network<'_>],
     row_network: &[u8],
 ) -> AlignedBytes {
-    encoded_with(name, linear, networks, row_network, None)
+    encoded_with(name, projection, networks, row_network, None)
 }
 
 fn encoded_with(
     name: &str,
-    (projection, expansion): (Option<Projection<'_>>, Option<Expansion<'_>>),
+    projection: Option<Projection<'_>>,
     networks: &[Network<'_>],
     row_network: &[u8],
     confidence: Option<Confidence<'_>>,
@@ -257,11 +237,7 @@ fn encoded_with(
     // In the files in testdata, the units have the same names as the columns.
     let (input_units, output_units) = (unnamed.input_names, unnamed.output_names);
     let metadata = Metadata { name, thickness_mm: 5.0, input_units, output_units, ..unnamed };
-    let parts = ModelParts {
-        projection,
-        expansion,
-        confidence,
-        ..ModelParts::new(networks, row_network, metadata)
-    };
+    let parts =
+        ModelParts { projection, confidence, ..ModelParts::new(networks, row_network, metadata) };
     encode_to_vec(&parts).unwrap()
 }

@@ -2,7 +2,6 @@
 
 pub mod distribution;
 pub mod device_cost;
-pub mod gate;
 pub mod worth;
 pub mod learning_curve;
 pub mod limit;

@@ -13,7 +13,7 @@ use taxel_data::digest::digest;
 use taxel_data::{BadValue, Dataset, Progress, Stream, input, require};
 use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
 use taxel_learn::train::stream::Pieces;
-use taxel_learn::train::{FreshFrames, Recursive, Solver, Widths, check_spread};
+use taxel_learn::train::{FreshFrames, Recursive, Solver, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::noise::{Noise, NoiseKind};
@@ -79,9 +79,6 @@ pub struct Training {
     pub centres: usize,
     /// Width σ on scaled inputs; the mean width if each centre has its own.
     pub spread: f64,
-    /// Rule that gives the centres their widths.
-    #[serde(default)]
-    pub widths: Widths,
     /// Whether the networks add an affine tail A·x.
     pub affine_tail: bool,
     /// Number format of the weights.
@@ -95,8 +92,6 @@ pub struct Training {
     pub whole_array: bool,
     /// Number of features that this network sees.
     pub features: Option<usize>,
-    /// Number of components that this network computes, which are expanded to all outputs.
-    pub output_rank: Option<usize>,
     /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
     #[serde(default)]
     pub relative_inputs: bool,
@@ -201,7 +196,7 @@ impl Experiment {
             let known = taxel_scenes::ALL.map(|(name, _)| name).join(", ");
             return Err(Error::Usage(format!(
                 "{name_or_path} is a data file by its name, and a scene is wanted here: {known}, or a scene file (.toml). Measured data \
-                 tells neither the sensor nor what may happen to it; `train`, `run`, `trade` and `gate` take it"
+                 tells neither the sensor nor what may happen to it; `train`, `run` and `trade` take it"
             )));
         }
         let text = input::read_text(Path::new(name_or_path)).map_err(|error| match error {
@@ -262,13 +257,11 @@ impl Experiment {
         Options {
             centres: t.centres,
             spread: t.spread,
-            widths: t.widths,
             affine_tail: t.affine_tail,
             seed: self.world.seed,
             format: t.format,
             whole_array: t.whole_array,
             features: t.features,
-            output_rank: t.output_rank,
             ..Options::default()
         }
     }

@@ -29,8 +29,6 @@ pub struct Measurements {
     pub test: Dataset,
     /// When these were measured.
     pub test_log: Log,
-    /// Readings of the test frames as they were measured, whatever the model's inputs are.
-    pub test_readings: Table,
     /// Readings of the untouched sensor for these, if they are known.
     pub test_rest: Option<Arc<Rest>>,
     /// Whether these are of the same file as the frames to train on.

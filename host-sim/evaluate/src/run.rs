@@ -117,10 +117,8 @@ pub struct ModelSummary {
     pub relative_inputs: bool,
     /// Number of centres of each network (the largest).
     pub centres: usize,
-    /// Number of outputs of each network: its row's outputs, those of all rows, or components of these.
+    /// Number of outputs of each network: its row's outputs, or those of all rows.
     pub outputs_per_network: usize,
-    /// Number of outputs that such components are expanded to; 0 without an expansion.
-    pub expanded_outputs: usize,
     /// Width σ on scaled inputs; after refinement the mean over the networks.
     pub spread: f64,
     /// Whether centres, widths and the projection were refined after K-means.
@@ -130,7 +128,7 @@ pub struct ModelSummary {
     pub blob_bytes: usize,
     /// CRC-32 of the blob, in hexadecimal.
     pub model_crc: String,
-    /// What decoding a frame costs a Cortex-M4F, without a gate.
+    /// What decoding a frame costs a Cortex-M4F.
     pub frame_cost: Cost,
 }
 
@@ -316,7 +314,7 @@ fn model_summary(
 ) -> Result<ModelSummary> {
     let model = prepared.model();
     let shape = model.shape();
-    let frames = Prices::accepted()?.frames(&Design::new(blob), Exponential::default())?;
+    let frame_cost = Prices::accepted()?.frame(&Design::new(blob), Exponential::default())?;
     Ok(ModelSummary {
         training_frames: training.frames.frames(),
         test_frames,
@@ -326,13 +324,12 @@ fn model_summary(
         relative_inputs: model.metadata().relative_inputs,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         outputs_per_network: model.networks().next().map_or(0, |n| n.shape().outputs),
-        expanded_outputs: model.expansion().map_or(0, |expansion| expansion.outputs()),
         spread: if training.refine { blob.spread() } else { options.spread },
         refined: training.refine,
         affine_tail: options.affine_tail,
         blob_bytes: blob.bytes().len(),
         model_crc: format!("{:08x}", model.crc()),
-        frame_cost: frames.ungated,
+        frame_cost,
     })
 }
 

@@ -6,14 +6,13 @@
 
 mod design;
 mod memory;
-mod frames;
 mod terms;
 
 use std::collections::HashMap;
 
 pub use design::{Design, NetworkDesign};
-pub use frames::{Cost, Frames};
 pub use memory::DecoderRam;
+use serde::Serialize;
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::Format;
 pub use terms::{Terms, filter_terms, terms};
@@ -32,15 +31,28 @@ const HEAD: &str = "term,instructions,cycles,flash cycles";
 const FLASH_LINE_BYTES: usize = 16;
 const WAIT_STATES: u64 = 5;
 
-/// What lies before decoding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Gating {
-    /// No gate.
-    Ungated,
-    /// A gate that finds all rows at rest.
-    AtRest,
-    /// A gate that finds all rows touched, each by its last reading; an array by the last reading of its last row.
-    Awake,
+/// Cost of one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Cost {
+    /// Instructions executed.
+    pub instructions: u64,
+    /// Cycles at zero wait states, by a model of the processor.
+    pub cycles: u64,
+    /// Cycles with code in flash at 5 wait states, by a model of an STM32F446's flash. The weights are in RAM, if the
+    /// images have room for them there; else they are in flash, and this is a lower bound.
+    pub flash_cycles: u64,
+}
+
+impl Cost {
+    /// Cost of both.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            instructions: self.instructions + other.instructions,
+            cycles: self.cycles + other.cycles,
+            flash_cycles: self.flash_cycles + other.flash_cycles,
+        }
+    }
 }
 
 /// What one of a term costs: instructions, cycles at zero wait, and cycles from flash.
@@ -104,9 +116,9 @@ impl Prices {
     ///
     /// # Errors
     /// [`Error`] names a term that the list lacks.
-    pub fn frame(&self, design: &Design, exponential: Exponential, gating: Gating) -> Result<Cost> {
-        let cost = self.of(&terms(design, exponential, gating))?;
-        let waiting = if gating == Gating::AtRest { 0 } else { design.least_waiting_for_weights() };
+    pub fn frame(&self, design: &Design, exponential: Exponential) -> Result<Cost> {
+        let cost = self.of(&terms(design, exponential))?;
+        let waiting = design.least_waiting_for_weights();
         Ok(Cost { flash_cycles: cost.flash_cycles + waiting, ..cost })
     }
 
@@ -132,18 +144,6 @@ impl Prices {
         let [instructions, cycles, flash_cycles] = sum.map(|cost| cost.round() as u64);
         Ok(Cost { instructions, cycles, flash_cycles })
     }
-
-    /// What a frame costs a model of this `design` without a gate, and behind gates.
-    ///
-    /// # Errors
-    /// As [`frame`](Self::frame).
-    pub fn frames(&self, design: &Design, exponential: Exponential) -> Result<Frames<Cost>> {
-        Ok(Frames {
-            ungated: self.frame(design, exponential, Gating::Ungated)?,
-            at_rest: self.frame(design, exponential, Gating::AtRest)?,
-            awake: self.frame(design, exponential, Gating::Awake)?,
-        })
-    }
 }
 
 impl Design {
@@ -154,7 +154,7 @@ impl Design {
             return 0;
         }
         let networks: usize = self.row_networks().map(NetworkDesign::bytes).sum();
-        least_waiting_for_weights(networks + self.projection_bytes() + self.expansion_bytes())
+        least_waiting_for_weights(networks + self.projection_bytes())
     }
 }
 
@@ -199,7 +199,7 @@ mod tests {
             Prices::parse(&Prices::text("rustc", &[("rows".to_owned(), [1.0; 3])])).unwrap();
         let shape = ModelShape { rows: 1, inputs: 2, outputs: 3 };
         let design = Design::of_rows(shape, Format::F32, 4, false);
-        let error = prices.frame(&design, Exponential::default(), Gating::Ungated).unwrap_err();
+        let error = prices.frame(&design, Exponential::default()).unwrap_err();
         assert!(error.to_string().contains("no price for \"f32"), "{error}");
     }
 }

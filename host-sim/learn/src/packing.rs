@@ -7,7 +7,6 @@ use taxel_core::blob::{
     self, Columns, DecodeError, Floats, Metadata, Model, ModelParts, NoiseKind,
 };
 use taxel_core::confidence::Confidence;
-use taxel_core::expansion::Expansion;
 use taxel_core::fill::Fill;
 use taxel_core::rbf::Network;
 use taxel_data::{Dataset, columns, input};
@@ -55,7 +54,7 @@ impl Origin {
     }
 }
 
-/// Packs the networks, projection and expansion `trained` on `dataset` into a blob. Its training errors are those on
+/// Packs the networks and the projection `trained` on `dataset` into a blob. Its training errors are those on
 /// that data set; the weights may have been fitted to more frames.
 ///
 /// # Errors
@@ -79,16 +78,13 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
     } else {
         units(&dataset.inputs.names)
     };
-    // Behind a projection alone there is an expansion.
-    let expansion = trained.networks.first().and_then(FittedNetwork::expansion);
     let training_rmse = floats(&match projection {
-        Some(it) => training_rmse(&views, expansion, &train::projection::apply(it, dataset)),
-        None => training_rmse(&views, None, dataset),
+        Some(it) => training_rmse(&views, &train::projection::apply(it, dataset)),
+        None => training_rmse(&views, dataset),
     });
     let [full_scale, linear_rmse] = [&origin.full_scale, &origin.linear_rmse].map(|it| floats(it));
     let parts = ModelParts {
         projection,
-        expansion,
         confidence: None,
         linear_rmse: Floats(&linear_rmse),
         fill: None,
@@ -119,19 +115,11 @@ fn floats(values: &[f64]) -> Vec<u8> {
     values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect()
 }
 
-fn training_rmse(
-    networks: &[Network<'_>],
-    expansion: Option<Expansion<'_>>,
-    dataset: &Dataset,
-) -> Vec<f64> {
+fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
     let mut rmse = Vec::new();
     for (row, network) in networks.iter().enumerate() {
         let table = dataset.row_table(row);
-        let inferred = infer(network, Exponential::default(), &table.inputs.values);
-        let predicted = match expansion {
-            Some(expansion) => train::output_rank::expand(expansion, &inferred),
-            None => inferred,
-        };
+        let predicted = infer(network, Exponential::default(), &table.inputs.values);
         let squares = table.outputs.squared_errors(&predicted);
         let counts = table.outputs.counts();
         rmse.extend(squares.iter().zip(counts).map(|(s, count)| (s / count as f64).sqrt()));
@@ -224,7 +212,6 @@ pub(crate) fn rebuild(
     let row_network: Vec<u8> = (0..model.shape().rows).filter_map(of_row).collect();
     let parts = ModelParts {
         projection: model.projection(),
-        expansion: model.expansion(),
         confidence,
         linear_rmse: model.linear_rmse(),
         fill,

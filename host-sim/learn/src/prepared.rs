@@ -13,7 +13,7 @@ use crate::infer::{Exponential, assess_lines, infer_in_turn, is_missing};
 use crate::packing::ModelBlob;
 use crate::parallel;
 use crate::relative::{ratios, reciprocals};
-use crate::train::{output_rank, projection};
+use crate::train::projection;
 
 /// Frames that a thread fills at a time.
 const FRAMES_AT_ONCE: usize = 64;
@@ -115,12 +115,7 @@ impl<'b> PreparedModel<'b> {
 
     /// Decodes `readings` (`frames × inputs`) to outputs (`frames × outputs`), line after line.
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
-        let inferred =
-            infer_in_turn(&self.networks, self.exponential, &self.inputs_of_networks(readings));
-        match self.model.expansion() {
-            Some(expansion) => output_rank::expand(expansion, &inferred),
-            None => inferred,
-        }
+        infer_in_turn(&self.networks, self.exponential, &self.inputs_of_networks(readings))
     }
 
     /// Network of each row-wire, or the one network behind a projection.

@@ -91,10 +91,6 @@ pub fn check(model: &Model<'_>) -> Result<()> {
             "rows share a network, while their channels drift apart: train one with a network for each row",
         ),
         (
-            model.expansion().is_some(),
-            "it computes few components of its outputs: train one without --output-rank",
-        ),
-        (
             model.confidence().is_some(),
             "its confidence is of the sensor as it was: train one without --confidence",
         ),

@@ -13,25 +13,22 @@ use crate::parallel;
 pub mod resolution;
 mod solver;
 pub mod kmeans;
-pub mod hidden_layer;
 mod samples;
 pub mod least_squares;
 pub(crate) mod tasks;
 pub(crate) mod principal;
 pub mod format;
 pub mod projection;
-pub mod output_rank;
 pub mod memory;
 pub mod layers;
 pub mod refine;
 pub mod stream;
 
 pub use format::FittedNetwork;
-pub use hidden_layer::{HiddenLayer, Widths};
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
 use samples::Ridge;
-pub use samples::{InputScale, Samples};
+pub use samples::{HiddenLayer, InputScale, Samples};
 pub use solver::{Recursive, Solver};
 
 /// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
@@ -49,10 +46,8 @@ pub const WHOLE_ARRAY_SPREAD: f64 = 0.5;
 pub struct Options {
     /// Number of centres, K. Fewer are used where there are fewer distinct samples.
     pub centres: usize,
-    /// Width σ of all Gaussians, on scaled inputs; their mean width if each has its own.
+    /// Width σ of all Gaussians, on scaled inputs.
     pub spread: f64,
-    /// Rule that gives the centres their widths.
-    pub widths: Widths,
     /// Whether the network adds an affine tail A·x.
     pub affine_tail: bool,
     /// Ridge penalty on squared weights, for each training frame: at 1 it is as strong as an input that is always 1,
@@ -72,9 +67,6 @@ pub struct Options {
     pub whole_array: bool,
     /// Number of features that all readings are projected to; `None` for the usual one ([`projection::fit`]).
     pub features: Option<usize>,
-    /// Number of components that the network for all rows computes, which are expanded to its outputs; `None` for a
-    /// network that computes all outputs.
-    pub output_rank: Option<usize>,
     /// Memory in bytes that training may take, about. More is refused before it is taken.
     pub most_memory_bytes: u64,
 }
@@ -87,7 +79,6 @@ impl Default for Options {
         Self {
             centres: 64,
             spread: 0.8,
-            widths: Widths::Common,
             affine_tail: true,
             penalty: None,
             solver: Solver::Qr,
@@ -96,7 +87,6 @@ impl Default for Options {
             format: Format::F32,
             whole_array: false,
             features: None,
-            output_rank: None,
             most_memory_bytes: USUAL_MEMORY_BYTES,
         }
     }
@@ -109,11 +99,7 @@ impl Options {
     /// [`BadValue`] for the first option that cannot be used.
     pub fn check_for(&self, dataset: &Dataset) -> std::result::Result<(), BadValue> {
         self.check(dataset.frames())?;
-        tasks::check(&dataset.outputs, self.centres)?;
-        match self.output_rank {
-            Some(rank) if self.whole_array => output_rank::check(rank, &dataset.outputs),
-            _ => Ok(()),
-        }
+        tasks::check(&dataset.outputs, self.centres)
     }
 
     /// Initial covariance δ of the recursive least squares on so many `frames`: that of the solver, else one over the
@@ -139,17 +125,10 @@ impl Options {
                 "there must be fewer than the {frames} training frames; lower it or add data"
             ));
         }
-        if let (Some(rank), false) = (self.output_rank, self.whole_array) {
-            let rule = "only one network for the whole array has outputs enough: leave it out";
-            return Err(BadValue::new("output_rank", rank, rule));
-        }
         if let (Some(features), false) = (self.features, self.whole_array) {
             let rule =
                 "only one network for the whole array has a projection to features: leave it out";
             return Err(BadValue::new("features", features, rule));
-        }
-        if self.widths != Widths::Common && self.format == Format::Fixed16 {
-            return Err(hidden_layer::not_held(self.format));
         }
         self.penalty.map_or(Ok(()), check_penalty)?;
         if let Solver::Rls(settings) = self.solver {
@@ -184,7 +163,7 @@ pub fn check_spread(field: &str, spread: f64) -> std::result::Result<(), BadValu
 
 impl Samples<'_> {
     /// Fits output weights to the samples for given `centres` (`centres × inputs`, on scaled inputs), by
-    /// least squares, with the widths, in the format and of the rank that `options` ask for.
+    /// least squares, with the width and in the format that `options` ask for.
     ///
     /// # Errors
     /// [`Error`](crate::Error) if the format does not hold the network.
@@ -192,7 +171,7 @@ impl Samples<'_> {
         self.fit_layer(&self.layer(centres.to_vec(), options), options)
     }
 
-    /// Fits output weights to the samples as [`fit`](Self::fit) does, for a given `layer` with its own widths.
+    /// Fits output weights to the samples as [`fit`](Self::fit) does, for a given `layer` with its own width.
     ///
     /// # Errors
     /// [`Error`](crate::Error) if the format does not hold the network.
@@ -212,10 +191,6 @@ impl Samples<'_> {
         penalties: &[Option<f64>],
     ) -> Result<Vec<FittedNetwork>> {
         let with = |penalty: &Option<f64>| Options { penalty: *penalty, ..*options };
-        if let Some(rank) = options.output_rank {
-            let fit = |penalty| output_rank::fit(self, layer, rank, &with(penalty));
-            return penalties.iter().map(fit).collect();
-        }
         let ridge = |penalty| Ridge::new(layer, self.inputs(), &with(penalty));
         let ridges: Vec<Ridge> = penalties.iter().map(ridge).collect();
         format::fit(self, layer, options, &ridges)
@@ -247,7 +222,7 @@ pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> R
     fit(&Layers::start(dataset, options)?, options, progress)
 }
 
-/// Trains as [`train`] does, and refines centres, widths and the projection before the weights are fitted.
+/// Trains as [`train`] does, and refines centres, width and the projection before the weights are fitted.
 ///
 /// # Errors
 /// As [`train`] and [`refine`](refine::refine).

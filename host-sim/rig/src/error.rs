@@ -150,9 +150,6 @@ fn configuration_range(field: ConfigurationField) -> String {
         Field::ContactThreshold => {
             "the change that is a contact (--contact-threshold: above 0)".into()
         }
-        Field::RestTolerance => {
-            "the tolerance of rows at rest (--rest-tolerance: 0 to below 1)".into()
-        }
         Field::FilterTimeConstant => {
             format!(
                 "the filter's time constant (--filter-ms: 0 to {MOST_FILTER_MS}; 0 in an image without the feature `filter`)"

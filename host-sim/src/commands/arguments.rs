@@ -7,19 +7,12 @@ use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, Typ
 use taxel_core::rbf::Format;
 use taxel_data::BadValue;
 use taxel_learn::Exponential;
-use taxel_learn::train::Widths;
 use taxel_simulate::sensor::Precision;
 
 /// Parser for the name of a number format.
 pub fn format() -> impl TypedValueParser<Value = Format> {
     let named = |format: Format| PossibleValue::new(format.name()).help(format.description());
     one_of(Format::ALL.map(|format| (named(format), format)))
-}
-
-/// Parser for the name of a rule for widths.
-pub fn widths() -> impl TypedValueParser<Value = Widths> {
-    let named = |widths: Widths| PossibleValue::new(widths.name()).help(widths.description());
-    one_of(Widths::ALL.map(|widths| (named(widths), widths)))
 }
 
 /// Parser for the name of an exponential.

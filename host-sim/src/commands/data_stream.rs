@@ -202,7 +202,6 @@ impl DataArguments {
             is_one_log: false,
             spread: Spread { deviations: vec![], ranges: vec![] },
             test: training.subset(&[]),
-            test_readings: training.inputs.clone(),
             test_choice: "none".into(),
             outliers: no_outliers,
             left_out: LeftOut::default(),

@@ -4,7 +4,7 @@ use taxel_core::blob::Model;
 use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Silent};
 use taxel_learn::Options;
-use taxel_learn::train::{Widths, projection};
+use taxel_learn::train::projection;
 
 use super::stderr;
 
@@ -22,11 +22,6 @@ pub fn note(model: &Model<'_>, options: &Options, frames: Option<&Dataset>) {
 fn why(options: &Options, frames: Option<&Dataset>) -> String {
     /// Frames that tell whether centres and widths fit a format.
     const TRIED: usize = 1000;
-    if options.widths == Widths::Neighbours {
-        return "only the exact formula for distances (f32-direct) has a width for each centre; it takes a device more than \
-                twice as long as one width in f32 (docs/formats.md)"
-            .into();
-    }
     let fix = frames.map_or("--format fixed16 may hold it".into(), |frames| {
         let step = frames.frames().div_ceil(TRIED);
         let few: Vec<usize> = (0..frames.frames()).step_by(step).collect();

@@ -10,7 +10,7 @@ use serde::Serialize;
 use taxel_core::blob::{Metadata, Model};
 use taxel_firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
 use taxel_firmware::timing::ScanPlan;
-use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices};
+use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::image;
 
@@ -38,8 +38,6 @@ struct Summary {
     relative_inputs: bool,
     /// Features that all readings are projected to, for one network of all rows; 0 without a projection.
     projected_features: usize,
-    /// Components that the one network computes and that are expanded to all outputs; 0 without an expansion.
-    expanded_components: usize,
     /// What tells deviations and novelty; `None` for a model without a confidence.
     confidence: Option<ConfidenceSummary>,
     /// What fills missing readings; `None` for a model that does not.
@@ -60,7 +58,7 @@ struct Summary {
     /// Its scan on the NUCLEO-F446RE; `None` if that cannot scan it, or readings are not in Ω.
     scan: Option<ScanSummary>,
     /// What decoding a frame costs a Cortex-M4F.
-    frame_costs: Frames<Cost>,
+    frame_cost: Cost,
     inputs: Vec<ColumnSummary>,
     outputs: Vec<ModelOutput>,
 }
@@ -153,7 +151,6 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
             .map(|it| FillSummary { factors: it.factors(), bytes: 4 * it.block().len() }),
         relative_inputs: metadata.relative_inputs,
         projected_features: model.projection().map_or(0, |it| it.features()),
-        expanded_components: design.components.unwrap_or(0),
         networks: networks.collect(),
         noise_kind: format!("{:?}", metadata.noise_kind).to_lowercase(),
         noise_level: metadata.noise_level,
@@ -165,7 +162,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         weights_in_ram: design.weights_in_ram,
         needs: needs(&model, &design, blob.bytes().len()),
         scan: scan(&model),
-        frame_costs: Prices::accepted()?.frames(&design, Exponential::default())?,
+        frame_cost: Prices::accepted()?.frame(&design, Exponential::default())?,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: model_outputs::of(&model),
     })
@@ -256,10 +253,6 @@ fn page_of(s: &Summary) -> print::Page {
         let (readings, features) = (s.rows * s.inputs_per_row, s.projected_features);
         line("projection", format!("{readings} readings → {features} features for all rows"));
     }
-    if s.expanded_components > 0 {
-        let (components, outputs) = (s.expanded_components, s.rows * s.outputs_per_row);
-        line("expansion", format!("{components} components → {outputs} outputs of all rows"));
-    }
     if let Some(ConfidenceSummary { directions, components, bytes }) = s.confidence {
         line(
             "confidence",
@@ -289,7 +282,6 @@ fn page_of(s: &Summary) -> print::Page {
         ("estimate", ram.estimate),
         ("scaled readings", ram.scaled_readings),
         ("features", ram.features),
-        ("components", ram.components),
         ("relative inputs", ram.relative_inputs),
         ("activations", ram.activations),
     ];
@@ -318,13 +310,7 @@ fn page_of(s: &Summary) -> print::Page {
             ),
         );
     }
-    for (label, cost) in [
-        ("a frame", s.frame_costs.ungated),
-        ("gated, at rest", s.frame_costs.at_rest),
-        ("gated, touched", s.frame_costs.awake),
-    ] {
-        line(label, costs(cost, s.weights_in_ram));
-    }
+    line("a frame", costs(s.frame_cost, s.weights_in_ram));
     let relative = if s.relative_inputs { "; relative to the baseline, R/R₀" } else { "" };
     let names = ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>());
     line("inputs", format!("{names}{relative}"));

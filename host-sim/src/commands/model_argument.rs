@@ -3,9 +3,9 @@
 use clap::Args;
 use taxel_core::rbf::Format;
 use taxel_learn::Options;
-use taxel_learn::train::{WHOLE_ARRAY_SPREAD, Widths};
+use taxel_learn::train::WHOLE_ARRAY_SPREAD;
 
-use super::arguments::{format, gigabytes, widths};
+use super::arguments::{format, gigabytes};
 
 /// What a model computes, and how its numbers are held.
 #[derive(Args, Default)]
@@ -21,17 +21,9 @@ pub struct ModelArguments {
     /// [default: as many as a row has readings, or 18 for outputs that belong to no row].
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     features: Option<usize>,
-    /// Let the network of --whole-array compute R components, which are expanded to all outputs once a frame. With many
-    /// centres that takes fewer cycles and less flash; a small R loses accuracy (docs/projection.md).
-    #[arg(long, value_name = "R")]
-    output_rank: Option<usize>,
     /// Number format of the weights [default: the scene's, or f32].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
-    /// Widths of the Gaussians: one for all centres of a network, or one for each (docs/training.md) [default: the scene's,
-    /// or common].
-    #[arg(long, value_name = "RULE", value_parser = widths())]
-    widths: Option<Widths>,
     /// Memory in GB that training may take; where it would take more, it is refused at once [default: 8].
     #[arg(long, value_name = "GB", value_parser = gigabytes)]
     most_memory: Option<u64>,
@@ -46,10 +38,8 @@ impl ModelArguments {
             options.spread *= WHOLE_ARRAY_SPREAD;
         }
         options.features = self.features.or(options.features);
-        options.output_rank = self.output_rank.or(options.output_rank);
         options.most_memory_bytes = self.most_memory.unwrap_or(options.most_memory_bytes);
         options.format = self.format.unwrap_or(options.format);
-        options.widths = self.widths.unwrap_or(options.widths);
         options
     }
 }

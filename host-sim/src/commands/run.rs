@@ -179,7 +179,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     };
     page.line(format_args!("{}: {from}, seed {}", result.subject, result.seed));
     page.line(format_args!(
-        "model: {} network{}, {} -> K = {} -> {}, spread {}{}, {} bytes, CRC-32 {}",
+        "model: {} network{}, {} -> K = {} -> {} outputs, spread {}{}, {} bytes, CRC-32 {}",
         model.networks,
         if model.networks == 1 { "" } else { "s" },
         {
@@ -194,10 +194,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
             }
         },
         model.centres,
-        match model.expanded_outputs {
-            0 => format!("{} outputs", model.outputs_per_network),
-            all => format!("{} components -> {all} outputs", model.outputs_per_network),
-        },
+        model.outputs_per_network,
         model.spread,
         if model.refined { " (refined)" } else { "" },
         model.blob_bytes,

@@ -6,14 +6,12 @@ use crate::experiment::{Experiment, names_a_scene};
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::Progress;
-use taxel_learn::ModelBlob;
 use taxel_simulate::sensor::Precision;
 
 use super::data_argument::{DataArguments, HowToTrain, JudgedBy};
 use super::data_file::DATA_FILES;
 use super::scene_argument::{
-    self, DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument, Sizes,
+    DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument, Sizes,
 };
 use super::{Common, arguments};
 
@@ -140,27 +138,4 @@ impl SubjectOptions {
         let data = self.data.load(Path::new(source), how, judged)?;
         Ok(Subject::Measured(Box::new(data)))
     }
-}
-
-/// Loads the blob at `path`, whose columns must be those of `subject`; without a path, trains its model.
-pub fn model(path: Option<&Path>, subject: &Subject, progress: &dyn Progress) -> Result<ModelBlob> {
-    let Some(path) = path else {
-        return subject.training_set(None).blob(&subject.options(), progress);
-    };
-    let data = match subject {
-        Subject::Scene(scene) => return scene_argument::model(Some(path), scene, progress),
-        Subject::Measured(data) => data,
-    };
-    let blob = ModelBlob::read(path)?;
-    let model = blob.parse();
-    let metadata = model.metadata();
-    let fits = metadata.input_names.iter().eq(data.training.inputs.names.iter())
-        && metadata.output_names.iter().eq(data.training.outputs.names.iter())
-        && metadata.relative_inputs == data.training.relative_inputs;
-    if fits {
-        return Ok(blob);
-    }
-    let message = "its columns, or whether they are relative to the baseline, are not those of the CSV file: give the \
-                   options that it was trained with (--inputs, --outputs, --relative-inputs)";
-    Err(Error::Unfit { path: path.into(), message: message.into() })
 }

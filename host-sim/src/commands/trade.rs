@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use crate::error::{Bounded, NoPoint};
-use crate::evaluate::gate::{self, RECOMMENDED_K};
 use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan, Readout, Wires};
 use crate::metrics;
 use crate::subject::Subject;
@@ -26,15 +25,14 @@ mod page;
 
 /// Trade speed for accuracy: measure every decoder, and choose the best.
 ///
-/// Trains and judges every number format, exponential, K, affine tail, number of columns read, number of samples averaged,
-/// gate, and on contacts that move filter in time. Marks the Pareto front of error and time from the start of a scan to its
+/// Trains and judges every number format, exponential, K, number of columns read, number of samples averaged,
+/// and on contacts that move filter in time. Marks the Pareto front of error and time from the start of a scan to its
 /// estimate, and chooses the best point within your bounds.
 ///
 /// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/`, and with a bound chosen.bin, all together
 /// at the end; those of an earlier trade go.
 /// That time is the scan's, by the plan of the board's firmware for either readout (docs/board.md), and the decoding's, by
-/// the price list of the firmware's code (docs/cycles.md). Behind a gate cycles are the mean over the test frames, by the
-/// share of untouched rows (docs/trade.md). Bounds that nothing can meet are refused before anything is trained.
+/// the price list of the firmware's code (docs/cycles.md). Bounds that nothing can meet are refused before anything is trained.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim trade press
@@ -52,10 +50,6 @@ pub struct Arguments {
     /// Centres K to try [default: 16,32,64,128,256, of a CSV file those that are fewer than its training frames].
     #[arg(long, value_name = "K", value_delimiter = ',')]
     centres: Vec<usize>,
-    /// Components that the network for the whole array computes instead of all outputs, to try where they take fewer
-    /// multiplications (docs/projection.md); `none` for networks that compute all outputs alone.
-    #[arg(long, value_name = "R,…", value_delimiter = ',', default_value = "24")]
-    output_rank: Vec<RankOption>,
     /// Columns of a scene to read, to try: every, every 2nd and so on. Fewer make the scan shorter [default: 1,2,3,6
     /// with --frame-rate or --max-latency-ms, else 1].
     #[arg(long, value_name = "STEP", value_delimiter = ',')]
@@ -63,10 +57,6 @@ pub struct Arguments {
     /// Numbers of samples averaged for each reading, to try: more lower the noise, and make the scan longer.
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1")]
     average: Vec<usize>,
-    /// Gates to try besides none: tolerances in standard deviations of the averaged noise; `none` for no
-    /// gate [default: 3.5 if the scene's noise is relative, or the sensor at rest is known; none on contacts that move].
-    #[arg(long, value_name = "K,…", value_delimiter = ',', allow_negative_numbers = true)]
-    gate: Vec<GateOption>,
     /// Judge on contacts that slide at this speed, and are pressed and lifted so often a second, instead of the scene's
     /// motion: by the newest finished estimate against the truth at that moment. `none` for still contacts.
     #[arg(long, value_name = "MM/S,HZ")]
@@ -78,7 +68,7 @@ pub struct Arguments {
     /// Choose the cheapest point with an RMSE of at most this, in the group's unit.
     #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
     max_error: Option<f64>,
-    /// Choose within so many cycles a frame, at zero wait (behind a gate: on average). Unless --max-error is given,
+    /// Choose within so many cycles a frame, at zero wait. Unless --max-error is given,
     /// the most accurate point within all bounds is chosen (of errors within 0.5 %, the cheapest).
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
@@ -142,10 +132,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     device.check().map_err(|bad| of_option(bad, &OPTIONS))?;
     let plan = Plan {
         centres: centres(&arguments.centres, &subject)?,
-        output_ranks: output_ranks(&arguments.output_rank)?,
         column_steps: column_steps(arguments, &subject)?,
         samples_averaged: distinct("--average", &arguments.average)?,
-        gate_k: gate_k(&arguments.gate, &subject)?,
         device,
         worst_case: arguments.worst_case,
     };
@@ -211,15 +199,13 @@ fn command() -> String {
 }
 
 /// Options by the settings that they set.
-const OPTIONS: [(&str, &str); 13] = [
+const OPTIONS: [(&str, &str); 11] = [
     ("worst-case", "--worst-case"),
-    ("output-rank", "--output-rank"),
     ("clock-mhz", "--clock-mhz"),
     ("scan-ms", "--scan-ms"),
     ("centres", "--centres"),
     ("average", "--average"),
     ("column-step", "--column-step"),
-    ("gate", "--gate"),
     ("max-error", option(Bounded::Error)),
     ("max-cycles", option(Bounded::Cycles)),
     ("max-flash", option(Bounded::Flash)),
@@ -270,24 +256,6 @@ impl From<ReadoutOption> for Readout {
     }
 }
 
-/// Value of `--gate`.
-#[derive(Clone, Copy, PartialEq)]
-enum GateOption {
-    None,
-    K(f64),
-}
-
-impl FromStr for GateOption {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        match text {
-            "none" => Ok(Self::None),
-            k => k.parse().map(Self::K).map_err(|_| "give numbers, such as 3.5, or none".into()),
-        }
-    }
-}
-
 /// Value of `--motion`.
 #[derive(Clone, Copy)]
 enum MotionOption {
@@ -334,24 +302,6 @@ impl MotionOption {
             let bad = BadValue { field: bad.field.replace("motion.", "--motion: "), ..bad };
             Error::Usage(bad.to_string())
         })
-    }
-}
-
-/// Value of `--output-rank`.
-#[derive(Clone, Copy)]
-struct RankOption(Option<usize>);
-
-impl FromStr for RankOption {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        match text {
-            "none" => Ok(Self(None)),
-            rank => match rank.parse() {
-                Ok(rank) => Ok(Self(Some(rank))),
-                Err(_) => Err("give whole numbers, such as 24, or none".into()),
-            },
-        }
     }
 }
 
@@ -451,53 +401,6 @@ fn wires(subject: &Subject, step: usize) -> Option<Wires> {
         }
         Subject::Measured(data) => Wires::named(&data.training.inputs.names),
     }
-}
-
-/// Ranks that are asked for, in order; networks that compute all outputs there are always.
-fn output_ranks(given: &[RankOption]) -> Result<Vec<usize>> {
-    let ranks: Vec<usize> = given.iter().filter_map(|rank| rank.0).collect();
-    distinct("--output-rank", &ranks)
-}
-
-/// Gates that are asked for, or the one that docs/gating.md recommends where the noise allows one.
-fn gate_k(given: &[GateOption], subject: &Subject) -> Result<Vec<f64>> {
-    if given.is_empty() {
-        if subject.moving_scene().is_some() {
-            return Ok(vec![]);
-        }
-        let usual = match subject {
-            Subject::Scene(scene) => gate::check_noise(&scene.world),
-            Subject::Measured(data) if data.rest.is_none() => return Ok(vec![]),
-            Subject::Measured(data) => gate::GateRest::new(data, &[RECOMMENDED_K]).map(|_| ()),
-        };
-        return Ok(match usual {
-            Ok(()) => vec![RECOMMENDED_K],
-            Err(cause) => {
-                stderr::remark(format_args!("note: no points behind a gate: {cause}"));
-                vec![]
-            }
-        });
-    }
-    let k: Vec<f64> = given
-        .iter()
-        .filter_map(|gate| if let GateOption::K(k) = gate { Some(*k) } else { None })
-        .collect();
-    if k.len() == given.len() {
-        if let Subject::Measured(data) = subject
-            && let Err(bad) = gate::GateRest::new(data, &k)
-            && bad.field != "k"
-        {
-            let k: Vec<String> = k.iter().map(ToString::to_string).collect();
-            return Err(Error::Usage(format!("--gate {}: {bad}", k.join(","))));
-        }
-        return distinct("--gate", &k);
-    }
-    if given.len() > 1 {
-        let message =
-            "--gate none: there are always points without a gate; give none alone, or numbers";
-        return Err(Error::Usage(message.into()));
-    }
-    Ok(vec![])
 }
 
 fn distinct<T: Copy + PartialOrd + std::fmt::Display>(

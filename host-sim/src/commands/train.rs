@@ -16,7 +16,6 @@ use taxel_data::{columns, output};
 use taxel_learn::fill;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
-use taxel_learn::train::Widths;
 
 use super::data_argument::JudgedBy;
 use super::model_argument::ModelArguments;
@@ -35,7 +34,7 @@ mod recursion;
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
-  host-sim train press --whole-array --centres 256 --output-rank 24 --format fixed16 -o press.bin
+  host-sim train press --whole-array --centres 256 --format fixed16 -o press.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
   host-sim train log.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs -o m.bin
@@ -98,8 +97,6 @@ struct Summary {
     centres: usize,
     /// Width σ on scaled inputs; after refinement the mean over the networks.
     spread: f64,
-    /// Rule that gave the centres their widths.
-    widths: Widths,
     /// Penalty on squared weights, for each frame; `None` for the usual one.
     penalty: Option<f64>,
     /// How output weights were computed: `qr` or `rls`.
@@ -107,8 +104,6 @@ struct Summary {
     /// Whether centres, widths and the projection were refined after K-means.
     refined: bool,
     affine_tail: bool,
-    /// Components that are expanded to all outputs; `None` if the networks compute the outputs themselves.
-    output_rank: Option<usize>,
     /// Whether inputs are readings relative to the baseline.
     relative_inputs: bool,
     /// Whether the model tells deviations and novelty.
@@ -192,12 +187,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         training_frames: frames,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         spread: if set.refine { blob.spread() } else { options.spread },
-        widths: options.widths,
         penalty: options.penalty,
         solver: options.solver.name(),
         refined: set.refine,
         affine_tail: options.affine_tail,
-        output_rank: model.expansion().map(|expansion| expansion.components()),
         relative_inputs: set.frames.relative_inputs,
         confidence: model.confidence().is_some(),
         fill: model.fill().is_some(),
@@ -275,20 +268,14 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}{}, spread = {}{}{}, affine tail: {}, {} frames{}{}{}{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}{}{}, affine tail: {}, {} frames{}{}{}{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.model_crc,
         summary.formats.first().unwrap_or(&""),
         summary.centres,
-        summary.output_rank.map_or(String::new(), |rank| format!(", rank {rank}")),
         summary.spread,
-        match (summary.widths, summary.refined) {
-            (Widths::Common, false) => "",
-            (Widths::Common, true) => " (refined)",
-            (Widths::Neighbours, false) => " (mean, by neighbours)",
-            (Widths::Neighbours, true) => " (mean, by neighbours, refined)",
-        },
+        if summary.refined { " (refined)" } else { "" },
         summary.penalty.map_or(String::new(), |p| format!(", penalty = {}", choice::short(p))),
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,

@@ -75,7 +75,7 @@ impl<'b> FrameByFrame<'b> {
             (*reading, any_faulty) = (f32::NAN, true);
         }
         self.decoder.fill(&mut readings, &mut self.scratch);
-        let frame = Frame { readings_ohm: &readings, reciprocals: &self.reciprocals, gate: None };
+        let frame = Frame { readings_ohm: &readings, reciprocals: &self.reciprocals };
         let mut outputs = vec![f32::NAN; shape.rows * shape.outputs];
         let mut status = vec![RowStatus::MissingReading; shape.rows];
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };

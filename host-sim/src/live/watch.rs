@@ -404,7 +404,6 @@ fn errors(layout: &Layout, outputs: Option<&[f32]>, truth: Option<&[f32]>) -> (f
 /// What is to be said of a row, by how its decoding ended.
 fn row_flag(status: u8) -> Option<Flag> {
     match status {
-        EstimateReport::ROW_AT_REST => Some(Flag::AtRest),
         0 => None,
         _ => Some(Flag::Missing),
     }

@@ -268,6 +268,5 @@ fn made(view: &View<'_>) -> String {
     }
     let version = env!("CARGO_PKG_VERSION");
     let _ = writeln!(html, "<div><dt>Program</dt><dd>host-sim {version}</dd></div>\n</dl>");
-    html + "<p class=\"note\">Cycles and RAM are those of a Cortex-M4F by the price list in docs/cycles.md, without a \
-            gate.</p>\n"
+    html + "<p class=\"note\">Cycles and RAM are those of a Cortex-M4F by the price list in docs/cycles.md.</p>\n"
 }

@@ -150,7 +150,6 @@ fn result(groups: &[&str]) -> RunResult {
             relative_inputs: false,
             centres: 9,
             outputs_per_network: groups.len() * PER_ROW,
-            expanded_outputs: 0,
             spread: 0.8,
             refined: true,
             affine_tail: true,

@@ -70,7 +70,7 @@ pub fn html(trade: &Trade, command: &str) -> Page {
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> The Pareto front, from fast to slow. \
          <a href=\"trade.csv\">trade.csv</a> has all {} points and all outputs.</figcaption>\n{}<p class=\"note\">{}</p>\n\
          <p class=\"note\">Cycles are those of decoding, by the project’s models of a Cortex-M4F at zero wait and from flash \
-         (not checked against silicon), code of {}. Behind a gate, cycles and times are means over the test frames. {}</p>\n</figure>\n\
+         (not checked against silicon), code of {}. {}</p>\n</figure>\n\
          <p class=\"note\">Made by <code>{}</code></p>\n",
         grouped(trade.points.len()),
         table::of_front(trade),

@@ -101,10 +101,7 @@ fn facts(result: &RunResult, noise: Option<&str>) -> Vec<(&'static str, String)>
         0 => format!("{} {readings}", model.inputs_per_network),
         count => format!("{count} {readings} → {} features", model.inputs_per_network),
     };
-    let outputs = match model.expanded_outputs {
-        0 => format!("{} outputs", model.outputs_per_network),
-        all => format!("{} components → {all} outputs", model.outputs_per_network),
-    };
+    let outputs = format!("{} outputs", model.outputs_per_network);
     let drift = match scene.as_ref().map_or(0.0, |scene| scene.gain_drift) {
         0.0 => String::new(),
         gain => format!(", gain drift ±{}", percent(gain)),

@@ -93,14 +93,13 @@ fn experiments_are_told_by_the_schema() {
     let schema = &schema();
     let folder = prepared("json_experiments", schema);
     let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
-    let gate = checked(&["gate", "scene.toml", "-n", "100", "--model", "m.bin"]);
     let limit = ["limit", "scene.toml", "-n", "4", "--model", "m.bin", "-o", "limit"];
     let limit = checked(&[&limit[..], &["--geometry"]].concat());
     check_file(&folder, schema, "limit/limit.json");
-    let trade = ["trade", "scene.toml", "--centres", "6", "--output-rank", "none"];
+    let trade = ["trade", "scene.toml", "--centres", "6"];
     let trade = checked(&[&trade[..], &["--max-error", "1"]].concat());
     check_file(&folder, schema, "out/small/trade.json");
-    for document in [gate, limit, trade] {
+    for document in [limit, trade] {
         assert_eq!((&document["subject"], &document["seed"]), (&json!("small"), &json!(1)));
     }
 }

@@ -273,24 +273,6 @@ fn the_unit_of_an_output_that_is_there_in_pauses_changes_no_other() {
 }
 
 #[test]
-fn a_gate_on_a_log_that_drifts_has_the_baseline_of_each_pause() {
-    let folder = Folder::new("log-gate");
-    // A drift that a baseline of all pauses would take for touch.
-    folder.write("log.csv", log(0.02));
-    folder.write("still.csv", log(0.0));
-    let skipped = |file: &str, key: &str| {
-        let gate = [&["gate", file, "--k", "5"], &COLUMNS[..5]].concat();
-        checked(&folder, &schema(), &gate)["lines"][0][key].as_f64().unwrap()
-    };
-    let [drifting, still] = ["log.csv", "still.csv"].map(|file| skipped(file, "skipped"));
-    assert!((still - drifting).abs() < 0.05 && still > 0.4, "{still} {drifting}");
-    assert!(skipped("log.csv", "woken") < 0.05);
-    let refused =
-        folder.fail(&[&["gate", "log.csv", "--fold-blocks", "5"], &COLUMNS[..5]].concat(), 2);
-    assert!(refused.contains("--fold-blocks has no effect"), "{refused}");
-}
-
-#[test]
 fn a_reading_that_dies_in_a_log_takes_no_baseline_from_the_others() {
     let folder = Folder::new("log-dead");
     folder.write("log.csv", log(0.0));

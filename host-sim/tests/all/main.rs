@@ -14,7 +14,6 @@ mod directions;
 mod drift;
 mod export;
 mod frozen;
-mod gate;
 mod health;
 #[cfg(target_os = "linux")]
 mod interruption;

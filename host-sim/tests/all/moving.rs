@@ -25,10 +25,8 @@ fn scene(moves: bool) -> Experiment {
 fn traded(moves: bool, bounds: Bounds) -> Trade {
     let plan = Plan {
         centres: vec![16],
-        output_ranks: vec![],
         column_steps: vec![1],
         samples_averaged: vec![1, 4],
-        gate_k: vec![],
         device: Device::default(),
         worst_case: false,
     };
@@ -108,7 +106,7 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     assert!(page.contains("Contacts that move") && page.contains("while a contact slides"));
     assert!(checked(&folder, &schema, &["run", "still.toml"])["moving"].is_null());
 
-    let trade = ["trade", "still.toml", "--centres", "12", "--output-rank", "none", "--no-refine"];
+    let trade = ["trade", "still.toml", "--centres", "12", "--no-refine"];
     let fast = [&trade[..], &["--motion", "50mm/s,3Hz", "--max-error", "1"]].concat();
     let traded = checked(&folder, &schema, &fast);
     assert_eq!(traded["motion"]["speed_mm_per_s"], serde_json::json!([50.0, 50.0]));
@@ -121,6 +119,4 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
         let refused = folder.fail(&[&trade[..], &["--motion", motion]].concat(), 2);
         assert!(refused.contains(refusal), "{refused}");
     }
-    let gate = [&trade[..], &["--motion", "50mm/s,3Hz", "--gate", "3.5"]].concat();
-    assert!(folder.fail(&gate, 2).contains("--motion none"));
 }

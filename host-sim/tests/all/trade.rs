@@ -5,12 +5,10 @@ use std::sync::OnceLock;
 
 use crate::common::{Folder, small_scene, unrefined};
 use host_sim::Result;
-use host_sim::evaluate::gate::{self, Settings};
 use host_sim::evaluate::trade::{self, Bounds, Device, Memory, Plan, Trade};
 use host_sim::experiment::Experiment;
 use host_sim::subject::Subject;
 use taxel_data::{Silent, Stream};
-use taxel_learn::cost::{Design, Prices};
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_simulate::Synthesis;
 
@@ -23,10 +21,8 @@ fn press() -> Experiment {
 fn plan() -> Plan {
     Plan {
         centres: vec![16, 64],
-        output_ranks: vec![24],
         column_steps: vec![1],
         samples_averaged: vec![1, 16],
-        gate_k: vec![3.5],
         device: Device { clock_mhz: 100.0, memory: Memory::Ram, ..Device::default() },
         worst_case: false,
     }
@@ -56,12 +52,10 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     assert_eq!(trade.chosen, None);
     let count = |name: &str| trade.points.iter().filter(|p| p.arithmetic.name() == name).count();
     for kernel in ["fixed16", "f32-direct"] {
-        // K, full or not, for rows or the array: K = 16 would take more multiplications with rank 24 than without.
-        let networks = 2 + 3;
-        assert_eq!(count(kernel), networks * 2 * 2 * 2, "{kernel}"); // tail, samples, gate
+        assert_eq!(count(kernel), 2 * 2 * 2, "{kernel}"); // rows or the array, K, samples
     }
     for kernel in ["f32-direct-libm", "f32-direct-micromath"] {
-        assert_eq!(count(kernel), (2 + 3) * 2 * 2, "{kernel}"); // the gate is not measured with them
+        assert_eq!(count(kernel), 2 * 2 * 2, "{kernel}");
     }
     // Expanded distances appear only where their rounding is proved harmless.
     assert!((1..40).contains(&count("f32")), "{}", count("f32"));
@@ -96,9 +90,7 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     // More samples have less error, and 16 bits are as good as 32.
     let find = |kernel: &str, centres, samples| {
         let wanted = |p: &&trade::Point| {
-            (p.way().as_str(), p.centres, p.samples_averaged, p.affine_tail, p.gate_k)
-                == (kernel, centres, samples, true, None)
-                && p.output_rank.is_none()
+            (p.way().as_str(), p.centres, p.samples_averaged) == (kernel, centres, samples)
         };
         trade.points.iter().find(wanted).unwrap()
     };
@@ -112,13 +104,6 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     let array = find("fixed16 array", 64, 1);
     assert!(array.rmse("dz_mm") < 0.95 * fixed.rmse("dz_mm"), "{}", array.rmse("dz_mm"));
     assert!(array.frame.cycles < fixed.frame.cycles && array.blob_bytes < fixed.blob_bytes);
-    // So has one that computes few components, and it takes less flash.
-    let ranked: Vec<_> = trade.points.iter().filter(|p| p.output_rank == Some(24)).collect();
-    assert!(!ranked.is_empty() && ranked.iter().all(|p| p.whole_array && p.centres == 64));
-    let few = ranked.iter().find(|p| p.name() == array.name().replace("64", "64, rank 24"));
-    let few = few.unwrap();
-    assert!(few.rmse("dz_mm") < 1.03 * array.rmse("dz_mm"), "{}", few.rmse("dz_mm"));
-    assert!(few.blob_bytes < array.blob_bytes && few.ram_bytes > array.ram_bytes);
 }
 
 #[test]
@@ -131,8 +116,8 @@ fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
         let cheaper = other.times.frame_ms < chosen.times.frame_ms && other.rmse("dz_mm") <= 0.055;
         assert!(!cheaper, "{} is cheaper", other.name());
     }
-    let ungated = |point: &trade::Point| point.gate_k.is_none() && point.samples_averaged == 16;
-    let place = trade.points.iter().position(ungated).unwrap();
+    let often = |point: &trade::Point| point.samples_averaged == 16;
+    let place = trade.points.iter().position(often).unwrap();
     let point = &trade.points[place];
     let model = ModelBlob::of_bytes(trade.blob(place)).unwrap();
     assert_eq!(model.bytes().len(), point.blob_bytes);
@@ -146,52 +131,6 @@ fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
     assert!((rmse - point.rmse("dz_mm")).abs() < 1e-12, "{rmse}");
 }
 
-#[test]
-fn behind_a_gate_points_have_the_errors_of_the_gates_rows_and_cost_their_share() {
-    let (scene, mut trade) = (press(), traded().clone());
-    let prices = Prices::accepted().unwrap();
-    // The same gate by other means: the model by itself, and the same test frames.
-    let mut gated = 0;
-    for (i, point) in trade.points.iter().enumerate() {
-        let Some(k) = point.gate_k else { continue };
-        // The gate knows nothing of the tail.
-        if !point.affine_tail || point.centres != 16 || point.samples_averaged != 1 {
-            continue;
-        }
-        let without = &trade.points[i - 1];
-        assert_eq!(point.name(), format!("{}, gate k = 3.5", without.name()));
-        let blob = ModelBlob::of_bytes(trade.blob(i)).unwrap();
-        let model = blob.prepare(Exponential::default());
-        let frames = prices.frames(&Design::new(&blob), Exponential::default()).unwrap();
-        let settings = Settings {
-            k: vec![k],
-            frames: scene.training.test_frames,
-            baseline_frames: gate::BASELINE_FRAMES,
-            frame_cycles: frames.map(|cost| cost.cycles),
-            flash_frame_cycles: None,
-        };
-        let result = gate::measure(&scene, &model, &settings, &Silent).unwrap();
-        assert_eq!(point.errors, result.lines[0].errors);
-        assert_eq!(without.errors, result.ungated_errors());
-        let skipped = result.lines[0].skipped;
-        // A press wakes some row, and with it the whole array.
-        let expected = if point.whole_array { 0.0..0.4 } else { 0.4..0.8 };
-        assert!(expected.contains(&skipped), "{}: {skipped}", point.name());
-        let cycles = frames.map(|cost| cost.cycles).mean(skipped);
-        assert_eq!(point.frame.cycles, cycles.round() as u64);
-        assert!(point.whole_array || point.frame.instructions < without.frame.instructions);
-        // RAM of the baseline and of its estimate.
-        assert_eq!(point.ram_bytes - without.ram_bytes, 576 + 584);
-        assert_eq!(trade.rest_tolerance(i), Some(3.5 * 0.005));
-        gated += 1;
-    }
-    assert!(gated >= 4, "{gated}");
-    // A frame costs so little only behind a gate.
-    trade.choose(&Bounds { cycles: Some(10_000), ..Bounds::default() }).unwrap();
-    let chosen = trade.chosen.unwrap();
-    assert!(trade.points[chosen].gate_k.is_some() && trade.points[chosen].on_front);
-}
-
 /// The scene `press` with two rows and few frames.
 fn few_frames_of_two_rows() -> String {
     include_str!("../../../scenes/press.toml")
@@ -202,7 +141,7 @@ fn few_frames_of_two_rows() -> String {
 }
 
 #[test]
-fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
+fn the_files_and_the_table_tell_every_point() {
     let folder = Folder::new("trade-files");
     folder.write("few.toml", few_frames_of_two_rows());
     let few = ["trade", "few.toml", "--no-refine", "--centres", "16", "--average", "1"];
@@ -223,25 +162,20 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     assert!(words.contains("The most accurate: ") && words.contains("always predicting the mean"));
     assert!(front.ends_with("\nopen out/few/trade.html\n"), "{front}");
     assert!(!all.contains("--all"), "{all}");
-    let page = folder.succeed(&[&few[..], &["--gate", "3,4", "--max-cycles", "2500"]].concat());
-    assert!(page.contains(" avg gate "), "{page}");
-    assert!(page.contains("--rest-tolerance 0.015") || page.contains("--rest-tolerance 0.02"));
+    folder.succeed(&[&few[..], &["--max-cycles", "9000"]].concat());
     let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
     let csv = read("out/few/trade.csv");
     let mut lines = csv.lines();
-    assert!(lines.next().unwrap().starts_with(
-        "kernel,whole_array,centres,spread,affine_tail,columns,samples_averaged,gate_k,"
-    ));
-    let k_of = |line: &str| line.split(',').nth(7).unwrap().to_owned();
-    let of_fixed16: Vec<String> =
-        lines.filter(|line| line.starts_with("fixed16,false,")).map(k_of).collect();
-    assert_eq!(of_fixed16, ["", "3", "4", "", "3", "4"]);
+    assert!(
+        lines
+            .next()
+            .unwrap()
+            .starts_with("kernel,whole_array,centres,spread,columns,samples_averaged,filter_ms,")
+    );
+    assert_eq!(lines.count(), every.len());
     let json: serde_json::Value = serde_json::from_str(&read("out/few/trade.json")).unwrap();
-    assert_eq!(json["points"][0]["gate_k"], serde_json::Value::Null);
-    assert_eq!(json["points"][1]["gate_k"], 3.0);
-    assert!(read("out/few/figures/error-by-time.svg").contains("c1 hollow mark"));
     let html = read("out/few/trade.html");
-    assert!(html.contains("gate k</th>") && !html.contains("<script"));
+    assert!(html.contains("cycles</th>") && !html.contains("<script"));
     assert!(html.contains(">time of a frame, scan to estimate (ms)</text>"), "{html}");
     // The legend has every kind of mark, and no column has dashes alone.
     let (legend, plot) = html.split_once("frames a second</text>").unwrap();
@@ -270,26 +204,21 @@ fn the_files_and_the_table_tell_points_behind_a_gate_from_others() {
     );
     assert!(html.matches("<tr class=\"chosen-row\">").count() == 1 && html.contains(">chosen: K"));
     assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
-    assert!(html.contains("at most 2\u{202f}500\u{a0}cycles at zero wait"), "the bound");
+    assert!(html.contains("at most 9\u{202f}000\u{a0}cycles at zero wait"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());
     // Measurements are kept where no point is chosen, and another run's choice is not left beside them.
-    let output = folder.run(&[&few[..], &["--gate", "none", "--max-error", "0.05"]].concat());
+    let output = folder.run(&[&few[..], &["--max-error", "0.05"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.code() == Some(2) && stderr.contains("--max-error 0.05"), "{stderr}");
     assert!(stderr.contains("train and measure …\n"), "a log shows what runs: {stderr}");
     let page = String::from_utf8(output.stdout).unwrap();
     assert!(page.contains("\n* fixed16 ") && !page.contains("Chosen:"), "{page}");
-    assert!(!read("out/few/figures/error-by-time.svg").contains("c1 hollow mark"), "{page}");
     assert!(!folder.path("out/few/chosen.bin").exists());
-    // Without noise there is no gate, and the note gives the reason.
-    let output = folder.run(&[&few[..], &["--noise", "0"]].concat());
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && stderr.contains("no points behind a gate"), "{stderr}");
 }
 
 #[test]
-fn what_nothing_can_meet_and_plans_that_make_no_gate_are_refused_before_training() {
+fn what_nothing_can_meet_is_refused_before_training() {
     let (scene, all) = (press(), traded());
     let cycles = all.points.iter().map(|point| point.frame.cycles).min().unwrap();
     // Costs, and errors below the limit.
@@ -312,25 +241,6 @@ fn what_nothing_can_meet_and_plans_that_make_no_gate_are_refused_before_training
         let message = compute(&scene, bounds).unwrap_err().to_string();
         assert!(message.contains("max-error"), "{message}");
     }
-
-    let refusal = |scene: &Experiment, plan: &Plan| {
-        compute_plan(scene, plan, Bounds::default()).unwrap_err().to_string()
-    };
-    let (centres, samples_averaged, gate_k) = (vec![16], vec![1], vec![3.5, 200.0]);
-    let plan = Plan {
-        centres,
-        output_ranks: vec![],
-        column_steps: vec![1],
-        samples_averaged,
-        gate_k,
-        device: Device::default(),
-        worst_case: false,
-    };
-    let message = refusal(&scene, &plan);
-    assert!(message.contains("gate = 200") && message.contains("below 1"), "{message}");
-    let mut silent = scene.clone();
-    silent.world.noise.level = 0.0;
-    assert!(refusal(&silent, &plan).contains("noise level = 0"));
 }
 
 #[test]
@@ -339,17 +249,14 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
     scene.world.read_rows = vec![3];
     let plan = Plan {
         centres: vec![20],
-        output_ranks: vec![4],
         column_steps: vec![1],
         samples_averaged: vec![1],
-        gate_k: vec![],
         device: Device::default(),
         worst_case: false,
     };
     let one_row = compute_plan(&scene, &plan, Bounds::default()).unwrap();
-    assert!(one_row.points.len() >= 8 && one_row.left_out.is_empty());
+    assert!(one_row.points.len() >= 4 && one_row.left_out.is_empty());
     assert!(one_row.points.iter().all(|point| !point.whole_array && point.centres == 20));
-    assert!(one_row.points.iter().all(|point| point.output_rank.is_none()));
 
     // One network for the array has half of the spread, which 16 bits cannot hold.
     scene.world.read_rows = vec![3, 4];
@@ -368,8 +275,7 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
     assert!(
         narrow.left_out[0].ends_with("spread (in a scene's [training], or by `train --spread`)")
     );
-    // With a tail and without, of full rank and of rank 4.
-    assert!(of_array(&narrow, "f32-direct") == 4);
+    assert!(of_array(&narrow, "f32-direct") == 1);
 }
 
 #[test]
@@ -379,10 +285,8 @@ fn chosen_columns_are_judged_beside_what_can_be_told_from_these_alone() {
     scene.training.frames = 600;
     let chosen = |column_steps: &[usize]| Plan {
         centres: vec![16],
-        output_ranks: vec![],
         column_steps: column_steps.to_vec(),
         samples_averaged: vec![1],
-        gate_k: vec![],
         device: Device::default(),
         worst_case: false,
     };
@@ -413,10 +317,8 @@ fn chosen_columns_are_judged_beside_what_can_be_told_from_these_alone() {
 fn a_choice_of_columns_tells_how_to_use_it_and_what_the_line_carries() {
     let folder = Folder::new("trade-columns");
     folder.write("few.toml", few_frames_of_two_rows());
-    let few = ["trade", "few.toml", "--no-refine", "--centres", "16", "--output-rank", "none"];
-    let ask = |hz, steps| {
-        [&few[..], &["--gate", "none", "--frame-rate", hz, "--column-step", steps]].concat()
-    };
+    let few = ["trade", "few.toml", "--no-refine", "--centres", "16"];
+    let ask = |hz, steps| [&few[..], &["--frame-rate", hz, "--column-step", steps]].concat();
     let page = folder.succeed(&ask("1300", "1,3"));
     assert!(page.lines().all(|line| line.chars().count() <= 120), "{page}");
     for words in [
@@ -458,10 +360,8 @@ fn a_choice_of_columns_tells_how_to_use_it_and_what_the_line_carries() {
 fn a_pad_for_pressure_alone_and_a_contact_are_traded() {
     let plan = Plan {
         centres: vec![16],
-        output_ranks: vec![],
         column_steps: vec![1],
         samples_averaged: vec![1],
-        gate_k: vec![3.5],
         device: Device::default(),
         worst_case: false,
     };
@@ -479,7 +379,7 @@ fn a_pad_for_pressure_alone_and_a_contact_are_traded() {
     let pad = compute_plan(&small(&pad), &plan, Bounds::default()).unwrap();
     // The board samples its other columns now and then.
     assert!(pad.points.iter().all(|point| point.times.scan_ms == Some(0.804)));
-    assert!(pad.points.iter().any(|point| point.whole_array && point.gate_k.is_some()));
+    assert!(pad.points.iter().any(|point| point.whole_array));
 
     let contact = Subject::Scene(Box::new(small(include_str!("../../../scenes/contact.toml"))));
     let bounds = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
@@ -521,8 +421,6 @@ fn measurements_are_traded_as_they_are() {
         assert!(stderr.contains(&format!("{option} {value}: ")), "{stderr}");
         assert_eq!(stderr.contains("choose --inputs"), option == "--column-step", "{stderr}");
     }
-    let gated = folder.fail(&[&other[..], &["--gate", "3", "--rest", "none"]].concat(), 2);
-    assert!(gated.contains("--baseline FILE") && gated.contains("--rest"), "{gated}");
 }
 
 #[test]

@@ -148,23 +148,17 @@ fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     };
     let (of_array, of_rows) = (rmse("array.bin"), rmse("rows.bin"));
     assert!(of_array < of_rows, "{of_array} {of_rows}");
-    let printed = folder.succeed(&[&array[..6], &["few.bin", "--output-rank", "5"]].concat());
-    assert!(printed.contains("rank 5, "), "{printed}");
-    let printed = folder.succeed(&["inspect", "few.bin"]);
-    assert!(printed.contains("5 components → 36 outputs of all rows"), "{printed}");
-    let bytes = |model: &str| std::fs::metadata(folder.path(model)).unwrap().len();
-    assert!(bytes("few.bin") < bytes("array.bin"));
 
     // The scene asks for the same, but with a width of its own, of which --whole-array takes half.
     let scene = small_scene()
-        .replace("affine_tail = true", "affine_tail = true\nwhole_array = true\noutput_rank = 5")
+        .replace("affine_tail = true", "affine_tail = true\nwhole_array = true")
         .replace("spread = 0.8", "spread = 0.4");
-    assert!(scene.contains("output_rank") && scene.contains("spread = 0.4"));
+    assert!(scene.contains("whole_array") && scene.contains("spread = 0.4"));
     folder.write("array.toml", scene);
     folder.succeed(&["train", "array.toml", "-n", "2000", "-o", "scene.bin"]);
     let network =
         |model: &str| json(&folder.succeed(&["inspect", model, "--json"]))["networks"].clone();
-    assert_eq!(network("scene.bin"), network("few.bin"));
+    assert_eq!(network("scene.bin"), network("array.bin"));
 
     let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
     let mut lines: Vec<Vec<&str>> = data.lines().map(|l| l.split(',').collect()).collect();
@@ -396,7 +390,7 @@ fn inspect_says_what_image_a_model_needs() {
         let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "--centres", "8"];
         folder.succeed(&[&train[..], &["--no-refine", "-o", "m.bin"]].concat());
         let printed = folder.succeed(&["inspect", "m.bin"]);
-        assert!(printed.contains("gated, at rest") && printed.contains("from flash"), "{printed}");
+        assert!(printed.contains("a frame ") && printed.contains("from flash"), "{printed}");
         match says {
             Some(says) => assert!(printed.contains(says), "{printed}"),
             None => assert!(!printed.contains("TAXEL_CAPACITY"), "{printed}"),

@@ -285,8 +285,6 @@ impl Source {
         let force_n = deformations.iter().map(|moved| moved[2] * N_PER_MM).sum();
         if depth_mm > 0.02 {
             frame.contact = Some(Contact { x_mm, y_mm, depth_mm, force_n: Some(force_n) });
-        } else {
-            frame.flags.push(Flag::AtRest);
         }
         if self.show == "values" {
             frame.readings = (0..16)

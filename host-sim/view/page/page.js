@@ -144,8 +144,7 @@ function showBanner() {
   setText("banner", capital(words));
   byId("banner").dataset.level = level;
   const state = trouble ? "gone" : status?.state ?? "live";
-  const isAtRest = state === "live" && frame?.flags.includes("at rest");
-  setText("state", trouble ? trouble === "connecting" ? "connecting" : "no connection" : isAtRest ? "live, at rest" : state === "live" && layout?.kind === "recording" ? "playing" : state);
+  setText("state", trouble ? trouble === "connecting" ? "connecting" : "no connection" : state === "live" && layout?.kind === "recording" ? "playing" : state);
   byId("state").dataset.state = state;
 }
 

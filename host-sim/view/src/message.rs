@@ -118,9 +118,6 @@ pub enum Flag {
     /// Readings are missing.
     #[serde(rename = "missing")]
     Missing,
-    /// Nothing touches it, and it was not decoded.
-    #[serde(rename = "at rest")]
-    AtRest,
 }
 
 /// A contact on the sheet.

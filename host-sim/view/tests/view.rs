@@ -219,7 +219,7 @@ fn the_page_is_told_in_the_agreed_json() {
         time_us: 9,
         readings: vec![1.5, f32::NAN],
         deviations: Some(vec![f32::INFINITY]),
-        flags: vec![Flag::AtRest],
+        flags: vec![Flag::Novel],
         contact: Some(Contact { force_n: None, ..Contact::default() }),
         ..Frame::default()
     });
@@ -235,7 +235,7 @@ fn the_page_is_told_in_the_agreed_json() {
     assert!(frame["age_ms"].is_number() && frame["sent_ms"].is_number());
     assert_eq!(frame["readings"], serde_json::json!([1.5, null]));
     assert_eq!(frame["deviations"], serde_json::json!([null]));
-    assert_eq!(frame["flags"], serde_json::json!(["at rest"]));
+    assert_eq!(frame["flags"], serde_json::json!(["novel"]));
     assert!(frame["contact"]["force_n"].is_null() && frame.get("truth").is_none());
 }
 

@@ -7,12 +7,11 @@ use super::format::{
 };
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use super::sections::{
-    check_count, cut_fill, take, take_block, take_confidence, take_expansion, take_linear,
-    take_projection, take_relative_inputs,
+    check_count, cut_fill, take, take_block, take_confidence, take_linear, take_projection,
+    take_relative_inputs,
 };
 use crate::checksum::CRC_32;
 use crate::confidence::{Confidence, Sizes};
-use crate::expansion::Expansion;
 use crate::fill::Fill;
 use crate::projection::Projection;
 use crate::rbf::{
@@ -27,9 +26,6 @@ pub struct Model<'a> {
     row_network: &'a [u8],
     metadata: Metadata<'a>,
     projection: Option<Projection<'a>>,
-    expansion: Option<&'a [f32]>,
-    /// Components of the expansion; 0 without one.
-    components: u16,
     confidence: Option<&'a [f32]>,
     /// Directions and components of the confidence.
     confidence_sizes: [u16; 2],
@@ -71,10 +67,6 @@ impl<'a> Model<'a> {
         if projection.is_some() {
             check_count("networks behind a projection", 1, networks.into())?;
         }
-        let (expansion, rest) = match projection {
-            Some(_) => take_expansion(rest, shape)?,
-            None => (None, rest),
-        };
         let (confidence, rest) = take_confidence(rest, shape)?;
         let last_sections = rest;
         let (linear_rmse, rest) = take_linear(last_sections, shape)?;
@@ -96,10 +88,8 @@ impl<'a> Model<'a> {
             row_network,
             metadata,
             projection,
-            expansion: expansion.map(|it| it.block()),
-            // As in the blob.
-            components: expansion.map_or(0, |it| it.components() as u16),
             confidence: confidence.map(|it| it.block()),
+            // As in the blob.
             confidence_sizes: confidence
                 .map_or([0; 2], |it| [it.sizes().directions as u16, it.sizes().components as u16]),
             networks,
@@ -110,10 +100,6 @@ impl<'a> Model<'a> {
             let (network, after) = take_network(rest, model.network_shape(), index)?;
             // Every value is looked at once, here; later reads only cut slices.
             network.check_values().map_err(|cause| DecodeError::Network { index, cause })?;
-            if model.expansion().is_some_and(|it| !it.stays_finite(network.largest_output())) {
-                let cause = NetworkError::NotFinite { what: "the largest output" };
-                return Err(DecodeError::Expansion { cause });
-            }
             rest = after;
         }
         if !rest.is_empty() {
@@ -167,22 +153,9 @@ impl<'a> Model<'a> {
     }
 
     /// The projection from a whole frame to the network's inputs; `None` if each row's readings are its network's
-    /// inputs. Behind a projection there is one network, and its outputs are those of all rows, or are
-    /// [expanded](Self::expansion) to these.
+    /// inputs. Behind a projection there is one network, and its outputs are those of all rows.
     pub fn projection(&self) -> Option<Projection<'a>> {
         self.projection
-    }
-
-    /// The expansion of the one network's outputs to those of all rows; `None` if a network's outputs are those of its
-    /// rows. It stands behind a projection alone.
-    pub fn expansion(&self) -> Option<Expansion<'a>> {
-        let outputs = self.shape.rows.wrapping_mul(self.shape.outputs);
-        self.expansion.map(|block| Expansion::of_checked(self.components(), outputs, block))
-    }
-
-    /// Number of components that are [expanded](Self::expansion) to the outputs; 0 without an expansion.
-    pub fn components(&self) -> usize {
-        self.components.into()
     }
 
     /// The model's confidence in its outputs; `None` if it has none.
@@ -212,16 +185,11 @@ impl<'a> Model<'a> {
         cut_fill(rest, self.shape).unwrap_or_default()
     }
 
-    /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows, or the
-    /// components that are expanded to these.
+    /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows.
     pub(crate) fn network_shape(&self) -> ModelShape {
         let ModelShape { rows, outputs, .. } = self.shape;
         let Some(projection) = self.projection else { return self.shape };
-        let outputs = match self.components() {
-            0 => rows * outputs,
-            components => components,
-        };
-        ModelShape { rows: 1, inputs: projection.features(), outputs }
+        ModelShape { rows: 1, inputs: projection.features(), outputs: rows * outputs }
     }
 
     /// The networks, in the order of the blob.

@@ -7,15 +7,13 @@ use super::aligned::AlignedBytes;
 use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
-    CRC_BYTES, ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, FillHeader,
-    LinearSection, MAGIC, MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField,
-    TAG_CONFIDENCE, TAG_EXPANSION, TAG_FILL, TAG_LINEAR, TAG_METADATA, TAG_PROJECTION,
-    TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
+    CRC_BYTES, ConfidenceHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, FillHeader, LinearSection, MAGIC,
+    MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_CONFIDENCE, TAG_FILL,
+    TAG_LINEAR, TAG_METADATA, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Floats, Metadata};
 use crate::checksum::CRC_32;
 use crate::confidence::Confidence;
-use crate::expansion::Expansion;
 use crate::fill::Fill;
 use crate::projection::Projection;
 use crate::rbf::Network;
@@ -25,8 +23,6 @@ use crate::rbf::Network;
 pub struct ModelParts<'a> {
     /// Projection from a frame to the inputs of one network for all rows; `None` with a network a row.
     pub projection: Option<Projection<'a>>,
-    /// Expansion of the one network's outputs, which are then components, to the outputs of all rows.
-    pub expansion: Option<Expansion<'a>>,
     /// Confidence in the outputs.
     pub confidence: Option<Confidence<'a>>,
     /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if it
@@ -45,18 +41,9 @@ pub struct ModelParts<'a> {
 impl<'a> ModelParts<'a> {
     /// Networks that decode rows from their readings, and nothing else. Each row has an index into `networks`.
     pub fn new(networks: &'a [Network<'a>], row_network: &'a [u8], metadata: Metadata<'a>) -> Self {
-        let (projection, expansion, confidence, fill) = (None, None, None, None);
+        let (projection, confidence, fill) = (None, None, None);
         let linear_rmse = Floats(&[]);
-        Self {
-            projection,
-            expansion,
-            confidence,
-            linear_rmse,
-            fill,
-            networks,
-            row_network,
-            metadata,
-        }
+        Self { projection, confidence, linear_rmse, fill, networks, row_network, metadata }
     }
 }
 
@@ -76,7 +63,6 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
     let blocks = [
         parts.projection.map(|it| it.block()),
-        parts.expansion.map(|it| it.block()),
         parts.confidence.map(|it| it.block()),
         parts.fill.map(|it| it.block()),
     ];
@@ -104,16 +90,6 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         }
     }
 
-    if let Some(expansion) = parts.expansion {
-        if parts.projection.is_none() {
-            return Err(EncodeError::ExpansionWithoutProjection);
-        }
-        let components = expansion.components();
-        if outputs != components {
-            return Err(EncodeError::UnfitExpansion { outputs, components });
-        }
-        outputs = expansion.outputs();
-    }
     let rows = parts.row_network.len();
     if let Some(projection) = parts.projection {
         // One network has the outputs of all rows, and features for inputs.
@@ -161,11 +137,6 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
             writer.put(&ProjectionHeader { tag: TAG_PROJECTION_TO, features })?;
         }
         writer.put_block(&[bytemuck::cast_slice(projection.block())])?;
-    }
-    if let Some(expansion) = parts.expansion {
-        let components = fit("number of components", expansion.components(), u16::MAX)?;
-        writer.put(&ExpansionHeader { tag: TAG_EXPANSION, components })?;
-        writer.put_block(&[bytemuck::cast_slice(expansion.block())])?;
     }
     if let Some(confidence) = parts.confidence {
         let sizes = confidence.sizes();

@@ -95,12 +95,6 @@ pub enum DecodeError {
         /// What is wrong with the projection.
         cause: NetworkError,
     },
-    /// The expansion's parameters are not valid.
-    #[error("expansion: {cause}")]
-    Expansion {
-        /// What is wrong with the expansion.
-        cause: NetworkError,
-    },
     /// The confidence's parameters are not valid.
     #[error("confidence: {cause}")]
     Confidence {
@@ -167,17 +161,6 @@ pub enum EncodeError {
         /// Number of rows.
         rows: usize,
     },
-    /// The network's outputs are not the components that the expansion takes.
-    #[error("the network has {outputs} outputs; the expansion takes {components} components")]
-    UnfitExpansion {
-        /// Number of outputs of the network.
-        outputs: usize,
-        /// Number of components of the expansion.
-        components: usize,
-    },
-    /// An expansion stands behind a network that is not behind a projection.
-    #[error("an expansion needs one network for all rows, behind a projection")]
-    ExpansionWithoutProjection,
     /// The encoded blob is rejected when it is parsed again.
     #[error("the model would be refused when read: {0}")]
     Refused(#[from] DecodeError),

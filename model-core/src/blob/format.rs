@@ -24,7 +24,6 @@ pub(super) const TAG_METADATA: u8 = 0;
 pub(super) const TAG_PROJECTION: u8 = 4;
 /// Tag of a section without fields: the model's inputs are relative to the baseline.
 pub(super) const TAG_RELATIVE_INPUTS: u8 = 5;
-pub(super) const TAG_EXPANSION: u8 = 6;
 pub(super) const TAG_CONFIDENCE: u8 = 7;
 /// Tag of a projection to another number of features than a row has readings.
 pub(super) const TAG_PROJECTION_TO: u8 = 8;
@@ -117,14 +116,6 @@ pub(super) struct ProjectionHeader {
     pub features: u16,
 }
 
-/// Header of the expansion's section; padding and its floats follow.
-#[derive(Serialize, Deserialize)]
-pub(super) struct ExpansionHeader {
-    pub tag: u8,
-    /// Number of components, which the network infers instead of outputs.
-    pub components: u16,
-}
-
 /// Header of the confidence's section; padding and its floats follow.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ConfidenceHeader {
@@ -149,7 +140,7 @@ mod tests {
 
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
-        let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS, TAG_EXPANSION];
+        let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS];
         let newer = [TAG_CONFIDENCE, TAG_PROJECTION_TO, TAG_FILL, TAG_LINEAR];
         for tag in others.into_iter().chain(newer) {
             assert_eq!(Format::from_tag(tag), None);

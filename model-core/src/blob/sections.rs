@@ -2,13 +2,11 @@
 
 use super::error::DecodeError;
 use super::format::{
-    ConfidenceHeader, ExpansionHeader, FLOAT_ALIGNMENT, FillHeader, LinearSection,
-    ProjectionHeader, TAG_CONFIDENCE, TAG_EXPANSION, TAG_FILL, TAG_LINEAR, TAG_PROJECTION,
-    TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
+    ConfidenceHeader, FLOAT_ALIGNMENT, FillHeader, LinearSection, ProjectionHeader, TAG_CONFIDENCE,
+    TAG_FILL, TAG_LINEAR, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Floats, ModelShape};
 use crate::confidence::{Confidence, Sizes};
-use crate::expansion::Expansion;
 use crate::fill::{self, Fill};
 use crate::projection::{self, Projection};
 
@@ -101,24 +99,6 @@ pub(super) fn take_projection(
     let projection = Projection::new(readings, features, block)
         .map_err(|cause| DecodeError::Projection { cause })?;
     Ok((Some(projection), rest))
-}
-
-/// Cuts the expansion from the front of `bytes` if there is one, and checks it.
-pub(super) fn take_expansion(
-    bytes: &[u8],
-    shape: ModelShape,
-) -> Result<(Option<Expansion<'_>>, &[u8]), DecodeError> {
-    const SECTION: &str = "expansion section";
-    if bytes.first() != Some(&TAG_EXPANSION) {
-        return Ok((None, bytes));
-    }
-    let (header, rest) = take::<ExpansionHeader>(bytes, SECTION)?;
-    let (components, outputs) = (header.components.into(), shape.rows * shape.outputs);
-    let floats = projection::block_floats(components, outputs);
-    let (block, rest) = take_floats(rest, SECTION, "bytes of expansion", floats)?;
-    let expansion = Expansion::new(components, outputs, block)
-        .map_err(|cause| DecodeError::Expansion { cause })?;
-    Ok((Some(expansion), rest))
 }
 
 /// Cuts the confidence from the front of `bytes` if there is one, and checks it.

@@ -5,13 +5,11 @@
 #![expect(unsafe_code, reason = "calls to assembly, which reads as many words as it is told to")]
 
 use super::Block;
-use crate::estimate::{Estimate, RowStatus};
 
 core::arch::global_asm!(
     include_str!("common.s"),
     include_str!("f32.s"),
     include_str!("fixed16.s"),
-    include_str!("gate.s"),
     include_str!("mixture.s"),
     options(raw)
 );
@@ -70,19 +68,6 @@ unsafe extern "C" {
         features: usize,
     );
     fn taxel_density(component: *const f32, features: *const f32, count: usize, floor: f32) -> f32;
-    fn taxel_give_rest(
-        readings: *const f32,
-        baseline: *const f32,
-        rest: *const f32,
-        outputs: *mut f32,
-        tolerance: f32,
-        rest_status: *const RowStatus,
-        status: *mut RowStatus,
-        rows: usize,
-        inputs: usize,
-        output_count: usize,
-        until_awake: u32,
-    ) -> usize;
 }
 
 /// Whether an input was clamped, NaN or infinite, from the floating-point status after a routine. The conversion of
@@ -146,50 +131,6 @@ pub(crate) unsafe fn density(component: &[f32], features: &[f32], floor: f32) ->
     // SAFETY: the caller has checked the lengths.
     unsafe { taxel_density(component.as_ptr(), features.as_ptr(), count, floor) }
 }
-
-/// Gives rest to the rows of a frame, as [`Gate`](crate::gate::Gate) does: to all, or until one is awake. Returns
-/// the number of rows that are awake.
-///
-/// # Safety
-/// The caller must check that there is at least one row, with as many `inputs` and `outputs` (both at least 1) as
-/// `sizes` says, in readings, baseline, outputs at rest, estimate, and the status of each.
-#[inline(always)]
-pub(crate) unsafe fn give_rest(
-    readings: &[f32],
-    (baseline, rest, status): (&[f32], &[f32], &[RowStatus]),
-    tolerance: f32,
-    [inputs, outputs]: [usize; 2],
-    estimate: &mut Estimate<'_>,
-    until_awake: bool,
-) -> usize {
-    let rows = estimate.status.len();
-    debug_assert!(rows > 0 && inputs > 0 && outputs > 0);
-    debug_assert!(readings.len() == rows * inputs && baseline.len() == readings.len());
-    debug_assert!(rest.len() == rows * outputs && estimate.outputs.len() == rest.len());
-    debug_assert!(status.len() == rows);
-    // SAFETY: the caller has checked the lengths. The routine writes a status that there is.
-    unsafe {
-        taxel_give_rest(
-            readings.as_ptr(),
-            baseline.as_ptr(),
-            rest.as_ptr(),
-            estimate.outputs.as_mut_ptr(),
-            tolerance,
-            status.as_ptr(),
-            estimate.status.as_mut_ptr(),
-            rows,
-            inputs,
-            outputs,
-            until_awake.into(),
-        )
-    }
-}
-
-// What the assembly relies on.
-const _: () = {
-    assert!(RowStatus::Decoded as u8 == 0 && RowStatus::MissingReading as u8 == 1);
-    assert!(RowStatus::AtRest as u8 == 3);
-};
 
 /// Square root of a number that is not negative, rounded correctly.
 #[inline(always)]

@@ -128,19 +128,6 @@ fn a_long_gap_and_a_time_that_goes_back_start_anew() {
 }
 
 #[test]
-fn a_touch_starts_from_rest() {
-    let (mut one, theta) = (One::new(3000, 2000), theta(3000) as f32);
-    one.at(0, 0.8);
-    one.at(1000, 0.9);
-    for frame in 2..5 {
-        assert_eq!(one.row(1000 * frame, RowStatus::AtRest, 0.01), 0.01);
-    }
-    let (alpha, beta) = (1.0 - theta * theta, (1.0 - theta).powi(2));
-    let expected = 0.01 + (alpha + 2.0 * beta) * 0.5; // the lead is two frames
-    assert!((one.at(5000, 0.51) - expected).abs() < 1e-6);
-}
-
-#[test]
 fn a_row_that_is_not_decoded_starts_anew_and_others_go_on() {
     let settings = Settings { time_constant_us: 3000, lead_us: 1000 };
     let mut state = State::new([[0.0; 2]; 4]);

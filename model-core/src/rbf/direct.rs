@@ -4,7 +4,7 @@
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
 
 use super::parameters::{
-    Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans, magnitudes,
+    Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
 };
 use crate::cortex_m4::{INPUTS, OUTPUTS};
 use crate::feature::{F32DirectBuilt, Feature};
@@ -176,14 +176,6 @@ impl<'a> Network<'a> {
         let p = &self.parameters;
         [p.input_minimum, p.input_per_span, p.centres, p.decay, p.output_weights, p.bias, p.affine]
             .map(bytemuck::cast_slice)
-    }
-
-    /// A bound on the magnitude of every output, for any inputs; infinite if it is beyond f32.
-    pub(super) fn largest_output(&self) -> f32 {
-        let p = &self.parameters;
-        // Activations are at most 1, and scaled inputs are clamped below 2.
-        let [weights, tail, bias] = [p.output_weights, p.affine, p.bias].map(magnitudes);
-        2.0 * (weights + 2.0 * tail + bias)
     }
 
     pub(super) fn training_range(&self, input: usize) -> [f32; 2] {

@@ -115,16 +115,14 @@ impl Layout for Expanded {
                 return Err(NetworkError::ExponentOutOfRange { centre });
             }
         }
-        if !network.largest_output().is_finite() {
+        let p = network.parameters();
+        // Activations stay below 2^(1/8).
+        let largest = 2.0
+            * (magnitudes(p.output_weights) + magnitudes(p.affine) * UNITS + magnitudes(p.bias));
+        if !largest.is_finite() {
             return Err(NetworkError::NotFinite { what: "the sum of weights" });
         }
         Ok(())
-    }
-
-    fn largest_output(network: &Network<'_>) -> f32 {
-        let p = network.parameters();
-        // Activations stay below 2^(1/8).
-        2.0 * (magnitudes(p.output_weights) + magnitudes(p.affine) * UNITS + magnitudes(p.bias))
     }
 
     fn parameters<'a>(network: &Network<'a>) -> Parameters<'a> {

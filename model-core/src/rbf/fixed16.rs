@@ -151,11 +151,6 @@ impl Layout for Fixed16 {
         Ok(())
     }
 
-    fn largest_output(network: &Network<'_>) -> f32 {
-        // A sum has 32 bits.
-        network.parameters().output_scale.iter().fold(0.0_f32, |most, s| most.max(s.abs())) * UNITS
-    }
-
     fn parameters<'a>(network: &Network<'a>) -> Parameters<'a> {
         let Shape { inputs, centres, outputs } = network.shape();
         let mut cut = Cut(network.block());

@@ -47,9 +47,6 @@ pub trait Layout: Copy + Debug + PartialEq {
     /// The variant of [`NetworkError`] that names the first bad value.
     fn check_values(network: &Network<'_, Self>) -> Result<(), NetworkError>;
 
-    /// A bound on the magnitude of every output of `network`, for any inputs; infinite if it is beyond f32.
-    fn largest_output(network: &Network<'_, Self>) -> f32;
-
     /// The parameters of `network`.
     fn parameters<'a>(network: &Network<'a, Self>) -> Self::Parameters<'a>;
 
@@ -155,10 +152,6 @@ impl<'a, L: Layout> Network<'a, L> {
 
     pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
         L::check_values(self)
-    }
-
-    pub(super) fn largest_output(&self) -> f32 {
-        L::largest_output(self)
     }
 
     pub(super) fn training_range(&self, input: usize) -> [f32; 2] {

@@ -8,7 +8,7 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use hostile::seal;
 use mock_board::{
-    Bench, Flash, ask, blob, blob_of_components, blob_with_confidence, configure, quiet,
+    Bench, Flash, ask, blob, blob_of_features, blob_with_confidence, configure, quiet,
     request_bytes, upload_steps,
 };
 use taxel_core::blob::Floats;
@@ -128,7 +128,7 @@ fn blobs() -> Outcome<Vec<Vec<u8>>> {
         blob(1, 2).to_vec(),
         blob_with_confidence(false).to_vec(),
         blob_with_confidence(true).to_vec(),
-        blob_of_components(2).to_vec(),
+        blob_of_features(2).to_vec(),
     ];
     let outputs = ElectrodeOutputs { quantity: Quantity::Deformation, axes: vec![Axis::Z] };
     let mut world = World { outputs: outputs.into(), read_rows: vec![3, 4], ..World::press() };
@@ -148,13 +148,12 @@ fn blobs() -> Outcome<Vec<Vec<u8>>> {
             (&dataset, Options { affine_tail: false, ..of_rows }),
             (&ratios, of_rows),
             (&dataset, whole),
-            (&dataset, Options { output_rank: Some(2), ..whole }),
         ] {
             let trained = train(data, &options, &Silent)?;
             let origin = Origin::of_data("m", 0, 1, data);
             let blob = pack(&trained, data, &origin)?;
             blobs.push(blob.bytes().to_vec());
-            if options.whole_array && options.output_rank.is_none() {
+            if options.whole_array {
                 blobs.push(fill::add(&blob, &data.inputs)?.bytes().to_vec());
             }
         }

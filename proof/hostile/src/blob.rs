@@ -61,7 +61,7 @@ pub fn check(body: &[u8]) -> bool {
         (0..FRAMES).flat_map(|number| readings_of(number, readings, &mut draws)).collect();
     let mut on_device = Vec::new();
     for readings_ohm in frames.chunks_exact(readings) {
-        let frame = Frame { readings_ohm, reciprocals: &reciprocals, gate: None };
+        let frame = Frame { readings_ohm, reciprocals: &reciprocals };
         let mut estimate = decoder.decode(frame).expect("a frame of the model's shape");
         check_estimate(&model, readings_ohm, &estimate.borrowed());
         on_device.extend(estimate.outputs.iter().map(|output| f64::from(*output)));
@@ -120,7 +120,6 @@ fn check_estimate(model: &Model<'_>, readings: &[f32], estimate: &Estimate<'_>) 
                 assert!(outputs.iter().all(|y| y.is_finite()), "decoded to {outputs:?}");
                 assert!(is_complete, "decoded without a reading");
             }
-            RowStatus::AtRest => panic!("at rest without a gate"),
             RowStatus::Overflow | RowStatus::MissingReading => {
                 assert!(outputs.iter().all(|y| y.is_nan()), "{status:?}, and {outputs:?}");
                 let relative = model.metadata().relative_inputs;
@@ -178,8 +177,7 @@ mod tests {
         let decoder = Decoder::<2>::load(&blob).unwrap();
         for reading in [60.0, 1e6] {
             let (readings_ohm, reciprocals) = ([reading; 6], [reciprocal(60.0); 6]);
-            let frame =
-                Frame { readings_ohm: &readings_ohm, reciprocals: &reciprocals, gate: None };
+            let frame = Frame { readings_ohm: &readings_ohm, reciprocals: &reciprocals };
             let estimate = decoder.decode(frame).unwrap();
             assert_eq!(estimate.status, [RowStatus::Decoded; 2], "{reading} Ω");
         }

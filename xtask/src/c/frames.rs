@@ -5,15 +5,11 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use taxel_core::blob::ModelShape;
-use taxel_core::gate::Rest;
 use taxel_core::relative::reciprocal;
-use taxel_core::{Decoder, Frame, Gate, OwnedEstimate, RowStatus};
+use taxel_core::{Decoder, Frame, OwnedEstimate, RowStatus};
 
 use super::models::Model;
 use crate::process::Outcome;
-
-/// Tolerance of the gate, as in the harness.
-const TOLERANCE: f32 = 0.02;
 
 /// Most rows of a model.
 const MOST_ROWS: usize = 255;
@@ -83,36 +79,26 @@ fn group_bytes(
     let reciprocals: Vec<f32> = baseline.iter().map(|it| reciprocal(*it)).collect();
     let mut scratch = vec![0.0; decoder.scratch_floats()];
     let ModelShape { rows, outputs, .. } = decoder.shape();
-    let empty = OwnedEstimate {
+    let mut estimate = OwnedEstimate {
         outputs: vec![0.0; rows * outputs],
         status: vec![RowStatus::Decoded; rows],
     };
-    let decode = |frame: Frame<'_>, scratch: &mut [f32]| -> Outcome<(bool, OwnedEstimate)> {
-        let mut estimate = empty.clone();
-        let clamped = decoder.decode_into(frame, scratch, &mut estimate.borrowed());
-        Ok((clamped.map_err(|cause| cause.to_string())?, estimate))
-    };
-    let (_, at_rest) = decode(of(baseline, &reciprocals, None), &mut scratch)?;
-    let rest = Rest { baseline_ohm: baseline, outputs: &at_rest.outputs, status: &at_rest.status };
-    let gate = Gate::new(rest, TOLERANCE);
 
     let mut bytes = (frames.len() as u32).to_le_bytes().to_vec();
     put(&mut bytes, baseline);
     for frame in frames {
         let mut readings: Vec<f32> = frame.iter().map(|reading| *reading as f32).collect();
         if let Some(draw) = draw.as_deref_mut() {
-            disturb(&mut readings, baseline, rows, draw);
+            disturb(&mut readings, draw);
         }
         put(&mut bytes, &readings);
-        for gate in [None, gate] {
-            let (clamped, estimate) = decode(of(&readings, &reciprocals, gate), &mut scratch)?;
-            bytes.extend(u32::from(clamped).to_le_bytes());
-            put(&mut bytes, &estimate.outputs);
-            bytes.extend(estimate.status.iter().map(|status| *status as u8));
-        }
+        let given = Frame { readings_ohm: &readings, reciprocals: &reciprocals };
+        let clamped = decoder.decode_into(given, &mut scratch, &mut estimate.borrowed());
+        bytes.extend(u32::from(clamped.map_err(|cause| cause.to_string())?).to_le_bytes());
+        put(&mut bytes, &estimate.outputs);
+        bytes.extend(estimate.status.iter().map(|status| *status as u8));
         let mut deviations = vec![0.0; rows * outputs];
-        let novelty =
-            decoder.assess_into(of(&readings, &reciprocals, None), &mut scratch, &mut deviations);
+        let novelty = decoder.assess_into(given, &mut scratch, &mut deviations);
         if let Some(novelty) = novelty.map_err(|cause| cause.to_string())? {
             put(&mut bytes, &[novelty]);
             put(&mut bytes, &deviations);
@@ -128,19 +114,14 @@ fn group_bytes(
     Ok(bytes)
 }
 
-/// A frame behind a gate, or without one.
-fn of<'f>(readings_ohm: &'f [f32], reciprocals: &'f [f32], gate: Option<Gate<'f>>) -> Frame<'f> {
-    Frame { readings_ohm, reciprocals, gate }
-}
-
 fn put(bytes: &mut Vec<u8>, values: &[f32]) {
     bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
 }
 
-/// Changes about half of all frames: readings missing, hostile or far beyond training; rows at rest.
-fn disturb(readings: &mut [f32], baseline: &[f32], rows: usize, draw: &mut Draw) {
+/// Changes about half of all frames: readings missing, hostile or far beyond training.
+fn disturb(readings: &mut [f32], draw: &mut Draw) {
     let count = readings.len();
-    match draw.below(10) {
+    match draw.below(8) {
         0 => readings[draw.below(count)] = HOSTILE[draw.below(HOSTILE.len())],
         1 => {
             for _ in 0..=draw.below(count) / 3 {
@@ -154,19 +135,6 @@ fn disturb(readings: &mut [f32], baseline: &[f32], rows: usize, draw: &mut Draw)
         3 => {
             let factor = [0.8, 0.95, 1.05, 1.3][draw.below(4)];
             readings.iter_mut().for_each(|reading| *reading *= factor);
-        }
-        4 | 5 => {
-            // Rows at rest, or nearly.
-            let inputs = count / rows;
-            let factor = [1.0, 1.001, 1.004, 1.006, 0.985][draw.below(5)];
-            let every = draw.below(2) == 0;
-            for row in 0..rows {
-                if every || draw.below(2) == 0 {
-                    let places = row * inputs..(row + 1) * inputs;
-                    let rest = readings[places.clone()].iter_mut().zip(&baseline[places]);
-                    rest.for_each(|(reading, baseline)| *reading = baseline * factor);
-                }
-            }
         }
         _ => {}
     }

@@ -23,7 +23,7 @@ const SPREAD_OF_ARRAY: f64 = 0.4;
 pub enum Shape {
     /// The paper's sensor: a network a row, 18 readings to 18 outputs, with a fill.
     Rows,
-    /// All of it by one network behind a projection, with few components, a confidence and a fill.
+    /// All of it by one network behind a projection, with a confidence and a fill.
     Array,
     /// A mat of 4 × 7 cells: a network a row without affine tail, inputs relative to the baseline, a confidence.
     Mat,
@@ -97,7 +97,6 @@ fn made(shape: Shape, format: Format, frames: usize) -> Outcome<Model> {
         format,
         affine_tail: shape != Shape::Mat,
         whole_array: array,
-        output_rank: array.then_some(16),
         spread: if array { SPREAD_OF_ARRAY } else { usual.spread },
         ..usual
     };

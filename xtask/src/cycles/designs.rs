@@ -3,7 +3,6 @@
 use std::ops::RangeInclusive;
 
 use taxel_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
-use taxel_core::expansion::Expansion;
 use taxel_core::projection::Projection;
 use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
 use taxel_core::scale::UNITS;
@@ -63,9 +62,6 @@ fn draw(sizes: Sizes, random: &mut Random) -> Option<Design> {
     design.networks.truncate(1);
     design.row_network.fill(0);
     design.relative_inputs = relative;
-    if array && other {
-        design = design.with_components(1 + centres % (rows * outputs));
-    }
     design.networks[0].common_width = format != Format::F32Direct || !other || centres == 1;
     let fits = design.parameter_bytes() <= MOST_BYTES;
     let fits = fits && rows * inputs <= MOST_OF_FRAME && rows * outputs <= MOST_OF_FRAME;
@@ -81,19 +77,15 @@ pub fn blob(design: &Design) -> Outcome<Vec<u8>> {
     let first = design.networks.first().ok_or("no network")?;
     let words = words(first);
     let network = network(first, &words).map_err(|cause| failed(&cause))?;
-    let ModelShape { rows, inputs, outputs } = design.shape;
-    let (readings, outputs) = (rows * inputs, rows * outputs);
+    let ModelShape { rows, inputs, .. } = design.shape;
+    let readings = rows * inputs;
     let features = if design.projection { design.features() } else { inputs };
     // Feature i is reading i of the first row.
     let mut block = vec![0.0; features * (1 + readings)];
     (0..features).for_each(|i| block[features * (1 + i) + i] = 1.0);
     let projection = Projection::new(readings, features, &block).map_err(|it| failed(&it))?;
-    let components = design.components.unwrap_or(1);
-    let parts_of_components = vec![0.25; outputs * (1 + components)];
-    let expansion = Expansion::new(components, outputs, &parts_of_components);
     let parts = ModelParts {
         projection: design.projection.then_some(projection),
-        expansion: design.components.map(|_| expansion.map_err(|it| failed(&it))).transpose()?,
         confidence: None,
         linear_rmse: Floats(&[]),
         fill: None,

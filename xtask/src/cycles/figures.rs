@@ -38,9 +38,8 @@ const BUDGETS: [(&str, u64, &str, u64); 7] = [
     ("fixed16", 64, "frame", 33_600),
 ];
 
-/// Budget in cycles of one power of two, and of a frame whose rows are all at rest: a tenth of that of a frame.
+/// Budget in cycles of one power of two.
 const EXPONENTIAL: u64 = 32;
-const RESTING_FRAME: u64 = 3360;
 
 /// Budgets of an inference with K = 64 from flash, with weights in RAM: kernel, and per cent of its cycles at zero
 /// wait. The loops of `fixed16` fit the flash's instruction cache. In `f32`, most of the allowance is for the reading
@@ -224,7 +223,6 @@ pub fn over_budget(figures: &[Figure]) -> Vec<String> {
             .find(|(of, k, of_scope, _)| (*of, *k, *of_scope) == (kernel, centres, scope));
         let most = match scope {
             "exponential" => EXPONENTIAL * centres,
-            "resting-frame" | "array-resting-frame" => RESTING_FRAME,
             _ => own.map_or(u64::MAX, |(.., most)| *most),
         };
         let percent = FROM_FLASH_PERCENT
@@ -306,13 +304,12 @@ pub mod tests {
             figure("fixed16", "frame", false, 33_600),
             figure("fixed16", "inference", true, 4001),
             figure("f32", "exponential", false, 64 * 32),
-            figure("f32-direct", "array-resting-frame", false, 3360),
         ];
         assert_eq!(over_budget(&within), [""; 0]);
         let more = |it: &Figure| {
             over_budget(&[figure(&it.kernel, &it.scope, it.affine, it.count.cycles + 1)])
         };
-        assert_eq!(within.iter().flat_map(more).count(), 4);
+        assert_eq!(within.iter().flat_map(more).count(), 3);
         let mut figure = figure("f32", "inference", false, 1000);
         figure.count.flash_cycles = 1450;
         assert_eq!(over_budget(std::slice::from_ref(&figure)), [""; 0]);

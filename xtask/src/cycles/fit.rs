@@ -7,7 +7,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
-use taxel_learn::cost::{Cost, Design, Gating, Price, Prices, Terms, filter_terms, terms};
+use taxel_learn::cost::{Cost, Design, Price, Prices, Terms, filter_terms, terms};
 use taxel_learn::{Exponential, ModelBlob};
 
 use super::designs;
@@ -46,16 +46,14 @@ pub struct Frame {
 /// The frames of a run with a model of this `design`.
 pub fn frames(design: &Design, measured: &[Measured]) -> Vec<Frame> {
     let frame = |Measured { kernel, scope, region }: &Measured| {
-        let gating = match scope.strip_prefix("array-").unwrap_or(scope) {
-            "frame" => Gating::Ungated,
-            "resting-frame" => Gating::AtRest,
-            "awake-frame" => Gating::Awake,
+        match scope.strip_prefix("array-").unwrap_or(scope) {
+            "frame" => {}
             FILTER => {
                 let (kernel, scope, count) = (kernel.clone(), scope.clone(), region.whole);
                 return Some(Frame { kernel, scope, terms: filter_terms(design.shape), count });
             }
             _ => return None,
-        };
+        }
         let exponential = match kernel.strip_prefix(Format::F32Direct.name()) {
             Some(name) if !name.is_empty() => Exponential::by_name(name.strip_prefix('-')?)?,
             // Compiled twins are no code of the firmware.
@@ -63,7 +61,7 @@ pub fn frames(design: &Design, measured: &[Measured]) -> Vec<Frame> {
             _ => Exponential::default(),
         };
         let (kernel, scope, count) = (kernel.clone(), scope.clone(), region.whole);
-        Some(Frame { kernel, scope, terms: terms(design, exponential, gating), count })
+        Some(Frame { kernel, scope, terms: terms(design, exponential), count })
     };
     measured.iter().filter_map(frame).collect()
 }
@@ -183,12 +181,6 @@ pub fn compare(path: &Path, image: &Image, json: bool) -> Outcome {
     let measured = image.run(path)?;
     let frames = frames(&Design::new(&blob), &measured);
     let predicted = predicted(&frames)?;
-    if !frames.iter().any(|frame| frame.scope.ends_with("resting-frame")) {
-        eprintln!(
-            "note: no frame behind a gate was measured: a gate compares relative to readings at rest, and needs a \
-             training range that reaches above 0 in every input"
-        );
-    }
     let lines = frames.iter().zip(&predicted).map(|(frame, predicted)| {
         let (Frame { kernel, scope, count, .. }, [a, b, c]) = (frame, all(predicted));
         let Count { instructions, cycles, flash_cycles } = count;

@@ -90,7 +90,6 @@ fn blob(dataset: &Dataset, options: &Options, origin: &Origin) -> Outcome<Vec<u8
     let first = model.networks().next().ok_or("a model without networks")?;
     let parts = ModelParts {
         projection: model.projection(),
-        expansion: model.expansion(),
         confidence: None,
         linear_rmse: Floats(&[]),
         fill: None,

@@ -15,8 +15,8 @@ const HEAD: &str = "\
 ";
 
 const ARRAY_HEAD: &str = "\
-| kernel | K | frame: instructions | cycles | µs at 168 MHz | from flash: µs at 180 MHz | at rest | with tail | µs | from flash: µs |
-|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
+| kernel | K | frame: instructions | cycles | µs at 168 MHz | from flash: µs at 180 MHz | with tail | µs | from flash: µs |
+|---|--:|--:|--:|--:|--:|--:|--:|--:|
 ";
 
 /// Kernels and numbers of centres that the tables show; the file of figures has all.
@@ -104,7 +104,6 @@ pub fn markdown(figures: &[Figure]) -> String {
                 (false, "array-frame", cycles),
                 (false, "array-frame", microseconds),
                 (false, "array-frame", flash_microseconds),
-                (false, "array-resting-frame", cycles),
                 (true, "array-frame", cycles),
                 (true, "array-frame", microseconds),
                 (true, "array-frame", flash_microseconds),
@@ -125,8 +124,8 @@ pub fn json(figures: &[Figure]) -> String {
             format!("\"kernel\": \"{}\"", group[0].kernel),
             format!("\"centres\": {}", group[0].centres),
         ];
-        let of_rows = ["row", "frame", "resting-frame", "awake-frame"];
-        let of_array = ["array-frame", "array-resting-frame", "array-awake-frame"];
+        let of_rows = ["row", "frame"];
+        let of_array = ["array-frame"];
         let parts = [(false, &["inference"][..]), (false, &of_rows), (true, &of_rows)];
         let parts = parts.into_iter().chain([(false, &of_array[..]), (true, &of_array)]);
         for (affine, scope) in parts.flat_map(|(affine, of)| of.iter().map(move |it| (affine, it)))
@@ -155,15 +154,15 @@ mod tests {
     fn json_names_every_figure_that_was_measured() {
         let figures = [
             figure("f32", "inference", false, 336),
-            figure("f32", "resting-frame", true, 7),
+            figure("f32", "frame", true, 7),
             figure("f32", "array-frame", false, 9),
             figure("f32-portable", "inference", false, 8),
         ];
         assert_eq!(
             json(&figures),
             "[\n  {\"kernel\": \"f32\", \"centres\": 64, \"instructions\": 100, \"cycles\": 336, \
-             \"flash_cycles\": 436, \"affine_resting_frame_instructions\": 100, \
-             \"affine_resting_frame_cycles\": 7, \"affine_resting_frame_flash_cycles\": 107, \
+             \"flash_cycles\": 436, \"affine_frame_instructions\": 100, \
+             \"affine_frame_cycles\": 7, \"affine_frame_flash_cycles\": 107, \
              \"array_frame_instructions\": 100, \"array_frame_cycles\": 9, \"array_frame_flash_cycles\": 109},\n  \
              {\"kernel\": \"f32-portable\", \"centres\": 64, \"instructions\": 100, \"cycles\": 8, \
              \"flash_cycles\": 108}\n]\n"

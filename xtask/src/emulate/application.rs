@@ -32,10 +32,6 @@ const FILTERED: &[&str] = &["-n500", "--filter-ms=5", "--lead-ms=2", "--period-m
 /// Training options of the network for the whole array: the number format and K that are the fastest on a device.
 const ARRAY: &[&str] = &["--whole-array", "--format=fixed16", "--centres=64"];
 
-/// Training options of such a network that computes few components, which are expanded to all outputs.
-const COMPONENTS: &[&str] =
-    &["--whole-array", "--format=fixed16", "--centres=64", "--output-rank=24"];
-
 /// Arguments for tests of host-sim: the image answers the same requests alike on both lines, and keeps settings over
 /// restarts.
 const BY_TESTS: &[&str] = &[
@@ -70,22 +66,20 @@ pub fn log() -> PathBuf {
 }
 
 /// Trains the models for the checks, and returns the checks.
-pub fn checks() -> Outcome<[Check; 6]> {
-    let [rows, array, components] = ["qemu-rows.bin", "qemu-array.bin", "qemu-components.bin"]
-        .map(|name| target_dir().join(name).into_os_string());
+pub fn checks() -> Outcome<[Check; 5]> {
+    let [rows, array] =
+        ["qemu-rows.bin", "qemu-array.bin"].map(|name| target_dir().join(name).into_os_string());
     let log = log().into_os_string();
     // Removes the log of the previous run, if there was one.
     let _ = fs::remove_file(&log);
     train(&[], &rows)?;
     train(ARRAY, &array)?;
-    train(COMPONENTS, &components)?;
     Ok([
         Check::new("application", OF_ROWS, &["--model".as_ref(), &rows, "--log".as_ref(), &log]),
         // This is the smaller model, because it is uploaded on that line as well.
         Check::new("application on the UART", ON_UART, &["--model".as_ref(), &array]),
         Check::new("application with one network", OF_ARRAY, &["--model".as_ref(), &array]),
         Check::new("application with a filter", FILTERED, &["--model".as_ref(), &array]),
-        Check::new("application with components", OF_ARRAY, &["--model".as_ref(), &components]),
         Check {
             name: "application by tests",
             arguments: BY_TESTS.iter().map(OsString::from).collect(),

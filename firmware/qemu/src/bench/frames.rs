@@ -1,4 +1,4 @@
-//! Frames of any shape, without a gate and behind it.
+//! Frames of any shape.
 
 use core::hint::black_box;
 
@@ -7,7 +7,6 @@ use qemu_image::checks::Numbers;
 use taxel_core::blob::{Model, ModelShape};
 use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use taxel_core::filter::{Settings, State};
-use taxel_core::gate::{Gate, Rest};
 use taxel_core::rbf::Format;
 use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Estimate, RowStatus};
@@ -17,9 +16,6 @@ use super::{BASELINE_OHM, inputs};
 
 /// Most rows of a model.
 const MOST_ROWS: usize = 32;
-
-/// Tolerance of the gate: 3.5 times a noise of 0.5 %.
-const REST_TOLERANCE: f32 = 0.0175;
 
 /// RAM of which slices are taken one after the other.
 pub struct Arena(pub &'static mut [f32]);
@@ -87,30 +83,20 @@ impl Outcome {
 struct Bench<'a> {
     decoder: Decoder<'a, MOST_ROWS>,
     frame: &'a [f32],
-    /// The baseline of a gate that finds all rows of the frame touched at their last readings, so that it looks at all
-    /// readings; of one network for all rows, with the last row touched. The frame itself stays within the training
-    /// range.
-    far_baseline: &'a [f32],
     reciprocals: &'a [f32],
-    rest: Outcome,
     outcome: Outcome,
     scratch: &'a mut [f32],
 }
 
-/// Measures frames of `model` with every exponential that its format can have; behind the gate with the firmware's.
+/// Measures frames of `model` with every exponential that its format can have.
 #[inline(never)]
 pub fn measure(model: &Model<'_>, frame: &[f32], arena: &mut Arena) {
     let mut bench = bench(model, frame, arena);
     let format = unwrap!(model.networks().next()).format();
-    // A gate compares relative to the baseline, which is the frame: a row is at rest with positive readings alone.
-    if frame.iter().all(|reading| *reading > 0.0) {
-        bench.measure::<Polynomial, true>(format.name());
-    } else {
-        bench.measure::<Polynomial, false>(format.name());
-    }
+    bench.measure::<Polynomial>(format.name());
     if format == Format::F32Direct {
-        bench.measure::<Libm, false>("f32-direct-libm");
-        bench.measure::<Micromath, false>("f32-direct-micromath");
+        bench.measure::<Libm>("f32-direct-libm");
+        bench.measure::<Micromath>("f32-direct-micromath");
     }
     bench.filter(format.name(), arena);
     if model.confidence().is_some() {
@@ -122,60 +108,34 @@ pub fn measure(model: &Model<'_>, frame: &[f32], arena: &mut Arena) {
 fn bench<'a>(model: &Model<'a>, frame: &'a [f32], arena: &mut Arena) -> Bench<'a> {
     let shape = model.shape();
     let decoder = unwrap!(Decoder::new(*model).ok(), "the model has too many rows");
-    let far_baseline = arena.take(frame.len());
-    far_baseline.copy_from_slice(frame);
-    let rows = far_baseline.chunks_exact_mut(shape.inputs).rev();
-    let touched = if model.projection().is_some() { 1 } else { shape.rows };
-    let last = rows.take(touched).filter_map(|row| row.last_mut());
-    last.for_each(|reading| *reading *= 1.0 + 2.0 * REST_TOLERANCE);
     let relative = model.metadata().relative_inputs;
     let reciprocals = arena.take(if relative { frame.len() } else { 0 });
     reciprocals.fill(reciprocal(BASELINE_OHM));
     let scratch = arena.take(decoder.scratch_floats());
-    let (rest, outcome) = (Outcome::new(shape, arena), Outcome::new(shape, arena));
-    Bench { decoder, frame, far_baseline, reciprocals, rest, outcome, scratch }
+    let outcome = Outcome::new(shape, arena);
+    Bench { decoder, frame, reciprocals, outcome, scratch }
 }
 
 impl Bench<'_> {
     #[inline(never)] // so that the stack holds the values of one exponential at a time
-    fn measure<E: ExpKernel, const GATED: bool>(&mut self, name: &str) {
-        let Self { decoder, frame, far_baseline, reciprocals, rest, outcome, scratch } = self;
-        let given = |readings_ohm, gate| taxel_core::Frame { readings_ohm, reciprocals, gate };
-        rest.decode::<E>(decoder, given(frame, None), scratch);
-        // What the sensor shows at rest, if this is its baseline.
-        let gate = |baseline_ohm| {
-            let rest = Rest { baseline_ohm, outputs: rest.outputs, status: rest.status() };
-            Gate::new(rest, REST_TOLERANCE)
-        };
-        let scopes = if decoder.model().projection().is_some() {
-            ["array-frame", "array-resting-frame", "array-awake-frame"]
-        } else {
-            ["frame", "resting-frame", "awake-frame"]
-        };
-        for (scope, gate, status) in [
-            (scopes[0], None, RowStatus::Decoded),
-            (scopes[1], gate(frame), RowStatus::AtRest),
-            (scopes[2], gate(far_baseline), RowStatus::Decoded),
-        ] {
-            if gate.is_some() && !GATED {
-                continue;
-            }
-            region(name, scope, || {
-                let frame = given(black_box(*frame), black_box(gate));
-                outcome.decode::<E>(black_box(decoder), frame, black_box(scratch));
-            });
-            let all = outcome.status().iter().all(|row| *row == status);
-            assert!(all, "a row is not as in {=str}", scope);
-        }
+    fn measure<E: ExpKernel>(&mut self, name: &str) {
+        let Self { decoder, frame, reciprocals, outcome, scratch } = self;
+        let scope = if decoder.model().projection().is_some() { "array-frame" } else { "frame" };
+        let frame = taxel_core::Frame { readings_ohm: frame, reciprocals };
+        region(name, scope, || {
+            outcome.decode::<E>(black_box(decoder), black_box(frame), black_box(scratch));
+        });
+        let all = outcome.status().iter().all(|row| *row == RowStatus::Decoded);
+        assert!(all, "a row is not decoded in {=str}", scope);
     }
 
     /// Measures the filter in time of a frame a millisecond after another.
     #[inline(never)]
     fn filter(&mut self, name: &str, arena: &mut Arena) {
         let settings = Settings { time_constant_us: 5000, lead_us: 1000 };
-        let tracks = arena.take(2 * self.rest.outputs.len()).as_chunks_mut().0;
+        let tracks = arena.take(2 * self.outcome.outputs.len()).as_chunks_mut().0;
         let mut state = State::new(tracks);
-        let mut estimate = self.rest.estimate();
+        let mut estimate = self.outcome.estimate();
         state.filter(settings, 0, &mut estimate);
         region(name, "filter", || {
             black_box(&mut state).filter(black_box(settings), 1000, black_box(&mut estimate));
@@ -185,12 +145,8 @@ impl Bench<'_> {
     /// Measures how far off the frame's outputs may be, and how novel it is.
     #[inline(never)]
     fn assess(&mut self, name: &str, arena: &mut Arena) {
-        let deviation = arena.take(self.rest.outputs.len());
-        let frame = taxel_core::Frame {
-            readings_ohm: self.frame,
-            reciprocals: self.reciprocals,
-            gate: None,
-        };
+        let deviation = arena.take(self.outcome.outputs.len());
+        let frame = taxel_core::Frame { readings_ohm: self.frame, reciprocals: self.reciprocals };
         let mut novelty = None;
         region(name, "confidence", || {
             let frame = black_box(frame);

@@ -10,9 +10,6 @@ use super::BASELINE_OHM;
 /// Number of sweeps: enough for the important features to come near the wanted values.
 const SWEEPS: usize = 50;
 
-/// Least part of an input's largest reading, where the training range starts below.
-const LEAST_SHARE: f32 = 0.1;
-
 /// Fills `frame` with readings in Ω within the training range of `model`: every row from random inputs. `features` is
 /// working space of as many numbers as a network has inputs.
 pub fn fill(model: &Model<'_>, frame: &mut [f32], features: &mut [f32], numbers: &mut Numbers) {
@@ -27,9 +24,6 @@ pub fn fill(model: &Model<'_>, frame: &mut [f32], features: &mut [f32], numbers:
             let Some(network) = network else { continue };
             for (input, x) in inputs.iter_mut().enumerate() {
                 let [lowest, highest] = network.training_range(input);
-                // Positive if the range allows it, since a gate knows no other baseline.
-                let crosses_zero = lowest <= 0.0 && highest > 0.0;
-                let lowest = if crosses_zero { LEAST_SHARE * highest } else { lowest };
                 *x = lowest + (0.5 + 0.5 * numbers.draw()) * (highest - lowest);
             }
         }

@@ -1,4 +1,4 @@
-//! Infers by networks of many shapes, projects and gates, by assembly and by its compiled twins, which must give the
+//! Infers by networks of many shapes and projects, by assembly and by its compiled twins, which must give the
 //! same bits. Nothing may be read or written beyond what a shape has.
 #![no_std]
 #![no_main]
@@ -22,6 +22,5 @@ fn main() -> ! {
     log("f32", unwrap!(shapes::networks(&mut memory, Format::F32)));
     log("fixed16", unwrap!(shapes::networks(&mut memory, Format::Fixed16)));
     log("projection", unwrap!(shapes::projections(&mut memory)));
-    log("gate", shapes::gates());
     exit::success()
 }

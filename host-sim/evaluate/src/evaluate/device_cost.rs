@@ -10,7 +10,7 @@ use crate::verdict::SLOT_BYTES;
 /// Clock of the STM32F446 at which its flash makes it wait as `flash_cycles` count.
 const CLOCK_MHZ: f64 = 180.0;
 
-/// Cost of decoding a frame on a Cortex-M4F without a gate, and the memory that a model takes.
+/// Cost of decoding a frame on a Cortex-M4F, and the memory that a model takes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceCost {
     /// Cycles with memory that never waits.
@@ -34,7 +34,7 @@ impl DeviceCost {
     /// Cost of the model in `blob`, by the price list in the repository.
     pub fn new(blob: &ModelBlob) -> Result<Self> {
         let design = Design::new(blob);
-        let frame = Prices::accepted()?.frames(&design, Exponential::default())?.ungated;
+        let frame = Prices::accepted()?.frame(&design, Exponential::default())?;
         let blob_bytes = blob.bytes().len();
         Ok(Self {
             cycles: frame.cycles,

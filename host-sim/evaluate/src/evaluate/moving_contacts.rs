@@ -115,7 +115,7 @@ impl<'s> Judged<'s> {
     ) -> Result<Self> {
         let model = blob.prepare(Exponential::default()).of_inputs();
         let prices = Prices::accepted()?;
-        let cost = prices.frames(&Design::new(blob), Exponential::default())?.ungated;
+        let cost = prices.frame(&Design::new(blob), Exponential::default())?;
         let scan_ms = device.scan_ms(Some(Wires::of(&scene.world)), samples);
         let names = scene.output_names();
         let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();

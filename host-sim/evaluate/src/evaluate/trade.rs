@@ -15,7 +15,6 @@ use taxel_learn::{ModelBlob, Options};
 use taxel_limit::Refusal;
 use taxel_simulate::path::Path;
 
-use super::gate;
 use crate::error::{Error, NoPoint, Result};
 use crate::metrics::{self, DecoderErrors, LimitSummary, Measure};
 use crate::subject::Subject;
@@ -26,7 +25,6 @@ mod device;
 mod line;
 mod choice;
 mod point;
-mod gating;
 mod touches;
 mod worst;
 mod frames;
@@ -56,16 +54,10 @@ const CERTAIN: f64 = 3.0;
 pub struct Plan {
     /// Numbers of centres K of each network.
     pub centres: Vec<usize>,
-    /// Numbers of components that a network for the whole array may compute, which are expanded to its outputs. There
-    /// are always points that compute all outputs as well.
-    pub output_ranks: Vec<usize>,
     /// Numbers of samples averaged for each reading: white noise falls with the square root, noise with a memory hardly.
     pub samples_averaged: Vec<usize>,
     /// Steps from one column-wire that is read to the next: 1 reads all. Only scenes have others than 1.
     pub column_steps: Vec<usize>,
-    /// Tolerances of gates, in standard deviations of the averaged readings' noise. There are always
-    /// points without a gate as well.
-    pub gate_k: Vec<f64>,
     pub device: Device,
     /// Whether front and choice count the largest error of the subject's own and [other](OtherError) contacts.
     pub worst_case: bool,
@@ -213,14 +205,6 @@ impl Trade {
     pub fn blob(&self, point: usize) -> &[u8] {
         &self.distinct_blobs[self.blobs[point]]
     }
-
-    /// Tolerance for the configuration of a device, relative to each reading, for a point behind a gate.
-    pub fn rest_tolerance(&self, point: usize) -> Option<f64> {
-        let point = &self.points[point];
-        let same = |readings: &&Readings| readings.samples_averaged == point.samples_averaged;
-        let readings = self.readings.iter().find(same)?;
-        point.gate_k.map(|k| k * readings.noise_level)
-    }
 }
 
 /// Trains and judges every point of `plan` for the subject. The front is determined by the RMSE of `group` and the time of
@@ -362,9 +346,6 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
     if let Some(step) = plan.column_steps.iter().find(|step| !(1..=columns).contains(*step)) {
         return Err(BadValue::new("column-step", step, rule));
     }
-    if plan.output_ranks.contains(&0) {
-        return Err(BadValue::new("output-rank", 0, "a network computes one component at least"));
-    }
     plan.device.check()?;
     let has_others = subject.scene().is_some_and(|scene| !scene.others.is_empty());
     if plan.worst_case && !has_others {
@@ -372,25 +353,13 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
             "there are no other contacts to judge by; leave it out, or give a scene of contacts";
         return Err(BadValue::new("worst-case", true, rule));
     }
-    if subject.moving_scene().is_some() && !plan.gate_k.is_empty() {
-        let rule = "a gate is judged by still contacts; leave it out, or give --motion none";
-        return Err(BadValue::new("gate", plan.gate_k[0], rule));
-    }
     if let Subject::Measured(_) = subject
         && let Some(samples) = plan.samples_averaged.iter().find(|samples| **samples != 1)
     {
         let rule = "measured readings are averaged already: give 1, or a scene";
         return Err(BadValue::new("average", samples, rule));
     }
-    if plan.gate_k.is_empty() {
-        return Ok(());
-    }
-    let gates = match subject {
-        // Averaging only lowers the noise.
-        Subject::Scene(scene) => gate::check(&scene.world, &plan.gate_k),
-        Subject::Measured(data) => gate::GateRest::new(data, &plan.gate_k).map(|_| ()),
-    };
-    gates.map_err(|bad| if bad.field == "k" { bad.named("gate") } else { bad })
+    Ok(())
 }
 
 /// Fills in the fields that compare points with each other.

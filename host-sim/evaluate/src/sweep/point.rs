@@ -7,7 +7,6 @@ use taxel_core::rbf::Format;
 use taxel_data::Silent;
 use taxel_learn::Exponential;
 use taxel_learn::cost::{DecoderRam, Design, Prices};
-use taxel_learn::train::Widths;
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::World;
 
@@ -179,7 +178,7 @@ pub fn compute(plan: &Plan, point: &Point, shared: &mut Shared) -> Result<Result
         results.add(&format!("ratio_to_limit_{}", errors.group), errors.ratio_to_limit);
     }
     let design = Design::new(&blob);
-    let cost = Prices::accepted()?.frames(&design, Exponential::default())?.ungated;
+    let cost = Prices::accepted()?.frame(&design, Exponential::default())?;
     let times = point.device.times(scan_ms, &cost);
     results.add("decode_ms", Some(times.decode_ms));
     results.add("frame_ms", Some(times.frame_ms));
@@ -204,12 +203,10 @@ struct MeasuredFile {
 struct TrainingFile {
     centres: Option<usize>,
     spread: Option<f64>,
-    widths: Option<Widths>,
     affine_tail: Option<bool>,
     format: Option<String>,
     whole_array: Option<bool>,
     features: Option<usize>,
-    output_rank: Option<usize>,
     refine: Option<bool>,
     confidence: Option<bool>,
 }
@@ -225,7 +222,6 @@ pub fn measured(data: &Measurements, text: &str) -> std::result::Result<Measurem
     options.seed = file.seed.unwrap_or(options.seed);
     options.centres = t.centres.unwrap_or(options.centres);
     options.spread = t.spread.unwrap_or(options.spread);
-    options.widths = t.widths.unwrap_or(options.widths);
     options.affine_tail = t.affine_tail.unwrap_or(options.affine_tail);
     if let Some(name) = &t.format {
         let known = Format::ALL.map(Format::name);
@@ -234,7 +230,6 @@ pub fn measured(data: &Measurements, text: &str) -> std::result::Result<Measurem
     }
     options.whole_array = t.whole_array.unwrap_or(options.whole_array);
     options.features = t.features.or(options.features);
-    options.output_rank = t.output_rank.or(options.output_rank);
     data.refine = t.refine.unwrap_or(data.refine);
     data.confidence = t.confidence.unwrap_or(data.confidence);
     Ok(data)

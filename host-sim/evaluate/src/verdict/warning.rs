@@ -255,16 +255,6 @@ impl Warning {
             format!("K = {centres} is stored as {stored}: K = {stored} costs a device no more")
         })
     }
-
-    /// Gate whose mean cycles of a frame, `gated`, are no fewer than those `ungated`.
-    pub fn costly_gate(gated: f64, ungated: f64) -> Option<Self> {
-        Self::when(gated >= ungated, "gate-costs-more", || {
-            format!(
-                "the gate costs more than it saves: {gated:.0} cycles a frame with it, {ungated:.0} without; leave it \
-                 off for motions like these"
-            )
-        })
-    }
 }
 
 /// Most columns, and most outputs, that are named in a warning of drift.

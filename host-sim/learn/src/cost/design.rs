@@ -17,8 +17,6 @@ pub struct Design {
     pub row_network: Vec<usize>,
     /// Whether one network decodes all rows, behind a projection of their readings to its inputs.
     pub projection: bool,
-    /// Number of components that the one network behind a projection computes, if they are expanded to the outputs.
-    pub components: Option<usize>,
     /// Whether inputs are relative to the baseline.
     pub relative_inputs: bool,
     /// Whether the images copy the weights to RAM. Else they stay in flash.
@@ -49,7 +47,6 @@ impl Design {
             networks: model.networks().map(|network| NetworkDesign::new(&network)).collect(),
             row_network: (0..rows).filter_map(|row| model.network_of_row(row)).collect(),
             projection,
-            components: model.expansion().map(|expansion| expansion.components()),
             relative_inputs: model.metadata().relative_inputs,
             weights_in_ram: blob.bytes().len() <= WEIGHT_RAM_BYTES,
         }
@@ -67,7 +64,6 @@ impl Design {
             networks: vec![network; rows],
             row_network: (0..rows).collect(),
             projection: false,
-            components: None,
             relative_inputs: false,
             weights_in_ram: false,
         };
@@ -83,24 +79,16 @@ impl Design {
         Self { shape, projection: true, ..of_one }.in_ram_if_it_fits()
     }
 
-    /// This design of one network for all rows, which computes so many `components` instead of outputs.
-    #[must_use]
-    pub fn with_components(mut self, components: usize) -> Self {
-        self.components = Some(components);
-        self.networks.iter_mut().for_each(|network| network.shape.outputs = components);
-        self.in_ram_if_it_fits()
-    }
-
     /// This design with the weights where the images put them, going by its parameters alone.
     #[must_use]
     pub fn in_ram_if_it_fits(self) -> Self {
         Self { weights_in_ram: self.parameter_bytes() <= WEIGHT_RAM_BYTES, ..self }
     }
 
-    /// Bytes of all parameters in a blob: networks, projection and expansion, without names and headers.
+    /// Bytes of all parameters in a blob: networks and projection, without names and headers.
     pub fn parameter_bytes(&self) -> usize {
         let networks: usize = self.networks.iter().map(NetworkDesign::bytes).sum();
-        networks + self.projection_bytes() + self.expansion_bytes()
+        networks + self.projection_bytes()
     }
 
     /// The network of each row; with a projection the one for all rows.
@@ -118,12 +106,6 @@ impl Design {
     pub fn features(&self) -> usize {
         let inputs = self.networks.first().map_or(0, |network| network.shape.inputs);
         if self.projection { inputs } else { 0 }
-    }
-
-    /// Bytes of the expansion's parameters in a blob; 0 without one.
-    pub fn expansion_bytes(&self) -> usize {
-        let outputs = self.shape.rows * self.shape.outputs;
-        self.components.map_or(0, |components| outputs * (1 + components) * size_of::<f32>())
     }
 }
 

@@ -18,8 +18,6 @@ pub struct DecoderRam {
     pub scaled_readings: usize,
     /// Features of the whole array, on the stack; 0 without a projection.
     pub features: usize,
-    /// Components that are expanded to the outputs, on the stack; 0 without an expansion.
-    pub components: usize,
     /// One over each reading of the baseline, and readings relative to it; 0 for a model of readings.
     pub relative_inputs: usize,
     /// Exponents and activations of a batch of centres, on the stack.
@@ -45,7 +43,6 @@ impl DecoderRam {
             estimate: shape.rows * (shape.outputs * float + 1),
             scaled_readings: if design.projection { features } else { readings },
             features,
-            components: design.components.unwrap_or(0) * float,
             relative_inputs: match (design.relative_inputs, design.projection) {
                 (false, _) => 0,
                 (true, false) => (shape.rows + 1) * readings,
@@ -63,16 +60,10 @@ impl DecoderRam {
             estimate,
             scaled_readings,
             features,
-            components,
             relative_inputs,
             activations,
         } = self;
-        let on_the_way = scaled_readings + features + components + relative_inputs + activations;
+        let on_the_way = scaled_readings + features + relative_inputs + activations;
         decoder + frame + estimate + on_the_way
-    }
-
-    /// Total in bytes behind a gate, which holds the baseline (a frame) and its estimate.
-    pub fn gated_bytes(&self) -> usize {
-        self.bytes() + self.frame + self.estimate
     }
 }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::{Format, Shape};
 
-use super::{Design, Gating, NetworkDesign};
+use super::{Design, NetworkDesign};
 use crate::infer::Exponential;
 
 /// Inputs and outputs for which there is code of its own.
@@ -20,15 +20,11 @@ pub type Terms = BTreeMap<String, usize>;
 
 /// The terms of one frame of a model of this `design`.
 #[must_use]
-pub fn terms(design: &Design, exponential: Exponential, gating: Gating) -> Terms {
+pub fn terms(design: &Design, exponential: Exponential) -> Terms {
     let mut sum = Sum::default();
-    let ModelShape { rows, inputs, outputs } = design.shape;
+    let ModelShape { rows, inputs, .. } = design.shape;
     let one = design.projection;
     let kind = if one { "array" } else { "rows" };
-    gate(design, gating, kind, &mut sum);
-    if gating == Gating::AtRest {
-        return sum.0;
-    }
     let relative = usize::from(design.relative_inputs);
     let relatively =
         [("", relative * if one { 1 } else { rows }), ("reading", relative * rows * inputs)];
@@ -36,10 +32,6 @@ pub fn terms(design: &Design, exponential: Exponential, gating: Gating) -> Terms
     sum.add(&format!("{kind} relative to the baseline"), relatively);
     if one {
         project(rows * inputs, design.features(), &mut sum);
-    }
-    if let Some(components) = design.components {
-        // The projection's routine expands.
-        project(components, rows * outputs, &mut sum);
     }
     for network in design.row_networks() {
         sum.add(&format!("{kind} in {}", network.format.name()), [("", 1)]);
@@ -70,46 +62,6 @@ impl Sum {
             let name = if name.is_empty() { part.to_owned() } else { format!("{part}: {name}") };
             *self.0.entry(name).or_default() += times;
         }
-    }
-}
-
-/// `taxel_give_rest`, once for all rows. An array's ends with the first row that is awake.
-fn gate(design: &Design, gating: Gating, kind: &str, sum: &mut Sum) {
-    let ModelShape { rows, inputs, outputs } = design.shape;
-    let (what, at_rest) = match gating {
-        Gating::Ungated => return,
-        Gating::AtRest => ("at rest", rows),
-        Gating::Awake if design.projection => ("awake", rows - 1),
-        Gating::Awake => ("awake", 0),
-    };
-    sum.add(&format!("gate, {kind} {what}"), [("", 1)]);
-    sum.add(&format!("gate, {kind}"), [("row", rows)]);
-    let beyond = inputs % EIGHTEEN;
-    sum.add(
-        "gate",
-        [
-            ("18 readings", rows * (inputs / EIGHTEEN)),
-            ("reading beyond eighteens", rows * beyond),
-            ("row of readings beyond eighteens", rows * usize::from(beyond > 0)),
-            ("row of fewer than 18 readings", rows * usize::from(inputs < EIGHTEEN)),
-            ("row at rest", at_rest),
-        ],
-    );
-    if outputs == EIGHTEEN {
-        sum.add("gate", [("row of 18 outputs at rest", at_rest)]);
-    } else {
-        sum.add(
-            "gate",
-            [
-                ("4 outputs at rest", at_rest * (outputs / 4)),
-                ("output at rest beyond fours", at_rest * (outputs % 4)),
-                (
-                    "row at rest of outputs beyond fours",
-                    at_rest * usize::from(!outputs.is_multiple_of(4)),
-                ),
-                ("row at rest of fewer than 4 outputs", at_rest * usize::from(outputs < 4)),
-            ],
-        );
     }
 }
 

@@ -11,7 +11,7 @@ use super::text::{columns, rows_of};
 /// Part of a model that [`Fixed`](taxel_core::Fixed) has no room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unheld {
-    /// Projection of all readings to one network's inputs, with or without an expansion of its outputs.
+    /// Projection of all readings to one network's inputs.
     Projection,
     /// Inputs relative to the baseline.
     RelativeInputs,

@@ -388,7 +388,6 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
         let parts = ModelParts {
             linear_rmse: Floats(&[]),
             projection: None,
-            expansion: None,
             confidence: None,
             fill: None,
             networks,
@@ -401,7 +400,6 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
         };
         ModelBlob::of_bytes(&encode_to_vec(&parts).unwrap()).unwrap()
     };
-    let of_components = Options { whole_array: true, output_rank: Some(4), ..Options::default() };
     let density = confidence::Density::fit(
         &frames,
         &confidence::Settings { components: 2, ..Default::default() },
@@ -411,7 +409,6 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
     for (blob, says) in [
         (parts(&[shared], &[0, 0], 0.1), "share a network"),
         (parts(&model.model().networks().collect::<Vec<_>>(), &[0, 1], 0.0), "no training errors"),
-        (small(of_components).0, "--output-rank"),
         (confidence::add(&blob, &density, &held_out).unwrap(), "--confidence"),
         (fill::add(&blob, &frames.inputs).unwrap(), "--fill"),
     ] {

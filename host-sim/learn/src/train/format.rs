@@ -1,21 +1,19 @@
 //! Fitting of output weights to the activations that a device will compute, one file a number format.
 //!
-//! Centres, widths and scaling are rounded to the format first, and the weights are fitted to the
+//! Centres, width and scaling are rounded to the format first, and the weights are fitted to the
 //! resulting activations. That rounding then causes no error any more; only the weights are rounded
 //! last.
 
 use std::cell::OnceCell;
 
-use taxel_core::expansion::Expansion;
 use taxel_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
 
 use taxel_data::{RowTable, Table};
 
-use super::hidden_layer::{HiddenLayer, not_held};
 use super::least_squares::{Decomposed, Design, Factor, Recursion, predict};
 use super::samples::{Ridge, Samples};
 use super::tasks::{Factors, Task};
-use super::{Options, Recursive, Solver};
+use super::{HiddenLayer, Options, Recursive, Solver};
 use crate::error::{Error, Result, parameter_not_held};
 use crate::infer::{Exponential, infer};
 
@@ -38,7 +36,6 @@ pub struct FittedNetwork {
     format: Format,
     affine: bool,
     words: Vec<u32>,
-    expansion: Option<Vec<f32>>,
 }
 
 impl FittedNetwork {
@@ -52,7 +49,7 @@ impl FittedNetwork {
         affine: bool,
         words: Vec<u32>,
     ) -> Result<Self> {
-        let fitted = Self { shape, format, affine, words, expansion: None };
+        let fitted = Self { shape, format, affine, words };
         match fitted.try_network() {
             Ok(_) => Ok(fitted),
             Err(cause) => Err(parameter_not_held(format, cause)),
@@ -103,23 +100,6 @@ impl FittedNetwork {
             }
             Format::F32 => expanded::Network::try_new(*shape, *affine, words)?.into(),
             Format::Fixed16 => fixed16::Network::try_new(*shape, *affine, words)?.into(),
-        })
-    }
-
-    /// The network with an `expansion` of its outputs: means of all outputs, then each component's parts.
-    pub(super) fn expanded_by(self, expansion: Vec<f32>) -> Self {
-        Self { expansion: Some(expansion), ..self }
-    }
-
-    /// Expansion of the network's outputs, if these are components of other ones.
-    ///
-    /// # Panics
-    /// Never: an expansion was made for the network's number of outputs.
-    pub fn expansion(&self) -> Option<Expansion<'_>> {
-        let components = self.shape.outputs;
-        self.expansion.as_ref().map(|block| {
-            let outputs = block.len() / (1 + components);
-            Expansion::new(components, outputs, block).expect("made for these components")
         })
     }
 
@@ -200,8 +180,7 @@ pub(super) trait Held: Send + Sync {
     fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork>;
 }
 
-/// Gaussians of `layer`, held in the `format`. Where each centre has a width of its own, direct distances replace
-/// [`Format::F32`].
+/// Gaussians of `layer`, held in the `format`.
 ///
 /// # Errors
 /// [`Error`] if the format does not hold them.
@@ -211,19 +190,11 @@ pub(super) fn held(
     options: &Options,
     format: Format,
 ) -> Result<Box<dyn Held>> {
-    let common_width = layer.relative_widths.is_empty();
     let (centres, of_width) = (&layer.centres, &Options { spread: layer.spread, ..*options });
     Ok(match format {
-        Format::F32 if common_width => {
-            Box::new(expanded_f32::Expanded::new(samples, centres, of_width))
-        }
-        Format::Fixed16 if common_width => {
-            Box::new(fixed_point::Exponents::new(samples, centres, of_width)?)
-        }
-        Format::Fixed16 => return Err(not_held(format).into()),
-        Format::F32Direct | Format::F32 => {
-            Box::new(direct_f32::Direct::new(samples, layer, options))
-        }
+        Format::F32 => Box::new(expanded_f32::Expanded::new(samples, centres, of_width)),
+        Format::Fixed16 => Box::new(fixed_point::Exponents::new(samples, centres, of_width)?),
+        Format::F32Direct => Box::new(direct_f32::Direct::new(samples, layer, options)),
     })
 }
 
@@ -331,8 +302,7 @@ pub(super) fn left(
 }
 
 /// Fits `samples` with the Gaussians of `layer`: one network for each of `ridges`. They share one
-/// decomposition, unless the solver is a recursion. Where each centre has a width of its own, direct distances replace
-/// [`Format::F32`].
+/// decomposition, unless the solver is a recursion.
 ///
 /// # Errors
 /// [`Error`](crate::Error) if the format does not hold a network.
@@ -345,7 +315,7 @@ pub(super) fn fit(
     let targets = Targets::new(&samples.table.outputs);
     let (table, solver) = (samples.table, options.solver);
     let frames = table.outputs.counts();
-    if options.format != Format::F32 || !layer.relative_widths.is_empty() {
+    if options.format != Format::F32 {
         let held = held(samples, layer, options, options.format)?;
         let fit = Fit::new(&*held, table, &targets, solver, &frames);
         return ridges.iter().map(|ridge| fit.network(*ridge)).collect();

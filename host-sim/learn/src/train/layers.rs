@@ -4,8 +4,7 @@ use std::borrow::Cow;
 
 use taxel_data::Dataset;
 
-use super::hidden_layer::HiddenLayer;
-use super::{Options, Samples, memory, projection};
+use super::{HiddenLayer, Options, Samples, memory, projection};
 use crate::error::Result;
 use crate::parallel;
 

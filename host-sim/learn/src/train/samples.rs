@@ -3,12 +3,21 @@
 use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
 use taxel_data::{Purpose, Random, RowTable, Stream};
 
-use super::{HiddenLayer, Options, kmeans};
+use super::{Options, kmeans};
 
 /// Frames for each regressor below which they are few.
 const FEW_FRAMES: usize = 50;
 /// Least error of a reading over its range, whatever few frames say.
 const LEAST_ERROR: f64 = 1e-3;
+
+/// Hidden layer of a network: its Gaussians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HiddenLayer {
+    /// Centres on inputs scaled to [0, 1], `centres × inputs`.
+    pub centres: Vec<f64>,
+    /// Width σ of all Gaussians, on that scale.
+    pub spread: f64,
+}
 
 /// Minimum and span of every input, by which readings are scaled to [0, 1].
 #[derive(Debug, Clone, PartialEq)]
@@ -157,10 +166,8 @@ impl<'b> Samples<'b> {
         found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
     }
 
-    /// Hidden layer of Gaussians at `centres` (`centres × inputs`, on scaled inputs), with the widths that `options` ask
-    /// for.
+    /// Hidden layer of Gaussians at `centres` (`centres × inputs`, on scaled inputs), with the spread of `options`.
     pub fn layer(&self, centres: Vec<f64>, options: &Options) -> HiddenLayer {
-        let relative_widths = options.widths.relative(&centres, self.inputs());
-        HiddenLayer { centres, spread: options.spread, relative_widths }
+        HiddenLayer { centres, spread: options.spread }
     }
 }

@@ -9,7 +9,6 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use taxel_core::expansion::Expansion;
 use taxel_core::rbf::Format;
 use taxel_data::{BadValue, Dataset, Progress, RowTable, Table, require};
 
@@ -18,7 +17,7 @@ use super::least_squares::{Design, Recursion, predict};
 use super::tasks::Factors;
 use super::{
     Examples, HiddenLayer, Layers, Options, Recursive, Refinement, Samples, Solver, Trained,
-    output_rank, projection, refine,
+    projection, refine,
 };
 use crate::error::Result;
 
@@ -117,7 +116,6 @@ fn fit(
         piece = next.transpose()?.map(Cow::Owned);
         if let Some(next) = &piece {
             same_columns(first, next)?;
-            options.output_rank.map_or(Ok(()), |rank| output_rank::check(rank, &next.outputs))?;
         }
         progress.step();
     }
@@ -154,11 +152,9 @@ fn curve(rows: &[Row]) -> Vec<Learned> {
 /// Recursion of one network.
 struct Row {
     held: Box<dyn Held>,
-    /// First frames, with the outputs that the network computes.
+    /// First frames.
     table: RowTable,
     targets: Targets,
-    /// Expansion of the network's outputs, if these are components.
-    expansion: Option<Vec<f32>>,
     /// Recursion of the frames that have some columns, with these columns. All carry all outputs, so that one can be
     /// continued as two where a piece has columns apart that were together so far.
     recursions: Vec<(Vec<usize>, Recursion)>,
@@ -178,27 +174,22 @@ impl Row {
     ) -> Result<Self> {
         let options = Options { spread: layer.spread, ..*options };
         let samples = Samples::new(first);
-        let expansion =
-            options.output_rank.map(|rank| output_rank::expansion(&samples, layer, rank, &options));
-        let table = given(expansion.as_deref(), Cow::Borrowed(first)).into_owned();
-        let samples = Samples { table: &table, ..samples };
         let held = format::held(&samples, layer, &options, format)?;
-        let targets = Targets::new(&table.outputs);
+        let targets = Targets::new(&first.outputs);
         let settings = match options.solver {
             Solver::Rls(settings) => settings,
             Solver::Qr => Recursive::default(),
         };
-        let regressors = held.design(&table).regressors();
+        let regressors = held.design(first).regressors();
         let recursion =
             Recursion::new(regressors, targets.outputs(), initial_covariance, &settings);
         let recursions = vec![((0..targets.outputs()).collect(), recursion)];
-        Ok(Self { held, targets, expansion, recursions, test, curve: vec![], table })
+        Ok(Self { held, targets, recursions, test, curve: vec![], table: first.clone() })
     }
 
     /// Takes in the frames of `table`, of which so many came `before`.
     fn absorb(&mut self, table: &RowTable, before: usize) {
-        let of_network = given(self.expansion.as_deref(), Cow::Borrowed(table));
-        let targets = self.targets.of_others(&of_network.outputs).deviations;
+        let targets = self.targets.of_others(&table.outputs).deviations;
         self.part_columns(&targets);
         let design = self.held.design(table);
         let frames = table.inputs.len();
@@ -271,12 +262,7 @@ impl Row {
         for line in predicted.chunks_exact_mut(computed) {
             line.iter_mut().zip(&self.targets.means).for_each(|(value, mean)| *value += mean);
         }
-        let outputs = table.outputs.names.len();
-        if let Some(block) = &self.expansion {
-            let expansion = Expansion::new(computed, outputs, block).expect("of these outputs");
-            predicted = output_rank::expand(expansion, &predicted);
-        }
-        let range = lines.start * outputs..lines.end * outputs;
+        let range = lines.start * computed..lines.end * computed;
         let truth = Table {
             names: table.outputs.names.clone(),
             values: table.outputs.values[range].to_vec(),
@@ -301,11 +287,7 @@ impl Row {
             return Err(BadValue::new("format", format.name(), rule).into());
         }
         let left = format::left(&**held, table, targets, &factors);
-        let network = network.unless_lost(table, targets, &left)?;
-        Ok(match self.expansion {
-            Some(expansion) => network.expanded_by(expansion),
-            None => network,
-        })
+        network.unless_lost(table, targets, &left)
     }
 }
 
@@ -330,14 +312,6 @@ fn absorb_part(
     let inputs = table.inputs.part(&lines, &all(&table.inputs));
     let part = RowTable { inputs, outputs: table.outputs.part(&lines, &[]), ..*table };
     recursion.absorb(&*held.design(&part), &targets, 0..lines.len());
-}
-
-/// Table with the outputs that a network computes: components, if there is an expansion.
-fn given<'t>(expansion: Option<&[f32]>, table: Cow<'t, RowTable>) -> Cow<'t, RowTable> {
-    let Some(expansion) = expansion else { return table };
-    let rank = expansion.len() / table.outputs.names.len() - 1;
-    let outputs = output_rank::components(expansion, rank, &table.outputs);
-    Cow::Owned(RowTable { outputs, inputs: table.inputs.clone(), ..*table })
 }
 
 /// Whether an error is measured after so many frames: 10, 20, 50, 100, 200, …

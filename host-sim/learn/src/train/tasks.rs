@@ -83,20 +83,3 @@ pub(super) fn check(outputs: &Table, centres: usize) -> Result<(), BadValue> {
     }
     Ok(())
 }
-
-/// Checks that no output is missing, for what `setting` asks for.
-pub(super) fn check_complete(outputs: &Table, setting: &str, value: usize) -> Result<(), BadValue> {
-    let incomplete = outputs.names.iter().zip(outputs.counts());
-    let incomplete = incomplete.map(|(name, count)| (name, outputs.len() - count));
-    for (name, missing) in incomplete {
-        require(missing == 0, setting, value, || {
-            format!(
-                "it takes all outputs of a frame together, and {} is missing in {missing} of {} frames; leave it out, or \
-                 train on frames that have all outputs",
-                quoted(name),
-                outputs.len()
-            )
-        })?;
-    }
-    Ok(())
-}

@@ -115,34 +115,6 @@ fn penalties_that_share_a_decomposition_give_the_networks_that_each_gives_alone(
 }
 
 #[test]
-fn a_width_for_each_centre_takes_direct_distances_and_is_refused_by_fixed16() {
-    let table = table(2000, 0.05);
-    let samples = Samples::new(&table);
-    let with =
-        |widths, format| Options { centres: 12, spread: 0.4, widths, format, ..Options::default() };
-    let fit = |options: &Options| samples.fit(&samples.centres(options, 0), options);
-    let own = fit(&with(Widths::Neighbours, Format::F32)).unwrap();
-    assert_eq!(own, fit(&with(Widths::Neighbours, Format::F32Direct)).unwrap());
-    assert_eq!(own.format(), Format::F32Direct);
-    let widths: Vec<f32> = own.network().widths().collect();
-    assert_eq!(widths.len(), 12);
-    assert!((widths.iter().sum::<f32>() / 12.0 - 0.4).abs() < 1e-4, "{widths:?}");
-    assert!(widths.iter().any(|width| (width - 0.4).abs() > 0.05), "{widths:?}");
-    // Of a layer that all formats share, too.
-    let fixed = with(Widths::Common, Format::Fixed16);
-    let layer = samples.layer(samples.centres(&fixed, 0), &with(Widths::Neighbours, Format::F32));
-    let options = with(Widths::Neighbours, Format::Fixed16);
-    let refusals = [
-        options.check(2000).unwrap_err().to_string(),
-        samples.fit_layer(&layer, &fixed).unwrap_err().to_string(),
-    ];
-    for refusal in refusals {
-        let says = ["widths = neighbours", "fixed16", "give the format f32-direct"];
-        assert!(says.iter().all(|part| refusal.contains(part)), "{refusal}");
-    }
-}
-
-#[test]
 fn a_penalty_is_for_each_frame() {
     let with = |penalty| Options { penalty, ..Options::default() };
     assert!((with(Some(1e-7)).initial_covariance(2000) * 2e-4 - 1.0).abs() < 1e-12);
@@ -244,7 +216,7 @@ fn dataset(RowTable { inputs, outputs, common_span }: RowTable) -> Dataset {
 }
 
 #[test]
-fn outputs_with_too_few_frames_and_a_rank_of_incomplete_ones_are_refused_by_name() {
+fn outputs_with_too_few_frames_are_refused_by_name() {
     let mut data = dataset(with_missing_outputs(3000));
     let count = data.fewest_values();
     let refused = |data: &Dataset, options: &Options| {
@@ -253,9 +225,6 @@ fn outputs_with_too_few_frames_and_a_rank_of_incomplete_ones_are_refused_by_name
     let options = Options { centres: count, ..Options::default() };
     let message = refused(&data, &options);
     assert!(message.contains("wave_mm") && message.contains(&format!("the {count} ")), "{message}");
-    let options = Options { whole_array: true, output_rank: Some(1), ..Options::default() };
-    let message = refused(&data, &options);
-    assert!(message.contains("output_rank = 1") && message.contains("wave_mm"), "{message}");
     data.outputs.values.iter_mut().step_by(2).for_each(|value| *value = f64::NAN);
     assert!(refused(&data, &Options { centres: 1, ..Options::default() }).contains("wave_mm"));
 }

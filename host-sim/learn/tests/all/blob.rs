@@ -4,8 +4,7 @@ use taxel_core::blob::{DecodeError, Model};
 use taxel_core::rbf::{Format, Network};
 use taxel_core::{AlignedBytes, Decoder};
 use taxel_data::{Silent, Stream};
-use taxel_learn::cost::Design;
-use taxel_learn::train::{Widths, train};
+use taxel_learn::train::train;
 use taxel_learn::{Exponential, ModelBlob, Options, Origin, pack};
 use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
 use taxel_simulate::sensor::Axis;
@@ -27,41 +26,14 @@ fn real_blob() -> Vec<u8> {
     pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
 }
 
-/// Blob of one network for both rows, which computes four components of their 12 outputs.
-fn blob_of_components(format: Format) -> Vec<u8> {
+/// Blob of one network for both rows, which computes their 12 outputs.
+fn blob_of_array(format: Format) -> Vec<u8> {
     let dataset = synthesise(&world(), Stream::Training, 400);
-    let options = Options {
-        format,
-        centres: 8,
-        spread: 0.6,
-        whole_array: true,
-        output_rank: Some(4),
-        ..Options::default()
-    };
+    let options =
+        Options { format, centres: 8, spread: 0.6, whole_array: true, ..Options::default() };
     let trained = train(&dataset, &options, &Silent).unwrap();
     let origin = Origin::of_data("press", 0, 1, &dataset);
     pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
-}
-
-#[test]
-fn a_width_for_each_centre_is_decoded_and_priced_as_it_is_trained() {
-    let dataset = synthesise(&world(), Stream::Training, 400);
-    let blob = |widths| {
-        let options =
-            Options { format: Format::F32Direct, centres: 8, widths, ..Options::default() };
-        let trained = train(&dataset, &options, &Silent).unwrap();
-        pack(&trained, &dataset, &Origin::of_data("press", 0, 1, &dataset)).unwrap()
-    };
-    let [common, own] = Widths::ALL.map(blob);
-    let model = own.parse();
-    assert!(model.networks().all(|network| network.widths().count() == 8));
-    // The mean over the centres is the spread that was asked for.
-    assert_eq!([common.spread(), own.spread()], [Options::default().spread; 2]);
-    // Seven widths more in each of two networks.
-    assert_eq!(own.bytes().len(), common.bytes().len() + 2 * 7 * 4);
-    let designs = [&common, &own].map(Design::new);
-    assert_eq!(designs[1].parameter_bytes(), designs[0].parameter_bytes() + 2 * 7 * 4);
-    decodes_alike(own.bytes());
 }
 
 /// Calls `use_them` with a copy of `bytes` at an address that is a multiple of four.
@@ -100,7 +72,7 @@ fn changed(blob: &[u8], offset: usize, bytes: &[u8]) -> Vec<u8> {
 #[test]
 fn every_single_bit_flip_is_refused_with_its_error() {
     each_bit_flip_is_refused(real_blob());
-    each_bit_flip_is_refused(blob_of_components(Format::Fixed16));
+    each_bit_flip_is_refused(blob_of_array(Format::Fixed16));
 }
 
 fn each_bit_flip_is_refused(mut blob: Vec<u8>) {
@@ -127,7 +99,7 @@ fn each_bit_flip_is_refused(mut blob: Vec<u8>) {
 #[test]
 fn every_truncation_and_any_trailing_byte_is_refused() {
     each_truncation_and_trailing_byte_is_refused(&real_blob());
-    each_truncation_and_trailing_byte_is_refused(&blob_of_components(Format::Fixed16));
+    each_truncation_and_trailing_byte_is_refused(&blob_of_array(Format::Fixed16));
 }
 
 fn each_truncation_and_trailing_byte_is_refused(blob: &[u8]) {
@@ -190,7 +162,7 @@ fn inconsistent_structure_and_bad_numbers_under_a_valid_crc_are_refused() {
 #[test]
 fn device_and_host_decode_alike() {
     decodes_alike(&real_blob());
-    Format::ALL.into_iter().for_each(|format| decodes_alike(&blob_of_components(format)));
+    Format::ALL.into_iter().for_each(|format| decodes_alike(&blob_of_array(format)));
 }
 
 fn decodes_alike(blob: &[u8]) {

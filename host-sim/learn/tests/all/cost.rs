@@ -5,16 +5,16 @@ use std::fmt::Write as _;
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::Format;
 use taxel_learn::Exponential;
-use taxel_learn::cost::{Cost, DecoderRam, Design, Frames, Prices, kernel_name};
+use taxel_learn::cost::{Cost, DecoderRam, Design, Prices, kernel_name};
 
 const PAPER: ModelShape = ModelShape { rows: 8, inputs: 18, outputs: 18 };
 
-fn frames(prices: &Prices, design: &Design) -> Frames<Cost> {
-    prices.frames(design, Exponential::default()).unwrap()
+fn frame(prices: &Prices, design: &Design) -> Cost {
+    prices.frame(design, Exponential::default()).unwrap()
 }
 
 #[test]
-fn every_shape_has_a_price_and_a_gate_saves_and_costs_something() {
+fn every_shape_has_a_price() {
     let prices = Prices::accepted().unwrap();
     let sizes = || [1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 24, 37, 64, 144].into_iter();
     let shapes = [1, 2, 3, 8].into_iter().flat_map(|rows| {
@@ -29,12 +29,9 @@ fn every_shape_has_a_price_and_a_gate_saves_and_costs_something() {
                         let design = design(shape, format, centres, affine);
                         for relative_inputs in [false, true] {
                             let design = Design { relative_inputs, ..design.clone() };
-                            let Frames { ungated, at_rest, awake } = frames(&prices, &design);
-                            for cost in [ungated, at_rest, awake] {
-                                assert!(cost.instructions < cost.cycles, "{design:?}: {cost:?}");
-                                assert!(cost.cycles < cost.flash_cycles, "{design:?}: {cost:?}");
-                            }
-                            assert!(ungated.cycles < awake.cycles, "{design:?}");
+                            let cost = frame(&prices, &design);
+                            assert!(cost.instructions < cost.cycles, "{design:?}: {cost:?}");
+                            assert!(cost.cycles < cost.flash_cycles, "{design:?}: {cost:?}");
                         }
                     }
                 }
@@ -62,7 +59,7 @@ fn a_sensor_that_leaves_something_out_takes_less_and_the_page_says_what_each_tak
     for format in [Format::F32, Format::Fixed16] {
         let takes = |(_, shape, centres): (&str, ModelShape, usize)| {
             let design = Design::of_rows(shape, format, centres, true);
-            let cost = frames(&prices, &design).ungated;
+            let cost = frame(&prices, &design);
             let ram = DecoderRam::new(&design).bytes() as u64;
             [
                 design.parameter_bytes() as u64,
@@ -114,18 +111,13 @@ fn the_accepted_figures_of_trained_models_are_told() {
         });
         let Some((format, exponential)) = exponential else { continue };
         let centres = centres.parse().unwrap();
-        let (design, scope): (fn(_, _, _, _) -> Design, _) = match scope.strip_prefix("array-") {
-            Some(scope) => (Design::of_array, scope),
-            None => (Design::of_rows, scope),
-        };
-        let design = design(PAPER, format, centres, affine == "yes");
-        let frames = prices.frames(&design, exponential).unwrap();
-        let predicted = match scope {
-            "frame" => frames.ungated,
-            "resting-frame" => frames.at_rest,
-            "awake-frame" => frames.awake,
+        let design: fn(_, _, _, _) -> Design = match scope {
+            "array-frame" => Design::of_array,
+            "frame" => Design::of_rows,
             _ => continue,
         };
+        let design = design(PAPER, format, centres, affine == "yes");
+        let predicted = prices.frame(&design, exponential).unwrap();
         let percent = |predicted: u64, counted: &str| {
             100.0 * (predicted as f64 / counted.parse::<f64>().unwrap() - 1.0)
         };
@@ -133,7 +125,7 @@ fn the_accepted_figures_of_trained_models_are_told() {
             [percent(predicted.instructions, instructions), percent(predicted.cycles, cycles)];
         assert!(errors.iter().all(|error| error.abs() < 1.0), "{line}: {errors:?} %");
         // The image that counts has all weights in RAM.
-        let waiting = if scope == "resting-frame" { 0 } else { design.least_waiting_for_weights() };
+        let waiting = design.least_waiting_for_weights();
         let error = percent(predicted.flash_cycles - waiting, flash);
         assert!(error.abs() < 10.0, "{line}: {error} % from flash");
         compared += 1;

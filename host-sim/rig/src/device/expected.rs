@@ -154,7 +154,7 @@ fn confidence(
         baseline_ohm.unwrap_or(&unknown).iter().map(|ohm| reciprocal(*ohm)).collect();
     let mut scratch = vec![0.0; decoder.scratch_floats()];
     let frames = readings_ohm.chunks_exact(inputs.max(1)).map(|readings_ohm| {
-        let frame = Frame { readings_ohm, reciprocals: &reciprocals, gate: None };
+        let frame = Frame { readings_ohm, reciprocals: &reciprocals };
         let mut deviation = vec![0.0; outputs];
         let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).ok()??;
         Some((novelty, deviation))

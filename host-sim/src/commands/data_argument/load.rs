@@ -69,7 +69,6 @@ impl DataArguments {
         // Readings themselves, even if the model is given their ratios to the baseline.
         resolution::check(&training.frames)
             .map_err(|refusal| Error::Unfit { path: path.into(), message: refusal.to_string() })?;
-        let test_readings = test.frames.inputs.clone();
         let given = |frames: Frames| match how.relative_inputs.then(|| frames.baselines()) {
             Some(Some(baselines)) => relative::dataset(frames.frames, &baselines),
             _ => frames.frames,
@@ -91,7 +90,6 @@ impl DataArguments {
             fold_of,
             test: given(test),
             test_log,
-            test_readings,
             test_rest,
             is_one_log: matches!(judged, JudgedBy::HeldOut),
             spread,

@@ -23,7 +23,7 @@ use super::super::{Common, print};
 use super::frames::{hear_scans, missing, values};
 use super::scan::{
     Confidence, ScanArguments, Wanted, check_length, configure, patience, patience_for_next,
-    reading_names, tolerance,
+    reading_names,
 };
 
 #[derive(Args)]
@@ -39,10 +39,6 @@ pub struct RecordArguments {
     readings: bool,
     #[command(flatten)]
     scan: ScanArguments,
-    /// Relative change within which a row counts as untouched and is not decoded, once the device has a
-    /// `baseline`; 0 decodes all rows (docs/gating.md).
-    #[arg(long, value_name = "SHARE", default_value_t = Configuration::DEFAULT.rest_tolerance, value_parser = tolerance, allow_negative_numbers = true)]
-    rest_tolerance: f32,
     /// Save the start of each scan too, in a column time_s: seconds since the first one. `decode --filter-ms` needs it.
     #[arg(long)]
     time: bool,
@@ -91,8 +87,6 @@ struct Saved {
     frames_lost: u32,
     /// Readings or outputs that are empty.
     values_missing: usize,
-    /// Rows that were untouched, and so were not decoded.
-    rows_at_rest: usize,
     /// Frames that are unlike those of training, as far as the device was to tell.
     frames_novel: usize,
     /// Noise of the untouched sensor, if it was asked for.
@@ -158,7 +152,6 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         return Err(Error::Usage(message.into()));
     }
     let decoding = Configuration {
-        rest_tolerance: action.rest_tolerance,
         confidence: action.confidence.into(),
         filter_time_constant_us: filter.time_constant_us,
         filter_lead_us: filter.lead_us,
@@ -200,9 +193,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let frames_per_s = (elapsed_us > 0).then(|| f64::from(steps) / (elapsed_us as f64 * 1e-6));
     let estimates = scans.iter().filter_map(|scan| scan.estimate.as_ref());
     let is_novel = |it: &&ScanEstimate| it.flags & EstimateReport::NOVEL != 0;
-    let frames_novel = estimates.clone().filter(is_novel).count();
-    let at_rest = |status: &&u8| **status == EstimateReport::ROW_AT_REST;
-    let rows_at_rest = estimates.flat_map(|it| &it.row_status).filter(at_rest).count();
+    let frames_novel = estimates.filter(is_novel).count();
     let file = action.output.clone();
     let (frames, values_missing) = (scans.len(), missing);
     let saved = Saved {
@@ -211,7 +202,6 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         asked_period_us: action.scan.period_us,
         frames_lost,
         values_missing,
-        rows_at_rest,
         frames_novel,
         noise,
         file,
@@ -329,7 +319,6 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
         asked_period_us: action.scan.period_us,
         frames_lost: 0,
         values_missing,
-        rows_at_rest: 0,
         frames_novel: 0,
         noise: None,
         file,
@@ -361,9 +350,6 @@ impl Saved {
             } else {
                 format!("{rate:.1} frames a second were scanned")
             });
-        }
-        if self.rows_at_rest > 0 {
-            page.line(format_args!("{} rows were untouched, and not decoded", self.rows_at_rest));
         }
         if self.frames_novel > 0 {
             page.line(format_args!("{} frames were unlike those of training", self.frames_novel));

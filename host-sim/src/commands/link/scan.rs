@@ -68,12 +68,6 @@ impl From<Confidence> for ConfidenceSent {
     }
 }
 
-/// Tolerance within the range that a device accepts.
-pub fn tolerance(text: &str) -> std::result::Result<f32, String> {
-    let share = text.parse().ok().filter(|share| (0.0..1.0).contains(share));
-    share.ok_or_else(|| "give a share from 0 and below 1, such as 0.0175 for 3.5 × 0.5 %".into())
-}
-
 /// Activates a configuration for scanning, which decodes as `decoding` says.
 pub fn configure(
     device: &mut Device,

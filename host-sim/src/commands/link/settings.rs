@@ -9,7 +9,7 @@ use taxel_rig::device::Device;
 
 use super::super::filter_arguments::milliseconds;
 use super::super::{Common, print};
-use super::scan::{Confidence, tolerance};
+use super::scan::Confidence;
 
 #[derive(Args)]
 #[group(required = true, multiple = true)]
@@ -38,9 +38,6 @@ pub struct ConfigureArguments {
     /// Relative change against the baseline that counts as contact.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     contact_threshold: Option<f32>,
-    /// Relative change within which a row counts as untouched and is not decoded; 0 decodes all rows.
-    #[arg(long, value_name = "SHARE", value_parser = tolerance, allow_negative_numbers = true)]
-    rest_tolerance: Option<f32>,
     /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/filter.md).
     #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
     filter_ms: Option<u32>,
@@ -75,7 +72,6 @@ impl ConfigureArguments {
         c.shorted_below_ohm = self.shorted_below_ohm.unwrap_or(c.shorted_below_ohm);
         c.open_above_ohm = self.open_above_ohm.unwrap_or(c.open_above_ohm);
         c.contact_threshold = self.contact_threshold.unwrap_or(c.contact_threshold);
-        c.rest_tolerance = self.rest_tolerance.unwrap_or(c.rest_tolerance);
         c.filter_time_constant_us = self.filter_ms.unwrap_or(c.filter_time_constant_us);
         c.filter_lead_us = self.lead_ms.unwrap_or(c.filter_lead_us);
         c.report_every = self.report_every.unwrap_or(c.report_every);
@@ -175,8 +171,8 @@ fn show(device: &mut Device, common: &Common) -> Result<()> {
         }
     ));
     page.line(format_args!(
-        "{:<17} shorted below {} Ω, open above {} Ω, contact from {}, at rest within {}",
-        "limits", c.shorted_below_ohm, c.open_above_ohm, c.contact_threshold, c.rest_tolerance
+        "{:<17} shorted below {} Ω, open above {} Ω, contact from {}",
+        "limits", c.shorted_below_ohm, c.open_above_ohm, c.contact_threshold
     ));
     if let Some(constants) = &settings.constants {
         let whether = if kept.constants { "kept" } else { "none are kept" };

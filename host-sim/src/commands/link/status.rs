@@ -60,13 +60,8 @@ pub fn show(device: &mut Device, common: &Common) -> Result<()> {
     }
     page.line(format_args!("{:<17} {}", "scanning", scanning(&status.active)));
     page.line(format_args!(
-        "{:<17} {} scanned, {} decoded (except {} untouched rows), {} missed, {} samples failed",
-        "frames",
-        s.frames_scanned,
-        s.frames_decoded,
-        s.rows_at_rest,
-        s.frames_missed,
-        s.failed_samples
+        "{:<17} {} scanned, {} decoded, {} missed, {} samples failed",
+        "frames", s.frames_scanned, s.frames_decoded, s.frames_missed, s.failed_samples
     ));
     page.line(format_args!(
         "{:<17} scan {} µs, decoding {} µs",

@@ -37,7 +37,7 @@ fn csv_of(trade: &Trade) -> String {
         .groups()
         .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
     let mut csv = format!(
-        "kernel,whole_array,centres,spread,affine_tail,columns,samples_averaged,gate_k,output_rank,filter_ms,lead_ms,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
+        "kernel,whole_array,centres,spread,columns,samples_averaged,filter_ms,lead_ms,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -48,16 +48,13 @@ fn csv_of(trade: &Trade) -> String {
         let errors = errors.collect::<Vec<_>>();
         let _ = writeln!(
             csv,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             p.arithmetic.name(),
             p.whole_array,
             p.centres,
             p.spread,
-            p.affine_tail,
             p.columns.map_or(String::new(), |columns| columns.to_string()),
             p.samples_averaged,
-            p.gate_k.map_or(String::new(), |k| k.to_string()),
-            p.output_rank.map_or(String::new(), |rank| rank.to_string()),
             p.filter.map_or(String::new(), |filter| filter.time_constant_ms.to_string()),
             p.filter.map_or(String::new(), |filter| filter.lead_ms.to_string()),
             errors.join(","),

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use crate::evaluate::trade::{Memory, Point, Trade, Wires};
 use crate::metrics;
-use crate::report::format::significant;
 use crate::verdict::Verdict;
 
 use super::others;
@@ -31,15 +30,12 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
     ));
     page.line(format_args!(
-        "\n  {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
+        "\n  {:<26} {:>3} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
         "format",
         "K",
-        "rank",
-        "tail",
         "cols",
         "avg",
-        // On contacts that move there is no gate.
-        if trade.motion.is_some() { "filt" } else { "gate" },
+        "filt",
         "RMSE",
         "× limit",
         "ms",
@@ -58,7 +54,7 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         // Always predicting the mean is the same whatever is read.
         for (name, rmse) in readings.references(&trade.group).skip(usize::from(place > 0)) {
             page.line(format_args!(
-                "  {name:<40} {:>4} {:>3} {:>12}",
+                "  {name:<30} {:>4} {:>3} {:>12}",
                 readings.columns().map_or("-".into(), |columns| columns.to_string()),
                 readings.samples_averaged,
                 error(rmse)
@@ -145,17 +141,8 @@ fn legend(trade: &Trade, all: bool) -> String {
                 .into(),
         );
     }
-    let has = |of: fn(&Point) -> bool| trade.points.iter().any(of);
-    if has(|point| point.whole_array) {
+    if trade.points.iter().any(|point| point.whole_array) {
         lines.push("array: one network for all rows, behind a projection; not listed if larger than a slot".into());
-    }
-    if has(|point| point.output_rank.is_some()) {
-        lines.push(
-            "rank: components that this network computes, which are expanded to all outputs".into(),
-        );
-    }
-    if has(|point| point.gate_k.is_some()) {
-        lines.push("gate: k of a gate that skips untouched rows; its cycles are the mean over the test frames".into());
     }
     lines.join("\n")
 }
@@ -183,18 +170,12 @@ fn line_of(trade: &Trade, i: usize) -> String {
     };
     let ratio = point.ratio_to_limit(&trade.group).map_or("-".into(), |r| format!("{r:.2}"));
     format!(
-        "{mark} {:<26} {:>3} {:>4} {:>4} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
+        "{mark} {:<26} {:>3} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
         point.way(),
         point.centres,
-        point.output_rank.map_or("-".into(), |rank| rank.to_string()),
-        if point.affine_tail { "yes" } else { "no" },
         point.columns.map_or("-".into(), |columns| columns.to_string()),
         point.samples_averaged,
-        match (point.gate_k, point.filter) {
-            (Some(k), _) => k.to_string(),
-            (None, Some(filter)) => format!("{:.1}", filter.time_constant_ms),
-            (None, None) => "-".into(),
-        },
+        point.filter.map_or("-".into(), |filter| format!("{:.1}", filter.time_constant_ms)),
         error(point.rmse(&trade.group)),
         ms(point.times.frame_ms),
         point.times.age_ms.map_or("-".into(), ms),
@@ -223,14 +204,10 @@ fn choice(page: &mut Page, trade: &Trade, chosen: usize, folder: &Path) {
     let period = period_us(trade, point).map(|us| format!(" --period-us {us}"));
     let oversampling =
         (point.samples_averaged > 1).then(|| format!(" --oversampling {}", point.samples_averaged));
-    let tolerance = trade
-        .rest_tolerance(chosen)
-        .map(|tolerance| significant(tolerance, 3))
-        .map(|tolerance| format!(" --rest-tolerance {tolerance} (once it has a baseline)"));
     let filter = point.filter.map(|filter| {
         format!(" --filter-ms {} --lead-ms {}", filter.time_constant_ms, filter.lead_ms)
     });
-    let options: String = [period, oversampling, tolerance, filter].into_iter().flatten().collect();
+    let options: String = [period, oversampling, filter].into_iter().flatten().collect();
     if !options.is_empty() {
         page.line(format_args!("on a device: host-sim link PORT configure{options}"));
     }

@@ -24,14 +24,9 @@ fn shape(format: Format) -> Shape {
     }
 }
 
-/// Colour of a point: by what its networks see. Behind a gate it is hollow.
+/// Colour of a point: by what its networks see.
 fn class(point: &Point) -> &'static str {
-    match (point.whole_array, point.gate_k.is_some()) {
-        (false, false) => "c1 mark",
-        (false, true) => "c1 hollow mark",
-        (true, false) => "c4 mark",
-        (true, true) => "c4 hollow mark",
-    }
+    if point.whole_array { "c4 mark" } else { "c1 mark" }
 }
 
 /// Picture in this size, and the number of points that lie outside it.
@@ -58,7 +53,7 @@ fn marks(trade: &Trade, axes: &Axes) -> Vec<Series> {
     let mut shown: Vec<&Point> = trade.points.iter().filter(|it| axes.hold(trade, it)).collect();
     let style = |point: &Point| {
         let format = Format::ALL.iter().rev().position(|it| *it == point.arithmetic.format);
-        (point.whole_array, point.gate_k.is_some(), format)
+        (point.whole_array, format)
     };
     let chosen = trade.chosen.map(|i| &trade.points[i]);
     let is_pale = |point: &Point| {
@@ -76,10 +71,9 @@ fn marks(trade: &Trade, axes: &Axes) -> Vec<Series> {
             (true, false) => " rows",
             (true, true) => " array",
         };
-        let gate = if point.gate_k.is_some() { ", gate" } else { "" };
         let format = point.arithmetic.format;
         let class = class(point).trim_end_matches(" mark");
-        let name = format!("{}{network}{gate}", format.name());
+        let name = format!("{}{network}", format.name());
         Series::new(&name, class, Mark::Points(shape(format)), vec![])
     };
     let line = Series::new("Pareto front", "front", Mark::Line, vec![]);

@@ -72,14 +72,11 @@ fn columns(trade: &Trade) -> Vec<Column> {
     vec![
         Column { name: "format".into(), is_text: true, text: |_, p| p.way() },
         number("K", |_, p| p.centres.to_string()),
-        number("rank", |_, p| known(p.output_rank, |rank| rank.to_string())),
-        number("tail", |_, p| if p.affine_tail { "yes" } else { "no" }.into()),
         number("columns", |_, p| known(p.columns, |columns| columns.to_string())),
         number("samples", |trade, p| {
             let averaged = trade.points.iter().any(|p| p.samples_averaged > 1);
             known(averaged.then_some(p.samples_averaged), |samples| samples.to_string())
         }),
-        number("gate k", |_, p| known(p.gate_k, |k| k.to_string())),
         number("filter, ms", |_, p| known(p.filter, |filter| fixed(filter.time_constant_ms, 1))),
         number(&rmse, |trade, p| significant(p.rmse(&trade.group), 3)),
         number("worst of other contacts", |_, p| {

@@ -3,7 +3,7 @@
 //! The CRC-32 of a blob has a Hamming distance of 3 up to 2^32 − 1 bits, and of 4 up to 91 607 bits (11 KiB). So it
 //! finds one and two flipped bits in every blob, and three in small ones.
 
-use mock_board::{blob, blob_of_components, blob_with_confidence};
+use mock_board::{blob, blob_of_features, blob_with_confidence};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use taxel_core::AlignedBytes;
@@ -45,7 +45,7 @@ const FILES: [&str; 6] = [
 
 /// Blobs whose bits are flipped, the smallest first.
 fn subjects() -> Result<Vec<AlignedBytes>, String> {
-    let small = [blob(1, 1), blob(2, 5), blob_of_components(1), blob_with_confidence(true)];
+    let small = [blob(1, 1), blob(2, 5), blob_of_features(1), blob_with_confidence(true)];
     let mut all = small.to_vec();
     for file in FILES {
         all.push(tested_model(file)?);

@@ -9,7 +9,7 @@ use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Silent;
 use taxel_data::random::{Purpose, Random, Stream};
-use taxel_learn::train::{Widths, train};
+use taxel_learn::train::train;
 use taxel_learn::{ModelBlob, Options, Origin, pack};
 
 use crate::effort::Effort;
@@ -74,10 +74,8 @@ fn models() -> &'static [(Format, ModelBlob)] {
         let kinds: Vec<([usize; 4], Format, bool)> = kinds.collect();
         let model = |(shape, format, affine_tail): ([usize; 4], Format, bool)| {
             let frames = samples(shape);
-            let is_own = format == Format::F32Direct && affine_tail;
-            let widths = if is_own { Widths::Neighbours } else { Widths::Common };
             let [.., centres] = shape;
-            let options = Options { format, affine_tail, centres, widths, ..Options::default() };
+            let options = Options { format, affine_tail, centres, ..Options::default() };
             let trained = train(&frames, &options, &Silent).expect("a model of few frames");
             let origin = Origin::of_data("shapes", 0, 1, &frames);
             (format, pack(&trained, &frames, &origin).expect("a small model"))

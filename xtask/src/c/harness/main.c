@@ -10,9 +10,9 @@
 #define GUARD 4u
 #define ROOM (4u * (MODEL_READINGS + MODEL_OUTPUTS + MODEL_ROWS))
 
-static float readings[MODEL_READINGS], baseline[MODEL_READINGS], outputs[MODEL_OUTPUTS], rest_outputs[MODEL_OUTPUTS];
+static float readings[MODEL_READINGS], baseline[MODEL_READINGS], outputs[MODEL_OUTPUTS];
 static float scratch[MODEL_SCRATCH + GUARD];
-static uint8_t status[MODEL_ROWS], rest_status[MODEL_ROWS];
+static uint8_t status[MODEL_ROWS];
 static uint32_t frame;
 
 #ifdef __cplusplus
@@ -51,7 +51,7 @@ static int same_int(const char *what, int found)
     return same(what, &word, sizeof word);
 }
 
-static int decodes_as_expected(const struct model_rest *rest)
+static int decodes_as_expected(void)
 {
     int returned, is_same;
     memset(outputs, 0x55, sizeof outputs);
@@ -60,13 +60,6 @@ static int decodes_as_expected(const struct model_rest *rest)
     region_end();
     is_same = same_int("what decode returns", returned) && same("outputs", outputs, sizeof outputs)
         && same("status", status, sizeof status);
-    if (!is_same) {
-        return 0;
-    }
-    memset(outputs, 0x55, sizeof outputs);
-    returned = model_decode_gated(readings, rest, outputs, status, scratch);
-    is_same = same_int("what decode_gated returns", returned) && same("outputs behind a gate", outputs, sizeof outputs)
-        && same("status behind a gate", status, sizeof status);
 #if MODEL_CONFIDENCE
     if (is_same) {
         const float novelty = model_assess(readings, outputs, scratch);
@@ -91,7 +84,6 @@ static int decodes_as_expected(const struct model_rest *rest)
 
 static int all_are_as_expected(void)
 {
-    struct model_rest rest;
     uint32_t count;
     if (model_selftest() != 0) {
         report("self-test", 0);
@@ -109,13 +101,8 @@ static int all_are_as_expected(void)
 #if MODEL_RELATIVE
         model_set_baseline(baseline);
 #endif
-        model_decode(baseline, rest_outputs, rest_status, scratch);
-        rest.baseline = baseline;
-        rest.outputs = rest_outputs;
-        rest.status = rest_status;
-        rest.tolerance = 0.02f;
         for (; count > 0; count--, frame++) {
-            if (!take(readings, sizeof readings) || !decodes_as_expected(&rest)) {
+            if (!take(readings, sizeof readings) || !decodes_as_expected()) {
                 return 0;
             }
         }

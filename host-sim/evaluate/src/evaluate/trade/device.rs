@@ -97,7 +97,7 @@ impl Wires {
 pub struct Times {
     /// Time of the scan; `None` if it is unknown.
     pub scan_ms: Option<f64>,
-    /// Time of decoding; behind a gate, the mean over the test frames.
+    /// Time of decoding.
     pub decode_ms: f64,
     /// Time from the start of the scan until its estimate is finished: both, and what the processor does between them; of
     /// decoding alone if the scan's is unknown.

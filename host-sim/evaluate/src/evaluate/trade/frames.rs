@@ -11,7 +11,6 @@ use taxel_simulate::outputs::Outputs;
 
 use super::Plan;
 use super::device::Wires;
-use super::gating::Gates;
 use super::touches::Touches;
 use super::worst::OtherContacts;
 use crate::error::Result;
@@ -43,7 +42,6 @@ pub(super) struct Frames<'s> {
 pub(super) struct Inputs {
     /// Projection of the whole array; `None` if each network sees the readings of its row.
     pub projection: Option<Vec<f32>>,
-    pub gates: Gates,
 }
 
 impl Inputs {
@@ -98,8 +96,7 @@ impl<'s> Frames<'s> {
         let inputs = |&whole_array: &bool| {
             let projection =
                 whole_array.then(|| projection::fit(&set.frames, options.features)).transpose()?;
-            let gates = Gates::new(subject, (&test, noise), &plan.gate_k, whole_array)?;
-            Ok(Inputs { projection, gates })
+            Ok(Inputs { projection })
         };
         let inputs = arrays.iter().map(inputs).collect::<Result<_>>()?;
         let scan_ms = plan.device.scan_ms(wires, samples_averaged);

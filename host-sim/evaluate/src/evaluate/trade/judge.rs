@@ -2,17 +2,18 @@
 
 use rayon::prelude::*;
 use taxel_core::filter::{Settings, Track};
+use taxel_core::rbf::Format;
 use taxel_data::progress::Progress;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
 use taxel_learn::train::{
     Examples, FittedNetwork, Layers, Refinement, Samples, WHOLE_ARRAY_SPREAD, refine,
 };
-use taxel_learn::{Exponential, ModelBlob, Options, Origin, Trained, pack};
+use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 
 use super::progress::Part;
 use super::readings::in_words;
 use super::touches::Way;
-use super::ways::{Variant, Ways};
+use super::ways::{Ways, formats};
 use super::{Arithmetic, Device, Point, SLOT_BYTES};
 use crate::error::Result;
 use crate::metrics::{self, Measure};
@@ -42,12 +43,12 @@ impl Judged {
     ) -> Result<()> {
         let (frames, whole_array) = (ways.frames, ways.inputs.whole_array());
         let (projection, fitted) = fit(ways, progress)?;
-        for (index, variant) in ways.variants.iter().enumerate() {
+        for (index, format) in formats().enumerate() {
             let of_rows = fitted.iter().map(|row| row[index].as_ref().cloned());
             let networks = match of_rows.collect::<std::result::Result<_, _>>() {
                 Ok(networks) => networks,
                 Err(cause) => {
-                    self.leave_out(*variant, ways, cause);
+                    self.leave_out(format, ways, cause);
                     continue;
                 }
             };
@@ -58,14 +59,13 @@ impl Judged {
             let origin = Origin { noise, ..origin.clone() };
             let blob = pack(&trained, frames.training(), &origin)?;
             // A network that fell back to direct distances is the point of that format.
-            let fell_back =
-                trained.networks.iter().any(|network| network.format() != variant.format);
+            let fell_back = trained.networks.iter().any(|network| network.format() != format);
             let fits = !whole_array || blob.bytes().len() <= SLOT_BYTES;
             if fell_back || !fits {
                 continue;
             }
-            for arithmetic in Arithmetic::all().filter(|a| a.format == variant.format) {
-                self.points(&blob, (ways, *variant), arithmetic, readings, (device, prices))?;
+            for arithmetic in Arithmetic::all().filter(|a| a.format == format) {
+                self.points(&blob, ways, arithmetic, readings, (device, prices))?;
             }
             self.distinct.push(blob.bytes().to_vec());
         }
@@ -73,9 +73,9 @@ impl Judged {
     }
 
     /// Notes why a format cannot hold a network of these settings.
-    fn leave_out(&mut self, variant: Variant, ways: &Ways<'_>, cause: &taxel_learn::Error) {
+    fn leave_out(&mut self, format: Format, ways: &Ways<'_>, cause: &taxel_learn::Error) {
         let of = if ways.inputs.whole_array() { " array" } else { "" };
-        let (name, centres) = (variant.format.name(), ways.centres);
+        let (name, centres) = (format.name(), ways.centres);
         let readings = in_words(ways.frames.wires.map(|wires| wires.columns), None);
         let cause = match cause {
             taxel_learn::Error::Setting(bad) if bad.field == "spread" => {
@@ -87,21 +87,14 @@ impl Judged {
             }
             cause => cause.to_string(),
         };
-        let note = |rank: &str| format!("{name}{of}, K = {centres}{rank}{readings}: {cause}");
-        // What holds for full rank need not be said again.
-        let rank = variant.output_rank.filter(|_| !self.left_out.contains(&note("")));
-        let note = note(&rank.map_or(String::new(), |rank| format!(", rank {rank}")));
-        if !self.left_out.contains(&note) {
-            self.left_out.push(note);
-        }
+        self.left_out.push(format!("{name}{of}, K = {centres}{readings}: {cause}"));
     }
 
-    /// Adds the points of a network: without a gate, and behind every gate that was measured with its exponential. On contacts
-    /// that move, without a filter and behind one.
+    /// Adds the points of a network: one, and on contacts that move another one behind a filter.
     fn points(
         &mut self,
         blob: &ModelBlob,
-        (Ways { frames, inputs, .. }, variant): (&Ways<'_>, Variant),
+        Ways { frames, inputs, .. }: &Ways<'_>,
         arithmetic: Arithmetic,
         (readings, measure): (usize, &Measure),
         (device, prices): (&Device, &Prices),
@@ -119,19 +112,16 @@ impl Judged {
         // Fewer than asked for where there are fewer distinct samples.
         let centres = design.networks.iter().map(|network| network.shape.centres).max();
         let centres = centres.unwrap_or_default();
-        let costs = prices.frames(&design, arithmetic.exponential)?;
-        let mut add = |(gate_k, filter): (Option<f64>, Settings), frame: Cost, errors| {
+        let cost = prices.frame(&design, arithmetic.exponential)?;
+        let mut add = |filter: Settings, frame: Cost, errors| {
             self.points.push(Point {
                 arithmetic,
                 whole_array: inputs.whole_array(),
                 centres,
-                output_rank: variant.output_rank,
                 spread: blob.spread(),
-                affine_tail: variant.affine_tail,
                 readings,
                 columns: frames.wires.map(|wires| wires.columns),
                 samples_averaged: frames.samples_averaged,
-                gate_k,
                 filter: filter.is_on().then(|| filter.into()),
                 errors,
                 others: others.clone(),
@@ -139,32 +129,23 @@ impl Judged {
                 frame,
                 times: device.times(frames.scan_ms, &frame),
                 blob_bytes: blob.bytes().len(),
-                ram_bytes: if gate_k.is_some() { ram.gated_bytes() } else { ram.bytes() }
+                ram_bytes: ram.bytes()
                     + if filter.is_on() { FILTER_BYTES * test.outputs.names.len() } else { 0 },
                 on_front: false,
             });
             self.blobs.push(self.distinct.len());
         };
-        let (no_gate, no_filter) = (None, Settings::default());
         if let Some(touches) = &frames.touches {
-            let (cost, device) = ((costs.ungated, prices), (device, frames.scan_ms));
+            let (cost, device) = ((cost, prices), (device, frames.scan_ms));
             let touched = touches.judge((blob, &model), cost, device, measure)?;
             for Way { filter, cost, errors, .. } in touched.ways {
-                add((no_gate, filter), cost, errors);
+                add(filter, cost, errors);
             }
             return Ok(());
         }
-        let errors = |estimate: &[f64]| metrics::by_group(&test.outputs, estimate, measure);
         let estimate = model.decode_lines(&test.inputs.values);
-        add((no_gate, no_filter), costs.ungated, errors(&estimate));
-        // Behind a gate with the firmware's exponential alone.
-        if arithmetic.exponential == Exponential::default() {
-            let rest_outputs = model.decode_lines(&inputs.gates.rest_inputs.values);
-            for gate in inputs.gates.iter() {
-                let gated = errors(&gate.gated(&estimate, &rest_outputs));
-                add((Some(gate.k), no_filter), costs.mean_cost(gate.share), gated);
-            }
-        }
+        let errors = metrics::by_group(&test.outputs, &estimate, measure);
+        add(Settings::default(), cost, errors);
         Ok(())
     }
 }
@@ -192,14 +173,14 @@ fn weight(centres: usize) -> usize {
     8 + centres * centres / 640
 }
 
-/// Networks of a row, or of the whole array: one of each variant, or why there is none.
-type OfVariants = Vec<taxel_learn::Result<FittedNetwork>>;
+/// Networks of a row, or of the whole array: one of each format, or why there is none.
+type OfFormats = Vec<taxel_learn::Result<FittedNetwork>>;
 
-/// Networks of every variant on the same layers, for every row, and their projection.
+/// Networks of every format on the same layers, for every row, and their projection.
 fn fit(
-    ways @ Ways { frames, inputs, centres, variants }: &Ways<'_>,
+    ways @ Ways { frames, inputs, centres }: &Ways<'_>,
     progress: &dyn Progress,
-) -> Result<(Option<Vec<f32>>, Vec<OfVariants>)> {
+) -> Result<(Option<Vec<f32>>, Vec<OfFormats>)> {
     let (dataset, whole_array) = (frames.training(), inputs.whole_array());
     let features = frames.options.features.filter(|_| whole_array);
     let spread = match (frames.options.whole_array, whole_array) {
@@ -207,12 +188,11 @@ fn fit(
         (true, false) => frames.options.spread / WHOLE_ARRAY_SPREAD,
         _ => frames.options.spread,
     };
-    let (centres, output_rank) = (*centres, None);
-    let mut options =
-        Options { whole_array, features, output_rank, centres, spread, ..frames.options };
+    let centres = *centres;
+    let mut options = Options { whole_array, features, centres, spread, ..frames.options };
     options.check_for(dataset)?;
     let [refining, fitting] = parts(ways).map(|steps| Part::new(progress, steps, weight(centres)));
-    // Layers are shared by all formats and by networks with and without a tail.
+    // Layers are shared by all formats.
     let mut layers = Layers::behind(inputs.projection.clone(), dataset, &options);
     if let Some(examples) = frames.set.examples() {
         let settings = Refinement::default();
@@ -224,10 +204,8 @@ fn fit(
     let fitted = rows.map(|(row, layer)| {
         let table = layers.seen.row_table(row);
         let samples = Samples::new(&table);
-        let fit = |&Variant { format, affine_tail, output_rank }: &Variant| {
-            samples.fit_layer(layer, &Options { affine_tail, format, output_rank, ..options })
-        };
-        let fitted = variants.par_iter().map(fit).collect();
+        let fit = |format| samples.fit_layer(layer, &Options { format, ..options });
+        let fitted = formats().collect::<Vec<_>>().into_par_iter().map(fit).collect();
         fitting.step();
         fitted
     });

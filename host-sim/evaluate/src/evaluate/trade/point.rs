@@ -73,36 +73,30 @@ pub struct Point {
     pub whole_array: bool,
     /// Number of centres K of each network.
     pub centres: usize,
-    /// Number of components that the network computes, which are expanded to all outputs; `None` if it computes these.
-    pub output_rank: Option<usize>,
     /// Width σ on scaled inputs.
     pub spread: f64,
-    pub affine_tail: bool,
     /// Index of the [readings](super::Trade::readings) that are decoded.
     pub readings: usize,
     /// Number of column-wires that are read; `None` if the readings are not those of wires.
     pub columns: Option<usize>,
     /// Number of samples averaged for each reading.
     pub samples_averaged: usize,
-    /// Tolerance of the gate, in standard deviations of the averaged readings' noise; `None` without a gate.
-    pub gate_k: Option<f64>,
     /// Filter in time behind the decoder; `None` without one.
     pub filter: Option<FilterSettings>,
     /// Errors on the test frames, or on [contacts that move](super::Trade::motion), by group.
     pub errors: Vec<Errors>,
-    /// Errors on still contacts that the model was not trained on, without a gate and a filter; empty for measurements.
+    /// Errors on still contacts that the model was not trained on, without a filter; empty for measurements.
     pub others: Vec<OtherError>,
     /// Ratio of the RMSE to the smallest of all points, by group.
     pub ratio_to_best: Vec<f64>,
-    /// Cost of one frame on a Cortex-M4F; behind a gate, the mean over the test frames.
+    /// Cost of one frame on a Cortex-M4F.
     #[serde(flatten)]
     pub frame: Cost,
     /// Times of one frame on the plan's device.
     #[serde(flatten)]
     pub times: Times,
     pub blob_bytes: usize,
-    /// Size of decoder, frame, estimate and working memory; for a gate also the baseline and its
-    /// estimate.
+    /// Size of decoder, frame, estimate and working memory.
     pub ram_bytes: usize,
     /// Whether the point is on the Pareto front: no other point is at least as good in the time of a frame and the RMSE
     /// of the chosen group, and better in one.
@@ -127,15 +121,12 @@ impl Point {
 
     /// Settings of the point in a few words.
     pub fn name(&self) -> String {
-        let tail = if self.affine_tail { " + tail" } else { "" };
         let samples = Some(self.samples_averaged).filter(|samples| *samples > 1);
         let readings = in_words(self.columns, samples);
-        let gate = self.gate_k.map_or(String::new(), |k| format!(", gate k = {k}"));
-        let rank = self.output_rank.map_or(String::new(), |rank| format!(", rank {rank}"));
         let filter = self.filter.map_or(String::new(), |filter| {
             format!(", filter of {:.1} ms", filter.time_constant_ms)
         });
-        format!("{}, K = {}{rank}{tail}{readings}{gate}{filter}", self.way(), self.centres)
+        format!("{}, K = {}{readings}{filter}", self.way(), self.centres)
     }
 
     /// What the point has to offer by the error of a group.

@@ -6,8 +6,7 @@ use std::collections::HashSet;
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::Format;
 use taxel_data::dataset::Dataset;
-use taxel_learn::Exponential;
-use taxel_learn::cost::{Cost, Design, Prices};
+use taxel_learn::cost::{Design, Prices};
 use taxel_learn::train::projection;
 
 use super::choice::Offer;
@@ -20,37 +19,19 @@ pub(super) struct Ways<'f> {
     pub frames: &'f Frames<'f>,
     pub inputs: &'f Inputs,
     pub centres: usize,
-    /// Networks to fit, the cheapest format first.
-    pub variants: Vec<Variant>,
 }
 
-/// Network to fit: its format, whether it has an affine tail, and the rank of its output weights.
-#[derive(Clone, Copy)]
-pub(super) struct Variant {
-    pub format: Format,
-    pub affine_tail: bool,
-    pub output_rank: Option<usize>,
+/// Formats of the networks to fit, the cheapest first.
+pub(super) fn formats() -> impl DoubleEndedIterator<Item = Format> {
+    Format::ALL.into_iter().rev()
 }
 
 impl<'f> Ways<'f> {
     /// All ways of a plan to decode these `frames`.
     pub fn all(frames: &'f Frames<'f>, plan: &Plan) -> impl Iterator<Item = Self> {
         let of_inputs = |inputs| plan.centres.iter().map(move |centres| (inputs, *centres));
-        frames.inputs.iter().flat_map(of_inputs).map(move |(inputs, centres)| {
-            // Full rank, and for the whole array those of the plan that take fewer multiplications.
-            let outputs = frames.training().outputs.names.len();
-            let fewer = |rank: &usize| rank * (centres + outputs) < centres * outputs;
-            let of_plan = plan.output_ranks.iter().copied().filter(fewer).map(Some);
-            let of_plan = of_plan.filter(|_| inputs.whole_array());
-            let ranks: Vec<Option<usize>> = [None].into_iter().chain(of_plan).collect();
-            let tails =
-                Format::ALL.into_iter().rev().flat_map(|format| [(format, false), (format, true)]);
-            let variants = tails.flat_map(|(format, affine_tail)| {
-                let variant = move |rank: &_| Variant { format, affine_tail, output_rank: *rank };
-                ranks.iter().map(variant)
-            });
-            Self { frames, inputs, centres, variants: variants.collect() }
-        })
+        let ways = frames.inputs.iter().flat_map(of_inputs);
+        ways.map(move |(inputs, centres)| Self { frames, inputs, centres })
     }
 
     /// What every way can offer at best, with an error of 0. Blobs are larger than is said here by less than their units
@@ -61,33 +42,23 @@ impl<'f> Ways<'f> {
         let names_bytes: usize = columns.map(|name| name.len() + 1).sum();
         let distinct = distinct_samples(dataset, self.inputs, self.centres);
         let mut offers = Vec::new();
-        for variant in &self.variants {
-            let design = self.design(*variant, &distinct);
+        for format in formats() {
+            let design = self.design(format, &distinct);
             let blob_bytes = names_bytes + design.parameter_bytes();
             if self.inputs.whole_array() && blob_bytes > SLOT_BYTES {
                 continue;
             }
-            for arithmetic in Arithmetic::all().filter(|it| it.format == variant.format) {
-                let costs = prices.frames(&design, arithmetic.exponential)?;
-                let mut offer = |cost: Cost| {
-                    let times = device.times(self.frames.scan_ms, &cost);
-                    offers.push(Offer { rmse: 0.0, cycles: cost.cycles, blob_bytes, times });
-                };
-                offer(costs.ungated);
-                if arithmetic.exponential == Exponential::default() {
-                    self.inputs.gates.iter().for_each(|gate| offer(costs.mean_cost(gate.share)));
-                }
+            for arithmetic in Arithmetic::all().filter(|it| it.format == format) {
+                let cost = prices.frame(&design, arithmetic.exponential)?;
+                let times = device.times(self.frames.scan_ms, &cost);
+                offers.push(Offer { rmse: 0.0, cycles: cost.cycles, blob_bytes, times });
             }
         }
         Ok(offers)
     }
 
     /// Design of the model that training gives, with at most as many centres as `distinct` samples of each network.
-    fn design(
-        &self,
-        Variant { format, affine_tail, output_rank }: Variant,
-        distinct: &[usize],
-    ) -> Design {
+    fn design(&self, format: Format, distinct: &[usize]) -> Design {
         let (dataset, centres) = (self.frames.training(), self.centres);
         let of_row = |columns: &[String]| columns.len() / dataset.rows;
         let shape = ModelShape {
@@ -96,15 +67,12 @@ impl<'f> Ways<'f> {
             outputs: of_row(&dataset.outputs.names),
         };
         let mut design = match &self.inputs.projection {
-            None => Design::of_rows(shape, format, centres, affine_tail),
+            None => Design::of_rows(shape, format, centres, true),
             Some(parameters) => {
-                let mut design = Design::of_array(shape, format, centres, affine_tail);
+                let mut design = Design::of_array(shape, format, centres, true);
                 let features = parameters.len() / (dataset.inputs.names.len() + 1);
                 design.networks.iter_mut().for_each(|network| network.shape.inputs = features);
-                match output_rank {
-                    Some(components) => design.with_components(components),
-                    None => design,
-                }
+                design
             }
         };
         for (network, most) in design.networks.iter_mut().zip(distinct) {

@@ -71,10 +71,8 @@ mod tests {
         let subject = Subject::Scene(scene.into());
         let plan = |worst_case| Plan {
             centres: vec![8, 64],
-            output_ranks: vec![],
             samples_averaged: vec![1],
             column_steps: vec![1],
-            gate_k: vec![],
             device: Device::default(),
             worst_case,
         };

@@ -5,7 +5,7 @@ use taxel_core::{RowStatus, scratch_floats};
 
 use super::numbers::comment;
 use super::template::Values;
-use crate::cost::{Cost, Design, Gating, Prices};
+use crate::cost::{Cost, Design, Prices};
 use crate::error::Result;
 use crate::export::text::columns;
 use crate::infer::Exponential;
@@ -31,7 +31,7 @@ impl<'b> Facts<'b> {
     /// Facts of the model in `blob`.
     pub fn new(blob: &'b ModelBlob) -> Result<Self> {
         let design = Design::new(blob);
-        let cost = Prices::accepted()?.frame(&design, Exponential::default(), Gating::Ungated)?;
+        let cost = Prices::accepted()?.frame(&design, Exponential::default())?;
         Ok(Self { model: blob.parse(), constant_bytes: constant_bytes(blob), cost })
     }
 
@@ -97,14 +97,11 @@ impl<'b> Facts<'b> {
             ("DECODED", RowStatus::Decoded),
             ("MISSING_READING", RowStatus::MissingReading),
             ("OVERFLOW", RowStatus::Overflow),
-            ("AT_REST", RowStatus::AtRest),
         ] {
             values.set(key, status as u8);
         }
         let array = model.projection().is_some();
         values.set("OR_ANOTHER_ROWS", said(array, ", or one of another row"));
-        let all = " Either all rows are at rest,\n * or all are decoded.";
-        values.set("ALL_ROWS", said(array, all));
         values.set("NETWORKS", self.networks());
         values.set("CONSTANT_BYTES", self.constant_bytes);
         values.set("ROW_READINGS", shape.inputs);

@@ -34,7 +34,7 @@ pub fn arrays(model: &Model<'_>) -> Result<String> {
     let [mut outputs, mut deviations, mut filled, mut status] = [const { Vec::new() }; 4];
     let [mut clamped, mut novelty] = [const { Vec::new() }; 2];
     for frame in &frames {
-        let given = Frame { readings_ohm: frame, reciprocals: &reciprocals, gate: None };
+        let given = Frame { readings_ohm: frame, reciprocals: &reciprocals };
         let any_clamped = decoder.decode_into(given, &mut scratch, &mut estimate.borrowed());
         clamped.push(u8::from(any_clamped.map_err(refused)?).to_string());
         status.push(estimate.status.iter().map(|it| (*it as u8).to_string()).collect());

@@ -38,7 +38,6 @@ pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
         ("accumulate", has(Format::F32Direct) || affine),
         ("rows", !array),
         ("array", array),
-        ("expansion", model.expansion().is_some()),
         ("relative", model.metadata().relative_inputs),
         ("confidence", confidence),
         ("fill", fill),
@@ -58,7 +57,7 @@ pub fn header(name: &Name, flags: &[&str], facts: &Values) -> String {
 /// The source file.
 pub fn code(model: &Model<'_>, name: &Name, flags: &[&str], facts: &mut Values) -> Result<String> {
     facts.set("SIZES", sizes(model));
-    tell_constants(model, facts);
+    tell_constants(facts);
     facts.set("TESTS", selftest::arrays(model)?);
     let names = model.metadata().output_names.iter();
     facts.set(
@@ -104,8 +103,6 @@ fn sizes(model: &Model<'_>) -> String {
         ("ROWS", shape.rows),
         ("READINGS", shape.rows * shape.inputs),
         ("OUTPUTS", shape.rows * shape.outputs),
-        ("ROW_READINGS", shape.inputs),
-        ("ROW_OUTPUTS", shape.outputs),
         ("INPUTS", inputs),
         ("NETWORK_OUTPUTS", outputs),
     ];
@@ -121,8 +118,8 @@ fn sizes(model: &Model<'_>) -> String {
     lines.collect::<Vec<_>>().concat()
 }
 
-/// Constants of formulas, and what depends on the kind of model.
-fn tell_constants(model: &Model<'_>, facts: &mut Values) {
+/// Constants of formulas.
+fn tell_constants(facts: &mut Values) {
     let exp = ["EXP_6", "EXP_5", "EXP_4", "EXP_3", "EXP_2", "EXP_1", "EXP_0"];
     let exp2 = ["EXP2_5", "EXP2_4", "EXP2_3", "EXP2_2", "EXP2_1", "EXP2_0"];
     let floats = exp.into_iter().zip(EXP_COEFFICIENTS);
@@ -134,10 +131,6 @@ fn tell_constants(model: &Model<'_>, facts: &mut Values) {
     {
         facts.set(key, value);
     }
-    let behind = if model.expansion().is_some() { " + NETWORK_OUTPUTS" } else { "" };
-    facts.set("RATIOS", format!("2 * INPUTS{behind}"));
-    let array = model.projection().is_some();
-    facts.set("UNTIL_AWAKE", if array { " && awake == 0" } else { "" });
 }
 
 /// Tables of all networks and of what lies around them, and the function that infers by one of them.
@@ -168,9 +161,6 @@ fn networks(model: &Model<'_>) -> String {
     } else {
         let rows = (0..model.shape().rows).filter_map(|row| model.network_of_row(row));
         tables += &array("uint8_t", "row_network", rows.map(|network| network.to_string()));
-    }
-    if let Some(expansion) = model.expansion() {
-        tables += &floats("expansion", expansion.block());
     }
     tables += "\nstatic int infer(unsigned network, const float *inputs, float *scratch, float *outputs)\n{\n";
     let last = cases.pop().unwrap_or_default();

@@ -4,10 +4,9 @@ use taxel_core::rbf::direct::Parameters;
 use taxel_core::rbf::{Format, Shape};
 use taxel_data::RowTable;
 
-use super::super::hidden_layer::HiddenLayer;
 use super::super::least_squares::{Design, Regressors};
 use super::super::tasks::Factors;
-use super::super::{InputScale, Options, Samples};
+use super::super::{HiddenLayer, InputScale, Options, Samples};
 use super::{FittedNetwork, Held, Targets, Weights};
 use crate::error::Result;
 
@@ -15,19 +14,17 @@ use crate::error::Result;
 pub(super) struct Direct {
     scale: InputScale,
     centres: Vec<f64>,
-    /// Decays rounded to f32, as the device will use them, so that weights fit the device's activations: one for all
-    /// centres, or one for each.
-    decays: Vec<f64>,
+    /// Decay of all centres, rounded to f32 as the device will use it, so that weights fit the device's activations.
+    decay: f64,
     affine_tail: bool,
 }
 
 impl Direct {
     pub(super) fn new(samples: &Samples<'_>, layer: &HiddenLayer, options: &Options) -> Self {
-        let decay = |width: &f64| f64::from((1.0 / (2.0 * width * width)) as f32);
         Self {
             scale: samples.scale.clone(),
             centres: layer.centres.clone(),
-            decays: layer.widths().iter().map(decay).collect(),
+            decay: f64::from((1.0 / (2.0 * layer.spread * layer.spread)) as f32),
             affine_tail: options.affine_tail,
         }
     }
@@ -36,7 +33,7 @@ impl Direct {
         Regressors {
             centres: &self.centres,
             inputs: self.scale.minimum.len(),
-            decays: &self.decays,
+            decays: std::slice::from_ref(&self.decay),
             affine_tail: self.affine_tail,
         }
     }
@@ -56,7 +53,7 @@ impl Held for Direct {
             input_minimum: &round(&self.scale.minimum),
             input_per_span: &round(&self.scale.per_span),
             centres: &round(&self.centres),
-            decay: &round(&self.decays),
+            decay: &[self.decay as f32],
             output_weights: &round(&weights.centres),
             bias: &round(&weights.bias),
             affine: &round(&weights.affine),

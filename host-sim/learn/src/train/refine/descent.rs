@@ -9,8 +9,7 @@ use super::movable::{Movable, Piece, Sizes};
 use super::sources::Start;
 use super::width;
 use crate::error::Result;
-use crate::train::Options;
-use crate::train::hidden_layer::HiddenLayer;
+use crate::train::{HiddenLayer, Options};
 
 /// Factor on the ranges of features, which are seen on a few frames at a time and are wider on all.
 const UNSEEN_RANGE: f64 = 1.1;
@@ -21,7 +20,7 @@ pub(super) struct Descent {
     /// Outputs of each task.
     tasks: Vec<Vec<usize>>,
     adam: Adam,
-    /// Largest floor that the widths are kept above.
+    /// Largest floor that the width is kept above.
     floor_at_most: f64,
     format: Format,
     /// Ranges that inputs are scaled by, unless they are mixed: those change.
@@ -37,20 +36,17 @@ impl Descent {
         let sizes = Sizes {
             inputs,
             centres: layer.centres.len() / inputs,
-            widths: layer.relative_widths.len().max(1),
             sources: mix.len() / inputs,
             affine_tail: options.affine_tail,
         };
-        let movable = Movable::new(sizes, &layer.centres, &layer.widths(), &mix);
-        // Only direct distances have a width for each centre.
-        let format = if sizes.widths > 1 { Format::F32Direct } else { options.format };
+        let movable = Movable::new(sizes, &layer.centres, layer.spread, &mix);
         let adam = Adam::new(settings.rate, settings.steps, movable.values.len());
         Self {
             movable,
             tasks,
             adam,
-            floor_at_most: width::floor_at_most(format, layer.spread),
-            format,
+            floor_at_most: width::floor_at_most(options.format, layer.spread),
+            format: options.format,
             ranges,
             ridge: options.penalty.unwrap_or(settings.ridge),
         }
@@ -83,7 +79,7 @@ impl Descent {
         }
     }
 
-    /// Makes the widths so large that the format holds it.
+    /// Makes the width so large that the format holds it.
     pub(super) fn hold(&mut self, pieces: &[&Piece]) {
         if self.floor_at_most > 0.0 {
             let least = width::least(self.format, self.movable.centres(), &self.ranges(pieces));
@@ -106,7 +102,7 @@ impl Descent {
     /// Where the descent has come to: the hidden layer among mixed inputs, and the mix.
     pub(super) fn layer(&self) -> (HiddenLayer, &[f64]) {
         let movable = &self.movable;
-        let layer = HiddenLayer::with_widths(movable.centres().to_vec(), &movable.widths());
+        let layer = HiddenLayer { centres: movable.centres().to_vec(), spread: movable.width() };
         (layer, movable.mix())
     }
 }

@@ -1,7 +1,5 @@
-//! What refinement moves: centres, widths and the mix of a network, as one list of numbers; activations for
+//! What refinement moves: centres, width and the mix of a network, as one list of numbers; activations for
 //! given samples, and the way back from a loss's derivative by regressors to that by these numbers.
-
-use std::ops::Range;
 
 use taxel_data::widest;
 
@@ -14,8 +12,6 @@ pub(super) struct Sizes {
     /// Number of inputs that the network sees.
     pub(super) inputs: usize,
     pub(super) centres: usize,
-    /// Number of widths: one for all centres, or one for each.
-    pub(super) widths: usize,
     /// Number of numbers that the inputs are mixed of; 0 if the network sees samples as they are.
     pub(super) sources: usize,
     pub(super) affine_tail: bool,
@@ -28,7 +24,7 @@ impl Sizes {
     }
 }
 
-/// Centres (`centres × inputs`), the logarithms of the widths, and the mix (`sources × inputs`) if there is one.
+/// Centres (`centres × inputs`), the logarithm of their width, and the mix (`sources × inputs`) if there is one.
 #[derive(Debug, Clone)]
 pub(super) struct Movable {
     pub(super) sizes: Sizes,
@@ -36,31 +32,30 @@ pub(super) struct Movable {
 }
 
 impl Movable {
-    /// Start of a network with these `centres`, `widths` and mix (empty for none).
-    pub(super) fn new(sizes: Sizes, centres: &[f64], widths: &[f64], mix: &[f64]) -> Self {
-        let logarithms: Vec<f64> = widths.iter().map(|width| libm::log(*width)).collect();
-        Self { sizes, values: [centres, &logarithms, mix].concat() }
+    /// Start of a network with these `centres`, their `width`, and the mix (empty for none).
+    pub(super) fn new(sizes: Sizes, centres: &[f64], width: f64, mix: &[f64]) -> Self {
+        Self { sizes, values: [centres, &[libm::log(width)], mix].concat() }
     }
 
     pub(super) fn centres(&self) -> &[f64] {
         &self.values[..self.sizes.centres * self.sizes.inputs]
     }
 
-    /// Widths: one for all centres, or one for each.
-    pub(super) fn widths(&self) -> Vec<f64> {
-        self.values[self.width_places()].iter().map(|log| libm::exp(*log)).collect()
+    /// Width of all centres.
+    pub(super) fn width(&self) -> f64 {
+        libm::exp(self.values[self.width_place()])
     }
 
     /// What each input adds to each mixed input; empty without a mix.
     pub(super) fn mix(&self) -> &[f64] {
-        &self.values[self.width_places().end..]
+        &self.values[self.width_place() + 1..]
     }
 
-    /// Makes every width at least so large.
+    /// Makes the width at least so large.
     pub(super) fn widen_to(&mut self, least: f64) {
-        let places = self.width_places();
+        let place = self.width_place();
         if least > 0.0 {
-            self.values[places].iter_mut().for_each(|log| *log = log.max(libm::log(least)));
+            self.values[place] = self.values[place].max(libm::log(least));
         }
     }
 
@@ -87,20 +82,18 @@ impl Movable {
         mixed
     }
 
-    fn width_places(&self) -> Range<usize> {
-        let first = self.sizes.centres * self.sizes.inputs;
-        first..first + self.sizes.widths
+    fn width_place(&self) -> usize {
+        self.sizes.centres * self.sizes.inputs
     }
 
     /// Computes the regressors of the samples in `piece`.
     pub(super) fn activate(&self, piece: &Piece) -> Activated {
         let Sizes { inputs, centres, affine_tail, .. } = self.sizes;
         let mixed = self.mixed(piece);
-        let widths = self.widths();
+        let decay = 0.5 / self.width().powi(2);
         let mut exponents = vec![[0.0; SIDE]; centres];
-        let gaussians = self.centres().chunks_exact(inputs).zip(widths.iter().cycle());
-        for (exponents, (centre, width)) in exponents.iter_mut().zip(gaussians) {
-            *exponents = exponents_of(&mixed, centre, 0.5 / width.powi(2));
+        for (exponents, centre) in exponents.iter_mut().zip(self.centres().chunks_exact(inputs)) {
+            *exponents = exponents_of(&mixed, centre, decay);
         }
         let mut regressors = exponents.clone();
         for line in &mut regressors {
@@ -125,12 +118,12 @@ impl Movable {
         gradient: &mut [f64],
     ) {
         let Sizes { inputs, centres, sources, affine_tail, .. } = self.sizes;
-        let per_variance: Vec<f64> = self.widths().iter().map(|width| width.powi(-2)).collect();
-        let places = self.width_places();
+        let per_variance = self.width().powi(-2);
+        let width_place = self.width_place();
         let mut by_exponents = by_regressors;
         let by_tail = by_exponents.split_off(centres);
         let lines = by_exponents.iter_mut().zip(&activated.regressors).zip(&activated.exponents);
-        for (((by_exponent, activation), exponent), place) in lines.zip(places.clone().cycle()) {
+        for ((by_exponent, activation), exponent) in lines {
             let mut sums = [0.0; SIDE];
             widest!({
                 for s in 0..SIDE {
@@ -138,7 +131,7 @@ impl Movable {
                     sums[s] = -2.0 * exponent[s] * by_exponent[s];
                 }
             });
-            gradient[place] += sums.iter().sum::<f64>();
+            gradient[width_place] += sums.iter().sum::<f64>();
         }
 
         let ones = activated.regressors.last().expect("the bias's regressor");
@@ -146,34 +139,24 @@ impl Movable {
         let mut sums = vec![0.0; centres * (inputs + 1)];
         add_products(&by_exponents, &with_one, &mut sums);
         let lines = self.centres().chunks_exact(inputs).zip(sums.chunks_exact(inputs + 1));
-        let lines = lines.zip(per_variance.iter().cycle());
-        for (((centre, sums), per_variance), place) in lines.zip(gradient.chunks_exact_mut(inputs))
-        {
+        for ((centre, sums), place) in lines.zip(gradient.chunks_exact_mut(inputs)) {
             for ((place, c), sum) in place.iter_mut().zip(centre).zip(sums) {
                 *place += (sum - c * sums[inputs]) * per_variance;
             }
         }
 
         if sources > 0 {
-            // What all centres share is a factor on the sums, and what each has of its own is one on its terms.
-            let (own, shared) = match per_variance.as_slice() {
-                [shared] => (vec![1.0; centres], *shared),
-                own => (own.to_vec(), 1.0),
-            };
-            let lines = self.centres().chunks_exact(inputs).zip(&own);
-            let factors: Vec<f64> =
-                lines.flat_map(|(centre, own)| centre.iter().map(move |c| c * own)).collect();
             let mut by_mixed = vec![[0.0; SIDE]; inputs];
-            add_combinations(&factors, &by_exponents, &mut by_mixed);
+            add_combinations(self.centres(), &by_exponents, &mut by_mixed);
             let mut total = [[0.0; SIDE]];
-            add_combinations(&own, &by_exponents, &mut total);
+            add_combinations(&vec![1.0; centres], &by_exponents, &mut total);
             for (j, (by_mixed, mixed)) in by_mixed.iter_mut().zip(&activated.mixed).enumerate() {
                 for s in 0..SIDE {
                     let by_tail = if affine_tail { by_tail[j][s] } else { 0.0 };
-                    by_mixed[s] = by_tail + (by_mixed[s] - mixed[s] * total[0][s]) * shared;
+                    by_mixed[s] = by_tail + (by_mixed[s] - mixed[s] * total[0][s]) * per_variance;
                 }
             }
-            add_products(&piece.inputs, &by_mixed, &mut gradient[places.end..]);
+            add_products(&piece.inputs, &by_mixed, &mut gradient[width_place + 1..]);
         }
     }
 }

@@ -12,9 +12,8 @@ use super::movable::Piece;
 use super::targets::Targets;
 use super::{turn, width};
 use crate::error::Result;
-use crate::train::hidden_layer::HiddenLayer;
 use crate::train::layers::Layers;
-use crate::train::{InputScale, projection};
+use crate::train::{HiddenLayer, InputScale, projection};
 
 /// Size of a reading as a source: so many times a typical part of the projection, for a reading of one standard
 /// deviation. The larger, the faster single parts move.

@@ -76,8 +76,7 @@ fn gradient_is_the_slope(sizes: Sizes, loss: &dyn Fn(&Movable) -> Loss) {
     let mut draw = draws(5);
     let centres: Vec<f64> = (0..sizes.centres * sizes.inputs).map(|_| draw()).collect();
     let mix: Vec<f64> = (0..sizes.sources * sizes.inputs).map(|_| draw()).collect();
-    let widths: Vec<f64> = (0..sizes.widths).map(|_| 0.8 + 0.3 * draw()).collect();
-    let movable = Movable::new(sizes, &centres, &widths, &mix);
+    let movable = Movable::new(sizes, &centres, 0.8 + 0.3 * draw(), &mix);
     let found = loss(&movable).gradient;
     assert_eq!(found.len(), movable.values.len());
     let scale = found.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
@@ -93,34 +92,9 @@ fn gradient_is_the_slope(sizes: Sizes, loss: &dyn Fn(&Movable) -> Loss) {
 }
 
 #[test]
-fn a_width_for_each_centre_moves_by_itself() {
-    let world = World { read_rows: vec![3], ..World::press() };
-    let synthesis = Synthesis::new(&world);
-    let (training, test) =
-        (synthesis.frames(Stream::Training, 3000), synthesis.frames(Stream::Test, 1000));
-    let fresh = Fresh(synthesis);
-    let options =
-        Options { centres: 8, widths: crate::train::Widths::Neighbours, ..Options::default() };
-    let start = Layers::start(&training, &options).unwrap();
-    let examples = Examples::Fresh(&fresh);
-    let refined = refine(&training, &start, &options, &quick(), examples, &Silent).unwrap();
-    let ratios: Vec<f64> = (refined.hidden[0].widths().iter())
-        .zip(start.hidden[0].widths())
-        .map(|(after, before)| after / before)
-        .collect();
-    let (least, most) = ratios.iter().fold((f64::MAX, 0.0_f64), |(l, m), r| (l.min(*r), m.max(*r)));
-    assert!(most > 1.2 * least, "{ratios:?}");
-    let [before, after] = [start, refined]
-        .map(|layers| rmse(&crate::train::fit(&layers, &options, &Silent).unwrap(), &test));
-    assert!(after < 0.98 * before, "{after} and {before}");
-}
-
-#[test]
 fn gradients_are_slopes_of_the_loss() {
-    for (sources, affine_tail, widths) in
-        [(0, true, 1), (0, true, 6), (5, true, 1), (5, true, 6), (5, false, 6)]
-    {
-        let sizes = Sizes { inputs: 3, centres: 6, widths, sources, affine_tail };
+    for (sources, affine_tail) in [(0, true), (5, true), (5, false)] {
+        let sizes = Sizes { inputs: 3, centres: 6, sources, affine_tail };
         let given = if sources > 0 { sources } else { 3 };
         // The second piece of the rest is not full.
         let [rest, held] = [(300, 1), (100, 2)].map(|(count, purpose)| {
@@ -162,7 +136,7 @@ fn of_two_tasks(tasks: &[Vec<usize>; 2], count: usize, purpose: u64) -> [Vec<Pie
 
 #[test]
 fn tasks_that_share_activations_have_the_sum_of_their_losses_and_of_its_slopes() {
-    let sizes = Sizes { inputs: 3, centres: 6, widths: 1, sources: 0, affine_tail: true };
+    let sizes = Sizes { inputs: 3, centres: 6, sources: 0, affine_tail: true };
     let tasks = [vec![0, 2], vec![1]];
     let (rest, held) = (of_two_tasks(&tasks, 300, 1), of_two_tasks(&tasks, 200, 2));
     let [rest, held] =
@@ -174,7 +148,7 @@ fn tasks_that_share_activations_have_the_sum_of_their_losses_and_of_its_slopes()
 
     let mut draw = draws(5);
     let centres: Vec<f64> = (0..18).map(|_| draw()).collect();
-    let movable = Movable::new(sizes, &centres, &[0.8], &[]);
+    let movable = Movable::new(sizes, &centres, 0.8, &[]);
     let alone = [1, 2].map(|task| {
         let only = [(0..tasks[task - 1].len()).collect()];
         let loss = on_held_out(&movable, &only, &rest[task], &held[task], 1e-3).unwrap().unwrap();
@@ -196,10 +170,10 @@ fn tasks_that_share_activations_have_the_sum_of_their_losses_and_of_its_slopes()
 /// An output that no sample on one side has takes no part, and none is left if there is no other.
 #[test]
 fn a_task_without_samples_on_both_sides_has_no_loss() {
-    let sizes = Sizes { inputs: 3, centres: 6, widths: 1, sources: 0, affine_tail: true };
+    let sizes = Sizes { inputs: 3, centres: 6, sources: 0, affine_tail: true };
     let mut draw = draws(5);
     let centres: Vec<f64> = (0..18).map(|_| draw()).collect();
-    let movable = Movable::new(sizes, &centres, &[0.8], &[]);
+    let movable = Movable::new(sizes, &centres, 0.8, &[]);
     let without = |output: Option<usize>, count: usize, purpose: u64| {
         let (x, mut y) = samples(3, 2, count, purpose);
         y.chunks_exact_mut(2).for_each(|line| output.into_iter().for_each(|o| line[o] = f64::NAN));

@@ -49,8 +49,7 @@ fn without_a_rest_the_networks_are_those_of_training_in_memory() {
     for (format, whole_array) in
         [(Format::F32, false), (Format::Fixed16, false), (Format::F32Direct, true)]
     {
-        let rank = whole_array.then_some(12);
-        let options = Options { format, whole_array, output_rank: rank, ..options() };
+        let options = Options { format, whole_array, ..options() };
         let streamed = by_recursion(900, 900, 1, &options, None).0;
         let in_memory = super::super::train(&frames, &options, &Silent).unwrap();
         assert_eq!(streamed.networks, in_memory.networks, "{}", format.name());

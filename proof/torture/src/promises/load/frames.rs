@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use mock_board::{
-    Bench, Board, Flash, Memory, Running, ask, blob, blob_of_components, blob_with_confidence,
+    Bench, Board, Flash, Memory, Running, ask, blob, blob_of_features, blob_with_confidence,
     find_report, frame_at_rest, quiet, statistics,
 };
 use rand_core::{Rng, SeedableRng};
@@ -85,9 +85,9 @@ fn years(seed: u64, frames: u64) -> f64 {
     mean_us * cases as f64 * f64::from(FRAMES_PER_CASE) / 1e6 / 86_400.0 / 365.25
 }
 
-/// Runs an application for some thousands of frames: with a model or none, gated or not.
+/// Runs an application for some thousands of frames: with a model or none.
 fn run(seed: u64, memory: &mut Memory) -> Result<(), String> {
-    let models = [blob(1, 1), blob_with_confidence(false), blob_of_components(2), blob(3, 5)];
+    let models = [blob(1, 1), blob_with_confidence(false), blob_of_features(2), blob(3, 5)];
     let mut slots = match seed / 4 % 5 {
         4 => Flash::slots(),
         model => Flash::slots_with(&models[model as usize]),
@@ -96,7 +96,6 @@ fn run(seed: u64, memory: &mut Memory) -> Result<(), String> {
     let configuration = Configuration {
         frame_period_us: period_us,
         send_readings: seed / 20 % 2 == 1,
-        rest_tolerance: if seed / 40 % 2 == 1 { 0.01 } else { 0.0 },
         confidence: ConfidenceSent::Deviations,
         ..quiet()
     };

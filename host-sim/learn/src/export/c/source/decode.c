@@ -52,15 +52,11 @@ static float relative(const float *readings, unsigned index)
 
 //@end
 //@if rows
-/* Decodes the rows of a frame, but for those that a gate has marked as at rest. */
-static int decode(const float *readings, float *outputs, uint8_t *status, float *scratch, int gated)
+int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, float *scratch)
 {
     int clamped = 0;
     for (unsigned row = 0; row < ROWS; row++) {
         const float *inputs = readings + row * INPUTS;
-        if (gated && status[row] == TAXEL_MODEL_AT_REST) {
-            continue;
-        }
 //@if relative
         for (unsigned i = 0; i < INPUTS; i++) {
             scratch[INPUTS + i] = relative(readings, row * INPUTS + i);
@@ -75,21 +71,14 @@ static int decode(const float *readings, float *outputs, uint8_t *status, float 
 //@end
 //@if array
 /* Decodes all rows of a frame at once, behind a projection of all readings to features. */
-static int decode(const float *readings, float *outputs, uint8_t *status, float *scratch, int gated)
+int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, float *scratch)
 {
     float *const features = scratch + INPUTS;
-//@if expansion
-    float *const inferred = scratch + 2 * INPUTS;
-//@end
-//@if !expansion
-    float *const inferred = outputs;
-//@end
     uint8_t of_all;
     int clamped;
-    (void)gated; /* Either all rows are at rest, or all are decoded. */
 //@if relative
     {
-        float *const ratios = scratch + @RATIOS@;
+        float *const ratios = scratch + 2 * INPUTS;
         for (unsigned i = 0; i < READINGS; i++) {
             ratios[i] = relative(readings, i);
         }
@@ -97,61 +86,12 @@ static int decode(const float *readings, float *outputs, uint8_t *status, float 
     }
 //@end
     project(projection, readings, READINGS, features, INPUTS);
-    clamped = decode_inputs(0, features, scratch, inferred, &of_all);
+    clamped = decode_inputs(0, features, scratch, outputs, &of_all);
     if (of_all == TAXEL_MODEL_MISSING_READING && all_finite(readings, READINGS)) {
         of_all = TAXEL_MODEL_OVERFLOW;
     }
-//@if expansion
-    if (of_all == TAXEL_MODEL_DECODED) {
-        project(expansion, inferred, NETWORK_OUTPUTS, outputs, OUTPUTS);
-    } else {
-        fill_with(outputs, OUTPUTS, not_a_number());
-    }
-//@end
     memset(status, of_all, ROWS);
     return clamped;
 }
 
 //@end
-int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, float *scratch)
-{
-    return decode(readings, outputs, status, scratch, 0);
-}
-
-/* Whether a row is at rest. False for what is not a number. */
-static int is_at_rest(const float *readings, const float *baseline, float tolerance)
-{
-    float change = 0.0f, most_change = 0.0f;
-    for (unsigned i = 0; i < ROW_READINGS; i++) {
-        const float difference = readings[i] - baseline[i];
-        const float most = tolerance * baseline[i];
-        if (!(difference <= most && -difference <= most)) {
-            return 0;
-        }
-        change += difference;
-        most_change += most;
-    }
-    return change * change * (float)ROW_READINGS <= most_change * most_change;
-}
-
-int taxel_model_decode_gated(const float *readings, const struct taxel_model_rest *rest, float *outputs,
-                             uint8_t *status, float *scratch)
-{
-    unsigned awake = 0;
-    if (!(rest->tolerance > 0.0f && rest->tolerance < 1.0f)) {
-        return decode(readings, outputs, status, scratch, 0);
-    }
-    for (unsigned row = 0; row < ROWS@UNTIL_AWAKE@; row++) {
-        const unsigned first = row * ROW_OUTPUTS;
-        if (rest->status[row] == TAXEL_MODEL_DECODED
-            && is_at_rest(readings + row * ROW_READINGS, rest->baseline + row * ROW_READINGS, rest->tolerance)) {
-            memcpy(outputs + first, rest->outputs + first, ROW_OUTPUTS * sizeof *outputs);
-            status[row] = TAXEL_MODEL_AT_REST;
-        } else {
-            status[row] = TAXEL_MODEL_MISSING_READING; /* until it is decoded */
-            awake++;
-        }
-    }
-    return awake > 0 ? decode(readings, outputs, status, scratch, 1) : 0;
-}
-

@@ -32,9 +32,7 @@ enum taxel_model_status {
     /* A reading of the row is not finite@OR_ANOTHER_ROWS@; the outputs are NaN. */
     TAXEL_MODEL_MISSING_READING = @MISSING_READING@,
     /* Readings are so large that an output overflowed; the outputs are NaN. */
-    TAXEL_MODEL_OVERFLOW = @OVERFLOW@,
-    /* The row is untouched and was skipped; the outputs are those at rest. Only taxel_model_decode_gated says so. */
-    TAXEL_MODEL_AT_REST = @AT_REST@
+    TAXEL_MODEL_OVERFLOW = @OVERFLOW@
 };
 
 /* Decodes one frame: `readings` [TAXEL_MODEL_READINGS], NaN where one is missing, to `outputs` [TAXEL_MODEL_OUTPUTS]
@@ -45,23 +43,6 @@ enum taxel_model_status {
  * outside that range: such outputs are guesses. Else it returns 0.
  */
 int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, float *scratch);
-
-/* The sensor at rest: what a gate compares frames with. */
-struct taxel_model_rest {
-    /* Mean of frames at rest [TAXEL_MODEL_READINGS]. */
-    const float *baseline;
-    /* What taxel_model_decode makes of the baseline: outputs [TAXEL_MODEL_OUTPUTS] and status [TAXEL_MODEL_ROWS]. */
-    const float *outputs;
-    const uint8_t *status;
-    /* Largest change of a reading at rest, relative to its baseline; above 0 and below 1, else no row is skipped. */
-    float tolerance;
-};
-
-/* Decodes as taxel_model_decode does, but skips rows at rest: each reading is within the tolerance of its baseline, and
- * the sum of n readings within tolerance / sqrt(n). They get the outputs at rest.@ALL_ROWS@
- */
-int taxel_model_decode_gated(const float *readings, const struct taxel_model_rest *rest, float *outputs,
-                             uint8_t *status, float *scratch);
 
 //@if relative
 /* Takes the readings of the untouched sensor [TAXEL_MODEL_READINGS], which readings are divided by. Before that, all
