@@ -17,7 +17,6 @@ use crate::store::{ConfirmedModels, Slot, Upload};
 mod buffers;
 mod configuration;
 mod frame_clock;
-mod lease;
 mod link;
 mod session_end;
 mod model;
@@ -25,15 +24,12 @@ mod wiring;
 mod sensor;
 mod saved_settings;
 mod work;
-mod authenticity;
-mod recheck;
 mod trial;
 mod models;
 mod undo;
 mod session;
 mod answer;
 
-use authenticity::Authenticity;
 pub use buffers::Buffers;
 use link::Link;
 use models::Models;
@@ -89,7 +85,6 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             confirmed: ConfirmedModels::NONE,
             upload: Upload::new(),
             trial: Trial::default(),
-            authenticity: Authenticity::new(journal),
         };
         let now_us = platform.now_us();
         let mut link = Link::new(platform, message);

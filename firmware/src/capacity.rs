@@ -81,11 +81,11 @@ impl Capacity {
     }
 
     /// Bytes of the longest message: a report of all readings, or of all outputs and their deviations, the circuit's
-    /// constants in a seal, or an identity.
+    /// constants, or an identity.
     pub const fn message_bytes(self) -> usize {
-        let readings = 4 * self.rows * self.columns + 88;
+        let readings = 4 * self.rows * self.columns + 40;
         let estimate = 4 * 2 * self.all_outputs() + self.rows + 48;
-        let constants = 4 * (self.rows + 2 * self.columns) + 88;
+        let constants = 4 * (self.rows + 2 * self.columns) + 40;
         let parts = [readings, estimate, constants, 256];
         let (mut longest, mut part) = (0, 0);
         while part < parts.len() {

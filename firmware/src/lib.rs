@@ -13,8 +13,6 @@
 
 // From the ground up: a module imports only what is declared before it.
 mod log;
-#[cfg(feature = "seal")]
-pub mod seal;
 pub mod circuit;
 pub mod readout;
 pub mod link;

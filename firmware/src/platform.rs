@@ -33,15 +33,9 @@ pub trait Platform: Port {
     /// What survives a restart besides the slots.
     fn journal(&mut self) -> &mut Journal<Self::Page>;
 
-    /// Number that no other board of its kind has, so that a request sealed for one device is none for another; zeros on
-    /// a board without one.
+    /// Number that no other board of its kind has; zeros on a board without one.
     fn unique_id(&self) -> [u8; 12] {
         [0; 12]
-    }
-
-    /// Whether somebody at the board lets it take its first key: by a button held at the start, or a strap.
-    fn may_provision(&self) -> bool {
-        false
     }
 
     /// Count of the processor's cycles, which wraps around; always 0 on a board without a counter.

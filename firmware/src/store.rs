@@ -11,7 +11,7 @@ mod confirmed;
 mod upload;
 
 pub use confirmed::ConfirmedModels;
-pub use journal::{Journal, KeepError, KeyFound, Kind, PAGE_BYTES};
+pub use journal::{Journal, KeepError, Kind, PAGE_BYTES};
 pub use upload::Upload;
 
 /// Error of a flash that could not be erased or written.

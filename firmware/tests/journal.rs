@@ -4,10 +4,7 @@ use mock_board::Flash;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use taxel_core::checksum::CRC_32;
-use taxel_firmware::store::{Journal, KeepError, KeyFound, Kind, PAGE_BYTES, Slot};
-
-const OURS: [u8; 32] = [0xA5; 32];
-const OTHER: [u8; 32] = [0x3C; 32];
+use taxel_firmware::store::{Journal, KeepError, Kind, PAGE_BYTES, Slot};
 
 /// Kinds of settings.
 const SETTINGS: [Kind; 3] = [Kind::Configuration, Kind::Constants, Kind::Baseline];
@@ -21,10 +18,9 @@ fn erases(journal: &mut Journal<Flash>) -> usize {
     journal.pages().iter().map(|page| page.erases).sum()
 }
 
-/// A journal with a key, and the constants `[7; 100]`.
-fn with_key(key: &[u8; 32]) -> Journal<Flash> {
+/// A journal with the constants `[7; 100]`, in its second page.
+fn with_constants() -> Journal<Flash> {
     let mut journal = Flash::journal();
-    journal.keep(Kind::Key, &[key]).unwrap();
     journal.keep(Kind::Constants, &[&[7; 100]]).unwrap();
     journal
 }
@@ -41,12 +37,9 @@ fn starts(page: &[u8]) -> Vec<usize> {
     items(page, b"\xFF\0\x04\0")
 }
 
-fn keys(page: &[u8]) -> Vec<usize> {
-    items(page, &[Kind::Key as u8, 0, 32, 0])
-}
 #[test]
 fn no_flipped_bit_of_a_start_item_loses_anything_and_a_start_makes_it_good() {
-    let mut journal = with_key(&OURS);
+    let mut journal = with_constants();
     let pages = bytes_of(&mut journal);
     let starts = starts(&pages[1]);
     assert_eq!(starts.len(), 2);
@@ -57,82 +50,9 @@ fn no_flipped_bit_of_a_start_item_loses_anything_and_a_start_makes_it_good() {
         for _ in 0..2 {
             assert_eq!(journal.recover(), Ok(()));
             assert_eq!(journal.read(Kind::Constants), Some(&[7; 100][..]), "{bit}");
-            assert_eq!(journal.key(), KeyFound::Set(&OURS), "{bit}");
         }
         let whole = bytes_of(&mut journal).iter().map(|page| self::starts(page).len()).max();
         assert!(whole >= Some(2), "{bit}");
-    }
-}
-
-#[test]
-fn no_flipped_bit_turns_the_key_off_or_takes_it_away_and_a_start_makes_it_good() {
-    let mut journal = with_key(&OURS);
-    let pages = bytes_of(&mut journal);
-    let keys = keys(&pages[1]);
-    assert_eq!(keys.len(), 2);
-    for bit in 0..8 * 48 {
-        let mut page = pages[1].clone();
-        page[keys[0] + bit / 8] ^= 1 << (bit % 8);
-        let mut journal = Flash::journal_of([&pages[0], &page]);
-        assert_eq!(journal.recover(), Ok(()));
-        assert_eq!(journal.key(), KeyFound::Set(&OURS), "{bit}");
-        // Any bit of the other copy does no more harm: there are two again.
-        for page in journal.pages() {
-            page.decay(keys[1] / 4 + bit / 32, 1 << (bit % 32));
-        }
-        assert_eq!(journal.recover(), Ok(()));
-        assert_eq!(journal.key(), KeyFound::Set(&OURS), "{bit}");
-    }
-}
-
-#[test]
-fn with_both_copies_decayed_a_key_is_damaged_for_good_and_other_items_can_be_read() {
-    let mut journal = with_key(&OURS);
-    let keys = keys(&bytes_of(&mut journal)[1]);
-    keys.iter().for_each(|key| journal.pages()[1].decay(key / 4 + 3, 1));
-    for number in 0..=255 {
-        assert_eq!(journal.key(), KeyFound::Damaged);
-        assert_eq!(journal.read(Kind::Constants), Some(&[7; 100][..]));
-        // A page that is full is not left: the other one would seem to have no key.
-        let kept = journal.keep(Kind::Configuration, &[&[number; 40]]);
-        assert!(kept.is_ok() || number > 110, "{number}");
-        assert!(kept.is_err() || number < 128, "{number}");
-        assert_eq!(journal.keep(Kind::Key, &[&OTHER]), Err(KeepError::Failed));
-    }
-}
-
-#[test]
-fn a_key_is_replaced_and_the_one_before_never_comes_back() {
-    let mut journal = with_key(&OURS);
-    assert_eq!(journal.keep(Kind::Key, &[&OURS]), Ok(false));
-    assert_eq!(journal.keep(Kind::Key, &[&OTHER]), Ok(true));
-    assert_eq!(journal.key(), KeyFound::Set(&OTHER));
-    for page in [0, 1] {
-        let places = keys(&bytes_of(&mut journal)[page]);
-        let in_use = journal.pages()[page].bytes()[places[0] + 8] == OTHER[0];
-        assert_eq!(places.len(), 2);
-        places.iter().filter(|_| in_use).for_each(|place| {
-            journal.pages()[page].decay(place / 4 + 3, 1);
-        });
-    }
-    assert_eq!(journal.key(), KeyFound::Damaged);
-}
-
-/// Whoever may keep a setting could hide an item in it, and let the power go before it is whole.
-#[test]
-fn a_key_that_hides_in_an_unfinished_setting_is_none() {
-    let hidden = bytes_of(&mut with_key(&OURS))[1][..64].to_vec();
-    let mut journal = Flash::journal();
-    journal.keep(Kind::Constants, &[&[7; 100]]).unwrap();
-    let content = [&[0; 24][..], &hidden].concat();
-    journal.pages()[0].cut_power_after(2 + content.len() as u64 / 4);
-    assert_eq!(journal.keep(Kind::Baseline, &[&content]), Err(KeepError::Failed));
-    journal.pages()[0].power_on();
-    let [_, page] = bytes_of(&mut journal);
-    assert_eq!(keys(&page).len(), 1, "it stands where an item may begin");
-    for _ in 0..2 {
-        assert_eq!(journal.key(), KeyFound::None);
-        assert_eq!(journal.recover(), Ok(()));
     }
 }
 
@@ -164,7 +84,7 @@ fn an_item_that_was_torn_at_one_start_does_not_count_at_the_next() {
 
 #[test]
 fn the_number_of_a_page_goes_on_at_0_behind_its_largest_value() {
-    let mut pages = bytes_of(&mut with_key(&OURS));
+    let mut pages = bytes_of(&mut with_constants());
     for start in starts(&pages[1]) {
         let item = &mut pages[1][start..];
         item[8..12].fill(0xFF);
@@ -176,7 +96,6 @@ fn the_number_of_a_page_goes_on_at_0_behind_its_largest_value() {
         assert_eq!(journal.keep(Kind::Configuration, &[&[number; 40]]), Ok(true));
         assert_eq!(journal.read(Kind::Configuration), Some(&[number; 40][..]));
         assert_eq!(journal.read(Kind::Constants), Some(&[7; 100][..]), "{number}");
-        assert_eq!(journal.key(), KeyFound::Set(&OURS), "{number}");
     }
     assert!(erases(&mut journal) > 1);
 }
@@ -195,9 +114,8 @@ fn pages_that_hold_anything_are_no_harm_and_can_be_used() {
             cell[..8].copy_from_slice(&[b'I', b'T', b'E', b'M', kind, 0, length, 0]);
         }
         let mut journal = Flash::journal_of([&pages[0], &pages[1]]);
-        assert_eq!(journal.key(), KeyFound::None);
         assert!(Kind::ALL.into_iter().all(|kind| journal.read(kind).is_none()), "case {case}");
-        for (kind, length) in Kind::ALL.into_iter().zip([40, 187, 585, 16, 8, 32]) {
+        for (kind, length) in Kind::ALL.into_iter().zip([40, 187, 585, 16]) {
             let new: Vec<u8> = (0..length).map(|i| (i * 7 + case * 13) as u8).collect();
             assert_eq!(journal.keep(kind, &[&new]), Ok(true), "case {case}");
             assert_eq!(journal.read(kind), Some(&new[..]), "case {case}");
@@ -214,21 +132,19 @@ fn what_does_not_fit_is_refused_and_nothing_is_lost() {
     assert_eq!(journal.read(Kind::Constants), Some(&[7; 100][..]));
     assert_eq!(erases(&mut journal), 1); // before the first one was kept
     journal.keep(Kind::Constants, &[]).unwrap();
-    // Beside four small items, room for four start items, and a key.
-    let most = PAGE_BYTES - 4 * 32 - 4 * 32 - 2 * 64 - 16;
+    // Beside three small items, room for four start items.
+    let most = PAGE_BYTES - 3 * 32 - 4 * 32 - 16;
     for (length, outcome) in [(most + 1, too_large), (most, Ok(true))] {
         assert_eq!(journal.keep(Kind::Baseline, &[&vec![1; length]]), outcome);
     }
-    // What an upload and a seal need fits beside it.
-    for (kind, length) in [(Kind::Models, 16), (Kind::Counter, 8), (Kind::Key, 32)] {
-        assert_eq!(journal.keep(kind, &[&vec![2; length]]), Ok(true));
-    }
+    // What an upload needs fits beside it.
+    assert_eq!(journal.keep(Kind::Models, &[&[2; 16]]), Ok(true));
     assert_eq!(journal.read(Kind::Baseline).map(<[u8]>::len), Some(most));
 }
 
 #[test]
 fn the_settings_of_a_sensor_of_16_rows_and_32_columns_fit_however_often_they_change() {
-    let mut journal = with_key(&OURS);
+    let mut journal = with_constants();
     let lengths = [40, 11 + 4 * (16 + 2 * 32), 9 + 4 * 16 * 32];
     for seed in 0..30_u8 {
         for (kind, length) in SETTINGS.into_iter().zip(lengths) {
@@ -238,5 +154,4 @@ fn the_settings_of_a_sensor_of_16_rows_and_32_columns_fit_however_often_they_cha
         }
     }
     assert!(erases(&mut journal) > 4);
-    assert_eq!(journal.key(), KeyFound::Set(&OURS));
 }

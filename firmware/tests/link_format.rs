@@ -6,11 +6,10 @@ use taxel_firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::cobs;
 use taxel_firmware::link::message::{
     Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
-    KeptBaseline, KeyState, Memory, ModelFault, ModelIdentity, Refusal, Report, Request, SealFault,
-    Setting, Statistics, UploadState, UploadStep,
+    KeptBaseline, Memory, ModelFault, ModelIdentity, Refusal, Report, Request, Setting, Statistics,
+    UploadState, UploadStep,
 };
 use taxel_firmware::link::packet::{self, PROTOCOL_VERSION};
-use taxel_firmware::seal::{Key, tag};
 
 const START_US: u64 = 3_000_000;
 
@@ -39,56 +38,32 @@ fn report_bytes(number: u16, report: &Report<'_>) -> Vec<u8> {
 
 type Example = (&'static str, Vec<u8>);
 
-/// Key of the examples, and the device that it is for.
-const KEY: Key = [0xA5; 32];
-const UNIQUE_ID: [u8; 12] = *b"an STM32F446";
-
 /// Numbers of the examples: a reading, and a missing one.
 const OHM: [f32; 2] = [60.0, f32::NAN];
-
-/// A request, sealed.
-fn sealed(request: &Request<'_>) -> Vec<u8> {
-    let mut buffer = [0; 64];
-    let request = postcard::to_slice(request, &mut buffer).unwrap();
-    let (counter, tag) = (301, tag(&KEY, &UNIQUE_ID, 301, request));
-    request_bytes(7, &Request::Sealed { counter, tag, request })
-}
 
 fn requests() -> Vec<Example> {
     let readings_ohm = Floats::new(&OHM);
     // A blob of 1000 bytes for the paper's sensor, with one network for all rows.
     let head = *b"TAXL\x01\xe8\x03\0\0\x08\x12\x12\x01\x08\0\0";
-    let configure = |configuration, lease_ms| Request::Configure { configuration, lease_ms };
+    let configure = |configuration| request_bytes(300, &Request::Configure(configuration));
     let upload = |step| request_bytes(6, &Request::Upload(step));
     vec![
         ("identify", request_bytes(1, &Request::Identify)),
         ("statistics?", request_bytes(2, &Request::Statistics)),
         ("configuration?", request_bytes(3, &Request::Configuration)),
-        ("configure", request_bytes(300, &configure(Configuration::DEFAULT, 0))),
+        ("configure", configure(Configuration::DEFAULT)),
         (
-            "configure: contact threshold 0.0175, for 10 s",
-            request_bytes(
-                300,
-                &configure(
-                    Configuration { contact_threshold: 0.0175, ..Configuration::DEFAULT },
-                    10_000,
-                ),
-            ),
+            "configure: contact threshold 0.0175",
+            configure(Configuration { contact_threshold: 0.0175, ..Configuration::DEFAULT }),
         ),
         (
             "configure: filter of 5 ms, lead 2 ms, a report every 10 scans",
-            request_bytes(
-                300,
-                &configure(
-                    Configuration {
-                        filter_time_constant_us: 5000,
-                        filter_lead_us: 2000,
-                        report_every: 10,
-                        ..Configuration::DEFAULT
-                    },
-                    0,
-                ),
-            ),
+            configure(Configuration {
+                filter_time_constant_us: 5000,
+                filter_lead_us: 2000,
+                report_every: 10,
+                ..Configuration::DEFAULT
+            }),
         ),
         (
             "capture baseline of 20 frames",
@@ -100,13 +75,11 @@ fn requests() -> Vec<Example> {
         ),
         ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
         ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
-        ("try", upload(UploadStep::Try { lease_ms: 60_000 })),
+        ("try", upload(UploadStep::Try { trial_ms: 60_000 })),
         ("abort", upload(UploadStep::Abort)),
         ("confirm", upload(UploadStep::Confirm)),
         ("restart", request_bytes(7, &Request::Restart)),
         ("undo", request_bytes(7, &Request::Undo { crc_32: 0x1234_5678 })),
-        ("provision", request_bytes(7, &Request::Provision { key: KEY })),
-        ("restart, sealed as number 301", sealed(&Request::Restart)),
         ("set baseline: 60 Ω, unknown", request_bytes(8, &Request::SetBaseline { readings_ohm })),
         ("resume", request_bytes(8, &Request::Resume)),
     ]
@@ -137,9 +110,7 @@ fn identity() -> Report<'static> {
         slot_bytes: 131_056,
         chunk_bytes: 512,
         memory: Memory { vector_table: 1024, stack_reserved: 300, ..Memory::default() },
-        key: KeyState::Set,
-        unique_id: UNIQUE_ID,
-        counter: 1001,
+        unique_id: *b"an STM32F446",
         wires_crc_32: 3,
     })
 }
@@ -198,12 +169,10 @@ fn reports() -> Vec<Example> {
         frames_scanned: 1,
         longest_decode_us: 2,
         slot_erases: 1,
-        model_checks: 300,
         longest_latency_us: 2,
         ..Statistics::default()
     };
-    let configuration =
-        Report::Configuration { configuration: Configuration::DEFAULT, lease_left_ms: 300 };
+    let configuration = Report::Configuration(Configuration::DEFAULT);
     let refused = |refusal| report_bytes(6, &Report::Refused(refusal));
     vec![
         ("identity", report_bytes(1, &identity())),
@@ -232,7 +201,6 @@ fn reports() -> Vec<Example> {
             report_bytes(0, &Report::Upload(UploadState::TrialOver { crc_32: 0x1234_5678 })),
         ),
         ("refused: nothing to undo", refused(Refusal::NothingToUndo)),
-        ("provisioned", report_bytes(7, &Report::Provisioned)),
         ("restarting", report_bytes(7, &Report::Restarting)),
         ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
         (
@@ -241,7 +209,6 @@ fn reports() -> Vec<Example> {
         ),
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
-        ("refused: replayed", refused(Refusal::Seal(SealFault::Counter { last: 300 }))),
         ("refused: flash", refused(Refusal::Flash)),
         ("refused: erased too often", refused(Refusal::TooSoon { wait_us: 600_000_000 })),
     ]
@@ -285,8 +252,7 @@ fn every_refusal_has_the_specified_number() {
         (Refusal::TooSoon { wait_us: 1 }, 12),
         (Refusal::NothingToUndo, 13),
         (Refusal::OnTrial, 14),
-        (Refusal::Seal(SealFault::Missing), 15),
-        (Refusal::TrialOver, 16),
+        (Refusal::TrialOver, 15),
     ];
     for (refusal, number) in refusals {
         let mut buffer = [0; 16];

@@ -6,11 +6,9 @@ mod checks;
 mod fixed;
 
 mod app;
-mod authenticity;
 mod bit_for_bit;
 mod journal;
 mod link_format;
-mod recheck;
 mod settings;
 mod store;
 mod sweeps;

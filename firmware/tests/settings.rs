@@ -60,10 +60,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
             Report::Constants(found) => assert_eq!(Some(found), constants.constants()),
             other => panic!("{other:?}"),
         });
-        let capture = [
-            Request::Configure { configuration: scanning, lease_ms: 0 },
-            Request::CaptureBaseline { frames: 3 },
-        ];
+        let capture = [Request::Configure(scanning), Request::CaptureBaseline { frames: 3 }];
         for (number, request) in (1..).zip(&capture) {
             bench.board.pins.borrow_mut().to_device.extend(request_bytes(number, request));
         }
@@ -89,7 +86,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         let mut bench = Bench::with_journal(quiet(), journal.clone());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         ask(&mut session, &bench.board, &Request::Configuration, |report| match report {
-            Report::Configuration { configuration, .. } => assert_eq!(configuration, scanning),
+            Report::Configuration(configuration) => assert_eq!(configuration, scanning),
             other => panic!("{other:?}"),
         });
         ask(&mut session, &bench.board, &Request::Constants, |report| match report {
@@ -137,52 +134,6 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
     let keep = Request::Keep(Setting::Baseline);
     let refused = ask(&mut session, &bench.board, &keep, |report| refusal(&report)).0;
     assert_eq!(refused, Refusal::Keep(KeepFault::Nothing));
-}
-
-#[test]
-fn a_configuration_that_is_kept_under_a_lease_outlasts_the_lease() {
-    let mut slots = Flash::slots_with(&blob(1, 3));
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let leased = Configuration { contact_threshold: 0.25, ..quiet() };
-    let requests = [
-        Request::Configure { configuration: leased, lease_ms: 500 },
-        Request::Keep(Setting::Configuration),
-    ];
-    for request in &requests {
-        ask(&mut session, &bench.board, request, |_| ());
-    }
-    bench.board.pins.borrow_mut().now_us += 501_000;
-    session.step();
-    let asked = ask(&mut session, &bench.board, &Request::Configuration, |report| match report {
-        Report::Configuration { configuration, lease_left_ms } => (configuration, lease_left_ms),
-        other => panic!("{other:?}"),
-    });
-    assert_eq!(asked.0, (leased, 0));
-}
-
-#[test]
-fn a_configuration_that_could_not_be_kept_ends_with_its_lease() {
-    let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
-    let supply = device.journal.pages()[0].supply();
-    device.session(|session, board| {
-        let leased = Configuration { frame_period_us: 0, contact_threshold: 0.25, ..quiet() };
-        let request = Request::Configure { configuration: leased, lease_ms: 500 };
-        ask(session, board, &request, |_| ());
-        supply.borrow_mut().on(Some(0));
-        let refused = ask(session, board, &Request::Keep(Setting::Configuration), |report| {
-            matches!(report, Report::Refused(Refusal::Flash))
-        });
-        assert!(refused.0);
-        supply.borrow_mut().on(None);
-        board.pins.borrow_mut().now_us += 501_000;
-        session.step();
-        let own = ask(session, board, &Request::Configuration, |report| match report {
-            Report::Configuration { configuration, .. } => configuration,
-            other => panic!("{other:?}"),
-        });
-        assert_eq!(own.0, quiet());
-    });
 }
 
 #[test]
@@ -288,12 +239,7 @@ fn writes_are_limited_between_restarts() {
         let refused = loop {
             let threshold = 0.001 + kept_times as f32 * 1e-5;
             let configuration = Configuration { contact_threshold: threshold, ..quiet() };
-            ask(
-                &mut session,
-                &bench.board,
-                &Request::Configure { configuration, lease_ms: 0 },
-                |_| (),
-            );
+            ask(&mut session, &bench.board, &Request::Configure(configuration), |_| ());
             let keep = Request::Keep(Setting::Configuration);
             let answer = ask(&mut session, &bench.board, &keep, |report| match report {
                 Report::Kept(kept) => Ok(kept.writes_left),

@@ -14,7 +14,7 @@ fn after_restart(slots: &[Flash; 2], bench: &mut Bench<'_>) -> Option<ModelIdent
     let mut device = Device::new(slots.clone());
     device.journal = bench.journal();
     device.weights.clear();
-    device.identity().0
+    device.model()
 }
 
 /// Slots with the model `old`, and what is in force while `new` is on trial.
@@ -33,7 +33,7 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
         let (mut slots, mut bench) = on_trial(&old, &new);
         let mut weights = vec![0; words];
         let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-        let tried = identity(&mut session, &bench.board).0.unwrap();
+        let tried = model(&mut session, &bench.board).unwrap();
         assert_eq!((tried.crc_32, tried.slot, tried.generation), (crc_of(&new), 1, 1));
         assert_eq!((tried.on_trial, tried.in_ram), (true, words > 0));
         let _ = session;
@@ -46,11 +46,11 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
 fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let (mut slots, mut bench) = on_trial(&old, &new);
-    let confirm = [UploadStep::Try { lease_ms: 60_000 }, UploadStep::Confirm, UploadStep::Confirm];
+    let confirm = [UploadStep::Try { trial_ms: 60_000 }, UploadStep::Confirm, UploadStep::Confirm];
     let state = upload(&mut bench, &mut slots, &mut [], &confirm);
     assert_eq!(state, confirmed(&new));
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let found = identity(&mut session, &bench.board).0.unwrap();
+    let found = model(&mut session, &bench.board).unwrap();
     assert_eq!((found.crc_32, found.generation, found.on_trial), (crc_of(&new), 1, false));
     let _ = session;
     assert_eq!(after_restart(&slots, &mut bench), Some(found));
@@ -113,9 +113,6 @@ fn on_trial_nothing_overwrites_the_previous_model() {
     assert_eq!(refused, Err(Refusal::OnTrial));
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    // A trial outlasts an upload's time of silence.
-    board.pins.borrow_mut().now_us += 20_000_000;
-    session.step();
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
     let _ = session;
     let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
@@ -130,7 +127,7 @@ fn a_model_that_decays_on_trial_is_left() {
         slots[1].decay(20, 4);
         let mut weights = vec![0; words];
         let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-        let found = identity(&mut session, &bench.board).0.unwrap();
+        let found = model(&mut session, &bench.board).unwrap();
         assert_eq!((found.crc_32, found.on_trial), (crc_of(&old), false));
         let _ = session;
         let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
@@ -151,7 +148,7 @@ fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
     };
     assert_eq!(pass(&mut session, 59_000_000), None);
     // The host may let it last longer, and asking alone does not.
-    let again = Request::Upload(UploadStep::Try { lease_ms: 120_000 });
+    let again = Request::Upload(UploadStep::Try { trial_ms: 120_000 });
     ask(&mut session, &board, &again, |_| ());
     assert_eq!(pass(&mut session, 119_000_000), None);
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
@@ -175,7 +172,7 @@ fn a_trial_lasts_half_an_hour_at_most() {
     let (mut slots, mut bench) = on_trial(&old, &new);
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let again = Request::Upload(UploadStep::Try { lease_ms: u32::MAX });
+    let again = Request::Upload(UploadStep::Try { trial_ms: u32::MAX });
     ask(&mut session, &board, &again, |_| ());
     board.pins.borrow_mut().now_us += 1_799_000_000;
     assert_eq!(session.step(), None);

@@ -43,8 +43,6 @@ class Bench:
         self.ohm = [[draw.uniform(44.0, 68.0) for _ in range(columns)] for _ in range(rows)]
         self.board = Board(image, self.ohm, log=log, **options)
         self._host_sim, self._log, self._number = host_sim, log, 0
-        #: Messages of the requests that the last `host-sim link` sent.
-        self.requests = []
 
     def run_for(self, seconds):
         """Lets the board run for so many seconds of its own time."""
@@ -70,7 +68,6 @@ class Bench:
             finally:
                 host.kill()
                 said = host.communicate()[0]
-                self.requests = [message for _, message in packets(terminal.sent)]
                 terminal.close()
         self._log(said.rstrip())
         expect(host.returncode == status, f"host-sim link {arguments[0]} ended with {host.returncode}")

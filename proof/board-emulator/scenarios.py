@@ -28,9 +28,6 @@ COUNTERS, BASELINE, ESTIMATE = b"\x01", b"\x03", b"\x05"
 STATISTICS, CAPTURE = b"\x01", b"\x04"
 #: That of an upload which is on trial.
 ON_TRIAL = b"\x07\x02"
-#: Requests to set a key and in a seal, and refusals: no seal, a counter that counted before, nobody holds the button.
-PROVISION, SEALED = b"\x10", b"\x11"
-NO_SEAL, COUNTER_USED, NOT_ALLOWED = (REFUSED + bytes([15, fault]) for fault in (0, 2, 4))
 #: Slowest and fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
 SLOWEST_LSI_HZ, FASTEST_LSI_HZ, SLOWEST_ERASE_S = 17_000, 47_000, 4.0
 #: Gain-bandwidth product of the slowest op-amps in Hz that settle while the board waits (docs/readout.md).
@@ -91,7 +88,7 @@ def wide(make, files):
     expect("16 rows, 32 columns" in said and ", 0 samples failed" in said, "it does not read all columns")
     bench.host_sim("baseline", "-n", 3, "-o", files.directory / "baseline.csv")
     check_baseline(bench, files.directory / "baseline.csv", 16 * 32)
-    bench.finish()
+    bench.finish(erased=[JOURNAL[1]])
 
 
 def sparse(make, files):
@@ -379,7 +376,7 @@ def restart(make, files):
 
 
 def dead_host(make, files):
-    """A host that dies behind `try`: when its lease is over, the model before, here none, is in force again."""
+    """A host that dies behind `try`: when the trial is over, the model before, here none, is in force again."""
     bench = make()
     bench.run_for(0.02)
     bench.host_sim("upload", files.model, "--trial")
@@ -390,35 +387,6 @@ def dead_host(make, files):
     bench.run_for(0.2)
     expect("none: upload one" in bench.host_sim("identify"), "the trial has no end")
     bench.finish(erased=[JOURNAL[1], SLOT_B])
-
-
-def seal(make, files):
-    """A key, in an image that knows seals: the button lets it in over rubbish in flash, and nothing changes without it."""
-    bench, key = make(image=files.seal_image), files.directory / "device.key"
-    key.write_bytes(bytes(range(32)))
-    for page in JOURNAL:
-        fill(bench, page, RUBBISH)
-    bench.run_for(1.2)
-    bench.ask(PROVISION + bytes(32), NOT_ALLOWED, ERASE_PATIENCE_S)
-    bench.board.button_held = True
-    bench.ask(RESTART, RESTARTING)
-    bench.run_for(0.02)
-    bench.board.button_held = False
-    bench.host_sim("provision", key)
-    bench.ask(KEEP_CONFIGURATION, NO_SEAL)
-    bench.host_sim("upload", files.model, "--key", key)
-    last = [request for request in bench.requests if request[:1] == SEALED][-1]
-    bench.ask(last, COUNTER_USED)
-    # A host without the key cannot restart it, so a fault does.
-    bench.ask(RESTART, NO_SEAL)
-    bench.board.derail()
-    bench.run_for(0.02)
-    said = bench.host_sim("identify")
-    expect("set: nothing changes without --key" in said and "slot 1, generation 1" in said, "key or model is gone")
-    bench.ask(last, COUNTER_USED)
-    bench.host_sim("configure", "--period-us", 20_000, "--key", key)
-    expect(bench.period_us() == 20_000, "the owner of the key cannot change the configuration")
-    bench.finish(resets=["program"] * 2, erased=[*JOURNAL, SLOT_B])
 
 
 def onchip(make, files):
@@ -562,5 +530,5 @@ SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
     for scenario in (session, sparse, few_features, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow,
                      no_clock, clock_stops, fault_restarts, panic_restarts, brown_out, sagging_supply, keep, burst, overrun,
-                     log_abandoned, restart, dead_host, seal, onchip, onchip_stream)
+                     log_abandoned, restart, dead_host, onchip, onchip_stream)
 }

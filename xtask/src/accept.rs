@@ -2,7 +2,6 @@
 
 mod board;
 mod record;
-mod resistors;
 
 use std::fmt::Display;
 use std::fs;
@@ -25,7 +24,6 @@ use crate::size::Size;
 use crate::toolchain::{Toolchain, elf};
 use board::Board;
 use record::{Beside, Decoding, Record};
-use resistors::{compare, read_resistors};
 
 /// Numbers of centres of the models that are tried, in every format.
 const CENTRES: [usize; 3] = [16, 64, 256];
@@ -74,9 +72,6 @@ pub struct Options {
     /// Speed of the serial line in bits a second: the image is built for it [default: TAXEL_BAUD of the environment, or 921600]
     #[arg(long, value_name = "N", conflicts_with = "emulated", value_parser = clap::value_parser!(u32).range(1..))]
     baud: Option<u32>,
-    /// CSV of the known resistors at the wires in Ω: columns r1c1_ohm, r1c2_ohm and so on in any order, one line.
-    #[arg(long, value_name = "FILE")]
-    resistors: Option<PathBuf>,
     /// Where to write the file. By default proof/silicon, or a build folder for the emulated board.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -85,8 +80,6 @@ pub struct Options {
 /// Accepts a board, and writes the file.
 pub fn run(options: &Options) -> Outcome {
     let frames = Synthesis::new(&World::press()).frames(Stream::Test, FRAMES);
-    let read = |file: &PathBuf| read_resistors(file, &frames.inputs.names);
-    let known = options.resistors.as_ref().map(read).transpose()?;
     let toolchain = Toolchain::find()?;
     let mut board = if let Some(port) = &options.port {
         Board::real(port, options.baud, options.flashed, &toolchain)?
@@ -108,7 +101,6 @@ pub fn run(options: &Options) -> Outcome {
     let stack_bytes = decoding.iter().map(|it| it.stack_bytes).fold(last, u32::max);
     println!("the stack took {stack_bytes} of {} bytes", identity.memory.stack_reserved);
     let restart = restart(&mut device)?;
-    let resistors = known.map(|known| compare(&mut device, &known)).transpose()?;
     let git = ["-C", &root().to_string_lossy(), "describe", "--always", "--dirty"];
     let record = Record {
         is_emulated: options.emulated,
@@ -123,7 +115,6 @@ pub fn run(options: &Options) -> Outcome {
         scan_us,
         erase_ms,
         keeps_its_model_over_a_restart: restart,
-        resistors_rms_percent: resistors,
     };
     let path = options
         .output
@@ -219,9 +210,9 @@ fn decode(device: &mut Device, path: &Path, frames: &Dataset) -> Outcome<Decodin
 /// Erases the slot that is not in force while the sensor is scanned, and lets it scan on. Returns the time in ms that the
 /// erase took, by the scans that were missed meanwhile, and that of the longest scan in µs.
 fn erase_and_scan(device: &mut Device) -> Outcome<(Beside<Vec<u32>>, Beside<u32>)> {
-    let own = device.configuration().map_err(text)?.configuration;
+    let own = device.configuration().map_err(text)?;
     let scanning = Configuration { frame_period_us: PERIOD_US, send_estimates: false, ..own };
-    device.configure_until_restart(scanning).map_err(text)?;
+    device.configure(scanning).map_err(text)?;
     let missed_before = device.statistics().map_err(text)?.frames_missed;
     let head = fs::read(own_folder().join("fixed16-16.bin")).map_err(text)?;
     let begun = upload::step(device, upload::begin(&head)).map_err(text)?;

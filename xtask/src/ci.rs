@@ -16,16 +16,6 @@ type Step = (&'static str, Command);
 /// A step that has ended: its name, its time, and the lines for the summary if it failed or ran tests.
 type Ended = (&'static str, Duration, Outcome<String>);
 
-/// Mutants of the board's image that CI builds: one for each of its files that matter most. All take some minutes.
-const MUTANTS: [&str; 6] = [
-    "select-early",
-    "flash-busy",
-    "rows-driven-at-a-fault",
-    "not-fed-before-erase",
-    "button-inverted",
-    "numbers-early",
-];
-
 /// Runs every step, even after a failure, and prints a summary.
 pub fn run() -> Outcome {
     let logs = target_dir().join("ci");
@@ -94,7 +84,6 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             own("c", &["c", "--short"]),
             // The emulated board's time is virtual: it answers alike on a busy machine.
             own("board", &["board"]),
-            own("mutants", &[&["board", "--mutants"], &MUTANTS[..]].concat()),
         ],
         vec![
             own("emulate", &["emulate"]),

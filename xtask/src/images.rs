@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::PathBuf;
+use std::process::Command;
 
 use crate::panics;
 use crate::process::{Outcome, Watched, run as run_command, watch};
@@ -38,11 +39,13 @@ pub const NUCLEO_ONCHIP: &str = "nucleo-f446re-onchip";
 pub const FEATURES: [&str; 8] =
     ["confidence", "f32", "f32-direct", "fill", "filter", "fixed16", "micromath", "settings"];
 
-/// The feature that the board's image does not have.
-pub const SEAL: &str = "seal";
-
 /// Name of the board's image with `fixed16` alone.
 pub const NUCLEO_FIXED16: &str = "nucleo-f446re-fixed16";
+
+/// Name of the board's image with room for a larger sensor, and that room: more columns than three converters sample, and
+/// more rows than one register drives.
+pub const NUCLEO_WIDE: &str = "nucleo-f446re-wide";
+const WIDE: &str = "16x32x18";
 
 /// Libraries of the images, and the link check.
 const LIBRARIES: Packages =
@@ -62,7 +65,6 @@ pub fn run(image: Option<&str>) -> Outcome {
     }
     link_check(&toolchain)?;
     build_image(&toolchain, QEMU)?;
-    panics::check(&build_other(&toolchain, SEAL)?, true)?;
     build_image(&toolchain, NUCLEO)?;
     panics::check(&elf(NUCLEO_SPI), true)?;
     panics::check(&elf(NUCLEO_ONCHIP), false)?;
@@ -78,31 +80,29 @@ pub fn build_image(toolchain: &Toolchain, packages: Packages) -> Outcome {
 /// built again afterwards.
 pub fn build_variant(toolchain: &Toolchain, features: &[&str], name: &str) -> Outcome {
     let features = features.join(",");
-    let mut command = toolchain.build();
-    command.args(PROFILE).args(NUCLEO).args(["--bin", NUCLEO_SPI]);
-    command.args(["--no-default-features", "--features", &features]);
-    run_command(&mut command)?;
+    build_as(name, toolchain.build().args(["--no-default-features", "--features", &features]))
+}
+
+/// Builds the board's image with room for a larger sensor. The image of the usual name must be built again afterwards.
+pub fn build_wide(toolchain: &Toolchain) -> Outcome {
+    build_as(NUCLEO_WIDE, toolchain.build().env("TAXEL_CAPACITY", WIDE))
+}
+
+/// Builds the board's image by `command`, and keeps it under another `name`.
+fn build_as(name: &str, command: &mut Command) -> Outcome {
+    run_command(command.args(PROFILE).args(NUCLEO).args(["--bin", NUCLEO_SPI]))?;
     let [built, kept] = [NUCLEO_SPI, name].map(elf);
     fs::copy(&built, &kept).map_err(|cause| format!("{}: {cause}", kept.display()))?;
     Ok(())
 }
 
-/// Builds the board's image without `feature`, or with one that it does not have, and returns its path. The image of the
-/// usual name must be built again afterwards.
-pub fn build_other(toolchain: &Toolchain, feature: &str) -> Outcome<PathBuf> {
-    let mut features = FEATURES.to_vec();
-    match features.iter().position(|other| *other == feature) {
-        Some(place) => drop(features.remove(place)),
-        None => features.push(feature),
-    }
-    let name = other_name(feature);
-    build_variant(toolchain, &features, &name)?;
+/// Builds the board's image without `feature`, and returns its path. The image of the usual name must be built again
+/// afterwards.
+pub fn build_without(toolchain: &Toolchain, feature: &str) -> Outcome<PathBuf> {
+    let others: Vec<&str> = FEATURES.into_iter().filter(|other| *other != feature).collect();
+    let name = format!("nucleo-f446re-without-{feature}");
+    build_variant(toolchain, &others, &name)?;
     Ok(elf(&name))
-}
-
-/// Name of the image that differs in one `feature`.
-pub fn other_name(feature: &str) -> String {
-    format!("nucleo-f446re-other-{feature}")
 }
 
 fn lint(toolchain: &Toolchain, packages: Packages) -> Outcome {

@@ -136,7 +136,6 @@ impl Rest {
 fn parsed(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, clap::Error> {
     let arguments = Arguments::try_parse_from(arguments)?;
     let unknown = match &arguments.command {
-        Command::Board(options) => options.unknown(),
         Command::Mutants(options) => options.unknown(),
         _ => None,
     };
@@ -191,8 +190,6 @@ mod tests {
             ("mutants no-feed-before-erase", 0),
             ("mutants no-feed-before-eras", 2),
             ("mutants --second no-feed-before-erase", 2),
-            ("board --mutants sck-slow", 0),
-            ("board --mutants sck-slo", 2),
         ] {
             assert_eq!(exit(line), code, "{line}");
         }

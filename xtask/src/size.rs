@@ -9,8 +9,7 @@ use budget::Budget;
 use object::{Object, ObjectSection, ObjectSymbol};
 
 use crate::images::{
-    FEATURES, NUCLEO, NUCLEO_FIXED16, NUCLEO_SPI, QEMU, SEAL, build_image, build_other,
-    build_variant,
+    FEATURES, NUCLEO, NUCLEO_FIXED16, NUCLEO_SPI, QEMU, build_image, build_variant, build_without,
 };
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
@@ -79,12 +78,11 @@ pub fn run() -> Outcome {
     let text = fs::read_to_string(&path).map_err(|cause| format!("{BUDGET}: {cause}"))?;
     let budget = budget::parse(&text).map_err(|cause| format!("{BUDGET}: {cause}"))?;
     let toolchain = Toolchain::find()?;
-    let features = FEATURES.into_iter().chain([SEAL]);
-    let parts = features.map(|feature| Part::new(&budget, feature));
+    let parts = FEATURES.into_iter().map(|feature| Part::new(&budget, feature));
     let parts: Vec<_> = parts.collect::<Outcome<_>>()?;
     build_image(&toolchain, QEMU)?;
     build_variant(&toolchain, &["fixed16"], NUCLEO_FIXED16)?;
-    let others = parts.iter().map(|part| Size::new(&build_other(&toolchain, part.feature)?));
+    let others = parts.iter().map(|part| Size::new(&build_without(&toolchain, part.feature)?));
     let others: Vec<_> = others.collect::<Outcome<_>>()?;
     build_image(&toolchain, NUCLEO)?;
 
@@ -129,7 +127,7 @@ pub fn run() -> Outcome {
 /// First letters of a feature's price among the budgets.
 const PRICE: &str = "feature:";
 
-/// A feature of the board's image, whose price is what the image takes less without it, or more with it.
+/// A feature of the board's image, whose price is what the image takes less without it.
 struct Part<'a> {
     feature: &'static str,
     budget: Budget<'a>,

@@ -43,10 +43,6 @@ impl Platform for Board {
     fn journal(&mut self) -> &mut Journal<Flash> {
         &mut self.0
     }
-
-    fn may_provision(&self) -> bool {
-        opaque(true)
-    }
 }
 
 struct Sensor(ZeroPotential<8, 18>);

@@ -1,4 +1,4 @@
-//! The board: clock, serial line, watchdog and journal, and the key of the host at the other end of the line.
+//! The board: clock, serial line, watchdog and journal.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -6,7 +6,6 @@ use std::rc::Rc;
 
 use taxel_firmware::link::message::Memory;
 use taxel_firmware::platform::{Platform, Port};
-use taxel_firmware::seal::Key;
 use taxel_firmware::store::Journal;
 
 use crate::flash::Flash;
@@ -42,14 +41,6 @@ pub struct Pins {
     /// When it took the last byte.
     taken_us: u32,
     cycles: u32,
-    /// Whether the board's button was held at the start.
-    pub is_held: bool,
-    /// Key that the host seals its requests with, if it has one.
-    pub key: Option<Key>,
-    /// Counter of its last sealed request, once it has asked for it.
-    pub counter: Option<u64>,
-    /// Counter of the last one that was not refused.
-    pub answered: u64,
 }
 
 /// A board. Clones have the same pins.
@@ -62,9 +53,6 @@ pub struct Board {
 }
 
 impl Board {
-    /// Number that no other mock has.
-    pub const UNIQUE_ID: [u8; 12] = *b"mock board 1";
-
     /// A board with this journal.
     pub fn new(journal: Journal<Flash>) -> Self {
         Self { pins: Rc::default(), journal }
@@ -124,13 +112,5 @@ impl Platform for Board {
 
     fn journal(&mut self) -> &mut Journal<Flash> {
         &mut self.journal
-    }
-
-    fn unique_id(&self) -> [u8; 12] {
-        Self::UNIQUE_ID
-    }
-
-    fn may_provision(&self) -> bool {
-        self.pins.borrow().is_held
     }
 }

@@ -4,16 +4,13 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use taxel_firmware::app::Session;
-use taxel_firmware::link::message::{
-    Identity, KeyState, ModelIdentity, Refusal, Report, Request, UploadState, UploadStep,
-};
-use taxel_firmware::seal::Key;
+use taxel_firmware::link::message::{ModelIdentity, Report, Request, UploadState, UploadStep};
 use taxel_firmware::store::{Journal, KeepError, Kind};
 
 use crate::bench::{Bench, Memory, Running, quiet};
 use crate::board::Board;
 use crate::flash::{Cells, Flash, Supply};
-use crate::host::{self, Answer, ask, model_crc, provision, undo, upload_steps};
+use crate::host::{self, Answer, ask, model_crc, undo, upload_steps};
 use crate::models::crc_of;
 
 /// Bytes of a chunk of an upload.
@@ -34,24 +31,14 @@ pub struct Device {
     pub cut_after: Option<u64>,
     /// Power that is cut: that of the slots.
     pub supply: Rc<RefCell<Supply>>,
-    /// Key that the host seals its requests with.
-    pub key: Option<Key>,
-    /// Whether somebody holds the board's button at the start.
-    pub is_held: bool,
-    /// Largest counter of a sealed request that was not refused.
-    pub answered: u64,
     memory: Box<Memory>,
 }
 
-/// What a device's flash holds, and what its host knows.
-pub struct Snapshot {
-    cells: [Cells; 4],
-    key: Option<Key>,
-    answered: u64,
-}
+/// What a device's flash holds.
+pub struct Snapshot([Cells; 4]);
 
 impl Device {
-    /// A device without a key, with these slots.
+    /// A device with these slots.
     pub fn new(slots: [Flash; 2]) -> Self {
         Self {
             supply: slots[0].supply(),
@@ -59,33 +46,21 @@ impl Device {
             journal: Flash::journal(),
             weights: vec![0; 1024],
             cut_after: None,
-            key: None,
-            is_held: false,
-            answered: 0,
             memory: Box::new(Memory::new()),
         }
-    }
-
-    /// A device with this key, as its host has it.
-    pub fn with_key(slots: [Flash; 2], key: &Key) -> Self {
-        let mut device = Self { key: Some(*key), ..Self::new(slots) };
-        device.journal.keep(Kind::Key, &[key]).expect("there is room");
-        device
     }
 
     /// What its flash holds.
     pub fn snapshot(&mut self) -> Snapshot {
         let [one, other] = self.journal.pages();
         let [first, second] = &self.slots;
-        let cells = [first, second, one, other].map(Flash::cells);
-        Snapshot { cells, key: self.key, answered: self.answered }
+        Snapshot([first, second, one, other].map(Flash::cells))
     }
 
-    /// Puts back what its flash held, and what its host knew.
-    pub fn restore(&mut self, Snapshot { cells, key, answered }: &Snapshot) {
+    /// Puts back what its flash held.
+    pub fn restore(&mut self, Snapshot(cells): &Snapshot) {
         let flashes = self.slots.iter_mut().chain(self.journal.pages());
         flashes.zip(cells).for_each(|(flash, cells)| flash.restore(cells));
-        (self.key, self.answered) = (*key, *answered);
     }
 
     /// Switches the power on, and lets weak bits settle.
@@ -107,12 +82,9 @@ impl Device {
     ) -> T {
         self.power_on();
         let board = Board::new(self.journal.clone());
-        board.pins.borrow_mut().key = self.key;
-        board.pins.borrow_mut().is_held = self.is_held;
         let mut bench = Bench::on(board, &mut self.memory, quiet());
         let done = work(&mut bench, &mut self.slots, &mut self.weights);
         self.journal = bench.journal();
-        self.answered = self.answered.max(bench.board.pins.borrow().answered);
         done
     }
 
@@ -134,9 +106,9 @@ impl Device {
         self.session(model_crc)
     }
 
-    /// The model in force, whether there is a key, and the counter of sealed requests.
-    pub fn identity(&mut self) -> (Option<ModelIdentity>, KeyState, u64) {
-        self.session(identity)
+    /// The model in force.
+    pub fn model(&mut self) -> Option<ModelIdentity> {
+        self.session(model)
     }
 
     /// Carries out these steps of an upload, until one is refused; returns the last answer.
@@ -152,11 +124,6 @@ impl Device {
     /// Leaves the model with the CRC-32 `left` for the one before it.
     pub fn undo(&mut self, left: u32) -> Answer {
         self.session(|session, board| undo(session, board, left).0)
-    }
-
-    /// Sets `key`.
-    pub fn provision(&mut self, key: Key) -> Result<(), Refusal> {
-        self.session(|session, board| provision(session, board, key).0)
     }
 
     /// Keeps `bytes` in the journal, past the application.
@@ -178,13 +145,10 @@ pub fn confirmed_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
     steps
 }
 
-/// The model in force, whether there is a key, and the counter of sealed requests.
-pub fn identity(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-) -> (Option<ModelIdentity>, KeyState, u64) {
+/// The model in force.
+pub fn model(session: &mut Running<'_, '_>, board: &Board) -> Option<ModelIdentity> {
     ask(session, board, &Request::Identify, |report| match report {
-        Report::Identity(Identity { model, key, counter, .. }) => (model, key, counter),
+        Report::Identity(identity) => identity.model,
         other => panic!("{other:?}"),
     })
     .0

@@ -3,11 +3,10 @@
 use taxel_core::blob::Model;
 use taxel_firmware::app::{Session, SessionEnd};
 use taxel_firmware::link::message::{
-    Configuration, Refusal, Report, Request, Statistics, UploadState, UploadStep,
+    Refusal, Report, Request, Statistics, UploadState, UploadStep,
 };
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
-use taxel_firmware::seal::{Key, tag};
 
 use crate::bench::{Bench, Running};
 use crate::board::Board;
@@ -18,11 +17,6 @@ const ASKED: u16 = 77;
 
 /// Answer to a step of an upload, or to an undo.
 pub type Answer = Result<UploadState, Refusal>;
-
-/// A request for a configuration of the device's own.
-pub fn configure(configuration: Configuration) -> Request<'static> {
-    Request::Configure { configuration, lease_ms: 0 }
-}
 
 /// The bytes of one request.
 pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
@@ -77,52 +71,15 @@ pub fn settle(session: &mut Running<'_, '_>, board: &Board) -> Option<SessionEnd
     None
 }
 
-/// The bytes of a request that this key seals for the mock board.
-pub fn sealed(key: &Key, counter: u64, request: &Request<'_>) -> Vec<u8> {
-    let mut buffer = [0; 1024];
-    let request = postcard::to_slice(request, &mut buffer).unwrap();
-    let tag = tag(key, &Board::UNIQUE_ID, counter, request);
-    request_bytes(ASKED, &Request::Sealed { counter, tag, request })
-}
-
-/// Sends `request` and passes the answer to `read`; what needs a seal is sealed if the host has a key. All that the device
-/// has sent before is forgotten.
+/// Sends `request` and passes the answer to `read`. All that the device has sent before is forgotten.
 pub fn ask<T>(
     session: &mut Running<'_, '_>,
     board: &Board,
     request: &Request<'_>,
     read: impl FnOnce(Report<'_>) -> T,
 ) -> (T, Option<SessionEnd>) {
-    let key = board.pins.borrow().key.filter(|_| !request.is_free());
-    let Some(key) = key else {
-        return send(session, board, request_bytes(ASKED, request), read);
-    };
-    let known = board.pins.borrow().counter;
-    let last = known.unwrap_or_else(|| {
-        send(session, board, request_bytes(ASKED, &Request::Identify), |report| match report {
-            Report::Identity(identity) => identity.counter,
-            other => panic!("{other:?}"),
-        })
-        .0
-    });
-    board.pins.borrow_mut().counter = Some(last + 1);
-    send(session, board, sealed(&key, last + 1, request), |report| {
-        if !matches!(report, Report::Refused(_)) {
-            board.pins.borrow_mut().answered = last + 1;
-        }
-        read(report)
-    })
-}
-
-/// Sends the bytes of a request and passes the answer to `read`.
-pub fn send<T>(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    bytes: Vec<u8>,
-    read: impl FnOnce(Report<'_>) -> T,
-) -> (T, Option<SessionEnd>) {
     board.pins.borrow_mut().to_host.clear();
-    board.pins.borrow_mut().to_device.extend(bytes);
+    board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, request));
     let end = settle(session, board);
     let answer = std::mem::take(&mut board.pins.borrow_mut().to_host);
     let mut read = Some(read);
@@ -165,7 +122,7 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
             .enumerate()
             .map(|(i, bytes)| UploadStep::Chunk { offset: (i * chunk) as u32, bytes }),
     );
-    steps.push(UploadStep::Try { lease_ms: 60_000 });
+    steps.push(UploadStep::Try { trial_ms: 60_000 });
     steps
 }
 
@@ -214,19 +171,6 @@ fn answer(report: Report<'_>) -> Answer {
         Report::Refused(refusal) => Err(refusal),
         other => panic!("{other:?}"),
     }
-}
-
-/// Sets the key.
-pub fn provision(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    key: Key,
-) -> (Result<(), Refusal>, Option<SessionEnd>) {
-    ask(session, board, &Request::Provision { key }, |report| match report {
-        Report::Provisioned => Ok(()),
-        Report::Refused(refusal) => Err(refusal),
-        other => panic!("{other:?}"),
-    })
 }
 
 /// Uploads `blob` in chunks of `chunk` bytes and confirms it.

@@ -19,8 +19,6 @@
 // From the ground up: a module imports only what is declared before it.
 mod shape;
 mod flash;
-#[cfg(target_os = "linux")]
-mod decay;
 mod board;
 mod source;
 mod models;
@@ -31,13 +29,11 @@ pub mod sweep;
 
 pub use bench::{Bench, Memory, Running, TestApp, TestSession, quiet};
 pub use board::{Board, Pins};
-#[cfg(target_os = "linux")]
-pub use decay::flip_bit;
-pub use device::{Device, Snapshot, confirmed, confirmed_steps, identity, trial_steps};
+pub use device::{Device, Snapshot, confirmed, confirmed_steps, model, trial_steps};
 pub use flash::{Cells, Flash, Supply, Torn, Worn};
 pub use host::{
-    Answer, ask, begin, configure, find_report, install, model_crc, provision, reports,
-    request_bytes, sealed, send, settle, statistics, undo, upload, upload_step, upload_steps,
+    Answer, ask, begin, find_report, install, model_crc, reports, request_bytes, settle,
+    statistics, undo, upload, upload_step, upload_steps,
 };
 pub use models::{
     blob, blob_of, blob_of_a_row, blob_of_features, blob_of_length, blob_with_confidence, crc_of,

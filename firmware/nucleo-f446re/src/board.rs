@@ -111,8 +111,6 @@ pub struct Board<R> {
     pub slots: [Slot; 2],
     /// The two pages of the journal.
     pub pages: [Slot; 2],
-    /// Whether the blue button was held at the start.
-    pub is_button_held: bool,
     /// Watchdog, already running; it restarts the program if it is not fed for 5.4 to 15 s.
     pub watchdog: IndependentWatchdog,
 }
@@ -193,7 +191,6 @@ impl<R: Readout> Board<R> {
             clock,
             slots,
             pages,
-            is_button_held: gpioc.pc13.into_input().is_low(),
             watchdog,
         })
     }

@@ -27,7 +27,6 @@ struct Nucleo<R> {
     watchdog: IndependentWatchdog,
     led: ErasedPin<Output>,
     journal: Journal<Slot>,
-    is_button_held: bool,
     readout: PhantomData<R>,
 }
 
@@ -80,10 +79,6 @@ impl<R: Readout> Platform for Nucleo<R> {
             .for_each(|(place, byte)| *place = *byte);
         bytes
     }
-
-    fn may_provision(&self) -> bool {
-        self.is_button_held
-    }
 }
 
 /// Runs the application with the frames that `source` makes of the readout.
@@ -106,7 +101,6 @@ pub fn run<R: Readout, F: FrameSource>(source: impl FnOnce(R) -> F) -> ! {
         watchdog: board.watchdog,
         led: board.led,
         journal: Journal::new(board.pages),
-        is_button_held: board.is_button_held,
         readout: PhantomData,
     };
     let Some(buffers) = buffers() else { restart() };

@@ -10,9 +10,7 @@ use super::models::Models;
 use super::session::Session;
 use super::session_end::SessionEnd;
 use crate::circuit::ConstantsFault;
-use crate::link::message::{
-    ConfidenceSent, Configuration, Identity, KeyState, Refusal, Report, Request, UploadState,
-};
+use crate::link::message::{ConfidenceSent, Identity, Refusal, Report, Request, UploadState};
 use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
 use crate::log::info;
@@ -24,8 +22,8 @@ use crate::store::Slot;
 /// while it writes the previous chunk.
 const LARGEST_CHUNK_BYTES: usize = 512;
 
-/// Bytes of a message that are not the chunk's: those of a seal, packet and fields.
-const AROUND_CHUNK_BYTES: usize = if cfg!(feature = "seal") { 72 } else { 24 };
+/// Bytes of a message that are not the chunk's: those of packet and fields.
+const AROUND_CHUNK_BYTES: usize = 24;
 
 const fn chunk_bytes(message_bytes: usize) -> usize {
     let room = message_bytes.saturating_sub(AROUND_CHUNK_BYTES) / 4 * 4;
@@ -54,14 +52,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         model: &InForce<'_, ROWS>,
         spare: &mut S,
     ) -> Option<SessionEnd> {
-        let (number, request, is_sealed) = self.open(received)?;
+        let (number, request) = self.open(received)?;
         let Self { sensor, models, link, work } = self;
         let wires_crc_32 = sensor.wiring.crc_32;
-        let is_keyless = models.authenticity.key_state() == KeyState::None;
-        if is_sealed || is_keyless && !request.only_asks() {
-            let now_us = link.platform().now_us();
-            link.lease.hear(now_us);
-        }
         let mut end = None;
         // Nothing is sent for `Ok(None)`: the answer takes a while.
         let report = match request {
@@ -69,13 +62,13 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 Ok(Some(Report::Identity(models.identity(model, wires_crc_32, spare, link))))
             }
             Request::Statistics => Ok(Some(Report::Statistics(link.statistics))),
-            Request::Configuration => Ok(Some(configuration(sensor.configuration, link))),
-            Request::Configure { configuration: wanted, lease_ms } => sensor
-                .configure(wanted, lease_ms, link)
-                .map(|()| Some(configuration(sensor.configuration, link))),
+            Request::Configuration => Ok(Some(Report::Configuration(sensor.configuration))),
+            Request::Configure(wanted) => sensor
+                .configure(wanted, link)
+                .map(|()| Some(Report::Configuration(sensor.configuration))),
             Request::Resume => {
                 sensor.resume(link);
-                Ok(Some(configuration(sensor.configuration, link)))
+                Ok(Some(Report::Configuration(sensor.configuration)))
             }
             Request::CaptureBaseline { frames } => {
                 sensor.begin_capture(number, frames, link).map(|()| None)
@@ -129,11 +122,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             Request::Forget(setting) => {
                 link.forget(setting).map(|()| Some(Report::Kept(link.kept())))
             }
-            Request::Provision { key } => models
-                .authenticity
-                .provision(&key, link.platform())
-                .map(|()| Some(Report::Provisioned)),
-            Request::Sealed { .. } => Err(Refusal::Unknown), // in another one
         };
         match report {
             Ok(Some(report)) => _ = link.send(number, &report),
@@ -143,42 +131,21 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         end
     }
 
-    /// Takes a request out of its packet, and out of its seal if it has one: number, request, and whether it was sealed. What
-    /// is no request, or may not be asked for, is refused.
-    #[inline(always)] // it has one caller
-    fn open<'r>(&mut self, received: Received<'r>) -> Option<(u16, Request<'r>, bool)> {
+    /// Takes a request with its number out of its packet. What is no request is refused.
+    fn open<'r>(&mut self, received: Received<'r>) -> Option<(u16, Request<'r>)> {
         let packet = match received {
-            Received::Frame(bytes) => packet::unpack(bytes),
+            Received::Frame(bytes) => packet::decode(bytes),
             Received::Broken | Received::TooLong => Err(PacketError::Damaged),
         };
-        let (number, mut body) = match packet {
-            Ok(packet) => (packet.number, packet.body),
+        match packet {
+            Ok(packet) => {
+                let requests = &mut self.link.statistics.requests;
+                *requests = requests.saturating_add(1);
+                Some((packet.number, packet.body))
+            }
             Err(error) => {
                 self.reject(error);
-                return None;
-            }
-        };
-        let mut is_sealed = false;
-        loop {
-            let request = match packet::message::<Request<'_>>(number, body) {
-                Ok(request) => request,
-                Err(error) => {
-                    self.reject(error);
-                    return None;
-                }
-            };
-            if is_sealed {
-                return Some((number, request, is_sealed));
-            }
-            let requests = &mut self.link.statistics.requests;
-            *requests = requests.saturating_add(1);
-            match self.models.authenticity.open(&request, self.link.platform()) {
-                Ok(Some(sealed)) => (body, is_sealed) = (sealed, true),
-                Ok(None) => return Some((number, request, is_sealed)),
-                Err(refusal) => {
-                    self.link.send(number, &Report::Refused(refusal));
-                    return None;
-                }
+                None
             }
         }
     }
@@ -218,19 +185,8 @@ impl Models {
             slot_bytes: spare.bytes().len() as u32,
             chunk_bytes: chunk_bytes(self.capacity.message_bytes()) as u16,
             memory: link.platform().memory(),
-            key: self.authenticity.key_state(),
             unique_id: link.platform().unique_id(),
-            counter: self.authenticity.counter(),
             wires_crc_32,
         }
     }
-}
-
-/// The report of the `configuration` in force.
-fn configuration<P: Platform>(
-    configuration: Configuration,
-    link: &mut Link<'_, P>,
-) -> Report<'static> {
-    let now_us = link.platform().now_us();
-    Report::Configuration { configuration, lease_left_ms: link.lease.left_ms(now_us) }
 }

@@ -1,7 +1,6 @@
-//! The host's side: reports to it, how long it is silent, and what is counted for it.
+//! The host's side: reports to it, and what is counted for it.
 
 use super::frame_clock::LongClock;
-use super::lease::Lease;
 use crate::link::message::{KeepFault, Refusal, Report, Statistics};
 use crate::link::{cobs, packet};
 use crate::platform::{Platform, Port};
@@ -21,7 +20,6 @@ pub struct Link<'m, P> {
     platform: P,
     buffer: &'m mut [u8],
     time: LongClock,
-    pub lease: Lease,
     pub statistics: Statistics,
     /// Number of times that the host may still have something kept before the next restart.
     pub writes_left: u16,
@@ -54,18 +52,8 @@ impl<P: Platform> Link<'_, P> {
 impl<'m, P: Port> Link<'m, P> {
     pub fn new(mut platform: P, buffer: &'m mut [u8]) -> Self {
         let time = LongClock::starting_at(platform.now_us());
-        let (lease, statistics) = (Lease::NONE, Statistics::default());
-        let writes_left = MOST_WRITES;
-        Self {
-            platform,
-            buffer,
-            time,
-            lease,
-            statistics,
-            writes_left,
-            cut: false,
-            left_us: TURN_US,
-        }
+        let (statistics, writes_left) = (Statistics::default(), MOST_WRITES);
+        Self { platform, buffer, time, statistics, writes_left, cut: false, left_us: TURN_US }
     }
 
     /// Begins a turn of the loop.

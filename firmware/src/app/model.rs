@@ -15,7 +15,7 @@ pub struct InForce<'a, const ROWS: usize> {
     pub identity: Option<ModelIdentity>,
     /// Its blob, which the decoder borrows.
     pub blob: &'a [u8],
-    /// The blob in its slot, while that is sound, if `blob` is a copy.
+    /// The blob in its slot, if `blob` is a copy.
     pub stored: Option<&'a [u8]>,
 }
 
@@ -67,9 +67,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
 
     /// CRC-32 of the model in force, if it is sound in its slot.
     pub fn stored_crc(&self, capacity: Capacity) -> Option<u32> {
-        let is_copy = self.identity.is_some_and(|model| model.in_ram);
-        let stored = if is_copy { self.stored } else { Some(self.blob) };
-        Some(check(capacity, stored?).ok()?.crc())
+        Some(check(capacity, self.stored.unwrap_or(self.blob)).ok()?.crc())
     }
 }
 

@@ -1,6 +1,5 @@
 //! Which model comes into force: uploads, trials and their confirmation.
 
-use super::authenticity::Authenticity;
 use super::link::Link;
 use super::model::{self, InForce};
 use super::session_end::SessionEnd;
@@ -19,7 +18,6 @@ pub struct Models {
     pub confirmed: ConfirmedModels,
     pub upload: Upload,
     pub trial: Trial,
-    pub authenticity: Authenticity,
 }
 
 impl Models {
@@ -78,8 +76,8 @@ impl Models {
                 self.upload.abort();
                 Ok(())
             }
-            UploadStep::Try { lease_ms } => {
-                self.trial.lease(link.now_us(), lease_ms);
+            UploadStep::Try { trial_ms } => {
+                self.trial.set_end(link.now_us(), trial_ms);
                 if self.trial.is_going_on() {
                     return Ok(()); // the answer was lost, or the trial is to last longer
                 }

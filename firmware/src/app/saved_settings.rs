@@ -47,11 +47,11 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         if !KEEPS {
             return;
         }
-        let journal = link.platform().journal();
-        if let Some(configuration) = journal.read(Kind::Configuration).and_then(configuration) {
-            (self.configuration, self.own_configuration) = (configuration, configuration);
+        if let Some(configuration) = link.kept_configuration() {
+            self.configuration = configuration;
             info!("configuration as kept: a frame every {=u32} us", configuration.frame_period_us);
         }
+        let journal = link.platform().journal();
         if let Some(constants) = journal.read(Kind::Constants).and_then(constants) {
             if self.source.set_constants(constants).is_ok() {
                 info!("constants as kept: drive voltage {=f32} V", constants.drive_v);
@@ -121,10 +121,6 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
                 journal.keep(setting.into(), &[&head, &origin_crc.to_le_bytes(), readings])
             }
         };
-        if setting == Setting::Configuration && written.is_ok() {
-            // What is kept is the device's own: a lease must not end with another one.
-            self.own_configuration = self.configuration;
-        }
         link.count_write(written)
     }
 
@@ -147,14 +143,20 @@ impl<P: Platform> Link<'_, P> {
         if KEEPS { self.may_write() } else { Err(Refusal::Keep(KeepFault::Unsupported)) }
     }
 
+    /// The configuration that is kept.
+    pub(super) fn kept_configuration(&mut self) -> Option<Configuration> {
+        let journal = self.platform().journal();
+        journal.read(Kind::Configuration).and_then(configuration).filter(|_| KEEPS)
+    }
+
     /// The settings that are kept.
     pub(super) fn kept(&mut self) -> Kept {
         let writes_left = self.writes_left;
         if !KEEPS {
             return Kept { configuration: None, constants: false, baseline: None, writes_left };
         }
+        let configuration = self.kept_configuration();
         let journal = self.platform().journal();
-        let configuration = journal.read(Kind::Configuration).and_then(configuration);
         let constants = journal.read(Kind::Constants).and_then(constants).is_some();
         let baseline = journal.read(Kind::Baseline).and_then(baseline);
         let baseline = baseline.map(|kept| KeptBaseline {

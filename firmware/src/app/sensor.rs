@@ -23,8 +23,8 @@ pub struct Sensor<'m, F, const ROWS: usize> {
     pub source: F,
     /// The configuration in force.
     pub configuration: Configuration,
-    /// The device's own configuration, which is in force without a lease.
-    pub own_configuration: Configuration,
+    /// The configuration in force where none is kept.
+    default_configuration: Configuration,
     pub clock: FrameClock,
     /// The wires that are scanned: those of the model in force, else all.
     pub wiring: Wiring<'m, ROWS>,
@@ -83,7 +83,7 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
         Self {
             source,
             configuration,
-            own_configuration: configuration,
+            default_configuration: configuration,
             clock: FrameClock::starting_at(now_us),
             wiring,
             frame,
@@ -245,26 +245,21 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         link.send(UNASKED, &Report::Health(report));
     }
 
-    /// Puts `configuration` in force for `lease_ms`, or as the device's own without a lease.
+    /// Puts `configuration` in force.
     pub fn configure<P: Platform>(
         &mut self,
         configuration: Configuration,
-        lease_ms: u32,
         link: &mut Link<'_, P>,
     ) -> Result<(), Refusal> {
         configuration.check().map_err(Refusal::Configuration)?;
-        if lease_ms == 0 {
-            self.own_configuration = configuration;
-        }
-        link.lease.set(lease_ms);
         self.put_in_force(configuration, link);
         Ok(())
     }
 
-    /// Ends a lease: puts the device's own configuration in force.
+    /// Puts the configuration in force that is kept, else the default.
     pub fn resume<P: Platform>(&mut self, link: &mut Link<'_, P>) {
-        link.lease.set(0);
-        self.put_in_force(self.own_configuration, link);
+        let kept = link.kept_configuration();
+        self.put_in_force(kept.unwrap_or(self.default_configuration), link);
     }
 
     /// Scans by `configuration` from now on. Nothing changes if it is in force already.

@@ -4,7 +4,6 @@ use taxel_core::Decoder;
 use taxel_core::blob::{Columns, Floats};
 
 use super::model::{InForce, candidates, check_head, choose, copy_to};
-use super::recheck::{Checked, Recheck};
 use super::sensor::Scan;
 use super::session_end::SessionEnd;
 use super::{App, Core};
@@ -20,7 +19,6 @@ pub struct Session<'a, 'm, P, F, S, const ROWS: usize> {
     pub(super) app: &'a mut App<'m, P, F, ROWS>,
     pub(super) model: InForce<'a, ROWS>,
     pub(super) spare: &'a mut S,
-    recheck: Recheck,
 }
 
 impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
@@ -72,50 +70,19 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         app.core.take_shape_of(model.decoder.as_ref());
         let is_copy = model.identity.is_some_and(|identity| identity.in_ram);
         model.stored = active.bytes().get(..model.blob.len()).filter(|_| is_copy);
-        Self { app, model, spare, recheck: Recheck::new() }
+        Self { app, model, spare }
     }
 
     /// Runs one turn of the loop: answers at most one request, and scans a frame if one is due.
     pub fn step(&mut self) -> Option<SessionEnd> {
         self.app.core.link.begin_turn();
-        let end = self.serve_link().or_else(|| self.app.core.end_leases());
+        let end = self.serve_link().or_else(|| {
+            let Core { models, link, .. } = &mut self.app.core;
+            models.end_late_trial(link)
+        });
         self.app.core.scan_if_due(self.model.decoder.as_ref());
         self.app.core.feed_watchdog();
-        end.or_else(|| self.recheck())
-    }
-
-    /// Checks another piece of the model in force. A copy in RAM is decoded from even if the slot is damaged.
-    fn recheck(&mut self) -> Option<SessionEnd> {
-        let model = self.model.identity?;
-        let stored = self.model.stored;
-        let copies = [self.model.blob, stored.unwrap_or_default()];
-        let copies = if stored.is_some() { &copies[..] } else { copies.get(..1)? };
-        let Core { models, link, .. } = &mut self.app.core;
-        let s = &mut link.statistics;
-        match self.recheck.step(copies, model.crc_32) {
-            Checked::Piece => None,
-            Checked::All => {
-                s.model_checks = s.model_checks.saturating_add(1);
-                None
-            }
-            Checked::Damaged(0) => {
-                warning!("model {=u32:08x} is damaged where it is decoded from", model.crc_32);
-                s.model_damages = s.model_damages.saturating_add(1);
-                if !models.trial.is_going_on() {
-                    models.upload.forget(); // the spare slot may be the other one now
-                }
-                Some(SessionEnd::Damaged)
-            }
-            Checked::Damaged(_) => {
-                warning!(
-                    "slot {=u8} is damaged: its model is in RAM until the restart",
-                    model.slot
-                );
-                s.slot_damages = s.slot_damages.saturating_add(1);
-                self.model.stored = None;
-                None
-            }
-        }
+        end
     }
 }
 
@@ -161,20 +128,6 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             flags |= if missed > 0 { EstimateReport::OVERRUN } else { 0 };
             work.send_estimate(UNASKED, (frame, start_us), flags, (novelty, sent), link);
         }
-    }
-
-    /// Ends what a host has begun and not gone on with.
-    fn end_leases(&mut self) -> Option<SessionEnd> {
-        let Self { sensor, models, link, .. } = self;
-        let now_us = link.now_us() as u32;
-        if link.lease.has_ended(now_us) {
-            warning!("the host is silent: back to the own configuration");
-            sensor.resume(link);
-        }
-        if link.lease.has_upload_ended(now_us) && models.upload.is_receiving() {
-            models.upload.abort();
-        }
-        models.end_late_trial(link)
     }
 
     /// Feeds the watchdog, unless the last scan gave no reading at all. A sensor that stays silent thus leads to a

@@ -5,8 +5,6 @@
 pub enum SessionEnd {
     /// Another model must be put in force.
     NewModel,
-    /// What is decoded from is damaged: a sound model must be put in force.
-    Damaged,
     /// The host asked for a restart.
     Restart,
 }

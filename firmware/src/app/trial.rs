@@ -1,7 +1,8 @@
 //! A model on trial: in force without being kept as that, so that every restart brings the previous one back, whether the watchdog
 //! or the power caused it.
 
-use super::lease::MOST_LEASE_MS;
+/// Longest trial in ms.
+const MOST_TRIAL_MS: u32 = 1_800_000;
 
 /// Whether a model is on trial.
 #[derive(Debug, Clone, Copy, Default)]
@@ -27,9 +28,9 @@ impl Trial {
         self.slot = Some(slot);
     }
 
-    /// Lets the trial last for `lease_ms` from `now_us` on, but at most half an hour.
-    pub fn lease(&mut self, now_us: u64, lease_ms: u32) {
-        self.ends_us = now_us + 1000 * u64::from(lease_ms.min(MOST_LEASE_MS));
+    /// Lets the trial last for `trial_ms` from `now_us` on, but at most half an hour.
+    pub fn set_end(&mut self, now_us: u64, trial_ms: u32) {
+        self.ends_us = now_us + 1000 * u64::from(trial_ms.min(MOST_TRIAL_MS));
     }
 
     /// Whether there is one, and its time is over.

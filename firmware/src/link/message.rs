@@ -20,18 +20,9 @@ pub enum Request<'a> {
     Statistics,
     /// Ask for the configuration in force. Answered by [`Report::Configuration`].
     Configuration,
-    /// Put a configuration in force. Answered by [`Report::Configuration`], or by [`Refusal::Configuration`], which
-    /// leaves the previous one in force.
-    Configure {
-        /// The configuration.
-        configuration: Configuration,
-        /// Lease in ms: the device returns to its own configuration once no request has come for so long. With 0, the
-        /// configuration becomes the device's own one, until the next restart.
-        ///
-        /// Requests that only ask ([`Request::only_asks`]) do not count: whoever looks on does not keep the device
-        /// from its work.
-        lease_ms: u32,
-    },
+    /// Put a configuration in force, until [`Request::Resume`] or a restart unless it is kept ([`Request::Keep`]).
+    /// Answered by [`Report::Configuration`], or by [`Refusal::Configuration`], which leaves the previous one in force.
+    Configure(Configuration),
     /// Average the next frames as the baseline, the sensor at rest. Answered by [`Report::Baseline`] when they
     /// have been scanned.
     CaptureBaseline {
@@ -72,7 +63,7 @@ pub enum Request<'a> {
     Keep(Setting),
     /// Keep a setting no longer; it stays in force until the next restart. Answered by [`Report::Kept`].
     Forget(Setting),
-    /// End a lease: put the device's own configuration in force. Answered by [`Report::Configuration`].
+    /// Put the configuration in force that is kept, else the default. Answered by [`Report::Configuration`].
     Resume,
     /// Put the model that was in force before this one in force again, over restarts as well. Answered by
     /// [`Report::Upload`] with [`UploadState::Confirmed`].
@@ -80,34 +71,6 @@ pub enum Request<'a> {
         /// CRC-32 of the model in force, which is left: a repeated request does not undo twice.
         crc_32: u32,
     },
-    /// Set the device's key: from now on a request that changes anything must be sealed by it ([`Request::Sealed`]). The
-    /// first key is taken only if somebody at the board allows it. Another one replaces it, sealed by the one before.
-    /// Answered by [`Report::Provisioned`].
-    Provision {
-        /// The key.
-        key: [u8; 32],
-    },
-    /// Carry out another request, which comes from whoever has the key. Answered as that one, or by [`Refusal::Seal`].
-    Sealed {
-        /// Number that rises from one sealed request to the next, so that none counts twice ([`Identity::counter`]).
-        counter: u64,
-        /// HMAC-SHA256 by the key, of purpose, device, counter and request.
-        tag: [u8; 32],
-        /// The request, as postcard fields.
-        request: &'a [u8],
-    },
-}
-
-impl Request<'_> {
-    /// Whether the request changes nothing, and so prolongs no lease.
-    pub fn only_asks(&self) -> bool {
-        matches!(self, Self::Identify | Self::Statistics | Self::Configuration)
-    }
-
-    /// Whether it needs no seal on a device with a key: it changes neither estimates nor flash.
-    pub fn is_free(&self) -> bool {
-        self.only_asks() || matches!(self, Self::Decode { .. } | Self::Constants | Self::Kept)
-    }
 }
 
 /// Steps of uploading a model, in their order.
@@ -133,7 +96,7 @@ pub enum UploadStep<'a> {
     Try {
         /// Time in ms, at most half an hour, after which the previous model comes back unless the trial is confirmed.
         /// If the step is sent again, this time counts from then on.
-        lease_ms: u32,
+        trial_ms: u32,
     },
     /// Abort the upload, and forget the bytes received. A model on trial is left for the previous one.
     Abort,
@@ -165,12 +128,7 @@ pub enum Report<'a> {
     /// Counters since the start.
     Statistics(Statistics),
     /// The configuration in force.
-    Configuration {
-        /// The configuration.
-        configuration: Configuration,
-        /// Time in ms until its lease ends if no request comes; 0 for the device's own configuration.
-        lease_left_ms: u32,
-    },
+    Configuration(Configuration),
     /// The baseline: the sensor at rest.
     Baseline {
         /// Mean readings in Ω, row after row; NaN where one was missing.
@@ -201,8 +159,6 @@ pub enum Report<'a> {
     Constants(#[serde(borrow)] Constants<'a>),
     /// The settings that are kept over restarts.
     Kept(Kept),
-    /// The device has this key.
-    Provisioned,
 }
 
 /// Identity of the device, and of the model in force.
@@ -231,25 +187,10 @@ pub struct Identity<'a> {
     pub chunk_bytes: u16,
     /// Use of flash and RAM.
     pub memory: Memory,
-    /// Whether the device has a key.
-    pub key: KeyState,
     /// Number that no other device of this board has; zeros if the board has none.
     pub unique_id: [u8; 12],
-    /// Largest counter of a sealed request so far, or beyond: the next one must be above it.
-    pub counter: u64,
     /// CRC-32 of the wires of all readings, in their order: of a row and a column each, as bytes that count from 0.
     pub wires_crc_32: u32,
-}
-
-/// Whether a device has a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum KeyState {
-    /// It has none, and does what any host asks.
-    None,
-    /// It has one, and changes nothing without a seal made by it.
-    Set,
-    /// It had one, which has decayed, and changes nothing any more.
-    Damaged,
 }
 
 /// Identity of the model in force.
@@ -478,12 +419,6 @@ pub struct Statistics {
     pub longest_confidence_us: u32,
     /// Longest time of the same in cycles of the processor; 0 on a board that does not count them.
     pub longest_confidence_cycles: u32,
-    /// Number of times that the model in force was checked from end to end in the background.
-    pub model_checks: u32,
-    /// Number of times that the bytes that are decoded from were found damaged, and another copy or model replaced them.
-    pub model_damages: u32,
-    /// Number of times that a model that is decoded from RAM was found damaged in its slot.
-    pub slot_damages: u32,
     /// Longest time in µs from the start of a scan until the board's line took the last byte of its estimate. What the
     /// line holds back, such as a ring of bytes, is still to be sent then.
     pub longest_latency_us: u32,
@@ -570,32 +505,8 @@ pub enum Refusal {
     NothingToUndo,
     /// A model is on trial: it must be confirmed or aborted first.
     OnTrial,
-    /// The device's key forbids it.
-    Seal(SealFault),
     /// The model was not confirmed in time: the previous one is in force again.
     TrialOver,
-}
-
-/// What the device's key has against a request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SealFault {
-    /// The request has no seal, or a trial no digest, and the device has a key.
-    Missing,
-    /// The seal was not made of this request by this key for this device, or the digest not of the blob that was uploaded.
-    Forged,
-    /// The counter is not above the largest so far, or far above it.
-    Counter {
-        /// Largest counter so far, or beyond.
-        last: u64,
-    },
-    /// The request has a seal, and the device has no key.
-    NoKey,
-    /// Nobody at the board allowed it to take a key: hold its button while it starts.
-    NotAllowed,
-    /// The device's key has decayed.
-    KeyDamaged,
-    /// The image knows no keys: it was built without the feature `seal`.
-    Unsupported,
 }
 
 /// Why a setting cannot be kept.

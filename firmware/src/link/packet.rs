@@ -53,15 +53,6 @@ pub fn encode<'b, T: Serialize>(number: u16, body: &T, buffer: &'b mut [u8]) -> 
 /// # Errors
 /// Every variant of [`PacketError`].
 pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<Packet<T>, PacketError> {
-    let Packet { number, body } = unpack(bytes)?;
-    message(number, body).map(|body| Packet { number, body })
-}
-
-/// Decodes a packet but for its body.
-///
-/// # Errors
-/// [`PacketError::Damaged`] and [`PacketError::OtherVersion`].
-pub fn unpack(bytes: &[u8]) -> Result<Packet<&[u8]>, PacketError> {
     let (covered, stored) = bytes.split_last_chunk::<4>().ok_or(PacketError::Damaged)?;
     if CRC_32.checksum(covered) != u32::from_le_bytes(*stored) {
         return Err(PacketError::Damaged);
@@ -71,16 +62,8 @@ pub fn unpack(bytes: &[u8]) -> Result<Packet<&[u8]>, PacketError> {
     if version != PROTOCOL_VERSION {
         return Err(PacketError::OtherVersion { number, version });
     }
-    Ok(Packet { number, body: rest })
-}
-
-/// Decodes the message that is the body of packet `number`.
-///
-/// # Errors
-/// [`PacketError::NotAMessage`].
-pub fn message<'b, T: Deserialize<'b>>(number: u16, body: &'b [u8]) -> Result<T, PacketError> {
-    match postcard::take_from_bytes(body) {
-        Ok((message, [])) => Ok(message),
+    match postcard::take_from_bytes(rest) {
+        Ok((body, [])) => Ok(Packet { number, body }),
         _ => Err(PacketError::NotAMessage { number }),
     }
 }

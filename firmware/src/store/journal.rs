@@ -1,4 +1,4 @@
-//! A journal in two pages of flash: settings, the models that were confirmed, and the device's key.
+//! A journal in two pages of flash: settings, and the models that were confirmed.
 //!
 //! One page is in use. Items are added behind the last one, and the newest item of a kind counts. When the page is
 //! full, the other page is erased, and the newest items are written there.
@@ -16,9 +16,6 @@
 //! - So a start [recovers](Journal::recover). A page without a firm start item gets another one. What counts
 //!   moves to the other page if the last item is not firm: nothing but a start item is ever added behind one. A page with
 //!   a start item that does not count, but may do so at another start, is erased.
-//!
-//! A key must never seem to have gone. So it is written only before a page's start item, and twice: whatever key a
-//! page in use has was whole, and one that does not count has decayed. A start moves a key that has lost one copy.
 
 use taxel_core::checksum::CRC_32;
 
@@ -47,17 +44,11 @@ const START: u8 = 0xFF;
 /// Second word of a start item: its kind and length.
 const START_HEAD: [u8; 4] = [START, 0, 4, 0];
 
-/// Number of start items of a page, and of copies of a key.
+/// Number of start items of a page.
 const COPIES: usize = 2;
 
-/// Length of a key in bytes.
-const KEY_BYTES: usize = 32;
-
-/// First words of a key's item: its mark, kind and length.
-const KEY_HEAD: [u8; 8] = [MARK[0], MARK[1], MARK[2], MARK[3], Kind::Key as u8, 0, 32, 0];
-
-/// Bytes of a page that are left for start items, more than two behind cuts, and for a key.
-const ROOM: usize = 4 * CELL + COPIES * item_bytes(KEY_BYTES);
+/// Bytes of a page that are left for start items, more than two behind cuts.
+const ROOM: usize = 4 * CELL;
 
 /// Number of times that an item is written, each time behind the last, until it is given up.
 const ATTEMPTS: usize = 4;
@@ -73,27 +64,11 @@ pub enum Kind {
     Baseline,
     /// Which model is in force ([`ConfirmedModels`](super::ConfirmedModels)).
     Models,
-    /// Number that no request sealed from now on may have.
-    Counter,
-    /// The device's key.
-    Key,
 }
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 6] = [
-        Self::Configuration,
-        Self::Constants,
-        Self::Baseline,
-        Self::Models,
-        Self::Counter,
-        Self::Key,
-    ];
-
-    /// Number of items that are written at once.
-    fn copies(self) -> usize {
-        if self == Self::Key { COPIES } else { 1 }
-    }
+    pub const ALL: [Self; 4] = [Self::Configuration, Self::Constants, Self::Baseline, Self::Models];
 }
 
 impl From<Setting> for Kind {
@@ -106,23 +81,12 @@ impl From<Setting> for Kind {
     }
 }
 
-/// Key of a device, as the journal tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum KeyFound<'j> {
-    /// None was ever set.
-    None,
-    /// This one.
-    Set(&'j [u8; KEY_BYTES]),
-    /// One was set and all its copies have decayed.
-    Damaged,
-}
-
 /// Why something was not kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeepError {
     /// It is too large for a page.
     TooLarge,
-    /// A page could not be erased or written, or holds a key that has decayed.
+    /// A page could not be erased or written.
     Failed,
 }
 
@@ -186,10 +150,6 @@ struct Contents<'p> {
     starts: usize,
     /// Newest content of each kind.
     items: [&'p [u8]; Kind::ALL.len()],
-    /// Number of copies of the key that count.
-    keys: usize,
-    /// Whether some copy of a key does not count.
-    has_decayed_key: bool,
     /// Whether the last item that counts is firm, and its end.
     is_firm: bool,
     end: usize,
@@ -199,32 +159,19 @@ impl<'p> Contents<'p> {
     /// Reads the page of these `bytes`; a page that is too short counts as empty.
     fn new(bytes: &'p [u8]) -> Self {
         let page = bytes.get(..PAGE_BYTES).unwrap_or_default();
-        let mut contents = Self {
-            number: None,
-            starts: 0,
-            items: [&[]; _],
-            keys: 0,
-            has_decayed_key: false,
-            is_firm: false,
-            end: 0,
-        };
+        let mut contents =
+            Self { number: None, starts: 0, items: [&[]; _], is_firm: false, end: 0 };
         let mut place = 0;
         while place < page.len() {
-            let is_before_start = contents.number.is_none();
             let Some(item) = Item::at(page, place) else {
-                let rest = page.get(place..).unwrap_or_default();
-                contents.has_decayed_key |= is_before_start && rest.starts_with(&KEY_HEAD);
                 place += CELL;
                 continue;
             };
             if item.kind == START {
                 contents.number = item.number();
                 contents.starts += usize::from(item.is_firm);
-            } else if item.kind != Kind::Key as u8 || is_before_start {
-                contents.keys += usize::from(item.kind == Kind::Key as u8);
-                if let Some(newest) = contents.items.get_mut(usize::from(item.kind)) {
-                    *newest = item.content;
-                }
+            } else if let Some(newest) = contents.items.get_mut(usize::from(item.kind)) {
+                *newest = item.content;
             }
             (contents.is_firm, contents.end) = (item.is_firm, item.end);
             place = item.end;
@@ -235,11 +182,6 @@ impl<'p> Contents<'p> {
     /// Newest content of this `kind`.
     fn content(&self, kind: Kind) -> &'p [u8] {
         self.items.get(kind as usize).copied().unwrap_or_default()
-    }
-
-    /// Whether a key was set, and is lost.
-    fn has_lost_key(&self) -> bool {
-        self.keys == 0 && self.has_decayed_key
     }
 }
 
@@ -360,7 +302,7 @@ impl<S: Slot> Journal<S> {
         };
         let is_started = contents.starts > 0;
         let (is_firm, end) = (contents.is_firm, contents.end);
-        let has_copies = contents.starts >= COPIES && contents.keys != 1;
+        let has_copies = contents.starts >= COPIES;
         let number = contents.number.unwrap_or_default();
         let [active, other] = self.page_and_other(index);
         let is_whole = has_copies && is_firm && end >= used(active.bytes());
@@ -382,17 +324,6 @@ impl<S: Slot> Journal<S> {
         Some(contents.content(kind)).filter(|content| !content.is_empty())
     }
 
-    /// The key.
-    pub fn key(&self) -> KeyFound<'_> {
-        let contents = self.in_use().map(|(_, contents)| contents);
-        let key = contents.and_then(|contents| contents.content(Kind::Key).first_chunk());
-        match key {
-            Some(key) => KeyFound::Set(key),
-            None if contents.is_some_and(|found| found.has_lost_key()) => KeyFound::Damaged,
-            None => KeyFound::None,
-        }
-    }
-
     /// Keeps `parts`, joined, as `kind`; no parts at all forget it. Nothing is written if these bytes are kept
     /// already. Returns whether something was written. May take a second.
     ///
@@ -407,13 +338,12 @@ impl<S: Slot> Journal<S> {
         }
         let new = parts.iter().map(|part| part.len()).sum();
         let lengths = Kind::ALL.map(|other| if other == kind { new } else { kept(other).len() });
-        // A key has its room in any case.
-        let bytes: usize = lengths.iter().take(Kind::Key as usize).map(|it| item_bytes(*it)).sum();
+        let bytes: usize = lengths.iter().map(|length| item_bytes(*length)).sum();
         if bytes + ROOM > PAGE_BYTES {
             return Err(KeepError::TooLarge);
         }
         let index = found.map(|(index, _)| index);
-        if let Some(index) = index.filter(|_| kind != Kind::Key)
+        if let Some(index) = index
             && append(self.page_and_other(index)[0], kind as u8, parts).is_ok()
         {
             return Ok(true);
@@ -430,18 +360,13 @@ impl<S: Slot> Journal<S> {
     ) -> Result<(), KeepError> {
         let [old, new] = self.page_and_other(index);
         let contents = Contents::new(old.bytes());
-        if contents.has_lost_key() {
-            return Err(KeepError::Failed); // the new page would seem to be one without a key
-        }
         erase(new)?;
         for kind in Kind::ALL {
             let content = contents.content(kind);
-            for _ in 0..kind.copies() {
-                if Some(kind) == changed {
-                    append(new, kind as u8, parts)?;
-                } else if !content.is_empty() {
-                    append(new, kind as u8, &[content])?;
-                }
+            if Some(kind) == changed {
+                append(new, kind as u8, parts)?;
+            } else if !content.is_empty() {
+                append(new, kind as u8, &[content])?;
             }
         }
         let number = contents.number.unwrap_or_default().wrapping_add(1).to_le_bytes();

@@ -32,11 +32,6 @@ impl Upload {
         self.state
     }
 
-    /// Whether chunks are expected.
-    pub fn is_receiving(&self) -> bool {
-        matches!(self.state, UploadState::Receiving { .. })
-    }
-
     /// Prepares `spare` for a blob of `length` bytes at the time `now_us` since the start. The slot is erased unless it
     /// still is from the last begin.
     ///
@@ -147,11 +142,6 @@ impl Upload {
     /// Ends the upload, and forgets the bytes received.
     pub fn abort(&mut self) {
         self.state = UploadState::Idle;
-    }
-
-    /// Forgets all but the wear: the spare slot may be another one now.
-    pub fn forget(&mut self) {
-        *self = Self { worn_until_us: self.worn_until_us, ..Self::new() };
     }
 
     /// Converts an outcome of the flash; a failure ends the upload.

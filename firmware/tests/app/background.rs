@@ -101,7 +101,7 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
     constants.drive_v = 0.21;
     let slower = Configuration { frame_period_us: 2000, send_readings: true, ..quiet() };
     let changes = [
-        configure(slower),
+        Request::Configure(slower),
         Request::SetConstants(constants.constants().unwrap()),
         Request::CaptureBaseline { frames: 1 },
     ];
@@ -131,7 +131,7 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
     // Nothing is given up where nothing changes.
     let (started, stopped) = (board.pins.borrow().started, board.pins.borrow().stopped);
     run_until_started(&mut session, &board, started + 1);
-    ask(&mut session, &board, &configure(slower), |_| ());
+    ask(&mut session, &board, &Request::Configure(slower), |_| ());
     assert_eq!(board.pins.borrow().stopped, stopped);
     assert_eq!(statistics(&mut session, &board).frames_missed, 0);
 }

@@ -39,7 +39,7 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
     ask(
         &mut session,
         &board,
-        &configure(Configuration { contact_threshold: 0.25, ..quiet() }),
+        &Request::Configure(Configuration { contact_threshold: 0.25, ..quiet() }),
         |_| (),
     );
     for (ohm, contact) in [(48.0, 0), (47.9, EstimateReport::CONTACT)] {
@@ -68,7 +68,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     };
     let begin = |session: &mut TestSession<'_>| {
         let scanning = Configuration { frame_period_us: 100, ..quiet() };
-        ask(session, &board, &configure(scanning), |_| ());
+        ask(session, &board, &Request::Configure(scanning), |_| ());
         let request = request_bytes(8, &Request::CaptureBaseline { frames: 1000 });
         board.pins.borrow_mut().to_device.extend(request);
         settle(session, &board);
@@ -86,14 +86,14 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     assert_eq!(read(&mut session), without);
     capture(&mut session, &board, 2);
     let decoded = (0, vec![0, 0]);
-    ask(&mut session, &board, &configure(quiet()), |_| ());
+    ask(&mut session, &board, &Request::Configure(quiet()), |_| ());
     assert_eq!(read(&mut session), decoded);
     // While another is captured, and if that is given up, readings are relative to the one before.
     begin(&mut session);
     assert_eq!(read(&mut session), decoded);
     scan_some(&mut session);
     assert_eq!(read(&mut session), decoded);
-    ask(&mut session, &board, &configure(quiet()), |_| ());
+    ask(&mut session, &board, &Request::Configure(quiet()), |_| ());
     assert_eq!(read(&mut session), decoded);
     // A baseline of no known reading is none.
     let unknown = Request::SetBaseline { readings_ohm: Floats::new(&[f32::NAN; ROWS * COLS]) };
@@ -123,12 +123,12 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
     say(&mut session, 10, &Request::CaptureBaseline { frames: 1000 });
     say(&mut session, 11, &Request::CaptureBaseline { frames: 1000 });
     assert_eq!(answer(10), [refused.as_str()]);
-    say(&mut session, 12, &configure(quiet()));
+    say(&mut session, 12, &Request::Configure(quiet()));
     assert_eq!(answer(11), [refused.as_str()]);
     say(&mut session, 13, &Request::CaptureBaseline { frames: 1 });
     assert_eq!(answer(13), [refused]);
     // The same request again goes on counting.
-    say(&mut session, 14, &configure(Configuration { frame_period_us: 100, ..quiet() }));
+    say(&mut session, 14, &Request::Configure(Configuration { frame_period_us: 100, ..quiet() }));
     say(&mut session, 15, &Request::CaptureBaseline { frames: 3 });
     say(&mut session, 15, &Request::CaptureBaseline { frames: 3 });
     while answer(15).is_empty() {

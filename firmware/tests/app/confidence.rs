@@ -56,7 +56,7 @@ fn decode(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> (S
 /// What the device sends of its next scans, which it then ends.
 fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceSent) -> Vec<Sent> {
     let scanning = Configuration { frame_period_us: 1000, confidence, ..quiet() };
-    ask(session, board, &configure(scanning), |_| ());
+    ask(session, board, &Request::Configure(scanning), |_| ());
     board.pins.borrow_mut().to_host.clear();
     let until_us = board.pins.borrow().now_us + 2500;
     while board.pins.borrow().now_us < until_us {
@@ -71,7 +71,7 @@ fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceS
         }
         None::<()>
     });
-    ask(session, board, &configure(quiet()), |_| ());
+    ask(session, board, &Request::Configure(quiet()), |_| ());
     assert!(found.len() >= 2, "{found:?}");
     found
 }

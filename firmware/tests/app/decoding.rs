@@ -131,7 +131,7 @@ fn a_baseline_that_is_being_captured_tells_of_no_contact() {
     };
     assert_eq!(contact(&mut session, &pressed), EstimateReport::CONTACT);
     let scanning = Configuration { frame_period_us: 1_000_000, ..quiet() };
-    ask(&mut session, &board, &configure(scanning), |_| ());
+    ask(&mut session, &board, &Request::Configure(scanning), |_| ());
     let again = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
     board.pins.borrow_mut().to_device.extend(again);
     settle(&mut session, &board);

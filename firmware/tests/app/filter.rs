@@ -102,8 +102,8 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
     let other = Configuration { filter_lead_us: 1501, ..filtering() };
     for (request, is_new) in [
         (Request::Identify, false),
-        (configure(filtering()), false), // in force already
-        (configure(other), true),
+        (Request::Configure(filtering()), false), // in force already
+        (Request::Configure(other), true),
         (set_baseline, true),
         (Request::SetConstants(constants), true),
     ] {
@@ -240,8 +240,10 @@ fn a_filter_out_of_range_is_refused_by_its_field() {
         (Configuration { report_every: 0, ..good }, Field::ReportEvery),
     ] {
         let refusal = Refusal::Configuration(field);
-        let refused =
-            ask(&mut session, &bench.board, &configure(bad), |r| r == Report::Refused(refusal)).0;
+        let refused = ask(&mut session, &bench.board, &Request::Configure(bad), |r| {
+            r == Report::Refused(refusal)
+        })
+        .0;
         assert!(refused, "{bad:?}");
     }
 }

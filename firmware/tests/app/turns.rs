@@ -91,7 +91,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
     for _ in 0..2000 {
         session.step();
     }
-    ask(&mut session, &board, &configure(quiet()), |_| ());
+    ask(&mut session, &board, &Request::Configure(quiet()), |_| ());
     let fed = feeds();
     session.step();
     assert_eq!(feeds(), fed + 1);

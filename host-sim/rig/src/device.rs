@@ -1,6 +1,6 @@
 //! A device at the other end of a serial line, real or emulated.
 //!
-//! [`Device`] sends requests and receives reports; [`upload`] replaces its model; [`calibrate`] finds the constants of its circuit; [`stream`] lets it decode frames; [`check`] compares it with the host.
+//! [`Device`] sends requests and receives reports; [`upload`] replaces its model; [`stream`] lets it decode frames; [`check`] compares it with the host.
 //! `docs/link.md` specifies the protocol.
 
 use std::collections::VecDeque;
@@ -13,11 +13,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use taxel_core::blob::Floats;
-use taxel_firmware::link::message::{KeyState, Refusal, Report, Request, SealFault};
+use taxel_firmware::link::message::{Refusal, Report, Request};
 use taxel_firmware::link::packet::PacketError;
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
-use taxel_firmware::seal::Key;
 
 use crate::error::{Error, Heard, Result};
 
@@ -26,18 +25,13 @@ mod identity;
 mod configuration;
 pub mod serial;
 mod settings;
-pub mod calibrate;
 pub mod stream;
-mod key;
 pub mod upload;
 mod expected;
 pub mod check;
 
-use configuration::Kept;
-pub use configuration::{ActiveConfiguration, LEASE};
 pub use identity::DeviceIdentity;
-use key::Counter;
-pub use key::key_of;
+pub use settings::CircuitConstants;
 
 /// Longest time that a board takes to answer a request that erases no flash.
 const ANSWER: Duration = Duration::from_millis(500);
@@ -73,14 +67,6 @@ pub struct Device {
     /// Bytes that were read and not looked at yet.
     pending: VecDeque<u8>,
     number: u16,
-    /// Key that requests are sealed with.
-    pub key: Option<Key>,
-    /// Counter of sealed requests, once the device was asked for it.
-    counter: Option<Counter>,
-    /// Configuration that is prolonged while reports are heard.
-    kept: Option<Kept>,
-    /// Time without requests after which the device returns to its own configuration.
-    pub lease: Duration,
     /// Flag that ends waiting with [`Error::Interrupted`] when it is set, if there is one.
     pub stop: Option<Arc<AtomicBool>>,
     /// Longest time that an answer may take.
@@ -108,10 +94,6 @@ impl Device {
             pending,
             // Answers to a host before this one may still come: they shall not have this one's numbers.
             number: RandomState::new().build_hasher().finish() as u16,
-            key: None,
-            counter: None,
-            kept: None,
-            lease: LEASE,
             stop: None,
             patience: ANSWER,
             damaged: 0,
@@ -121,11 +103,8 @@ impl Device {
         })
     }
 
-    /// Sends `bytes` unframed, as they are.
-    ///
-    /// # Errors
-    /// [`Error::Line`] if the line fails, or takes no bytes for too long; [`Error::Interrupted`].
-    pub fn send_raw(&mut self, bytes: &[u8]) -> Result<()> {
+    /// Sends `bytes` as they are.
+    fn send_raw(&mut self, bytes: &[u8]) -> Result<()> {
         let (mut rest, start) = (bytes, Instant::now());
         while !rest.is_empty() {
             self.check_stop()?;
@@ -140,20 +119,10 @@ impl Device {
         Ok(self.wire.flush()?)
     }
 
-    /// Sends a request with a new number, and returns the number. It is sealed if it must be and there is a key.
+    /// Sends a request with a new number, and returns the number.
     pub fn send(&mut self, request: &Request<'_>) -> Result<u16> {
         self.number = self.number.checked_add(1).unwrap_or(packet::UNASKED + 1);
-        let number = self.number;
-        let bytes = match (self.key, &mut self.counter) {
-            (Some(key), Some(counter)) if !request.is_free() => {
-                counter.seal(&key, request, |sealed| request_bytes(number, sealed))?
-            }
-            _ => request_bytes(number, request)?,
-        };
-        self.send_raw(&bytes)?;
-        if let Some(kept) = &mut self.kept {
-            kept.asked = Instant::now();
-        }
+        self.send_raw(&request_bytes(self.number, request)?)?;
         Ok(self.number)
     }
 
@@ -191,9 +160,6 @@ impl Device {
                 match report {
                     Ok(report) => {
                         self.heard = Heard::Reports;
-                        if let Some(kept) = &mut self.kept {
-                            kept.waiting = kept.waiting.filter(|number| *number != report.number);
-                        }
                         if let Some(answer) = read(report.number, &report.body) {
                             return Ok(Some(answer));
                         }
@@ -214,7 +180,6 @@ impl Device {
                 return Ok(None);
             }
             self.check_stop()?;
-            self.prolong()?;
             let count = look::read(&mut *self.wire, &mut bytes)?;
             self.pending.extend(&bytes[..count]);
             if count > 0 && self.heard == Heard::Nothing {
@@ -238,17 +203,6 @@ impl Device {
         timeout: Duration,
         read: impl Fn(&Report<'_>) -> Option<T>,
     ) -> Result<std::result::Result<T, Refusal>> {
-        if self.key.is_some() && self.counter.is_none() && !request.is_free() {
-            let identity = self.identify()?;
-            if identity.key == KeyState::Set {
-                self.counter = Some(Counter::new(&identity));
-            } else if !matches!(request, Request::Provision { .. }) {
-                self.check_key(&identity)?; // it would be carried out without a seal
-            }
-        }
-        // Now and then the counter is written down.
-        let is_sealed = self.counter.is_some() && !request.is_free();
-        let timeout = if is_sealed { timeout.max(WRITING) } else { timeout };
         self.heard = Heard::Nothing;
         for attempt in 0..ATTEMPTS {
             self.repeated += u64::from(attempt > 0);
@@ -260,12 +214,6 @@ impl Device {
                 })
             })?;
             match answer {
-                Some(Ok(Err(Refusal::Seal(SealFault::Counter { last })))) => {
-                    // Another host with the key was here.
-                    if let Some(counter) = &mut self.counter {
-                        counter.go_on(last);
-                    }
-                }
                 Some(Ok(answer)) => return Ok(answer),
                 Some(Err(answer)) => {
                     return Err(Error::Unexpected { request: format!("{request:?}"), answer });
@@ -312,7 +260,6 @@ impl Device {
         self.ask_plainly(&Request::Restart, |report| {
             matches!(report, Report::Restarting).then_some(())
         })?;
-        (self.kept, self.counter) = (None, None);
         // Bytes that arrive while it starts are lost, which is no fault of the line. An emulated device may take longer
         // to answer than a board does to start.
         let (patience, repeated) = (self.patience, self.repeated);
@@ -360,7 +307,7 @@ mod tests {
     /// A report as bytes on the line.
     fn framed() -> Vec<u8> {
         let mut buffer = [0; 64];
-        let packet = packet::encode(0, &Report::Provisioned, &mut buffer).expect("room");
+        let packet = packet::encode(0, &Report::Restarting, &mut buffer).expect("room");
         let mut line = Vec::new();
         cobs::encode(packet, |byte| {
             line.push(byte);

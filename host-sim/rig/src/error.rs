@@ -7,7 +7,7 @@ use taxel_core::filter::Settings;
 use taxel_firmware::capacity::Capacity;
 use taxel_firmware::circuit::ConstantsFault;
 use taxel_firmware::link::message::{
-    Configuration, ConfigurationField, KeepFault, ModelFault, Refusal, SealFault,
+    Configuration, ConfigurationField, KeepFault, ModelFault, Refusal,
 };
 use taxel_firmware::link::packet::PROTOCOL_VERSION;
 use taxel_firmware::readout::ScanSettings;
@@ -68,7 +68,7 @@ pub enum Error {
     #[error("the device closed the line")]
     Closed,
     /// Work that somebody ended.
-    #[error("interrupted; the device returns to its own configuration")]
+    #[error("interrupted; the device returns to the configuration that it keeps")]
     Interrupted,
     /// Device that does not answer.
     #[error("the device does not answer ({attempts} attempts, {} ms each); {heard}", timeout.as_millis())]
@@ -101,12 +101,6 @@ pub enum Error {
     #[error(transparent)]
     Data(#[from] taxel_data::Error),
 }
-
-/// Said of a device without a key, of one whose key is missing, and of one whose key has decayed.
-pub(crate) const NO_KEY: &str =
-    "the device has no key, and does what any host asks: `provision` it first, or leave --key out";
-pub(crate) const KEY_MISSING: &str = "the device has a key, and changes nothing without it: give it with --key FILE; if it is lost, erase the whole flash with a debugger";
-pub(crate) const KEY_DAMAGED: &str = "the device's key has decayed, so it changes nothing any more: erase the whole flash with a debugger";
 
 impl Error {
     /// Error for what a device or an emulator does wrong, and the `reason`.
@@ -207,27 +201,9 @@ fn why(refusal: Refusal) -> String {
         Refusal::NothingToUndo => {
             "it has no previous model; upload the model".into()
         }
-        Refusal::Seal(fault) => why_not_trusted(fault),
         Refusal::OnTrial => "its model is on trial; `confirm` or `undo` it first".into(),
         Refusal::TrialOver => {
             "the model was not confirmed in time, and the previous one is active again; upload it once more".into()
-        }
-    }
-}
-
-/// Reason why the device's key forbids something, in words.
-fn why_not_trusted(fault: SealFault) -> String {
-    match fault {
-        SealFault::Missing => KEY_MISSING.into(),
-        SealFault::Forged => "the request was sealed with another key, or for another device, or another model was uploaded meanwhile: check --key".into(),
-        SealFault::Counter { last } => format!(
-            "another host sealed requests at the same time (the counter is at {last}): try again when it is done"
-        ),
-        SealFault::NoKey => NO_KEY.into(),
-        SealFault::NotAllowed => "it takes its first key only from somebody at the board: restart it with its button held (docs/board.md), and provision it then".into(),
-        SealFault::KeyDamaged => KEY_DAMAGED.into(),
-        SealFault::Unsupported => {
-            "its image knows no keys: build one with the feature `seal` (docs/board.md)".into()
         }
     }
 }

@@ -52,15 +52,6 @@ pub struct CheckArguments {
         allow_negative_numbers = true
     )]
     frames: usize,
-    /// Damaged models to upload; after each, the previous model must still be active.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    damaged_uploads: usize,
-    /// Break an upload off after each of its chunks, and restart the device.
-    #[arg(long)]
-    interruptions: bool,
-    /// Random bytes to send; the device must then answer as before.
-    #[arg(long, value_name = "BYTES", default_value_t = 0)]
-    garbage: usize,
     #[command(flatten)]
     pub limits: Limits,
 }
@@ -184,15 +175,8 @@ impl CheckArguments {
     }
 
     /// Plan of the check, with `window` frames on their way at a time.
-    pub fn plan(&self, window: usize, common: &Common) -> Plan {
-        Plan {
-            seed: common.seed.unwrap_or(1),
-            damaged_uploads: self.damaged_uploads,
-            interruptions: self.interruptions,
-            garbage_bytes: self.garbage,
-            window,
-            filter: self.filter.settings(),
-        }
+    pub fn plan(&self, window: usize) -> Plan {
+        Plan { window, filter: self.filter.settings() }
     }
 }
 
@@ -236,25 +220,6 @@ fn page_of(f: &Findings) -> print::Page {
         "{:<17} {} of {} bit-identical to the host's, {:.0} a second",
         "frames", f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s
     ));
-    if let Some(u) = &f.uploads {
-        let good = if u.good_came_into_force { "activated" } else { "NOT ACTIVATED" };
-        page.line(format_args!("{:<17} {good} ({} bytes and more)", "good uploads", u.blob_bytes));
-        page.line(format_args!(
-            "{:<17} {} of {} refused, previous model active",
-            "damaged uploads", u.damaged_refused, u.damaged
-        ));
-        page.line(format_args!(
-            "{:<17} previous model active after {} of {}",
-            "interruptions", u.old_stayed, u.interrupted
-        ));
-    }
-    if let Some(g) = &f.garbage {
-        let decodes = if g.decodes_as_before { "as before" } else { "NOT AS BEFORE" };
-        page.line(format_args!(
-            "{:<17} {} bytes; request {} after them was answered, frames are decoded {decodes}",
-            "garbage", g.bytes, g.requests_until_answer
-        ));
-    }
     page.line(format_args!(
         "{:<17} {} requests sent again, {} damaged reports",
         "line", f.repeated, f.damaged

@@ -31,8 +31,7 @@ enum Line {
 
 /// Run the firmware in QEMU and compare its estimates with the host's.
 ///
-/// Decodes frames of a scene, or of a CSV file with a model of it. Fails (exit status 1) unless every frame is bit-identical and every check
-/// asked for is passed.
+/// Decodes frames of a scene, or of a CSV file with a model of it. Fails (exit status 1) unless every frame is bit-identical.
 #[derive(Args)]
 #[command(
     after_help = "Example: cargo xtask firmware && host-sim emulate press -n 10000\n\nNeeds qemu-system-arm and the image; docs/emulator.md tells how to get both."
@@ -84,7 +83,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let outcome = started.and_then(|(_emulator, link)| {
         let mut device = Device::new(link)?;
         device.patience = PATIENCE;
-        let plan = arguments.check.plan(WINDOW, common);
+        let plan = arguments.check.plan(WINDOW);
         check(&mut device, &frames, &model, &plan, &Terminal::new())
     });
     if let Some((temporary, wanted)) = log.zip(arguments.log.as_ref()) {

@@ -1,22 +1,19 @@
 //! Command `link`: a device on a serial port.
 
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::path::PathBuf;
 
-use crate::{Error, Result};
+use crate::Result;
 use clap::{Args, Subcommand, value_parser};
-use taxel_data::input;
-use taxel_firmware::seal::Key;
 use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
-use taxel_rig::device::{Device, DeviceIdentity, LEASE, key_of, serial, upload};
+use taxel_rig::device::{Device, DeviceIdentity, serial, upload};
 
 use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
 use super::{Common, interruption, stderr};
 
-/// Talk to a device on a serial port: identify, upload, record, calibrate, recalibrate.
+/// Talk to a device on a serial port: identify, upload, record, configure, recalibrate.
 #[derive(Args)]
 #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
 pub struct Arguments {
@@ -25,12 +22,6 @@ pub struct Arguments {
     /// Speed of the line in bits a second.
     #[arg(long, value_name = "BAUD", default_value_t = NUCLEO_BAUD, value_parser = value_parser!(u32).range(1..))]
     baud: u32,
-    /// Time without requests after which the device returns to its own configuration, if this program is killed.
-    #[arg(long, value_name = "MS", default_value_t = LEASE.as_millis() as u32, value_parser = value_parser!(u32).range(100..=600_000))]
-    lease_ms: u32,
-    /// File with the device's key, if it was provisioned: what changes the device is sealed with it.
-    #[arg(long, global = true, value_name = "FILE")]
-    key: Option<PathBuf>,
     #[command(subcommand)]
     action: Action,
 }
@@ -41,7 +32,7 @@ mod scan;
 mod frames;
 mod record;
 mod settings;
-mod calibrate;
+mod constants;
 mod recalibrate;
 
 #[derive(Subcommand)]
@@ -55,14 +46,6 @@ enum Action {
     /// previous one, whatever caused it.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
     Upload(UploadArguments),
-    /// Give the device a key: from then on it changes nothing for a host without it.
-    ///
-    /// The key is 32 random bytes, as bytes or as 64 hexadecimal digits: `(umask 077; openssl rand -hex 32 >
-    /// device.key)`. Keep it secret. The first key needs somebody at the board, who holds its button while it starts.
-    /// Another one replaces it if the old one is given with --key. A key that is lost goes only with the whole flash, by a
-    /// debugger (docs/reliability.md).
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 provision device.key")]
-    Provision(ProvisionArguments),
     /// Confirm the model that `upload --trial` left on trial: it stays active over restarts.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 confirm")]
     Confirm,
@@ -71,7 +54,7 @@ enum Action {
         after_help = "Example: host-sim link /dev/ttyACM0 record press.bin -n 1000 -o estimates.csv"
     )]
     Record(record::RecordArguments),
-    /// Capture the untouched sensor, and save the mean readings as CSV.
+    /// Capture the untouched sensor, keep its baseline over restarts, and save the mean readings as CSV.
     #[command(after_help = "Example: host-sim link /dev/ttyACM0 baseline -o rest.csv")]
     Baseline(record::BaselineArguments),
     /// Change the configuration, and keep it over restarts.
@@ -79,11 +62,9 @@ enum Action {
         after_help = "Example: host-sim link /dev/ttyACM0 configure --period-us 20000 --send both"
     )]
     Configure(settings::ConfigureArguments),
-    /// Find the constants of the device's circuit with known resistors.
-    ///
-    /// Asks for one arrangement of resistors after the other. docs/readout.md says which ones tell the constants.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 calibrate known.csv --store")]
-    Calibrate(calibrate::Arguments),
+    /// Set the constants of the device's circuit, and keep them over restarts.
+    #[command(after_help = "Example: host-sim link /dev/ttyACM0 constants circuit.toml")]
+    Constants(constants::Arguments),
     /// Mend the device's model after the sensor has changed, from reference presses, and upload it.
     ///
     /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, these are taken;
@@ -111,12 +92,11 @@ impl Arguments {
         match self.action {
             Action::Identify => "identify",
             Action::Upload(_) => "upload",
-            Action::Provision(_) => "provision",
             Action::Confirm => "confirm",
             Action::Record(_) => "record",
             Action::Baseline(_) => "baseline",
             Action::Configure(_) => "configure",
-            Action::Calibrate(_) => "calibrate",
+            Action::Constants(_) => "constants",
             Action::Recalibrate(_) => "recalibrate",
             Action::Undo => "undo",
             Action::Settings(_) => "settings",
@@ -142,39 +122,9 @@ struct UploadArguments {
     trial: Option<u32>,
 }
 
-#[derive(Args)]
-struct ProvisionArguments {
-    /// File with the new key.
-    new_key: PathBuf,
-}
-
-/// Largest file with a key, in bytes.
-const MOST_KEY_BYTES: u64 = 4096;
-
-/// Reads a device's key.
-fn read_key(path: &Path) -> Result<Key> {
-    let content = input::read(path, MOST_KEY_BYTES)?;
-    #[cfg(unix)]
-    note_readers(path);
-    key_of(&content).map_err(|bad| Error::Unfit { path: path.to_owned(), message: bad.to_string() })
-}
-
-/// Notes that others may read the secret at `path`.
-#[cfg(unix)]
-fn note_readers(path: &Path) {
-    use std::os::unix::fs::PermissionsExt;
-    let mode = std::fs::metadata(path).map_or(0, |metadata| metadata.permissions().mode());
-    if mode & 0o077 != 0 {
-        stderr::remark(format_args!("note: others may read {0}: chmod 600 {0}", path.display()));
-    }
-}
-
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let open = || -> Result<_> {
-        let key = arguments.key.as_deref().map(read_key).transpose()?;
         let mut device = Device::new(serial::open(&arguments.port, arguments.baud)?)?;
-        device.key = key;
-        device.lease = Duration::from_millis(arguments.lease_ms.into());
         device.stop = Some(interruption::flag());
         Ok(device)
     };
@@ -195,12 +145,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             }
             status::show(&mut device, common)
         }
-        Action::Provision(action) => {
-            let key = read_key(&action.new_key)?;
-            let mut device = open()?;
-            device.provision(&key)?;
-            status::show(&mut device, common)
-        }
         Action::Confirm => {
             let mut device = open()?;
             upload::confirm(&mut device)?;
@@ -209,10 +153,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Action::Record(action) => record::record(&mut open()?, action, common),
         Action::Baseline(action) => record::baseline(&mut open()?, action, common),
         Action::Configure(action) => settings::configure(&mut open()?, action, common),
-        Action::Calibrate(action) => calibrate::execute(&mut open()?, action, common),
-        Action::Recalibrate(action) => {
-            recalibrate::execute(&mut open()?, action, arguments.key.as_deref(), common)
-        }
+        Action::Constants(action) => constants::execute(&mut open()?, action, common),
+        Action::Recalibrate(action) => recalibrate::execute(&mut open()?, action, common),
         Action::Undo => {
             let mut device = open()?;
             upload::undo(&mut device)?;
@@ -222,19 +164,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         Action::Check(action) => {
             let Checked { frames, model, .. } = action.load(common)?;
             let mut device = open()?;
-            let plan = action.plan(1, common);
-            let progress = Terminal::new();
-            let findings = check(&mut device, &frames, &model, &plan, &progress)?;
+            let plan = action.plan(1);
+            let findings = check(&mut device, &frames, &model, &plan, &Terminal::new())?;
             conclude(&findings, &action.limits, common)
         }
     }
 }
 
-/// Uploads `model`, puts it on trial, and waits until the device has decoded frames with it.
+/// Uploads `model` while the device goes on, puts it on trial, and waits until the device has decoded frames with it.
 fn activate(device: &mut Device, model: &ModelBlob) -> Result<DeviceIdentity> {
-    let progress = Terminal::new();
-    let identity =
-        device.while_paused(|device| upload::start_trial(device, model.bytes(), &progress))?;
+    let identity = upload::start_trial(device, model.bytes(), &Terminal::new())?;
     upload::see_frames(device)?;
     Ok(identity)
 }

@@ -202,7 +202,7 @@ fn open(
         None => false,
     };
     let decodes = identity.model.is_some() && !is_other;
-    let own = device.configuration()?.configuration;
+    let own = device.resume()?;
     let usual = Configuration::DEFAULT.frame_period_us;
     let own_period = if own.frame_period_us == 0 { usual } else { own.frame_period_us };
     let configuration = Configuration {

@@ -121,23 +121,13 @@ impl std::io::Write for Patient {
 }
 
 #[test]
-fn a_sound_device_passes_every_check() {
+fn a_sound_device_decodes_as_the_host_does() {
     let model = model(16);
     let mut device = device(SOUND, &model);
-    let plan = Plan {
-        seed: 1,
-        damaged_uploads: 70,
-        interruptions: true,
-        garbage_bytes: 100_000,
-        window: 4,
-        filter: Settings::default(),
-    };
+    let plan = Plan { window: 4, filter: Settings::default() };
     let findings = check(&mut device, &frames_of(500), &model, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
     assert_eq!(findings.frames.bit_identical, 500);
-    let uploads = findings.uploads.unwrap();
-    assert_eq!((uploads.damaged_refused, uploads.damaged), (70, 70));
-    assert!(uploads.interrupted > 5 && uploads.old_stayed == uploads.interrupted);
 }
 
 /// Requests of every kind, refused ones and garbage included, each with the number of its answers.
@@ -159,7 +149,7 @@ fn requests(new: &ModelBlob) -> Vec<(Vec<u8>, usize)> {
     for (index, bytes) in new.bytes().chunks(512).enumerate() {
         add(&Request::Upload(UploadStep::Chunk { offset: 512 * index as u32, bytes }));
     }
-    add(&Request::Upload(UploadStep::Try { lease_ms: 60_000 }));
+    add(&Request::Upload(UploadStep::Try { trial_ms: 60_000 }));
     add(&Request::Identify);
     let again = Floats::new(readings[0].as_flattened());
     add(&Request::Decode { frame: 41, start_us: 0, readings_ohm: again });
@@ -228,14 +218,7 @@ fn the_image_answers_alike_on_both_lines() {
 fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
     let mut device = device(SOUND, &model(3));
     let wanted = model(5);
-    let plan = Plan {
-        seed: 1,
-        damaged_uploads: 0,
-        interruptions: false,
-        garbage_bytes: 0,
-        window: 1,
-        filter: Settings::default(),
-    };
+    let plan = Plan { window: 1, filter: Settings::default() };
     let findings = check(&mut device, &frames_of(20), &wanted, &plan, &Silent).unwrap();
     assert!(findings.all_good(), "{findings:#?}");
     assert_eq!(findings.device.model.unwrap().crc_32, wanted.parse().crc());
@@ -266,14 +249,7 @@ fn a_device_divides_by_its_baseline_as_the_host_does() {
         let baseline_ohm = Some(drifted(session.baselines(Stream::Test, 1, 100)).values);
         let Frames { readings, start_us, .. } = frames_of(50);
         let frames = Frames { readings: drifted(readings), baseline_ohm, start_us };
-        let plan = Plan {
-            seed: 1,
-            damaged_uploads: 7,
-            interruptions: false,
-            garbage_bytes: 0,
-            window: 1,
-            filter: Settings::default(),
-        };
+        let plan = Plan { window: 1, filter: Settings::default() };
         let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
         assert!(findings.all_good(), "{findings:#?}");
     }
@@ -283,14 +259,7 @@ fn a_device_divides_by_its_baseline_as_the_host_does() {
 fn a_device_tells_novelty_and_deviations_as_the_host_does() {
     let model = with_confidence(&model(3));
     let mut device = device(SOUND, &model);
-    let plan = Plan {
-        seed: 1,
-        damaged_uploads: 0,
-        interruptions: false,
-        garbage_bytes: 0,
-        window: 1,
-        filter: Settings::default(),
-    };
+    let plan = Plan { window: 1, filter: Settings::default() };
     let mut frames = frames_of(30);
     // One is far from all others, and one lacks a reading.
     frames.readings.values[..144].fill(900.0);
@@ -311,14 +280,7 @@ fn over_a_line_that_spoils_bytes_everything_still_arrives() {
     let new = model(16);
     let identity = upload::replace(&mut device, new.bytes(), &Silent).unwrap();
     assert_eq!(identity.model.unwrap().crc_32, new.parse().crc());
-    let plan = Plan {
-        seed: 1,
-        damaged_uploads: 0,
-        interruptions: false,
-        garbage_bytes: 0,
-        window: 1,
-        filter: Settings::default(),
-    };
+    let plan = Plan { window: 1, filter: Settings::default() };
     let findings = check(&mut device, &frames_of(30), &new, &plan, &Silent).unwrap();
     assert_eq!(findings.frames.bit_identical, 30);
     assert!(findings.repeated > 0 && !findings.all_good(), "the line was sound");
@@ -363,20 +325,9 @@ fn a_device_that_never_pauses_does_not_hold_the_host() {
     let heard = device.hear(start + Duration::from_millis(300), |_, _| None::<()>);
     assert_eq!(heard.unwrap(), None);
     assert!(start.elapsed() < Duration::from_secs(5));
-    // The lease outlasts its length, because listening prolongs it.
-    device.lease = Duration::from_millis(100);
-    device.configure(busy).unwrap();
-    device.hear(Instant::now() + Duration::from_millis(500), |_, _| None::<()>).unwrap();
-    assert_eq!(device.configuration().unwrap().configuration, busy);
-    // Afterwards the device's own configuration is active, which has no scans here.
+    // Afterwards the default is active, which has no scans here.
     device.while_paused(Device::identify).unwrap();
-    let own = device.configuration().unwrap();
-    assert_eq!((own.configuration.frame_period_us, own.lease_left_ms), (0, 0));
-    // What is to last becomes the device's own.
-    let slow = Configuration { frame_period_us: 1_000_000, ..busy };
-    device.configure_until_restart(slow).unwrap();
-    device.while_paused(Device::identify).unwrap();
-    assert_eq!(device.configuration().unwrap().configuration, slow);
+    assert_eq!(device.configuration().unwrap().frame_period_us, 0);
 }
 
 #[test]
@@ -523,10 +474,6 @@ pub mod serial_port {
         let alike = folder.run(&["link", &port, "recalibrate", "old.bin", "alike.csv"]);
         let said = String::from_utf8_lossy(&alike.stderr).into_owned();
         assert!(alike.status.code() == Some(1) && said.contains("too alike"), "{said}");
-        folder.write("device.key", "abcd".repeat(16));
-        let key = ["old.bin", "presses.csv", "--key", "device.key", "-o", "./device.key"];
-        let said = folder.fail(&[&["link", &port, "recalibrate"], &key[..]].concat(), 2);
-        assert!(said.contains("would be written over"), "{said}");
         folder.write("missing.csv", b"r1e1_dx_mm\n0\n");
         let missing = folder.run(&["link", &port, "recalibrate", "old.bin", "missing.csv"]);
         assert_eq!(missing.status.code(), Some(2));
@@ -672,7 +619,7 @@ pub mod serial_port {
         assert!(page.contains("virtual, firmware"), "{page}");
         assert!(page.contains(&format!("CRC-32 {:08x}, slot 0", old.parse().crc())), "{page}");
         assert!(page.contains("model             \"press\", "), "{page}");
-        assert!(page.contains("not scanning: its own configuration has no frame period"), "{page}");
+        assert!(page.contains("scanning          paused"), "{page}");
 
         // Recording under another model's names is refused, before anything is written.
         let wrong = folder.run(&["link", &port, "record", new_file, "-o", "estimate.csv"]);
@@ -713,18 +660,8 @@ pub mod serial_port {
         let found: f64 = line.split(',').next().unwrap().parse().unwrap();
         assert!((found / mean - 1.0).abs() < 1e-5, "{found} instead of {mean}");
 
-        let page = folder.succeed(&[
-            "link",
-            &port,
-            "check",
-            "press",
-            "--model",
-            new_file,
-            "-n",
-            "50",
-            "--garbage",
-            "5000",
-        ]);
+        let page =
+            folder.succeed(&["link", &port, "check", "press", "--model", new_file, "-n", "50"]);
         assert!(page.contains("50 of 50 bit-identical"), "{page}");
 
         // The virtual device reports 20 000 bytes of code and 4000 of RAM.
@@ -786,14 +723,7 @@ pub mod serial_port {
 fn a_device_filters_in_time_as_the_host_does() {
     let model = model(3);
     let filter = Settings { time_constant_us: 5000, lead_us: 2000 };
-    let plan = Plan {
-        seed: 1,
-        damaged_uploads: 0,
-        interruptions: false,
-        garbage_bytes: 500,
-        window: 4,
-        filter,
-    };
+    let plan = Plan { window: 4, filter };
     let mut frames = frames_of(160);
     frames.start_us.iter_mut().for_each(|us| *us *= 1000);
     frames.start_us[140..].iter_mut().for_each(|us| *us += 60_000); // a gap

@@ -1,4 +1,4 @@
-//! The host is killed or interrupted while a device works for it: the device goes back to its own work.
+//! The host is killed or interrupted while a device works for it.
 
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
@@ -10,13 +10,10 @@ use crate::device::{frames, model};
 use crate::virtual_device;
 use taxel_core::blob::Floats;
 use taxel_core::checksum::CRC_32;
-use taxel_firmware::link::message::{Configuration, Identity, KeyState, Memory, Report, Request};
+use taxel_firmware::link::message::{Configuration, Identity, Memory, Report, Request};
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
 use taxel_rig::device::{Device, serial};
-
-/// Length of the leases.
-const LEASE: Duration = Duration::from_millis(100);
 
 /// Time by which a busy computer may be late.
 const LATE: Duration = Duration::from_millis(1500);
@@ -84,11 +81,10 @@ impl Rig {
     /// Runs a command of `link`, and ends it at request number `requests`. Returns its status, and whether it was
     /// ended.
     fn end_at(&self, arguments: &[&str], requests: usize, end: End) -> (ExitStatus, bool) {
-        let lease = format!("--lease-ms={}", LEASE.as_millis());
         {
             let mut trap = self.trap.lock().unwrap();
             let host = program()
-                .args(["link", &lease, &self.port])
+                .args(["link", &self.port])
                 .args(arguments)
                 .current_dir(self.folder.path("."))
                 .stdout(Stdio::null())
@@ -107,23 +103,15 @@ impl Rig {
         }
     }
 
-    /// Waits until the device scans by its own configuration; returns whether it did so at once. Looking on does not
-    /// prolong a lease.
-    fn wait_for_own_scans(&self) -> bool {
+    /// Checks that the device scans by its own configuration.
+    fn expect_own_scans(&self) {
         let start = Instant::now();
         let mut device = self.device();
-        let mut looks = 0;
-        while device.configuration().unwrap().lease_left_ms > 0 {
-            looks += 1;
-            assert!(start.elapsed() < LEASE + LATE, "the lease does not end");
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        assert_eq!(device.configuration().unwrap().configuration, OWN);
+        assert_eq!(device.configuration().unwrap(), OWN);
         let before = device.statistics().unwrap().frames_scanned;
         while device.statistics().unwrap().frames_scanned == before {
-            assert!(start.elapsed() < LEASE + LATE, "the device does not scan");
+            assert!(start.elapsed() < LATE, "the device does not scan");
         }
-        looks == 0
     }
 
     /// Host of the device's own.
@@ -152,10 +140,9 @@ fn whenever_the_host_of_an_upload_dies_the_device_scans_on_with_the_old_model_or
     for (name, model) in ["0.bin", "1.bin"].iter().zip(&models) {
         rig.folder.write(name, model.bytes());
     }
-    let (mut old, mut exchanged) = (0, 0);
+    let mut old = 0;
     for is_killed in [true, false] {
-        // A signal is looked at in one place, before each request: every other one is enough.
-        for requests in (1..).step_by(if is_killed { 1 } else { 2 }) {
+        for requests in (1..).step_by(3) {
             let new = 1 - old;
             let end = match requests % 4 {
                 _ if is_killed => End::Kill,
@@ -178,16 +165,12 @@ fn whenever_the_host_of_an_upload_dies_the_device_scans_on_with_the_old_model_or
                 let found = shell_status(status);
                 assert!([ended, Some(0)].contains(&found), "{requests}: {status}");
             }
-            let at_once = rig.wait_for_own_scans();
-            assert!(end == End::Kill || at_once, "{end:?} {requests}");
+            rig.expect_own_scans();
             let found = rig.model();
             assert!(files.contains(&found), "{end:?} {requests}: model {found:08x}");
-            if found == files[new] {
-                (old, exchanged) = (new, exchanged + 1);
-            }
+            old = usize::from(found == files[1]);
         }
     }
-    assert!(exchanged > 3, "some died after the commit: {exchanged}");
 }
 
 #[test]
@@ -221,79 +204,27 @@ fn a_model_on_trial_is_left_by_a_restart_unless_it_is_confirmed() {
 }
 
 #[test]
-fn with_a_key_a_device_changes_nothing_without_it() {
-    let (old, new) = (model(3), model(4));
-    let rig = Rig::new("sealed", old.bytes());
-    rig.folder.write("new.bin", new.bytes());
-    let digits =
-        |first: u8| (0..32).map(|i| format!("{:02x}", first + i)).collect::<Vec<_>>().concat();
-    rig.folder.write("device.key", digits(3));
-    rig.folder.write("other.key", digits(7));
-    rig.folder.write("short.key", "0123");
-    let link = |arguments: &[&str], status: i32, text: &str| {
-        let output = rig.folder.run(&[&["link", &rig.port][..], arguments].concat());
-        let said = [output.stdout, output.stderr].map(|said| String::from_utf8(said).unwrap());
-        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {said:?}");
-        assert!(said.concat().contains(text), "{arguments:?}: {said:?}");
-    };
-    link(&["upload", "new.bin", "--key", "device.key"], 1, "has no key");
-    link(&["configure", "--period-us", "7000", "--key", "device.key"], 1, "has no key");
-    link(&["provision", "short.key"], 2, "64 hexadecimal digits");
-    link(&["provision", "device.key"], 1, "restart it with its button held");
-    rig.device().restart().unwrap();
-    link(&["provision", "device.key"], 0, "set: nothing changes without --key");
-    link(&["provision", "device.key"], 0, "set");
-    link(&["provision", "other.key"], 1, "give it with --key");
-    link(&["upload", "new.bin"], 1, "give it with --key");
-    link(&["configure", "--period-us", "7000"], 1, "give it with --key");
-    link(&["undo"], 1, "give it with --key");
-    link(&["upload", "new.bin", "--key", "other.key"], 1, "another key");
-    link(&["--key", "device.key", "upload", "new.bin"], 0, "generation 1");
-    link(&["configure", "--period-us", "7000", "--key", "device.key"], 0, "");
-    link(&["undo", "--key", "device.key"], 0, "generation 2");
-    link(&["provision", "other.key", "--key", "device.key"], 0, "set");
-    // As if the answer had been lost.
-    link(&["provision", "other.key", "--key", "device.key"], 0, "set");
-    link(&["provision", "device.key", "--key", "device.key"], 1, "another key");
-    link(&["undo", "--key", "device.key"], 1, "another key");
-    link(&["undo", "--key", "other.key"], 0, "generation 3");
-    let mut device = rig.device();
-    device.key = Some(std::array::from_fn(|i| 7 + i as u8));
-    assert_eq!(device.restart().unwrap().model.unwrap().crc_32, new.parse().crc());
-}
-
-#[test]
 fn a_recording_that_is_interrupted_leaves_no_file_and_the_device_as_it_was() {
     let rig = Rig::new("interrupted", model(3).bytes());
-    let commands = [
-        &["record", "-n", "50000", "-o", "x.csv", "--period-us", "1000"][..],
-        &["baseline", "-n", "50000", "-o", "x.csv", "--period-us", "1000"],
-    ];
-    for arguments in commands {
-        for end in [End::Interrupt, End::Kill] {
-            // Requests 4 and 5 prolong the lease, or are the baseline's: by then the device scans for the host.
-            let (status, ended) = rig.end_at(arguments, 5, end);
-            assert!(ended, "{arguments:?}");
-            let expected = if end == End::Interrupt { 130 } else { 137 };
-            assert_eq!(shell_status(status), Some(expected), "{arguments:?}");
-            let at_once = rig.wait_for_own_scans();
-            assert!(end == End::Kill || at_once, "{arguments:?}");
-            assert!(rig.folder.names().is_empty(), "{:?}", rig.folder.names());
-        }
+    // The last request lets the device scan for the host: it identifies, pauses, configures, and captures.
+    for (command, requests) in [("record", 3), ("baseline", 4)] {
+        let arguments = [command, "-n", "50000", "-o", "x.csv", "--period-us", "1000"];
+        let (status, ended) = rig.end_at(&arguments, requests, End::Interrupt);
+        assert!(ended, "{command}");
+        assert_eq!(shell_status(status), Some(130), "{command}");
+        rig.expect_own_scans();
+        assert!(rig.folder.names().is_empty(), "{:?}", rig.folder.names());
     }
 }
 
 #[test]
-fn who_looks_on_sees_that_a_host_has_paused_the_device() {
-    let rig = Rig::new("looking", model(3).bytes());
-    let mut device = rig.device();
-    let paused = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
-    device.lease = Duration::from_millis(29_900);
-    device.configure(paused).unwrap();
-    drop(device);
+fn what_a_dead_host_has_left_is_seen_and_ends_with_the_next_ones_work() {
+    let rig = Rig::new("dead", model(3).bytes());
+    let recording = ["record", "-n", "50000", "-o", "x.csv", "--period-us", "1000"];
+    assert!(rig.end_at(&recording, 2, End::Kill).1);
     let page = rig.folder.succeed(&["link", &rig.port, "identify"]);
-    assert!(page.contains("not scanning: paused by a host, for 29."), "{page}");
-    rig.device().resume().unwrap();
+    assert!(page.contains("scanning          paused"), "{page}");
+    rig.folder.succeed(&["link", &rig.port, "record", "-n", "3", "-o", "x.csv"]);
     let page = rig.folder.succeed(&["link", &rig.port, "identify"]);
     assert!(page.contains("scanning          a frame every 5 ms\n"), "{page}");
 }
@@ -361,9 +292,7 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
                 slot_bytes: 1000,
                 chunk_bytes: 0,
                 memory: Memory::default(),
-                key: KeyState::None,
                 unique_id: [0; 12],
-                counter: 0,
                 wires_crc_32: CRC_32.checksum(&all_wires),
             };
             let (scans, configuration) = match request.body {
@@ -371,12 +300,12 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
                     send(request.number, &Report::Identity(identity));
                     continue;
                 }
-                Request::Configure { configuration, .. } => {
+                Request::Configure(configuration) => {
                     (configuration.frame_period_us > 0, configuration)
                 }
                 _ => (false, Configuration::DEFAULT),
             };
-            send(request.number, &Report::Configuration { configuration, lease_left_ms: 1 });
+            send(request.number, &Report::Configuration(configuration));
             for (frame, start_us, readings) in frames.iter().take(if scans { 9 } else { 0 }) {
                 let readings = vec![60.0; *readings];
                 let readings_ohm = Floats::new(&readings);

@@ -158,26 +158,19 @@ fn what_devices_tell_is_told_by_the_schema() {
     let schema = schema();
     let model = device::model(4);
     let mut device = device::device(device::SOUND, &model);
-    let plan = Plan {
-        seed: 1,
-        damaged_uploads: 2,
-        interruptions: true,
-        garbage_bytes: 100,
-        window: 2,
-        filter: Settings::default(),
-    };
+    let plan = Plan { window: 2, filter: Settings::default() };
     let findings = check(&mut device, &device::frames_of(5), &model, &plan, &Silent).unwrap();
     for command in ["emulate", "link check"] {
         assert_eq!(schema.faults(&document(command, &findings)), [""; 0]);
     }
     upload::replace(&mut device, model.bytes(), &Silent).unwrap();
-    let active = device.configuration().unwrap();
-    let mut status = document("link identify", &active);
+    let configuration = device.configuration().unwrap();
+    let mut status = document("link identify", &json!({"configuration": configuration}));
     status["device"] = serde_json::to_value(device.identify().unwrap()).unwrap();
     status["statistics"] = serde_json::to_value(device.statistics().unwrap()).unwrap();
     assert_eq!(schema.faults(&status), [""; 0]);
     let kept = device.kept().unwrap();
-    let settings = json!({"configuration": active.configuration, "constants": null, "kept": kept});
+    let settings = json!({"configuration": configuration, "constants": null, "kept": kept});
     assert_eq!(schema.faults(&document("link settings", &settings)), [""; 0]);
 }
 

@@ -5,7 +5,6 @@ mod confidence;
 mod virtual_device;
 
 mod accuracy;
-mod calibrate;
 mod contact;
 mod data_files;
 mod device;
@@ -32,6 +31,7 @@ mod recordings;
 mod recursion;
 mod refusals;
 mod refused_readings;
+mod settings;
 mod sweep;
 mod trade;
 #[cfg(target_os = "linux")]

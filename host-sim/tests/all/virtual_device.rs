@@ -23,8 +23,6 @@ pub struct Line {
 struct Board<'s, W, N> {
     wire: W,
     journal: &'s mut Journal<Flash>,
-    /// Whether its button was held at the start: at every one but the first.
-    is_held: bool,
     /// Called with each request's last byte, before the device sees it.
     notice: N,
     start: Instant,
@@ -120,10 +118,6 @@ impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
     fn journal(&mut self) -> &mut Journal<Flash> {
         self.journal
     }
-
-    fn may_provision(&self) -> bool {
-        self.is_held
-    }
 }
 
 fn is_timeout(cause: &std::io::Error) -> bool {
@@ -203,7 +197,6 @@ fn run_on_its_own(
             let board = Board {
                 wire: &mut wire,
                 journal: &mut journal,
-                is_held: life > 0,
                 notice: &mut notice,
                 start: Instant::now(),
                 line,

@@ -44,8 +44,6 @@ LONGEST_PATIENCE = 2048
 #: Chip selects: port, pin. The fourth is for columns beyond the 24th; without them nothing hangs on its pin.
 SELECTS = (("B", 12), ("B", 1), ("C", 4), ("C", 5))
 FEWEST_CONVERTERS = 3
-#: Pin of the blue button, which is high unless the button is held.
-BUTTON = 13
 #: Inputs of a converter, and outputs of a shift register.
 CHIP_WIRES = 8
 
@@ -68,8 +66,6 @@ class Board:
         self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
         self._hsi_error, self._supply_v, self._op_amp_hz = hsi_error, 3.3, op_amp_hz
         self._sensor, self._baud, self.settling_us, self._log = sensor, baud, settling_us, log
-        #: Whether the blue button is held.
-        self.button_held = False
         self.time = Time()
         self.rules = Rules(self.where, self.note)
         #: What its flash and option bytes hold, and what was done to them.
@@ -119,7 +115,6 @@ class Board:
             "B": gpio.Port({gpio.MODER: 0x280, gpio.OSPEEDR: 0xC0, gpio.PUPDR: 0x100}),
             "C": gpio.Port(),
         }
-        self.ports["C"].inputs[BUTTON] = lambda: not self.button_held
         if self._onchip:
             self.register = RowPins(time, rules, self.ports["B"], lambda: self.settling_us)
         columns = len(self._ohm[0])

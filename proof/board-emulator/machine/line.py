@@ -56,8 +56,6 @@ class Terminal:
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         self._board = board
-        #: Bytes that came from the other end.
-        self.sent = bytearray()
         #: The program at the other end, if it lives by the board's clock; else by its own.
         self.host = None
         board.glance = self._pass_on
@@ -86,7 +84,6 @@ class Terminal:
             taken_now = os.read(self._master, 4096)
         except BlockingIOError:
             return
-        self.sent += taken_now
         self._board.usart.from_host.extend(taken_now)
 
     def _let_host_compute(self):

@@ -8,8 +8,8 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use hostile::seal;
 use mock_board::{
-    Bench, Flash, ask, blob, blob_of_features, blob_with_confidence, configure, quiet,
-    request_bytes, upload_steps,
+    Bench, Flash, ask, blob, blob_of_features, blob_with_confidence, quiet, request_bytes,
+    upload_steps,
 };
 use taxel_core::blob::Floats;
 use taxel_core::rbf::Format;
@@ -169,12 +169,12 @@ fn requests(use_them: &mut dyn FnMut(&Request<'_>)) {
         Request::Identify,
         Request::Statistics,
         Request::Configuration,
-        Request::Configure { configuration: quiet(), lease_ms: 0 },
-        Request::Configure { configuration: Configuration::DEFAULT, lease_ms: 20 },
+        Request::Configure(quiet()),
+        Request::Configure(Configuration::DEFAULT),
         Request::Resume,
         Request::CaptureBaseline { frames: 1 },
         Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats(&readings) },
-        Request::Configure { configuration: filtering, lease_ms: 20 },
+        Request::Configure(filtering),
         Request::Decode { frame: 2, start_us: 1 << 40, readings_ohm: Floats(&readings) },
     ] {
         use_them(&request);
@@ -220,7 +220,7 @@ fn settings() -> Vec<Vec<u8>> {
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let other = Configuration { frame_period_us: 20_000, ..quiet() };
-    for request in [configure(other), Request::Keep(Setting::Configuration)] {
+    for request in [Request::Configure(other), Request::Keep(Setting::Configuration)] {
         ask(&mut session, &board, &request, |_| ());
     }
     let _ = session;

@@ -26,11 +26,11 @@ pub fn check(bytes: &[u8]) -> bool {
     }
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&model)), "another model in force");
     let configuration = ask(&mut session, &board, &Request::Configuration, |report| match report {
-        Report::Configuration { configuration, .. } => configuration,
+        Report::Configuration(configuration) => configuration,
         other => panic!("{other:?}"),
     });
     // What it works with, it must take from a host as well.
-    let again = Request::Configure { configuration: configuration.0, lease_ms: 0 };
+    let again = Request::Configure(configuration.0);
     let taken = ask(&mut session, &board, &again, |report| !matches!(report, Report::Refused(_)));
     assert!(taken.0, "a configuration that it would refuse: {:?}", configuration.0);
     configuration.0 != quiet()

@@ -15,8 +15,6 @@ mod sensor;
 
 mod flips;
 mod power;
-mod recheck;
-mod authenticity;
 mod load;
 
 mod hostile_bytes;
@@ -44,11 +42,6 @@ pub const PROMISES: &[Promise] = &[
     power::UPLOAD,
     power::UNDO,
     power::SETTINGS,
-    power::KEY,
-    power::DECAY,
-    power::WORN,
-    recheck::RECHECK,
-    authenticity::FORGED,
     load::FRAMES,
     load::LINK,
     load::WATCHDOG,

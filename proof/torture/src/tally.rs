@@ -2,9 +2,6 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::effort::Effort;
-use crate::found::Found;
-
 /// Counts under names.
 pub struct Tally<const N: usize> {
     names: [&'static str; N],
@@ -38,22 +35,4 @@ impl<const N: usize> Tally<N> {
         let parts = self.names.iter().zip(counts).map(|(name, count)| format!("{name} {count}"));
         parts.collect::<Vec<_>>().join(", ")
     }
-}
-
-/// Runs `case` for at least 4000 seeds, and tells how often it had each of these outcomes.
-pub fn outcomes<const N: usize>(
-    effort: &Effort,
-    (title, names): (&str, [&'static str; N]),
-    unit: &'static str,
-    case: fn(u64) -> Result<usize, String>,
-) -> Found {
-    let tally = Tally::new(names);
-    let mut found = effort.worst((4000, 1 << 40), (0.0, unit), |seed| {
-        tally.add(case(seed)?, 1);
-        Ok(0.0)
-    });
-    if found.note.is_empty() {
-        found.note = format!("{title}{}", tally.text());
-    }
-    found
 }

@@ -46,8 +46,6 @@ pub struct Record<'a> {
     pub scan_us: Beside<u32>,
     pub erase_ms: Beside<Vec<u32>>,
     pub keeps_its_model_over_a_restart: Beside<bool>,
-    /// Error of the readings of known resistors, if there are any; predicted is the resistors' tolerance.
-    pub resistors_rms_percent: Option<Beside<f64>>,
 }
 
 impl Beside<u32> {
@@ -60,10 +58,8 @@ impl Beside<u32> {
 impl Record<'_> {
     /// Whether everything is right that must be. Cycles may differ, and on silicon times too.
     pub fn is_as_predicted(&self) -> bool {
-        let resistors = self.resistors_rms_percent.as_ref();
         self.decoding.iter().all(|it| it.bit_identical.measured == it.bit_identical.predicted)
             && (!self.is_emulated || self.scan_us.is_within(SCAN_OFF))
-            && resistors.is_none_or(|it| it.measured <= it.predicted)
             && self.keeps_its_model_over_a_restart.measured
             && self.stack_bytes.measured <= self.stack_bytes.predicted
     }
@@ -89,7 +85,6 @@ mod tests {
                 scan_us: Beside { measured, predicted: 1000 },
                 erase_ms: Beside { measured: Vec::new(), predicted: Vec::new() },
                 keeps_its_model_over_a_restart: Beside { measured: true, predicted: true },
-                resistors_rms_percent: None,
             };
             record.is_as_predicted()
         };

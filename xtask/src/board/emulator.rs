@@ -8,9 +8,8 @@ use std::process::Command;
 use taxel_firmware::timing::ScanPlan;
 
 use super::Options;
-use super::copy;
-use crate::images::{NUCLEO_FIXED16, NUCLEO_ONCHIP, SEAL, other_name};
-use crate::process::{Outcome, Said, capture, cargo, first_line, root, run, target_dir};
+use crate::images::{NUCLEO_FIXED16, NUCLEO_ONCHIP, NUCLEO_WIDE};
+use crate::process::{Outcome, cargo, first_line, root, run, target_dir};
 use crate::toolchain::elf;
 
 const FOLDER: &str = "proof/board-emulator";
@@ -20,10 +19,6 @@ const OWN_PYTHON: &str = "proof/board-emulator/.venv/bin/python";
 
 /// A Python program that fails if a package is missing, and prints a line otherwise.
 const NEEDS: &str = "import elftools, unicorn; print(unicorn.__version__)";
-
-/// Options for the image with seals, and for the one that reads the sensor by the board's own converters.
-const SEAL_IMAGE: &str = "--seal-image";
-const ONCHIP_IMAGE: &str = "--onchip-image";
 
 /// Arguments that train the model which scenarios upload, small enough that an upload takes seconds.
 const TRAIN: [&str; 5] = ["train", "press", "--no-refine", "--centres=16", "--output"];
@@ -55,10 +50,9 @@ impl Emulator {
             ("--host-sim", host_sim),
             ("--model", model),
             ("--directory", folder),
-            ("--wide-image", copy::image()),
+            ("--wide-image", elf(NUCLEO_WIDE)),
             ("--fixed16-image", elf(NUCLEO_FIXED16)),
-            (SEAL_IMAGE, elf(&other_name(SEAL))),
-            (ONCHIP_IMAGE, elf(NUCLEO_ONCHIP)),
+            ("--onchip-image", elf(NUCLEO_ONCHIP)),
         ];
         let mut arguments = vec![root().join(FOLDER).join("run.py").into_os_string()];
         for (name, value) in named {
@@ -78,12 +72,6 @@ impl Emulator {
     /// Runs the scenarios of these names on `image`, or all; their output is passed through.
     pub fn run(&self, image: &Path, scenarios: &[String]) -> Outcome {
         run(self.command(image).args(scenarios)).map_err(|_| "a scenario failed: see above".into())
-    }
-
-    /// Runs a scenario on `image`, which has what it needs, and returns its output.
-    pub fn capture(&self, image: &Path, scenario: &str) -> Said {
-        let mut command = self.command(image);
-        capture(command.arg(SEAL_IMAGE).arg(image).arg(ONCHIP_IMAGE).arg(image).arg(scenario))
     }
 
     /// The emulator with this `image`, before the names of scenarios.

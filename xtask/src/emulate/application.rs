@@ -15,13 +15,11 @@ pub const IMAGE: &str = APPLICATION;
 const LIMITS: [&str; 2] = ["--flash-limit=98304", "--ram-limit=14336"];
 
 /// Options of the check with a network a row.
-const OF_ROWS: &[&str] =
-    &["-n10000", "--damaged-uploads=1000", "--interruptions", "--garbage=100000"];
+const OF_ROWS: &[&str] = &["-n10000"];
 
 /// Options of the check on the UART, where every byte takes a turn of QEMU's main loop. They are enough to show
-/// that the driver loses nothing, and that the link finds its messages again after damage.
-const ON_UART: &[&str] =
-    &["--line=uart", "-n200", "--damaged-uploads=7", "--interruptions", "--garbage=20000"];
+/// that the driver loses nothing.
+const ON_UART: &[&str] = &["--line=uart", "-n200"];
 
 /// Options of the check with one network for the whole array. Only decoding differs; it takes more stack.
 const OF_ARRAY: &[&str] = &["-n1000"];
@@ -43,7 +41,7 @@ const BY_TESTS: &[&str] = &[
     "--ignored",
     "--exact",
     "device::the_image_answers_alike_on_both_lines",
-    "calibrate::the_image_keeps_settings_over_restarts",
+    "settings::the_image_keeps_settings_over_restarts",
 ];
 
 /// Output of tests that were found, and passed.

@@ -1,9 +1,8 @@
-//! Cuts of the power in whatever changes flash: uploads, undos, settings that are kept, keys that are set.
+//! Cuts of the power in whatever changes flash: uploads, undos, settings that are kept.
 
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use taxel_firmware::seal::{KEY_BYTES, Key};
-use taxel_firmware::store::{ConfirmedModels, KeyFound, Kind, PAGE_BYTES};
+use taxel_firmware::store::{ConfirmedModels, Kind, PAGE_BYTES};
 
 use super::{Cuts, SLOT_WORDS};
 use crate::device::Device;
@@ -20,13 +19,11 @@ pub enum Job {
     Undo,
     /// A setting that is kept, or forgotten.
     Setting,
-    /// A key that is set, or replaced.
-    Key,
 }
 
 impl Job {
     /// All jobs.
-    pub const ALL: [Self; 4] = [Self::Upload, Self::Undo, Self::Setting, Self::Key];
+    pub const ALL: [Self; 3] = [Self::Upload, Self::Undo, Self::Setting];
 }
 
 /// Starts after a cut, at each of which weak bits settle anew.
@@ -45,10 +42,8 @@ const LATER: u64 = 64;
 const SETTINGS: [(Kind, usize); 3] =
     [(Kind::Configuration, 40), (Kind::Constants, 187), (Kind::Baseline, 585)];
 
-const KEYS: [Key; 2] = [[0x42; KEY_BYTES], [0xC7; KEY_BYTES]];
-
 /// Cuts the power at one operation of the `job`, at operations of the start behind it, and of what a host does next. The
-/// device must be as before, or as after the job, the same at each start. Half of all devices have a key.
+/// device must be as before, or as after the job, the same at each start.
 ///
 /// # Errors
 /// What is wrong, and where.
@@ -63,15 +58,13 @@ pub fn cut(job: Job, seed: u64) -> Result<Cuts, String> {
 struct Shown {
     model: Option<u32>,
     settings: [Option<Vec<u8>>; 3],
-    key: Option<Key>,
 }
 
-/// What a host asks for: a model of this seed, an undo, a setting with its bytes, or a key.
+/// What a host asks for: a model of this seed, an undo, or a setting with its bytes.
 enum Wish {
     Model(usize),
     Undo,
     Setting(usize, Vec<u8>),
-    Key(Key),
 }
 
 /// One first cut, and second cuts behind it.
@@ -92,7 +85,6 @@ impl Case {
         let mut device = Device::new(slots);
         *device.journal.pages() = [0, 1].map(|_| Flash::erased(PAGE_BYTES / 4, &supply, torn));
         device.slots[0].flash(0, &blob(1, 2));
-        device.is_held = true;
         let random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut case = Self { random, torn, device, cuts: 0, quarters: [0; 4] };
         let swings = case.below(2) == 0;
@@ -146,7 +138,7 @@ impl Case {
         self.cut_recovery(&allowed, place)?;
         let found = self.expect(&allowed, place)?;
         let after = self.device.snapshot();
-        let next = if self.below(2) == 0 { job } else { Job::ALL[self.below(4) as usize] };
+        let next = if self.below(2) == 0 { job } else { Job::ALL[self.below(3) as usize] };
         let mut second = self.below(STRIDE);
         loop {
             self.device.restore(&after);
@@ -167,13 +159,10 @@ impl Case {
         }
     }
 
-    /// Uses the device for a while: a key for half of all devices, uploads, and settings up to some exchanges of pages. In
-    /// half of the cases a page is nearly full then. Returns what it shows.
+    /// Uses the device for a while: uploads, and settings up to some exchanges of pages. In half of the cases a page is
+    /// nearly full then. Returns what it shows.
     fn prepare(&mut self, job: Job) -> Result<Shown, String> {
-        let mut shown = self.show()?;
-        if self.below(2) == 0 {
-            shown = self.certainly(&Wish::Key(KEYS[0]), &shown)?;
-        }
+        let mut shown = self.show();
         let uploads = if job == Job::Undo { 1 + self.below(2) } else { self.below(4) };
         for upload in 0..uploads {
             shown = self.certainly(&Wish::Model(4 + upload as usize), &shown)?;
@@ -186,7 +175,7 @@ impl Case {
         shown = self.keep_some(times, shown)?;
         if self.below(2) == 0 {
             self.fill_page();
-            shown = self.show()?;
+            shown = self.show();
         }
         Ok(shown)
     }
@@ -196,7 +185,7 @@ impl Case {
         for _ in 0..times {
             let wish = self.wish(Job::Setting, 0);
             let wanted = self.wanted(&wish, &shown);
-            if !self.fulfil(&wish) || self.show()? != wanted {
+            if !self.fulfil(&wish) || self.show() != wanted {
                 return Err(format!("not kept: {}", wanted.brief()));
             }
             shown = wanted;
@@ -235,7 +224,6 @@ impl Case {
                 let length = if self.below(8) == 0 { 0 } else { SETTINGS[setting].1 };
                 Wish::Setting(setting, self.bytes(length))
             }
-            Job::Key => Wish::Key(KEYS[usize::from(self.device.key == Some(KEYS[0]))]),
         }
     }
 
@@ -253,7 +241,6 @@ impl Case {
             Wish::Setting(setting, bytes) => {
                 wanted.settings[*setting] = (!bytes.is_empty()).then(|| bytes.clone());
             }
-            Wish::Key(key) => wanted.key = Some(*key),
         }
         wanted
     }
@@ -266,38 +253,28 @@ impl Case {
                 model_crc(session, board).is_some_and(|left| undo(session, board, left).0.is_ok())
             }),
             Wish::Setting(setting, bytes) => self.device.keep(SETTINGS[*setting].0, bytes).is_ok(),
-            Wish::Key(key) => self.device.provision(*key).is_ok(),
         }
     }
 
-    /// What the device shows after a restart. Its counter must be beyond all that were answered.
-    fn show(&mut self) -> Result<Shown, String> {
-        let (model, _, counter) = self.device.identity();
-        if counter < self.device.answered {
-            return Err(format!("request {} could be replayed", self.device.answered));
-        }
+    /// What the device shows after a restart.
+    fn show(&mut self) -> Shown {
+        let model = self.device.restart();
         let journal = &self.device.journal;
-        let key = match journal.key() {
-            KeyFound::None => None,
-            KeyFound::Set(key) => Some(*key),
-            KeyFound::Damaged => return Err("the key is damaged".to_owned()),
-        };
         let settings = SETTINGS.map(|(kind, _)| journal.read(kind).map(<[u8]>::to_vec));
-        Ok(Shown { model: model.map(|model| model.crc_32), settings, key })
+        Shown { model, settings }
     }
 
-    /// Checks that the device shows one of these, the same at each start; returns it. Its host has the key then.
+    /// Checks that the device shows one of these, the same at each start; returns it.
     fn expect(&mut self, allowed: &[&Shown], place: &str) -> Result<Shown, String> {
-        let first = self.show().map_err(|why| format!("{place}: {why}"))?;
+        let first = self.show();
         for start in 1..=STARTS {
-            let found = self.show().map_err(|why| format!("{place}, start {start}: {why}"))?;
+            let found = self.show();
             if found != first || !allowed.contains(&&found) {
                 let allowed = allowed.iter().map(|shown| shown.brief()).collect::<Vec<_>>();
                 let (first, found) = (first.brief(), found.brief());
                 return Err(format!("{place}, start {start}: {first}, {found}, not {allowed:?}"));
             }
         }
-        self.device.key = first.key;
         Ok(first)
     }
 
@@ -330,7 +307,7 @@ impl Case {
 
     /// Asks for all kinds of things, which must come true for good; now and then for many.
     fn mend(&mut self, mut shown: Shown) -> Result<(), String> {
-        for job in [Job::Upload, Job::Setting, Job::Key] {
+        for job in [Job::Upload, Job::Setting] {
             let wish = self.wish(job, 9);
             shown = self.certainly(&wish, &shown)?;
         }
@@ -345,10 +322,6 @@ impl Shown {
     /// A few words.
     fn brief(&self) -> String {
         let heads = self.settings.each_ref().map(|bytes| bytes.as_ref().map(|bytes| bytes[0]));
-        format!(
-            "model {:08x?}, settings {heads:?}, key {:?}",
-            self.model,
-            self.key.map(|key| key[0])
-        )
+        format!("model {:08x?}, settings {heads:?}", self.model)
     }
 }

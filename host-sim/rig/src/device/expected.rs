@@ -14,9 +14,6 @@ use taxel_learn::{Exponential, ModelBlob};
 use super::{Device, DeviceIdentity, stream, upload};
 use crate::error::{Error, Result, check_room};
 
-/// Frames after which a lease is prolonged: on a device with a key, a request to decode does not do it.
-const FRAMES_A_LEASE: usize = 100;
-
 /// Frames that a device is to decode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
@@ -119,24 +116,19 @@ impl Expected {
         window: usize,
         progress: &dyn Progress,
     ) -> Result<(usize, Duration)> {
-        let (mut same, mut time) = (0, Duration::ZERO);
+        let mut same = 0;
         device.pause()?; // what is configured next is another configuration, and starts the filter anew
         device.configure(self.configuration())?;
         self.set_baseline(device)?;
         progress.stage("decoding on the device", frames);
         let window = if self.filter.is_on() { 1 } else { window };
-        for first in (0..frames).step_by(FRAMES_A_LEASE) {
-            let end = frames.min(first + FRAMES_A_LEASE);
-            device.configure(self.configuration())?;
-            let readings_ohm = &self.readings_ohm[first * self.per_frame[0]..];
-            let readings_ohm = &readings_ohm[..(end - first) * self.per_frame[0]];
-            let take = |frame, estimate: &EstimateReport<'_>| {
-                same += usize::from(self.is_same(first as u32 + frame, estimate));
-                progress.step();
-            };
-            let start_us = &self.start_us[first..end];
-            time += stream::decode_frames(device, readings_ohm, start_us, window, take)?;
-        }
+        let readings_ohm = &self.readings_ohm[..frames * self.per_frame[0]];
+        let start_us = &self.start_us[..frames];
+        let take = |frame, estimate: &EstimateReport<'_>| {
+            same += usize::from(self.is_same(frame, estimate));
+            progress.step();
+        };
+        let time = stream::decode_frames(device, readings_ohm, start_us, window, take)?;
         Ok((same, time))
     }
 }

@@ -5,7 +5,7 @@ use taxel_core::Wires;
 use taxel_core::blob::{Columns, Model, ModelShape};
 use taxel_core::checksum::CRC_32;
 use taxel_firmware::capacity::Capacity;
-use taxel_firmware::link::message::{Identity, KeyState, Memory, ModelIdentity};
+use taxel_firmware::link::message::{Identity, Memory, ModelIdentity};
 
 /// Identity that a device reports.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -32,27 +32,12 @@ pub struct DeviceIdentity {
     pub chunk_bytes: usize,
     /// Use of its flash and RAM.
     pub memory: Memory,
-    /// Whether it has a key, and changes nothing without a seal.
-    #[serde(serialize_with = "key_with_text")]
-    pub key: KeyState,
     /// Number that no other board of its kind has, as hexadecimal digits in JSON.
     #[serde(serialize_with = "id_with_text")]
     pub unique_id: [u8; 12],
-    /// Largest counter of a sealed request so far, or beyond.
-    pub counter: u64,
     /// CRC-32 of the wires of its readings.
     #[serde(skip)]
     pub wires_crc_32: u32,
-}
-
-/// Serialises whether there is a key as text.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn key_with_text<S: Serializer>(key: &KeyState, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(match key {
-        KeyState::None => "none",
-        KeyState::Set => "set",
-        KeyState::Damaged => "damaged",
-    })
 }
 
 /// Serialises a device's number as text.
@@ -171,9 +156,7 @@ impl From<&Identity<'_>> for DeviceIdentity {
             slot_bytes: identity.slot_bytes as usize,
             chunk_bytes: identity.chunk_bytes.into(),
             memory: identity.memory,
-            key: identity.key,
             unique_id: identity.unique_id,
-            counter: identity.counter,
             wires_crc_32: identity.wires_crc_32,
         }
     }

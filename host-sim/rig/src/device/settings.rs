@@ -1,10 +1,52 @@
 //! Constants of a device's circuit, and settings that it keeps over restarts.
 
+use serde::Serialize;
+use taxel_core::blob::Floats;
+use taxel_firmware::circuit::Constants;
 use taxel_firmware::link::message::{Kept, Report, Request, Setting};
 
 use super::{Device, WRITING};
-use crate::calibration::CircuitConstants;
 use crate::error::{Error, Result};
+
+/// Constants of a circuit, as the device takes them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CircuitConstants {
+    /// Reference voltage of the converter, in V.
+    pub reference_v: f32,
+    /// Voltage in V by which the active row is pulled below the others.
+    pub drive_v: f32,
+    /// Resistance in Ω between the drive and each row-wire.
+    pub row_source_ohm: Vec<f32>,
+    /// Feedback resistance in Ω of each column.
+    pub feedback_ohm: Vec<f32>,
+    /// Resistance in Ω in series with each column.
+    pub series_ohm: Vec<f32>,
+}
+
+impl From<&Constants<'_>> for CircuitConstants {
+    fn from(constants: &Constants<'_>) -> Self {
+        Self {
+            reference_v: constants.reference_v,
+            drive_v: constants.drive_v,
+            row_source_ohm: constants.row_source_ohm.iter().collect(),
+            feedback_ohm: constants.feedback_ohm.iter().collect(),
+            series_ohm: constants.series_ohm.iter().collect(),
+        }
+    }
+}
+
+impl CircuitConstants {
+    /// The constants as the link carries them.
+    fn for_link(&self) -> Constants<'_> {
+        Constants {
+            reference_v: self.reference_v,
+            drive_v: self.drive_v,
+            row_source_ohm: Floats::new(&self.row_source_ohm),
+            feedback_ohm: Floats::new(&self.feedback_ohm),
+            series_ohm: Floats::new(&self.series_ohm),
+        }
+    }
+}
 
 impl Device {
     /// Asks for the active constants of the circuit.

@@ -74,14 +74,14 @@ pub fn send(
         answer = step(device, UploadStep::Chunk { offset, bytes })?;
         progress.step();
     }
-    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Try { lease_ms: TRIAL_MS }) }
+    if answer.is_err() { Ok(answer) } else { step(device, UploadStep::Try { trial_ms: TRIAL_MS }) }
 }
 
 /// Uploads `blob` and makes it the active model, on trial, and checks that the device decodes with it. Until
 /// [`confirm`] a restart brings the previous model back.
 ///
 /// # Errors
-/// [`Error`] if the device refuses it, needs a key, has no room for it or does not decode with it, or the work is interrupted; its
+/// [`Error`] if the device refuses it, has no room for it or does not decode with it, or the work is interrupted; its
 /// previous model is then active again.
 pub fn start_trial(
     device: &mut Device,
@@ -99,7 +99,6 @@ pub fn start_trial(
         let needs = format!("{rows} rows of {inputs} readings and {outputs} outputs");
         return Err(no_room(capacity, &format!("which says that it has {needs}: check its file")));
     }
-    device.check_key(&identity)?;
     or_abort(device, |device| {
         let outcome = send(device, blob, identity.chunk_bytes, progress)?;
         let crc_32 = match outcome.map_err(Error::Refused)? {
@@ -149,7 +148,7 @@ fn see_estimate(device: &mut Device, crc_32: u32) -> Result<DeviceIdentity> {
 /// trial.
 pub fn see_frames(device: &mut Device) -> Result<()> {
     or_abort(device, |device| {
-        let period_us = device.configuration()?.configuration.frame_period_us;
+        let period_us = device.configuration()?.frame_period_us;
         let period = Duration::from_micros(period_us.into());
         if period_us == 0 || period > SLOWEST_SCANS {
             return Ok(());
@@ -169,7 +168,7 @@ pub fn see_frames(device: &mut Device) -> Result<()> {
 
 /// Lets the trial that is going on last for so many `minutes` from now on.
 pub fn prolong_trial(device: &mut Device, minutes: u32) -> Result<()> {
-    let again = UploadStep::Try { lease_ms: 60_000 * minutes };
+    let again = UploadStep::Try { trial_ms: 60_000 * minutes };
     match step(device, again)?.map_err(Error::Refused)? {
         UploadState::OnTrial { .. } => Ok(()),
         other => Err(unexpected("a longer trial", other)),

@@ -115,7 +115,7 @@ impl Source for DeviceScans {
 
     fn close(&mut self) {
         self.device.stop = None;
-        // If it does not answer, its lease ends by itself.
+        // If it does not answer, it can be told nothing.
         let _ = self.device.resume();
     }
 }

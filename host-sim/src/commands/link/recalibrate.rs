@@ -1,7 +1,7 @@
 //! Action `recalibrate`: the model is mended from reference presses, and uploaded.
 
 use std::io::{BufRead, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::{Error, Result};
 use clap::Args;
@@ -49,16 +49,11 @@ struct Summary {
     model_crc: String,
 }
 
-pub fn execute(
-    device: &mut Device,
-    arguments: &Arguments,
-    key: Option<&Path>,
-    common: &Common,
-) -> Result<()> {
+pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(path) = &arguments.output {
-        let others = [arguments.baseline.baseline.as_deref(), key].into_iter().flatten();
         let read = [&arguments.model, &arguments.presses].map(PathBuf::as_path);
-        print::check_output(path, &read.into_iter().chain(others).collect::<Vec<_>>())?;
+        let baseline = arguments.baseline.baseline.as_deref();
+        print::check_output(path, &read.into_iter().chain(baseline).collect::<Vec<_>>())?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let (fields, limits) = (FieldArguments::default(), Some(Limits::USUAL));
@@ -77,7 +72,6 @@ pub fn execute(
     if identity.model.is_some_and(|model| model.on_trial) {
         return Err(taxel_rig::Error::Refused(Refusal::OnTrial).into());
     }
-    device.check_key(&identity)?;
     let has_readings = metadata.input_names.iter().any(|name| file.column(name).is_ok());
     let readings = if has_readings {
         let mut readings = table_of(&file, metadata.input_names.iter())?;

@@ -67,9 +67,6 @@ pub struct BaselineArguments {
     /// The model that is active, if it takes some of the readings: its blob tells their names.
     #[arg(long, value_name = "BLOB")]
     model: Option<PathBuf>,
-    /// Keep the baseline over restarts; otherwise it is active until the next one.
-    #[arg(long)]
-    store: bool,
     /// CSV file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -307,9 +304,7 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
     let readings = answer.map_err(taxel_rig::Error::Refused)?;
     check_length(0, readings.len(), names.len())?;
     let values_missing = missing(readings.iter(), Wanted::Readings)?;
-    if action.store {
-        device.keep(Setting::Baseline)?;
-    }
+    device.keep(Setting::Baseline)?;
     let lines = std::iter::once(readings.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
     let file = action.output.clone();

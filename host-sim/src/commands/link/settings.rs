@@ -4,8 +4,7 @@ use crate::Result;
 use clap::{Args, ValueEnum, value_parser};
 use serde::Serialize;
 use taxel_firmware::link::message::{ConfidenceSent, Configuration, Kept, Setting};
-use taxel_rig::calibration::CircuitConstants;
-use taxel_rig::device::Device;
+use taxel_rig::device::{CircuitConstants, Device};
 
 use super::super::filter_arguments::milliseconds;
 use super::super::{Common, print};
@@ -103,8 +102,9 @@ struct Settings {
 }
 
 pub fn configure(device: &mut Device, action: &ConfigureArguments, common: &Common) -> Result<()> {
-    let configuration = action.changed(device.configuration()?.configuration);
-    device.configure_until_restart(configuration)?;
+    // What another host has left behind is not kept.
+    let configuration = action.changed(device.resume()?);
+    device.configure(configuration)?;
     device.keep(Setting::Configuration)?;
     show(device, common)
 }
@@ -129,11 +129,8 @@ fn show(device: &mut Device, common: &Common) -> Result<()> {
         Err(taxel_rig::Error::Refused(_)) => None,
         constants => Some(constants?),
     };
-    let settings = Settings {
-        configuration: device.configuration()?.configuration,
-        constants,
-        kept: device.kept()?,
-    };
+    let settings =
+        Settings { configuration: device.configuration()?, constants, kept: device.kept()? };
     if common.json {
         return print::json(&settings);
     }

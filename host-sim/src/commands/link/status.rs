@@ -2,8 +2,8 @@
 
 use crate::Result;
 use serde::Serialize;
-use taxel_firmware::link::message::{KeyState, Statistics};
-use taxel_rig::device::{ActiveConfiguration, Device, DeviceIdentity};
+use taxel_firmware::link::message::{Configuration, Statistics};
+use taxel_rig::device::{Device, DeviceIdentity};
 
 use super::super::check_arguments::memory_lines;
 use super::super::{Common, print};
@@ -11,15 +11,14 @@ use super::super::{Common, print};
 #[derive(Serialize)]
 struct Status {
     device: DeviceIdentity,
-    #[serde(flatten)]
-    active: ActiveConfiguration,
+    configuration: Configuration,
     statistics: Statistics,
 }
 
 pub fn show(device: &mut Device, common: &Common) -> Result<()> {
     let status = Status {
         device: device.identify()?,
-        active: device.configuration()?,
+        configuration: device.configuration()?,
         statistics: device.statistics()?,
     };
     if common.json {
@@ -55,10 +54,11 @@ pub fn show(device: &mut Device, common: &Common) -> Result<()> {
     } else {
         page.line(format_args!("{:<17} none: upload one", "model"));
     }
-    if let Some(said) = sealed(d) {
-        page.line(format_args!("{:<17} {said}", "key"));
-    }
-    page.line(format_args!("{:<17} {}", "scanning", scanning(&status.active)));
+    let scanning = match status.configuration.frame_period_us {
+        0 => "paused: the configuration has no frame period".into(),
+        us => format!("a frame every {} ms", f64::from(us) / 1e3),
+    };
+    page.line(format_args!("{:<17} {scanning}", "scanning"));
     page.line(format_args!(
         "{:<17} {} scanned, {} decoded, {} missed, {} samples failed",
         "frames", s.frames_scanned, s.frames_decoded, s.frames_missed, s.failed_samples
@@ -96,36 +96,6 @@ pub fn show(device: &mut Device, common: &Common) -> Result<()> {
         "link", s.requests, s.bad_packets, s.lost_reports, s.bad_loops
     ));
     page.line(format_args!("{:<17} {} since the start", "slots erased", s.slot_erases));
-    page.line(format_args!(
-        "{:<17} {} times, damaged {} times where it is decoded from, {} times in its slot",
-        "model checked", s.model_checks, s.model_damages, s.slot_damages
-    ));
     memory_lines(&mut page, &d.memory);
     page.print()
-}
-
-/// What the device's key means, if it has one.
-fn sealed(device: &DeviceIdentity) -> Option<&'static str> {
-    match device.key {
-        KeyState::None => None,
-        KeyState::Set => Some("set: nothing changes without --key"),
-        KeyState::Damaged => Some("decayed: nothing changes any more"),
-    }
-}
-
-/// What the device is doing, by its active configuration.
-fn scanning(active: &ActiveConfiguration) -> String {
-    let ActiveConfiguration { configuration, lease_left_ms } = active;
-    let left_s = f64::from(*lease_left_ms) / 1e3;
-    match (configuration.frame_period_us, lease_left_ms) {
-        (0, 0) => "not scanning: its own configuration has no frame period".into(),
-        (0, _) => {
-            format!("not scanning: paused by a host, for {left_s:.1} s more without requests")
-        }
-        (us, 0) => format!("a frame every {} ms", f64::from(us) / 1e3),
-        (us, _) => format!(
-            "a frame every {} ms, set by a host, for {left_s:.1} s more without requests",
-            f64::from(us) / 1e3
-        ),
-    }
 }

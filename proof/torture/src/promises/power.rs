@@ -2,12 +2,12 @@
 //! after.
 
 use mock_board::Torn;
-use mock_board::sweep::{Job, abort_and_decay, cut, upload_to_worn};
+use mock_board::sweep::{Job, cut};
 
 use crate::effort::Effort;
 use crate::found::Found;
 use crate::promise::Promise;
-use crate::tally::{Tally, outcomes};
+use crate::tally::Tally;
 
 pub const UPLOAD: Promise = Promise {
     name: "cut-upload",
@@ -28,33 +28,6 @@ pub const SETTINGS: Promise = Promise {
     text: "power cut while a setting is kept: old or new",
     share: 8,
     check: |effort, _| Ok(sweep(effort, Job::Setting)),
-};
-
-pub const KEY: Promise = Promise {
-    name: "cut-key",
-    text: "power cut while a key is set: old or new one",
-    share: 8,
-    check: |effort, _| Ok(sweep(effort, Job::Key)),
-};
-
-pub const DECAY: Promise = Promise {
-    name: "abort-decay",
-    text: "slot in force decays: aborted uploads stay out",
-    share: 2,
-    check: |effort, _| {
-        let names = ["the same model", "the one before it", "none"];
-        Ok(outcomes(effort, ("in force after the decay: ", names), "losses", abort_and_decay))
-    },
-};
-
-pub const WORN: Promise = Promise {
-    name: "worn-words",
-    text: "an upload to worn flash: in force, or refused",
-    share: 2,
-    check: |effort, _| {
-        let names = ["in force", "refused", "cut"];
-        Ok(outcomes(effort, ("uploads: ", names), "losses", upload_to_worn))
-    },
 };
 
 /// Most cases.

@@ -6,9 +6,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::rc::Rc;
 
 use taxel_data::Silent;
-use taxel_firmware::link::message::{
-    Configuration, Identity, KeyState, Memory, ModelIdentity, Statistics,
-};
+use taxel_firmware::link::message::{Configuration, Identity, Memory, ModelIdentity, Statistics};
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
 
@@ -115,9 +113,7 @@ fn identity(on_trial: bool) -> Report<'static> {
         slot_bytes: 4096,
         chunk_bytes: 4,
         memory: Memory::default(),
-        key: KeyState::None,
         unique_id: [0; 12],
-        counter: 0,
         wires_crc_32: 0,
     })
 }
@@ -159,7 +155,7 @@ fn two_frames_are_waited_for_since_the_first_may_be_the_previous_models() {
     let counted = asked.clone();
     let mut device = device(move |request| {
         if *request == Request::Configuration {
-            return Report::Configuration { configuration, lease_left_ms: 0 };
+            return Report::Configuration(configuration);
         }
         counted.set(counted.get() + 1);
         Report::Statistics(Statistics { frames_decoded: counted.get(), ..Statistics::default() })

@@ -1,8 +1,8 @@
 //! A line that is too slow: every report arrives whole or is counted as lost.
 
 use mock_board::{
-    Bench, Board, Flash, Memory, blob, blob_with_confidence, configure, find_report, quiet,
-    request_bytes, settle, statistics,
+    Bench, Board, Flash, Memory, blob, blob_with_confidence, find_report, quiet, request_bytes,
+    settle, statistics,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -85,7 +85,7 @@ fn run(seed: u64) -> Result<[u64; 3], String> {
     // The line is free again: what is asked now is answered.
     board.pins.borrow_mut().gap_us = 0;
     board.pins.borrow_mut().room = None;
-    let stop = request_bytes(10, &configure(quiet()));
+    let stop = request_bytes(10, &Request::Configure(quiet()));
     board.pins.borrow_mut().to_device.extend(stop);
     settle(&mut session, &board);
     bytes.append(&mut board.pins.borrow_mut().to_host);

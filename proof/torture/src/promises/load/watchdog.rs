@@ -101,7 +101,7 @@ fn longest_unfed_s(seed: u64) -> f64 {
     let new = blob(2, 4);
     let steps = upload_steps(&new, CHUNK);
     let mut uploads = steps[..steps.len() - 1].iter().cycle().copied().map(Request::Upload);
-    let configure = Request::Configure { configuration: BUSY, lease_ms: 0 };
+    let configure = Request::Configure(BUSY);
     board.pins.borrow_mut().to_device.extend(request_bytes(4, &configure));
     board.pins.borrow_mut().gap_us = gap_us;
     board.pins.borrow_mut().look_us = 100;
