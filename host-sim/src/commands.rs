@@ -29,7 +29,6 @@ mod interruption;
 
 pub mod run;
 pub mod synth;
-pub mod noise;
 pub mod forward;
 pub mod train;
 pub mod decode;

@@ -9,7 +9,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
     self, Captured, Common, compare, decode, emulate, eval, export, forward, inspect, join, limit,
-    link, noise, recover, run, sweep, synth, table1, trade, train, view,
+    link, recover, run, sweep, synth, table1, trade, train, view,
 };
 use crate::{Error, Result};
 
@@ -33,7 +33,6 @@ struct Cli {
 enum Command {
     Run(run::Arguments),
     Synth(synth::Arguments),
-    Noise(noise::Arguments),
     Forward(forward::Arguments),
     Train(train::Arguments),
     Join(join::Arguments),
@@ -70,7 +69,6 @@ impl Command {
             Self::Link(arguments) => return format!("link {}", arguments.action_name()),
             Self::Run(_) => "run",
             Self::Synth(_) => "synth",
-            Self::Noise(_) => "noise",
             Self::Forward(_) => "forward",
             Self::Train(_) => "train",
             Self::Decode(_) => "decode",
@@ -167,7 +165,6 @@ fn execute(command: Command, common: &Common) -> Result<()> {
     match command {
         Command::Run(arguments) => run::execute(&arguments, common),
         Command::Synth(arguments) => synth::execute(&arguments, common),
-        Command::Noise(arguments) => noise::execute(&arguments, common),
         Command::Forward(arguments) => forward::execute(&arguments, common),
         Command::Train(arguments) => train::execute(&arguments, common),
         Command::Join(arguments) => join::execute(&arguments, common),

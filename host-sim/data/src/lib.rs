@@ -22,7 +22,6 @@ pub mod table;
 pub mod dataset;
 pub mod clock;
 pub mod rest;
-pub mod spectrum;
 
 pub use clock::Clock;
 pub use data_file::DataFile;

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use taxel_data::dataset::{LeftOut, UnusedInputs};
-use taxel_data::spectrum::Spectrum;
 use taxel_data::{Clock, Dataset, Rest, Table};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Options, Origin};
@@ -188,16 +187,14 @@ impl Measurements {
 
     /// Relative noise of a reading at rest, as a fraction: the root of the mean over columns of (standard
     /// deviation/mean)². In a log the standard deviation is that of differences between successive lines, over √2, which
-    /// a drift does not raise; what neighbours share of noise with a memory is added. `None` if the sensor at rest is not known, or a column's mean is zero.
+    /// a drift does not raise, nor noise that successive lines share. `None` if the sensor at rest is not known, or a
+    /// column's mean is zero.
     pub fn noise_level(&self) -> Option<f64> {
         let rest = self.rest.as_ref()?;
         let columns = rest.readings.names.len();
         let relative = rest.noise().into_iter().zip(rest.readings.means());
         let squares: f64 = relative.map(|(deviation, mean)| (deviation / mean).powi(2)).sum();
-        let lines = rest.lines.as_ref();
-        let noise = lines.and_then(|lines| Spectrum::new(&rest.readings, lines, None));
-        let whole = noise.map_or(1.0, |noise| noise.variance_over_differences());
-        Some((whole * squares / columns as f64).sqrt()).filter(|level| level.is_finite())
+        Some((squares / columns as f64).sqrt()).filter(|level| level.is_finite())
     }
 
     /// Baseline of the test frame in the middle, on one line, if the sensor at rest is known and its readings are

@@ -12,10 +12,8 @@ use crate::measurements::Measurements;
 use crate::metrics::{DecoderErrors, Errors, LimitSummary};
 use crate::over_time::RestOverTime;
 
-mod noise;
 mod warning;
 
-pub use noise::sentences;
 pub use warning::{FEW_TEST_FRAMES, FRAMES_A_WEIGHT, OUT_OF_RANGE, SLOT_BYTES, Warning};
 
 /// Share of the mean's RMSE above which an output counts as hardly decoded.
@@ -103,14 +101,12 @@ impl Verdict {
         self.with(Warning::few_test_frames(test_frames)).with(outliers.and_then(Warning::outliers))
     }
 
-    /// Adds what measurements give reason to beware of: folds that flatter, readings `at_rest` that drift where a model
-    /// is given readings as they are, and noise that averaging hardly lowers.
+    /// Adds what measurements give reason to beware of: folds that flatter, and readings `at_rest` that drift where a
+    /// model is given readings as they are.
     #[must_use]
     pub fn of_data(self, data: &Measurements, at_rest: Option<&RestOverTime>) -> Self {
         let drift = at_rest.filter(|_| !data.training.relative_inputs).and_then(Warning::drift);
-        self.with(Warning::folds_flatter(data.folds_flatter))
-            .with(drift)
-            .with(at_rest.and_then(Warning::correlated_noise))
+        self.with(Warning::folds_flatter(data.folds_flatter)).with(drift)
     }
 
     /// Adds that the frames to judge by are the end of a log, and whether their baseline is `renewed` in each of its pauses.

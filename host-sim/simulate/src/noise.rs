@@ -2,7 +2,6 @@
 
 use serde::Deserialize;
 use taxel_data::exp;
-use taxel_data::spectrum::left_of_mean;
 
 /// Gaussian noise on the readings: a standard normal n for every reading of every frame, and first-order autoregressive
 /// noise of variance 1.
@@ -66,6 +65,17 @@ impl Noise {
             ..self
         }
     }
+}
+
+/// Share of an AR(1) variance that is left of it in the mean of so many `samples`, of which neighbours have the correlation
+/// `decay`: (n + 2·Σ (n − k)·decayᵏ)/n², with k from 1 to n − 1.
+fn left_of_mean(samples: usize, decay: f64) -> f64 {
+    let (mut power, mut sum) = (1.0, samples as f64);
+    for apart in 1..samples {
+        power *= decay;
+        sum += 2.0 * (samples - apart) as f64 * power;
+    }
+    sum / (samples as f64).powi(2)
 }
 
 /// Meaning of a noise level p, for a standard normal n.

@@ -165,8 +165,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
-        .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift))
-        .with(at_rest.and_then(Warning::correlated_noise));
+        .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift));
     let summary = Summary {
         model_file: arguments.model.clone(),
         model_crc: format!("{:08x}", model.model().crc()),

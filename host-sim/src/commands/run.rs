@@ -27,7 +27,6 @@ const FILES: FileSet = FileSet {
         "errors-by-electrode",
         "errors-over-time",
         "readings-at-rest",
-        "noise-by-averaging",
         "trajectory",
         "readings",
         "frames",

@@ -55,7 +55,6 @@ pub fn page(view: &View<'_>, figures: Figures) -> Page {
         body.figure(&over_time::errors(log));
         if let Some(rest) = &log.rest {
             body.figure(&over_time::at_rest(log, rest));
-            rest.noise.iter().for_each(|noise| body.figure(&over_time::averaging(noise)));
         }
     }
     if let Some(moving) = view.moving {

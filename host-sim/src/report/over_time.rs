@@ -1,13 +1,11 @@
 //! Figures of a log over time: errors, and readings of the untouched sensor.
 
-use taxel_data::spectrum::{Averaging, Spectrum};
 use taxel_evaluate::over_time::{OverTime, PercentOf, RestOverTime, RestStretch, Stretch};
-use taxel_evaluate::verdict::sentences;
 
 use super::axes::Axis;
 use super::chart::{Chart, Mark, STYLES, Series};
 use super::figures::Figure;
-use super::format::{grouped, significant, symbol};
+use super::format::{grouped, symbol};
 use super::svg::Shape;
 use super::ticks::{self, Ticks};
 
@@ -134,44 +132,6 @@ pub fn at_rest(log: &OverTime, rest: &RestOverTime) -> Figure {
                     rest.readings
                 )
             }
-        ),
-        &chart,
-        [WIDE, NARROW],
-    )
-}
-
-/// Figure of how far averaging frames at rest lowers their noise.
-pub fn averaging(noise: &Spectrum) -> Figure {
-    let (label, factor) = match noise.interval_s {
-        Some(s) => ("averaging time in s", s),
-        None => ("frames averaged", 1.0),
-    };
-    let points = |of: fn(&Averaging) -> f64| {
-        noise.averaging.iter().map(|it| [factor * it.frames as f64, of(it)]).collect::<Vec<_>>()
-    };
-    let series = vec![
-        Series::new("white noise (slope −1/2)", "muted", Mark::Dashed, points(|it| it.white)),
-        Series::new("Allan deviation", "c1", Mark::LineAnd(Shape::Circle), points(|it| it.allan)),
-        Series::new("error of the mean", "c2", Mark::Line, points(|it| it.error)),
-    ];
-    let of =
-        |axis: usize| series.iter().flat_map(move |it| it.points.iter().map(move |at| at[axis]));
-    let chart = Chart {
-        title: "Noise at rest by averaging time".into(),
-        x: Axis::logarithmic(label, ticks::logarithmic(of(0), |value| significant(value, 2))),
-        y: Axis::logarithmic(
-            "share of one frame's noise",
-            ticks::logarithmic(of(1), |value| significant(value, 2)),
-        ),
-        series,
-        end_labels: false,
-    };
-    Figure::of_chart(
-        "noise-by-averaging",
-        format!(
-            "Noise at rest by averaging time: Allan deviation of {} readings, and error of means by the fitted parts. {}",
-            noise.readings,
-            sentences(noise).join(" ")
         ),
         &chart,
         [WIDE, NARROW],

@@ -83,9 +83,6 @@ fn models_and_data_are_told_by_the_schema() {
     folder.write("b.csv", "t_s,b\n0.01,1\n0.99,2\n");
     let join = ["join", "a.csv", "b.csv", "--on", "t_s", "--tolerance", "0.1", "-o", "ab.csv"];
     assert_eq!(checked(&join)["frames_without_partner"], 1);
-    let rest = ["synth", "scene.toml", "-n", "300", "--untouched", "--frame-rate", "100"];
-    checked(&[&rest[..], &["-o", "rest.csv"]].concat());
-    assert_eq!(checked(&["noise", "rest.csv"])["noise"]["colour"], "white");
 }
 
 #[test]

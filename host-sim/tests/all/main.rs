@@ -23,7 +23,6 @@ mod mat;
 mod log;
 mod measured;
 mod moving;
-mod noise;
 #[cfg(unix)]
 mod output;
 mod readout;

@@ -1,7 +1,6 @@
 //! Readings of the untouched sensor over time, and which of them drift.
 
 use serde::Serialize;
-use taxel_data::spectrum::Spectrum;
 use taxel_data::{Clock, Rest};
 use taxel_learn::Options;
 
@@ -42,8 +41,6 @@ pub struct RestOverTime {
     pub readings: usize,
     /// Time between the first stretch and the last, in words: `in 9.6 minutes`.
     pub span: String,
-    /// What the noise is like; `None` if too few lines follow one another.
-    pub noise: Option<Spectrum>,
     /// What relative inputs would change; `None` if it was not tried.
     pub relative_trial: Option<RelativeTrial>,
 }
@@ -153,16 +150,9 @@ impl RestOverTime {
             drifts: noticeable,
             readings: all.len(),
             span: clock.span(time(0)[0], time(ranges.len() - 1)[1]),
-            noise: noise_of(rest, lines, clock),
             relative_trial: None,
         })
     }
-}
-
-/// Noise of a log at `rest`, on these `lines`.
-fn noise_of(rest: &Rest, lines: &[usize], clock: &Clock) -> Option<Spectrum> {
-    let times_s: Vec<f64> = lines.iter().map(|line| clock.at[*line]).collect();
-    Spectrum::new(&rest.readings, lines, (clock.unit == "s").then_some(&times_s))
 }
 
 #[cfg(test)]

@@ -1,5 +1,3 @@
-use taxel_data::spectrum::Spectrum;
-use taxel_data::{Purpose, Random, Stream, Table};
 use taxel_learn::outliers::Outliers;
 use taxel_limit::reference::GroupLimit;
 use taxel_simulate::noise::{Noise, NoiseKind};
@@ -247,40 +245,4 @@ fn averaging_within_a_time_constant_is_warned_of() {
     assert_eq!(warning(&noise, 1, 36e-6), None);
     assert_eq!(warning(&noise, 16, 0.1), None);
     assert_eq!(warning(&Noise::white(NoiseKind::Relative, 0.005), 256, 36e-6), None);
-}
-
-#[test]
-fn noise_at_rest_is_told_in_words() {
-    let numbers: Vec<usize> = (0..2000).collect();
-    let times: Vec<f64> = numbers.iter().map(|n| *n as f64 * 0.002).collect();
-    let told = |decay: f64, times: Option<&[f64]>| {
-        let mut random = Random::new(3, Stream::Test, Purpose::Noise, 0, 0);
-        let mut states = [0.0; 9];
-        let mut frame = |_: &usize| {
-            states.each_mut().map(|state| {
-                *state = decay * *state + (1.0 - decay * decay).sqrt() * random.normal();
-                100.0 + *state
-            })
-        };
-        let values: Vec<f64> = numbers.iter().flat_map(&mut frame).collect();
-        let names = (0..9).map(|column| format!("ch{column}")).collect();
-        let noise = Spectrum::new(&Table { names, values }, &numbers, times).unwrap();
-        (sentences(&noise).join(" "), noise.variance_over_differences())
-    };
-    let (white, factor) = told(0.0, Some(&times));
-    assert!(white.starts_with("The noise at rest is white: no correlation"), "{white}");
-    assert!(
-        white.contains("Averaging pays as far as these frames tell: the mean of 128 has 0.0884"),
-        "{white}"
-    );
-    assert_eq!(factor, 1.0);
-    let (coloured, factor) = told(0.9, None);
-    assert!(coloured.contains("of the noise at rest has a time constant of 9."), "{coloured}");
-    assert!(coloured.contains("Averaging does not pay: the mean of two frames"), "{coloured}");
-    assert!(
-        coloured.ends_with("Time is counted in frames: nothing tells when they were read."),
-        "{coloured}"
-    );
-    // Neighbours share nine tenths: their differences have a tenth of the variance.
-    assert!((factor / 10.0 - 1.0).abs() < 0.1, "{factor}");
 }

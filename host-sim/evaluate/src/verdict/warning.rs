@@ -5,7 +5,6 @@ use taxel_core::blob::Model;
 use taxel_core::rbf::Format;
 use taxel_data::Table;
 use taxel_data::error::cut;
-use taxel_data::spectrum::{self, NoiseColour};
 use taxel_firmware::capacity::Capacity;
 use taxel_learn::cost::{Design, NetworkDesign};
 use taxel_learn::outliers::Outliers;
@@ -13,7 +12,7 @@ use taxel_learn::train::projection;
 use taxel_rig::image;
 use taxel_simulate::noise::Noise;
 
-use super::{sentences, significant};
+use super::significant;
 use crate::over_time::{PercentOf, RestOverTime};
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB.
@@ -30,6 +29,9 @@ pub const FRAMES_FOR_CONFIDENCE: usize = 300;
 
 /// Share of readings outside the training range above which a warning is due.
 pub const OUT_OF_RANGE: f64 = 0.01;
+
+/// Least share by which averaging twice as many samples must lower the noise to pay.
+const PAYS: f64 = 0.1;
 
 /// Share of simulated readings at or below zero above which a warning is due.
 const NOT_POSITIVE: f64 = 1e-4;
@@ -198,18 +200,11 @@ impl Warning {
         })
     }
 
-    /// Noise at rest that averaging does not lower as it does white noise.
-    pub fn correlated_noise(rest: &RestOverTime) -> Option<Self> {
-        let noise = rest.noise.as_ref()?;
-        let due = noise.colour == NoiseColour::Correlated;
-        Self::when(due, "noise-with-a-memory", || sentences(noise).join(" "))
-    }
-
     /// Means of so many `samples` that lower the noise by less than a tenth of what half as many leave: what is
     /// `left` of it by a number of samples.
     pub fn idle_averaging(samples: usize, left: impl Fn(usize) -> Noise) -> Option<Self> {
         let level = |samples: usize| left(samples.max(1)).total_level();
-        let due = samples > 1 && level(samples) > (1.0 - spectrum::PAYS) * level(samples / 2);
+        let due = samples > 1 && level(samples) > (1.0 - PAYS) * level(samples / 2);
         Self::when(due, "averaging-does-not-pay", || {
             format!(
                 "the mean of {samples} samples has {} of one sample's noise, and of half as many {}: a part of it has a time \

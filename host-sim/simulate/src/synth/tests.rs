@@ -1,5 +1,4 @@
 use taxel_data::digest::digest;
-use taxel_data::spectrum::{NoiseColour, Spectrum};
 
 use super::*;
 use crate::outputs::{ContactOutput, ElectrodeOutputs, Quantity};
@@ -398,31 +397,31 @@ fn remembering(level: f64, correlated_level: f64, time_constant_ms: f64) -> Worl
 #[test]
 fn noise_with_a_memory_has_the_size_and_the_time_constant_that_it_is_asked_for() {
     for (level, correlated_level, time_constant_ms) in
-        [(0.0, 0.01, 20.0), (0.005, 0.005, 20.0), (0.005, 0.005, 2.0)]
+        [(0.0, 0.01, 20.0), (0.005, 0.005, 20.0), (0.005, 0.005, 2.0), (0.005, 0.0, 0.0)]
     {
         let world = remembering(level, correlated_level, time_constant_ms);
-        let period_s = 0.1 * time_constant_ms / 1000.0;
+        let period_s = 0.1 * f64::max(time_constant_ms, 20.0) / 1000.0;
         let times = Timetable::every(period_s, 0.0, 1500.0 * period_s).unwrap();
-        let log = Synthesis::new(&world).untouched().timed(times.clone());
+        let log = Synthesis::new(&world).untouched().timed(times);
         let readings = log.frames(Stream::Training, 1500).inputs;
-        let numbers: Vec<usize> = (0..1500).collect();
-        let found = Spectrum::new(&readings, &numbers, Some(&times.starts_s)).unwrap();
-        let tau_ms = 1000.0 * found.time_constant_s.unwrap();
-        assert!((tau_ms / time_constant_ms - 1.0).abs() < 0.1, "{tau_ms}");
-        let [white, correlated] = found.levels.unwrap();
-        assert!((white - level).abs() < 0.0003, "{white}");
-        assert!((correlated / correlated_level - 1.0).abs() < 0.05, "{correlated}");
+        let ideal = log.clone().ideal().frames(Stream::Training, 1500).inputs;
+        let noise: Vec<f64> = ratios(&readings, &ideal).flatten().map(|it| it - 1.0).collect();
+        // Mean product of a reading's noise with its own so many frames later.
+        let covariance = |frames: usize| {
+            let products = noise.iter().zip(&noise[frames * readings.names.len()..]);
+            products.clone().map(|(a, b)| a * b).sum::<f64>() / products.len() as f64
+        };
+        let total = world.noise.total_level().powi(2);
+        assert!((covariance(0) / total - 1.0).abs() < 0.05, "{}", covariance(0));
+        for frames in [1, 5, 10] {
+            let shared =
+                correlated_level.powi(2) * world.noise.correlation(frames as f64 * period_s);
+            let found = covariance(frames);
+            assert!((found - shared).abs() < 0.03 * total, "{frames} frames: {found}, {shared}");
+        }
         let few = log.frames(Stream::Training, 20).inputs.values;
         assert_eq!(few, readings.values[..few.len()]);
     }
-    let white = remembering(0.005, 0.005, 20.0);
-    let white = World { noise: Noise::white(NoiseKind::Relative, 0.005), ..white };
-    let times = Timetable::every(0.002, 0.0, 3.0).unwrap();
-    let log = Synthesis::new(&white).untouched().timed(times);
-    let readings = log.frames(Stream::Training, 1500).inputs;
-    let numbers: Vec<usize> = (0..1500).collect();
-    let found = Spectrum::new(&readings, &numbers, None).unwrap();
-    assert_eq!((found.colour, found.correlated_share), (NoiseColour::White, 0.0));
 }
 
 #[test]

@@ -4,17 +4,15 @@ use std::path::{Path, PathBuf};
 
 use crate::live::recorder::{Beside, Recorder};
 use crate::live::sheet;
-use crate::verdict::sentences;
 use crate::{Error, Result};
 use clap::{Args, value_parser};
 use serde::Serialize;
 use taxel_core::blob::Model;
-use taxel_data::spectrum::Spectrum;
 use taxel_data::{Table, csv_file};
 use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request, Setting};
 use taxel_learn::ModelBlob;
 use taxel_rig::device::{Device, DeviceIdentity};
-use taxel_rig::scans::{Scan, ScanEstimate};
+use taxel_rig::scans::ScanEstimate;
 
 use super::super::filter_arguments::FilterArguments;
 use super::super::health::note_faults;
@@ -51,9 +49,6 @@ pub struct RecordArguments {
     /// (docs/confidence.md).
     #[arg(long, value_enum, value_name = "WHAT", default_value = "nothing", requires = "model")]
     confidence: Confidence,
-    /// Nothing touches the sensor: judge the noise on its readings (docs/noise.md).
-    #[arg(long, conflicts_with = "confidence")]
-    untouched: bool,
     /// CSV file to write; or a recording (.mcap), with readings and estimates, which is written while they come and survives a
     /// kill (docs/live.md).
     #[arg(short, long, value_name = "FILE")]
@@ -86,8 +81,6 @@ struct Saved {
     values_missing: usize,
     /// Frames that are unlike those of training, as far as the device was to tell.
     frames_novel: usize,
-    /// Noise of the untouched sensor, if it was asked for.
-    noise: Option<Spectrum>,
     file: PathBuf,
 }
 
@@ -98,18 +91,12 @@ const MISSED: f64 = 0.98;
 fn check_usage(action: &RecordArguments) -> Result<()> {
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     if is_recording(&action.output) {
-        if action.time || action.untouched {
-            let message = "-o: a recording has the times of all scans, and noise at rest is judged on CSV files; leave \
-                           --time and --untouched out";
+        if action.time {
+            let message = "-o: a recording has the times of all scans; leave --time out";
             return Err(Error::Usage(message.into()));
         }
     } else {
         print::check_output(&action.output, &inputs)?;
-    }
-    if action.untouched && action.model.is_some() && !action.readings {
-        let message =
-            "--untouched: noise is judged by readings, and estimates are saved; add --readings";
-        return Err(Error::Usage(message.into()));
     }
     Ok(())
 }
@@ -171,7 +158,6 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     if wanted == Wanted::Readings {
         note_faults(&Table { names: names.clone(), values: lines.concat() });
     }
-    let noise = if action.untouched { Some(noise(&scans, &names, every)?) } else { None };
     let time = action.time.then_some("time_s");
     let first_us = scans.first().map_or(0, |scan| scan.start_us);
     let lines = scans.iter().zip(lines).map(|(scan, line)| {
@@ -200,7 +186,6 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         frames_lost,
         values_missing,
         frames_novel,
-        noise,
         file,
     };
     saved.print(common)
@@ -225,24 +210,6 @@ fn recorder(
         ..Beside::default()
     };
     Recorder::start(path, &layout, beside)
-}
-
-/// Noise on the readings of these `scans`, in columns of these `names`. The device has sent `every` so many.
-fn noise(scans: &[Scan], names: &[String], every: u16) -> Result<Spectrum> {
-    let first = scans.first().map_or((0, 0), |scan| (scan.number, scan.start_us));
-    let numbers: Vec<usize> = scans
-        .iter()
-        .map(|scan| (scan.number.wrapping_sub(first.0) / u32::from(every)) as usize)
-        .collect();
-    let times_s: Vec<f64> =
-        scans.iter().map(|scan| (scan.start_us - first.1) as f64 * 1e-6).collect();
-    let values = scans.iter().flat_map(values).collect();
-    let readings = Table { names: names.to_vec(), values };
-    Spectrum::new(&readings, &numbers, Some(&times_s)).ok_or_else(|| {
-        let message = "--untouched: it takes 40 frames without a gap, and readings that change, to judge noise; raise \
-                       --frames";
-        Error::Usage(message.into())
-    })
 }
 
 /// Checks that a model `is_active` on the device.
@@ -315,7 +282,6 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
         frames_lost: 0,
         values_missing,
         frames_novel: 0,
-        noise: None,
         file,
     };
     saved.print(common)
@@ -349,7 +315,6 @@ impl Saved {
         if self.frames_novel > 0 {
             page.line(format_args!("{} frames were unlike those of training", self.frames_novel));
         }
-        self.noise.iter().flat_map(sentences).for_each(|sentence| page.line(sentence));
         page.print()
     }
 }
