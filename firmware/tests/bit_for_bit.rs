@@ -83,11 +83,3 @@ fn every_kernel_decodes_many_frames_on_the_host_as_in_the_emulator() {
 fn networks_of_fixed_size_decode_as_their_blobs_on_the_host_as_in_the_emulator() {
     expect("fixed", |say| fixed::compare_all(model("hand-made.bin"), model("row4.bin"), say));
 }
-
-#[test]
-fn recursive_least_squares_learns_on_the_host_as_in_the_emulator() {
-    expect("rls", |say| {
-        say(format_args!("recursion: {:08x}", checks::recursion()?));
-        Some(())
-    });
-}

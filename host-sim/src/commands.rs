@@ -22,7 +22,6 @@ mod rest_argument;
 mod filter_arguments;
 mod health;
 mod data_argument;
-mod data_stream;
 mod subject_argument;
 mod check_arguments;
 mod interruption;

@@ -4,7 +4,6 @@
 //! one page serves light and dark.
 
 use taxel_data::output::Inner;
-use taxel_evaluate::evaluate::learning_curve::LearningCurve;
 use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::printed::Cells;
 use taxel_evaluate::evaluate::trade::Trade;
@@ -36,7 +35,6 @@ mod printed;
 mod trade;
 mod limit;
 mod points;
-mod learning_curve;
 
 pub use figures::{FOLDER as FIGURES, Page};
 pub use points::{evenly, result_text, setting_cells, setting_heads};
@@ -77,11 +75,6 @@ pub fn sweep_html(merged: &Merged, stem: &str, command: &str) -> Page {
 /// Picture of a computed table beside the paper's printed Table 1; a file of its own, light or dark like the viewer.
 pub fn printed_svg(computed: &Cells) -> String {
     printed::svg(computed)
-}
-
-/// Picture of a recursion's learning curve on `subject`, as a file of its own: light or dark like the viewer.
-pub fn learning_curve_svg(curve: &LearningCurve, subject: &str) -> String {
-    learning_curve::svg(curve, subject)
 }
 
 #[cfg(test)]

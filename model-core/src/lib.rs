@@ -3,12 +3,11 @@
 //! Readings travel one way: frame (Ω, a slice) → [`health`] → ([`fill`] →) [`gate`] → ([`relative`] →) ([`projection`] →)
 //! [`scale`] → [`rbf`] (and its affine tail) → [`Estimate`] (→ [`filter`]). The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
-//! [`rls`] is recursive least squares, by which the paper trains.
 //!
 //! The crate knows no pin and no file. The same code serves host, emulator and board, so that
 //! their estimates agree bit for bit where the same [exponential](exp) is chosen.
 //!
-//! The network and its training follow Wang et al., "Decoupling research of flexible tactile
+//! The network follows Wang et al., "Decoupling research of flexible tactile
 //! sensors interfered by white Gaussian noise using improved RBFNN", Sensors & Transducers, 2014
 //! ("the paper").
 //!
@@ -28,7 +27,6 @@ pub mod feature;
 pub mod scale;
 pub mod relative;
 pub mod checksum;
-pub mod rls;
 mod frame;
 mod estimate;
 mod cortex_m4;

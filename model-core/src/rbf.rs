@@ -1,8 +1,8 @@
 //! The K-centre Gaussian radial-basis-function network, in three formats.
 //!
-//! F(x) = Σ_k ω_k·exp(−‖x − c_k‖²/(2σ²)) + b (+ A·x), with x the scaled readings (the paper, eq. 8–10; the
-//! affine tail A·x is ours). All parameters are borrowed, and the shape is part of the value, so that one
-//! firmware serves any K.
+//! F(x) = Σ_k ω_k·exp(−‖x − c_k‖²/(2σ²)) + b (+ A·x), with x the scaled readings (the paper's Gaussian is eq. 11, its
+//! network eq. 18, and K-means' output eq. 19; the affine tail A·x is ours). All parameters are borrowed, and the shape
+//! is part of the value, so that one firmware serves any K.
 //!
 //! | [`Format`] | distances | a Cortex-M4F computes with |
 //! |---|---|---|

@@ -1,6 +1,5 @@
 //! Calls every function that a device calls, on inputs that are opaque to the optimiser.
 
-use taxel_core::rls::{self, Rls};
 use taxel_core::{ColumnWire, Decoder, Estimate, RowStatus, RowWire, Wires, decoder_ram_bytes};
 use taxel_firmware::store::blob_in_slot;
 
@@ -48,34 +47,10 @@ fn exercise_decoding() {
     }
 }
 
-/// Calls recursive least squares, with sizes known only at run time.
-fn exercise_least_squares() {
-    let mut memory = opaque([0.0_f32; 512]);
-    let (regressors, outputs) = (opaque(17), opaque(3));
-    let values = Rls::<f32>::values(regressors, outputs);
-    let (Some(memory), mut weights) = (memory.get_mut(..values), opaque([0.0; 64])) else { return };
-    let Ok(mut rls) = Rls::try_new(memory, [regressors, outputs], opaque(1e3), opaque(0.999))
-    else {
-        return;
-    };
-    let (mut regressor, mut target) = (opaque([0.5; 32]), opaque([0.25; 8]));
-    let (Some(h), Some(y)) = (regressor.get_mut(..opaque(17)), target.get_mut(..opaque(3))) else {
-        return;
-    };
-    opaque(rls.update(h, y).is_ok());
-    rls.weights(&mut weights);
-    opaque(rls.is_excited(opaque(10.0)));
-    opaque(weights);
-    let (root, projection) = (opaque([0.5_f32; 64]), opaque([0.5; 16]));
-    rls::solve(&root, &projection, opaque(8), &mut weights);
-    opaque(weights);
-}
-
 /// Entry point for a linker without a script: it leaves out whatever this function does not reach.
 #[unsafe(no_mangle)]
 extern "C" fn _start() -> ! {
     exercise_decoding();
-    exercise_least_squares();
     application::exercise();
     readout::exercise();
     loop {

@@ -9,7 +9,6 @@ use taxel_core::confidence::{Confidence, Sizes};
 use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use taxel_core::filter::{Settings, State};
 use taxel_core::rbf::{Format, Network};
-use taxel_core::rls::Rls;
 use taxel_core::scale::{CLAMP, saturates};
 use taxel_core::{Decoder, Estimate, RowStatus};
 
@@ -411,25 +410,4 @@ pub fn extremes<'m>(mode: &str, model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) 
         say(format_args!("{}: {crc:08x}", format.name()));
     }
     Some(())
-}
-
-/// CRC-32 of all bits of the weights that recursive least squares has after each of 200 samples.
-pub fn recursion() -> Option<u32> {
-    let mut memory = [0.0; Rls::<f32>::values(9, 3)];
-    let mut rls = Rls::try_new(&mut memory, [9, 3], 1e4, 0.99).ok()?;
-    let crc = CRC;
-    let mut digest = crc.digest();
-    let mut numbers = Numbers::new(2);
-    for _ in 0..200 {
-        let mut regressor: [f32; 9] =
-            core::array::from_fn(|i| if i == 8 { 1.0 } else { numbers.draw() });
-        let noise = 1e-3 * numbers.draw();
-        let (first, last) = (regressor[0] - 0.5 * regressor[1], 0.25 * regressor[7]);
-        let mut target = [first + noise, last - noise, 2.0 * first * last];
-        rls.update(&mut regressor, &mut target).ok()?;
-        let mut weights = [0.0; 27];
-        rls.weights(&mut weights);
-        add(&mut digest, &weights);
-    }
-    Some(digest.finalize())
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::columns;
-use crate::digest::TableDigest;
+use crate::digest;
 use crate::error::{Error, Problem, Result, Role};
 use crate::input;
 
@@ -14,7 +14,6 @@ mod csv;
 mod dialect;
 mod foreign;
 mod npy;
-pub mod pieces;
 
 pub use dialect::{Separator, Stated};
 
@@ -252,19 +251,10 @@ impl DataFile {
 
     /// Digest of the numbers in the columns called `names`, of all lines of the file.
     pub fn digest(&self, names: &[&str]) -> Result<u64> {
-        let mut digest = TableDigest::new(names.iter().copied());
-        self.add_to(&mut digest, names)?;
-        Ok(digest.sum())
-    }
-
-    /// Adds all lines of the columns called `names` to a digest.
-    pub fn add_to(&self, digest: &mut TableDigest, names: &[&str]) -> Result<()> {
         let columns = self.columns(names.iter().copied())?;
-        for lines in self.values.chunks(self.header.len() * 1024) {
-            let lines = lines.chunks_exact(self.header.len());
-            digest.add(lines.flat_map(|line| columns.iter().map(|column| line[*column])));
-        }
-        Ok(())
+        let lines = self.values.chunks_exact(self.header.len());
+        let values = lines.flat_map(|line| columns.iter().map(|column| line[*column]));
+        Ok(digest::of_table(names, values))
     }
 
     /// Checks that these columns (from 0) hold nothing but numbers. Outputs of few different texts are classes.

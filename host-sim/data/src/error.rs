@@ -145,9 +145,6 @@ pub enum Problem {
         /// Lines of Python that convert it.
         python: String,
     },
-    /// UTF-16 where a file is read piece by piece.
-    #[error("UTF-16 is not read piece by piece; save it as UTF-8, or give --solver qr")]
-    Utf16InPieces,
     /// What gzip packed, and cannot be unpacked.
     #[error("it cannot be unpacked: {cause}; pack it again with gzip")]
     Packed { cause: String },
@@ -187,14 +184,6 @@ pub enum Problem {
     #[error("it has more than {}; check the path", in_words(*most_bytes))]
     FileTooLarge {
         /// Largest size that is read, in bytes.
-        most_bytes: u64,
-    },
-    /// Line longer than any that is read.
-    #[error("no line of data ends within {} after line {after}; check the line ends", in_words(*most_bytes))]
-    LineTooLong {
-        /// Number of the last line before it; 0 for the first line.
-        after: u64,
-        /// Longest line that is read, in bytes.
         most_bytes: u64,
     },
     /// Blank line in a file of one column, where it could be a missing value.

@@ -1,7 +1,7 @@
 //! Input files, read whole up to a size that is told when it is exceeded: not every path names a file that ends.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, Cursor, ErrorKind, Read};
+use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
@@ -109,19 +109,6 @@ pub(crate) fn unpacked(path: &Path, bytes: &[u8]) -> Result<Option<Vec<u8>>> {
         return Err(Error::file(path, Problem::UnpackedTooLarge { most_bytes }));
     }
     Ok(Some(unpacked))
-}
-
-/// Reader of the `source`, or of what gzip packed into it.
-pub(crate) fn unpacking(
-    path: &Path,
-    mut source: Box<dyn Read + Send>,
-) -> Result<Box<dyn Read + Send>> {
-    let mut start = vec![];
-    let read = source.by_ref().take(GZIP.len() as u64).read_to_end(&mut start);
-    read.map_err(|cause| Error::read(path, cause))?;
-    let is_packed = start == GZIP;
-    let whole = Cursor::new(start).chain(source);
-    Ok(if is_packed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) })
 }
 
 /// Reads the text file at `path` whole, if it has at most [`MOST_TEXT_BYTES`].

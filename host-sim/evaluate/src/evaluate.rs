@@ -3,7 +3,6 @@
 pub mod distribution;
 pub mod device_cost;
 pub mod worth;
-pub mod learning_curve;
 pub mod limit;
 pub mod confidence;
 pub mod printed;

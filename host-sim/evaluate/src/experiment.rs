@@ -12,8 +12,7 @@ use taxel_core::rbf::Format;
 use taxel_data::digest::digest;
 use taxel_data::{BadValue, Dataset, Progress, Stream, input, require};
 use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
-use taxel_learn::train::stream::Pieces;
-use taxel_learn::train::{FreshFrames, Recursive, Solver, check_spread};
+use taxel_learn::train::{FreshFrames, Solver, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::noise::{Noise, NoiseKind};
@@ -81,6 +80,9 @@ pub struct Training {
     pub spread: f64,
     /// Whether the networks add an affine tail A·x.
     pub affine_tail: bool,
+    /// How output weights are computed.
+    #[serde(default)]
+    pub solver: Solver,
     /// Number format of the weights.
     #[serde(default = "default_format", deserialize_with = "file::format::deserialize")]
     pub format: Format,
@@ -125,7 +127,7 @@ pub struct Table1 {
     /// Number of frames, and of centres, of the standard network (K = N).
     pub standard_frames: usize,
     /// How output weights are computed; the paper's way is recursive least squares.
-    #[serde(default = "by_recursion", deserialize_with = "file::solver::deserialize")]
+    #[serde(default = "by_recursion")]
     pub solver: Solver,
     /// What the paper leaves open, where it is chosen otherwise than for a device.
     pub open: Option<OpenChoices>,
@@ -155,7 +157,7 @@ pub enum JudgedOn {
 }
 
 fn by_recursion() -> Solver {
-    Solver::Rls(Recursive::default())
+    Solver::Rls
 }
 
 fn yes() -> bool {
@@ -258,6 +260,7 @@ impl Experiment {
             centres: t.centres,
             spread: t.spread,
             affine_tail: t.affine_tail,
+            solver: t.solver,
             seed: self.world.seed,
             format: t.format,
             whole_array: t.whole_array,
@@ -322,25 +325,6 @@ impl Experiment {
     /// frames of the untouched sensor. `synthesis` is one of the experiment's world.
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
         self.dataset_from(synthesis, stream, 0, frames)
-    }
-
-    /// Training frames of `synthesis` from number `first` up to `count`, piece by piece.
-    ///
-    /// # Panics
-    /// If a trajectory has several frames, which pieces could cut.
-    pub fn pieces<'e>(
-        &'e self,
-        synthesis: Synthesis<'e>,
-        first: usize,
-        count: usize,
-    ) -> Pieces<'e> {
-        const PIECE: usize = 4096;
-        assert_eq!(synthesis.steps(), 1, "trajectories of one frame");
-        let starts = (first..count).step_by(PIECE);
-        Box::new(starts.map(move |start| {
-            let frames = PIECE.min(count - start);
-            Ok(self.dataset_from(&synthesis, Stream::Training, start, frames))
-        }))
     }
 
     /// Data set from trajectory number `first` of `stream` on.

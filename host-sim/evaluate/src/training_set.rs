@@ -7,7 +7,6 @@ use taxel_learn::confidence::{self, Density, HeldOut};
 use taxel_learn::decoders::LINEAR;
 use taxel_learn::fill;
 use taxel_learn::select;
-use taxel_learn::train::stream::{self, Frames, Learned, Pieces};
 use taxel_learn::train::{Examples, Refinement, resolution, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
@@ -85,36 +84,9 @@ impl<'s> TrainingSet<'s> {
         if self.fill {
             fill::check(&self.frames)?;
         }
-        self.pack(&self.train(options, progress)?, options, progress)
-    }
-
-    /// Trains with `options` by recursion, refined if that is asked for: on these frames, which layers are taken from,
-    /// and then on the `rest`, piece by piece. `count` is the number of all frames, if it is known.
-    ///
-    /// The learning curve, which is returned too, has errors on `test`, or else on the next frames.
-    pub fn train_by_recursion(
-        &self,
-        rest: Pieces<'_>,
-        count: Option<usize>,
-        test: Option<&Dataset>,
-        options: &Options,
-        progress: &dyn Progress,
-    ) -> Result<(Trained, Vec<Learned>)> {
-        let frames = Frames { first: &self.frames, rest, count, test };
-        let refinement = Refinement::default();
-        let refinement = self.examples().map(|examples| (&refinement, examples));
-        Ok(stream::train(frames, options, refinement, progress)?)
-    }
-
-    /// Packs the model that was `trained` with `options`, with a confidence and a fill if these are asked for.
-    pub fn pack(
-        &self,
-        trained: &Trained,
-        options: &Options,
-        progress: &dyn Progress,
-    ) -> Result<ModelBlob> {
+        let trained = self.train(options, progress)?;
         let origin = Origin { linear_rmse: self.linear_rmse(), ..self.origin.clone() };
-        let blob = pack(trained, &self.frames, &origin)?;
+        let blob = pack(&trained, &self.frames, &origin)?;
         let blob =
             if self.confidence { self.with_confidence(&blob, options, progress)? } else { blob };
         if !self.fill {

@@ -15,6 +15,7 @@ pub mod infer;
 pub mod health;
 pub mod relative;
 pub mod outliers;
+pub mod rls;
 pub mod train;
 pub mod packing;
 pub mod export;

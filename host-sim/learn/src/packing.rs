@@ -54,8 +54,7 @@ impl Origin {
     }
 }
 
-/// Packs the networks and the projection `trained` on `dataset` into a blob. Its training errors are those on
-/// that data set; the weights may have been fitted to more frames.
+/// Packs the networks and the projection `trained` on `dataset` into a blob.
 ///
 /// # Errors
 /// [`Error`] for a model beyond what the format holds.
@@ -96,7 +95,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
             noise_kind: if origin.noise.1 == 0.0 { NoiseKind::None } else { origin.noise.0 },
             noise_level: origin.noise.1 as f32,
             seed: origin.seed,
-            training_frames: u32::try_from(trained.frames).unwrap_or(u32::MAX),
+            training_frames: u32::try_from(dataset.frames()).unwrap_or(u32::MAX),
             thickness_mm: origin.thickness_mm.map_or(0.0, |h| h as f32),
             relative_inputs: dataset.relative_inputs,
             input_names: Columns(&input_names),

@@ -24,12 +24,12 @@
 use rayon::prelude::*;
 use taxel_core::blob::Model;
 use taxel_core::rbf::Network;
-use taxel_core::rls;
 use taxel_data::Table;
 
 use crate::error::{Error, Result};
 use crate::packing::{ModelBlob, rebuild};
 use crate::prepared::PreparedModel;
+use crate::rls;
 use crate::train::FittedNetwork;
 
 mod smooth;
@@ -289,7 +289,7 @@ impl Unit {
         let outputs: Vec<Vec<f64>> =
             centres.iter().map(|x| self.in_errors(&self.network.infer(x, &mut []))).collect();
         let [centre, output] = [mean_line(&centres), mean_line(&outputs)];
-        let mut triangle = vec![0.0; rls::triangle_values(regressors)];
+        let mut triangle = vec![0.0; regressors * regressors];
         let mut projection = vec![0.0; regressors * inputs];
         rls::start(&mut triangle, regressors, RIDGE);
         for (x, y) in centres.iter().zip(&outputs) {
@@ -297,7 +297,7 @@ impl Unit {
             rls::rotate(&mut triangle, &mut projection, &mut y, &mut x);
         }
         let mut parts = vec![0.0; regressors * inputs];
-        rls::solve_triangle(&triangle, &projection, regressors, &mut parts);
+        rls::solve(&triangle, &projection, regressors, &mut parts);
         let mut differences: Vec<Vec<f64>> = vec![vec![]; inputs];
         for press in presses {
             let (x, stated) = (&self.inputs[*press], &self.stated[*press]);
@@ -325,7 +325,7 @@ impl Unit {
         };
         let mut shift = guess.to_vec();
         let mut lowest = cost(&shift);
-        let mut triangle = vec![0.0; rls::triangle_values(inputs)];
+        let mut triangle = vec![0.0; inputs * inputs];
         let mut step = vec![0.0; inputs];
         for _ in 0..MOST_STEPS {
             rls::start(&mut triangle, inputs, PRIOR);
@@ -334,7 +334,7 @@ impl Unit {
             for press in presses {
                 self.rotate(&shift, *press, &mut triangle, &mut target);
             }
-            rls::solve_triangle(&triangle, &target, inputs, &mut step);
+            rls::solve(&triangle, &target, inputs, &mut step);
             let mut is_lower = false;
             for _ in 0..MOST_HALVINGS {
                 let next: Vec<f64> = shift.iter().zip(&step).map(|(s, step)| s + step).collect();

@@ -4,6 +4,7 @@
 //! alone decides how work is cut into pieces, whose results are merged in order. The network is rounded
 //! once, to the numbers of its format, as a [`FittedNetwork`].
 
+use serde::Deserialize;
 use taxel_core::rbf::Format;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
@@ -11,7 +12,6 @@ use crate::error::Result;
 use crate::parallel;
 
 pub mod resolution;
-mod solver;
 pub mod kmeans;
 mod samples;
 pub mod least_squares;
@@ -22,14 +22,44 @@ pub mod projection;
 pub mod memory;
 pub mod layers;
 pub mod refine;
-pub mod stream;
 
 pub use format::FittedNetwork;
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
 use samples::Ridge;
 pub use samples::{HiddenLayer, InputScale, Samples};
-pub use solver::{Recursive, Solver};
+
+/// How output weights are computed. Both ways give the same weights, but for rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Solver {
+    /// Blocked QR decomposition of all samples, which several penalties share.
+    #[default]
+    Qr,
+    /// Recursive least squares: one sample after another, as the paper has it.
+    Rls,
+}
+
+impl Solver {
+    /// Both ways.
+    pub const ALL: [Self; 2] = [Self::Qr, Self::Rls];
+
+    /// Name, as options and scenes have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Qr => "qr",
+            Self::Rls => "rls",
+        }
+    }
+
+    /// What it does, in a few words.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Qr => "QR decomposition of all frames",
+            Self::Rls => "Recursive least squares, one pass over the frames; slower",
+        }
+    }
+}
 
 /// Initial covariance δ of the recursive least squares where no penalty is chosen. The penalty on squared weights is
 /// 1/δ for all frames together, too small to be felt.
@@ -102,12 +132,8 @@ impl Options {
         tasks::check(&dataset.outputs, self.centres)
     }
 
-    /// Initial covariance δ of the recursive least squares on so many `frames`: that of the solver, else one over the
-    /// penalty on squared weights.
+    /// Initial covariance δ of the recursive least squares on so many `frames`: one over the penalty on squared weights.
     pub fn initial_covariance(&self, frames: usize) -> f64 {
-        if let Solver::Rls(Recursive { initial_covariance: Some(covariance), .. }) = self.solver {
-            return covariance;
-        }
         self.penalty.map_or(INITIAL_COVARIANCE, |penalty| 1.0 / (penalty * frames as f64))
     }
 
@@ -131,9 +157,6 @@ impl Options {
             return Err(BadValue::new("features", features, rule));
         }
         self.penalty.map_or(Ok(()), check_penalty)?;
-        if let Solver::Rls(settings) = self.solver {
-            settings.check()?;
-        }
         check_spread("spread", self.spread)
     }
 }
@@ -204,8 +227,6 @@ pub struct Trained {
     pub projection: Option<Vec<f32>>,
     /// Networks of the row-wires in order, or the one network behind the projection.
     pub networks: Vec<FittedNetwork>,
-    /// Number of frames that their weights were fitted to.
-    pub frames: usize,
 }
 
 /// Trains one network for each row-wire of `dataset`, or one for all of them.
@@ -255,7 +276,7 @@ fn check(dataset: &Dataset, options: &Options) -> Result<()> {
 pub fn fit(layers: &Layers<'_>, options: &Options, progress: &dyn Progress) -> Result<Trained> {
     let mut models = fit_each(layers, options, &[options.penalty], progress)?;
     let networks = models.pop().expect("one model a penalty");
-    Ok(Trained { projection: layers.projection.clone(), networks, frames: layers.seen.frames() })
+    Ok(Trained { projection: layers.projection.clone(), networks })
 }
 
 /// Fits output weights as [`fit`] does, with each of `penalties` instead of the options' own: the networks of one model

@@ -17,7 +17,6 @@ mod frame;
 pub mod limit;
 pub mod reference;
 pub mod identify;
-pub mod geometry;
 
 pub use error::Refusal;
 pub use limit::Limit;

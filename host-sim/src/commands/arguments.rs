@@ -7,12 +7,19 @@ use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, Typ
 use taxel_core::rbf::Format;
 use taxel_data::BadValue;
 use taxel_learn::Exponential;
+use taxel_learn::train::Solver;
 use taxel_simulate::sensor::Precision;
 
 /// Parser for the name of a number format.
 pub fn format() -> impl TypedValueParser<Value = Format> {
     let named = |format: Format| PossibleValue::new(format.name()).help(format.description());
     one_of(Format::ALL.map(|format| (named(format), format)))
+}
+
+/// Parser for the name of a solver.
+pub fn solver() -> impl TypedValueParser<Value = Solver> {
+    let named = |solver: Solver| PossibleValue::new(solver.name()).help(solver.description());
+    one_of(Solver::ALL.map(|solver| (named(solver), solver)))
 }
 
 /// Parser for the name of an exponential.

@@ -6,7 +6,6 @@ use crate::measurements::far_from_zero;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_data::clock::neighbours_alike;
-use taxel_data::data_file::is_array;
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::Grid;
 use taxel_data::{DataFile, Dataset, Rest, Table};
@@ -109,11 +108,6 @@ impl DataArguments {
         self.file.refuse_for_scene()
     }
 
-    /// Mat whose cells the inputs are, if it was given.
-    pub fn grid(&self) -> Option<Grid> {
-        self.grid
-    }
-
     /// Number of random folds, if it was given.
     pub fn folds(&self) -> Option<usize> {
         self.folds
@@ -156,11 +150,6 @@ impl DataArguments {
         [self.inputs.as_deref(), self.outputs.as_deref()]
     }
 
-    /// Whether lines with an outlier are trained on, too.
-    pub fn keeps_outliers(&self) -> bool {
-        self.keep_outliers
-    }
-
     /// Readings of the untouched sensor in the columns of `inputs`, if a file with them was given.
     pub fn rest_of_file(&self, inputs: &Table) -> Result<Option<Rest>> {
         let read = |path| readings::at_rest(&self.file.fields().read(path)?, inputs);
@@ -186,30 +175,6 @@ impl DataArguments {
             readings::check_baseline(&rest.readings, &file.path)?;
         }
         Ok(rest)
-    }
-
-    /// Error if an option was given that needs all lines of the file at `path` at once.
-    pub fn refuse_for_stream(&self, path: &Path, how: HowToTrain) -> Result<()> {
-        if how.relative_inputs && self.baseline.is_none() {
-            return Err(Error::Usage(
-                "--relative-inputs: a recursion reads lines once; give --baseline FILE, with frames of the untouched sensor"
-                    .into(),
-            ));
-        }
-        let of_all_lines = [
-            ("--fold-column", self.fold_column.is_some()),
-            ("--rest", self.rest.is_given()),
-            ("--time", self.time.is_some()),
-            ("--first-share and --last-share", self.file.takes_a_share()),
-            ("--confidence", how.confidence),
-            ("an array of numpy's", is_array(path)),
-        ];
-        refuse_given(of_all_lines, |option| {
-            format!(
-                "{option}: a recursion reads the lines of a CSV file once, and this needs all of them at once: \
-                 leave it out, or give --solver qr"
-            )
-        })
     }
 
     /// Folds of frames with these `outputs`, as many as were asked for: of successive frames, or drawn at random. Unless a
@@ -246,7 +211,7 @@ fn check_level(rest: &Table, inputs: &Table, path: &Path) -> Result<()> {
 }
 
 /// Error that names the options which choose columns.
-pub fn with_options(error: taxel_data::Error) -> Error {
+fn with_options(error: taxel_data::Error) -> Error {
     let option = |role| match role {
         Role::Inputs => "--inputs",
         Role::Outputs => "--outputs",

@@ -92,11 +92,6 @@ impl DataFileArguments {
         &self.fields
     }
 
-    /// Whether a part of the file's lines is taken, so that the file alone does not tell which.
-    pub fn takes_a_share(&self) -> bool {
-        self.first_share.is_some() || self.last_share.is_some()
-    }
-
     /// Error if an option was given: they are for data files alone.
     pub fn refuse_for_scene(&self) -> Result<()> {
         let of_fields = [
@@ -144,11 +139,6 @@ impl FieldArguments {
             units_line: self.units_line,
         };
         Reading { has_header: self.header, stated, ..Reading::default() }
-    }
-
-    /// Numbers that stand for a missing value.
-    pub fn missing(&self) -> &[f64] {
-        &self.missing
     }
 
     /// Options that are for text files alone, and whether they were given.
@@ -207,7 +197,7 @@ impl FieldArguments {
 }
 
 /// Says on stderr what is not plain CSV in a `file`.
-pub fn note_found(file: &DataFile) {
+fn note_found(file: &DataFile) {
     if !file.found.is_empty() {
         stderr::remark(format_args!("note: {}: {}", file.path.display(), file.found));
     }

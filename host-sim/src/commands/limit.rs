@@ -50,9 +50,6 @@ pub struct Arguments {
     /// Test frames [default: 400, or 400 posteriors of rows where rows move independently].
     #[arg(short = 'n', long, value_name = "N", allow_negative_numbers = true)]
     frames: Option<usize>,
-    /// Try other pitches, heights, and numbers of wires: the directions that each shows.
-    #[arg(long)]
-    geometry: bool,
     /// Models of the scene to judge on the same frames: their errors, and the ratios of these to the limit.
     #[arg(long, value_name = "FILE,…", value_delimiter = ',')]
     model: Vec<PathBuf>,
@@ -92,7 +89,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut results = Vec::new();
     let mut pages = Vec::new();
     for Prepared { scene, noise_levels, frames, models } in &scenes {
-        let plan = Plan { noise_levels, frames: *frames, geometry: arguments.geometry, models };
+        let plan = Plan { noise_levels, frames: *frames, models };
         let result = limit::compute(scene, &plan, &Terminal::new())?;
         let folder = folder_of(scene);
         folder.as_ref().map_or(Ok(()), |folder| write_files(folder, &result))?;
@@ -184,9 +181,6 @@ fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
     );
     for level in &result.levels {
         directions(&mut page, level);
-    }
-    if !result.geometry.is_empty() {
-        geometry(&mut page, result);
     }
     if let Some(folder) = folder {
         page.line(format_args!(
@@ -301,34 +295,6 @@ fn known_by_axis(seen: &Observability) -> String {
     let known = seen.axes.iter().map(|axis| format!("{:>4.0} %", 100.0 * axis.known));
     let rmse: Vec<String> = seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm)).collect();
     format!("{} {:>24}", known.collect::<String>(), rmse.join(" "))
-}
-
-fn geometry(page: &mut print::Page, result: &LimitResult) {
-    page.line(format_args!(
-        "\nOther geometries at noise {}: what all readings would show\n{:<28} {:>8} {:>9} {:>10} {:>7}   {:^18} {:>24}",
-        print::percent(result.levels.first().map_or(f64::NAN, |level| level.noise_level)),
-        "sensor",
-        "readings",
-        "unknowns",
-        "observable",
-        "a row",
-        "known: dx, dy, dz",
-        "RMSE in mm"
-    ));
-    for variant in &result.geometry {
-        let start =
-            format!("{:<28} {:>8} {:>9}", variant.change, variant.readings, variant.unknowns);
-        if let Some(refused) = &variant.refused {
-            page.line(format_args!("{start}  -  {refused}"));
-        }
-        let Some(seen) = &variant.observability else { continue };
-        page.line(format_args!(
-            "{start} {:>10} {:>7.1}   {}",
-            seen.observable,
-            seen.observable as f64 / seen.row_wires.len() as f64,
-            known_by_axis(seen)
-        ));
-    }
 }
 
 /// Name of the readings that figures are from.

@@ -3,9 +3,9 @@
 use clap::Args;
 use taxel_core::rbf::Format;
 use taxel_learn::Options;
-use taxel_learn::train::WHOLE_ARRAY_SPREAD;
+use taxel_learn::train::{Solver, WHOLE_ARRAY_SPREAD};
 
-use super::arguments::{format, gigabytes};
+use super::arguments::{format, gigabytes, solver};
 
 /// What a model computes, and how its numbers are held.
 #[derive(Args, Default)]
@@ -24,6 +24,9 @@ pub struct ModelArguments {
     /// Number format of the weights [default: the scene's, or f32].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
+    /// How output weights are computed. Both ways give the same estimates [default: the scene's, or qr].
+    #[arg(long, value_name = "SOLVER", value_parser = solver())]
+    solver: Option<Solver>,
     /// Memory in GB that training may take; where it would take more, it is refused at once [default: 8].
     #[arg(long, value_name = "GB", value_parser = gigabytes)]
     most_memory: Option<u64>,
@@ -40,6 +43,7 @@ impl ModelArguments {
         options.features = self.features.or(options.features);
         options.most_memory_bytes = self.most_memory.unwrap_or(options.most_memory_bytes);
         options.format = self.format.unwrap_or(options.format);
+        options.solver = self.solver.unwrap_or(options.solver);
         options
     }
 }

@@ -98,11 +98,6 @@ impl SubjectArgument {
 }
 
 impl SubjectOptions {
-    /// Whether `source` is a scene, or otherwise a data file or `-`.
-    pub fn is_scene(source: &str) -> bool {
-        source != "-" && names_a_scene(source)
-    }
-
     /// Loads the scene or CSV file called `source`. `confidence` asks for one, whatever a scene says; `sizes` are instead
     /// of the scene's.
     pub fn load(

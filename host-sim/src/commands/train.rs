@@ -3,12 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
-use crate::evaluate::learning_curve::LearningCurve;
 use crate::evaluate::worth::Worth;
 use crate::measurements::Measurements;
 use crate::metrics::{self, Errors, NETWORK};
 use crate::subject::Subject;
-use crate::{Error, Result, report};
+use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
@@ -16,6 +15,7 @@ use taxel_data::{columns, output};
 use taxel_learn::fill;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
+use taxel_learn::train::Solver;
 
 use super::data_argument::JudgedBy;
 use super::model_argument::ModelArguments;
@@ -25,7 +25,6 @@ use super::subject_argument::SubjectOptions;
 use super::{Common, direct_format, print, refused_readings};
 
 mod choice;
-mod recursion;
 
 /// Train a model on a scene or a CSV file, and write its blob.
 ///
@@ -38,12 +37,9 @@ mod recursion;
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
   host-sim train log.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs -o m.bin
-  host-sim train press --no-refine -n 10000000 --solver rls --curve curve.svg -o m.bin
-  zcat log.csv.gz | host-sim train - --inputs 'ch*' --outputs 'f?_n' --solver rls -o m.bin
   host-sim train joined.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs b.c5 --fold-blocks 10 -o m.bin")]
 pub struct Arguments {
-    /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a data file (CSV, .npy, .npz); with --solver rls
-    /// also `-`, a CSV file on standard input.
+    /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a data file (CSV, .npy, .npz).
     source: String,
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]
@@ -81,8 +77,6 @@ pub struct Arguments {
     frames: Option<usize>,
     #[command(flatten)]
     subject: SubjectOptions,
-    #[command(flatten)]
-    recursion: recursion::RecursionArguments,
 }
 
 #[derive(Serialize)]
@@ -114,8 +108,6 @@ struct Summary {
     formats: Vec<&'static str>,
     outputs: Vec<ModelOutput>,
     selection: Option<Selection>,
-    /// Errors by the number of frames that the recursion had taken in; `None` without one.
-    learning_curve: Option<LearningCurve>,
     /// What the model is worth, beside the baselines.
     #[serde(flatten)]
     worth: Worth,
@@ -134,17 +126,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
     let inputs = [source, baseline];
     print::check_output(&arguments.output, &inputs)?;
-    if let Some(path) = arguments.recursion.curve() {
-        print::check_output(path, &[&inputs[..], &[&arguments.output]].concat())?;
-    }
-    let mut recursion = arguments.recursion.plan(arguments)?;
-    let subject = match &mut recursion {
-        Some(plan) => plan.load(arguments, common)?,
-        None => load(arguments, common, arguments.frames)?,
-    };
+    let subject = load(arguments, common)?;
     refused_readings::note_scene(&subject);
     let mut options = arguments.model.over(subject.options());
-    options.solver = recursion.as_ref().map_or(options.solver, recursion::Plan::solver);
     let mut set = subject.training_set(None);
     set.fill |= arguments.fill;
     if set.fill {
@@ -158,22 +142,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let selection = choice::choose(arguments, &subject, &set, &mut options)?;
 
     let progress = Terminal::new();
-    let (blob, frames, learning_curve) = match &mut recursion {
-        None => (set.blob(&options, &progress)?, set.frames.frames(), None),
-        Some(plan) => {
-            let (trained, curve) = plan.train(&subject, &set, &options, &progress)?;
-            set.origin.digest = plan.digest().unwrap_or(set.origin.digest);
-            (set.pack(&trained, &options, &progress)?, trained.frames, Some(curve))
-        }
-    };
-    if let (Some(path), Some(curve)) = (arguments.recursion.curve(), &learning_curve) {
-        if curve.points.is_empty() {
-            return Err(Error::Usage(format!(
-                "--curve: its first error is measured on the frames after the tenth, and there are {frames}: leave it out"
-            )));
-        }
-        output::write_bytes(path, report::learning_curve_svg(curve, subject.name()).as_bytes())?;
-    }
+    let blob = set.blob(&options, &progress)?;
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
@@ -184,7 +153,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         file: arguments.output.clone(),
         blob_bytes: blob.bytes().len(),
         model_crc: format!("{:08x}", model.crc()),
-        training_frames: frames,
+        training_frames: set.frames.frames(),
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         spread: if set.refine { blob.spread() } else { options.spread },
         penalty: options.penalty,
@@ -198,11 +167,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         outputs: model_outputs::of(&model),
         worth: Worth::new(&subject, &set, &blob, selection.as_ref(), &options),
         selection,
-        learning_curve,
-        outliers: match recursion {
-            Some(plan) => plan.outliers(),
-            None => subject.measurements().map(|data| data.outliers.clone()),
-        },
+        outliers: subject.measurements().map(|data| data.outliers.clone()),
         lines_left_out: subject.measurements().map(|data| data.left_out.clone()),
         unused_inputs: subject.measurements().map(|data| data.unused.clone()),
         constant_inputs: subject
@@ -214,14 +179,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 }
 
 /// Scene or CSV file that is trained on: all frames of a file, or so many of a scene.
-fn load(arguments: &Arguments, common: &Common, frames: Option<usize>) -> Result<Subject> {
+fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
     let options = &arguments.subject;
     if options.data.baseline().is_some() && !options.relative_inputs.relative_inputs {
         let message = "--baseline is what --relative-inputs divides by: give both, or neither";
         return Err(Error::Usage(message.into()));
     }
     let centres = arguments.centres.iter().min().copied();
-    let sizes = Sizes { frames, centres };
+    let sizes = Sizes { frames: arguments.frames, centres };
     let (judged, confidence) = (JudgedBy::None, arguments.confidence);
     let subject = options.load(&arguments.source, common, judged, confidence, sizes)?;
     match &subject {
@@ -279,7 +244,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         summary.penalty.map_or(String::new(), |p| format!(", penalty = {}", choice::short(p))),
         if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,
-        if summary.learning_curve.is_some() { ", weights by recursion" } else { "" },
+        if summary.solver == Solver::Rls.name() { ", weights by recursion" } else { "" },
         if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
         if summary.confidence { ", with confidence" } else { "" },
         if summary.fill { ", fills missing readings" } else { "" }
@@ -289,9 +254,6 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
             "  ({asked} centres were asked for; the data has fewer distinct samples)"
         ));
     }
-    if let Some(curve) = &summary.learning_curve {
-        learning_curve_into(&mut page, curve);
-    }
     let Worth { judged_on, verdict, .. } = &summary.worth;
     print::verdict(&mut page, Some(judged_on.words()), verdict);
     let network = metrics::of_decoder(&summary.worth.decoders, NETWORK);
@@ -299,21 +261,4 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
     let r_squared: Vec<String> = network.iter().map(of).collect();
     print::wrapped(&mut page, &format!("R² there: {}", r_squared.join(", ")));
     page
-}
-
-/// Learning curve as lines of `page`.
-fn learning_curve_into(page: &mut print::Page, curve: &LearningCurve) {
-    if curve.points.is_empty() {
-        page.line(format_args!(
-            "\nno learning curve: its first error is measured on the frames after the tenth"
-        ));
-        return;
-    }
-    page.line(format_args!("\nlearning curve: RMSE on {}", curve.judged_on.words()));
-    let names: Vec<_> = curve.groups.iter().map(|group| format!(" {group:>12}")).collect();
-    page.line(format_args!("{:>10}{}", "frames", names.concat()));
-    for point in &curve.points {
-        let errors: Vec<_> = point.rmse.iter().map(|rmse| format!(" {rmse:>12.4}")).collect();
-        page.line(format_args!("{:>10}{}", point.frames, errors.concat()));
-    }
 }

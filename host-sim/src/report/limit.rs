@@ -110,7 +110,6 @@ pub fn html(result: &LimitResult, command: &str) -> Page {
         body += &figures.html(&Figure::of_panels(&name, caption.into(), &known(result, seen)));
     }
     body += &limits(result);
-    body += &geometry(result);
     let _ = writeln!(body, "<p class=\"note\">Made by <code>{}</code></p>", escape(command));
     Page { html: document(&title, &body), figures: figures.files }
 }
@@ -239,35 +238,4 @@ fn known(result: &LimitResult, seen: &Observability) -> [Panel; 3] {
         let values = Values { of_cells: &of_cells, scale, label, unit: "", shown };
         Map::new(&face, &title, &format!("Δ{letter}: share known"), BAR_PX).values(&values)
     })
-}
-
-/// Table of other geometries.
-fn geometry(result: &LimitResult) -> String {
-    if result.geometry.is_empty() {
-        return String::new();
-    }
-    let mut html = String::from(
-        "<h2>Other geometries</h2>\n<figure class=\"table\">\n<figcaption>Observable directions of other sensors in the \
-         same scene, and the RMSE that would be left if all were linear and normal.</figcaption>\n<div class=\"scroll\" \
-         tabindex=\"0\" role=\"region\" aria-label=\"Other geometries\">\n<table>\n<thead><tr><th>sensor</th>",
-    );
-    let heads = ["readings", "unknowns", "observable", "Δx, mm", "Δy, mm", "Δz, mm"];
-    html += &(numbers("th", heads.map(String::from)) + "</tr></thead>\n<tbody>\n");
-    for variant in &result.geometry {
-        let counts = numbers("td", [variant.readings, variant.unknowns].map(|it| it.to_string()));
-        let _ = write!(html, "<tr><td>{}</td>{counts}", escape(&variant.change));
-        if let Some(refused) = &variant.refused {
-            let _ = write!(
-                html,
-                "<td colspan=\"4\" style=\"white-space: normal; padding-left: 16px\">{}</td>",
-                escape(refused)
-            );
-        }
-        if let Some(seen) = &variant.observability {
-            let axes = seen.axes.iter().map(|axis| format!("{:.4}", axis.rmse_mm));
-            html += &numbers("td", [seen.observable.to_string()].into_iter().chain(axes));
-        }
-        html += "</tr>\n";
-    }
-    html + "</tbody>\n</table>\n</div>\n</figure>\n"
 }

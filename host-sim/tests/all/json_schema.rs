@@ -91,7 +91,7 @@ fn experiments_are_told_by_the_schema() {
     let folder = prepared("json_experiments", schema);
     let checked = |arguments: &[&str]| checked(&folder, schema, arguments);
     let limit = ["limit", "scene.toml", "-n", "4", "--model", "m.bin", "-o", "limit"];
-    let limit = checked(&[&limit[..], &["--geometry"]].concat());
+    let limit = checked(&limit);
     check_file(&folder, schema, "limit/limit.json");
     let trade = ["trade", "scene.toml", "--centres", "6"];
     let trade = checked(&[&trade[..], &["--max-error", "1"]].concat());
@@ -119,15 +119,6 @@ fn sweeps_are_told_by_the_schema() {
     assert_eq!(compared["points"].as_array().unwrap().len(), 2);
     let limits = checked(&["limit", "scene.toml", "press", "--row", "4", "-n", "4"]);
     assert_eq!(limits["scenes"][1]["subject"], "press");
-}
-
-#[test]
-fn recursions_are_told_by_the_schema() {
-    let schema = &schema();
-    let folder = prepared("json_recursions", schema);
-    let rls = ["train", "scene.toml", "--solver", "rls", "-o", "r.bin"];
-    let trained = checked(&folder, schema, &rls);
-    assert_eq!(trained["learning_curve"]["points"][0]["frames"], 10);
 }
 
 #[test]

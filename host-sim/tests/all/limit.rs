@@ -1,8 +1,7 @@
 //! The limit from the command line, and beside the errors of decoders.
 
-use host_sim::evaluate::limit::{Plan, compute};
 use host_sim::experiment::Experiment;
-use host_sim::{metrics, report};
+use host_sim::metrics;
 use taxel_data::{Silent, Stream};
 use taxel_learn::decoders::BASELINES;
 use taxel_limit::Limit;
@@ -130,15 +129,4 @@ fn a_drifting_scene_is_run_without_a_limit_and_says_why() {
     assert!(page.contains("No ratio to the least possible error: a drift"), "{page}");
     let metrics = std::fs::read_to_string(folder.path("out/small/metrics.json")).unwrap();
     assert!(json(&metrics)["decoders"][0]["errors"][0]["ratio_to_limit"].is_null());
-}
-
-#[test]
-fn the_page_tells_of_other_geometries() {
-    let mut experiment = Experiment::load("paper").unwrap();
-    experiment.world.read_rows = vec![3];
-    let plan = Plan { noise_levels: &[0.05], frames: 3, geometry: true, models: &[] };
-    let result = compute(&experiment, &plan, &Silent).unwrap();
-    assert!(result.geometry.len() > 10);
-    let page = report::limit_html(&result, "limit paper").html;
-    assert!(page.contains("36 column-wires") && page.contains("sensor model holds up to 20 %"));
 }

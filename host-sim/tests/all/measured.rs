@@ -277,7 +277,7 @@ fn force_is_learnt_from_the_lines_at_rest_that_have_no_place() {
         let evaluated = json(&folder.succeed(&["eval", model, data, "--json"]));
         evaluated["decoders"][0]["errors"][group]["rmse"].as_f64()
     };
-    for more in [&["--no-refine", "--confidence"][..], &["--solver", "rls", "--no-refine"], &[]] {
+    for more in [&["--no-refine", "--confidence"][..], &[]] {
         for name in ["all", "touched"] {
             let (data, model) = (format!("{name}.csv"), format!("{name}.bin"));
             folder.succeed(&[&["train", &data, "-o", &model], &usual[..], more].concat());

@@ -1,13 +1,12 @@
 //! A text file of any bytes. What is read of a plain one must be what the `csv` crate and Rust's own parser of numbers
 //! read: the reader has a quick way for plain files and a careful one for others, which must not differ. What is read of
-//! any other dialect must be the same when it is written as plain CSV, and when it comes in pieces.
+//! any other dialect must be the same when it is written as plain CSV.
 
-use std::io::{Cursor, Write};
+use std::io::Write;
 use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use taxel_data::data_file::pieces::Pieces;
 use taxel_data::data_file::{DataFile, Reading, Separator, Stated};
 
 /// Bytes of a file; the first byte says what is stated of it, and whether it is packed.
@@ -55,12 +54,6 @@ pub fn check(bytes: &[u8]) -> bool {
         assert_eq!(again.header, file.header);
         let values: Vec<Vec<f64>> = again.rows().map(<[f64]>::to_vec).collect();
         compare(&read, &values, &vec![true; columns.len()]);
-    }
-    let source = Cursor::new(packed.unwrap_or_else(|| bytes.to_vec()));
-    if let Ok(Some(piece)) = Pieces::new(path.into(), Box::new(source), reading).next_piece() {
-        let of_piece: Vec<Vec<f64>> = piece.rows().map(<[f64]>::to_vec).collect();
-        assert_eq!(piece.header, file.header);
-        compare(&read, &of_piece, &vec![true; columns.len()]);
     }
     true
 }

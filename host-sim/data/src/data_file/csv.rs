@@ -18,8 +18,8 @@ pub(super) fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Data
     let error = |problem| Error::file(path, problem);
     let found = Dialect::find(bytes, &reading.stated, reading.has_header);
     let (dialect, text) = found.map_err(error)?;
-    let plain = dialect.to_plain(&text, 0).map_err(error)?;
-    let mut file = parse_plain(path, &plain, reading.has_header || dialect.has_names(), 0)?;
+    let plain = dialect.to_plain(&text).map_err(error)?;
+    let mut file = parse_plain(path, &plain, reading.has_header || dialect.has_names())?;
     file.add_found(&dialect.found);
     if reading.keeps_text {
         file.texts = Some(texts(&file, &plain));
@@ -27,14 +27,8 @@ pub(super) fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Data
     Ok(file)
 }
 
-/// Parses plain CSV `text`. The first line is a header even if it holds numbers alone, if it `has_header`. Lines are
-/// numbered as if so many came `before`.
-pub(super) fn parse_plain(
-    path: &Path,
-    text: &[u8],
-    has_header: bool,
-    before: u64,
-) -> Result<DataFile> {
+/// Parses plain CSV `text`. The first line is a header even if it holds numbers alone, if it `has_header`.
+fn parse_plain(path: &Path, text: &[u8], has_header: bool) -> Result<DataFile> {
     let error = |problem| Error::file(path, problem);
     let mut reader = reader(text, true);
     let header = reader.headers().map_err(|e| error(Problem::Header { cause: cause_of(&e) }))?;
@@ -45,7 +39,7 @@ pub(super) fn parse_plain(
     if header.len() == 1
         && let Some(line) = blank_line(text)
     {
-        return Err(error(Problem::BlankLine { line: line + before as usize }));
+        return Err(error(Problem::BlankLine { line }));
     }
     let names_columns = has_header || !holds_numbers(&header);
     let mut found = String::new();
@@ -63,10 +57,10 @@ pub(super) fn parse_plain(
     let values = lines.and_then(|(_, lines)| body::read(lines, header.len()));
     let (values, line_numbers, not_numbers) = match (lines, values) {
         (Some((first, _)), Some(values)) if !values.is_empty() => {
-            let line_numbers = (before + first..).take(values.len() / header.len()).collect();
+            let line_numbers = (first..).take(values.len() / header.len()).collect();
             (values, line_numbers, vec![])
         }
-        _ => read_carefully(path, text, &mut reader, &header, before)?,
+        _ => read_carefully(path, text, &mut reader, &header)?,
     };
     let lacks_last_line_end = !matches!(text, [.., b'\n' | b'\r']);
     Ok(DataFile {
@@ -194,7 +188,6 @@ fn read_carefully(
     bytes: &[u8],
     reader: &mut csv::Reader<&[u8]>,
     header: &[String],
-    before: u64,
 ) -> Result<(Vec<f64>, Vec<u64>, Vec<NotNumbers>)> {
     let error = |problem| Error::file(path, problem);
     let mut values = Vec::new();
@@ -204,7 +197,7 @@ fn read_carefully(
     let mut seen: Vec<Seen> = header.iter().map(|_| Seen::default()).collect();
     let read_error = |e: csv::Error| error(Problem::Line { cause: cause_of(&e) });
     while reader.read_byte_record(&mut record).map_err(read_error)? {
-        let line = before + lines.of_record_at(record.position().map_or(0, csv::Position::byte));
+        let line = lines.of_record_at(record.position().map_or(0, csv::Position::byte));
         if record.len() != header.len() {
             let (fields, columns) = (record.len(), header.len());
             return Err(error(if reader.has_headers() {

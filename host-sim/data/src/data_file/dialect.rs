@@ -192,11 +192,6 @@ impl Dialect {
         })
     }
 
-    /// Dialect of later lines: without those that only the beginning of a file has.
-    pub(super) fn of_later_lines(&self) -> Self {
-        Self { header: None, left_out: vec![], ..self.clone() }
-    }
-
     /// Whether a first line of the plain text is names whatever it holds.
     pub(super) fn has_names(&self) -> bool {
         self.header.is_some()
@@ -212,21 +207,9 @@ impl Dialect {
             && !self.ends_in_separator
     }
 
-    /// Text of later lines as UTF-8; `None` for UTF-16, which is not cut into lines by its bytes.
-    pub(super) fn decode<'b>(&self, bytes: &'b [u8]) -> Option<Cow<'b, [u8]>> {
-        match self.encoding {
-            Encoding::Utf16 { .. } => None,
-            encoding => Some(encoding.decode(bytes)),
-        }
-    }
-
     /// Plain CSV text of the same table: commas, points in numbers. Lines keep their numbers: what is no line of the
-    /// table becomes a blank one. Lines of `text` are numbered as if so many came `before`.
-    pub(super) fn to_plain<'b>(
-        &self,
-        text: &'b [u8],
-        before: u64,
-    ) -> Result<Cow<'b, [u8]>, Problem> {
+    /// table becomes a blank one.
+    pub(super) fn to_plain<'b>(&self, text: &'b [u8]) -> Result<Cow<'b, [u8]>, Problem> {
         if self.is_plain() {
             return Ok(text.into());
         }
@@ -234,7 +217,7 @@ impl Dialect {
         let mut plain = String::with_capacity(text.len() + 64);
         let mut blank = None;
         for (index, (line, end)) in lines(&text).enumerate() {
-            let number = before + index as u64 + 1;
+            let number = index as u64 + 1;
             if line.trim().is_empty() {
                 blank = blank.or(Some(number as usize));
             } else if let (Some(line), true) = (blank, self.columns == 1) {

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use serde::Serialize;
 use taxel_data::{Progress, Stream};
 use taxel_learn::{Exponential, ModelBlob};
-use taxel_limit::geometry::{self, Variant};
 use taxel_limit::identify::{self, Observability, Prior};
 use taxel_limit::reference::{EffectiveSamples, GroupLimit};
 use taxel_limit::{Reference, Refusal};
@@ -22,8 +21,6 @@ pub struct Plan<'p> {
     /// Noise levels, as fractions.
     pub noise_levels: &'p [f64],
     pub frames: usize,
-    /// Whether other geometries are tried.
-    pub geometry: bool,
     /// Models to judge beside the limit.
     pub models: &'p [Candidate],
 }
@@ -74,8 +71,6 @@ pub struct LimitResult {
     pub row_wires: usize,
     /// Results by noise level.
     pub levels: Vec<Level>,
-    /// Other geometries at the first noise level, if asked for.
-    pub geometry: Vec<Variant>,
 }
 
 /// Limit at one noise level.
@@ -135,13 +130,6 @@ pub fn compute(
         level(&experiment, &prior, plan, progress)
     });
     let levels = levels.collect::<Result<Vec<Level>>>()?;
-    let geometry = if plan.geometry {
-        let mut world = world.clone();
-        plan.noise_levels.first().map_or(Ok(()), |level| world.set_noise_level(*level))?;
-        geometry::sweep(&world)
-    } else {
-        Vec::new()
-    };
     Ok(LimitResult {
         subject: experiment.name.clone(),
         seed: world.seed,
@@ -150,7 +138,6 @@ pub fn compute(
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,
         levels,
-        geometry,
     })
 }
 

@@ -103,20 +103,6 @@ pub(super) mod format {
     }
 }
 
-/// Solver of output weights by its name.
-pub(super) mod solver {
-    use serde::{Deserialize, Deserializer, de::Error};
-    use taxel_learn::train::{Recursive, Solver};
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Solver, D::Error> {
-        match String::deserialize(deserializer)?.as_str() {
-            "rls" => Ok(Solver::Rls(Recursive::default())),
-            "qr" => Ok(Solver::Qr),
-            name => Err(D::Error::custom(format!("unknown solver `{name}`, expected `rls`, `qr`"))),
-        }
-    }
-}
-
 /// Column-wires of a list that counts from 1, of a sensor that has so many.
 fn columns_from_0(columns: &[usize], most: usize) -> Result<Vec<usize>, BadValue> {
     let ascending = columns.windows(2).all(|pair| pair[0] < pair[1]);

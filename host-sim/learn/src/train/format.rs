@@ -10,10 +10,10 @@ use taxel_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fi
 
 use taxel_data::{RowTable, Table};
 
-use super::least_squares::{Decomposed, Design, Factor, Recursion, predict};
+use super::least_squares::{Decomposed, Design, Factor};
 use super::samples::{Ridge, Samples};
 use super::tasks::{Factors, Task};
-use super::{HiddenLayer, Options, Recursive, Solver};
+use super::{HiddenLayer, Options, Solver};
 use crate::error::{Error, Result, parameter_not_held};
 use crate::infer::{Exponential, infer};
 
@@ -249,12 +249,7 @@ impl<'s, H: Held + ?Sized> Fit<'s, H> {
                     let root = 1.0 / initial_covariance.sqrt();
                     if is_tail && of_tail > 0.0 { root.hypot(of_tail.sqrt()) } else { root }
                 }),
-            Solver::Rls(settings) => {
-                let mut recursion =
-                    Recursion::new(design.regressors(), outputs, initial_covariance, &settings);
-                recursion.absorb(&*design, targets, 0..task.table.inputs.len());
-                recursion.factor()
-            }
+            Solver::Rls => Factor::by_recursion(&*design, targets, outputs, initial_covariance),
         }
     }
 
@@ -267,19 +262,10 @@ impl<'s, H: Held + ?Sized> Fit<'s, H> {
 
     /// Squared error of each output that the solution of `factors` leaves.
     fn left(&self, factors: &Factors) -> Vec<f64> {
-        match self.solver {
-            Solver::Rls(Recursive { forgetting_factor, .. }) if forgetting_factor < 1.0 => {
-                left(self.held, self.table, self.targets, factors)
-            }
-            // The squares of the targets without those along the regressors.
-            _ => {
-                let squares = |values: &[f64]| column_squares(values, self.targets.outputs());
-                let all = squares(&self.targets.deviations.values).into_iter();
-                all.zip(squares(&factors.projection()))
-                    .map(|(all, along)| (all - along).max(0.0))
-                    .collect()
-            }
-        }
+        // The squares of the targets without those along the regressors.
+        let squares = |values: &[f64]| column_squares(values, self.targets.outputs());
+        let all = squares(&self.targets.deviations.values).into_iter();
+        all.zip(squares(&factors.projection())).map(|(all, along)| (all - along).max(0.0)).collect()
     }
 }
 
@@ -287,18 +273,6 @@ impl<'s, H: Held + ?Sized> Fit<'s, H> {
 fn column_squares(values: &[f64], columns: usize) -> Vec<f64> {
     let of = |column| values.iter().skip(column).step_by(columns).filter(|v| !v.is_nan());
     (0..columns).map(|column| of(column).map(|v| v * v).sum()).collect()
-}
-
-/// Squared error of each output that the solution of `factors` leaves on `table`, wherever it was fitted.
-pub(super) fn left(
-    held: &(impl Held + ?Sized),
-    table: &RowTable,
-    targets: &Targets,
-    factors: &Factors,
-) -> Vec<f64> {
-    let (lines, outputs) = (table.inputs.len(), targets.outputs());
-    let predicted = predict(&*held.design(table), 0..lines, &factors.weights(), outputs);
-    targets.deviations.squared_errors(&predicted)
 }
 
 /// Fits `samples` with the Gaussians of `layer`: one network for each of `ridges`. They share one

@@ -1,24 +1,21 @@
 //! Output weights: least squares over all samples, by a QR decomposition or by recursion.
 //!
-//! The weights minimise Σ_t ‖y_t − Wᵀh_t‖² + ‖W‖²/δ. The recursion ([`Recursion`]) from covariance δ·I without
-//! forgetting arrives at the same weights sample by sample, and the device can go on from there
-//! ([`taxel_core::rls`]). Taking many samples at once ([`Decomposed`]) changes the order of rounding only.
+//! The weights minimise Σ_t ‖y_t − Wᵀh_t‖² + ‖W‖²/δ. The [recursion](crate::rls) from covariance δ·I without forgetting
+//! arrives at the same weights sample by sample. Taking many samples at once ([`Decomposed`]) changes the order of
+//! rounding only.
 
 use std::ops::Range;
 
-use taxel_core::rls;
-
 use crate::parallel;
+use crate::rls::{self, Rls};
 
 mod exp;
 mod gaussian;
 mod triangle;
-mod recursion;
 
 pub(crate) use exp::exponentiate_non_positive;
 pub(crate) use gaussian::squared_distances;
 pub use gaussian::{Gaussians, Regressors};
-pub use recursion::Recursion;
 use triangle::{NewRows, ROWS_AT_ONCE, Triangle};
 
 /// Regressors of a set of samples: the rows of the matrix that weights are fitted through.
@@ -114,12 +111,29 @@ impl Factor {
         Decomposed::new(design, targets, outputs).factor(initial_covariance)
     }
 
-    /// Factor of these outputs alone.
-    pub(super) fn of_outputs(self, columns: &[usize]) -> Self {
-        let lines = self.projection.chunks_exact(self.outputs);
-        let projection =
-            lines.flat_map(|line| columns.iter().map(|column| line[*column])).collect();
-        Self { projection, outputs: columns.len(), ..self }
+    /// Takes in the samples of `design` with their `targets` (`samples × outputs`) one after another, with a penalty of
+    /// 1/`initial_covariance` on squared weights; see [`Rls`].
+    ///
+    /// # Panics
+    /// If `initial_covariance` is not positive and finite, or a sample cannot be used.
+    pub fn by_recursion(
+        design: &(impl Design + ?Sized),
+        targets: &[f64],
+        outputs: usize,
+        initial_covariance: f64,
+    ) -> Self {
+        let n = design.regressors();
+        let mut rls = Rls::new([n, outputs], initial_covariance, 1.0).expect("a covariance");
+        let mut values = vec![0.0; FILLED * n];
+        for (piece, targets) in targets.chunks(FILLED * outputs).enumerate() {
+            let (first, count) = (piece * FILLED, targets.len() / outputs);
+            design.fill(first..first + count, &mut values[..count * n]);
+            for (h, target) in values.chunks_exact_mut(n).zip(targets.chunks_exact(outputs)) {
+                rls.update(h, &mut target.to_vec()).expect("numbers that f32 holds");
+            }
+        }
+        let Rls { root, projection, .. } = rls;
+        Self { root, projection, regressors: n, outputs }
     }
 
     /// Weights, `regressors × outputs`, by back substitution.
@@ -128,31 +142,6 @@ impl Factor {
         rls::solve(&self.root, &self.projection, self.regressors, &mut weights);
         weights
     }
-}
-
-/// Samples that are evaluated at once.
-const EVALUATED: usize = 256;
-
-/// Outputs that `weights` (`regressors × outputs`) predict for these `samples` of `design`: `samples × outputs`.
-pub fn predict(
-    design: &(impl Design + ?Sized),
-    samples: Range<usize>,
-    weights: &[f64],
-    outputs: usize,
-) -> Vec<f64> {
-    let n = design.regressors();
-    let mut predicted = vec![0.0; samples.len() * outputs];
-    let mut values = vec![0.0; EVALUATED.min(samples.len()) * n];
-    for (piece, predicted) in predicted.chunks_mut(EVALUATED * outputs).enumerate() {
-        let (first, count) = (samples.start + piece * EVALUATED, predicted.len() / outputs);
-        design.fill(first..first + count, &mut values[..count * n]);
-        for (h, sums) in values.chunks_exact(n).zip(predicted.chunks_exact_mut(outputs)) {
-            for (h, weights) in h.iter().zip(weights.chunks_exact(outputs)) {
-                sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += h * weight);
-            }
-        }
-    }
-    predicted
 }
 
 /// Samples that a thread decomposes before its triangle is merged with others.

@@ -1,7 +1,7 @@
 //! Recursive least squares in f32 against f64, through what a sensor does over months.
 
-use taxel_core::rls::{self, Real, Rls};
 use taxel_data::random::{Purpose, Random, Stream};
+use taxel_learn::rls::{self, Real, Rls};
 
 use crate::effort::Effort;
 use crate::found::Found;
@@ -119,8 +119,7 @@ pub fn over_time<T: Number>(
     seed: u64,
     updates: u64,
 ) -> Result<Vec<Vec<f64>>, String> {
-    let mut memory = [T::ZERO; Rls::<f64>::values(REGRESSORS, 1)];
-    let started = Rls::try_new(&mut memory, [REGRESSORS, 1], T::of(1e6), T::of(factor));
+    let started = Rls::new([REGRESSORS, 1], T::of(1e6), T::of(factor));
     let mut recursion = started.map_err(|refusal| refusal.to_string())?;
     let mut random = Random::new(seed, Stream::Test, Purpose::Noise, 0, 0);
     let mut all = Vec::new();
@@ -136,13 +135,11 @@ pub fn over_time<T: Number>(
             }
         }
         if update.is_multiple_of((updates / LOOKS).max(1)) {
-            let mut weights = [T::ZERO; REGRESSORS];
-            recursion.weights(&mut weights);
-            let weights = weights.map(T::value);
+            let weights: Vec<f64> = recursion.weights().into_iter().map(T::value).collect();
             if let Some(weight) = weights.iter().find(|w| w.is_nan() || w.abs() > MOST_WEIGHT) {
                 return Err(format!("a weight is {weight:e} after {update} updates"));
             }
-            all.push(weights.to_vec());
+            all.push(weights);
         }
     }
     Ok(all)

@@ -10,7 +10,7 @@ fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataFile> {
 fn carefully(bytes: &[u8]) -> Result<(Vec<f64>, Vec<u64>)> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
-    let read = read_carefully(Path::new("test.csv"), bytes, &mut reader, &header, 0);
+    let read = read_carefully(Path::new("test.csv"), bytes, &mut reader, &header);
     read.map(|(values, line_numbers, _)| (values, line_numbers))
 }
 

@@ -52,8 +52,7 @@ impl Judged {
                     continue;
                 }
             };
-            let seen = frames.training().frames();
-            let trained = Trained { projection: projection.clone(), networks, frames: seen };
+            let trained = Trained { projection: projection.clone(), networks };
             let origin = &frames.set.origin;
             let noise = (origin.noise.0, frames.noise_level());
             let origin = Origin { noise, ..origin.clone() };

@@ -1,6 +1,6 @@
 use nalgebra::{DMatrix, DVector};
 
-use super::super::{Options, Recursive, Samples};
+use super::super::{Options, Samples};
 use super::*;
 use taxel_data::{Purpose, Random, Stream, Table};
 
@@ -32,27 +32,6 @@ fn fit_batch(
         solved.iter().enumerate().for_each(|(i, w)| weights[i * o + output] = *w);
     }
     weights
-}
-
-/// Oracle by recursion: every sample through the device's own recursive least squares.
-fn recursive(design: &impl Design, targets: &[f64], outputs: usize, covariance: f64) -> Factor {
-    let n = design.regressors();
-    let (mut triangle, mut projection) =
-        (vec![0.0; rls::triangle_values(n)], vec![0.0; n * outputs]);
-    rls::start(&mut triangle, n, 1.0 / covariance.sqrt());
-    let mut h = vec![0.0; n];
-    for (i, target) in targets.chunks_exact(outputs).enumerate() {
-        design.fill(i..i + 1, &mut h);
-        rls::rotate(&mut triangle, &mut projection, &mut h, &mut target.to_vec());
-    }
-    let mut root = vec![0.0; n * n];
-    let mut rest = &triangle[..];
-    for (i, line) in root.chunks_exact_mut(n).enumerate() {
-        let (row, after) = rest.split_at(n - i);
-        line[i..].copy_from_slice(row);
-        rest = after;
-    }
-    Factor { root, projection, regressors: n, outputs }
 }
 
 fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
@@ -118,7 +97,7 @@ fn groups_of_rows_give_the_weights_of_the_recursion_whatever_the_shape() {
         let regressors = case.regressors(&decays, samples % 2 == 0);
         let design = regressors.of(&case.scaled);
         let blocked = Factor::new(&design, &case.targets, outputs, 1e2);
-        let recursive = recursive(&design, &case.targets, outputs, 1e2);
+        let recursive = Factor::by_recursion(&design, &case.targets, outputs, 1e2);
         for (blocked, recursive) in [
             (&blocked.weights(), &recursive.weights()),
             (&blocked.root, &recursive.root),
@@ -144,7 +123,7 @@ fn groups_of_rows_predict_as_the_recursion_does_where_regressors_are_all_but_dep
     // two.
     for (covariance, allowed) in [(1.0, 1e-10), (1e6, 1e-10), (1e9, 1e-9)] {
         let blocked = Factor::new(&design, &case.targets, 3, covariance);
-        let recursive = recursive(&design, &case.targets, 3, covariance);
+        let recursive = Factor::by_recursion(&design, &case.targets, 3, covariance);
         let predicted = [&blocked, &recursive].map(|factor| predictions(&design, 3000, factor));
         let relative = relative_difference(&predicted[0], &predicted[1]);
         println!("δ = {covariance:e}: predictions differ by {relative:.1e}");
@@ -209,57 +188,9 @@ fn regressors_that_are_never_excited_get_no_weight() {
     }
 }
 
-/// Weights by the device's own recursion, with leakage.
-fn by_device(
-    design: &impl Design,
-    targets: &[f64],
-    [covariance, forgetting]: [f64; 2],
-) -> Vec<f64> {
-    let n = design.regressors();
-    let mut memory = vec![0.0; rls::Rls::<f64>::values(n, 2)];
-    let mut device = rls::Rls::try_new(&mut memory, [n, 2], covariance, forgetting).unwrap();
-    let mut h = vec![0.0; n];
-    for (i, target) in targets.chunks_exact(2).enumerate() {
-        design.fill(i..i + 1, &mut h);
-        device.update(&mut h, &mut target.to_vec()).unwrap();
-    }
-    let mut weights = vec![0.0; n * 2];
-    device.weights(&mut weights);
-    weights
-}
-
-fn recursion(
-    design: &impl Design,
-    targets: &[f64],
-    outputs: usize,
-    [covariance, forgetting_factor]: [f64; 2],
-) -> Factor {
-    let settings = Recursive { forgetting_factor, initial_covariance: None };
-    let mut recursion = Recursion::new(design.regressors(), outputs, covariance, &settings);
-    let samples = targets.len() / outputs;
-    // However the samples are cut.
-    recursion.absorb(design, targets, 0..samples / 3);
-    recursion.absorb(design, targets, samples / 3..samples);
-    recursion.factor()
-}
-
-#[test]
-fn the_recursion_is_that_of_the_device_to_the_bit() {
-    for (samples, centres, inputs) in [(1, 1, 1), (50, 3, 2), (333, 12, 3), (700, 41, 5)] {
-        let case = Case::new(samples, centres, inputs, 2);
-        let regressors = case.regressors(&[3.0], samples % 2 == 0);
-        let design = regressors.of(&case.scaled);
-        for forgetting in [1.0, 0.999, 0.9] {
-            let setting = [1e4, forgetting];
-            let found = recursion(&design, &case.targets, 2, setting).weights();
-            assert_eq!(found, by_device(&design, &case.targets, setting), "{samples} {forgetting}");
-        }
-    }
-}
-
 /// Row 4 of `press` as the program trains it, K-means centres of width 0.8: Gaussians that all look alike.
 #[test]
-fn the_recursion_predicts_as_batch_ridge_does_on_a_press() {
+fn the_recursion_has_the_weights_of_batch_ridge_on_a_press() {
     let mut world = taxel_simulate::World::press();
     world.read_rows = vec![3];
     let table = taxel_simulate::synthesise(&world, Stream::Training, 2000).row_table(0);
@@ -271,31 +202,9 @@ fn the_recursion_predicts_as_batch_ridge_does_on_a_press() {
     let design = regressors.of(&samples.scaled);
     for covariance in [1e2, 1e6] {
         let (targets, outputs) = (&table.outputs.values, table.outputs.names.len());
-        let found = recursion(&design, targets, outputs, [covariance, 1.0]).weights();
+        let found = Factor::by_recursion(&design, targets, outputs, covariance).weights();
         let batch = fit_batch(&regressors, &samples.scaled, &table.outputs, covariance);
-        let of = |weights: &[f64]| predict(&design, 0..2000, weights, outputs);
-        let predictions = relative_difference(&of(&found), &of(&batch));
-        let weights = relative_difference(&found, &batch);
-        println!(
-            "press, δ = {covariance:e}: predictions differ by {predictions:.1e}, weights by {weights:.1e}"
-        );
-        assert!(
-            predictions <= 1e-8 && weights <= 1e-8,
-            "{covariance:e}: {predictions:e}, {weights:e}"
-        );
+        let relative = relative_difference(&found, &batch);
+        assert!(relative <= 1e-8, "δ = {covariance:e}: {relative:e}");
     }
-}
-
-#[test]
-fn with_forgetting_the_recursion_follows_what_changes() {
-    let mut case = Case::new(2000, 9, 2, 1);
-    case.targets[1000..].iter_mut().for_each(|y| *y += 1.0);
-    let regressors = case.regressors(&[5.0], true);
-    let design = regressors.of(&case.scaled);
-    let error = |forgetting: f64| {
-        let weights = recursion(&design, &case.targets, 1, [1e6, forgetting]).weights();
-        let predicted = predict(&design, 1900..2000, &weights, 1);
-        relative_difference(&predicted, &case.targets[1900..])
-    };
-    assert!(error(0.99) < 0.2 && error(1.0) > 0.3, "{} {}", error(0.99), error(1.0));
 }
