@@ -34,7 +34,6 @@ pub mod decode;
 pub mod eval;
 pub mod inspect;
 pub mod export;
-pub mod join;
 pub mod table1;
 pub mod trade;
 pub mod limit;
@@ -44,7 +43,6 @@ pub mod compare;
 pub mod emulate;
 pub mod link;
 pub mod view;
-pub mod recover;
 
 pub use captured::{Captured, Stopped, capture};
 
@@ -92,7 +90,6 @@ pub fn message(error: &Error) -> String {
 /// Advice on options for an error that a library reported without knowing them.
 fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
-    use taxel_data::error::Problem;
     let of_field = |field: &str| match field {
         "whole_array" => " (--whole-array)",
         "fill" => " (leave --fill or training.fill out)",
@@ -108,10 +105,6 @@ fn advice(error: &Error) -> &'static str {
         Data::Setting(bad) => of_field(&bad.field),
         Data::Unfit { field, .. } => of_field(field),
         Data::Write { .. } | Data::WrittenOverInput { .. } => " (-o)",
-        Data::File { problem: Problem::NoPartner { .. }, .. } => " (--tolerance, --lag, --on)",
-        Data::File {
-            problem: Problem::ClockSetBack { .. } | Problem::NoTimeStamp { .. }, ..
-        } => " (--on)",
         _ => "",
     }
 }

@@ -6,12 +6,13 @@ use std::sync::atomic::AtomicBool;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
+use taxel_data::DataFile;
 
+use crate::Result;
 use crate::commands::{
-    self, Captured, Common, compare, decode, emulate, eval, export, forward, inspect, join, limit,
-    link, recover, run, sweep, synth, table1, trade, train, view,
+    self, Captured, Common, compare, decode, emulate, eval, export, forward, inspect, limit, link,
+    run, sweep, synth, table1, trade, train, view,
 };
-use crate::{Error, Result};
 
 /// Simulate, train and evaluate resistive tactile sensors; write weight blobs for the device.
 ///
@@ -35,7 +36,6 @@ enum Command {
     Synth(synth::Arguments),
     Forward(forward::Arguments),
     Train(train::Arguments),
-    Join(join::Arguments),
     Decode(decode::Arguments),
     Eval(eval::Arguments),
     Inspect(inspect::Arguments),
@@ -48,17 +48,11 @@ enum Command {
     Emulate(emulate::Arguments),
     Link(link::Arguments),
     View(view::Arguments),
-    Recover(recover::Arguments),
     /// Print a script that completes commands and options in a shell.
     ///
     /// bash: `host-sim completions bash > ~/.local/share/bash-completion/completions/host-sim`.
     Completions {
         shell: clap_complete::Shell,
-    },
-    /// Print the manual page of the program or of a command: `host-sim man train | man -l -`.
-    Man {
-        /// Command, instead of the whole program.
-        command: Option<String>,
     },
 }
 
@@ -81,11 +75,8 @@ impl Command {
             Self::Compare(_) => "compare",
             Self::Sweep(_) => "sweep",
             Self::Emulate(_) => "emulate",
-            Self::Join(_) => "join",
             Self::View(_) => "view",
-            Self::Recover(_) => "recover",
             Self::Completions { .. } => "completions",
-            Self::Man { .. } => "man",
         };
         name.into()
     }
@@ -107,12 +98,13 @@ pub struct Called {
 }
 
 /// Calls a command with these arguments (without the program's name) in this thread, and returns its result as JSON. It
-/// unwinds with [`commands::Stopped`] soon after `stop` is set.
+/// reads these `tables` where an argument is their path, and unwinds with [`commands::Stopped`] soon after `stop` is set.
 ///
 /// # Errors
 /// As the program has them, with its message and its exit status.
 pub fn call(
     arguments: &[String],
+    tables: Vec<DataFile>,
     stop: &Arc<AtomicBool>,
 ) -> std::result::Result<Called, (String, u8)> {
     let all = ["host-sim", "--json"].into_iter().chain(arguments.iter().map(String::as_str));
@@ -121,7 +113,7 @@ pub fn call(
     let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
     commands::print::begin(&command.name());
     let (outcome, Captured { result: json, remarks, .. }) =
-        commands::capture(stop, || execute(command, &cli.common));
+        commands::capture(stop, tables, || execute(command, &cli.common));
     match outcome {
         Ok(()) => Ok(Called { json, remarks }),
         Err(error) => Err((commands::message(&error), commands::exit_status(&error))),
@@ -141,33 +133,12 @@ fn advised(mut error: clap::Error) -> clap::Error {
     error
 }
 
-/// Prints the manual page of the program, or of its `command`.
-fn print_manual(command: Option<&str>) -> Result<()> {
-    let mut program = Cli::command();
-    program.build();
-    let of_command = |name: &str| program.find_subcommand(name).cloned();
-    let page = match command {
-        None => program,
-        Some(name) => of_command(name).ok_or_else(|| {
-            Error::Usage(format!(
-                "man {name}: there is no such command; `host-sim --help` lists them"
-            ))
-        })?,
-    };
-    let mut text = Vec::new();
-    clap_mangen::Man::new(page)
-        .render(&mut text)
-        .map_err(|cause| Error::failed(cause.to_string()))?;
-    commands::print::show(&String::from_utf8_lossy(&text))
-}
-
 fn execute(command: Command, common: &Common) -> Result<()> {
     match command {
         Command::Run(arguments) => run::execute(&arguments, common),
         Command::Synth(arguments) => synth::execute(&arguments, common),
         Command::Forward(arguments) => forward::execute(&arguments, common),
         Command::Train(arguments) => train::execute(&arguments, common),
-        Command::Join(arguments) => join::execute(&arguments, common),
         Command::Decode(arguments) => decode::execute(&arguments, common),
         Command::Eval(arguments) => eval::execute(&arguments, common),
         Command::Inspect(arguments) => inspect::execute(&arguments, common),
@@ -180,12 +151,10 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::Emulate(arguments) => emulate::execute(&arguments, common),
         Command::Link(arguments) => link::execute(&arguments, common),
         Command::View(arguments) => view::execute(&arguments, common),
-        Command::Recover(arguments) => recover::execute(&arguments, common),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut script);
             commands::print::show(&String::from_utf8_lossy(&script))
         }
-        Command::Man { command } => print_manual(command.as_deref()),
     }
 }

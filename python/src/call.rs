@@ -1,6 +1,7 @@
 //! Commands of the program, called in this process.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,8 +10,10 @@ use std::time::Duration;
 
 use host_sim::commands::Stopped;
 use host_sim::program;
+use numpy::PyReadonlyArray2;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use taxel_data::DataFile;
 
 /// Time between two looks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
@@ -69,12 +72,26 @@ pub fn wait<T: Send>(
     }
 }
 
-/// Calls a command of `host-sim` with these arguments. Returns its result as JSON, and its remarks.
+/// A table: its path among the arguments of a command, the names of its columns, and its lines.
+type Table<'py> = (String, Vec<String>, PyReadonlyArray2<'py, f64>);
+
+/// Calls a command of `host-sim` with these arguments, of which some are paths of `tables`. Returns its result as JSON, and
+/// its remarks.
 #[pyfunction]
-pub fn call(py: Python<'_>, arguments: Vec<String>) -> PyResult<(String, Vec<String>)> {
+pub fn call(
+    py: Python<'_>,
+    arguments: Vec<String>,
+    tables: Vec<Table<'_>>,
+) -> PyResult<(String, Vec<String>)> {
+    let table = |(path, header, lines): Table<'_>| {
+        let table = DataFile::of_table(Path::new(&path), header, lines.as_slice()?.to_vec());
+        table.map_err(|cause| PyValueError::new_err(cause.to_string()))
+    };
+    let tables = tables.into_iter().map(table).collect::<PyResult<Vec<_>>>()?;
     let stop = Arc::default();
     let flag = Arc::clone(&stop);
-    let called = apart(py, &stop, move || program::call(&arguments, &flag))?.map_err(error)?;
+    let called =
+        apart(py, &stop, move || program::call(&arguments, tables, &flag))?.map_err(error)?;
     Ok((called.json, called.remarks))
 }
 

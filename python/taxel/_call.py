@@ -17,23 +17,27 @@ from numpy.typing import ArrayLike
 from taxel import _native
 
 
-#: Folders of files of one call, which nobody but this module knows.
-WORK = re.compile(r"\S*taxel-\w+/(data\.npz: )?")
+#: Folders of files and names of tables of one call, which nobody but this module knows.
+WORK = re.compile(r"\S*taxel-\w+/|data\.table: ")
+
+
+#: Path, names of columns, and lines.
+Table = tuple[str, list[str], np.ndarray]
 
 
 class TaxelWarning(UserWarning):
     """A note or a warning of a command."""
 
 
-def call(arguments: Sequence[object], *, warn: bool = True) -> dict[str, Any]:
+def call(arguments: Sequence[object], *, tables: Sequence[Table] = (), warn: bool = True) -> dict[str, Any]:
     """Result of a command of `host-sim`, as its `--json` has it. Its remarks become warnings."""
     try:
-        text, remarks = _native.call([str(argument) for argument in arguments])
+        text, remarks = _native.call([str(argument) for argument in arguments], list(tables))
     except (ValueError, RuntimeError) as error:
         said = WORK.sub("", str(error)).split("\n\nFor more information")[0]
         raise type(error)(said) from None
     for remark in remarks if warn else []:
-        warnings.warn(WORK.sub("", remark).replace("data.npz", "the data"), TaxelWarning, stacklevel=3)
+        warnings.warn(WORK.sub("", remark).replace("data.table", "the data"), TaxelWarning, stacklevel=3)
     return json.loads(text) if text else {}
 
 
@@ -65,6 +69,6 @@ def two_dimensional(values: ArrayLike, what: str) -> np.ndarray:
     return array
 
 
-def save(path: Path, columns: dict[str, np.ndarray]) -> None:
-    """Writes columns as an archive of numpy's that commands read: one array a column, which has its name."""
-    np.savez(path, **columns)
+def table(path: str, columns: dict[str, np.ndarray]) -> Table:
+    """A table that a command reads where `path` is among its arguments."""
+    return path, list(columns), np.ascontiguousarray(np.column_stack(list(columns.values())), dtype=np.float64)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _native
-from taxel._call import TaxelWarning, call, folder, option, save, two_dimensional
+from taxel._call import TaxelWarning, call, folder, option, table, two_dimensional
 from taxel._columns import matrix, names_of, numbered, pattern, place, untouched
 
 try:
@@ -163,9 +163,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             arguments += ["--relative-inputs", *option("--rest", [pattern(names_y)])]
         arguments += option("--confidence", self.confidence) + option("--seed", self.random_state)
         with folder() as path:
-            data, blob = path / "data.npz", path / "model.bin"
-            save(data, columns)
-            self.report_ = call(["train", data, *arguments, "-o", blob])
+            blob = path / "model.bin"
+            given = table("data.table", columns)
+            self.report_ = call(["train", given[0], *arguments, "-o", blob], tables=[given])
             self._take(blob.read_bytes())
         self._one_output = np.ndim(y) == 1
         self._columns = [place(name, names_x) for name in self.blob_.input_names]

@@ -25,7 +25,7 @@ class Recording(Frames):
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Reads a recording (.mcap). One that was cut by a kill is read as far as it is whole; `host-sim recover` mends it."""
+    """Reads a recording (.mcap). One that was cut by a kill is read as far as it is whole; `host-sim view` mends it."""
     readings, (estimates, truth), time_s, (reading_names, output_names) = _native.read_recording(str(path))
     known = [] if truth is None else output_names
     outputs = np.empty((len(readings), 0), np.float32) if truth is None else truth

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taxel._call import call, folder, option, save, two_dimensional
+from taxel._call import call, folder, option, table, two_dimensional
 from taxel._columns import names_of
 from taxel._model import Model
 from taxel._scene import Scene
@@ -123,12 +123,12 @@ def evaluate(model: Model | str | Path, X: ArrayLike, y: ArrayLike, *, baseline:
     if len(X) != len(y):
         raise ValueError(f"X has {len(X)} lines and y {len(y)}")
     with folder() as work:
-        data, blob = work / "data.npz", work / "model.bin"
-        save(data, dict(zip(names_x, X.T)) | dict(zip(names_y, y.T)))
+        blob = work / "model.bin"
         blob.write_bytes(model.to_bytes())
-        arguments: list[object] = ["eval", blob, data]
+        tables = [table("data.table", dict(zip(names_x, X.T)) | dict(zip(names_y, y.T)))]
+        arguments: list[object] = ["eval", blob, "data.table"]
         if baseline is not None:
             rest = np.atleast_2d(np.asarray(baseline, np.float64))
-            save(work / "rest.npz", dict(zip(names_x, rest.T)))
-            arguments += ["--baseline", work / "rest.npz"]
-        return call(arguments)
+            tables.append(table("rest.table", dict(zip(names_x, rest.T))))
+            arguments += ["--baseline", "rest.table"]
+        return call(arguments, tables=tables)

@@ -27,8 +27,8 @@ enum Fields<'n> {
     /// Numbers that a line has.
     F64,
     F32,
-    /// Fields of another file, of these lines or of all.
-    Texts(FieldTexts<'n>, Option<&'n [usize]>),
+    /// Fields of another file.
+    Texts(FieldTexts<'n>),
 }
 
 impl<'n> Column<'n> {
@@ -42,9 +42,9 @@ impl<'n> Column<'n> {
         Self { name, fields: Fields::F32 }
     }
 
-    /// Column called `name` of these `texts`, which are written as they are: those of these `lines`, or all in turn.
-    pub fn texts(name: &'n str, texts: FieldTexts<'n>, lines: Option<&'n [usize]>) -> Self {
-        Self { name, fields: Fields::Texts(texts, lines) }
+    /// Column called `name` of these `texts`, which are written as they are.
+    pub fn texts(name: &'n str, texts: FieldTexts<'n>) -> Self {
+        Self { name, fields: Fields::Texts(texts) }
     }
 }
 
@@ -138,8 +138,7 @@ impl Piece {
                 match column.fields {
                     Fields::F64 => write_number(&mut self.text, value()),
                     Fields::F32 => write_f32(&mut self.text, value()),
-                    Fields::Texts(texts, lines) => {
-                        let line = lines.map_or(line, |lines| lines[line]);
+                    Fields::Texts(texts) => {
                         let field = texts.at(line);
                         let needs_quotes = field.contains([',', '"', '\n', '\r']);
                         let field = if needs_quotes {

@@ -1,4 +1,4 @@
-//! Data files, read whole: text of any dialect, `.npy` and `.npz`, packed by gzip or not.
+//! Data files, read whole: text of any dialect, packed by gzip or not.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -6,24 +6,18 @@ use std::path::{Path, PathBuf};
 
 use crate::columns;
 use crate::digest;
-use crate::error::{Error, Problem, Result, Role};
+use crate::error::{Error, Problem, Result};
 use crate::input;
 
 mod time;
 mod csv;
 mod dialect;
-mod foreign;
-mod npy;
 
 pub use dialect::{Separator, Stated};
 
-/// Largest magnitude up to which f64 holds every whole number: 2^53.
-pub(crate) const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
-
 /// Data file that was read whole: named columns of numbers, one frame a line.
 ///
-/// Missing values are held as NaN: empty fields, words such as N/A, and NaN of a text file, NaN of an array. Time stamps
-/// by ISO 8601 are seconds since 1970. Other text is NaN too, and an error once its column is asked for.
+/// Missing values are held as NaN: empty fields, words such as N/A, and NaN. Time stamps by ISO 8601 are seconds since 1970. Other text is NaN too, and an error once its column is asked for.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DataFile {
     /// Path of the file, for messages.
@@ -33,7 +27,7 @@ pub struct DataFile {
     pub names_columns: bool,
     /// Whether it is a CSV file without an end of its last line, which may be cut off in a number.
     pub lacks_last_line_end: bool,
-    /// What is not plain CSV in it, in words, such as "semicolons, decimal commas"; "" for a plain file or an array.
+    /// What is not plain CSV in it, in words, such as "semicolons, decimal commas"; "" for a plain file.
     pub found: String,
     /// Lines of data (from 0) that are kept.
     pub(crate) kept: Range<usize>,
@@ -43,21 +37,17 @@ pub struct DataFile {
     pub(crate) line_numbers: Vec<u64>,
     /// Fields of a CSV file, if they are wanted as they are written.
     pub(crate) texts: Option<Texts>,
-    /// Columns of integer arrays with numbers from 2^53 on, of which f64 does not hold every digit.
-    pub(crate) rounded: Vec<usize>,
     /// Columns of a text file that hold other text than numbers.
     pub(crate) not_numbers: Vec<NotNumbers>,
 }
 
-/// Fields of a column that are no numbers.
+/// Field of a column that is no number.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NotNumbers {
     column: usize,
     /// Number of the first line with one, and that field.
     line: u64,
     field: String,
-    /// All different fields of a column of text, if they are few.
-    labels: Vec<String>,
 }
 
 /// Fields as they are written, line after line, without spaces around.
@@ -107,7 +97,7 @@ pub struct Reading {
 }
 
 impl DataFile {
-    /// Reads the file at `path`: an array for the extension `.npy`, arrays side by side for `.npz`, else text.
+    /// Reads the text file at `path`.
     ///
     /// Separator, decimal sign, encoding, comments and a line of units are found. The first line of a text file is a
     /// header, unless it holds numbers alone: it is data then, and columns are called `c1`, `c2`, …
@@ -115,8 +105,7 @@ impl DataFile {
     /// # Errors
     /// [`Error::Read`] if the file cannot be read. [`Error::File`] for a file beyond
     /// [`input::MOST_DATA_BYTES`], packed or not, an empty file, a repeated column name, or a line with too few or too
-    /// many fields; for text that can be read in two ways, and for files of other programs. Also for arrays
-    /// of more than two dimensions, of other elements than numbers, or of different lengths.
+    /// many fields; for text that can be read in two ways, and for files that hold no text.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_as(path, &Reading::default())
     }
@@ -126,16 +115,10 @@ impl DataFile {
         Self::parse(path, &input::read(path, input::MOST_DATA_BYTES)?, reading)
     }
 
-    /// Parses `bytes` as [`read_as`](Self::read_as) does those of the file at `path`, whose extension tells arrays.
+    /// Parses `bytes` as [`read_as`](Self::read_as) does those of the file at `path`.
     pub fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Self> {
         let unpacked = input::unpacked(path, bytes)?;
         let bytes = unpacked.as_deref().unwrap_or(bytes);
-        if is_array(path) {
-            let parse =
-                if has_extension(path, "npy") { npy::parse_array } else { npy::parse_archive };
-            return parse(path, bytes);
-        }
-        foreign::check(path, bytes)?;
         let mut file = csv::parse(path, bytes, reading)?;
         if unpacked.is_some() {
             file.add_found("gzip");
@@ -146,12 +129,35 @@ impl DataFile {
     /// A table that was read otherwise, from the file at `path`: columns called `header`, and their `values` line after line.
     ///
     /// # Errors
-    /// [`Error::File`] if there is no value, or one that is infinite.
+    /// [`Error::File`] if there is no value, one that is infinite, or a name with a control character.
     ///
     /// # Panics
     /// If `header` is empty.
     pub fn of_table(path: &Path, header: Vec<String>, values: Vec<f64>) -> Result<Self> {
-        npy::data_file(path, header, true, values)
+        if values.is_empty() {
+            return Err(Error::file(path, Problem::NoLines));
+        }
+        if let Some(place) = header.iter().position(|name| name.contains(char::is_control)) {
+            let problem = Problem::UnusableName { column: place + 1, name: header[place].clone() };
+            return Err(Error::file(path, problem));
+        }
+        if let Some(place) = values.iter().position(|value| value.is_infinite()) {
+            let (line, column) = (place / header.len(), place % header.len());
+            let problem =
+                Problem::Infinite { line: line as u64 + 1, column: header[column].clone() };
+            return Err(Error::file(path, problem));
+        }
+        let kept = 0..values.len() / header.len();
+        let (path, line_numbers) = (path.into(), (1..=kept.len() as u64).collect());
+        Ok(Self {
+            path,
+            header,
+            names_columns: true,
+            kept,
+            values,
+            line_numbers,
+            ..Self::default()
+        })
     }
 
     /// Puts `what` is not plain before what was found.
@@ -215,15 +221,8 @@ impl DataFile {
 
     /// Fields of this `column` (from 0): as they are written, without spaces around, in a CSV file that was read with its
     /// text; otherwise the shortest digits of their numbers.
-    ///
-    /// # Errors
-    /// [`Error::File`] for whole numbers of an array that are too large for f64: it lost some of their digits.
-    pub fn texts(&self, column: usize) -> Result<FieldTexts<'_>> {
-        if self.rounded.contains(&column) {
-            let column = self.header[column].clone();
-            return Err(Error::file(&self.path, Problem::RoundedIntegers { column }));
-        }
-        Ok(FieldTexts { file: self, column })
+    pub fn texts(&self, column: usize) -> FieldTexts<'_> {
+        FieldTexts { file: self, column }
     }
 
     /// Number in the file (from 1, header included) of the line of data `line` (from 0), for messages.
@@ -235,7 +234,7 @@ impl DataFile {
     /// [mat](crate::mat), `r2c1_adc_16`, is also found by the file's own name for it, `adc_16`.
     pub fn column(&self, name: &str) -> Result<usize> {
         let column = self.column_of_any(name)?;
-        self.check_numbers(&[column], None)?;
+        self.check_numbers(&[column])?;
         Ok(column)
     }
 
@@ -257,38 +256,20 @@ impl DataFile {
         Ok(digest::of_table(names, values))
     }
 
-    /// Checks that these columns (from 0) hold nothing but numbers. Outputs of few different texts are classes.
-    pub fn check_numbers(&self, columns: &[usize], role: Option<Role>) -> Result<()> {
+    /// Checks that these columns (from 0) hold nothing but numbers.
+    pub fn check_numbers(&self, columns: &[usize]) -> Result<()> {
         let Some(found) = self.not_numbers.iter().find(|it| columns.contains(&it.column)) else {
             return Ok(());
         };
-        let NotNumbers { line, field, labels, .. } = found.clone();
+        let NotNumbers { line, field, .. } = found.clone();
         let column = self.header[found.column].clone();
-        let problem = if role == Some(Role::Outputs) && !labels.is_empty() {
-            Problem::ClassLabel {
-                column,
-                count: labels.len(),
-                labels: columns::some_names(&labels),
-            }
-        } else {
-            Problem::NotANumber { line, column, field }
-        };
-        Err(Error::file(&self.path, problem))
+        Err(Error::file(&self.path, Problem::NotANumber { line, column, field }))
     }
 
     /// Indices (from 0) of the columns called `names`.
     pub fn columns<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<Vec<usize>> {
         names.into_iter().map(|name| self.column(name)).collect()
     }
-}
-
-/// Whether the file at `path` holds numpy's arrays, by its extension.
-pub fn is_array(path: &Path) -> bool {
-    ["npy", "npz"].into_iter().any(|kind| has_extension(path, kind))
-}
-
-fn has_extension(path: &Path, kind: &str) -> bool {
-    path.extension().is_some_and(|end| end.eq_ignore_ascii_case(kind))
 }
 
 /// Names `c1`, `c2`, … of columns without names.

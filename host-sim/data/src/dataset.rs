@@ -300,7 +300,7 @@ fn chosen(file: &DataFile, pattern: Option<&str>, role: Role) -> Result<Vec<usiz
         };
         return Err(Error::file(&file.path, problem));
     }
-    file.check_numbers(&selected, Some(role))?;
+    file.check_numbers(&selected)?;
     Ok(selected)
 }
 

@@ -135,16 +135,8 @@ pub enum Problem {
     #[error("header: {cause}; save as UTF-8")]
     Header { cause: String },
     /// File that holds bytes which no text has.
-    #[error("it is neither text nor an array of numpy's; save it as CSV")]
+    #[error("it is no text; save the table as CSV")]
     NoText,
-    /// File of another program, with what converts it.
-    #[error("it is {kind}, which is not read; convert it with Python:\n\n    {}\n", python.replace('\n', "\n    "))]
-    Foreign {
-        /// What it is, with its article.
-        kind: &'static str,
-        /// Lines of Python that convert it.
-        python: String,
-    },
     /// What gzip packed, and cannot be unpacked.
     #[error("it cannot be unpacked: {cause}; pack it again with gzip")]
     Packed { cause: String },
@@ -228,28 +220,12 @@ pub enum Problem {
         }
     )]
     NotANumber { line: u64, column: String, field: String },
-    /// Output of few different texts.
-    #[error(
-        "column {} is a class label: {count} texts such as {labels}; give each class a column of 0 and 1, in Python \
-         pandas.get_dummies(table, columns=[{}], dtype=int), train these columns as outputs, and take the largest",
-        quoted(column),
-        quoted(column)
-    )]
-    ClassLabel {
-        column: String,
-        /// Number of different texts, and some of them.
-        count: usize,
-        labels: String,
-    },
-    /// Value of an array that is infinite.
+    /// Value of a table that is infinite.
     #[error(
         "line {line}, column {}: the value is infinite; write NaN if it is missing",
         quoted(column)
     )]
     Infinite { line: u64, column: String },
-    /// File of arrays that is no table of numbers.
-    #[error("{cause}; save arrays of numbers, lines × columns, by numpy.save or numpy.savez")]
-    Array { cause: String },
     /// Column that is needed and missing.
     #[error("column {} is missing; the file has: {known}", quoted(name))]
     MissingColumn {
@@ -323,74 +299,6 @@ pub enum Problem {
         /// Values that every line needs, for the message.
         rule: String,
     },
-    /// Time stamp before that of the line before.
-    #[error(
-        "line {line}, column {}: {} is earlier than {} before it; sort the lines by time, or split the file where the \
-         clock was set back",
-        quoted(column),
-        cut(value),
-        cut(before)
-    )]
-    ClockSetBack {
-        line: u64,
-        column: String,
-        /// Time stamp of the line.
-        value: String,
-        /// Latest time stamp before it.
-        before: String,
-    },
-    /// Time stamps of which f64 does not hold every digit, and which are no whole numbers in text either.
-    #[error(
-        "line {line}, column {}: the time stamp {} has more digits than numbers hold, beside time stamps or a lag above \
-         2^53 = 9007199254740992; give whole numbers in a CSV file, or a smaller unit's count from a later start",
-        quoted(column),
-        cut(value)
-    )]
-    InexactTime { line: u64, column: String, value: String },
-    /// Column of an array of 64-bit integers that are too large to be written with every digit.
-    #[error(
-        "column {}: it has whole numbers beyond 2^53 = 9007199254740992, of which digits are lost; save them in a CSV \
-         file, or count from a later start",
-        quoted(column)
-    )]
-    RoundedIntegers { column: String },
-    /// Log of which no line has a partner in another one.
-    #[error(
-        "no time stamp is within tolerance = {} of one in {other}: the nearest are {} apart; raise the tolerance, set \
-         the lag between the clocks, or check which columns hold the time",
-        number(*tolerance), number(*distance)
-    )]
-    NoPartner {
-        other: String,
-        /// Largest distance that was allowed.
-        tolerance: f64,
-        /// Smallest distance of two time stamps.
-        distance: f64,
-    },
-    /// Logs whose time stamps seem to count in different units.
-    #[error(
-        "its time stamps and those of {other} seem to count in different units: they span {} and {}; give --time-factor \
-         {} for the unit of the first log, or --time-factor 1 if they count in the same unit",
-        number(spans[0]), number(spans[1]), number(*factor)
-    )]
-    OtherUnit {
-        other: String,
-        /// Time between first and last stamp of each log.
-        spans: [f64; 2],
-        /// Factor that makes the second log's unit the first one's.
-        factor: f64,
-    },
-    /// Logs of which hardly any line has a partner.
-    #[error(
-        "{pairs} of {lines} lines have a partner in {other}, hardly any: raise the tolerance, set the lag between the \
-         clocks, or check that both count time in one unit; --time-factor 1 joins these lines all the same"
-    )]
-    FewPartners { other: String, pairs: usize, lines: usize },
-    /// Logs of which one has no time stamp.
-    #[error(
-        "this file or {other} has no time stamp: the column is empty; check which columns hold the time"
-    )]
-    NoTimeStamp { other: String },
 }
 
 #[cfg(test)]

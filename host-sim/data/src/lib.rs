@@ -17,7 +17,6 @@ pub mod columns;
 pub mod mat;
 pub mod data_file;
 pub mod csv_file;
-pub mod join;
 pub mod table;
 pub mod dataset;
 pub mod clock;

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use taxel_data::error::Problem;
 use taxel_data::{DataFile, LANES, widest};
 
-use crate::sensor::{LaneModel, Scratch};
+use crate::sensor::{LaneModel, Precision, Scratch};
 use crate::world::World;
 
 /// Ideal readings in Ω of the rows that `world` reads, for the deformations in `file`: `lines ×
@@ -76,7 +76,7 @@ impl Forward<'_> {
             }
             model.row_column_resistance_ohm(
                 row,
-                world.precision,
+                Precision::F64,
                 &deformation_mm,
                 scratch,
                 &mut resistance_ohm,

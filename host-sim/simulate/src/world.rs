@@ -11,7 +11,7 @@ use crate::outputs::{ContactOutput, ElectrodeOutputs, Outputs};
 use crate::path::Path;
 use crate::readout::Readout;
 use crate::rubber;
-use crate::sensor::{Precision, Sensor};
+use crate::sensor::Sensor;
 use crate::timetable::MOST_SCANS;
 
 type Check = std::result::Result<(), BadValue>;
@@ -24,8 +24,6 @@ const MOST: f64 = 1e9;
 pub struct World {
     /// Seed of every random draw.
     pub seed: u64,
-    /// Precision in which readings are computed.
-    pub precision: Precision,
     /// Geometry and material of the sensor.
     pub sensor: Sensor,
     pub motion: motion::Kind,
@@ -50,7 +48,6 @@ impl World {
         let sensor = Sensor::paper();
         Self {
             seed: 1,
-            precision: Precision::default(),
             motion: motion.into(),
             path: None,
             rubber: rubber::Kind::default(),

@@ -8,7 +8,6 @@ use taxel_core::rbf::Format;
 use taxel_data::BadValue;
 use taxel_learn::Exponential;
 use taxel_learn::train::Solver;
-use taxel_simulate::sensor::Precision;
 
 /// Parser for the name of a number format.
 pub fn format() -> impl TypedValueParser<Value = Format> {
@@ -26,15 +25,6 @@ pub fn solver() -> impl TypedValueParser<Value = Solver> {
 pub fn exponential() -> impl TypedValueParser<Value = Exponential> {
     let named = |e: Exponential| PossibleValue::new(e.name()).help(e.description());
     one_of(Exponential::ALL.map(|exponential| (named(exponential), exponential)))
-}
-
-/// Parser for the name of a precision.
-pub fn precision() -> impl TypedValueParser<Value = Precision> {
-    let named = |name, help| PossibleValue::new(name).help(help);
-    one_of([
-        (named("f64", "Within 2e-13 of the sensor's equations"), Precision::F64),
-        (named("f32", "Within 1e-6, a third faster; random draws stay the same"), Precision::F32),
-    ])
 }
 
 /// Parser for the path of a folder that receives several files: not `-`, which stands for stdout elsewhere.

@@ -1,8 +1,11 @@
-//! What a command says, kept for a caller in the same process, instead of stdout and stderr.
+//! A command called in the same process: the tables that it is given, and what it says, instead of files, stdout and stderr.
 
 use std::cell::RefCell;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+
+use taxel_data::DataFile;
 
 /// What a command has said so far.
 #[derive(Default)]
@@ -11,6 +14,8 @@ pub struct Captured {
     pub result: String,
     /// Its remarks, one each.
     pub remarks: Vec<String>,
+    /// Tables that it reads under their paths, in place of files.
+    tables: Vec<DataFile>,
     /// Flag that ends its work when it is set.
     stop: Arc<AtomicBool>,
 }
@@ -22,13 +27,22 @@ thread_local! {
     static CAPTURED: RefCell<Option<Captured>> = const { RefCell::new(None) };
 }
 
-/// Does `work` in this thread and keeps what it says. Where it shows progress, it unwinds with [`Stopped`] once `stop` is
-/// set.
-pub fn capture<T>(stop: &Arc<AtomicBool>, work: impl FnOnce() -> T) -> (T, Captured) {
-    let captured = Captured { stop: Arc::clone(stop), ..Captured::default() };
+/// Does `work` in this thread and keeps what it says. It finds these `tables` under their paths. Where it shows progress, it
+/// unwinds with [`Stopped`] once `stop` is set.
+pub fn capture<T>(
+    stop: &Arc<AtomicBool>,
+    tables: Vec<DataFile>,
+    work: impl FnOnce() -> T,
+) -> (T, Captured) {
+    let captured = Captured { tables, stop: Arc::clone(stop), ..Captured::default() };
     CAPTURED.set(Some(captured));
     let done = work();
     (done, CAPTURED.take().unwrap_or_default())
+}
+
+/// Table that the caller gave under this path.
+pub fn table(path: &Path) -> Option<DataFile> {
+    with(|captured| captured.tables.iter().find(|table| table.path == path).cloned()).flatten()
 }
 
 /// Keeps a result. Returns whether somebody wants it.

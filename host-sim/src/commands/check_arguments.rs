@@ -10,7 +10,6 @@ use taxel_data::{DataFile, Rest, Stream};
 use taxel_firmware::link::message::Memory;
 use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::check::{Findings, Frames, Plan};
-use taxel_simulate::sensor::Precision;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, synthesise};
 
@@ -20,7 +19,7 @@ use super::progress::Terminal;
 use super::readings::model_inputs;
 use super::rest_argument::UntouchedArguments;
 use super::scene_argument::{DEFAULT_SCENE, SceneArgument, Sizes};
-use super::{Common, arguments, print, stderr};
+use super::{Common, print, stderr};
 
 /// Time in µs from one frame of a scene to the next.
 const PERIOD_US: u32 = 10_000;
@@ -31,9 +30,6 @@ pub struct CheckArguments {
     /// A built-in scene (paper, press), the path of a scene file, or of a CSV file with the readings of --model.
     #[arg(default_value = DEFAULT_SCENE, value_name = "SCENE|CSV")]
     source: String,
-    /// Precision of the sensor's readings, instead of the scene's.
-    #[arg(long, value_parser = arguments::precision())]
-    precision: Option<Precision>,
     /// Weight blob; without it a model of the scene is trained.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -135,7 +131,7 @@ impl CheckArguments {
     }
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
-        let scene = SceneArgument::new(&self.source, self.precision).load_world(common)?;
+        let scene = SceneArgument::new(&self.source).load_world(common)?;
         scene.require_inverse("a check of a device")?;
         self.untouched.refuse("a scene makes its own baseline")?;
         scene.world.check_frames("-n", self.frames)?;

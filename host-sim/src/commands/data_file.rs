@@ -4,16 +4,16 @@ use std::path::Path;
 
 use super::arguments::refuse_given;
 use super::recordings::{self, is_recording};
-use super::stderr;
+use super::{captured, stderr};
 use crate::{Error, Result};
 use clap::Args;
 use taxel_data::DataFile;
-use taxel_data::data_file::{Reading, Separator, Stated, is_array};
+use taxel_data::data_file::{Reading, Separator, Stated};
 
 /// Heading of options for data files.
-pub const DATA_FILES: &str = "Data files (CSV, .npy, .npz, .mcap)";
+pub const DATA_FILES: &str = "Data files (CSV, .mcap)";
 
-/// How data files are read: text of any dialect (with or without a header), numpy's .npy and .npz, recordings (.mcap).
+/// How data files are read: text of any dialect (with or without a header), recordings (.mcap).
 #[derive(Args, Default)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct DataFileArguments {
@@ -162,12 +162,14 @@ impl FieldArguments {
     }
 
     fn read_as(&self, path: &Path, keeps_text: bool) -> Result<DataFile> {
-        if is_array(path) || is_recording(path) {
+        if is_recording(path) {
             refuse_given(self.of_text(), |option| {
                 format!("{option} is for text files; {} is none: leave it out", path.display())
             })?;
         }
-        let mut file = if is_recording(path) {
+        let mut file = if let Some(table) = captured::table(path) {
+            table
+        } else if is_recording(path) {
             recordings::read(path)?
         } else {
             DataFile::read_as(path, &Reading { keeps_text, ..self.reading() })?

@@ -60,41 +60,6 @@ pub fn print_no_rest(outputs: &Table, path: &Path) {
     ));
 }
 
-/// Names the outputs that look like the label of a class.
-pub fn print_classes(outputs: &Table) {
-    for (column, name) in outputs.names.iter().enumerate() {
-        let values = outputs.lines().map(|line| line[column]).filter(|value| !value.is_nan());
-        if let Some(classes) = classes(name, values.collect()) {
-            stderr::remark(format_args!(
-                "note: {} has {classes} different whole numbers and no unit, as the label of a class has: a decoder would \
-                 take 3 for something between 2 and 4; give one column of 0 and 1 for each class, and the largest \
-                 output tells the class",
-                cut(name)
-            ));
-        }
-    }
-}
-
-/// Most different numbers of an output that may be the label of a class.
-const MOST_CLASSES: usize = 20;
-/// Least number of lines that tell it.
-const LINES_FOR_CLASSES: usize = 50;
-
-/// Number of classes, if the values of the output called `name` look like labels. Two values may be a switch.
-fn classes(name: &str, mut values: Vec<f64>) -> Option<usize> {
-    let whole = values.iter().all(|value| value.fract() == 0.0);
-    if !whole || values.len() < LINES_FOR_CLASSES || !columns::unit_of(name).is_empty() {
-        return None;
-    }
-    values.sort_by(f64::total_cmp);
-    values.dedup();
-    // Labels are counted from 0 or 1; places on a grid and steps of a weight are further apart.
-    let counted = values.windows(2).all(|pair| pair[1] - pair[0] <= 1.0);
-    let first = values.first().copied()?;
-    let is_label = counted && (0.0..=1.0).contains(&first);
-    (is_label && (3..=MOST_CLASSES).contains(&values.len())).then_some(values.len())
-}
-
 fn note_on_left_out(left_out: &LeftOut, name: &str, of: usize) -> Option<String> {
     if left_out.lines() == 0 {
         return None;

@@ -47,7 +47,7 @@ use super::{Common, print, stderr};
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// CSV file, .npy, .npz or recording (.mcap) with the model's reading columns, in any order, among others.
+    /// CSV file or recording (.mcap) with the model's reading columns, in any order, among others.
     readings: PathBuf,
     /// CSV file to write, with the model's output columns; or a recording (.mcap), with the readings too.
     #[arg(short, long, value_name = "FILE")]
@@ -242,7 +242,7 @@ fn write(
     let names = estimate.names.iter().map(String::as_str).chain(keep.iter().map(|(name, _)| *name));
     let status = status_name(&names.collect::<Vec<_>>());
     let flags = flags.iter().map(|flags| f64::from(*flags));
-    let kept = keep.iter().map(|(name, texts)| Column::texts(name, *texts, None));
+    let kept = keep.iter().map(|(name, texts)| Column::texts(name, *texts));
     let estimated = estimate.names.iter().map(|name| Column::f32(name));
     let lines = estimate.lines();
     let Some((deviations, novelty)) = assessed else {
@@ -321,7 +321,7 @@ fn kept<'k>(
     if let Some(place) = (0..keep.len()).find(|place| repeated(*place)) {
         return Err(Error::Usage(format!("--keep {}: name each column once", keep[place])));
     }
-    let column = |name| Ok((name, file.texts(file.column_of_any(name)?)?));
+    let column = |name| Ok((name, file.texts(file.column_of_any(name)?)));
     names().map(column).collect::<taxel_data::Result<_>>().map_err(|error| match error {
         taxel_data::Error::File { path, problem } => {
             Error::Unfit { path, message: format!("{problem} (--keep)") }

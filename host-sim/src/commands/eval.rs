@@ -39,11 +39,11 @@ use super::{Common, command_line, print};
   host-sim eval press.bin test.csv --html report.html
   host-sim eval relative.bin test.csv --baseline rest.csv
   host-sim eval array.bin test.csv --without 'r4c*_ohm'
-  host-sim eval m.bin joined.csv --missing -1 --last-share 0.2")]
+  host-sim eval m.bin log.csv --missing -1 --last-share 0.2")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// CSV file, .npy or .npz with the model's reading and output columns.
+    /// CSV file or recording (.mcap) with the model's reading and output columns.
     data: PathBuf,
     #[command(flatten)]
     untouched: UntouchedArguments,

@@ -67,7 +67,7 @@ struct Several {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let first = &arguments.scene;
-    let more = arguments.more.iter().map(|name| SceneArgument::new(name, first.precision()));
+    let more = arguments.more.iter().map(|name| SceneArgument::new(name));
     let all: Vec<SceneArgument> = more.collect();
     let all: Vec<&SceneArgument> = [first].into_iter().chain(&all).collect();
     let scenes = all.iter().map(|scene| prepared(scene, arguments, common));

@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use taxel_data::DataFile;
 use taxel_data::output::{Scratch, write_whole};
-use taxel_recording::{Extras, Frame, Layout, Reader, Replace, Writer};
+use taxel_recording::{Extras, Frame, Layout, Reader, Replace, Writer, recover};
 
 use super::stderr;
 use crate::{Error, Result};
@@ -25,25 +25,34 @@ fn unfit(path: &Path, cause: &taxel_recording::Error) -> Error {
     Error::Unfit { path: path.into(), message: cause.to_string() }
 }
 
-/// Opens a recording, and notes if it was cut.
+/// Opens a recording. One that was cut is mended first, or read as far as it is whole where it cannot be written.
 pub fn open(path: &Path) -> Result<Reader> {
-    let reader = Reader::open(path).map_err(|cause| unfit(path, &cause))?;
-    if reader.was_cut() {
-        stderr::remark(format_args!(
-            "note: {0} has no end, since whoever wrote it was killed: `host-sim recover {0}` mends it",
-            path.display()
-        ));
+    let error = |cause| unfit(path, &cause);
+    let reader = Reader::open(path).map_err(error)?;
+    if !reader.was_cut() {
+        return Ok(reader);
     }
-    Ok(reader)
+    let name = path.display();
+    match recover(path) {
+        Ok(mended) => {
+            let frames = mended.map_or(0, |mended| mended.frames);
+            stderr::remark(format_args!(
+                "note: {name} had no end, since whoever wrote it was killed: mended, with {frames} frames"
+            ));
+            Reader::open(path).map_err(error)
+        }
+        Err(cause) => {
+            stderr::remark(format_args!(
+                "note: {name} has no end, and is read as far as it is whole: {cause}"
+            ));
+            Ok(reader)
+        }
+    }
 }
 
 /// Reads a recording as a table: the time of each frame, its readings, and its true outputs where these are known. Estimates are not
-/// taken for the truth: they stay out.
+/// taken for the truth: they stay out. Parts that are damaged stay out too, each with a note.
 pub fn read(path: &Path) -> Result<DataFile> {
-    let damaged = |cause: &taxel_recording::Error| Error::Unfit {
-        path: path.into(),
-        message: format!("{cause}; `host-sim recover {}` keeps what is sound", path.display()),
-    };
     let reader = open(path)?;
     let layout = reader.layout().clone();
     let mut header = vec![TIME.to_owned()];
@@ -51,7 +60,14 @@ pub fn read(path: &Path) -> Result<DataFile> {
     let (mut values, mut has_truth) = (Vec::new(), None);
     let mut first_us = None;
     for frame in reader {
-        let frame = frame.map_err(|cause| damaged(&cause))?;
+        let frame = match frame {
+            Ok(frame) => frame,
+            Err(cause @ taxel_recording::Error::Read(_)) => return Err(unfit(path, &cause)),
+            Err(cause) => {
+                stderr::remark(format_args!("note: {}: left out: {cause}", path.display()));
+                continue;
+            }
+        };
         // Either all lines of a table have it or none.
         let has_truth = *has_truth.get_or_insert(frame.truth.is_some());
         let truth = match (frame.truth, has_truth) {

@@ -50,7 +50,7 @@ impl RestArgument {
                         format!("no column matches {part:?}; the file has: {known} (--rest)");
                     return Err(unfit(&file.path, message));
                 }
-                file.check_numbers(&columns, None)?;
+                file.check_numbers(&columns)?;
                 columns
             }
             None => {

@@ -7,7 +7,6 @@ use crate::{Error, Result};
 use clap::Args;
 use taxel_data::{Progress, columns};
 use taxel_learn::ModelBlob;
-use taxel_simulate::sensor::Precision;
 
 use super::{Common, arguments, stderr};
 
@@ -20,21 +19,18 @@ pub struct SceneArgument {
     /// A built-in scene (paper, press, contact, moving) or the path of a scene file.
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
-    /// Precision of the sensor's readings, instead of the scene's.
-    #[arg(long, value_parser = arguments::precision())]
-    precision: Option<Precision>,
 }
 
 impl Default for SceneArgument {
     fn default() -> Self {
-        Self { scene: DEFAULT_SCENE.into(), precision: None }
+        Self { scene: DEFAULT_SCENE.into() }
     }
 }
 
 impl SceneArgument {
     /// Makes an argument as if it had been given on the command line.
-    pub fn new(scene: &str, precision: Option<Precision>) -> Self {
-        Self { scene: scene.into(), precision }
+    pub fn new(scene: &str) -> Self {
+        Self { scene: scene.into() }
     }
 
     /// Loads the scene and applies the overrides.
@@ -46,15 +42,8 @@ impl SceneArgument {
     /// Loads the scene for its world, whatever it says of training, and applies the overrides.
     pub fn load_world(&self, common: &Common) -> Result<Experiment> {
         let mut scene = Experiment::load_open(&self.scene)?;
-        let world = &mut scene.world;
-        world.seed = common.seed.unwrap_or(world.seed);
-        world.precision = self.precision.unwrap_or(world.precision);
+        scene.world.seed = common.seed.unwrap_or(scene.world.seed);
         Ok(scene)
-    }
-
-    /// Precision that was given.
-    pub fn precision(&self) -> Option<Precision> {
-        self.precision
     }
 
     /// Path of the scene, as an input that must not be replaced.

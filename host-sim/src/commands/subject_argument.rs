@@ -6,14 +6,13 @@ use crate::experiment::{Experiment, names_a_scene};
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_simulate::sensor::Precision;
 
+use super::Common;
 use super::data_argument::{DataArguments, HowToTrain, JudgedBy};
 use super::data_file::DATA_FILES;
 use super::scene_argument::{
     DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument, Sizes,
 };
-use super::{Common, arguments};
 
 /// Scene or CSV file to train and to judge on.
 #[derive(Args, Default)]
@@ -24,9 +23,6 @@ pub struct SubjectArgument {
     /// last fold of --fold-column].
     #[arg(long, value_name = "FILE", help_heading = DATA_FILES)]
     test: Option<PathBuf>,
-    /// Precision of the scene's readings, instead of its own.
-    #[arg(long, value_parser = arguments::precision())]
-    precision: Option<Precision>,
     #[command(flatten)]
     options: SubjectOptions,
 }
@@ -56,18 +52,11 @@ impl SubjectArgument {
         let source = self.source.as_deref().unwrap_or(DEFAULT_SCENE);
         let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
         let sizes = Sizes { frames: None, centres };
-        let mut subject = self.options.load(source, common, judged, false, sizes)?;
-        match &mut subject {
+        let subject = self.options.load(source, common, judged, false, sizes)?;
+        match &subject {
             Subject::Scene(_) if self.test.is_some() => {
                 let message =
                     "--test is for a CSV file; a scene has test frames of its own: leave it out";
-                return Err(Error::Usage(message.into()));
-            }
-            Subject::Scene(scene) => {
-                scene.world.precision = self.precision.unwrap_or(scene.world.precision);
-            }
-            Subject::Measured(_) if self.precision.is_some() => {
-                let message = "--precision is for a scene; a CSV file's readings are as they are: leave it out";
                 return Err(Error::Usage(message.into()));
             }
             // A fold column may tell which frames to judge by.
@@ -76,7 +65,7 @@ impl SubjectArgument {
             {
                 self.options.data.refuse_folds()?;
             }
-            Subject::Measured(_) => {}
+            Subject::Scene(_) | Subject::Measured(_) => {}
         }
         Ok(subject)
     }

@@ -13,10 +13,9 @@ use clap::Args;
 use serde::Serialize;
 use taxel_data::{columns, output};
 use taxel_learn::decoders::{mean, standard};
-use taxel_simulate::sensor::Precision;
 
 use super::scene_argument::{RelativeInputsArgument, SceneArgument, group_of_scene};
-use super::{Common, arguments, print};
+use super::{Common, print};
 
 pub mod comparison;
 
@@ -32,9 +31,6 @@ pub struct Arguments {
     /// A built-in scene (paper, press, paper-as-printed) or the path of a scene file.
     #[arg(default_value = "paper")]
     scene: String,
-    /// Precision of the sensor's readings, instead of the scene's.
-    #[arg(long, value_parser = arguments::precision())]
-    precision: Option<Precision>,
     #[command(flatten)]
     relative_inputs: RelativeInputsArgument,
     /// CSV file to write, with all axes, decoders and definitions.
@@ -57,7 +53,7 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let argument = SceneArgument::new(&arguments.scene, arguments.precision);
+    let argument = SceneArgument::new(&arguments.scene);
     let mut scene = argument.load(common)?;
     arguments.relative_inputs.apply(&mut scene);
     if scene.table1.is_some() {

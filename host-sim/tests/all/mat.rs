@@ -67,34 +67,6 @@ fn a_mat_of_numbered_columns_is_named_after_its_wires_and_told_its_image() {
         page.contains("× marks a reading that is missing or left out.")
             && !page.contains("href=\"figures")
     );
-    // What the data lack stands on the page.
-    let log = log([16, 16], 200);
-    let (head, lines) = log.split_once('\n').unwrap();
-    let lines = lines.lines().enumerate().map(|(i, line)| {
-        let rest = line.splitn(3, ',').nth(2).unwrap();
-        format!("9,{},{rest}\n", if (100..103).contains(&i) { "" } else { "400" })
-    });
-    folder.write("frozen.csv", format!("{head}\n{}", lines.collect::<String>()));
-    let eval = ["eval", "m.bin", "frozen.csv", "--last-share", "0.9", "--html", "frozen.html"];
-    folder.succeed(&eval);
-    let page = std::fs::read_to_string(folder.path("frozen.html")).unwrap();
-    let lines = "<dd>3 lack a reading; 20 are not chosen by the options</dd>";
-    assert!(
-        page.contains(lines) && page.contains("<dd>adc_0, adc_1 (never change)</dd>"),
-        "{page}"
-    );
-}
-
-#[test]
-fn a_grid_names_the_cells_of_a_mat_that_is_no_square() {
-    let folder = Folder::new("mat-grid");
-    folder.write("mat.csv", log([4, 16], 200));
-    folder.succeed(&[&TRAIN[..], &["--centres", "8", "--grid", "4x16"]].concat());
-    let inspected = folder.succeed(&["inspect", "m.bin"]);
-    assert!(inspected.contains("r1c1_adc_0 … r4c16_adc_63 (59)"), "{inspected}");
-    assert!(!inspected.contains("TAXEL_CAPACITY"), "{inspected}");
-    let refused = folder.fail(&[&TRAIN[..], &["--grid", "4x17"]].concat(), 2);
-    assert!(refused.contains("--grid 4x17 has 68 cells, and 64 columns are inputs"), "{refused}");
 }
 
 #[test]

@@ -79,20 +79,6 @@ fn few_lines_get_few_centres_and_say_so() {
 }
 
 #[test]
-fn a_column_that_never_changes_is_named() {
-    let folder = Folder::new("measured-constant");
-    let mut constant = lines(60);
-    constant.iter_mut().for_each(|line| line[1] = 7.0);
-    write(&folder, "constant.csv", &constant);
-    write(&folder, "changing.csv", &lines(60));
-    let (printed, notes) = train(&folder, "constant.csv", &["--json"]);
-    assert!(notes.contains("note: b never changes in constant.csv"), "{notes}");
-    assert_eq!(json(&printed)["unused_inputs"]["constant"], serde_json::json!(["b"]));
-    let (_, notes) = train(&folder, "changing.csv", &[]);
-    assert!(!notes.contains("never changes"), "{notes}");
-}
-
-#[test]
 fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing() {
     let folder = Folder::new("measured-unused");
     let mut text = String::from("a,b,dead,flat,twin,y\n");
@@ -123,10 +109,6 @@ fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing()
     assert_eq!(result["model"]["training_frames"], 200);
     let unused = &result["data"]["unused_inputs"];
     assert_eq!(unused["duplicated"], serde_json::json!([["twin", "a"]]));
-    // No baseline is needed for what is left out.
-    folder.write("rest.csv", "a,b,dead,flat,twin\n45,58,,7,45\n46,57,,7,46\n");
-    let relative = ["--relative-inputs", "--baseline", "rest.csv", "-o", "m.bin"];
-    folder.succeed(&[&["train", "all.csv"], &usual[..], &relative[..]].concat());
 }
 
 #[test]
@@ -146,42 +128,6 @@ fn lines_left_out_are_counted_by_reason() {
     let left_out = &json(&printed)["lines_left_out"];
     assert_eq!(left_out["without_reading"], 10);
     assert_eq!(left_out["missing_most"], serde_json::json!([["b", 10]]));
-}
-
-#[test]
-fn an_output_that_looks_like_the_label_of_a_class_is_noticed() {
-    let folder = Folder::new("measured-classes");
-    let notes_on = |name: &str, step: usize| {
-        let line = |(i, [a, b, _]): (usize, [f64; 3])| format!("{a},{b},{}\n", i % 5 * step);
-        let body: String = lines(60).into_iter().enumerate().map(line).collect();
-        folder.write("log.csv", format!("a,b,{name}\n{body}"));
-        let usual = ["train", "log.csv", "--inputs", "a,b", "--no-refine", "-o", "m.bin"];
-        let output = folder.run(&[&usual[..], &["--outputs", name]].concat());
-        String::from_utf8(output.stderr).unwrap()
-    };
-    let notes = notes_on("label", 1);
-    assert!(notes.contains("note: label has 5 different whole numbers and no unit"), "{notes}");
-    // A unit, or steps of more than one, are no label.
-    for notes in [notes_on("x_mm", 1), notes_on("load", 50)] {
-        assert!(!notes.contains("label of a class"), "{notes}");
-    }
-}
-
-#[test]
-fn folds_that_nothing_uses_are_refused() {
-    let folder = Folder::new("measured-folds");
-    write(&folder, "log.csv", &lines(100));
-    let usual = ["--inputs", "a,b", "--outputs", "y", "--no-refine"];
-    for option in ["--folds", "--fold-blocks"] {
-        for command in [&["train", "log.csv", "-o", "m.bin"][..], &["run", "log.csv"]] {
-            let output = folder.run(&[command, &usual[..], &[option, "4"]].concat());
-            let notes = String::from_utf8(output.stderr).unwrap();
-            assert!(!output.status.success(), "{notes}");
-            let why =
-                format!("{option} has no effect without refinement, --select or --confidence");
-            assert!(notes.contains(&why), "{notes}");
-        }
-    }
 }
 
 #[test]
@@ -222,12 +168,6 @@ fn run_judges_a_csv_file_by_its_last_fifth_or_fold_or_another_file() {
     assert_eq!(result["data"]["test_choice"], "the last fifth");
     let rmse = |decoder: usize| result["decoders"][decoder]["errors"][0]["rmse"].as_f64().unwrap();
     assert!(rmse(0) < 0.5 * rmse(1) && rmse(1) < rmse(2), "{result}");
-    // The same frames, trained and judged by the other commands.
-    write(&folder, "first.csv", &all[..400]);
-    write(&folder, "last.csv", &all[400..]);
-    train(&folder, "first.csv", &["--centres", "8"]);
-    let evaluated = json(&folder.succeed(&["eval", "m.bin", "last.csv", "--json"]));
-    assert_eq!(evaluated["decoders"][0]["errors"][0]["rmse"].as_f64(), Some(rmse(0)));
     let page = std::fs::read_to_string(folder.path("out/all/report.html")).unwrap();
     assert!(page.contains("Data “all”") && page.contains("the last fifth"), "{page}");
 
@@ -291,14 +231,4 @@ fn force_is_learnt_from_the_lines_at_rest_that_have_no_place() {
             assert!(all < 1.25 * alone, "{more:?}: {all} {alone}");
         }
     }
-    let selected = ["train", "all.csv", "--select", "--no-refine", "--spread", "0.5,0.8", "--json"];
-    let selected = json(&folder.succeed(&[&selected[..], &usual, &["-o", "s.bin"]].concat()));
-    let counts: Vec<_> = (selected["decoders"][0]["errors"].as_array().unwrap().iter())
-        .map(|errors| errors["count"].as_u64().unwrap())
-        .collect();
-    assert_eq!(counts, [1400, 1400, 2000]);
-    assert!(
-        selected["decoders"][1]["errors"][0]["rmse"].is_f64(),
-        "the linear decoder: {selected}"
-    );
 }

@@ -11,7 +11,6 @@ use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
 use crate::common::{Folder, small_scene, unrefined};
-use crate::json_schema::{checked, schema};
 
 /// The scene `press` with few frames, and contacts that move fast if they move.
 fn scene(moves: bool) -> Experiment {
@@ -83,8 +82,7 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     let motion = "[motion]\nspeed_mm_per_s = [50.0, 50.0]\npress_rate_hz = [3.0, 3.0]\ntrajectories = 4\n[noise]";
     folder.write("small.toml", small_scene().replace("[noise]", motion));
     folder.write("still.toml", small_scene());
-    let schema = schema();
-    let run = checked(&folder, &schema, &["run", "small.toml"]);
+    let run = folder.json(&["run", "small.toml"]);
     let moving = &run["moving"];
     let rmse = |of: &serde_json::Value| of["errors"][2]["rmse"].as_f64().unwrap();
     let ways = moving["ways"].as_array().unwrap();
@@ -104,11 +102,11 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     );
     let page = std::fs::read_to_string(folder.path("out/small/report.html")).unwrap();
     assert!(page.contains("Contacts that move") && page.contains("while a contact slides"));
-    assert!(checked(&folder, &schema, &["run", "still.toml"])["moving"].is_null());
+    assert!(folder.json(&["run", "still.toml"])["moving"].is_null());
 
     let trade = ["trade", "still.toml", "--centres", "12", "--no-refine"];
     let fast = [&trade[..], &["--motion", "50mm/s,3Hz", "--max-error", "1"]].concat();
-    let traded = checked(&folder, &schema, &fast);
+    let traded = folder.json(&fast);
     assert_eq!(traded["motion"]["speed_mm_per_s"], serde_json::json!([50.0, 50.0]));
     let chosen = traded["chosen"].as_u64().unwrap() as usize;
     assert_eq!(traded["points"][chosen]["samples_averaged"], 1);

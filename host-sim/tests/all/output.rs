@@ -1,13 +1,12 @@
-//! Where outputs go, and what is left when the work is interrupted or the disk is full.
+//! Where outputs go, and what is left when the work is interrupted.
 
-use std::collections::BTreeSet;
-use std::fs::{self, File, OpenOptions, Permissions};
-use std::os::unix::fs::{PermissionsExt, symlink};
+use std::fs::{self, File, OpenOptions};
+use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{Folder, program, shell_status, small_scene, small_scene_with_table1};
+use crate::common::{Folder, program, shell_status, small_scene};
 
 /// The program, with the folder of its work.
 fn host(folder: &Folder, arguments: &[&str]) -> Command {
@@ -50,8 +49,7 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
     let synth = ["synth", "scene.toml", "-n", "2", "-o"];
     let waiting = host(&folder, &[&synth[..], &["fifo"]].concat()).stderr(Stdio::piped()).spawn();
     assert!(Command::new("mkfifo").arg(folder.path("silent")).status().unwrap().success());
-    let join = ["join", "silent", "silent", "--on", "t", "--tolerance", "1", "-o", "x.csv"];
-    let unwritten = host(&folder, &join).stderr(Stdio::piped()).spawn();
+    let unwritten = host(&folder, &["inspect", "silent"]).stderr(Stdio::piped()).spawn();
 
     for path in ["-", "/dev/stdout", "/dev/fd/1", "link"] {
         if path == "link" {
@@ -117,19 +115,19 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
 #[test]
 fn an_open_file_that_is_read_is_not_written() {
     let folder = Folder::new("read-streams");
-    let text = "t,a\n1,2\n3,4\n";
+    let text = "t,a\n1,2\n3,4\n5,6\n7,9\n";
     folder.write("a.csv", text);
     fs::hard_link(folder.path("a.csv"), folder.path("same.csv")).unwrap();
-    folder.write("b.csv", "t,b\n1,5\n3,6\n");
-    let join = |input: &str, output: &str| {
-        format!("exec \"$0\" join {input} b.csv --on t --tolerance 0.1 -o {output}")
-    };
+    let train = ["train", "a.csv", "--inputs", "t", "--outputs", "a", "--centres", "1"];
+    folder.succeed(&[&train[..], &["--no-refine", "-o", "m.bin"]].concat());
+    let decode =
+        |input: &str, output: &str| format!("exec \"$0\" decode m.bin {input} -o {output}");
     for (script, says) in [
-        (format!("{} < a.csv", join("a.csv", "/dev/stdin")), "stdin is read"),
-        (format!("{} < a.csv", join("b.csv", "/proc/self/fd/0")), "stdin is read"),
-        (format!("exec 3>> a.csv; {}", join("a.csv", "/dev/fd/3")), "written over a.csv"),
-        (format!("exec 3<> a.csv; {}", join("same.csv", "/dev/fd/3")), "written over same.csv"),
-        (format!("{} >> a.csv", join("a.csv", "-")), "written over a.csv"),
+        (format!("{} < a.csv", decode("a.csv", "/dev/stdin")), "stdin is read"),
+        (format!("{} < a.csv", decode("m.bin", "/proc/self/fd/0")), "stdin is read"),
+        (format!("exec 3>> a.csv; {}", decode("a.csv", "/dev/fd/3")), "written over a.csv"),
+        (format!("exec 3<> a.csv; {}", decode("same.csv", "/dev/fd/3")), "written over same.csv"),
+        (format!("{} >> a.csv", decode("a.csv", "-")), "written over a.csv"),
     ] {
         let output = shell(&folder, &script).stderr(Stdio::piped()).output().unwrap();
         let stderr = String::from_utf8_lossy(&output.stderr);
@@ -137,36 +135,9 @@ fn an_open_file_that_is_read_is_not_written() {
         assert!(stderr.contains(says), "{script}: {stderr}");
         assert_eq!(fs::read_to_string(folder.path("a.csv")).unwrap(), text, "{script}");
     }
-    let good = format!("exec 3>> log.csv; {}", join("a.csv", "/dev/fd/3"));
+    let good = format!("exec 3>> log.csv; {}", decode("a.csv", "/dev/fd/3"));
     assert!(shell(&folder, &good).stderr(Stdio::null()).status().unwrap().success());
-    assert_eq!(
-        fs::read_to_string(folder.path("log.csv")).unwrap(),
-        "t,a,b.t,b\n1,2,1,5\n3,4,3,6\n"
-    );
-}
-
-#[test]
-fn read_only_files_stay_and_links_with_guessed_names_are_not_followed() {
-    let folder = Folder::new("read_only");
-    folder.write("scene.toml", small_scene());
-    for name in ["golden.bin", "victim"] {
-        folder.write(name, "golden");
-    }
-    fs::set_permissions(folder.path("golden.bin"), Permissions::from_mode(0o444)).unwrap();
-    let message = folder.fail(&["train", "scene.toml", "-o", "golden.bin"], 2);
-    assert!(message.contains("cannot write golden.bin: the file is read-only"), "{message}");
-    let script = "ln -s victim .x.csv.$$.tmp; exec \"$0\" synth scene.toml -n 1 -o x.csv";
-    assert!(shell(&folder, script).stdout(Stdio::null()).status().unwrap().success());
-    for name in ["golden.bin", "victim"] {
-        assert_eq!(fs::read_to_string(folder.path(name)).unwrap(), "golden");
-    }
-    let message = folder.fail(&["eval", "a\u{1b}[2Jb.bin", "scene.toml"], 2);
-    assert!(message.contains("a\\u{1b}[2Jb.bin") && !message.contains('\u{1b}'), "{message}");
-    let page = folder.succeed(&["synth", "scene.toml", "-n", "1", "-o", "c\u{1b}[2Jd.csv"]);
-    assert!(page.contains("c\\u{1b}[2Jd.csv") && !page.contains('\u{1b}'), "{page}");
-    symlink("made.csv", folder.path("dangling.csv")).unwrap();
-    folder.succeed(&["synth", "scene.toml", "-n", "1", "-o", "dangling.csv"]);
-    assert!(folder.path("dangling.csv").is_symlink() && folder.path("made.csv").is_file());
+    assert_eq!(fs::read_to_string(folder.path("log.csv")).unwrap().lines().count(), 5);
 }
 
 #[test]
@@ -208,7 +179,7 @@ fn is_large(path: &Path) -> bool {
 }
 
 #[test]
-fn an_interrupted_run_leaves_no_folder_and_an_emulator_no_file() {
+fn an_interrupted_run_leaves_no_folder() {
     let folder = Folder::new("empty_folder");
     for (arguments, name) in [(["run", "press"], "-INT"), (["trade", "press"], "-TERM")] {
         let child = host(&folder, &arguments).stderr(Stdio::piped()).spawn().unwrap();
@@ -225,56 +196,4 @@ fn an_interrupted_run_leaves_no_folder_and_an_emulator_no_file() {
         );
         assert!(folder.names().is_empty(), "{:?}", folder.names());
     }
-    folder.write("small.toml", small_scene());
-    folder.write("image.elf", "\x7FELF, or so it says");
-    let qemu = folder.write("qemu", "#!/bin/sh\nexec sleep 2\n");
-    fs::set_permissions(qemu, Permissions::from_mode(0o755)).unwrap();
-    fs::create_dir(folder.path("tmp")).unwrap();
-    let arguments = ["emulate", "small.toml", "--image", "image.elf", "--qemu", "./qemu"];
-    let temporary = || fs::read_dir(folder.path("tmp")).unwrap().count();
-    let mut child = host(&folder, &arguments).env("TMPDIR", folder.path("tmp")).spawn().unwrap();
-    let start = Instant::now();
-    while temporary() == 0 {
-        assert!(start.elapsed() < Duration::from_mins(1), "no file appears");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    signal(&child, "-TERM");
-    assert_eq!(shell_status(child.wait().unwrap()), Some(143));
-    assert_eq!(temporary(), 0);
-}
-
-#[test]
-fn a_folder_has_the_files_of_one_run_also_when_the_disk_is_full() {
-    let folder = Folder::new("one_run");
-    let scene = small_scene_with_table1();
-    let (before, table) = scene.split_at(scene.find("[table1]").unwrap());
-    folder.write("with.toml", format!("{before}{table}"));
-    folder.write("without.toml", before);
-    let names = || {
-        let entries = fs::read_dir(folder.path("out/small")).unwrap();
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    };
-    folder.succeed(&["run", "with.toml"]);
-    assert_eq!(names(), ["figures", "metrics.json", "model.bin", "report.html", "table1.csv"]);
-    let contents = || {
-        let of = |path| fs::read_dir(folder.path(path)).unwrap().map(|entry| entry.unwrap().path());
-        let paths = of("out/small").chain(of("out/small/figures"));
-        paths.map(|path| (fs::read(&path).ok(), path)).collect::<BTreeSet<_>>()
-    };
-    let old = contents();
-    // The model and the figures fit, the report does not.
-    let largest = fs::metadata(folder.path("out/small/metrics.json")).unwrap().len();
-    let script = format!("ulimit -f {}; exec \"$0\" run without.toml", largest / 512 + 2);
-    let output = shell(&folder, &script).output().unwrap();
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("cannot write out/small/report.html: File too large"), "{message}");
-    assert!(contents() == old);
-    assert!(folder.path("out/small/figures/error-by-noise.csv").exists());
-    folder.succeed(&["run", "without.toml"]);
-    assert_eq!(names(), ["figures", "metrics.json", "model.bin", "report.html"]);
-    assert!(!folder.path("out/small/figures/error-by-noise.csv").exists(), "of the run before");
 }

@@ -59,30 +59,31 @@ fn frames_in_a_recording_are_those_of_a_csv_file() {
 }
 
 #[test]
-fn a_recording_that_was_cut_is_named_and_mended() {
+fn a_recording_that_was_cut_is_mended_when_it_is_opened() {
     let folder = Folder::new("recordings_cut");
     folder.succeed(&["synth", "press", "-n", "900", "-o", "a.mcap"]);
     let bytes = fs::read(folder.path("a.mcap")).unwrap();
     folder.write("cut.mcap", &bytes[..bytes.len() * 2 / 3]);
     let train = ["train", "press", "-n", "400", "--centres", "8", "--no-refine", "-o", "m.bin"];
     folder.succeed(&train);
-    let decode = ["decode", "m.bin", "cut.mcap", "-o", "b.csv"];
-    let output = folder.run(&decode);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        output.status.success() && said.contains("`host-sim recover cut.mcap` mends it"),
-        "{said}"
-    );
-    let frames = csv(&folder, "b.csv").len();
+    let decode = |to: &str| {
+        let output = folder.run(&["decode", "m.bin", "cut.mcap", "-o", to]);
+        assert!(output.status.success());
+        (csv(&folder, to).len(), String::from_utf8(output.stderr).unwrap())
+    };
+    // While somebody records it, it is read as it is.
+    let recorded = fs::File::open(folder.path("cut.mcap")).unwrap();
+    recorded.lock().unwrap();
+    let (frames, said) = decode("a.csv");
+    assert!(said.contains("cut.mcap has no end") && said.contains("is being recorded"), "{said}");
     assert!(frames > 100 && frames < 900, "{frames}");
-    let said = folder.succeed(&["recover", "cut.mcap"]);
-    assert!(said.contains(&format!("cut.mcap: {frames} frames recovered")), "{said}");
-    assert!(folder.succeed(&["recover", "cut.mcap"]).contains("is whole"));
-    folder.succeed(&["decode", "m.bin", "cut.mcap", "-o", "c.csv"]);
-    assert_eq!(csv(&folder, "c.csv").len(), frames);
+    drop(recorded);
+    let (mended, said) = decode("b.csv");
+    assert!(said.contains("cut.mcap had no end"), "{said}");
+    assert!(said.contains(&format!("mended, with {frames} frames")), "{said}");
+    let (again, said) = decode("c.csv");
+    assert!([mended, again] == [frames; 2] && !said.contains("cut.mcap"), "{said}");
     folder.write("no.mcap", "not a recording");
-    for command in [&["recover", "no.mcap"][..], &["decode", "m.bin", "no.mcap", "-o", "d.csv"]] {
-        let said = folder.fail(command, 2);
-        assert!(said.contains("no.mcap"), "{said}");
-    }
+    let said = folder.fail(&["decode", "m.bin", "no.mcap", "-o", "d.csv"], 2);
+    assert!(said.contains("no.mcap"), "{said}");
 }

@@ -93,25 +93,11 @@ fn what_cannot_be_done_is_refused_by_name_and_with_the_fix() {
 }
 
 #[test]
-fn options_replace_a_scenes_numbers_before_these_are_checked() {
-    let folder = Folder::new("replaced-sizes");
-    let good = small_scene();
-    folder.write("centres.toml", good.replacen("centres = 12", "centres = 3000", 1));
-    folder.write("frames.toml", good.replacen("frames = 3000", "frames = 100000000", 1));
-    let train = |scene: &'static str, more: &[&'static str]| {
-        folder.succeed(&[&["train", scene, "--no-refine", "-o", "m.bin"], more].concat());
-    };
-    train("centres.toml", &["--centres", "12", "-n", "300"]);
-    train("frames.toml", &["-n", "300"]);
-    folder.succeed(&["synth", "frames.toml", "-n", "2", "-o", "two.csv"]);
-}
-
-#[test]
 fn what_is_not_text_or_damaged_is_refused() {
     let folder = Folder::new("damaged");
     folder.write("data.csv", b"ch1,f_n\n1,\x002\n");
     let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
-    refused(&folder, &train, &["data.csv", "neither text nor an array", "save it as CSV"]);
+    refused(&folder, &train, &["data.csv", "it is no text", "save the table as CSV"]);
     folder.write("scene.toml", small_scene());
     folder.succeed(&["train", "scene.toml", "-n", "100", "-o", "m.bin"]);
     folder.succeed(&["synth", "scene.toml", "-n", "10", "-o", "data.csv"]);
@@ -120,31 +106,6 @@ fn what_is_not_text_or_damaged_is_refused() {
     folder.write("corrupt.bin", &blob);
     let decode = ["decode", "corrupt.bin", "data.csv", "-o", "e.csv"];
     refused(&folder, &decode, &["corrupt.bin", "CRC-32"]);
-}
-
-#[test]
-fn a_folder_in_the_place_of_a_file_is_found_before_anything_is_written() {
-    let folder = Folder::new("before");
-    folder.write("scene.toml", small_scene());
-    std::fs::create_dir_all(folder.path("out/small/report.html")).unwrap();
-    refused(&folder, &["run", "scene.toml"], &["cannot write", "report.html"]);
-    assert_eq!(std::fs::read_dir(folder.path("out/small")).unwrap().count(), 1);
-}
-
-#[test]
-fn a_fill_is_refused_before_training() {
-    let folder = Folder::new("early-fill");
-    let lines = (0..60).map(|i| format!("{i},{},{}\n", i * i % 17, 3 * i % 11));
-    folder.write("two.csv", format!("a,b,y\n{}", lines.collect::<String>()));
-    folder.write("rest.csv", "a,b\n1,2\n1,2\n");
-    let two = ["train", "two.csv", "--inputs", "a,b", "--outputs", "y", "--fill", "-o", "m.bin"];
-    let relative = ["--relative-inputs", "--baseline", "rest.csv"];
-    for (more, says) in [(&[][..], "fewer than four"), (&relative[..], "relative to the baseline")]
-    {
-        let said = folder.fail(&[&two, more].concat(), 2);
-        assert!(said.contains(says) && said.contains("leave --fill"), "{said}");
-        assert!(!said.contains("fit "), "{said}");
-    }
 }
 
 /// Lines of two inputs and an output that follows from them. Names stand before what becomes of their values.
@@ -188,76 +149,4 @@ fn a_column_that_f32_does_not_hold_is_named() {
         let page = folder.succeed(&train(content, &[]));
         assert!(page.contains("R² there: y 0.99"), "{page}");
     }
-}
-
-#[test]
-fn lines_that_are_all_equal_have_no_r_squared() {
-    let folder = Folder::new("equal");
-    folder.write("d.csv", columns(|a| a, |y| y));
-    let inputs = ["--inputs", "a,b", "--outputs", "y", "--centres", "8", "--no-refine"];
-    folder.succeed(&[&["train", "d.csv", "-o", "m.bin"], &inputs[..]].concat());
-    folder.write("equal.csv", format!("a,b,y\n{}", "0.3,0.3,0.1\n".repeat(300)));
-    let page = folder.succeed(&["eval", "m.bin", "equal.csv"]);
-    let line = page.lines().find(|line| line.starts_with("network")).unwrap();
-    let r_squared = line.split_whitespace().rev().nth(2).unwrap();
-    assert_eq!(r_squared, "-", "{page}");
-    assert!(page.contains("y does not change in these frames"), "{page}");
-}
-
-#[test]
-fn what_a_scene_makes_doubtful_is_said() {
-    let folder = Folder::new("doubtful");
-    // Noise as large as the readings.
-    folder.write("noise.toml", small_scene().replace("level = 0.005", "level = 1.0"));
-    let output = folder.run(&["synth", "noise.toml", "-n", "100", "-o", "d.csv"]);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && said.contains("(readings-not-positive)"), "{said}");
-    // Too few frames for what is to be learnt: fresh frames show it.
-    folder.write("few.toml", small_scene().replace("level = 0.005", "level = 0.0"));
-    let few = ["train", "few.toml", "-n", "300", "--centres", "8", "-o", "m.bin"];
-    let page = folder.succeed(&few);
-    assert!(page.contains("On fresh frames") && page.contains("(no-gain-over-mean)"), "{page}");
-}
-
-#[test]
-fn nothing_to_evaluate_is_an_error_and_less_is_said() {
-    let folder = Folder::new("evaluate");
-    folder.write("scene.toml", small_scene());
-    folder.succeed(&["train", "scene.toml", "-n", "200", "-o", "m.bin"]);
-    folder.succeed(&["synth", "scene.toml", "-n", "2", "-o", "d.csv"]);
-    let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
-    let mut lines: Vec<Vec<&str>> = data.lines().map(|line| line.split(',').collect()).collect();
-    lines[1][0] = "1e39"; // beyond f32: missing to the device
-    let text = |lines: &[Vec<&str>]| lines.iter().map(|l| l.join(",") + "\n").collect::<String>();
-    folder.write("less.csv", text(&lines));
-    let page = folder.succeed(&["eval", "m.bin", "less.csv"]);
-    assert!(page.contains("54 of 72 values count"), "{page}");
-    let results = folder.succeed(&["--json", "eval", "m.bin", "less.csv"]);
-    let results: serde_json::Value = serde_json::from_str(&results).unwrap();
-    for errors in results["decoders"][1]["errors"].as_array().unwrap() {
-        // The mean is that of the values that count.
-        assert!(errors["r_squared"].as_f64().unwrap().abs() < 1e-12, "{errors}");
-    }
-    let page = folder.succeed(&["decode", "m.bin", "less.csv", "-o", "e.csv"]);
-    assert!(page.contains("1 of them"), "{page}");
-    lines.truncate(2);
-    lines[1][20] = "";
-    folder.write("none.csv", text(&lines));
-    refused(&folder, &["eval", "m.bin", "none.csv"], &["none.csv", "no line has both"]);
-}
-
-#[test]
-fn a_link_is_followed_and_permissions_stay() {
-    use std::os::unix::fs::{PermissionsExt, symlink};
-    let folder = Folder::new("links");
-    folder.write("scene.toml", small_scene());
-    let real = folder.write("real.csv", "old");
-    std::fs::set_permissions(&real, std::fs::Permissions::from_mode(0o600)).unwrap();
-    symlink("real.csv", folder.path("link.csv")).unwrap();
-    folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "link.csv"]);
-    assert!(folder.path("link.csv").is_symlink());
-    assert_eq!(std::fs::read_to_string(&real).unwrap().lines().count(), 4);
-    assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o600);
-    let printed = folder.succeed(&["synth", "scene.toml", "-n", "3", "-o", "/dev/stdout"]);
-    assert!(printed.starts_with("r4c1_ohm,"), "{printed}");
 }

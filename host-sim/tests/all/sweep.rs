@@ -186,17 +186,6 @@ fn another_plan_does_not_take_old_results() {
 }
 
 #[test]
-fn results_outside_all_bounds_name_the_nearest() {
-    let folder = prepared("sweep_bounds");
-    let bounds = "[bounds]\nframe_ms = { most = 0.001 }\n[axes]";
-    folder.write("plan.toml", PLAN.replace("[axes]", bounds).replace("[0.005, 0.02]", "0.005"));
-    let said = folder.succeed(&["sweep", "plan.toml"]);
-    let nearest = "no setting is within the bounds; the nearest is noise.level = 0.005, training.centres = 4 with frame_ms = ";
-    assert!(said.contains(nearest) && said.contains("0 within the bounds"), "{said}");
-    assert!(read(&folder, "out/tiny/results.html").contains(nearest));
-}
-
-#[test]
 fn points_that_cannot_be_are_named_and_the_others_computed() {
     let folder = prepared("sweep_failed");
     let deeper = "deformation.dent_depth_mm.1 = [1.0, 3.0]\nnoise.level";
@@ -224,52 +213,17 @@ fn plans_that_cannot_be_used_are_refused_with_what_is_near() {
     );
     for (from, to, said) in [
         ("training.centres", "training.centers", vec!["unknown field `centers`", "`centres`"]),
-        ("noise.level", "nois.level", vec!["unknown field `nois`", "`noise`"]),
-        ("[4, 8]", "[\"a\"]", vec!["invalid type"]),
         ("[4, 8]", "{from = 1, to = 8}", vec!["training.centres.count"]),
         ("rmse_dz_mm", "rmse_z_mm", vec!["objectives", "`rmse_dz_mm`"]),
-        ("[axes]", "[bound]\nframe_ms = 1\n[axes]", vec!["bound", "`bounds`"]),
         ("[axes]", "[bounds]\nframe = 1\n[axes]", vec!["bounds = frame", "`frame_ms`"]),
-        ("[axes]", "[device]\nreadout = \"i2c\"\n[axes]", vec!["device", "`spi`"]),
         ("[axes]", "[device]\nsample = 2\n[axes]", vec!["device", "`samples`"]),
-        (
-            "[axes]",
-            "[bounds]\nframe_ms = { most = 1, least = 1 }\n[axes]",
-            vec!["give one of them"],
-        ),
-        ("[axes]", "[bounds]\nframe_ms = nan\n[axes]", vec!["as a number"]),
-        ("\"scene.toml\"", "[]", vec!["scene is an empty list"]),
-        ("\"scene.toml\"", "5", vec!["a name, or a list of names"]),
         ("[axes]", "[draw]\npoints = 3\n[axes]", vec!["draw.axes", "at least one axis"]),
         ("[axes]", "[prices]\nrow_eur = -1\n[axes]", vec!["prices.row_eur = -1"]),
-        ("frame_ms", "cost_eur", vec!["objectives = cost_eur", "[prices]"]),
         ("limit_frames = 4", "train = false", vec!["rmse_dz_mm", "train = false"]),
-        (
-            "limit_frames = 4\nobjectives = [\"rmse_dz_mm",
-            "limit_frames = 0\nobjectives = [\"limit_dz_mm",
-            vec!["limit_dz_mm", "limit_frames = 0"],
-        ),
-        ("\"scene.toml\"", "[\"press\", \"press\"]", vec!["press is given twice"]),
         ("\"scene.toml\"", "\"lists.toml\"", vec!["scene = lists.toml", "`compare`"]),
-        (
-            "[axes]",
-            "[set]\nnoise.level = [0.1, 0.2]\n[axes]",
-            vec!["set = noise.level", "axis as well"],
-        ),
-        (
-            "[axes]",
-            "[set]\nsensor.pitch_mm = [1, 2]\n[axes]",
-            vec!["set = sensor.pitch_mm", "stand in [axes]"],
-        ),
-        ("[axes]", "[device]\nsamples = 0\n[axes]", vec!["device.samples = 0"]),
-        (
-            "[axes]",
-            "[set]\nnoise.level = 0.1\nseed = \"x\"\n[axes]",
-            vec!["set = noise.level", "axis as well"],
-        ),
+        ("[axes]", "[set]\nnoise.level = 0.1\n[axes]", vec!["set = noise.level", "axis as well"]),
         ("scene.toml", "scene.tml", vec!["scene.tml"]),
         ("name = \"tiny\"", "name = \"a/b\"", vec!["name"]),
-        ("limit_frames = 4", "repeats = 0", vec!["repeats = 0"]),
     ] {
         folder.write("plan.toml", PLAN.replace(from, to));
         let message = folder.fail(&["sweep", "plan.toml", "--list"], 2);

@@ -295,7 +295,7 @@ fn every_command_has_help_with_an_example() {
     let folder = Folder::new("help");
     for command in [
         "run", "synth", "forward", "train", "decode", "eval", "inspect", "table1", "emulate",
-        "link", "view", "recover",
+        "link", "view",
     ] {
         let help = folder.succeed(&[command, "--help"]);
         assert!(help.contains(&format!("host-sim {command} ")), "{help}");
@@ -304,7 +304,7 @@ fn every_command_has_help_with_an_example() {
     let help = folder.succeed(&["trade", "-h"]);
     let options = |section: &str| section.lines().filter(|line| line.contains("--")).count();
     let (_, help) = help.split_once("\nOptions:\n").unwrap();
-    let (own, rest) = help.split_once("\nData files (CSV, .npy, .npz, .mcap):\n").unwrap();
+    let (own, rest) = help.split_once("\nData files (CSV, .mcap):\n").unwrap();
     let (of_files, _) = rest.split_once("\nExamples:").unwrap();
     assert!((20..=31).contains(&options(own)) && own.contains("--seed"), "{own}");
     assert!(options(of_files) >= 10 && of_files.contains("--test"), "{of_files}");
@@ -346,23 +346,6 @@ fn table1_shows_the_papers_cells_beside_its_own() {
     assert!(cells[3].as_f64().unwrap() < 1.0, "{cells}");
     assert_eq!(result["test_frames"], 60);
     assert_eq!(result["solver"], "qr");
-}
-
-#[test]
-fn readings_of_another_sensor_are_remarked_upon() {
-    let folder = Folder::new("another");
-    folder.write("scene.toml", small_scene());
-    let thicker = small_scene().replace("[20.0, 18.0, 5.0]", "[20.0, 18.0, 7.0]");
-    folder.write("thicker.toml", thicker);
-    folder.succeed(&["train", "scene.toml", "-n", "500", "-o", "m.bin"]);
-    let remark = |scene: &str| {
-        folder.succeed(&["synth", scene, "-n", "100", "--seed", "2", "-o", "d.csv"]);
-        let output = folder.run(&["decode", "m.bin", "d.csv", "-o", "e.csv"]);
-        assert!(output.status.success());
-        String::from_utf8(output.stderr).unwrap()
-    };
-    assert_eq!(remark("scene.toml"), "");
-    assert!(remark("thicker.toml").contains("outside the range that it was trained on"));
 }
 
 #[test]

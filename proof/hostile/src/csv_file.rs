@@ -31,7 +31,7 @@ pub fn check(bytes: &[u8]) -> bool {
     let lines: Vec<(u64, Vec<f64>)> =
         (0..file.lines()).map(|line| (file.line_number(line), file.row(line).to_vec())).collect();
     assert!(lines.is_sorted_by(|one, next| one.0 < next.0), "line numbers that do not rise");
-    let is_number = |column: usize| file.check_numbers(&[column], None).is_ok();
+    let is_number = |column: usize| file.check_numbers(&[column]).is_ok();
     let columns: Vec<bool> = (0..file.header.len()).map(is_number).collect();
     let read: Vec<&[f64]> = lines.iter().map(|(_, values)| values.as_slice()).collect();
     assert!(!read.iter().any(|line| line.iter().any(|value| value.is_infinite())), "infinite");

@@ -18,7 +18,6 @@ mod csv_file;
 mod gzip;
 mod pattern;
 mod time_stamp;
-mod npy;
 mod scene;
 mod recording;
 
@@ -41,7 +40,6 @@ pub const TARGETS: &[Target] = &[
     Target { name: "gzip", check: gzip::check },
     Target { name: "pattern", check: pattern::check },
     Target { name: "time", check: time_stamp::check },
-    Target { name: "npy", check: npy::check },
     Target { name: "scene", check: scene::check },
     Target { name: "recording", check: recording::check },
 ];

@@ -10,9 +10,6 @@ use crate::error::{Error, Problem, Result};
 
 mod body;
 
-/// Most different texts of a column that are kept, to be named as classes.
-const MOST_LABELS: usize = 20;
-
 /// Parses the bytes of a text file of any dialect; `path` names it in messages.
 pub(super) fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<DataFile> {
     let error = |problem| Error::file(path, problem);
@@ -160,25 +157,10 @@ impl Seen {
         self.number |= found.is_some_and(|value| !value.is_nan());
         self.time |= time.is_some();
         if found.is_none() && time.is_none() || self.number && self.time {
-            let first = || NotNumbers { column, line, field: text(), labels: vec![] };
-            let not_numbers = self.not_numbers.get_or_insert_with(first);
-            let labels = &mut not_numbers.labels;
-            if labels.len() <= MOST_LABELS
-                && !labels.iter().any(|label| label.as_bytes() == field.trim_ascii())
-            {
-                labels.push(text());
-            }
+            let first = || NotNumbers { column, line, field: text() };
+            self.not_numbers.get_or_insert_with(first);
         }
         found.or(time).unwrap_or(f64::NAN)
-    }
-
-    /// Its fields that are no numbers, if there are any. Few different texts are the names of classes.
-    fn end(self) -> Option<NotNumbers> {
-        let is_class = |it: &NotNumbers| {
-            (2..=MOST_LABELS).contains(&it.labels.len()) && !self.number && !self.time
-        };
-        self.not_numbers
-            .map(|it| if is_class(&it) { it } else { NotNumbers { labels: vec![], ..it } })
     }
 }
 
@@ -214,7 +196,7 @@ fn read_carefully(
     if values.is_empty() {
         return Err(error(Problem::NoLines));
     }
-    Ok((values, line_numbers, seen.into_iter().filter_map(Seen::end).collect()))
+    Ok((values, line_numbers, seen.into_iter().filter_map(|it| it.not_numbers).collect()))
 }
 
 /// Count of lines; the CSV reader's own count is one short where lines end in CR LF.

@@ -93,9 +93,7 @@ mod tests {
                 known: crate::columns::some_names(&vec![long.clone(); 9]),
             },
             Problem::InputAndOutput { name: long.clone() },
-            Problem::TooLarge { line, column: column.clone(), value: 1e300, bound: 1e30 },
-            Problem::ClockSetBack { line, column, value: "-1e300".into(), before: "1e300".into() },
-            Problem::NoPartner { other: "b.csv".into(), tolerance: 1e300, distance: 1e300 },
+            Problem::TooLarge { line, column, value: 1e300, bound: 1e30 },
         ] {
             let message = problem.to_string();
             assert!(message.len() < 1600, "{} bytes: {}", message.len(), cut(&message));

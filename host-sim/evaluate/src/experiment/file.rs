@@ -10,7 +10,7 @@ use taxel_simulate::outputs::Outputs;
 use taxel_simulate::path::Path;
 use taxel_simulate::readout::Readout;
 use taxel_simulate::rubber;
-use taxel_simulate::sensor::{self, Precision, Sensor, Vector3};
+use taxel_simulate::sensor::{self, Sensor, Vector3};
 use taxel_simulate::world::check_counts;
 
 use super::others::{self, OtherContact};
@@ -22,8 +22,6 @@ pub(super) struct SceneFile {
     name: String,
     #[serde(default = "default_seed")]
     seed: u64,
-    #[serde(default)]
-    precision: Precision,
     sensor: SensorFile,
     deformation: motion::Kind,
     motion: Option<Path>,
@@ -158,7 +156,6 @@ impl SceneFile {
         };
         let world = World {
             seed: self.seed,
-            precision: self.precision,
             sensor,
             motion: self.deformation,
             path: self.motion,

@@ -11,7 +11,6 @@
 
 use std::collections::HashMap;
 
-use serde::{Deserialize, Serialize};
 use taxel_data::{LANES, Lanes};
 
 use super::{Sensor, Vector3};
@@ -20,13 +19,11 @@ use super::{Sensor, Vector3};
 const MODERATE_MM: [f64; 2] = [1e-15, 1e15];
 
 /// Precision of computed readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// Double precision: within 2e-13 of the sensor's equations.
-    #[default]
     F64,
-    /// Single precision: within 1e-6, a third faster; random draws stay the same.
+    /// Single precision: within 1e-6, a third faster; enough to weigh samples of the limit.
     F32,
 }
 

@@ -9,7 +9,7 @@ use crate::contact::Contact;
 use crate::motion::{Draws, Trajectories};
 use crate::outputs::{ContactOutput, ElectrodeOutputs, Outputs, Quantity};
 use crate::rubber::Response;
-use crate::sensor::{LaneModel, Scratch};
+use crate::sensor::{LaneModel, Precision, Scratch};
 
 /// Settings that all lanes of a synthesis share.
 pub(super) struct LaneSynthesis<'s> {
@@ -187,10 +187,9 @@ impl<'s> LaneSynthesis<'s> {
         let (steps, rows) = (self.synthesis.steps(), read_rows.len());
         let columns = world.sensor.column_wires;
         let Workspace { deformation_mm, resistance_ohm, gain, correlated, scratch } = workspace;
-        let precision = world.precision;
         self.model.row_column_resistance_ohm(
             row,
-            precision,
+            Precision::F64,
             deformation_mm,
             scratch,
             resistance_ohm,

@@ -36,7 +36,6 @@ impl DataArguments {
             stderr::remark(format_args!("note: {wire}: none of its readings tells anything"));
         }
         let (all, outliers, left_out) = self.usual_frames(&file, (&unused, &cells), how)?;
-        data_notes::print_classes(&all.frames.outputs);
         let given_folds = self
             .fold_column
             .as_ref()

@@ -1,5 +1,4 @@
 use super::*;
-use crate::error::Role;
 
 /// The text as it is parsed, of any dialect.
 fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataFile> {
@@ -147,20 +146,14 @@ fn a_column_that_is_no_number_is_told_once_it_is_asked_for() {
     let path = Path::new("test.csv");
     let file = parse(path, b"t,label,f\n1,pen,2\n2, cup,x\n3,pen,4\n", false).unwrap();
     assert!(file.column("t").is_ok() && file.value(1, 1).is_nan() && file.value(2, 2) == 4.0);
-    for (column, role, says) in [
-        ("f", None, "line 3, column \"f\": \"x\" is not a number"),
-        ("label", Some(Role::Inputs), "line 2, column \"label\": \"pen\" is not a number"),
-        ("label", Some(Role::Outputs), "class label: 2 texts such as pen, cup; give each class"),
-        ("f", Some(Role::Outputs), "\"x\" is not a number"),
+    for (column, says) in [
+        ("f", "line 3, column \"f\": \"x\" is not a number"),
+        ("label", "line 2, column \"label\": \"pen\" is not a number"),
     ] {
         let column = file.column_of_any(column).unwrap();
-        let refused = file.check_numbers(&[0, column], role).unwrap_err().to_string();
+        let refused = file.check_numbers(&[0, column]).unwrap_err().to_string();
         assert!(refused.contains(says), "{refused}");
     }
-    let many = (0..=MOST_LABELS).map(|line| format!("note {line}\n")).collect::<Vec<_>>().concat();
-    let file = parse(path, format!("a\n{many}").as_bytes(), false).unwrap();
-    let refused = file.check_numbers(&[0], Some(Role::Outputs)).unwrap_err().to_string();
-    assert!(refused.contains("\"note 0\" is not a number"), "{refused}");
 }
 
 #[test]
@@ -184,12 +177,4 @@ fn words_for_missing_values_and_columns_without_a_name_are_known() {
     assert!(file.rows().all(|row| row[1].is_nan()) && file.not_numbers.is_empty());
     let refused = parse(path, b",c1\n1,2\n", false).unwrap_err().to_string();
     assert!(refused.contains("header: column \"c1\" stands twice"), "{refused}");
-}
-
-#[test]
-fn a_lone_cr_before_the_header_is_a_line_of_its_own() {
-    for text in ["\r\ra,b\n1,2\n3,4\n", "\r\n\ra,b\r\n1,2\r\n3,4\r\n", "\n\ra,b\n1,2\n3,4\n"] {
-        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
-        assert_eq!(file.line_numbers, [4, 5], "{text:?}");
-    }
 }

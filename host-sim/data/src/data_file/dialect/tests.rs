@@ -94,35 +94,83 @@ fn a_long_header_is_read_whole() {
 
 #[test]
 fn what_is_no_text_is_refused() {
-    let no_text = read(b"a,b\n1,\0\n", Stated::default()).unwrap_err().to_string();
-    assert!(no_text.contains("neither text nor"), "{no_text}");
-    for (bytes, says) in [
-        (&b"PAR1\x15"[..], "pd.read_parquet('log.csv')"),
-        (b"MATLAB 5.0 MAT-file", "loadmat('log.csv')"),
-        (b"\x89HDF\r\n\x1a\n", "h5py.File('log.csv')"),
-        (b"PK\x03\x04.......xl/workbook.xml", "a spreadsheet"),
-        (b"PK\x03\x04.......log.csv", "a zip archive"),
-        (b"#ROSBAG V2.0\n", "a ROS bag"),
-        (b"\x80\x04\x95", "a pickle"),
-        (b"{\"a\": 1}\n", "lines=True"),
-    ] {
+    for bytes in [&b"a,b\n1,\0\n"[..], b"\x93NUMPY\x01\0v\0{'descr': '<f8'}", b"PK\x03\x04\0\0"] {
         let refused = read(bytes, Stated::default()).unwrap_err().to_string();
-        assert!(refused.contains(says) && refused.contains("Python"), "{refused}");
+        assert!(refused.contains("it is no text; save the table as CSV"), "{refused}");
     }
 }
 
+/// Three lines of a log, of which one lacks a value: `missing` stands for it, and `number` writes the others.
+fn log(
+    names: &str,
+    separator: &str,
+    end: &str,
+    missing: &str,
+    number: impl Fn(f64) -> String,
+) -> String {
+    let lines = [
+        [Some(0.0), Some(1234.5), None],
+        [Some(0.5), Some(-0.0042), Some(2e-7)],
+        [Some(1.0), Some(7.0), Some(-1.0)],
+    ];
+    let line = |values: [Option<f64>; 3]| {
+        let fields = values.map(|value| value.map_or(missing.to_owned(), &number));
+        fields.join(separator) + end
+    };
+    names.to_owned() + &lines.map(line).concat()
+}
+
 #[test]
-fn no_file_is_told_to_be_converted_to_itself() {
-    for (name, converted) in [
-        ("log.json", "log.csv"),
-        ("log", "log.csv"),
-        ("log.csv", "log.converted.csv"),
-        ("LOG.CSV", "LOG.converted.csv"),
+fn one_log_is_the_same_table_in_any_dialect() {
+    let point = |value: f64| value.to_string();
+    let comma = |value: f64| value.to_string().replace('.', ",");
+    let exponent = |value: f64| format!("{value:.18e}");
+    let plain = log("a,b,f\n", ",", "\n", "", point);
+    let semicolons = log("a;b;f\r\n", ";", "\r\n", "", comma);
+    let utf_16: Vec<u8> = semicolons.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let mut packed = flate2::write::GzEncoder::new(vec![], flate2::Compression::fast());
+    std::io::Write::write_all(&mut packed, semicolons.as_bytes()).unwrap();
+    let german = "semicolons, decimal commas";
+    for (bytes, says) in [
+        (plain.clone().into_bytes(), ""),
+        (plain.replace('\n', "\r\n").into(), ""),
+        (plain.replace('\n', "\r").into(), ""),
+        (format!("\u{feff}{plain}").into(), ""),
+        (plain.replacen("\n0.5", "\n\n0.5", 1).into(), ""),
+        (log("\"a\",\"b\",\"f\"\n", ",", "\n", "#N/A", |it| format!("\"{it}\"")).into(), ""),
+        (log("a,b,f\n", ",", "\n", "N/A", |it| format!(" {it} ")).into(), ""),
+        (
+            log("a,b,f\n", ",", "\n", "\"\"", |it| format!("\"{}\"", comma(it))).into(),
+            "decimal commas",
+        ),
+        (semicolons.clone().into(), german),
+        (format!("sep=;\r\n{semicolons}").into(), german),
+        ([vec![0xff, 0xfe], utf_16].concat(), "UTF-16, semicolons, decimal commas"),
+        (packed.finish().unwrap(), "gzip, semicolons, decimal commas"),
+        (log("a\tb\tf\n", "\t", "\n", "NaN", point).into(), "tabs"),
+        (log("# a b f\n", " ", "\n", "nan", exponent).into(), "spaces, names in line 1, comments"),
+        (log("# a,b,f\n", ",", "\n", "nan", exponent).into(), "names in line 1, comments"),
+        (log("   a    b  f\n", "   ", "\n", "NaN", point).into(), "spaces"),
+        (log("a,b,f,\n", ",", ",\n", "", point).into(), "a separator at the end of each line"),
+        (log("a | b | f\n", " | ", "\n", "-", point).into(), "separator '|'"),
+        (plain.replacen("\n0.5", "\n# a bump\n0.5", 1).into(), "comments"),
+        (log("a,b,f\ns,V,N\n", ",", "\n", "", point).into(), "units in line 2"),
+        (
+            log("a;b;f\n[s];[V];[N]\n", ";", "\n", "", comma).into(),
+            "semicolons, decimal commas, units in line 2",
+        ),
+        (log("a (s),b [V],f_N\n", ",", "\n", "", point).replace("f_N", "f (N)").into(), ""),
+        (log("", ",", "\n", "NaN", point).into(), ""),
+        (log("", " ", "\n", "nan", exponent).into(), "spaces"),
+        (log("", ";", "\n", "", comma).into(), german),
     ] {
-        let found = DataFile::parse(Path::new(name), b"{\"a\": 1}\n", &Reading::default());
-        let refused = found.unwrap_err().to_string();
-        let python = format!("pd.read_json('{name}', lines=True).to_csv('{converted}', index");
-        assert!(refused.contains(&python), "{refused}");
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let file =
+            read(&bytes, Stated::default()).unwrap_or_else(|error| panic!("{text:?}: {error}"));
+        assert_eq!(file.found, says, "{text:?}");
+        assert!(file.value(0, 2).is_nan(), "{text:?}");
+        let values: Vec<f64> = file.values.into_iter().filter(|value| !value.is_nan()).collect();
+        assert_eq!(values, [0.0, 1234.5, 0.5, -0.0042, 2e-7, 1.0, 7.0, -1.0], "{text:?}");
     }
 }
 

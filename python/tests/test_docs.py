@@ -1,0 +1,50 @@
+"""Lines of Python in the docs, run as they stand."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def force(times):
+    """Uneven presses of half a second each."""
+    random = np.random.default_rng(1)
+    starts, heights = np.cumsum(random.uniform(0.7, 2, 150)), random.uniform(1, 5, 150)
+    along = (times[:, None] - starts) / 0.5
+    return (heights * np.sin(np.pi * np.clip(along, 0, 1))).sum(axis=1)
+
+
+@pytest.mark.parametrize("ahead_s", [2.5, -1000.237, 1.7e9])
+def test_the_snippet_of_two_logs_finds_the_lag_and_joins_them(tmp_path, monkeypatch, ahead_s):
+    random = np.random.default_rng(2)
+    times = np.arange(20, 120, 0.015) + random.uniform(0, 0.003, 6667)
+    readings = {
+        f"r1c{column}_ohm": 60 / (1 + gain * force(times)) + random.normal(0, 0.1, len(times))
+        for column, gain in enumerate((0.05, 0.1, 0.02), 1)
+    }
+    pd.DataFrame({"time_s": times + ahead_s, **readings}).to_csv(tmp_path / "readings.csv", index=False)
+    of_scale = np.arange(5, 110, 0.0125)
+    truth = force(of_scale)
+    place = np.where(truth > 0.05, 3 + truth, np.nan)
+    scale = pd.DataFrame({"time_s": of_scale, "x_mm": place, "force_n": truth})
+    scale.loc[7::50, "force_n"] = np.nan
+    scale.to_csv(tmp_path / "scale.csv", index=False)
+
+    page = (DOCS / "data-files.md").read_text(encoding="utf-8")
+    snippet = re.search(r"## Two logs.*?```python\n(.*?)```", page, re.DOTALL).group(1)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(snippet, names)  # noqa: S102
+    assert abs(names["ahead_s"] - ahead_s) < 0.01
+    log = pd.read_csv("log.csv")
+    assert list(log) == ["time_s", *readings, "x_mm", "force_n"]
+    # The scale ends ten seconds before the board.
+    assert 5950 < len(log) < 6050
+    rest = force(log["time_s"].to_numpy() - ahead_s)
+    # Within a step of the grid, the force rises by 0.3 N at most.
+    assert np.abs(log["force_n"] - rest).max() < 0.5
+    assert log["x_mm"].isna().any() and np.abs(log["x_mm"] - 3 - log["force_n"]).max() < 1e-6
