@@ -1,7 +1,9 @@
 //! The host's end of the link against the firmware's application, which runs here in a thread.
 
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use crate::common::{Folder, unrefined};
@@ -26,10 +28,16 @@ pub fn press() -> World {
     World::press()
 }
 
+/// Model of `press` with so many centres, trained once for all tests.
 pub fn model(centres: usize) -> ModelBlob {
-    let mut scene = unrefined("press");
-    (scene.training.frames, scene.training.centres) = (500, centres);
-    scene.train(&Silent).unwrap()
+    static TRAINED: Mutex<BTreeMap<usize, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let mut trained = TRAINED.lock().unwrap();
+    let bytes = trained.entry(centres).or_insert_with(|| {
+        let mut scene = unrefined("press");
+        (scene.training.frames, scene.training.centres) = (500, centres);
+        scene.train(&Silent).unwrap().bytes().to_vec()
+    });
+    ModelBlob::of_bytes(bytes).unwrap()
 }
 
 /// The model with a confidence: of the mean reading and what that leaves out, with two components.
