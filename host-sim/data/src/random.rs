@@ -7,8 +7,7 @@
 //! Uniform: the upper 53 bits over 2^53. Normal: Box–Muller, √(−2 ln(1 − u₁))·(cos, sin)(2π u₂), by
 //! functions that every platform computes alike (`elementary`).
 
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::TAU;
 
 use crate::elementary::{ln, sin_cos};
 
@@ -75,7 +74,7 @@ pub enum Stream {
 /// Seeded source of random draws.
 #[derive(Debug, Clone)]
 pub struct Random {
-    generator: Xoshiro256PlusPlus,
+    state: [u64; 4],
     spare_normal: Option<f64>,
 }
 
@@ -84,12 +83,12 @@ impl Random {
     pub fn new(seed: u64, stream: Stream, purpose: Purpose, index: u64, part: u64) -> Self {
         let words = [stream as u64, purpose as u64, index, part];
         let mixed = words.iter().fold(seed, |state, word| split_mix(state ^ split_mix(*word)));
-        Self { generator: Xoshiro256PlusPlus::seed_from_u64(mixed), spare_normal: None }
+        Self { state: seeded(mixed), spare_normal: None }
     }
 
     /// Draws a uniform number on [0, 1).
     pub fn unit(&mut self) -> f64 {
-        unit(self.generator.next_u64())
+        unit(next(&mut self.state))
     }
 
     /// Draws a uniform number on [`low`, `high`).
@@ -107,11 +106,42 @@ impl Random {
         if let Some(spare) = self.spare_normal.take() {
             return spare;
         }
-        let radius = (-2.0 * ln(1.0 - self.unit())).sqrt();
-        let (sine, cosine) = sin_cos(std::f64::consts::TAU * self.unit());
-        self.spare_normal = Some(radius * sine);
-        radius * cosine
+        let [first, second] = normal_pair([self.unit(), self.unit()]);
+        self.spare_normal = Some(second);
+        first
     }
+}
+
+/// State of xoshiro256++ from a seed, by SplitMix64.
+#[inline(always)]
+fn seeded(mut seed: u64) -> [u64; 4] {
+    [0; 4].map(|_: u64| {
+        let word = split_mix(seed);
+        seed = seed.wrapping_add(SPLIT_MIX_STEP);
+        word
+    })
+}
+
+/// The next number of xoshiro256++.
+#[inline(always)]
+fn next(s: &mut [u64; 4]) -> u64 {
+    let number = s[0].wrapping_add(s[3]).rotate_left(23).wrapping_add(s[0]);
+    let shifted = s[1] << 17;
+    s[2] ^= s[0];
+    s[3] ^= s[1];
+    s[1] ^= s[2];
+    s[0] ^= s[3];
+    s[2] ^= shifted;
+    s[3] = s[3].rotate_left(45);
+    number
+}
+
+/// Two standard normal numbers from two uniform ones.
+#[inline(always)]
+fn normal_pair([radius, turn]: [f64; 2]) -> [f64; 2] {
+    let radius = (-2.0 * ln(1.0 - radius)).sqrt();
+    let (sine, cosine) = sin_cos(TAU * turn);
+    [radius * cosine, radius * sine]
 }
 
 /// Uniform number on [0, 1) from 64 random bits: the upper 53 over 2^53.

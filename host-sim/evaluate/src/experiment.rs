@@ -275,6 +275,7 @@ impl Experiment {
         let kind = match noise.kind {
             NoiseKind::Relative => BlobNoiseKind::Relative,
             NoiseKind::Span => BlobNoiseKind::Span,
+            NoiseKind::Absolute => BlobNoiseKind::Absolute,
         };
         Origin {
             name: self.name.clone(),
@@ -358,7 +359,8 @@ impl Experiment {
         check_name(&self.name)?;
         self.world.check()?;
         check_spread("training.spread", self.training.spread)?;
-        self.table1.as_ref().map_or(Ok(()), check_table1)?;
+        let noise_kind = self.world.noise.kind;
+        self.table1.as_ref().map_or(Ok(()), |table| check_table1(table, noise_kind))?;
         self.check_outputs()?;
         self.check_direction()?;
         let Some(t) = &self.table1 else { return Ok(()) };
@@ -405,7 +407,7 @@ fn shortened(message: &str) -> String {
     plain.lines().map(cut).collect::<Vec<_>>().join("\n")
 }
 
-fn check_table1(t: &Table1) -> Check {
+fn check_table1(t: &Table1, noise_kind: NoiseKind) -> Check {
     check_sizes("table1", t.frames, t.test_frames, t.centres)?;
     require(!t.spreads.is_empty(), "table1.spreads", "[]", || "list at least one".into())?;
     require(!t.noise_levels.is_empty(), "table1.noise_levels", "[]", || {
@@ -415,7 +417,7 @@ fn check_table1(t: &Table1) -> Check {
         check_spread("table1.spreads", *spread)?;
     }
     for level in &t.noise_levels {
-        check_noise_level("table1.noise_levels", *level)?;
+        check_noise_level("table1.noise_levels", noise_kind, *level)?;
     }
     if let Some(open) = &t.open {
         let delta = open.initial_covariance;

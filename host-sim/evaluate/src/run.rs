@@ -9,6 +9,7 @@ use taxel_learn::decoders::BASELINES;
 use taxel_learn::decoders::mean::Mean;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Decoder, Exponential, ModelBlob, Options, PreparedModel};
+use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::{Synthesis, World};
 
 use crate::by_depth::{DepthErrors, by_depth};
@@ -86,9 +87,8 @@ pub struct DataSummary {
 /// Summary of the scene that was run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SceneSummary {
-    /// Kind of noise: `relative` or `span`.
-    pub noise_kind: String,
-    /// Noise level p, as a fraction.
+    pub noise_kind: NoiseKind,
+    /// Noise level p: a fraction, or in Ω for absolute noise.
     pub noise_level: f64,
     /// Largest relative change of a drifting gain; 0 without drift.
     pub gain_drift: f64,
@@ -296,7 +296,7 @@ fn ideal_changes(world: &World, shown: &Distribution) -> Vec<Vec<f64>> {
 fn scene_summary(scene: &Experiment, shown: &Distribution) -> SceneSummary {
     let world = &scene.world;
     SceneSummary {
-        noise_kind: world.noise.kind.name().into(),
+        noise_kind: world.noise.kind,
         noise_level: world.noise.total_level(),
         gain_drift: world.drift.map_or(0.0, |drift| drift.gain),
         size_mm: world.sensor.size_mm,

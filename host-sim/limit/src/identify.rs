@@ -112,7 +112,7 @@ pub fn observability(
         .map(|row| world.read_rows.iter().position(|read| read == row).expect("a row that is read"))
         .collect();
     let n = places.len() * of_row;
-    let spans_ohm = Synthesis::new(world).noise_span_ohm();
+    let units_ohm = Synthesis::new(world).noise_unit_ohm();
     let mut slopes = DMatrix::zeros(places.len() * columns, n);
     let mut precisions = Vec::with_capacity(places.len() * columns);
     for (block, (&row, place)) in row_wires.iter().zip(&places).enumerate() {
@@ -120,17 +120,14 @@ pub fn observability(
             .chunks_exact(3)
             .map(|delta| [delta[0], delta[1], delta[2]])
             .collect();
-        let mut resistance_ohm = vec![0.0; columns];
-        sensor.row_column_resistance_ohm(row, &mean, &mut resistance_ohm);
-        let derivatives = sensor.log_resistance_derivatives(row, &mean);
-        for (k, (line, resistance)) in derivatives.iter().zip(resistance_ohm).enumerate() {
-            for (i, slope) in line.iter().enumerate() {
+        for (k, reading) in sensor.linearise(row, &mean).iter().enumerate() {
+            for (i, slope) in reading.log_slopes_per_mm.iter().enumerate() {
                 slopes[(block * columns + k, block * of_row + i)] = *slope;
             }
             // Standard deviation of ln R.
-            let span_ohm = spans_ohm.get(place * columns + k);
-            let deviation =
-                world.noise.total_level() * span_ohm.map_or(1.0, |span| span / resistance);
+            let unit_ohm = units_ohm.get(place * columns + k);
+            let unit = unit_ohm.map_or(1.0, |unit_ohm| unit_ohm / reading.resistance_ohm);
+            let deviation = world.noise.total_level() * unit;
             precisions.push(1.0 / deviation);
         }
     }

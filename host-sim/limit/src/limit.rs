@@ -75,9 +75,9 @@ impl Limit {
         if latents > MOST_LATENTS {
             return Err(Refusal::TooManyLatents { latents, most: MOST_LATENTS });
         }
-        let spans_ohm = Synthesis::new(world).noise_span_ohm();
+        let units_ohm = Synthesis::new(world).noise_unit_ohm();
         let deviations_ohm: Vec<f64> =
-            spans_ohm.iter().map(|span| (world.noise.total_level() * span).max(1e-12)).collect();
+            units_ohm.iter().map(|unit| (world.noise.total_level() * unit).max(1e-12)).collect();
         let groups = world.read_rows.chunks(together).enumerate().map(|(place, rows)| {
             let readings = together * world.sensor.column_wires;
             let deviation_ohm = if deviations_ohm.is_empty() {

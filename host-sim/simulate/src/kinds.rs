@@ -1,11 +1,10 @@
 //! Enums of all kinds that implement a trait, so that a new kind is a file and an entry in a list.
 
-/// Makes the enum `Kind` of types that implement a trait; a scene names each type in snake case.
+/// Makes the enum `Kind` of types that implement a trait.
 macro_rules! kinds {
     ($(#[$doc:meta])* $trait:ident: $($kind:ident),+) => {
-        $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, serde::Deserialize)]
-        #[serde(tag = "kind", rename_all = "snake_case")]
+        $(#[$doc])*
         pub enum Kind {
             $(
                 #[doc = concat!("See [`", stringify!($kind), "`].")]

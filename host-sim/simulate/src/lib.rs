@@ -9,6 +9,7 @@
 
 mod kinds;
 pub mod sensor;
+pub mod profile;
 pub mod contact;
 pub mod motion;
 pub mod path;

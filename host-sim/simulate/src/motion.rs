@@ -3,33 +3,25 @@
 //! A lane of the synthesis is a *trajectory*. A motion draws what it starts with; a [`Path`](crate::path::Path) then moves
 //! its contact from scan to scan. Without one, a trajectory is one still frame.
 
+use std::collections::BTreeMap;
 use std::fmt::Debug;
 
+use serde::Deserialize;
 use taxel_data::random::RandomLanes;
 use taxel_data::{BadValue, Lanes, Purpose, Stream};
 
 use crate::contact::Contact;
 use crate::kinds::kinds;
+use crate::profile::Profile;
 use crate::sensor::Sensor;
 
-mod independent;
 mod dent;
-mod press;
-mod punch;
-mod edge;
-mod ellipse;
-mod tail;
-mod pair;
+mod independent;
 mod mix;
 
-pub use edge::Edge;
-pub use ellipse::Ellipse;
+pub use dent::Dent;
 pub use independent::Independent;
 pub use mix::{Mix, Part};
-pub use pair::Pair;
-pub use press::Press;
-pub use punch::Punch;
-pub use tail::Tail;
 
 /// Motion of the electrodes, drawn at random for every trajectory.
 ///
@@ -77,7 +69,7 @@ pub trait Motion: Debug + Send + Sync {
     }
 
     /// Single Gaussian contact as wide, deep and sheared as this one; `None` for a motion without a contact.
-    fn as_press(&self) -> Option<Press> {
+    fn as_press(&self) -> Option<Dent> {
         None
     }
 
@@ -103,7 +95,7 @@ pub trait Motion: Debug + Send + Sync {
     /// Draws the quantities that all rows and scans of a trajectory share, for
     /// [`LANES`](taxel_data::simd::LANES) trajectories of `sensor`.
     fn start<'m>(&'m self, sensor: &'m Sensor, draws: &mut Draws) -> Box<dyn Trajectories + 'm> {
-        Box::new(dent::Contacts { sensor, contact: self.draw_contact(sensor, draws) })
+        Box::new(Contacts { sensor, contact: self.draw_contact(sensor, draws) })
     }
 }
 
@@ -119,6 +111,31 @@ pub trait Trajectories {
 
     /// Moves the contact to this centre and depth. Nothing changes for a motion without a contact.
     fn move_to(&mut self, _centre_mm: [Lanes; 2], _depth_mm: Lanes) {}
+}
+
+/// Contacts that have been drawn, and the sensor that they are pressed into.
+struct Contacts<'m> {
+    sensor: &'m Sensor,
+    contact: Option<Contact>,
+}
+
+impl Trajectories for Contacts<'_> {
+    fn deform(&mut self, row: usize, _: &mut Draws, deformation_mm: &mut [[Lanes; 3]]) {
+        if let Some(contact) = &self.contact {
+            contact.deform(self.sensor.row_electrodes_mm(row), deformation_mm);
+        }
+    }
+
+    fn contact(&self) -> Option<&Contact> {
+        self.contact.as_ref()
+    }
+
+    fn move_to(&mut self, centre_mm: [Lanes; 2], depth_mm: Lanes) {
+        if let Some(contact) = &mut self.contact {
+            contact.centre_mm = centre_mm;
+            contact.dent_depth_mm = depth_mm;
+        }
+    }
 }
 
 /// Random sources of consecutive trajectories, one a lane.
@@ -144,8 +161,41 @@ impl Draws {
 }
 
 kinds! {
-    /// Kind of motion that a scene can name.
-    Motion: Independent, Press, Punch, Edge, Ellipse, Tail, Pair, Mix
+    /// Motion of a scene.
+    #[serde(try_from = "Table")]
+    Motion: Independent, Dent, Mix
+}
+
+/// Motion as it stands in a scene: a contact is named by its profile.
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+enum Table {
+    Independent(Independent),
+    Press(BTreeMap<String, [f64; 2]>),
+    Punch(BTreeMap<String, [f64; 2]>),
+    Edge(BTreeMap<String, [f64; 2]>),
+    Ellipse(BTreeMap<String, [f64; 2]>),
+    Tail(BTreeMap<String, [f64; 2]>),
+    Pair(BTreeMap<String, [f64; 2]>),
+    Mix(Mix),
+}
+
+impl TryFrom<Table> for Kind {
+    type Error = String;
+
+    fn try_from(table: Table) -> Result<Self, String> {
+        let (profile, fields) = match table {
+            Table::Independent(motion) => return Ok(motion.into()),
+            Table::Mix(motion) => return Ok(motion.into()),
+            Table::Press(fields) => (Profile::Press, fields),
+            Table::Punch(fields) => (Profile::Punch, fields),
+            Table::Edge(fields) => (Profile::Edge, fields),
+            Table::Ellipse(fields) => (Profile::Ellipse, fields),
+            Table::Tail(fields) => (Profile::Tail, fields),
+            Table::Pair(fields) => (Profile::Pair, fields),
+        };
+        Ok(Dent::of_fields(profile, &fields)?.into())
+    }
 }
 
 /// Checks a uniform distribution's range.

@@ -1,23 +1,56 @@
 //! Gaussian noise on readings: a white part, and a part with a memory.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use taxel_data::exp;
 
 /// Gaussian noise on the readings: a standard normal n for every reading of every frame, and first-order autoregressive
 /// noise of variance 1.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Table")]
 pub struct Noise {
     /// Meaning of the levels.
     pub kind: NoiseKind,
-    /// Level p of the white part, as a fraction: 0.005 is 0.5 %.
+    /// Level p of the white part: a fraction (0.005 is 0.5 %), or in Ω for absolute noise.
     pub level: f64,
     /// Level of the part with a memory.
-    #[serde(default)]
     pub correlated_level: f64,
     /// Time in ms after which the correlation of that part has fallen to 1/e.
-    #[serde(default)]
     pub time_constant_ms: f64,
+}
+
+/// Noise as it stands in a scene, where levels in Ω have names of their own.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    kind: NoiseKind,
+    level: Option<f64>,
+    level_ohm: Option<f64>,
+    correlated_level: Option<f64>,
+    correlated_level_ohm: Option<f64>,
+    #[serde(default)]
+    time_constant_ms: f64,
+}
+
+impl TryFrom<Table> for Noise {
+    type Error = String;
+
+    fn try_from(table: Table) -> Result<Self, String> {
+        let Table { kind, time_constant_ms, .. } = table;
+        let fractions = [table.level, table.correlated_level];
+        let in_ohm = [table.level_ohm, table.correlated_level_ohm];
+        let (own, others, unit) = match kind {
+            NoiseKind::Absolute => (in_ohm, fractions, "_ohm"),
+            NoiseKind::Relative | NoiseKind::Span => (fractions, in_ohm, ""),
+        };
+        if others.iter().any(Option::is_some) {
+            return Err(format!(
+                "{} noise has level{unit} and correlated_level{unit} instead",
+                kind.name()
+            ));
+        }
+        let level = own[0].ok_or_else(|| format!("missing field `level{unit}`"))?;
+        Ok(Self { kind, level, correlated_level: own[1].unwrap_or(0.0), time_constant_ms })
+    }
 }
 
 impl Noise {
@@ -79,13 +112,15 @@ fn left_of_mean(samples: usize, decay: f64) -> f64 {
 }
 
 /// Meaning of a noise level p, for a standard normal n.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum NoiseKind {
     /// Noise relative to the reading: R·(1 + p·n).
     Relative,
     /// Noise relative to the channel's span over the scene: R + p·(maximum − minimum)·n.
     Span,
+    /// Additive noise of p in Ω, as the paper's thermal noise: R + p·n.
+    Absolute,
 }
 
 impl NoiseKind {
@@ -94,6 +129,16 @@ impl NoiseKind {
         match self {
             Self::Relative => "relative",
             Self::Span => "span",
+            Self::Absolute => "absolute",
+        }
+    }
+
+    /// Level of this kind with its unit: `0.5 %`, or `0.5 Ω`.
+    pub fn in_words(self, level: f64) -> String {
+        match self {
+            // Rounding first, since 0.07 · 100 is not 7.
+            Self::Relative | Self::Span => format!("{} %", (level * 1e8).round() / 1e6),
+            Self::Absolute => format!("{level} Ω"),
         }
     }
 }

@@ -130,6 +130,7 @@ impl Response for Creep {
 
 kinds! {
     /// Kind of rubber that a scene can name.
+    #[serde(tag = "kind", rename_all = "snake_case")]
     Rubber: Elastic, StandardLinearSolid
 }
 

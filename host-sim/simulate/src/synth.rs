@@ -162,7 +162,7 @@ impl<'w> Synthesis<'w> {
         );
         let (n, o) = (dataset.inputs.names.len(), dataset.outputs.names.len());
         let of_lanes = LANES * self.steps();
-        let synthesis = LaneSynthesis::new(self, stream, self.noise_span_ohm());
+        let synthesis = LaneSynthesis::new(self, stream, self.noise_unit_ohm());
         let readings = dataset.inputs.values.par_chunks_mut(of_lanes * n);
         let pieces = readings.zip(dataset.outputs.values.par_chunks_mut(of_lanes * o)).enumerate();
         pieces.for_each_init(
@@ -232,15 +232,20 @@ impl<'w> Synthesis<'w> {
         let sensor = &self.world.sensor;
         let mut readings = vec![0.0; self.read_rows.len() * sensor.column_wires];
         let mut outputs = vec![0.0; self.outputs.count(sensor, self.read_rows.len())];
-        let synthesis = LaneSynthesis::new(self, stream, self.noise_span_ohm());
+        let synthesis = LaneSynthesis::new(self, stream, self.noise_unit_ohm());
         synthesis.fill(&mut synthesis.workspace(), frame, &mut readings, &mut outputs);
         readings
     }
 
-    /// Span in Ω of every channel over the world, if its noise is relative to the span; otherwise empty.
-    pub fn noise_span_ohm(&self) -> Vec<f64> {
-        if self.noise.kind == NoiseKind::Relative || self.noise.is_none() {
-            return Vec::new();
+    /// What the level of noise is a multiple of in every channel, in Ω: its span over the world, or 1 Ω for absolute
+    /// noise. Empty for noise relative to the reading, and without noise.
+    pub fn noise_unit_ohm(&self) -> Vec<f64> {
+        match self.noise.kind {
+            NoiseKind::Span if !self.noise.is_none() => {}
+            NoiseKind::Absolute => {
+                return vec![1.0; self.read_rows.len() * self.world.sensor.column_wires];
+            }
+            _ => return Vec::new(),
         }
         let motion = Cow::Borrowed(&self.world.motion);
         let moved = Self { motion, path: None, drift: None, ..self.clone() };

@@ -5,10 +5,11 @@ use taxel_data::{BadValue, require};
 use taxel_firmware::readout::ScanSettings;
 
 use crate::drift::Drift;
-use crate::motion::{self, Independent, Press};
+use crate::motion::{self, Dent, Independent};
 use crate::noise::{Noise, NoiseKind};
 use crate::outputs::{ContactOutput, ElectrodeOutputs, Outputs};
 use crate::path::Path;
+use crate::profile::Profile;
 use crate::readout::Readout;
 use crate::rubber;
 use crate::sensor::Sensor;
@@ -18,6 +19,9 @@ type Check = std::result::Result<(), BadValue>;
 
 /// Largest length in mm, stiffness in N/mm and resistance in Ω/mm of a sensor; one over it is the least.
 const MOST: f64 = 1e9;
+
+/// Least distance in mm along z that a deformation may leave between upper and lower electrodes.
+const LEAST_GAP_MM: f64 = 1e-9;
 
 /// World to be simulated, and the part of it that is wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,11 +66,7 @@ impl World {
 
     /// World of the scene `press`: one contact.
     pub fn press() -> Self {
-        Self::of_motion(Press {
-            dent_radius_mm: [2.0, 5.0],
-            dent_depth_mm: [0.0, 1.0],
-            shear_ratio: [0.0, 0.5],
-        })
+        Self::of_motion(Dent::new(Profile::Press, &[[2.0, 5.0]], [[0.0, 1.0], [0.0, 0.5]]))
     }
 
     /// World of the scene `contact`: that of `press`, whose outputs are the contact's centre, depth and force.
@@ -116,9 +116,9 @@ impl World {
         }
     }
 
-    /// Changes the level of the white noise, a fraction (0.005 is 0.5 %).
+    /// Changes the level of the white noise: a fraction (0.005 is 0.5 %), or in Ω for absolute noise.
     pub fn set_noise_level(&mut self, level: f64) -> Check {
-        check_noise_level("noise level", level)?;
+        check_noise_level("noise level", self.noise.kind, level)?;
         self.noise.level = level;
         Ok(())
     }
@@ -185,16 +185,20 @@ impl World {
     }
 }
 
-/// Checks a noise level (a fraction); `field` names it in the message.
-pub fn check_noise_level(field: &str, level: f64) -> Check {
-    require((0.0..=1.0).contains(&level), field, level, || {
-        "it is a fraction from 0 to 1 (0.005 is 0.5 %)".into()
+/// Checks a level of noise of this `kind`; `field` names it in the message.
+pub fn check_noise_level(field: &str, kind: NoiseKind, level: f64) -> Check {
+    let most = if kind == NoiseKind::Absolute { MOST } else { 1.0 };
+    require((0.0..=most).contains(&level), field, level, || match kind {
+        NoiseKind::Absolute => format!("it is in ohm, from 0 to {MOST:e}"),
+        _ => "it is a fraction from 0 to 1 (0.005 is 0.5 %)".into(),
     })
 }
 
 fn noise(noise: &Noise) -> Check {
-    check_noise_level("noise.level", noise.level)?;
-    check_noise_level("noise.correlated_level", noise.correlated_level)?;
+    let unit = if noise.kind == NoiseKind::Absolute { "_ohm" } else { "" };
+    for (field, level) in [("level", noise.level), ("correlated_level", noise.correlated_level)] {
+        check_noise_level(&format!("noise.{field}{unit}"), noise.kind, level)?;
+    }
     let (field, time_constant_ms) = ("noise.time_constant_ms", noise.time_constant_ms);
     if noise.correlated_level == 0.0 {
         return require(time_constant_ms == 0.0, field, time_constant_ms, || {
@@ -313,7 +317,7 @@ fn motion(world: &World) -> Check {
     let lowest_upper = lowest(sensor.upper_electrodes_mm.iter().map(|p| p[2])) - range_mm[2][1];
     let highest_lower = -lowest(sensor.lower_electrodes_mm.iter().map(|p| -p[2]));
     let value = format!("down to z = {lowest_upper} mm");
-    require(lowest_upper > highest_lower, "deformation", value, || {
+    require(lowest_upper - highest_lower >= LEAST_GAP_MM, "deformation", value, || {
         format!(
             "lower electrodes reach {highest_lower} mm: they would touch; raise sensor.upper_electrodes_mm"
         )

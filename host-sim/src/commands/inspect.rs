@@ -242,6 +242,7 @@ fn page_of(s: &Summary) -> print::Page {
     line("trained on", format!("{} frames, digest {}", s.training_frames, s.scene_digest));
     let noise = match s.noise_kind.as_str() {
         "none" => "none added".to_owned(),
+        "absolute" => format!("absolute {} Ω", s.noise_level),
         kind => format!("{kind} {}", s.noise_level),
     };
     line("noise and seed", format!("{noise}, seed {}", s.seed));

@@ -12,6 +12,7 @@ use serde::Serialize;
 use taxel_data::output::FileSet;
 use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;
+use taxel_simulate::noise::NoiseKind;
 
 use super::progress::Terminal;
 use super::scene_argument::{SceneArgument, read_one_row};
@@ -41,7 +42,7 @@ pub struct Arguments {
     /// More scenes, one after the other; `compare` puts them side by side, with their best decoders.
     #[arg(value_name = "MORE", conflicts_with = "model")]
     more: Vec<String>,
-    /// Noise levels as fractions (0.01 is 1 %), instead of the scene's.
+    /// Levels of the white noise, instead of the scene's: fractions (0.01 is 1 %), or in ohm for absolute noise.
     #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
     noise: Vec<f64>,
     /// Row-wire (from 1) that is read, instead of all that the scene reads.
@@ -171,7 +172,10 @@ fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
         "{}: {} noise, seed {}, {} test frames\n",
-        result.subject, result.noise_kind, result.seed, result.frames
+        result.subject,
+        result.noise_kind.name(),
+        result.seed,
+        result.frames
     ));
     limits(&mut page, result);
     page.line(
@@ -180,7 +184,7 @@ fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
          readings take away, and RMSE that is left, for a sensor linearised at the mean deformation.",
     );
     for level in &result.levels {
-        directions(&mut page, level);
+        directions(&mut page, level, result.noise_kind);
     }
     if let Some(folder) = folder {
         page.line(format_args!(
@@ -211,7 +215,8 @@ fn limits(page: &mut print::Page, result: &LimitResult) {
         for figures in &level.limits {
             page.line(limit_line(level, figures, result));
         }
-        level.decoders.iter().for_each(|model| page.line(model_line(level, model)));
+        let noise = result.noise_kind.in_words(level.noise_level);
+        level.decoders.iter().for_each(|model| page.line(model_line(&noise, model)));
     }
     let priors = groups.into_iter().flatten().map(|g| format!("{:>9.4}{:18}", g.prior_rmse, ""));
     page.line(format_args!("{:>7} {:<8}{}", "", "prior", priors.collect::<String>().trim_end()));
@@ -227,7 +232,7 @@ fn limits(page: &mut print::Page, result: &LimitResult) {
     }
 }
 
-fn model_line(level: &Level, model: &DecoderErrors) -> String {
+fn model_line(noise: &str, model: &DecoderErrors) -> String {
     let cells = model.errors.iter().map(|errors| {
         let ratio = match (errors.ratio_to_limit, errors.ratio_standard_error) {
             (Some(ratio), Some(error)) => format!("{ratio:.3} ± {error:.3} ×"),
@@ -236,11 +241,12 @@ fn model_line(level: &Level, model: &DecoderErrors) -> String {
         format!(" {:>8.4} {ratio:>17}", errors.rmse)
     });
     let cells: String = cells.collect();
-    format!("{:>7} {:<8}{cells}   {}", print::percent(level.noise_level), "model", model.decoder)
+    format!("{noise:>7} {:<8}{cells}   {}", "model", model.decoder)
 }
 
 fn limit_line(level: &Level, figures: &Figures, result: &LimitResult) -> String {
-    let start = format!("{:>7} {:<8}", print::percent(level.noise_level), name(figures, result));
+    let noise = result.noise_kind.in_words(level.noise_level);
+    let start = format!("{noise:>7} {:<8}", name(figures, result));
     let Some(effective) = figures.effective_samples else {
         let refused = figures.refused.as_deref().unwrap_or_default();
         return format!("{start}  not given: {refused}");
@@ -258,10 +264,10 @@ fn limit_line(level: &Level, figures: &Figures, result: &LimitResult) -> String 
     )
 }
 
-fn directions(page: &mut print::Page, level: &Level) {
+fn directions(page: &mut print::Page, level: &Level, kind: NoiseKind) {
     page.line(format_args!(
         "\n{:<8} {:>10} {:>9}   {:^18} {:^24}   signal-to-noise ratios of the first directions",
-        print::percent(level.noise_level),
+        kind.in_words(level.noise_level),
         "observable",
         "unknowns",
         "known: dx, dy, dz",

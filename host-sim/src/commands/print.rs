@@ -266,12 +266,6 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Text of a fraction in per cent, without needless digits.
-pub fn percent(fraction: f64) -> String {
-    // Rounding first, since 0.07 · 100 is not 7.
-    format!("{} %", (fraction * 1e8).round() / 1e6)
-}
-
 /// Explains the columns of [`errors`].
 pub fn errors_legend(page: &mut Page) {
     page.line(

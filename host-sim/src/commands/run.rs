@@ -159,9 +159,9 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     let model = &result.model;
     let from = match (&result.scene, &result.data) {
         (Some(scene), _) => format!(
-            "{} noise {} %{}, {} training and {} test frames",
-            scene.noise_kind,
-            scene.noise_level * 100.0,
+            "{} noise {}{}, {} training and {} test frames",
+            scene.noise_kind.name(),
+            scene.noise_kind.in_words(scene.noise_level),
             match scene.gain_drift {
                 0.0 => String::new(),
                 gain => format!(", gain drift ±{} %", gain * 100.0),

@@ -108,7 +108,7 @@ impl Sizes {
 /// Noise level instead of the scene's.
 #[derive(Args, Default)]
 pub struct NoiseArgument {
-    /// Level of the white noise as a fraction (0.01 is 1 %), instead of the scene's.
+    /// Level of the white noise, instead of the scene's: a fraction (0.01 is 1 %), or in ohm for absolute noise.
     #[arg(long, value_name = "LEVEL", allow_negative_numbers = true)]
     noise: Option<f64>,
 }

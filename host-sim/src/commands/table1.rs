@@ -3,15 +3,14 @@
 use std::path::PathBuf;
 
 use super::progress::Terminal;
-use crate::evaluate::printed::{self, CELLS, Nearness};
+use crate::evaluate::printed::{CELLS, Nearness};
 use crate::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
-use crate::experiment;
 use crate::metrics::{Definition, Errors};
 use crate::report;
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use taxel_data::{columns, output};
+use taxel_data::output;
 use taxel_learn::decoders::{mean, standard};
 
 use super::scene_argument::{RelativeInputsArgument, SceneArgument, group_of_scene};
@@ -28,7 +27,7 @@ pub mod comparison;
   host-sim table1 paper -o table1.csv --svg table1.svg
   host-sim table1 paper-as-printed")]
 pub struct Arguments {
-    /// A built-in scene (paper, press, paper-as-printed) or the path of a scene file.
+    /// A built-in scene (paper, paper-as-printed) or the path of a scene file with [table1].
     #[arg(default_value = "paper")]
     scene: String,
     #[command(flatten)]
@@ -68,13 +67,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             return Err(Error::Usage("--svg and -o: give each a file of its own".into()));
         }
         print::check_output(path, &[argument.path()])?;
-        let comparable =
-            |table: &experiment::Table1| printed::is_layout(&table.spreads, &table.noise_levels);
-        let has_z = columns::groups(&scene.world.output_names())
-            .iter()
-            .any(|(group, _)| columns::is_compression(group));
-        if !(has_z && scene.table1.as_ref().is_none_or(comparable)) {
-            let message = "--svg: the table has other spreads or noise levels than the printed one, or no z; leave it out";
+        if scene.table1.as_ref().is_some_and(|table| !table1::is_comparable(&scene, table)) {
+            let message = "--svg: the table is of another sensor or motion than the paper's, has other spreads or noise \
+                           levels, or no z; leave it out";
             return Err(Error::Usage(message.into()));
         }
     }
@@ -112,7 +107,8 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
             continue;
         }
         page.line(format_args!("\n{}", definition.formula()));
-        let levels = table.columns.iter().map(|c| format!("{:>20}", print::percent(c.noise_level)));
+        let kind = table.noise_kind;
+        let levels = table.columns.iter().map(|c| format!("{:>20}", kind.in_words(c.noise_level)));
         page.line(format_args!("{:<16}{}", "noise", levels.collect::<String>()));
         for spread in table.columns[0].spreads() {
             let cells = table.columns.iter().map(|column| {
@@ -137,7 +133,7 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
     for column in &table.columns {
         page.line(format_args!(
             "noise {}: {}",
-            print::percent(column.noise_level),
+            table.noise_kind.in_words(column.noise_level),
             column.limit.note()
         ));
     }

@@ -120,9 +120,9 @@ impl<'b> SimulationFeed<'b> {
         deformations.for_each(|output| in_mm[output] = true);
         let can = Can { zero: true, record: true, seek: false };
         let source = format!(
-            "scene {}, {} % noise, {frame_rate} frames a second",
+            "scene {}, {} noise, {frame_rate} frames a second",
             scene.name,
-            scene.world.noise.total_level() * 100.0
+            scene.world.noise.kind.in_words(scene.world.noise.total_level())
         );
         let mut feed = Self {
             layout,

@@ -1,6 +1,7 @@
 //! Numbers and names as people read them.
 
 use taxel_data::columns::without_unit;
+use taxel_simulate::noise::NoiseKind;
 
 /// Text for a value that is not defined.
 pub const UNDEFINED: &str = "–";
@@ -52,6 +53,11 @@ pub fn percent(fraction: f64) -> String {
     }
     // Rounding first, since 0.07 · 100 is not 7.
     format!("{}\u{a0}%", (fraction * 1e8).round() / 1e6)
+}
+
+/// Level of noise with its unit.
+pub fn noise(kind: NoiseKind, level: f64) -> String {
+    kind.in_words(level).replace(' ', "\u{a0}")
 }
 
 /// Symbol of a group of outputs, without its unit: Δz for `dz_mm`, and words for a column's name.

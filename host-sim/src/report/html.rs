@@ -79,10 +79,12 @@ pub fn page(view: &View<'_>, figures: Figures) -> Page {
         body.heading("noise", "Noise and spread");
         body.figure(&sweep::error_by_noise(table, &group.group, &group.unit));
         body.figure(&sweep::error_by_spread(table, &group.group, &group.unit));
-        body.add("<details>\n<summary>Table 1 of the paper, in the paper’s metric</summary>\n");
-        let caption = tables::table1_caption(table, &group.group);
-        body.table(&caption, &tables::table1(table, &group.group), "");
-        body.add("</details>\n");
+        if let Some(nearest) = table.nearest_formula() {
+            body.add("<details>\n<summary>Beside Table 1 of the paper</summary>\n");
+            let caption = tables::table1_caption(table, nearest);
+            body.table(&caption, &tables::table1(nearest), "");
+            body.add("</details>\n");
+        }
     }
     body.heading("made", "How this was made");
     body.html += &made(view);

@@ -11,7 +11,7 @@ use super::errors::BAR_PX;
 use super::face::Face;
 use super::face_map::{Map, Values};
 use super::figures::{Figure, Figures, Page, Panel};
-use super::format::{percent, significant, symbol, with_unit};
+use super::format::{noise, significant, symbol, with_unit};
 use super::html::document;
 use super::svg::{Shape, escape};
 use super::tables::numbers;
@@ -74,7 +74,7 @@ pub fn html(result: &LimitResult, command: &str) -> Page {
     let mut body = format!(
         "<header>\n<h1>{}</h1>\n<p>{} noise; {} test frames; seed {}</p>\n{}</header>\n",
         escape(&title),
-        escape(&result.noise_kind),
+        result.noise_kind.name(),
         result.frames,
         result.seed,
         least(result)
@@ -90,10 +90,13 @@ pub fn html(result: &LimitResult, command: &str) -> Page {
     }
     for level in &result.levels {
         let seen = &level.observability;
-        let noise = percent(level.noise_level);
+        let noise = noise(result.noise_kind, level.noise_level);
         let of_level = match result.levels.len() {
             1 => String::new(),
-            _ => format!("-at-{}-percent", noise.trim_end_matches(['\u{a0}', '%'])),
+            _ => format!(
+                "-at-{}",
+                noise.replace('\u{a0}', "-").replace('%', "percent").replace('Ω', "ohm")
+            ),
         };
         let _ = writeln!(body, "<h2>What {noise} noise leaves visible</h2>");
         let caption = format!(
@@ -116,7 +119,8 @@ pub fn html(result: &LimitResult, command: &str) -> Page {
 
 /// Least possible errors of all readings at the first noise level.
 fn least(result: &LimitResult) -> String {
-    let noise = result.levels.first().map_or(String::new(), |level| percent(level.noise_level));
+    let of_first = |level: &Level| noise(result.noise_kind, level.noise_level);
+    let noise = result.levels.first().map_or(String::new(), of_first);
     let figures = result.levels.first().and_then(|level| level.limits.first());
     let groups = figures.iter().flat_map(|figures| &figures.groups).map(|group| {
         format!(
@@ -131,8 +135,7 @@ fn least(result: &LimitResult) -> String {
 }
 
 /// Line of the table for a model: its errors, and their ratios to the limit.
-fn model_row(level: &Level, model: &DecoderErrors) -> String {
-    let noise = percent(level.noise_level);
+fn model_row(noise: &str, model: &DecoderErrors) -> String {
     let cells = model.errors.iter().map(|errors| {
         let ratio = errors.ratio_to_limit.map_or(String::new(), |r| format!(" ({r:.3} ×)"));
         format!("{:.4}{ratio}", errors.rmse)
@@ -157,8 +160,8 @@ fn limits(result: &LimitResult) -> String {
     html += &numbers("th", heads.chain(["ESS".into()]));
     html += "</tr></thead>\n<tbody>\n";
     for level in &result.levels {
+        let noise = noise(result.noise_kind, level.noise_level);
         for figures in &level.limits {
-            let noise = percent(level.noise_level);
             let _ = write!(html, "<tr><td>{noise}</td><td>{}</td>", name(figures));
             if let Some(refused) = &figures.refused {
                 let _ = write!(
@@ -174,7 +177,7 @@ fn limits(result: &LimitResult) -> String {
             html += &(numbers("td", limits.chain(samples)) + "</tr>\n");
         }
         for model in &level.decoders {
-            html += &model_row(level, model);
+            html += &model_row(&noise, model);
         }
     }
     html + "</tbody>\n</table>\n</div>\n</figure>\n"
@@ -210,7 +213,7 @@ fn by_noise(result: &LimitResult) -> Chart {
     }
     let all = |axis: usize| series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
     let (x, y) = (
-        ticks::logarithmic_percent(all(0)),
+        ticks::logarithmic(all(0), |level| noise(result.noise_kind, level)),
         ticks::logarithmic(all(1), |value| significant(value, 1)),
     );
     Chart {

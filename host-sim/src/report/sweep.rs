@@ -6,7 +6,7 @@ use taxel_limit::limit;
 use super::axes::Axis;
 use super::chart::{Chart, Mark, STYLES, Series};
 use super::figures::Figure;
-use super::format::{percent, symbol, with_unit};
+use super::format::{noise, symbol, with_unit};
 use super::svg::Shape;
 use super::tables::rmse;
 use super::ticks;
@@ -82,14 +82,16 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     let clipped = heights(true).any(|y| y > most);
 
     let name = symbol(group);
-    let noise = ticks::logarithmic_percent(positive().map(|column| column.noise_level));
+    let levels = ticks::logarithmic(positive().map(|column| column.noise_level), |level| {
+        noise(table.noise_kind, level)
+    });
     let series = lines.into_iter().map(|(name, mut points)| {
         // A reference line runs from edge to edge.
         if name == mean::NAME
             && let [[_, first], .., [_, last]] | [[_, first @ last]] = points[..]
         {
-            points.insert(0, [noise.low, first]);
-            points.push([noise.high, last]);
+            points.insert(0, [levels.low, first]);
+            points.push([levels.high, last]);
         }
         let (class, mark) = line_style(name);
         Series::new(name, class, mark, points)
@@ -97,7 +99,7 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
     let series = series.collect();
     let chart = Chart {
         title: format!("RMSE of {name} against noise level, by decoder"),
-        x: Axis::logarithmic("noise level p", noise),
+        x: Axis::logarithmic("noise level p", levels),
         y: Axis::linear(with_unit(&format!("RMSE of {name}"), unit), y),
         series,
         end_labels: true,
@@ -142,7 +144,7 @@ pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
         let at = |spread| [spread, rmse(column.errors(NETWORK, Some(spread)), group)];
         let points = column.spreads().map(at).collect();
         let mark = Mark::LineAnd(STYLES[i % STYLES.len()].1);
-        let line = Series::new(&percent(column.noise_level), "c1", mark, points);
+        let line = Series::new(&noise(table.noise_kind, column.noise_level), "c1", mark, points);
         series.push(Series { opacity: 0.6 + 0.4 * i as f64 / last, ..line });
     }
     let heights = series.iter().flat_map(|s| s.points.iter().map(|[_, y]| *y));

@@ -9,7 +9,8 @@ use super::svg::escape;
 use super::ticks;
 use super::view::View;
 use taxel_evaluate::by_depth::DepthErrors;
-use taxel_evaluate::evaluate::table1::{Column, NETWORK, Table1};
+use taxel_evaluate::evaluate::printed::{CELLS, NOISE_LEVELS, SPREADS};
+use taxel_evaluate::evaluate::table1::{Comparison, NETWORK, Table1};
 use taxel_evaluate::metrics::{self, DecoderErrors, Definition, Errors};
 use taxel_evaluate::others::Others;
 
@@ -249,79 +250,43 @@ pub fn legend(decoders: &[DecoderErrors]) -> String {
     )
 }
 
-/// Definition in which the paper's table is shown: positional where it is defined.
-pub fn printed_definition(table: &Table1, group: &str) -> Definition {
-    let mean =
-        table.columns.first().and_then(|column| of_group(column.errors(mean::NAME, None), group));
-    match mean.and_then(|errors| errors.positional_percent) {
-        Some(_) => Definition::PositionalPercent,
-        None => Definition::FullScalePercent,
-    }
-}
-
 /// Caption of [`table1`].
-pub fn table1_caption(table: &Table1, group: &str) -> String {
-    let definition = printed_definition(table, group);
+pub fn table1_caption(table: &Table1, nearest: &Comparison) -> String {
     format!(
-        "Error of {} by spread and noise level, arranged as Table 1 of the paper: {}. Network with \
-         K = {}. Below each cell, where there is one, is the paper's; it does not state its definition. Cells \
-         marked † are no better than always predicting the training mean.",
-        escape(&symbol(group)),
-        escape(definition.formula()),
+        "Error of Δz by spread and noise level: {}. Network with K = {}. Below each cell is the paper's, which states no \
+         formula; by this one the cells are nearest to it. Cells marked † are no better than always predicting the \
+         training mean.",
+        escape(&nearest.formula),
         table.centres
     )
 }
 
-/// Table of errors by spread (lines) and noise level (columns).
-pub fn table1(table: &Table1, group: &str) -> String {
-    let definition = printed_definition(table, group);
-    let of = |errors: &[Errors]| {
-        of_group(errors, group).and_then(|e| definition.of(e)).filter(|v| v.is_finite())
-    };
-    let cell = |value: Option<f64>| value.map_or(UNDEFINED.into(), |v| format!("{v:.2}\u{a0}%"));
+/// Table of errors by spread (lines) and noise level (columns), by the formula that is `nearest` to the printed table.
+pub fn table1(nearest: &Comparison) -> String {
+    let cell = |percent: f64| format!("{percent:.2}\u{a0}%");
     let mut html = format!(
         "<table class=\"compact\">\n<thead><tr><th rowspan=\"2\">Spread</th>\
-         <th class=\"span\" colspan=\"{}\">Noise level</th></tr>\n<tr>",
-        table.columns.len()
+         <th class=\"span\" colspan=\"{}\">Noise level</th></tr>\n<tr>{}</tr></thead>\n<tbody>\n",
+        NOISE_LEVELS.len(),
+        numbers("th", NOISE_LEVELS.into_iter().map(percent))
     );
-    html += &numbers("th", table.columns.iter().map(|column| percent(column.noise_level)));
-    html += "</tr></thead>\n<tbody>\n";
-    for spread in table.columns.first().into_iter().flat_map(Column::spreads) {
+    for ((spread, cells), printed) in SPREADS.into_iter().zip(&nearest.cells).zip(&CELLS) {
         let _ = write!(html, "<tr><th scope=\"row\">{spread:?}</th>");
-        for column in &table.columns {
-            let value = of(column.errors(NETWORK, Some(spread)));
-            let poor = value
-                .zip(of(column.errors(mean::NAME, None)))
-                .is_some_and(|(value, mean)| value >= mean);
-            let (class, mark) =
-                if poor { (" poor", "<span class=\"dagger\">†</span>") } else { ("", "") };
-            let text = cell(value);
-            let _ = write!(html, "<td class=\"number{class}\">{text}{mark}");
-            let printed = table.printed.iter().find(|printed| {
-                same(printed.spread, spread) && same(printed.noise_level, column.noise_level)
-            });
-            if let Some(printed) = printed {
-                let _ = write!(html, "<small>paper {:.2}\u{a0}%</small>", printed.percent);
-            }
-            html += "</td>";
+        for ((found, mean), printed) in cells.iter().zip(nearest.mean_percent).zip(printed) {
+            let (class, mark) = if *found >= mean {
+                (" poor", "<span class=\"dagger\">†</span>")
+            } else {
+                ("", "")
+            };
+            let _ = write!(
+                html,
+                "<td class=\"number{class}\">{}{mark}<small>paper {}</small></td>",
+                cell(*found),
+                cell(*printed)
+            );
         }
         html += "</tr>\n";
     }
     html += "</tbody>\n<tbody class=\"reference\">\n";
-    for baseline in table.columns.first().into_iter().flat_map(Column::baselines) {
-        let cells = table.columns.iter().map(|it| cell(of(it.errors(&baseline.decoder, None))));
-        html += &line(&escape(&capitalised(&baseline.decoder)), cells);
-    }
-    html + "</tbody>\n</table>\n"
-}
-
-/// Name with a capital letter, as the head of a line.
-fn capitalised(name: &str) -> String {
-    let mut letters = name.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
-}
-
-/// Whether two settings that people typed are the same number.
-fn same(a: f64, b: f64) -> bool {
-    (a - b).abs() < 1e-9
+    html + &line("Mean", nearest.mean_percent.into_iter().map(cell)) + "</tbody>\n</table>\n"
 }

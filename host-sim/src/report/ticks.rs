@@ -52,11 +52,6 @@ pub fn within(low: f64, high: f64, wanted: usize) -> Ticks {
     Ticks { low, high, ..ticks }
 }
 
-/// Ticks of a [`logarithmic`] axis of noise levels, labelled in per cent.
-pub fn logarithmic_percent(values: impl IntoIterator<Item = f64>) -> Ticks {
-    logarithmic(values, super::format::percent)
-}
-
 /// Logarithmic range around all positive `values`, with some room. Its ticks are at 1-2-5, or closer
 /// within one decade.
 pub fn logarithmic(values: impl IntoIterator<Item = f64>, label: impl Fn(f64) -> String) -> Ticks {
@@ -109,6 +104,7 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::format::percent;
     use super::*;
 
     fn labels(ticks: &Ticks) -> Vec<&str> {
@@ -150,10 +146,10 @@ mod tests {
 
     #[test]
     fn logarithmic_ticks_lie_inside() {
-        let ticks = logarithmic_percent([0.0, 0.005, 0.1]);
+        let ticks = logarithmic([0.0, 0.005, 0.1], percent);
         assert_eq!(labels(&ticks), ["0.5\u{a0}%", "1\u{a0}%", "2\u{a0}%", "5\u{a0}%", "10\u{a0}%"]);
         assert!(ticks.low < 0.005 && ticks.high > 0.1);
-        assert!(!logarithmic_percent([0.01]).at.is_empty());
-        assert!(logarithmic_percent([]).low > 0.0);
+        assert!(!logarithmic([0.01], percent).at.is_empty());
+        assert!(logarithmic([], percent).low > 0.0);
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::figures::{Figure, Figures, Page};
-use super::format::{fixed, grouped, percent, significant, symbol, unbroken};
+use super::format::{fixed, grouped, noise, significant, symbol, unbroken};
 use super::html::document;
 use super::svg::escape;
 use taxel_evaluate::evaluate::trade::{Memory, Trade};
@@ -21,7 +21,7 @@ pub fn html(trade: &Trade, command: &str) -> Page {
         Some(choice) => format!("{} measured test frames ({choice})", grouped(trade.test_frames)),
         None => format!(
             "Noise {} a sample; {} test frames",
-            percent(trade.noise_level),
+            trade.noise_kind.map_or(String::new(), |kind| noise(kind, trade.noise_level)),
             grouped(trade.test_frames)
         ),
     };

@@ -13,7 +13,7 @@ use taxel_evaluate::over_time::OverTime;
 use taxel_evaluate::run::{DataSummary, RunResult, SensorSketch};
 use taxel_evaluate::verdict::Verdict;
 
-use super::format::{grouped, percent};
+use super::format::{grouped, noise, percent};
 
 /// How a page was made, so that it can be made again.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -67,8 +67,9 @@ impl<'a> View<'a> {
     /// View of a run.
     pub fn of_run(result: &'a RunResult, made: &'a Made) -> Self {
         let scene = result.scene.as_ref();
-        let noise =
-            scene.map(|it| format!("{} noise of {}", it.noise_kind, percent(it.noise_level)));
+        let noise = scene.map(|it| {
+            format!("{} noise of {}", it.noise_kind.name(), noise(it.noise_kind, it.noise_level))
+        });
         let kind = if scene.is_some() { "Scene" } else { "Data" };
         Self {
             title: format!("{kind} “{}”", result.subject),

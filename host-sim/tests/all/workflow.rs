@@ -314,19 +314,22 @@ fn every_command_has_help_with_an_example() {
 #[test]
 fn table1_shows_the_papers_cells_beside_its_own() {
     let folder = Folder::new("printed");
-    let scene = small_scene_with_table1();
-    let settings = "spreads = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]\n\
-                    noise_levels = [0.005, 0.01, 0.05, 0.1]";
-    let (world, _) = scene.split_once("[table1]").unwrap();
-    let table = format!(
-        "{world}[table1]\n{settings}\nframes = 60\ntest_frames = 50\ncentres = 6\naffine_tail = false\n\
-         standard_frames = 20\n"
-    );
+    let few =
+        "frames = 60\ntest_frames = 50\ncentres = 6\naffine_tail = false\nstandard_frames = 20\n";
+    let scene = include_str!("../../../scenes/paper.toml");
+    let (before, _) = scene.split_once("frames = 6000").unwrap();
+    let table = before.replace("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]") + few;
     folder.write("paper.toml", &table);
     folder.write("other.toml", table.replace("0.05, 0.1]", "0.06, 0.1]"));
-    let page = folder.succeed(&["table1", "other.toml"]);
-    assert!(!page.contains("As the paper prints it"), "{page}");
-    assert!(folder.fail(&["table1", "other.toml", "--svg", "t.svg"], 2).contains("--svg"));
+    folder.write("wider.toml", table.replace("[20.0, 18.0, 5.0]", "[21.0, 18.0, 5.0]"));
+    let (_, settings) = table.split_once("[table1]").unwrap();
+    folder.write("press.toml", format!("{}\n[table1]{settings}", small_scene()));
+    folder.write("ohm.toml", table.replace("relative\"\nlevel", "absolute\"\nlevel_ohm"));
+    for scene in ["other.toml", "wider.toml", "press.toml", "ohm.toml"] {
+        assert!(folder.fail(&["table1", scene, "--svg", "t.svg"], 2).contains("--svg"));
+    }
+    let page = folder.succeed(&["table1", "ohm.toml"]);
+    assert!(page.contains("0.05 Ω") && !page.contains("As the paper prints it"), "{page}");
     let same = folder.fail(&["table1", "paper.toml", "-o", "t.svg", "--svg", "t.svg"], 2);
     assert!(same.contains("a file of its own"), "{same}");
     let page = folder.succeed(&["table1", "paper.toml", "-o", "t.csv", "--svg", "t.svg"]);

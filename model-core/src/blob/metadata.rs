@@ -63,6 +63,8 @@ pub enum NoiseKind {
     Relative,
     /// Noise relative to a channel's span: R + p·(channel maximum − minimum)·n, with n standard normal.
     Span,
+    /// Absolute noise: R + p·n with p in Ω, and n standard normal.
+    Absolute,
 }
 
 /// Metadata of a model: names, units, and how it was trained.
@@ -74,7 +76,7 @@ pub struct Metadata<'a> {
     pub scene_digest: u64,
     /// Definition of the training noise.
     pub noise_kind: NoiseKind,
-    /// Training noise level p, as a fraction (0.005 is 0.5 %).
+    /// Training noise level p: a fraction (0.005 is 0.5 %), or in Ω for absolute noise.
     pub noise_level: f32,
     /// Seed of every random draw in synthesis and training.
     pub seed: u64,

@@ -9,6 +9,7 @@ use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::identify::{self, Observability, Prior};
 use taxel_limit::reference::{EffectiveSamples, GroupLimit};
 use taxel_limit::{Reference, Refusal};
+use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::{Synthesis, World};
 
 use crate::error::{Error, Result};
@@ -62,8 +63,7 @@ pub struct LimitResult {
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
-    /// Kind of noise: `relative` or `span`.
-    pub noise_kind: String,
+    pub noise_kind: NoiseKind,
     pub frames: usize,
     /// Extent of the sensor in mm.
     pub size_mm: [f64; 3],
@@ -76,7 +76,7 @@ pub struct LimitResult {
 /// Limit at one noise level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Level {
-    /// Noise level p, as a fraction.
+    /// Noise level p: a fraction, or in Ω for absolute noise.
     pub noise_level: f64,
     /// Limits: of all readings together, then of each row from its own readings if there are several.
     pub limits: Vec<Figures>,
@@ -133,7 +133,7 @@ pub fn compute(
     Ok(LimitResult {
         subject: experiment.name.clone(),
         seed: world.seed,
-        noise_kind: world.noise.kind.name().into(),
+        noise_kind: world.noise.kind,
         frames: plan.frames,
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,

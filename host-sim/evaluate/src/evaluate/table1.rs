@@ -11,6 +11,9 @@ use taxel_learn::decoders::{BASELINES, RowDecoder, Rows, mean};
 use taxel_learn::train::{FittedNetwork, Samples, Solver};
 use taxel_learn::{Decoder, Options};
 use taxel_simulate::Synthesis;
+use taxel_simulate::motion::Kind;
+use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::sensor::Sensor;
 
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, JudgedOn, OpenChoices, Table1 as Settings};
@@ -25,6 +28,7 @@ pub struct Table1 {
     /// Number of centres of each row-wire's network.
     pub centres: usize,
     pub affine_tail: bool,
+    pub noise_kind: NoiseKind,
     pub training_frames: usize,
     /// Number of frames on which each cell was evaluated.
     pub test_frames: usize,
@@ -34,7 +38,8 @@ pub struct Table1 {
     pub solver: &'static str,
     /// Columns of the table, one a noise level.
     pub columns: Vec<Column>,
-    /// Cells as the paper prints them; empty if the table has other spreads or noise levels, or no Δz.
+    /// Cells as the paper prints them; empty for another sensor or motion than the paper's, for other spreads or noise
+    /// levels, and without Δz.
     pub printed: Vec<Printed>,
     /// The table by every formula that could be the paper's, beside the printed cells; empty where these are.
     pub comparison: Vec<Comparison>,
@@ -56,7 +61,7 @@ pub struct Comparison {
 /// Errors of all decoders at one noise level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Column {
-    /// Noise level p, as a fraction.
+    /// Noise level p: a fraction, or in Ω for absolute noise.
     pub noise_level: f64,
     /// Least possible errors, of a decoder that sees all readings of a frame.
     pub limit: LimitSummary,
@@ -106,7 +111,8 @@ impl Column {
 /// [`Error`] for a scene without `[table1]`, or an error of [`train`](taxel_learn::train::train).
 pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table1> {
     let settings = experiment.table1.as_ref().ok_or_else(|| {
-        let cause = "it has no [table1]: add one, or use a scene that has (paper, press)";
+        let cause =
+            "it has no [table1]: add one, or use a scene that has (paper, paper-as-printed)";
         Error::of_scene(&experiment.name, cause)
     })?;
     let on_training = settings.open.is_some_and(|open| open.judged_on == JudgedOn::Training);
@@ -133,10 +139,15 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
         Ok(Column { noise_level: level, limit, decoders })
     });
     let columns = columns.collect::<Result<Vec<_>>>()?;
-    let comparison = compare(&columns, experiment.world.sensor.size_mm[2]);
+    let comparison = if is_comparable(experiment, settings) {
+        compare(&columns, experiment.world.sensor.size_mm[2])
+    } else {
+        Vec::new()
+    };
     Ok(Table1 {
         centres: settings.centres,
         affine_tail: settings.affine_tail,
+        noise_kind: experiment.world.noise.kind,
         training_frames: settings.frames,
         test_frames: if on_training { settings.frames } else { settings.test_frames },
         standard_frames: settings.standard_frames,
@@ -147,13 +158,26 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
     })
 }
 
+/// Whether a scene's `table` is one that the paper's could be: of its sensor, with electrodes that move on their own along
+/// z at least, and its spreads and noise levels in per cent.
+pub fn is_comparable(experiment: &Experiment, table: &Settings) -> bool {
+    let world = &experiment.world;
+    let is_moved = matches!(world.motion, Kind::Independent(_));
+    let is_of_paper = world.sensor == Sensor::paper() && is_moved;
+    let names = world.output_names();
+    let has_z = columns::groups(&names).iter().any(|(group, _)| columns::is_compression(group));
+    is_of_paper
+        && has_z
+        && world.noise.kind != NoiseKind::Absolute
+        && printed::is_layout(&table.spreads, &table.noise_levels)
+}
+
 fn no_limit_on_training() -> LimitSummary {
     let refused = "cells are judged on the samples that were trained on, and these are no test";
     LimitSummary { frames: 0, groups: Vec::new(), refused: Some(refused.into()) }
 }
 
-/// The table along z by every formula that could be the paper's, beside the printed cells; empty if it has other
-/// spreads, other noise levels, or no Δz.
+/// The table along z by every formula that could be the paper's, beside the printed cells.
 fn compare(columns: &[Column], thickness_mm: f64) -> Vec<Comparison> {
     type Formula = (&'static str, fn(&Entry, &Errors, f64) -> Option<f64>);
     const FORMULAS: [Formula; 5] = [
@@ -163,11 +187,6 @@ fn compare(columns: &[Column], thickness_mm: f64) -> Vec<Comparison> {
         ("‖e‖/‖Δz‖", |_, errors, _| errors.relative_l2_percent),
         ("RMSE/H", |_, errors, thickness_mm| Some(100.0 * errors.rmse / thickness_mm)),
     ];
-    let levels: Vec<f64> = columns.iter().map(|column| column.noise_level).collect();
-    let spreads: Vec<f64> = columns.first().into_iter().flat_map(Column::spreads).collect();
-    if !printed::is_layout(&spreads, &levels) {
-        return Vec::new();
-    }
     let by = |(formula, of): &Formula| {
         let z = |entry: Option<&Entry>| {
             let entry = entry?;

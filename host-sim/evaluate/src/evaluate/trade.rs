@@ -13,6 +13,7 @@ use taxel_learn::cost::Prices;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{ModelBlob, Options};
 use taxel_limit::Refusal;
+use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::path::Path;
 
 use crate::error::{Error, NoPoint, Result};
@@ -70,7 +71,9 @@ pub struct Trade {
     pub subject: String,
     /// Seed of every random draw.
     pub seed: u64,
-    /// Noise level of one sample, as a fraction; 0 for measured data, which has its own.
+    /// Kind of the noise that a scene adds; none for measured data, which has its own.
+    pub noise_kind: Option<NoiseKind>,
+    /// Level of that noise in one sample: a fraction, or in Ω for absolute noise.
     pub noise_level: f64,
     pub training_frames: usize,
     pub test_frames: usize,
@@ -285,6 +288,7 @@ pub fn compute(
     Ok(Trade {
         subject: subject.name().into(),
         seed: subject.origin().seed,
+        noise_kind: subject.scene().map(|scene| scene.world.noise.kind),
         noise_level: match subject {
             Subject::Scene(scene) => scene.world.noise.total_level(),
             Subject::Measured(data) => data.noise_level().unwrap_or(0.0),

@@ -3,7 +3,8 @@
 use serde::Deserialize;
 use taxel_data::{BadValue, require};
 use taxel_simulate::World;
-use taxel_simulate::motion::{Edge, Ellipse, Kind, Pair, Press, Punch, Tail};
+use taxel_simulate::motion::{Dent, Kind};
+use taxel_simulate::profile::Profile;
 
 /// Contact that a model was not trained on.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -26,72 +27,42 @@ const LONGEST_NAME: usize = 24;
 /// What the sensor model does not hold for, or lacks a wanted output, is left out.
 pub(super) fn derived(world: &World) -> Vec<OtherContact> {
     let Some(own) = world.motion.as_press() else { return vec![] };
-    let Press { dent_radius_mm, dent_depth_mm, shear_ratio } = own;
-    let [least_mm, most_mm] = dent_radius_mm;
+    let Dent { quantities: [radius_mm, ..], dent_depth_mm, shear_ratio, .. } = own;
+    let [least_mm, most_mm] = radius_mm;
     let [x_mm, y_mm, _] = world.sensor.size_mm;
     let apart_mm = [0.4, 0.5].map(|share| share * x_mm.min(y_mm));
     // Two dents together are no deeper than one of the scene.
     let overlap = (-(apart_mm[0] / most_mm).powi(2) / 8.0).exp();
     let pair_depth_mm = dent_depth_mm.map(|mm| mm / (1.0 + overlap));
-    let any = None;
-    let contacts: [(&str, Kind); 8] = [
-        ("smaller radii", Press { dent_radius_mm: SMALLER.map(|by| by * least_mm), ..own }.into()),
-        ("larger radii", Press { dent_radius_mm: LARGER.map(|by| by * most_mm), ..own }.into()),
-        ("more shear", Press { shear_ratio: LARGER.map(|by| by * shear_ratio[1]), ..own }.into()),
-        (
-            "flat punch",
-            Punch {
-                punch_radius_mm: dent_radius_mm,
-                decay_mm: [0.2 * least_mm, 0.5 * least_mm],
-                dent_depth_mm,
-                shear_ratio,
-            }
-            .into(),
-        ),
+    let of =
+        |profile, ranges: &[[f64; 2]]| Dent::new(profile, ranges, [dent_depth_mm, shear_ratio]);
+    let (half_turn, turn) = ([0.0, 180.0], [0.0, 360.0]);
+    let contacts: [(&str, Dent); 8] = [
+        ("smaller radii", of(Profile::Press, &[SMALLER.map(|by| by * least_mm)])),
+        ("larger radii", of(Profile::Press, &[LARGER.map(|by| by * most_mm)])),
+        ("more shear", Dent { shear_ratio: LARGER.map(|by| by * shear_ratio[1]), ..own }),
+        ("flat punch", of(Profile::Punch, &[radius_mm, [0.2 * least_mm, 0.5 * least_mm]])),
         (
             "edge",
-            Edge {
-                edge_length_mm: [1.5 * most_mm, 3.0 * most_mm],
-                edge_width_mm: [0.5 * least_mm, least_mm],
-                direction_deg: any,
-                dent_depth_mm,
-                shear_ratio,
-            }
-            .into(),
+            of(
+                Profile::Edge,
+                &[[1.5 * most_mm, 3.0 * most_mm], [0.5 * least_mm, least_mm], half_turn],
+            ),
         ),
-        (
-            "ellipse",
-            Ellipse {
-                dent_radius_mm,
-                aspect_ratio: [1.5, 3.0],
-                direction_deg: any,
-                dent_depth_mm,
-                shear_ratio,
-            }
-            .into(),
-        ),
-        (
-            "long tail",
-            Tail { cover_mm: dent_radius_mm.map(|mm| mm / OF_COVER), dent_depth_mm, shear_ratio }
-                .into(),
-        ),
+        ("ellipse", of(Profile::Ellipse, &[radius_mm, [1.5, 3.0], half_turn])),
+        ("long tail", of(Profile::Tail, &[radius_mm.map(|mm| mm / OF_COVER)])),
         (
             "two contacts",
-            Pair {
-                dent_radius_mm,
-                distance_mm: apart_mm,
-                direction_deg: any,
-                second_depth_ratio: [0.5, 1.0],
+            Dent {
                 dent_depth_mm: pair_depth_mm,
-                shear_ratio,
-            }
-            .into(),
+                ..of(Profile::Pair, &[radius_mm, apart_mm, turn, [0.5, 1.0]])
+            },
         ),
     ];
     let contacts =
         contacts.into_iter().filter(|(name, _)| *name != "more shear" || shear_ratio[1] > 0.0);
     let contacts =
-        contacts.map(|(name, deformation)| OtherContact { name: name.into(), deformation });
+        contacts.map(|(name, dent)| OtherContact { name: name.into(), deformation: dent.into() });
     contacts.filter(|other| other.world(world).check().is_ok()).collect()
 }
 

@@ -1,9 +1,10 @@
 //! The limit against figures that were computed independently, and against what must not change it.
 
 use taxel_learn::Decoder;
-use taxel_simulate::motion::{Edge, Ellipse, Kind, Mix, Pair, Part, Press, Punch, Tail};
-use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::motion::{Dent, Kind, Mix, Part};
+use taxel_simulate::noise::{Noise, NoiseKind};
 use taxel_simulate::path::Path;
+use taxel_simulate::profile::Profile;
 use taxel_simulate::rubber::StandardLinearSolid;
 use taxel_simulate::{drift::Drift, synthesise};
 
@@ -55,19 +56,22 @@ fn a_frame_is_decoded_alike_wherever_it_stands() {
 }
 
 #[test]
-fn noise_of_a_span_is_modelled() {
-    // Two scenes with nearly the same noise: one relative to the reading, one to the span.
+fn noise_of_each_kind_is_modelled() {
+    // Three scenes with nearly the same noise: relative to the reading, to the span, and in Ω.
     let mut world = World { read_rows: vec![3], ..World::press() };
     let limit = |world: &World| Reference::new(world, 100, &Silent).unwrap().limits()[2].clone();
     let relative = limit(&world);
     let frames = Synthesis::new(&world).ideal().frames(Stream::Test, 2000).inputs;
     let spans: f64 = frames.ranges().iter().map(|[low, high]| high - low).sum();
-    let span_of_mean = spans / frames.means().iter().sum::<f64>();
-    world.noise.kind = NoiseKind::Span;
-    world.noise.level = 0.005 / span_of_mean;
-    let of_span = limit(&world);
-    let ratio = of_span.limit / relative.limit;
-    assert!((0.85..1.15).contains(&ratio), "{relative:?} {of_span:?}");
+    let means: f64 = frames.means().iter().sum();
+    for (kind, level) in
+        [(NoiseKind::Span, 0.005 * means / spans), (NoiseKind::Absolute, 0.005 * means / 18.0)]
+    {
+        world.noise = Noise::white(kind, level);
+        let found = limit(&world);
+        let ratio = found.limit / relative.limit;
+        assert!((0.85..1.15).contains(&ratio), "{relative:?} {found:?}");
+    }
 }
 
 #[test]
@@ -97,31 +101,24 @@ fn the_limit_of_still_frames_does_not_depend_on_the_rubber() {
 
 #[test]
 fn latents_have_the_distribution_that_frames_are_drawn_from() {
-    let (dent_radius_mm, direction_deg) = ([2.0, 5.0], None);
-    let (dent_depth_mm, shear_ratio) = ([0.2, 1.0], [0.1, 0.5]);
-    let press: Kind = Press { dent_radius_mm, dent_depth_mm, shear_ratio }.into();
-    let (punch_radius_mm, decay_mm) = ([1.0, 3.0], [0.5, 1.0]);
-    let punch = Punch { punch_radius_mm, decay_mm, dent_depth_mm, shear_ratio };
-    let (edge_length_mm, edge_width_mm) = ([5.0, 12.0], [1.0, 2.0]);
-    let edge = Edge { edge_length_mm, edge_width_mm, direction_deg, dent_depth_mm, shear_ratio };
-    let aspect_ratio = [1.0, 3.0];
-    let ellipse =
-        Ellipse { dent_radius_mm, aspect_ratio, direction_deg, dent_depth_mm, shear_ratio };
-    let tail = Tail { cover_mm: [3.0, 9.0], dent_depth_mm, shear_ratio };
-    let (distance_mm, second_depth_ratio, dent_depth_mm) = ([4.0, 9.0], [0.2, 1.0], [0.2, 0.5]);
-    let pair = Pair {
-        dent_radius_mm,
-        distance_mm,
-        direction_deg,
-        second_depth_ratio,
-        dent_depth_mm,
-        shear_ratio,
-    };
-    let parts = [(2.0, punch.into()), (1.0, press.clone())];
-    let parts = parts.map(|(weight, deformation)| Part { weight, deformation }).to_vec();
+    let of = |profile, ranges: &[[f64; 2]]| Dent::new(profile, ranges, [[0.2, 1.0], [0.1, 0.5]]);
+    let turn = [0.0, 360.0];
+    let dents = [
+        of(Profile::Press, &[[2.0, 5.0]]),
+        of(Profile::Punch, &[[1.0, 3.0], [0.5, 1.0]]),
+        of(Profile::Edge, &[[5.0, 12.0], [1.0, 2.0], turn]),
+        of(Profile::Ellipse, &[[2.0, 5.0], [1.0, 3.0], turn]),
+        of(Profile::Tail, &[[3.0, 9.0]]),
+        Dent {
+            dent_depth_mm: [0.2, 0.5],
+            ..of(Profile::Pair, &[[2.0, 5.0], [4.0, 9.0], turn, [0.2, 1.0]])
+        },
+    ];
+    let parts = [(2.0, dents[1]), (1.0, dents[0])];
+    let parts = parts.map(|(weight, dent)| Part { weight, deformation: dent.into() }).to_vec();
     let mut world = World { read_rows: vec![1], ..World::press() };
-    let kinds = [press, punch.into(), edge.into(), ellipse.into(), tail.into(), pair.into()];
-    for motion in kinds.into_iter().chain([Mix { parts }.into(), World::paper().motion]) {
+    let kinds = dents.map(Kind::from).into_iter();
+    for motion in kinds.chain([Mix { parts }.into(), World::paper().motion]) {
         world.motion = motion;
         let drawn = Synthesis::new(&world).frames(Stream::Test, 20_000).outputs;
         let prior = prior(&world, &[1]);
@@ -178,7 +175,7 @@ fn noise_of_a_span_is_that_of_each_row() {
     let mut world = World::paper();
     world.noise.kind = NoiseKind::Span;
     let limit = Limit::new(&world).unwrap();
-    let spans_ohm = Synthesis::new(&world).noise_span_ohm();
+    let spans_ohm = Synthesis::new(&world).noise_unit_ohm();
     let expected: Vec<f64> = spans_ohm.iter().map(|span| world.noise.level * span).collect();
     let found: Vec<f64> = limit.groups.iter().flat_map(|it| it.deviation_ohm.clone()).collect();
     assert!(limit.groups.len() > 1);

@@ -1,105 +1,121 @@
-//! Contacts whose dent has some profile: what they share, and how they are drawn.
+//! Motion by one contact, whose dent has some profile.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays are indexed alike")]
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::fmt::Debug;
 
 use taxel_data::{
     BadValue, LANES, Lanes, Purpose, exp, normal_share_below, require, sin_cos, widest,
 };
 
-use super::{Draws, Motion, Press, Trajectories, check_range};
-use crate::contact::{Contact, Form, Profile};
-use crate::sensor::{Sensor, Vector3};
+use super::{Draws, Motion, check_range};
+use crate::contact::Contact;
+use crate::profile::{Form, Profile};
+use crate::sensor::Sensor;
 
-/// Kind of contact, centred anywhere on the face.
+/// One contact, centred anywhere on the face.
 ///
 /// Deformation: Δz = d·f(x, y) as seen from the centre, with the profile f, and (Δx, Δy) = μ·Δz·(cos θ, sin θ) with θ
 /// uniform on the circle. All other quantities are uniform on their ranges.
-pub(super) trait Dent: Debug + Send + Sync {
-    /// Ranges of the depth d in mm and of the shear ratio μ.
-    fn depth_and_shear(&self) -> [[f64; 2]; 2];
-
-    /// Quantities that fix the dent's form, at most four.
-    fn quantities(&self) -> Vec<Quantity>;
-
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dent {
     /// Profile f of the dent.
-    fn profile(&self) -> &'static dyn Profile;
-
-    /// Form of a dent at this centre on a face of this size, from its quantities.
-    fn form(&self, quantities: Form<f64>, _centre_mm: [f64; 2], _size_mm: &Vector3) -> Form<f64> {
-        quantities
-    }
-
-    /// Range of the radius s in mm of Gaussian dents exp(−ρ²/2s²) that are as wide at half their depth.
-    fn gaussian_radius_mm(&self) -> [f64; 2];
-
-    /// Greatest share of the depth anywhere.
-    fn most(&self) -> f64 {
-        1.0
-    }
-}
-
-/// Quantity of a dent that is uniform on a range.
-pub(super) struct Quantity {
-    /// Name of its field.
-    pub field: &'static str,
-    pub range: [f64; 2],
-    /// Values that it may have, and the rule in words.
-    pub allowed: (fn(f64) -> bool, &'static str),
-}
-
-impl Quantity {
-    /// Length in mm, which is positive.
-    pub fn length(field: &'static str, range: [f64; 2]) -> Self {
-        let allowed = (|mm: f64| mm.is_finite() && mm > 0.0) as fn(f64) -> bool;
-        Self { field, range, allowed: (allowed, "it must be a positive number") }
-    }
-
-    /// Direction in degrees from x towards y; all of them, uniformly, unless a scene says otherwise.
-    pub fn direction(range: Option<[f64; 2]>, all: f64) -> Self {
-        let allowed = (|degrees: f64| degrees.abs() <= 360.0) as fn(f64) -> bool;
-        let range = range.unwrap_or([0.0, all]);
-        Self { field: "direction_deg", range, allowed: (allowed, "it must be from -360 to 360") }
-    }
-
-    fn check(&self) -> Result<(), BadValue> {
-        let ((is_allowed, rule), [low, high]) = (self.allowed, self.range);
-        let field = format!("deformation.{}", self.field);
-        require(is_allowed(low), format!("{field} (low)"), format!("{low:?}"), || rule.into())?;
-        check_range(self.field, self.range)?;
-        require(is_allowed(high), format!("{field} (high)"), format!("{high:?}"), || rule.into())
-    }
-}
-
-/// Cosine and sine of a direction in degrees.
-pub(super) fn of_direction(degrees: f64) -> [f64; 2] {
-    let (sine, cosine) = sin_cos(TAU * (degrees / 360.0 - (degrees / 360.0).floor()));
-    [cosine, sine]
+    pub profile: Profile,
+    /// Ranges of the [quantities](Profile::quantities) that fix its form; what it does not have is 0.
+    pub quantities: Form<[f64; 2]>,
+    /// Range of the depth d in mm.
+    pub dent_depth_mm: [f64; 2],
+    /// Range of the shear ratio μ.
+    pub shear_ratio: [f64; 2],
 }
 
 /// Number of latents of a contact besides those of its form: centre, depth, and two of its shear.
 const LATENTS: usize = 5;
 
-impl<D: Dent> Motion for D {
+impl Dent {
+    /// Contact of this `profile` with these ranges of its quantities, its depth in mm and its shear ratio.
+    ///
+    /// # Panics
+    /// If there is not a range for each quantity.
+    pub fn new(
+        profile: Profile,
+        ranges: &[[f64; 2]],
+        [dent_depth_mm, shear_ratio]: [[f64; 2]; 2],
+    ) -> Self {
+        let mut quantities = [[0.0; 2]; 4];
+        quantities[..profile.quantities().len()].copy_from_slice(ranges);
+        Self { profile, quantities, dent_depth_mm, shear_ratio }
+    }
+
+    /// Contact of this `profile` with the ranges of a scene, by field.
+    pub(super) fn of_fields(
+        profile: Profile,
+        fields: &BTreeMap<String, [f64; 2]>,
+    ) -> Result<Self, String> {
+        let of_form = profile.quantities().iter().map(|it| (it.field, it.default));
+        let wanted = of_form.chain([("dent_depth_mm", None), ("shear_ratio", None)]);
+        let wanted: Vec<(&str, Option<[f64; 2]>)> = wanted.collect();
+        if let Some(name) = fields.keys().find(|name| wanted.iter().all(|it| it.0 != *name)) {
+            let names: Vec<String> = wanted.iter().map(|(name, _)| format!("`{name}`")).collect();
+            return Err(format!("unknown field `{name}`, expected {}", names.join(", ")));
+        }
+        let range = |(name, default): &(&str, Option<[f64; 2]>)| {
+            let range = fields.get(*name).copied().or(*default);
+            range.ok_or_else(|| format!("missing field `{name}`"))
+        };
+        let ranges = wanted.iter().map(range).collect::<Result<Vec<_>, _>>()?;
+        let (of_form, depth_and_shear) = ranges.split_at(profile.quantities().len());
+        Ok(Self::new(profile, of_form, [depth_and_shear[0], depth_and_shear[1]]))
+    }
+
+    /// Contact from numbers on [0, 1]: one each for the centre's x and y, the quantities of the form, and the depth.
+    fn from_units(&self, mut units: Vec<Lanes>, shear: &[Lanes; 2], sensor: &Sensor) -> Contact {
+        let [x_mm, y_mm, _] = sensor.size_mm;
+        let of_form = &self.quantities[..self.profile.quantities().len()];
+        let ranges = [&[[0.0, x_mm], [0.0, y_mm]], of_form, &[self.dent_depth_mm]].concat();
+        for (unit, [low, high]) in units.iter_mut().zip(ranges) {
+            unit.iter_mut().for_each(|unit| *unit = low + (high - low) * *unit);
+        }
+        let [x_mm, y_mm, quantities @ .., depth_mm] = &units[..] else {
+            unreachable!("a depth at least")
+        };
+        let mut form = [[0.0; LANES]; 4];
+        for frame in 0..LANES {
+            let mut of_frame = [0.0; 4];
+            of_frame.iter_mut().zip(quantities).for_each(|(number, lanes)| *number = lanes[frame]);
+            let of_frame = self.profile.form(of_frame, [x_mm[frame], y_mm[frame]], &sensor.size_mm);
+            form.iter_mut().zip(of_frame).for_each(|(lanes, number)| lanes[frame] = number);
+        }
+        Contact {
+            centre_mm: [*x_mm, *y_mm],
+            dent_depth_mm: *depth_mm,
+            shear: *shear,
+            profile: [self.profile; LANES],
+            form,
+        }
+    }
+}
+
+impl Motion for Dent {
     fn range_mm(&self) -> [[f64; 2]; 3] {
-        let [[_, depth], [_, ratio]] = self.depth_and_shear();
-        let deepest = depth * self.most();
-        let shear = deepest * ratio;
+        let deepest = self.dent_depth_mm[1] * self.profile.most(self.quantities);
+        let shear = deepest * self.shear_ratio[1];
         [[-shear, shear], [-shear, shear], [0.0, deepest]]
     }
 
     fn deepest_mm(&self) -> f64 {
-        self.depth_and_shear()[0][1]
+        self.dent_depth_mm[1]
     }
 
     fn check(&self) -> Result<(), BadValue> {
-        self.quantities().iter().try_for_each(Quantity::check)?;
-        let [depth_mm, shear_ratio] = self.depth_and_shear();
+        for (quantity, range) in self.profile.quantities().iter().zip(self.quantities) {
+            quantity.check(range)?;
+            check_range(quantity.field, range)?;
+        }
         for (field, range, rule) in [
-            ("dent_depth_mm", depth_mm, "a depth is not negative"),
-            ("shear_ratio", shear_ratio, "a ratio is not negative"),
+            ("dent_depth_mm", self.dent_depth_mm, "a depth is not negative"),
+            ("shear_ratio", self.shear_ratio, "a ratio is not negative"),
         ] {
             let holds = !(range[0].is_nan() || range[0] < 0.0);
             require(holds, format!("deformation.{field}"), format!("{range:?}"), || rule.into())?;
@@ -109,27 +125,25 @@ impl<D: Dent> Motion for D {
     }
 
     fn latents(&self, _electrodes: usize) -> usize {
-        LATENTS + self.quantities().len()
+        LATENTS + self.profile.quantities().len()
     }
 
-    fn as_press(&self) -> Option<Press> {
-        let [dent_depth_mm, shear_ratio] = self.depth_and_shear();
-        Some(Press { dent_radius_mm: self.gaussian_radius_mm(), dent_depth_mm, shear_ratio })
+    fn as_press(&self) -> Option<Self> {
+        let end = |end: usize| self.quantities.map(|range| range[end]);
+        let radius_mm = [0, 1].map(|it| self.profile.gaussian_radius_mm(end(it)));
+        Some(Self::new(Profile::Press, &[radius_mm], [self.dent_depth_mm, self.shear_ratio]))
     }
 
     fn largest_contact(&self, sensor: &Sensor) -> Option<Contact> {
-        let [[_, depth], [_, ratio]] = self.depth_and_shear();
-        let highest = self.quantities().into_iter().map(|quantity| quantity.range[1]);
-        let [x_mm, y_mm, _] = sensor.size_mm;
-        let values = [0.5 * x_mm, 0.5 * y_mm].into_iter().chain(highest).chain([depth]);
-        let values: Vec<Lanes> = values.map(|value| [value; LANES]).collect();
-        Some(contact(self, &values, &[[ratio; LANES]; 2], sensor))
+        let mut units = vec![[1.0; LANES]; 3 + self.profile.quantities().len()];
+        units[..2].fill([0.5; LANES]);
+        Some(self.from_units(units, &[[self.shear_ratio[1]; LANES]; 2], sensor))
     }
 
     /// There is a latent each for the centre's x and y, the quantities of the form and the depth, and two for the shear.
     /// These two are a vector in the shear's direction, so nothing jumps at θ = 2π.
     fn place_contact(&self, sensor: &Sensor, latents: &[Lanes]) -> Option<Contact> {
-        let [_, [low, high]] = self.depth_and_shear();
+        let [low, high] = self.shear_ratio;
         let (mut units, mut shear) = (latents[..self.latents(0) - 2].to_vec(), [[0.0; LANES]; 2]);
         let across = &latents[units.len()..][..2];
         widest!({
@@ -146,20 +160,19 @@ impl<D: Dent> Motion for D {
                 shear[1][frame] = factor * y;
             }
         });
-        Some(from_units(self, units, &shear, sensor))
+        Some(self.from_units(units, &shear, sensor))
     }
 
     fn draw_contact(&self, sensor: &Sensor, draws: &mut Draws) -> Option<Contact> {
-        let (mut units, mut shear) =
-            (vec![[0.0; LANES]; 3 + self.quantities().len()], [[0.0; LANES]; 2]);
-        let [_, ratio] = self.depth_and_shear();
+        let mut units = vec![[0.0; LANES]; 3 + self.profile.quantities().len()];
+        let mut shear = [[0.0; LANES]; 2];
         widest!({
             let random = draws.of(Purpose::Contact, 0);
             for unit in &mut units {
                 random.between([[0.0, 1.0]], std::array::from_mut(unit));
             }
             let mut drawn = [[0.0; LANES]; 2];
-            random.between([ratio, [0.0, 1.0]], &mut drawn);
+            random.between([self.shear_ratio, [0.0, 1.0]], &mut drawn);
             let [ratios, turns] = drawn;
             for frame in 0..LANES {
                 let (sine, cosine) = sin_cos(TAU * turns[frame]);
@@ -167,69 +180,7 @@ impl<D: Dent> Motion for D {
                 shear[1][frame] = ratios[frame] * sine;
             }
         });
-        Some(from_units(self, units, &shear, sensor))
-    }
-}
-
-/// Contact from numbers on [0, 1]: one each for the centre's x and y, the quantities of the form, and the depth.
-fn from_units<D: Dent>(
-    dent: &D,
-    mut units: Vec<Lanes>,
-    shear: &[Lanes; 2],
-    sensor: &Sensor,
-) -> Contact {
-    let [x_mm, y_mm, _] = sensor.size_mm;
-    let own = dent.quantities().into_iter().map(|quantity| quantity.range);
-    let ranges =
-        [[0.0, x_mm], [0.0, y_mm]].into_iter().chain(own).chain([dent.depth_and_shear()[0]]);
-    for (unit, [low, high]) in units.iter_mut().zip(ranges) {
-        unit.iter_mut().for_each(|unit| *unit = low + (high - low) * *unit);
-    }
-    contact(dent, &units, shear, sensor)
-}
-
-/// Contact with these values: its centre's x and y, the quantities of its form, and the depth.
-fn contact<D: Dent>(dent: &D, values: &[Lanes], shear: &[Lanes; 2], sensor: &Sensor) -> Contact {
-    let [x_mm, y_mm, quantities @ .., depth_mm] = values else { unreachable!("a depth at least") };
-    let mut form: Form = [[0.0; LANES]; 4];
-    for frame in 0..LANES {
-        let mut of_frame = [0.0; 4];
-        of_frame.iter_mut().zip(quantities).for_each(|(number, lanes)| *number = lanes[frame]);
-        let of_frame = dent.form(of_frame, [x_mm[frame], y_mm[frame]], &sensor.size_mm);
-        form.iter_mut().zip(of_frame).for_each(|(lanes, number)| lanes[frame] = number);
-    }
-    Contact {
-        centre_mm: [*x_mm, *y_mm],
-        dent_depth_mm: *depth_mm,
-        shear: *shear,
-        form,
-        profiles: vec![dent.profile()],
-        profile_of: [0; LANES],
-    }
-}
-
-/// Contacts that have been drawn, and the sensor that they are pressed into.
-pub(super) struct Contacts<'m> {
-    pub sensor: &'m Sensor,
-    pub contact: Option<Contact>,
-}
-
-impl Trajectories for Contacts<'_> {
-    fn deform(&mut self, row: usize, _: &mut Draws, deformation_mm: &mut [[Lanes; 3]]) {
-        if let Some(contact) = &self.contact {
-            contact.deform(self.sensor.row_electrodes_mm(row), deformation_mm);
-        }
-    }
-
-    fn contact(&self) -> Option<&Contact> {
-        self.contact.as_ref()
-    }
-
-    fn move_to(&mut self, centre_mm: [Lanes; 2], depth_mm: Lanes) {
-        if let Some(contact) = &mut self.contact {
-            contact.centre_mm = centre_mm;
-            contact.dent_depth_mm = depth_mm;
-        }
+        Some(self.from_units(units, &shear, sensor))
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use taxel_data::{BadValue, LANES, Lanes, Purpose, normal_share_below, require, widest};
 
-use super::{Draws, Kind, Motion, Press};
+use super::{Dent, Draws, Kind, Motion};
 use crate::contact::Contact;
 use crate::sensor::Sensor;
 
@@ -102,7 +102,7 @@ impl Motion for Mix {
     }
 
     /// Contact of the part with the largest weight.
-    fn as_press(&self) -> Option<Press> {
+    fn as_press(&self) -> Option<Dent> {
         let first = self.parts.iter().rev().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
         first.deformation.as_press()
     }

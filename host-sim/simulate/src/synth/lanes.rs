@@ -16,8 +16,8 @@ pub(super) struct LaneSynthesis<'s> {
     synthesis: &'s Synthesis<'s>,
     stream: Stream,
     model: LaneModel<'s>,
-    /// Span in Ω of every channel that is read; empty for relative noise.
-    span_ohm: Vec<f64>,
+    /// What the level of noise is a multiple of in every channel that is read, in Ω; empty for relative noise.
+    noise_unit_ohm: Vec<f64>,
     /// Index of each output of a row among electrodes and axes, and factor on its deformation.
     outputs: Vec<(usize, f64)>,
     /// Whether outputs of electrodes are of what pushes them, and not of where they are.
@@ -72,8 +72,12 @@ impl Memory {
 }
 
 impl<'s> LaneSynthesis<'s> {
-    /// Synthesis of frames of `stream`, with noise relative to `span_ohm` where that is not empty.
-    pub(super) fn new(synthesis: &'s Synthesis<'s>, stream: Stream, span_ohm: Vec<f64>) -> Self {
+    /// Synthesis of frames of `stream`, with noise in units of `noise_unit_ohm` where that is not empty.
+    pub(super) fn new(
+        synthesis: &'s Synthesis<'s>,
+        stream: Stream,
+        noise_unit_ohm: Vec<f64>,
+    ) -> Self {
         let sensor = &synthesis.world.sensor;
         let (mut outputs, mut of_contact) = (Vec::new(), &[][..]);
         let mut of_load = false;
@@ -92,7 +96,7 @@ impl<'s> LaneSynthesis<'s> {
             Outputs::Contact(wanted) => of_contact = wanted.as_slice(),
         }
         let model = LaneModel::new(sensor);
-        Self { synthesis, stream, model, span_ohm, outputs, of_load, of_contact }
+        Self { synthesis, stream, model, noise_unit_ohm, outputs, of_load, of_contact }
     }
 
     /// Working memory for one thread.
@@ -272,9 +276,9 @@ impl<'s> LaneSynthesis<'s> {
             let [even, odd] = &mut normals;
             random.normal_pair(even, odd);
             for (side, (readings, normals)) in readings.iter_mut().zip(&normals).enumerate() {
-                let span = self.span_ohm.get(place * columns + 2 * pair + side);
+                let unit = self.noise_unit_ohm.get(place * columns + 2 * pair + side);
                 for (reading, normal) in readings.iter_mut().zip(normals) {
-                    *reading += level * span.unwrap_or(reading) * normal;
+                    *reading += level * unit.unwrap_or(reading) * normal;
                 }
             }
         }
@@ -305,10 +309,10 @@ impl<'s> LaneSynthesis<'s> {
                 let [even, odd] = &mut normals;
                 random.normal_pair(even, odd);
             }
-            let span = self.span_ohm.get(place * world.sensor.column_wires + column);
+            let unit = self.noise_unit_ohm.get(place * world.sensor.column_wires + column);
             for (lane, reading) in readings.iter_mut().enumerate() {
                 state[lane] = decay * state[lane] + fresh * normals[column % 2][lane];
-                *reading += level * span.unwrap_or(&ideal_ohm[column][lane]) * state[lane];
+                *reading += level * unit.unwrap_or(&ideal_ohm[column][lane]) * state[lane];
             }
         }
     }

@@ -1,23 +1,26 @@
 use taxel_data::digest::digest;
 
 use super::*;
+use crate::motion::{Dent, Mix, Part};
 use crate::outputs::{ContactOutput, ElectrodeOutputs, Quantity};
+use crate::profile::Profile;
 use crate::rubber::StandardLinearSolid;
-use crate::sensor::{Axis, Sensor};
-
-fn world(name: &str) -> World {
-    if name == "paper" { World::paper() } else { World::press() }
-}
+use crate::sensor::Axis;
 
 #[test]
 fn a_frame_is_the_same_however_many_are_asked_for_and_whichever_rows_are_read() {
-    for name in ["paper", "press"] {
-        let whole = synthesise(&world(name), Stream::Training, 20);
-        let few = synthesise(&world(name), Stream::Training, 5);
-        assert_eq!(few.inputs.values, whole.inputs.values[..5 * 144]);
-        let mut two_rows = world(name);
-        two_rows.read_rows = vec![2, 6];
-        let two_rows = synthesise(&two_rows, Stream::Training, 20);
+    for world in [World::paper(), World::press(), world_of_contact()] {
+        let whole = synthesise(&world, Stream::Training, 200);
+        let few = synthesise(&world, Stream::Training, 70);
+        assert_eq!(few.inputs.values, whole.inputs.values[..70 * 144]);
+        let later = Synthesis::new(&world).frames_from(Stream::Training, 64, 20);
+        assert_eq!(later.inputs.values, whole.inputs.values[64 * 144..84 * 144]);
+        let two_rows = World { read_rows: vec![2, 6], ..world };
+        let two_rows = synthesise(&two_rows, Stream::Training, 200);
+        if whole.rows == 1 {
+            assert_eq!(two_rows.outputs, whole.outputs);
+            continue;
+        }
         assert_eq!(two_rows.row_table(0), whole.row_table(2));
         assert_eq!(two_rows.row_table(1), whole.row_table(6));
     }
@@ -25,43 +28,77 @@ fn a_frame_is_the_same_however_many_are_asked_for_and_whichever_rows_are_read() 
 
 #[test]
 fn streams_seeds_and_frames_differ() {
-    let first = synthesise(&world("press"), Stream::Training, 2);
-    let test = synthesise(&world("press"), Stream::Test, 2);
-    let other = synthesise(&World { seed: 2, ..world("press") }, Stream::Training, 2);
+    let first = synthesise(&World::press(), Stream::Training, 2);
+    let test = synthesise(&World::press(), Stream::Test, 2);
+    let other = synthesise(&World { seed: 2, ..World::press() }, Stream::Training, 2);
     assert_ne!(first.outputs, test.outputs);
     assert_ne!(first.outputs, other.outputs);
     assert_ne!(first.outputs.values[..144], first.outputs.values[144..]);
 }
 
-#[test]
-fn noise_of_either_kind_has_the_size_it_is_asked_for() {
-    for kind in [NoiseKind::Relative, NoiseKind::Span] {
-        let text = kind.name();
-        let mut world = World { read_rows: vec![3], ..World::press() };
-        world.noise.kind = kind;
-        world.set_noise_level(0.02).unwrap();
-        let frames = 20_000;
-        let noisy = synthesise(&world, Stream::Training, frames);
-        let ideal = Synthesis::new(&world).ideal().frames(Stream::Training, frames);
-        assert_eq!(noisy.outputs, ideal.outputs);
-        let spans =
-            Synthesis::new(&world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs.ranges();
-        let (mut sum, mut squares) = (0.0, 0.0);
-        for (noisy, ideal) in noisy.inputs.lines().zip(ideal.inputs.lines()) {
-            for (column, (noisy, ideal)) in noisy.iter().zip(ideal).enumerate() {
-                let unit = match kind {
-                    NoiseKind::Relative => *ideal,
-                    NoiseKind::Span => spans[column][1] - spans[column][0],
-                };
-                let n = (noisy - ideal) / (0.02 * unit);
-                sum += n;
-                squares += n * n;
-            }
+/// Mean and variance of the difference of two tables of rows, each divided by the `unit` of its reading and column.
+fn moments(noisy: &Table, ideal: &Table, unit: impl Fn(f64, usize) -> f64) -> [f64; 2] {
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for (noisy, ideal) in noisy.lines().zip(ideal.lines().cycle()) {
+        for (column, (noisy, ideal)) in noisy.iter().zip(ideal).enumerate() {
+            let n = (noisy - ideal) / unit(*ideal, column);
+            sum += n;
+            squares += n * n;
         }
-        let count = (frames * 18) as f64;
-        assert!((sum / count).abs() < 5.0 / count.sqrt(), "{text}: mean {}", sum / count);
-        let error = (squares / count - 1.0).abs();
-        assert!(error < 5.0 * (2.0 / count).sqrt(), "{text}: variance is off by {error}");
+    }
+    let count = noisy.values.len() as f64;
+    [sum / count, squares / count]
+}
+
+/// Checks a standard normal's `moments` over so many `numbers` within five standard errors.
+fn check_standard_normal([mean, variance]: [f64; 2], numbers: usize, of: &str) {
+    let count = numbers as f64;
+    assert!(mean.abs() < 5.0 / count.sqrt(), "{of}: mean {mean}");
+    assert!((variance - 1.0).abs() < 5.0 * (2.0 / count).sqrt(), "{of}: variance {variance}");
+}
+
+#[test]
+fn noise_of_each_kind_has_the_size_it_is_asked_for_in_frames_and_in_baselines() {
+    for (kind, level) in
+        [(NoiseKind::Relative, 0.02), (NoiseKind::Span, 0.02), (NoiseKind::Absolute, 0.7)]
+    {
+        let mut world = World { read_rows: vec![3], ..World::press() };
+        world.noise = Noise::white(kind, level);
+        world.check().unwrap();
+        let synthesis = Synthesis::new(&world);
+        let spans = synthesis.clone().ideal().frames(Stream::Span, SPAN_FRAMES).inputs.ranges();
+        let sigma_ohm = |ideal_ohm: f64, column: usize| match kind {
+            NoiseKind::Relative => level * ideal_ohm,
+            NoiseKind::Span => level * (spans[column][1] - spans[column][0]),
+            NoiseKind::Absolute => level,
+        };
+        let noisy = synthesis.frames(Stream::Training, 20_000);
+        let ideal = synthesis.clone().ideal().frames(Stream::Training, 20_000);
+        assert_eq!(noisy.outputs, ideal.outputs);
+        let found = moments(&noisy.inputs, &ideal.inputs, sigma_ohm);
+        check_standard_normal(found, noisy.inputs.values.len(), kind.name());
+        // White: neither neighbours in a frame nor those from frame to frame go together.
+        let differences: Vec<f64> =
+            noisy.inputs.values.iter().zip(&ideal.inputs.values).map(|(a, b)| a - b).collect();
+        let variance = differences.iter().map(|n| n * n).sum::<f64>();
+        for apart in [1, 18] {
+            let products: f64 = differences.windows(apart + 1).map(|n| n[0] * n[apart]).sum();
+            let correlation = products / variance;
+            assert!(correlation.abs() < 5.0 / (differences.len() as f64).sqrt(), "{correlation}");
+        }
+        // A baseline is the untouched sensor with what averaging leaves of the noise, and with draws of its own.
+        let untouched = synthesis.clone().ideal().untouched().frames(Stream::Test, 1).inputs;
+        let of_rest = world.sensor.linearise(3, &[[0.0; 3]; 6]);
+        assert!((untouched.values[0] / of_rest[0].resistance_ohm - 1.0).abs() < 1e-12);
+        let baselines = synthesis.baselines(Stream::Test, 4000, 25);
+        assert_eq!((baselines.len(), &baselines.names), (4000, &untouched.names));
+        let of_mean = |ideal_ohm: f64, column: usize| sigma_ohm(ideal_ohm, column) / 5.0;
+        let found = moments(&baselines, &untouched, of_mean);
+        check_standard_normal(found, baselines.values.len(), kind.name());
+        let noisy = synthesis.clone().untouched().frames(Stream::Test, 1).inputs;
+        let [of_frame, of_baseline] =
+            [noisy.values[0], baselines.values[0]].map(|ohm| ohm - untouched.values[0]);
+        assert!((of_frame / of_baseline / 5.0 - 1.0).abs() > 1e-3);
     }
 }
 
@@ -73,7 +110,7 @@ fn ratios<'t>(a: &'t Table, b: &'t Table) -> impl Iterator<Item = Vec<f64>> + 't
 #[test]
 fn a_drifting_gain_multiplies_all_readings_of_a_session_and_its_baseline() {
     let gain = 0.02;
-    let still = world("press");
+    let still = World::press();
     let drifting = World { drift: Some(Drift { gain }), ..still.clone() };
     let frames = 5000;
     let drifted = synthesise(&drifting, Stream::Test, frames);
@@ -106,46 +143,13 @@ fn a_drifting_gain_multiplies_all_readings_of_a_session_and_its_baseline() {
 }
 
 #[test]
-fn a_baseline_is_the_untouched_sensor_with_the_noise_that_averaging_leaves() {
-    for kind in [NoiseKind::Relative, NoiseKind::Span] {
-        let mut world = World { read_rows: vec![3, 4], ..World::press() };
-        world.noise = Noise::white(kind, 0.02);
-        let (frames, averaged) = (4000, 25);
-        let untouched = Synthesis::new(&world).ideal().untouched().frames(Stream::Test, 1).inputs;
-        let ideal = Sensor::paper();
-        let mut row_ohm = [0.0; 18];
-        ideal.row_column_resistance_ohm(4, &[[0.0; 3]; 6], &mut row_ohm);
-        assert!((untouched.values[18] / row_ohm[0] - 1.0).abs() < 1e-12);
-        let spans =
-            Synthesis::new(&world).ideal().frames(Stream::Span, SPAN_FRAMES).inputs.ranges();
-        let baselines = Synthesis::new(&world).baselines(Stream::Test, frames, averaged);
-        assert_eq!((baselines.len(), &baselines.names), (frames, &untouched.names));
-        let mut squares = 0.0;
-        for line in baselines.lines() {
-            for ((found, ideal), [low, high]) in line.iter().zip(&untouched.values).zip(&spans) {
-                let unit = if kind == NoiseKind::Relative { *ideal } else { high - low };
-                squares += ((found - ideal) / (0.02 / 5.0 * unit)).powi(2);
-            }
-        }
-        let count = (frames * 36) as f64;
-        let error = (squares / count - 1.0).abs();
-        assert!(error < 5.0 * (2.0 / count).sqrt(), "{kind:?}: variance is off by {error}");
-        // Its noise is not that of the frames.
-        let noisy = Synthesis::new(&world).untouched().frames(Stream::Test, 1).inputs;
-        let [of_frame, of_baseline] =
-            [noisy.values[0], baselines.values[0]].map(|ohm| ohm - untouched.values[0]);
-        assert!((of_frame / of_baseline / 5.0 - 1.0).abs() > 1e-3);
-    }
-}
-
-#[test]
 fn deformations_stay_in_their_ranges_and_fill_them() {
-    let paper = synthesise(&world("paper"), Stream::Training, 2000);
+    let paper = synthesise(&World::paper(), Stream::Training, 2000);
     for (name, [low, high]) in paper.outputs.names.iter().zip(paper.outputs.ranges()) {
         let floor = if name.ends_with("dz_mm") { 0.0 } else { -1.0 };
         assert!((floor..floor + 0.05).contains(&low) && (0.95..1.0).contains(&high), "{name}");
     }
-    let press = synthesise(&world("press"), Stream::Training, 5000);
+    let press = synthesise(&World::press(), Stream::Training, 5000);
     for line in press.outputs.lines() {
         for electrode in line.chunks_exact(3) {
             let [dx, dy, dz] = electrode else { panic!("three axes") };
@@ -158,7 +162,7 @@ fn deformations_stay_in_their_ranges_and_fill_them() {
 #[test]
 fn a_press_has_the_spread_that_the_design_states() {
     // RMSE of the prior mean over all electrodes: 0.158 mm, computed independently to 3.5 %.
-    let press = synthesise(&world("press"), Stream::Training, 20_000);
+    let press = synthesise(&World::press(), Stream::Training, 20_000);
     let z: Vec<usize> = (0..144).filter(|c| c % 3 == 2).collect();
     let (mut squares, mut means) = (0.0, vec![0.0; 144]);
     let frames = press.frames() as f64;
@@ -174,22 +178,19 @@ fn a_press_has_the_spread_that_the_design_states() {
 
 #[test]
 fn readings_are_those_of_the_sensors_equations() {
-    for name in ["paper", "press"] {
-        let world = world(name);
-        let frames = 150;
-        let dataset = Synthesis::new(&world).ideal().frames(Stream::Training, frames);
-        let mut row_ohm = [0.0; 18];
+    for world in [World::paper(), World::press()] {
+        let synthesis = Synthesis::new(&world).ideal();
+        let dataset = synthesis.frames(Stream::Training, 150);
         for (readings, outputs) in dataset.inputs.lines().zip(dataset.outputs.lines()) {
             for row in 0..8 {
-                let deltas = outputs[row * 18..][..18].chunks_exact(3);
-                let deltas: Vec<[f64; 3]> = deltas.map(|d| [d[0], d[1], d[2]]).collect();
-                world.sensor.row_column_resistance_ohm(row, &deltas, &mut row_ohm);
-                for (found, exact) in readings[row * 18..].iter().zip(row_ohm) {
-                    assert!((found / exact - 1.0).abs() < 2e-13, "{found} for {exact}");
+                let (deltas, _) = outputs[row * 18..][..18].as_chunks();
+                let exact = world.sensor.linearise(row, deltas);
+                for (found, exact) in readings[row * 18..].iter().zip(exact) {
+                    assert!((found / exact.resistance_ohm - 1.0).abs() < 2e-13, "{found}");
                 }
             }
         }
-        let last = Synthesis::new(&world).ideal().readings_of(Stream::Training, frames - 1);
+        let last = synthesis.readings_of(Stream::Training, 149);
         assert_eq!(dataset.inputs.lines().last().unwrap(), last);
     }
 }
@@ -238,17 +239,6 @@ fn the_contact_is_the_one_that_moves_the_electrodes() {
 }
 
 #[test]
-fn a_contact_is_the_same_however_many_frames_and_rows_are_read() {
-    let whole = synthesise(&world_of_contact(), Stream::Training, 200);
-    let few = World { read_rows: vec![2, 6], ..world_of_contact() };
-    let few = synthesise(&few, Stream::Training, 70);
-    assert_eq!(few.inputs.names.len(), 36);
-    assert_eq!(few.outputs.values, whole.outputs.values[..70 * 6]);
-    let later = Synthesis::new(&world_of_contact()).frames_from(Stream::Training, 64, 20);
-    assert_eq!(later.outputs.values, whole.outputs.values[64 * 6..84 * 6]);
-}
-
-#[test]
 fn nothing_touches_an_untouched_sensor() {
     let world = world_of_contact();
     let untouched = Synthesis::new(&world).untouched().frames(Stream::Training, 3);
@@ -277,10 +267,29 @@ fn contacts_of_motions_without_one_are_refused() {
 /// otherwise.
 #[test]
 fn synthesised_numbers_are_fixed_for_all_time() {
+    // The force is an integral, which may get better.
+    let without_force = vec![ContactOutput::Centre, ContactOutput::Depth, ContactOutput::Shear];
+    let of_contact = World { outputs: Outputs::Contact(without_force), ..World::press() };
+    let depth_and_shear = [[0.0, 1.0], [0.0, 0.5]];
+    let of = |profile, ranges: &[[f64; 2]]| Dent::new(profile, ranges, depth_and_shear);
+    let parts = [
+        of(Profile::Press, &[[2.0, 5.0]]),
+        of(Profile::Punch, &[[2.0, 5.0], [0.4, 1.0]]),
+        of(Profile::Edge, &[[7.5, 15.0], [1.0, 2.0], [0.0, 180.0]]),
+        of(Profile::Ellipse, &[[2.0, 5.0], [1.5, 3.0], [0.0, 180.0]]),
+        of(Profile::Tail, &[[4.2, 10.4]]),
+        Dent {
+            dent_depth_mm: [0.0, 0.5],
+            ..of(Profile::Pair, &[[2.0, 5.0], [7.2, 9.0], [0.0, 360.0], [0.5, 1.0]])
+        },
+    ];
+    let parts = parts.map(|dent| Part { weight: 1.0, deformation: dent.into() });
+    let mix = Mix { parts: parts.to_vec() };
     for (name, world, pinned) in [
         ("paper", World::paper(), 0xa286_1098_286b_610f_u64),
         ("press", World::press(), 0xd4e0_e1f1_2618_58b2),
-        ("contact", world_of_contact(), 0xe323_4ae1_9a97_57e4),
+        ("contact", of_contact, 0x7676_98ce_f9c8_aa29),
+        ("mix", World::of_motion(mix), 0x108d_4c69_134e_e9ab),
     ] {
         let dataset = synthesise(&world, Stream::Training, 10);
         let values = dataset.inputs.values.iter().chain(&dataset.outputs.values);
@@ -326,19 +335,8 @@ fn noise_and_drift_of_a_trajectory_are_those_of_its_frames_and_its_session() {
     let ideal = noisy.clone().ideal();
     let frames = 40 * 20;
     let [noisy, ideal] = [noisy, ideal].map(|it| it.frames(Stream::Test, frames).inputs);
-    let (mut sum, mut squares) = (0.0, 0.0);
-    let of_noise: Vec<f64> =
-        ratios(&noisy, &ideal).flatten().map(|ratio| (ratio - 1.0) / 0.005).collect();
-    for n in &of_noise {
-        sum += n;
-        squares += n * n;
-    }
-    let count = of_noise.len() as f64;
-    assert!((sum / count).abs() < 5.0 / count.sqrt(), "{}", sum / count);
-    assert!((squares / count - 1.0).abs() < 5.0 * (2.0 / count).sqrt(), "{}", squares / count);
-    // No two frames share their noise.
-    let products = of_noise.windows(145).map(|of| of[0] * of[144]).sum::<f64>();
-    assert!((products / count).abs() < 5.0 / count.sqrt(), "{}", products / count);
+    let found = moments(&noisy, &ideal, |ideal_ohm, _| 0.005 * ideal_ohm);
+    check_standard_normal(found, noisy.values.len(), "of a trajectory");
     // The gain drifts from one trajectory to the next, and not within one.
     let undrifted = World { drift: None, ..world.clone() };
     let undrifted = Synthesis::new(&undrifted).ideal().along(path, timetable);
@@ -529,11 +527,11 @@ fn rubber_with_a_memory_changes_where_electrodes_are_and_not_what_pushes_them() 
     let lines = moved.inputs.lines().zip(moved.outputs.lines()).step_by(57);
     for (readings_ohm, deformation_mm) in lines {
         let (row_mm, _) = deformation_mm[2 * 18..].as_chunks::<3>();
-        let mut expected_ohm = [0.0; 18];
-        world.sensor.row_column_resistance_ohm(2, &row_mm[..6], &mut expected_ohm);
-        let off = |(a, b): (&f64, &f64)| (a / b - 1.0).abs();
-        let worst = readings_ohm[36..].iter().zip(&expected_ohm).map(off).fold(0.0, f64::max);
-        assert!(worst < 1e-12, "{worst}");
+        for (found, expected) in
+            readings_ohm[36..].iter().zip(world.sensor.linearise(2, &row_mm[..6]))
+        {
+            assert!((found / expected.resistance_ohm - 1.0).abs() < 1e-12);
+        }
     }
     // Still contacts were held for long, and nothing presses an untouched sensor.
     let still = |world: &World| Synthesis::new(world).frames(Stream::Test, 10);

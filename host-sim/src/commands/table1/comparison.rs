@@ -2,7 +2,9 @@
 
 use crate::evaluate::printed::{CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
 
-use super::super::print::{Page, percent};
+use taxel_simulate::noise::NoiseKind;
+
+use super::super::print::Page;
 
 /// Header of [`line()`]s.
 pub fn header(what: &str) -> String {
@@ -27,7 +29,7 @@ pub fn line(name: &str, nearness: &Nearness) -> String {
 
 /// Adds computed and printed cells side by side.
 pub fn cells(page: &mut Page, cells: &Cells) {
-    let levels = NOISE_LEVELS.map(|level| format!("{:>18}", percent(level)));
+    let levels = NOISE_LEVELS.map(|level| format!("{:>18}", NoiseKind::Relative.in_words(level)));
     page.line(format_args!("{:<10}{}", "noise", levels.concat()));
     for ((spread, line), printed) in SPREADS.iter().zip(cells).zip(&CELLS) {
         let pairs =

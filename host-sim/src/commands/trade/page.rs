@@ -15,8 +15,8 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
     let tested = if let Some(choice) = &trade.test_choice {
         format!("{} measured test frames ({choice})", trade.test_frames)
     } else {
-        let percent = (trade.noise_level * 1e6).round() / 1e4;
-        format!("noise {percent} % a sample, {} test frames", trade.test_frames)
+        let noise = trade.noise_kind.map_or(String::new(), |kind| kind.in_words(trade.noise_level));
+        format!("noise {noise} a sample, {} test frames", trade.test_frames)
     };
     let tested = match &trade.motion {
         Some(path) => format!("{tested}; judged on {}", path.in_words()),

@@ -68,8 +68,8 @@ fn rise(world: &World) -> Result<f64, String> {
     let (mut before, mut worst) = (vec![f64::INFINITY; 2], 0.0_f64);
     for step in 0..=STEPS {
         let pressed = [0.0, 0.0, most_mm * f64::from(step) / f64::from(STEPS)];
-        let mut readings = vec![0.0; 2];
-        sensor.row_column_resistance_ohm(0, &[pressed; 2], &mut readings);
+        let linearised = sensor.linearise(0, &[pressed; 2]).into_iter();
+        let readings: Vec<f64> = linearised.map(|reading| reading.resistance_ohm).collect();
         if let Some(reading) = readings.iter().find(|r| !(r.is_finite() && **r > 0.0)) {
             return Err(format!("a reading is {reading:e} Ω at {} mm", pressed[2]));
         }
