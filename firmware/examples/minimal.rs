@@ -2,7 +2,7 @@
 //! and all of it takes less than 8 kB of flash without weights: `cargo xtask size`.
 //!
 //! The model, of `host-sim synth press -n 20000 -o press.csv`:
-//! `host-sim train press.csv --inputs 'r4c*_ohm' --outputs 'r4e*_dz_mm' --centres 16 --format f32-direct -o row4.bin`
+//! `host-sim train press.csv --inputs 'r4c*_ohm' --outputs 'r4e*_dz_mm' --centres 16 --format f32 -o row4.bin`
 
 use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiDevice};
 use taxel_core::{ColumnWires, RowWire};

@@ -104,8 +104,7 @@ impl Capacity {
         let frames = readings * (4 * size_of::<f32>() + size_of::<u16>())
             + 4 * self.scratch_floats()
             - 4 * readings;
-        let of_output = if cfg!(feature = "filter") { 4 } else { 2 };
-        frames + of_output * outputs * size_of::<f32>() + self.rows + 2 * self.message_bytes()
+        frames + 4 * outputs * size_of::<f32>() + self.rows + 2 * self.message_bytes()
     }
 
     /// Whether there is room for the readings and outputs of a model of this `shape`.

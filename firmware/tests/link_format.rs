@@ -92,7 +92,6 @@ fn identity() -> Report<'static> {
         rows: 8,
         columns: 18,
         outputs: 18,
-        kernel: "polynomial",
         model: Some(ModelIdentity {
             crc_32: 0x1234_5678,
             slot: 1,

@@ -2,7 +2,7 @@
 
 use mock_board::*;
 use taxel_core::rbf::Shape;
-use taxel_core::rbf::direct::{Network, Parameters};
+use taxel_core::rbf::float32::{Network, Parameters};
 use taxel_firmware::app::{Session, SessionEnd};
 use taxel_firmware::link::message::{
     Configuration, ModelFault, Refusal, Report, Request, UploadState, UploadStep,

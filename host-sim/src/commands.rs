@@ -12,7 +12,6 @@ mod model_outputs;
 pub mod scene_argument;
 pub mod coverage_page;
 mod data_notes;
-mod direct_format;
 mod refused_readings;
 mod recordings;
 mod data_file;

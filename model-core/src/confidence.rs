@@ -16,8 +16,7 @@
 
 #[cfg(cortex_m4f)]
 use crate::cortex_m4;
-use crate::exp::{ExpKernel, Polynomial};
-use crate::feature::{Built, ConfidenceBuilt, Feature};
+use crate::exp::{Exponential, Polynomial};
 use crate::projection::{self, Projection};
 use crate::rbf::NetworkError;
 
@@ -78,7 +77,6 @@ const fn component_floats(features: usize) -> usize {
 pub struct Confidence<'a> {
     sizes: Sizes,
     block: &'a [f32],
-    proof: ConfidenceBuilt,
 }
 
 /// The arrays of a block, in their order.
@@ -124,7 +122,6 @@ impl<'a> Confidence<'a> {
     /// [`NetworkError::NotFinite`] for a number that is NaN or infinite, [`NetworkError::NotPositive`] for a scale,
     /// variance or ratio that is negative, or a diagonal of W that is not positive.
     pub fn new(sizes: Sizes, block: &'a [f32]) -> Result<Self, NetworkError> {
-        let proof = NetworkError::proof(Feature::Confidence)?;
         let Sizes { readings, directions, components, outputs } = sizes;
         if [readings, directions, components, outputs].contains(&0) {
             return Err(NetworkError::Empty);
@@ -156,12 +153,12 @@ impl<'a> Confidence<'a> {
         if !not_negative.all(usable) || !components.all(positive) {
             return Err(NetworkError::NotPositive { what });
         }
-        Ok(Self { sizes, block, proof })
+        Ok(Self { sizes, block })
     }
 
     /// Makes a confidence of a block that [`new`](Self::new) has checked before.
-    pub(crate) fn of_checked(sizes: Sizes, block: &'a [f32]) -> Option<Self> {
-        ConfidenceBuilt::PROOF.map(|proof| Self { sizes, block, proof })
+    pub(crate) fn of_checked(sizes: Sizes, block: &'a [f32]) -> Self {
+        Self { sizes, block }
     }
 
     /// The confidence's sizes.

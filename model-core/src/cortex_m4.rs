@@ -7,12 +7,14 @@
 mod routines;
 
 #[cfg(cortex_m4f)]
-pub(crate) use routines::{Inputs, density, expanded, fixed16, project, sqrt};
+pub(crate) use routines::{Inputs, density, fixed16, project, sqrt};
 
 /// Inputs a row of the paper's sensor; inner loops are made for this number, in assembly or compiled.
 pub(crate) const INPUTS: usize = 18;
 /// Outputs a row of the paper's sensor; inner loops are made for groups of this number.
 pub(crate) const OUTPUTS: usize = 18;
+/// Most centres of a batch of the routine for `fixed16`.
+const BATCH: usize = 256;
 
 /// A network's parameters as plain words, with the counts that tell how to read them. Assembly reads this, so that
 /// order and sizes are its own.
@@ -43,9 +45,9 @@ impl Form {
 }
 
 impl<'a> Block<'a> {
-    /// Makes a block of these counts. A batch of the format's routine has `batch` centres.
+    /// Makes a block of these counts.
     #[inline(always)]
-    pub fn new(counts: [usize; 3], affine: bool, words: &'a [u32], batch: usize) -> Self {
+    pub fn new(counts: [usize; 3], affine: bool, words: &'a [u32]) -> Self {
         let [inputs, centres, outputs] = counts;
         let sizes = if inputs != INPUTS || outputs > OUTPUTS {
             Form::OTHER_SIZES
@@ -55,7 +57,7 @@ impl<'a> Block<'a> {
             0
         };
         let affine = if affine { Form::AFFINE } else { 0 };
-        let batches = if centres > batch { Form::BATCHES } else { 0 };
+        let batches = if centres > BATCH { Form::BATCHES } else { 0 };
         Self { inputs, centres, outputs, form: Form(affine | sizes | batches), words }
     }
 

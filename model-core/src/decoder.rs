@@ -2,11 +2,8 @@
 
 use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
 use crate::estimate::{Estimate, RowStatus};
-use crate::exp::{ExpKernel, Polynomial};
 use crate::projection::Projection;
-use crate::rbf::expanded::Expanded;
-use crate::rbf::fixed16::Fixed16;
-use crate::rbf::{Format, NetworkError, Packed};
+use crate::rbf::{Format, NetworkError, fixed16};
 use crate::relative::relative;
 
 /// RAM in bytes that a [`Decoder`] for at most so many `rows` takes on a 32-bit target, for any K: slices into the
@@ -45,7 +42,7 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 /// use taxel_core::blob::DecodeError;
 /// use taxel_core::{Aligned, Decoder, Estimate, Frame, RowStatus};
 /// # use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode};
-/// # use taxel_core::rbf::{Shape, direct::{Network, Parameters}};
+/// # use taxel_core::rbf::{Shape, float32::{Network, Parameters}};
 /// # let network = Network::try_new(
 /// #     Shape { inputs: 2, centres: 1, outputs: 1 },
 /// #     Parameters {
@@ -90,23 +87,20 @@ pub struct Decoder<'a, const ROWS: usize> {
 /// The network of a row, made ready when the model is loaded.
 #[derive(Debug, Clone, Copy)]
 enum RowNetwork<'a> {
-    /// A network in `f32-direct`, which is large: it is cut from its section for each row.
-    F32Direct(NetworkSection<'a>),
-    /// A network in `f32`.
-    F32(Packed<'a, Expanded>),
+    /// A network in `f32`, which is large: it is cut from its section for each row.
+    F32(NetworkSection<'a>),
     /// A network in `fixed16`.
-    Fixed16(Packed<'a, Fixed16>),
+    Fixed16(fixed16::Network<'a>),
 }
 
 impl<'a> RowNetwork<'a> {
     /// No network: whatever it is given is missing.
-    const NONE: Self = Self::F32Direct(NetworkSection::EMPTY);
+    const NONE: Self = Self::F32(NetworkSection::EMPTY);
 
     fn new(section: NetworkSection<'a>, shape: ModelShape) -> Result<Self, NetworkError> {
         match section.format() {
-            Format::F32Direct => Ok(Self::F32Direct(section)),
-            Format::F32 => section.packed(shape).map(Self::F32),
-            Format::Fixed16 => section.packed(shape).map(Self::Fixed16),
+            Format::F32 => Ok(Self::F32(section)),
+            Format::Fixed16 => section.fixed16(shape).map(Self::Fixed16),
         }
     }
 }
@@ -186,7 +180,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         scratch: &mut [f32],
         estimate: &mut Estimate<'_>,
     ) -> Result<bool, NetworkError> {
-        self.decode_with::<Polynomial>(frame, scratch, estimate)
+        decode(&self.model, &self.row_networks, frame, scratch, estimate)
     }
 
     /// Replaces missing readings of a frame (Ω) by those expected of the others, if the model can
@@ -215,22 +209,6 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     ) -> Result<Option<f32>, NetworkError> {
         assess(&self.model, frame, scratch, deviation)
     }
-
-    /// Decodes one frame as [`decode_into`](Self::decode_into) does, with the [exponential](crate::exp) `E` for
-    /// networks of the format `f32-direct`. It serves to measure what an exponential costs; other formats have one
-    /// of their own.
-    ///
-    /// # Errors
-    /// As [`decode_into`](Self::decode_into).
-    #[inline]
-    pub fn decode_with<E: ExpKernel>(
-        &self,
-        frame: Frame<'_>,
-        scratch: &mut [f32],
-        estimate: &mut Estimate<'_>,
-    ) -> Result<bool, NetworkError> {
-        decode(&self.model, &self.row_networks, E::exp, frame, scratch, estimate)
-    }
 }
 
 /// Assesses one frame as [`Decoder::assess_into`] does.
@@ -256,7 +234,7 @@ fn assess(
     novelty.map(Some)
 }
 
-/// Decodes one frame as [`Decoder::decode_with`] does, with the networks of the rows.
+/// Decodes one frame as [`Decoder::decode_into`] does, with the networks of the rows.
 ///
 /// Neither generic nor inlined on a device: it is thus compiled with this crate, for speed, while the rest of an
 /// image is compiled for size.
@@ -265,7 +243,6 @@ fn assess(
 fn decode(
     model: &Model<'_>,
     networks: &[RowNetwork<'_>],
-    exp: fn(f32) -> f32,
     frame: Frame<'_>,
     scratch: &mut [f32],
     estimate: &mut Estimate<'_>,
@@ -283,7 +260,7 @@ fn decode(
     let projection = model.projection();
     let Some(projection) = projection else {
         let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
-        let rows = Rows { networks, inputs, outputs, exp };
+        let rows = Rows { networks, inputs, outputs };
         return Ok(if relative {
             rows.decode::<true>(frame, [scaled, more], estimate)
         } else {
@@ -295,7 +272,7 @@ fn decode(
     let (features, ratios) = more.split_at_mut_checked(of_network).ok_or(too_short)?;
     let Some(network) = networks.first() else { return Ok(false) };
     let array = Array { projection, network, relative };
-    Ok(array.decode(exp, frame, [scaled, features, ratios], estimate))
+    Ok(array.decode(frame, [scaled, features, ratios], estimate))
 }
 
 /// Networks that decode a frame row by row.
@@ -305,7 +282,6 @@ struct Rows<'d, 'a> {
     inputs: usize,
     /// Number of outputs a row.
     outputs: usize,
-    exp: fn(f32) -> f32,
 }
 
 impl Rows<'_, '_> {
@@ -333,7 +309,7 @@ impl Rows<'_, '_> {
             } else {
                 readings
             };
-            any_clamped |= decode_inputs(network, self.exp, given, scaled, outputs, status);
+            any_clamped |= decode_inputs(network, given, scaled, outputs, status);
         }
         any_clamped
     }
@@ -424,7 +400,6 @@ impl Array<'_, '_> {
     #[inline(never)]
     fn decode(
         &self,
-        exp: fn(f32) -> f32,
         frame: Frame<'_>,
         scratch: [&mut [f32]; 3],
         estimate: &mut Estimate<'_>,
@@ -439,7 +414,7 @@ impl Array<'_, '_> {
         self.projection.project(readings, features);
         let mut status = RowStatus::Decoded;
         let network = self.network;
-        let clamped = decode_inputs(network, exp, features, scaled, estimate.outputs, &mut status);
+        let clamped = decode_inputs(network, features, scaled, estimate.outputs, &mut status);
         // Features can overflow although no reading is missing.
         if status == RowStatus::MissingReading && all_finite(readings) {
             status = RowStatus::Overflow;
@@ -454,36 +429,31 @@ impl Array<'_, '_> {
 #[inline(always)]
 fn decode_inputs(
     network: &RowNetwork<'_>,
-    exp: fn(f32) -> f32,
     inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
     status: &mut RowStatus,
 ) -> bool {
     let clamped = match network {
-        RowNetwork::F32Direct(section) => {
-            return decode_direct(section, exp, inputs, scaled, outputs, status);
-        }
-        RowNetwork::F32(network) => network.infer(inputs, scaled, outputs),
+        RowNetwork::F32(section) => return decode_f32(section, inputs, scaled, outputs, status),
         RowNetwork::Fixed16(network) => network.infer(inputs, scaled, outputs),
     };
     *status = RowStatus::Decoded;
     clamped && !is_missing(inputs, outputs, status)
 }
 
-/// Infers the outputs of a network in `f32-direct`, which has no assembly routine, as [`decode_inputs`] does.
+/// Infers the outputs of a network in `f32`, which has no assembly routine, as [`decode_inputs`] does.
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(not(cortex_m4f), inline(always))]
-fn decode_direct(
+fn decode_f32(
     section: &NetworkSection<'_>,
-    exp: fn(f32) -> f32,
     inputs: &[f32],
     scaled: &mut [f32],
     outputs: &mut [f32],
     status: &mut RowStatus,
 ) -> bool {
     let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
-    let Ok(network) = section.direct(shape) else {
+    let Ok(network) = section.float32(shape) else {
         outputs.fill(f32::NAN);
         *status = RowStatus::MissingReading;
         return false;
@@ -492,8 +462,8 @@ fn decode_direct(
     if clamped && is_missing(inputs, outputs, status) {
         return false;
     }
-    network.infer_scaled(scaled, outputs, exp);
-    // In the other formats outputs cannot overflow; that is checked when a model is loaded.
+    network.infer_scaled_shared(scaled, outputs);
+    // In `fixed16` outputs cannot overflow; that is checked when a model is loaded.
     let finite = all_finite(outputs);
     *status = if finite { RowStatus::Decoded } else { RowStatus::Overflow };
     if !finite {

@@ -13,7 +13,6 @@
 //! So a missing reading costs a sum over the factors squared, and readings that are there cost what a projection does.
 //! `docs/reliability.md` tells how large the errors are.
 
-use crate::feature::{Feature, FillBuilt};
 use crate::rbf::NetworkError;
 
 /// Share of a frame's readings that may be missing: one in so many. If more are, they are not filled.
@@ -25,7 +24,6 @@ pub struct Fill<'a> {
     readings: usize,
     factors: usize,
     block: &'a [f32],
-    proof: FillBuilt,
 }
 
 /// Number of floats in the block of a [`Fill`].
@@ -44,7 +42,6 @@ impl<'a> Fill<'a> {
     /// or parts of a reading whose squares sum up to 1 or more.
     pub fn new(readings: usize, factors: usize, block: &'a [f32]) -> Result<Self, NetworkError> {
         const WHAT: &str = "fill";
-        let proof = NetworkError::proof(Feature::Fill)?;
         if readings == 0 || factors == 0 {
             return Err(NetworkError::Empty);
         }
@@ -55,7 +52,7 @@ impl<'a> Fill<'a> {
         if !block.iter().all(|value| value.is_finite()) {
             return Err(NetworkError::NotFinite { what: WHAT });
         }
-        let fill = Self { readings, factors, block, proof };
+        let fill = Self { readings, factors, block };
         let sound = |(_, s, parts): (f32, f32, &[f32])| {
             s >= 0.0 && parts.iter().map(|part| part * part).sum::<f32>() < 1.0
         };
@@ -67,13 +64,8 @@ impl<'a> Fill<'a> {
     }
 
     /// Makes a fill of a block that [`new`](Self::new) has checked before, or will.
-    pub(crate) fn of_checked(
-        readings: usize,
-        factors: usize,
-        block: &'a [f32],
-    ) -> Result<Self, NetworkError> {
-        let proof = NetworkError::proof(Feature::Fill)?;
-        Ok(Self { readings, factors, block, proof })
+    pub(crate) fn of_checked(readings: usize, factors: usize, block: &'a [f32]) -> Self {
+        Self { readings, factors, block }
     }
 
     /// Number of readings in a frame.

@@ -14,7 +14,7 @@
 //! dt comes from the frames' times, not from an assumed period. `docs/filter.md` explains it.
 
 use crate::estimate::{Estimate, RowStatus};
-use crate::exp::{ExpKernel, Polynomial};
+use crate::exp::{Exponential, Polynomial};
 
 /// Settings of the filter. The default is off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

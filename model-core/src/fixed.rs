@@ -1,7 +1,6 @@
 //! A network in arrays of fixed size, for a program that never changes its model.
 
-use crate::exp::{ExpKernel, Polynomial};
-use crate::rbf::{Shape, direct};
+use crate::rbf::{Shape, float32};
 
 /// Network of `INPUTS` readings, `CENTRES` Gaussians and `OUTPUTS` outputs, whose parameters are arrays of its own.
 ///
@@ -10,7 +9,7 @@ use crate::rbf::{Shape, direct};
 /// this type, one for each row-wire.
 ///
 /// It infers what [`Decoder`](crate::Decoder) decodes from the blob, to the bit, for the number format
-/// [`f32-direct`](crate::rbf::Format::F32Direct). The other two formats have assembly routines that read an array of words.
+/// [`f32`](crate::rbf::Format::F32). The assembly routine of the other format reads an array of words.
 ///
 /// Each reading is scaled to [0, 1] on its training range, and clamped an eighth beyond it. With x the scaled readings, the
 /// outputs are A·x + Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b.
@@ -93,18 +92,18 @@ impl<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize>
     pub fn infer(&self, readings: &[f32; INPUTS]) -> [f32; OUTPUTS] {
         const { assert!(INPUTS > 0 && CENTRES > 0 && OUTPUTS > 0, "a dimension is zero") };
         let shape = Shape { inputs: INPUTS, centres: CENTRES, outputs: OUTPUTS };
-        let network = direct::Network::of_arrays(shape, self.parameters());
+        let network = float32::Network::of_arrays(shape, self.parameters());
         let (mut scaled, mut outputs) = ([0.0; INPUTS], [f32::NAN; OUTPUTS]);
         if network.scale(readings, &mut scaled) && !all(readings, Rule::Finite) {
             return outputs;
         }
-        network.infer_scaled(&scaled, &mut outputs, Polynomial::exp);
+        network.infer_scaled_shared(&scaled, &mut outputs);
         if all(&outputs, Rule::Finite) { outputs } else { [f32::NAN; OUTPUTS] }
     }
 
-    /// The parameters as slices, as [`direct::Network::try_new`] takes them.
-    pub const fn parameters(&self) -> direct::Parameters<'_> {
-        direct::Parameters {
+    /// The parameters as slices, as [`float32::Network::try_new`] takes them.
+    pub const fn parameters(&self) -> float32::Parameters<'_> {
+        float32::Parameters {
             input_minimum: &self.input_minimum,
             input_per_span: &self.input_per_span,
             centres: self.centres.as_flattened(),

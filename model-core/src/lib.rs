@@ -5,7 +5,7 @@
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
 //!
 //! The crate knows no pin and no file. The same code serves host, emulator and board, so that
-//! their estimates agree bit for bit where the same [exponential](exp) is chosen.
+//! their estimates agree bit for bit.
 //!
 //! The network follows Wang et al., "Decoupling research of flexible tactile
 //! sensors interfered by white Gaussian noise using improved RBFNN", Sensors & Transducers, 2014
@@ -23,7 +23,6 @@ compile_error!("the weight blob holds little-endian floats that are borrowed in 
 // From the ground up: a module imports only what is declared before it.
 
 pub mod exp;
-pub mod feature;
 pub mod scale;
 pub mod relative;
 pub mod checksum;
@@ -38,7 +37,6 @@ pub mod confidence;
 pub mod fill;
 pub mod blob;
 mod decoder;
-#[cfg(feature = "f32-direct")]
 mod fixed;
 
 pub use blob::Aligned;
@@ -48,7 +46,6 @@ pub use blob::AlignedBytes;
 pub use decoder::OwnedEstimate;
 pub use decoder::{Decoder, Frame, decoder_ram_bytes, scratch_floats};
 pub use estimate::{Estimate, RowStatus};
-#[cfg(feature = "f32-direct")]
 pub use fixed::Fixed;
 pub use frame::{ColumnWire, ColumnWires, RowWire, Wires};
 

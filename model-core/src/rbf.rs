@@ -1,14 +1,13 @@
-//! The K-centre Gaussian radial-basis-function network, in three formats.
+//! The K-centre Gaussian radial-basis-function network, in two number formats.
 //!
-//! F(x) = Σ_k ω_k·exp(−‖x − c_k‖²/(2σ²)) + b (+ A·x), with x the scaled readings (the paper's Gaussian is eq. 11, its
+//! F(x) = Σ_k ω_k·exp(−‖x − c_k‖²/(2σ_k²)) + b (+ A·x), with x the scaled readings (the paper's Gaussian is eq. 11, its
 //! network eq. 18, and K-means' output eq. 19; the affine tail A·x is ours). All parameters are borrowed, and the shape
 //! is part of the value, so that one firmware serves any K.
 //!
 //! | [`Format`] | distances | a Cortex-M4F computes with |
 //! |---|---|---|
-//! | [`F32Direct`](Format::F32Direct) | Σ (x − c)²: safe at any width | compiled code, any [`exp`](crate::exp) |
-//! | [`F32`](Format::F32) | ‖x‖² − 2x·c + ‖c‖²: where a bound proves it safe | `cortex_m4/f32.s` |
-//! | [`Fixed16`](Format::Fixed16) | as `F32`, in integers | `cortex_m4/fixed16.s`, two products an instruction |
+//! | [`F32`](Format::F32) | Σ (x − c)²: safe at any width, which each centre has | compiled code |
+//! | [`Fixed16`](Format::Fixed16) | ‖x‖² − 2x·c + ‖c‖², in integers; one width | `cortex_m4/fixed16.s`, two products an instruction |
 //!
 //! The order of the floating-point operations is part of each format's contract. The affine tail comes first,
 //! then one centre after the other, and last the bias, so that a large offset costs no digits of the rest.
@@ -17,26 +16,20 @@
 // From the ground up: a module imports only what is declared before it.
 mod parameters;
 mod format;
-pub mod packed;
-pub mod direct;
-pub mod expanded;
+pub mod float32;
 pub mod fixed16;
 
 pub use format::Format;
-pub(crate) use packed::{Layout, Network as Packed};
 pub(crate) use parameters::Cut;
 pub use parameters::{NetworkError, Shape};
 
 use self::parameters::check_length;
-use crate::exp::{ExpKernel, Polynomial};
 
 /// A network of any format, whose parameters have been checked against its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Network<'a> {
-    /// A network in f32 with direct distances ([`Format::F32Direct`]).
-    F32Direct(direct::Network<'a>),
-    /// A network in f32 with expanded distances ([`Format::F32`]).
-    F32(expanded::Network<'a>),
+    /// A network in f32 ([`Format::F32`]).
+    F32(float32::Network<'a>),
     /// A network in 16-bit fixed point ([`Format::Fixed16`]).
     Fixed16(fixed16::Network<'a>),
 }
@@ -45,7 +38,6 @@ pub enum Network<'a> {
 macro_rules! each {
     ($network:expr, $inner:ident => $body:expr) => {
         match $network {
-            Network::F32Direct($inner) => $body,
             Network::F32($inner) => $body,
             Network::Fixed16($inner) => $body,
         }
@@ -56,7 +48,6 @@ impl<'a> Network<'a> {
     /// The network's format.
     pub fn format(&self) -> Format {
         match self {
-            Self::F32Direct(_) => Format::F32Direct,
             Self::F32(_) => Format::F32,
             Self::Fixed16(_) => Format::Fixed16,
         }
@@ -70,8 +61,7 @@ impl<'a> Network<'a> {
     /// Whether the network has an affine tail.
     pub fn has_affine_tail(&self) -> bool {
         match self {
-            Self::F32Direct(inner) => !inner.parameters().affine.is_empty(),
-            Self::F32(inner) => inner.has_affine_tail(),
+            Self::F32(inner) => !inner.parameters().affine.is_empty(),
             Self::Fixed16(inner) => inner.has_affine_tail(),
         }
     }
@@ -79,8 +69,7 @@ impl<'a> Network<'a> {
     /// Widths σ of the centres on inputs scaled to [0, 1]: one for all, or one for each.
     pub fn widths(&self) -> impl Iterator<Item = f32> {
         let (common, each): (Option<f32>, &'a [f32]) = match self {
-            Self::F32Direct(inner) => (None, inner.parameters().decay),
-            Self::F32(inner) => (Some(inner.width()), &[]),
+            Self::F32(inner) => (None, inner.parameters().decay),
             Self::Fixed16(inner) => (Some(inner.width()), &[]),
         };
         common.into_iter().chain(each.iter().map(|decay| libm::sqrtf(0.5 / decay)))
@@ -94,8 +83,7 @@ impl<'a> Network<'a> {
     /// All words of the network, in slices that follow each other.
     pub(crate) fn block(&self) -> [&'a [u32]; 7] {
         match self {
-            Self::F32Direct(inner) => inner.block(),
-            Self::F32(inner) => [inner.block(), &[], &[], &[], &[], &[], &[]],
+            Self::F32(inner) => inner.block(),
             Self::Fixed16(inner) => [inner.block(), &[], &[], &[], &[], &[], &[]],
         }
     }
@@ -117,10 +105,10 @@ impl<'a> Network<'a> {
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     ///
     /// ```
-    /// use taxel_core::rbf::{Network, Shape, direct};
-    /// let network = Network::from(direct::Network::try_new(
+    /// use taxel_core::rbf::{Network, Shape, float32};
+    /// let network = Network::from(float32::Network::try_new(
     ///     Shape { inputs: 2, centres: 1, outputs: 1 },
-    ///     direct::Parameters {
+    ///     float32::Parameters {
     ///         input_minimum: &[50.0, 50.0],
     ///         input_per_span: &[0.1, 0.1],
     ///         centres: &[0.5, 0.5],
@@ -143,29 +131,13 @@ impl<'a> Network<'a> {
         scaled: &mut [f32],
         output: &mut [f32],
     ) -> Result<(), NetworkError> {
-        self.infer_with::<Polynomial>(reading, scaled, output)
-    }
-
-    /// Infers as [`infer`](Self::infer) does, with the [exponential](crate::exp) `E` for [`Format::F32Direct`]. It
-    /// serves to measure what an exponential costs; other formats have one of their own.
-    ///
-    /// # Errors
-    /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
-    #[inline(always)]
-    pub fn infer_with<E: ExpKernel>(
-        &self,
-        reading: &[f32],
-        scaled: &mut [f32],
-        output: &mut [f32],
-    ) -> Result<(), NetworkError> {
         check_length("reading", reading, self.shape().inputs)?;
         self.check_buffers(scaled, output)?;
         match self {
-            Self::F32Direct(inner) => {
+            Self::F32(inner) => {
                 let _ = inner.scale(reading, scaled);
-                inner.infer_scaled(scaled, output, E::exp);
+                inner.infer_scaled_shared(scaled, output);
             }
-            Self::F32(inner) => _ = inner.infer(reading, scaled, output),
             Self::Fixed16(inner) => _ = inner.infer(reading, scaled, output),
         }
         Ok(())
@@ -173,7 +145,7 @@ impl<'a> Network<'a> {
 
     /// Converts readings to the format's own unit of inputs: the first half of [`infer`](Self::infer).
     ///
-    /// [`Format::F32Direct`] clamps them here; the other formats do so when they infer.
+    /// [`Format::F32`] clamps them here, [`Format::Fixed16`] when it infers.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `scaled` is then untouched.
@@ -195,21 +167,16 @@ impl<'a> Network<'a> {
         Ok(each!(self, inner => inner.scale(reading, scaled)))
     }
 
-    /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of
-    /// [`infer_with`](Self::infer_with). `scaled` is overwritten.
+    /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of [`infer`](Self::infer). `scaled`
+    /// is overwritten.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.
     #[inline(always)]
-    pub fn infer_scaled_with<E: ExpKernel>(
-        &self,
-        scaled: &mut [f32],
-        output: &mut [f32],
-    ) -> Result<(), NetworkError> {
+    pub fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) -> Result<(), NetworkError> {
         self.check_buffers(scaled, output)?;
         match self {
-            Self::F32Direct(inner) => inner.infer_scaled(scaled, output, E::exp),
-            Self::F32(inner) => inner.infer_scaled(scaled, output),
+            Self::F32(inner) => inner.infer_scaled_shared(scaled, output),
             Self::Fixed16(inner) => inner.infer_scaled(scaled, output),
         }
         Ok(())
@@ -223,14 +190,8 @@ impl<'a> Network<'a> {
     }
 }
 
-impl<'a> From<direct::Network<'a>> for Network<'a> {
-    fn from(inner: direct::Network<'a>) -> Self {
-        Self::F32Direct(inner)
-    }
-}
-
-impl<'a> From<expanded::Network<'a>> for Network<'a> {
-    fn from(inner: expanded::Network<'a>) -> Self {
+impl<'a> From<float32::Network<'a>> for Network<'a> {
+    fn from(inner: float32::Network<'a>) -> Self {
         Self::F32(inner)
     }
 }

@@ -36,8 +36,8 @@ pub(crate) fn scale_and_tell(reading: f32, minimum: f32, per_span: f32) -> (f32,
 /// Half the width of [`CLAMP`], in spans of the training range.
 pub const HALF_RANGE: f32 = (CLAMP[1] - CLAMP[0]) / 2.0;
 
-/// Number of units in [`HALF_RANGE`]; networks with expanded distances count inputs in these units, from the
-/// middle of the training range.
+/// Number of units in [`HALF_RANGE`]; networks in `fixed16` count inputs in these units, from the middle of the
+/// training range.
 ///
 /// The conversion to `i32`, which saturates, is then the clamp: it takes a Cortex-M4F one cycle, where comparisons
 /// take eight.
@@ -53,12 +53,6 @@ pub const UNITS_PER_STEP: f32 = 65_536.0;
 #[inline]
 pub fn saturates(scaled: f32) -> bool {
     !(-UNITS..UNITS).contains(&scaled)
-}
-
-/// Clamps a scaled reading in [`UNITS`] and drops fractions of a unit; NaN becomes 0.
-#[inline]
-pub fn clamp_units(scaled: f32) -> f32 {
-    (scaled as i32) as f32
 }
 
 /// Clamps a scaled reading in [`UNITS`] and rounds it down to a step; NaN becomes 0.

@@ -5,7 +5,7 @@ use taxel_core::blob::{
     Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
     encoded_length_bound,
 };
-use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
 use taxel_core::{Aligned, Decoder, RowStatus};
 
@@ -22,7 +22,7 @@ fn parameters() -> Parameters<'static> {
 }
 
 fn network_of(parameters: Parameters<'_>) -> Network<'_> {
-    direct::Network::try_new(Shape { inputs: 2, centres: 1, outputs: 1 }, parameters)
+    float32::Network::try_new(Shape { inputs: 2, centres: 1, outputs: 1 }, parameters)
         .unwrap()
         .into()
 }
@@ -84,10 +84,10 @@ fn relative_inputs_are_a_section_of_one_byte_before_all_others() {
     let model = Model::decode(blob).unwrap();
     assert_eq!(*model.metadata(), metadata);
     assert_eq!(model.networks().collect::<Vec<_>>(), [network()]);
-    // The metadata end at 130. The padding of the floats, which begin at 140, is a byte shorter.
+    // The metadata end at 130. Three bytes of padding let the floats begin at 140 instead of 136.
     let plain = small_model(&mut plain.0);
-    assert_eq!((blob.len(), blob[130], blob[136]), (plain.len(), 5, 2));
-    assert_eq!((&blob[131..136], &blob[139..176]), (&plain[130..135], &plain[139..176]));
+    assert_eq!((blob.len(), blob[130], blob[135]), (plain.len() + 4, 3, 3));
+    assert_eq!((&blob[131..135], &blob[139..176]), (&plain[130..134], &plain[135..172]));
 }
 
 #[test]
@@ -104,8 +104,8 @@ fn errors_of_the_linear_decoder_are_a_section_before_the_networks() {
     assert_eq!(model.networks().collect::<Vec<_>>(), [network()]);
     // Tag and length; the errors; then the network's section, as without them.
     let plain = small_model(&mut plain.0);
-    assert_eq!((&blob[130..132], &blob[132..140]), (&[10, 8][..], &rmse[..]));
-    assert_eq!(&blob[140..145], &plain[130..135]);
+    assert_eq!((&blob[130..132], &blob[132..140]), (&[6, 8][..], &rmse[..]));
+    assert_eq!(&blob[140..144], &plain[130..134]);
 
     let mut refused = |rmse: &[u8]| {
         let parts = ModelParts { linear_rmse: Floats(rmse), ..without };
@@ -125,7 +125,7 @@ fn weights_are_borrowed_where_the_blob_lies() {
     let range = blob.as_ptr_range();
     let model = Model::decode(blob).unwrap();
     let network = model.networks().next().unwrap();
-    let Network::F32Direct(network) = network else { panic!("{network:?}") };
+    let Network::F32(network) = network else { panic!("{network:?}") };
     let start = network.parameters().centres.as_ptr().cast::<u8>();
     assert!(range.contains(&start));
 }

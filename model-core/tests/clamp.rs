@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
-use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
 use taxel_core::relative::{reciprocal, relative};
 use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS};
 use taxel_core::{AlignedBytes, Decoder, Estimate, Frame, RowStatus};
@@ -17,10 +17,8 @@ type Scaling = ([f32; INPUTS], [f32; INPUTS]);
 /// How a network of `format` scales inputs whose training ranges begin at `minimum` and have the length `span`.
 fn scaling(format: Format, minimum: [f32; INPUTS], span: [f32; INPUTS]) -> Scaling {
     let place = |input: usize| match format {
-        Format::F32Direct => (minimum[input], 1.0 / span[input]),
-        Format::F32 | Format::Fixed16 => {
-            (minimum[input] + 0.5 * span[input], UNITS / HALF_RANGE / span[input])
-        }
+        Format::F32 => (minimum[input], 1.0 / span[input]),
+        Format::Fixed16 => (minimum[input] + 0.5 * span[input], UNITS / HALF_RANGE / span[input]),
     };
     ([0, 1, 2].map(|input| place(input).0), [0, 1, 2].map(|input| place(input).1))
 }
@@ -37,15 +35,14 @@ fn sixteen_centres() -> [u32; 16 * 3 + 8] {
 /// A blob of two rows with one network, whose outputs do not matter.
 fn blob(format: Format, (from, by): &Scaling, relative_inputs: bool) -> AlignedBytes {
     let words: Vec<u32> = match format {
-        Format::F32Direct => Vec::new(),
-        Format::F32 => expanded::Parameters {
-            input_midpoint: from,
-            input_per_unit: by,
-            decay: 1e-18,
+        Format::F32 => float32::Parameters {
+            input_minimum: from,
+            input_per_span: by,
+            centres: &[0.5; 12],
+            decay: &[2.0; 4],
+            output_weights: &[0.5; 4],
             bias: &[1.0],
             affine: &[],
-            exponents: &[0.0; 16],
-            output_weights: &[0.5; 4],
         }
         .words()
         .collect(),
@@ -62,19 +59,7 @@ fn blob(format: Format, (from, by): &Scaling, relative_inputs: bool) -> AlignedB
         .collect(),
     };
     let network: Network<'_> = match format {
-        Format::F32Direct => {
-            let parameters = direct::Parameters {
-                input_minimum: from,
-                input_per_span: by,
-                centres: &[0.5; 12],
-                decay: &[2.0],
-                output_weights: &[0.5; 4],
-                bias: &[1.0],
-                affine: &[],
-            };
-            direct::Network::try_new(SHAPE, parameters).unwrap().into()
-        }
-        Format::F32 => expanded::Network::try_new(SHAPE, false, &words).unwrap().into(),
+        Format::F32 => float32::Network::of_words(SHAPE, false, &words).unwrap().into(),
         Format::Fixed16 => fixed16::Network::try_new(SHAPE, false, &words).unwrap().into(),
     };
     let shape = ModelShape { rows: ROWS, inputs: INPUTS, outputs: 1 };
@@ -95,8 +80,8 @@ fn clamps(decoder: &Decoder<'_, ROWS>, frame: Frame<'_>) -> (bool, [RowStatus; R
 fn is_clamped(format: Format, input: f32, from: f32, by: f32) -> bool {
     let scaled = f64::from((input - from) * by);
     let [low, high] = match format {
-        Format::F32Direct => CLAMP.map(f64::from),
-        Format::F32 | Format::Fixed16 => [-f64::from(UNITS), f64::from(UNITS)],
+        Format::F32 => CLAMP.map(f64::from),
+        Format::Fixed16 => [-f64::from(UNITS), f64::from(UNITS)],
     };
     scaled < low || scaled >= high
 }

@@ -1,7 +1,7 @@
 //! What several tests of the blob share.
 
 use taxel_core::checksum::CRC_32;
-use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
 
 /// A projection block: the first feature is the mean of the four readings, the second the difference of the rows.
@@ -21,7 +21,7 @@ pub fn network(weights: &[f32]) -> Network<'_> {
         affine: &[],
     };
     let shape = Shape { inputs: 2, centres: 1, outputs: weights.len() };
-    direct::Network::try_new(shape, parameters).unwrap().into()
+    float32::Network::try_new(shape, parameters).unwrap().into()
 }
 
 /// Examples of the blob's specification, each behind a line `[NAME]`: lines like `0 | 54 41 … | magic`.

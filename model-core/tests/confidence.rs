@@ -2,7 +2,7 @@
 
 use taxel_core::blob::{DecodeError, EncodeError, Metadata, ModelParts, ModelShape, encode};
 use taxel_core::confidence::{Confidence, Sizes};
-use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{NetworkError, Shape};
 use taxel_core::relative::reciprocal;
 use taxel_core::{Aligned, Decoder, Frame};
@@ -27,7 +27,7 @@ fn encoded(
         affine: &[],
     };
     let shape = Shape { inputs: 2, centres: 1, outputs: 1 };
-    let network = direct::Network::try_new(shape, parameters).unwrap().into();
+    let network = float32::Network::try_new(shape, parameters).unwrap().into();
     let unnamed = Metadata::unnamed(ModelShape { rows: 1, inputs: 2, outputs: 1 });
     let networks = &[network];
     let parts = ModelParts {

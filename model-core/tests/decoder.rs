@@ -1,8 +1,7 @@
 //! A decoder of the paper's sensor: it decodes as its networks infer, and rejects an unsound blob.
 
 use taxel_core::blob::{DecodeError, Metadata, ModelParts, ModelShape, encode_to_vec};
-use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
-use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, NetworkError, Shape};
 use taxel_core::relative::reciprocal;
 use taxel_core::{AlignedBytes, Decoder, Estimate, Frame, RowStatus};
@@ -46,13 +45,13 @@ impl Numbers {
             input_minimum: &self.minimum,
             input_per_span: &self.per_span,
             centres: &self.centres,
-            decay: &[0.75],
+            decay: &[0.75; CENTRES],
             output_weights: &self.weights,
             bias: &self.bias,
             affine: &self.affine,
         };
         let shape = Shape { inputs: COLS, centres: CENTRES, outputs: OUTPUTS };
-        direct::Network::try_new(shape, parameters).unwrap().into()
+        float32::Network::try_new(shape, parameters).unwrap().into()
     }
 }
 
@@ -75,44 +74,29 @@ fn bits(outputs: &[f32]) -> Vec<u32> {
 }
 
 /// Outputs of the networks themselves.
-fn inferred<E: ExpKernel>(seed: usize, frame: &[f32]) -> Vec<f32> {
+fn inferred(seed: usize, frame: &[f32]) -> Vec<f32> {
     let numbers = [Numbers::new(seed), Numbers::new(seed + 50)];
     let mut outputs = vec![0.0; ROWS * OUTPUTS];
     let rows = frame.chunks(COLS).zip(outputs.chunks_mut(OUTPUTS)).enumerate();
     for (row, (reading, output)) in rows {
         let network = numbers[row % 2].network();
-        network.infer_with::<E>(reading, &mut [0.0; COLS], output).unwrap();
+        network.infer(reading, &mut [0.0; COLS], output).unwrap();
     }
     outputs
 }
 
-fn decodes_as_its_networks<E: ExpKernel>() {
+#[test]
+fn it_decodes_bit_for_bit_as_its_networks_infer() {
     let (blob, frame) = (blob(1, ROWS), frame());
     let decoder = PaperDecoder::load(&blob).unwrap();
     let (mut outputs, mut status) = ([7.0; ROWS * OUTPUTS], [RowStatus::Overflow; ROWS]);
     let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
 
     let whole = Frame::from(&frame[..]);
-    decoder.decode_with::<E>(whole, &mut [0.0; COLS], &mut estimate).unwrap();
+    decoder.decode_into(whole, &mut [0.0; COLS], &mut estimate).unwrap();
 
     assert_eq!(status, [RowStatus::Decoded; ROWS]);
-    assert_eq!(bits(&outputs), bits(&inferred::<E>(1, &frame)), "{}", E::NAME);
-}
-
-#[test]
-fn it_decodes_bit_for_bit_as_its_networks_infer_with_every_exponential() {
-    decodes_as_its_networks::<Polynomial>();
-    decodes_as_its_networks::<Libm>();
-    decodes_as_its_networks::<Micromath>();
-}
-
-#[test]
-fn it_decodes_with_the_polynomial_unless_told_otherwise() {
-    let blob = blob(2, ROWS);
-    let decoder = PaperDecoder::load(&blob).unwrap();
-    let estimate = decoder.decode(&frame()[..]).unwrap();
-    assert_eq!(bits(&estimate.outputs), bits(&inferred::<Polynomial>(2, &frame())));
-    assert_ne!(bits(&estimate.outputs), bits(&inferred::<Micromath>(2, &frame())));
+    assert_eq!(bits(&outputs), bits(&inferred(1, &frame)));
     assert_eq!(decoder.metadata().name, "hand-made");
     assert_eq!(decoder.model_crc().to_le_bytes(), *blob.last_chunk().unwrap());
 }
@@ -151,7 +135,7 @@ fn a_decoder_has_room_for_fewer_rows_and_no_more() {
         let decoder = PaperDecoder::load(&blob).unwrap();
         assert_eq!(decoder.shape(), ModelShape { rows, inputs: COLS, outputs: OUTPUTS });
         let estimate = decoder.decode(&frame[..rows * COLS]).unwrap();
-        let expected = inferred::<Polynomial>(1, &frame);
+        let expected = inferred(1, &frame);
         assert_eq!(bits(&estimate.outputs), bits(&expected[..rows * OUTPUTS]));
     }
     let error = PaperDecoder::load(&blob(1, ROWS + 1)).unwrap_err();

@@ -4,7 +4,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::rbf::Shape;
-use taxel_core::rbf::direct::{Network, Parameters};
+use taxel_core::rbf::float32::{Network, Parameters};
 use taxel_core::{Decoder, Fixed};
 
 const SHAPE: Shape = Shape { inputs: 7, centres: 5, outputs: 3 };
@@ -74,7 +74,7 @@ fn a_network_with_a_width_for_each_centre_infers_as_its_blob() {
 fn a_tail_of_zeros_and_a_width_repeated_change_no_bit() {
     let mut numbers = numbers();
     let fixed = Small { decay: [0.7; 5], affine: [[0.0; 3]; 7], ..network(&mut numbers) };
-    let parameters = Parameters { decay: &[0.7], affine: &[], ..fixed.parameters() };
+    let parameters = Parameters { decay: &[0.7; 5], affine: &[], ..fixed.parameters() };
     assert_eq!(different(&fixed, parameters, &mut numbers), 0);
 }
 

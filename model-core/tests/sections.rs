@@ -27,11 +27,11 @@ fn sample(blob: &[u8], header: &[u8], block: &[f32]) -> Sample {
 /// A projection, a confidence and a fill.
 fn samples() -> [Sample; 3] {
     let mut buffer = Aligned([0; 1024]);
-    let of_projection = sample(projection::of_one_row(&mut buffer.0), &[8, 2], &PROJECTION);
+    let of_projection = sample(projection::of_one_row(&mut buffer.0), &[4, 2], &PROJECTION);
     let (blob, length) = confidence::small(false);
-    let of_confidence = sample(&blob.0[..length], &[7, 1, 1], &confidence::BLOCK);
+    let of_confidence = sample(&blob.0[..length], &[5, 1, 1], &confidence::BLOCK);
     let blob = fill::blob(Some(fill::fill()), false).unwrap();
-    let of_fill = sample(&blob, &[9, 1], fill::BLOCK.as_flattened());
+    let of_fill = sample(&blob, &[7, 1], fill::BLOCK.as_flattened());
     [of_projection, of_confidence, of_fill]
 }
 
@@ -89,7 +89,7 @@ fn every_damage_of_a_section_has_its_own_error() {
         assert_eq!(sample.damaged(sample.start + place, &[byte]), error, "{place} {byte}");
     }
     // With a tag of no section that may follow, the section of a network is missed.
-    for tag in [0, 6, 200] {
+    for tag in [0, 8, 200] {
         assert_eq!(confidence.damaged(confidence.start, &[tag]), malformed("network section"));
     }
 }
@@ -139,7 +139,7 @@ proptest! {
         let model = decoder.model();
         prop_assert_eq!(model.networks().count(), model.network_count());
         for network in model.networks() {
-            let Network::F32Direct(network) = network else { continue };
+            let Network::F32(network) = network else { continue };
             prop_assert!(network.parameters().centres.iter().all(|c| c.is_finite()));
         }
         let shape = decoder.shape();

@@ -19,8 +19,6 @@ def main():
     parser.add_argument("--image", type=pathlib.Path, required=True, help="the board's image (ELF)")
     parser.add_argument("--wide-image", type=pathlib.Path, required=True,
                         help="the same with room for 16 rows and 32 columns, for the scenario `wide`")
-    parser.add_argument("--fixed16-image", type=pathlib.Path, required=True,
-                        help="the same with the feature `fixed16` alone, for the scenario `few-features`")
     parser.add_argument("--onchip-image", type=pathlib.Path, required=True,
                         help="the image that reads the sensor by the chip's own converters, for the scenarios `onchip`")
     parser.add_argument("--onchip-scans", required=True,

@@ -108,20 +108,6 @@ def sparse(make, files):
         bench.finish(erased=[JOURNAL[1], SLOT_B])
 
 
-def few_features(make, files):
-    """An image with `fixed16` alone: a model of another format is refused by the feature's name, its own decodes."""
-    models = files.directory / "f32.bin", files.directory / "fixed16.bin"
-    bench = make(image=files.fixed16_image)
-    for model in models:
-        bench.program("train", "press", "--no-refine", "--centres", 4, "--format", model.stem, "-o", model)
-    bench.run_for(0.02)
-    expect("without the feature `f32`" in bench.host_sim("upload", models[0], status=2), "a model of f32 is not refused")
-    bench.host_sim("upload", models[1])
-    said = bench.host_sim("check", "press", "--model", models[1], "-n", files.frames)
-    expect(f"{files.frames} of {files.frames} bit-identical" in said, "it does not decode as the host")
-    bench.finish(erased=[JOURNAL[1], SLOT_B])
-
-
 def check_baseline(bench, file, readings):
     """So many readings at rest, in a file, against the resistances at the wires."""
     with open(file, newline="") as lines:
@@ -528,7 +514,7 @@ def serve(make, files):
 
 SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
-    for scenario in (session, sparse, few_features, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow,
+    for scenario in (session, sparse, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow,
                      no_clock, clock_stops, fault_restarts, panic_restarts, brown_out, sagging_supply, keep, burst, overrun,
                      log_abandoned, restart, dead_host, onchip, onchip_stream)
 }

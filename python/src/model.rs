@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use self_cell::self_cell;
 use taxel_core::{Decoder, Estimate, Frame, RowStatus, relative};
-use taxel_learn::{Exponential, ModelBlob, PreparedModel};
+use taxel_learn::{ModelBlob, PreparedModel};
 
 /// Most rows of a model, as many as the blob format has numbers for.
 const MOST_ROWS: usize = 255;
@@ -86,7 +86,7 @@ impl Blob {
     fn new(bytes: &[u8]) -> PyResult<Self> {
         let blob = ModelBlob::of_bytes(bytes).map_err(refused)?;
         let loaded = Loaded::try_new(blob, |blob| {
-            let tables = blob.prepare(Exponential::default());
+            let tables = blob.prepare();
             Decoder::new(blob.parse()).map(|frames| Ways { tables, frames })
         });
         loaded.map(Self).map_err(refused)

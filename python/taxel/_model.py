@@ -63,7 +63,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         Whether outputs have an affine part besides.
     refine : bool
         Whether centres and widths are refined after K-means: better, and minutes instead of seconds.
-    format : {"f32", "fixed16", "f32-direct"} or None
+    format : {"f32", "fixed16"} or None
         Number format of the weights; None for f32.
     whole_array : bool
         One network behind a projection of all readings. For columns named as wires (`r1c1_ohm`), whose outputs belong to
@@ -321,8 +321,8 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
                 raise ValueError(f"{name}={value!r}: give a whole number from {least} on")
-        if self.format not in (None, "f32", "fixed16", "f32-direct"):
-            raise ValueError(f'format={self.format!r}: give "f32", "fixed16" or "f32-direct"')
+        if self.format not in (None, "f32", "fixed16"):
+            raise ValueError(f'format={self.format!r}: give "f32" or "fixed16"')
         if self.grid is not None and np.shape(self.grid) != (2,):
             raise ValueError(f"grid={self.grid!r}: give rows and columns, such as (16, 16)")
 

@@ -12,8 +12,8 @@ use taxel_data::output::write_bytes;
 use taxel_data::{Dataset, Silent, Stream};
 use taxel_firmware::link::message::{Configuration, Memory, ModelIdentity, UploadState};
 use taxel_firmware::timing::ScanPlan;
+use taxel_learn::ModelBlob;
 use taxel_learn::cost::{Design, Prices};
-use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::{Device, stream, upload};
 use taxel_simulate::{Synthesis, World};
 
@@ -192,7 +192,7 @@ fn decode(device: &mut Device, path: &Path, frames: &Dataset) -> Outcome<Decodin
     decoded.map_err(text)?;
     let measured = u64::from(device.statistics().map_err(text)?.shortest_decode_cycles);
     let prices = Prices::accepted().map_err(text)?;
-    let cost = prices.frame(&Design::new(&blob), Exponential::default());
+    let cost = prices.frame(&Design::new(&blob));
     let predicted = cost.map_err(text)?.flash_cycles;
     let model = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     println!(

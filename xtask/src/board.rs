@@ -6,7 +6,7 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use crate::emulate::qemu::decoded;
-use crate::images::{NUCLEO, NUCLEO_FIXED16, NUCLEO_SPI, build_image, build_variant, build_wide};
+use crate::images::{NUCLEO, NUCLEO_SPI, build_image, build_wide};
 use crate::process::Outcome;
 use crate::toolchain::{Toolchain, elf};
 pub use emulator::Emulator;
@@ -38,9 +38,6 @@ impl Options {
 /// Scenario of an image with room for a larger sensor.
 const WIDE: &str = "wide";
 
-/// Scenario of an image with one feature alone.
-const FEW_FEATURES: &str = "few-features";
-
 /// Texts that the log of a scenario must contain.
 const LOGGED: [(&str, &str); 7] = [
     ("session", "slot 0 holds a model that was flashed, not uploaded"),
@@ -59,9 +56,6 @@ pub fn run(options: &Options) -> Outcome {
     let run = |scenario: &str| {
         options.names.is_empty() || options.names.iter().any(|name| name == scenario)
     };
-    if run(FEW_FEATURES) {
-        build_variant(&toolchain, &["fixed16"], NUCLEO_FIXED16)?;
-    }
     if run(WIDE) {
         build_wide(&toolchain)?;
     }

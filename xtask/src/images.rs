@@ -1,8 +1,6 @@
 //! Building and linting the firmware for its target, and proving that it cannot panic.
 
 use std::fs;
-use std::path::PathBuf;
-use std::process::Command;
 
 use crate::panics;
 use crate::process::{Outcome, Watched, run as run_command, watch};
@@ -34,13 +32,6 @@ pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 /// Names of the board's image with converters around it, and of that with its own.
 pub const NUCLEO_SPI: &str = "nucleo-f446re";
 pub const NUCLEO_ONCHIP: &str = "nucleo-f446re-onchip";
-
-/// Features of the board's image. All are on unless it is built with others.
-pub const FEATURES: [&str; 8] =
-    ["confidence", "f32", "f32-direct", "fill", "filter", "fixed16", "micromath", "settings"];
-
-/// Name of the board's image with `fixed16` alone.
-pub const NUCLEO_FIXED16: &str = "nucleo-f446re-fixed16";
 
 /// Name of the board's image with room for a larger sensor, and that room: more columns than three converters sample, and
 /// more rows than one register drives.
@@ -76,33 +67,14 @@ pub fn build_image(toolchain: &Toolchain, packages: Packages) -> Outcome {
     run_command(toolchain.build().args(PROFILE).args(packages))
 }
 
-/// Builds the board's image with these `features` alone, under a `name` of its own. The image of the usual name must be
-/// built again afterwards.
-pub fn build_variant(toolchain: &Toolchain, features: &[&str], name: &str) -> Outcome {
-    let features = features.join(",");
-    build_as(name, toolchain.build().args(["--no-default-features", "--features", &features]))
-}
-
 /// Builds the board's image with room for a larger sensor. The image of the usual name must be built again afterwards.
 pub fn build_wide(toolchain: &Toolchain) -> Outcome {
-    build_as(NUCLEO_WIDE, toolchain.build().env("TAXEL_CAPACITY", WIDE))
-}
-
-/// Builds the board's image by `command`, and keeps it under another `name`.
-fn build_as(name: &str, command: &mut Command) -> Outcome {
-    run_command(command.args(PROFILE).args(NUCLEO).args(["--bin", NUCLEO_SPI]))?;
-    let [built, kept] = [NUCLEO_SPI, name].map(elf);
+    let mut command = toolchain.build();
+    command.env("TAXEL_CAPACITY", WIDE).args(PROFILE).args(NUCLEO).args(["--bin", NUCLEO_SPI]);
+    run_command(&mut command)?;
+    let [built, kept] = [NUCLEO_SPI, NUCLEO_WIDE].map(elf);
     fs::copy(&built, &kept).map_err(|cause| format!("{}: {cause}", kept.display()))?;
     Ok(())
-}
-
-/// Builds the board's image without `feature`, and returns its path. The image of the usual name must be built again
-/// afterwards.
-pub fn build_without(toolchain: &Toolchain, feature: &str) -> Outcome<PathBuf> {
-    let others: Vec<&str> = FEATURES.into_iter().filter(|other| *other != feature).collect();
-    let name = format!("nucleo-f446re-without-{feature}");
-    build_variant(toolchain, &others, &name)?;
-    Ok(elf(&name))
 }
 
 fn lint(toolchain: &Toolchain, packages: Packages) -> Outcome {

@@ -1,4 +1,4 @@
-//! Flash and RAM of the images and of their features, compared with a budget.
+//! Flash and RAM of the images, compared with a budget.
 
 mod budget;
 
@@ -8,9 +8,7 @@ use std::path::Path;
 use budget::Budget;
 use object::{Object, ObjectSection, ObjectSymbol};
 
-use crate::images::{
-    FEATURES, NUCLEO, NUCLEO_FIXED16, NUCLEO_SPI, QEMU, build_image, build_variant, build_without,
-};
+use crate::images::{NUCLEO, QEMU, build_image};
 use crate::process::{Outcome, root};
 use crate::toolchain::{Toolchain, elf};
 
@@ -78,12 +76,7 @@ pub fn run() -> Outcome {
     let text = fs::read_to_string(&path).map_err(|cause| format!("{BUDGET}: {cause}"))?;
     let budget = budget::parse(&text).map_err(|cause| format!("{BUDGET}: {cause}"))?;
     let toolchain = Toolchain::find()?;
-    let parts = FEATURES.into_iter().map(|feature| Part::new(&budget, feature));
-    let parts: Vec<_> = parts.collect::<Outcome<_>>()?;
     build_image(&toolchain, QEMU)?;
-    build_variant(&toolchain, &["fixed16"], NUCLEO_FIXED16)?;
-    let others = parts.iter().map(|part| Size::new(&build_without(&toolchain, part.feature)?));
-    let others: Vec<_> = others.collect::<Outcome<_>>()?;
     build_image(&toolchain, NUCLEO)?;
 
     println!(
@@ -105,40 +98,12 @@ pub fn run() -> Outcome {
         "stack"
     );
     let mut exceeded = Vec::new();
-    for image in budget.iter().filter(|budget| !budget.name.starts_with(PRICE)) {
+    for image in &budget {
         let size = Size::new(&elf(image.name))?;
         print_line(image, &size);
         exceeded.extend(image.exceeded_by(size.flash(), size.ram()));
     }
-    println!(
-        "\n{:21} {:>6} of {:>6} | {:>5} of {:>5}",
-        "feature", "flash", "budget", "RAM", "bud."
-    );
-    let whole = Size::new(&elf(NUCLEO_SPI))?;
-    for (part, other) in parts.iter().zip(&others) {
-        let [flash, ram] = [Size::flash, Size::ram].map(|of| of(&whole).abs_diff(of(other)));
-        let Budget { flash: most_flash, ram: most_ram, .. } = part.budget;
-        println!("{:21} {flash:6} of {most_flash:6} | {ram:5} of {most_ram:5}", part.feature);
-        exceeded.extend(part.budget.exceeded_by(flash, ram));
-    }
     if exceeded.is_empty() { Ok(()) } else { Err(format!("{BUDGET}: {}", exceeded.join("; "))) }
-}
-
-/// First letters of a feature's price among the budgets.
-const PRICE: &str = "feature:";
-
-/// A feature of the board's image, whose price is what the image takes less without it.
-struct Part<'a> {
-    feature: &'static str,
-    budget: Budget<'a>,
-}
-
-impl<'a> Part<'a> {
-    fn new(budgets: &[Budget<'a>], feature: &'static str) -> Outcome<Self> {
-        let price = |budget: &&Budget<'_>| budget.name.strip_prefix(PRICE) == Some(feature);
-        let budget = *budgets.iter().find(price).ok_or(format!("no price of {feature}"))?;
-        Ok(Self { feature, budget })
-    }
 }
 
 fn print_line(image: &Budget<'_>, size: &Size) {

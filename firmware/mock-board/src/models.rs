@@ -4,7 +4,7 @@ use taxel_core::AlignedBytes;
 use taxel_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::confidence::{Confidence, Sizes};
 use taxel_core::projection::Projection;
-use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
 
 use crate::shape::{COLS, OUTPUTS, ROWS};
@@ -15,7 +15,7 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
     let (centre, weights) = (list(1, centres * COLS), list(2, centres * OUTPUTS));
     let (bias, affine) = (list(3, OUTPUTS), list(4, COLS * OUTPUTS));
-    let network = direct::Network::try_new(
+    let network = float32::Network::try_new(
         Shape { inputs: COLS, centres, outputs: OUTPUTS },
         Parameters {
             input_minimum: &[50.0; COLS],
@@ -91,7 +91,7 @@ pub fn blob_of_features(features: usize) -> AlignedBytes {
     let all = |count: usize, value: f32| vec![value; count];
     let (minimum, per_span) = (all(features, 50.0), all(features, 0.05));
     let (centre, weights, bias) = (all(features, 0.5), all(outputs, 0.5), all(outputs, 0.25));
-    let network = direct::Network::try_new(
+    let network = float32::Network::try_new(
         Shape { inputs: features, centres: 1, outputs },
         Parameters {
             input_minimum: &minimum,
@@ -123,7 +123,7 @@ pub fn blob_of_a_row(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes 
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
     let (centre, weights, bias) = (list(1, inputs), list(2, outputs), list(3, outputs));
     let (minimum, per_span) = (vec![50.0; inputs], vec![0.05; inputs]);
-    let network = direct::Network::try_new(
+    let network = float32::Network::try_new(
         Shape { inputs, centres: 1, outputs },
         Parameters {
             input_minimum: &minimum,

@@ -6,7 +6,6 @@ use core::fmt::Arguments;
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use taxel_core::blob::Model;
 use taxel_core::confidence::{Confidence, Sizes};
-use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use taxel_core::filter::{Settings, State};
 use taxel_core::rbf::{Format, Network};
 use taxel_core::scale::{CLAMP, saturates};
@@ -66,26 +65,26 @@ impl<const R: usize> Decoded<R> {
     };
 
     /// Decodes `frame` into `self`; `None` if the model has another shape.
-    fn decode<E: ExpKernel>(&mut self, decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<()> {
+    fn decode(&mut self, decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<()> {
         let outputs = self.outputs.as_flattened_mut();
         let mut estimate = Estimate { outputs, status: &mut self.status };
         let mut scratch = [0.0; 2 * COLS];
         let frame = frame.as_flattened().into();
-        self.clamped = decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).ok()?;
+        self.clamped = decoder.decode_into(frame, &mut scratch, &mut estimate).ok()?;
         Some(())
     }
 
     /// What `decoder` makes of `frame`.
     fn new(decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<Self> {
         let mut outcome = Self::NOTHING;
-        outcome.decode::<Polynomial>(decoder, frame)?;
+        outcome.decode(decoder, frame)?;
         Some(outcome)
     }
 }
 
 /// CRC-32 of all bits that the model in `blob` decodes some frames to, one with a missing reading. `None` if the
 /// blob does not load.
-pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
+pub fn decoding(blob: &[u8]) -> Option<u32> {
     let decoder = Decoder::<ROWS>::load(blob).ok()?;
     let crc = CRC;
     let mut digest = crc.digest();
@@ -98,7 +97,7 @@ pub fn decoding<E: ExpKernel>(blob: &[u8]) -> Option<u32> {
         if frame == 1 {
             readings[2][3] = f32::NAN;
         }
-        outcome.decode::<E>(&decoder, &readings)?;
+        outcome.decode(&decoder, &readings)?;
         add(&mut digest, outcome.outputs.as_flattened());
     }
     Some(digest.finalize())
@@ -143,7 +142,7 @@ fn one_of_extremes<const R: usize>(index: usize, numbers: &mut Numbers) -> Frame
 
 /// CRC-32 of all bits that the model in `blob` decodes so many `frames` to, and of whether an input was clamped.
 #[inline(never)] // as all that follows, so that the stack holds one decoder at a time
-fn decoding_all<E: ExpKernel, const R: usize>(
+fn decoding_all<const R: usize>(
     blob: &[u8],
     frames: usize,
     frame: fn(usize, &mut Numbers) -> Frame<R>,
@@ -154,7 +153,7 @@ fn decoding_all<E: ExpKernel, const R: usize>(
     let mut numbers = Numbers::new(4);
     let mut outcome = Decoded::NOTHING;
     for index in 0..frames {
-        outcome.decode::<E>(&decoder, &frame(index, &mut numbers))?;
+        outcome.decode(&decoder, &frame(index, &mut numbers))?;
         for (outputs, status) in outcome.outputs.iter().zip(outcome.status) {
             outputs.iter().for_each(|value| digest.update(&value.to_bits().to_le_bytes()));
             digest.update(&[status as u8]);
@@ -165,7 +164,7 @@ fn decoding_all<E: ExpKernel, const R: usize>(
 }
 
 /// Number of frames with one reading within four steps of f32 of an end of the clamp, how many of them are said to be
-/// clamped, and how many otherwise than by portable arithmetic. `None` if the blob does not load, or its number format
+/// clamped, and how many otherwise than by portable arithmetic. `None` if the blob does not load, or is in `f32`, which
 /// clamps before it infers.
 #[inline(never)]
 fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
@@ -183,7 +182,7 @@ fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
     let [mut frames, mut clamped, mut otherwise] = [0; 3];
     for row in 0..ROWS {
         let network = network_of(row)?;
-        if matches!(network, Network::F32Direct(_)) {
+        if matches!(network, Network::F32(_)) {
             return None;
         }
         for (input, (end, step)) in (0..COLS)
@@ -316,38 +315,29 @@ fn assessing_sizes() -> Option<Assessed> {
 pub type Say<'s> = &'s mut dyn FnMut(Arguments<'_>);
 
 /// The models of the paper's shape, by format.
-const KERNELS: [(Format, &str); 3] = [
-    (Format::F32, "kernels-f32.bin"),
-    (Format::Fixed16, "kernels-fixed16.bin"),
-    (Format::F32Direct, "kernels-f32-direct.bin"),
-];
+const KERNELS: [(Format, &str); 2] =
+    [(Format::F32, "kernels-f32.bin"), (Format::Fixed16, "kernels-fixed16.bin")];
 
 /// The models of one network for all rows, behind a projection.
-const ARRAYS: [(&str, &str); 5] = [
+const ARRAYS: [(&str, &str); 3] = [
     ("f32", "array-f32.bin"),
-    ("f32 without tail", "array-f32-no-tail.bin"),
     ("fixed16", "array-fixed16.bin"),
     ("fixed16 without tail", "array-fixed16-no-tail.bin"),
-    ("f32-direct", "array-f32-direct.bin"),
 ];
 
-/// Says what every number format and exponential decodes of [`MANY`] frames, what a clamp finds, and what frames
+/// Says what every number format decodes of [`MANY`] frames, what a clamp finds, and what frames
 /// are by a confidence. `None` if one of the models in testdata, which `model` gives by name, does not load.
 pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()> {
     for (format, file) in KERNELS {
-        decode_many::<Polynomial>(format, model(file), say)?;
+        let crc = decoding_all::<ROWS>(model(file), MANY, one_of_many)?;
+        say(format_args!("{}: {crc:08x}", format.name()));
     }
-    let direct = model("kernels-f32-direct.bin");
-    decode_many::<Libm>(Format::F32Direct, direct, say)?;
-    decode_many::<Micromath>(Format::F32Direct, direct, say)?;
-    for (format, file) in KERNELS.into_iter().take(2) {
-        let ([frames, clamped, otherwise], name) = (clamping(model(file))?, format.name());
-        say(format_args!(
-            "clamp, {name}: {clamped} of {frames} frames clamped, {otherwise} otherwise than the twin's"
-        ));
-    }
+    let [frames, clamped, otherwise] = clamping(model("kernels-fixed16.bin"))?;
+    say(format_args!(
+        "clamp, fixed16: {clamped} of {frames} frames clamped, {otherwise} otherwise than the twin's"
+    ));
     for (name, file) in ARRAYS {
-        let crc = decoding_all::<Polynomial, ARRAY_ROWS>(model(file), MANY, one_of_many)?;
+        let crc = decoding_all::<ARRAY_ROWS>(model(file), MANY, one_of_many)?;
         say(format_args!("array, {name}: {crc:08x}"));
     }
     let many = assessing_many(model("array-fixed16-confidence.bin"))?;
@@ -396,17 +386,11 @@ fn filtering() -> (u32, usize) {
     (digest.finalize(), started)
 }
 
-fn decode_many<E: ExpKernel>(format: Format, blob: &[u8], say: Say<'_>) -> Option<()> {
-    let crc = decoding_all::<E, ROWS>(blob, MANY, one_of_many)?;
-    say(format_args!("{}, {}: {crc:08x}", format.name(), E::NAME));
-    Some(())
-}
-
 /// Says what every number format decodes of readings that no sensor gives, while subnormals are treated as `mode` says.
 pub fn extremes<'m>(mode: &str, model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()> {
     say(format_args!("subnormals {mode}"));
     for (format, file) in KERNELS {
-        let crc = decoding_all::<Polynomial, ROWS>(model(file), MANY / 10, one_of_extremes)?;
+        let crc = decoding_all::<ROWS>(model(file), MANY / 10, one_of_extremes)?;
         say(format_args!("{}: {crc:08x}", format.name()));
     }
     Some(())

@@ -7,9 +7,8 @@ use core::{ptr, slice};
 
 use cortex_m::peripheral::MPU;
 
-use taxel_core::exp::Polynomial;
 use taxel_core::projection::Projection;
-use taxel_core::rbf::{Format, Network, Shape, expanded, fixed16};
+use taxel_core::rbf::{Network, Shape, fixed16};
 use taxel_core::scale::UNITS;
 
 use crate::checks::Numbers;
@@ -126,13 +125,7 @@ fn shapes() -> impl Iterator<Item = Shape> {
 }
 
 /// Writes a network of `shape` with random numbers in the format's own ranges to `words`.
-fn write_network(
-    words: &mut [u32],
-    format: Format,
-    shape: Shape,
-    affine: bool,
-    numbers: &mut Numbers,
-) {
+fn write_network(words: &mut [u32], shape: Shape, affine: bool, numbers: &mut Numbers) {
     let Shape { inputs, centres, outputs } = shape;
     let mut words = words.iter_mut();
     let mut put = |count: usize, next: &mut dyn FnMut() -> u32| {
@@ -141,21 +134,6 @@ fn write_network(
     let any = |numbers: &mut Numbers| ((numbers.draw() * UNITS) as i32).cast_unsigned();
     put(inputs, &mut || MIDDLE_OHM.to_bits());
     put(inputs, &mut || ((0.12 + 0.02 * numbers.draw()) * UNITS).to_bits());
-    if format == Format::F32 {
-        // Exponents between −80 and −0.5 for all inputs within the clamp.
-        let decay = 10.0 / inputs as f32 / UNITS / UNITS;
-        put(1, &mut || decay.to_bits());
-        put(outputs, &mut || numbers.draw().to_bits());
-        let tail = if affine { inputs * outputs } else { 0 };
-        put(tail, &mut || (numbers.draw() / UNITS).to_bits());
-        let stored = centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
-        for _ in 0..stored {
-            put(1, &mut || (-31.5 + 28.5 * numbers.draw()).to_bits());
-            put(inputs, &mut || (decay * UNITS * numbers.draw()).to_bits());
-        }
-        put(stored * outputs, &mut || numbers.draw().to_bits());
-        return;
-    }
     // Exponents below 2 for the distance, and as much for a·x.
     let decay = 8_589_934_592.0 / inputs.max(4) as f32;
     put(1, &mut || (decay as i32).cast_unsigned());
@@ -176,10 +154,11 @@ fn write_network(
 
 /// Whether assembly infers the same as the twin, from readings and from scaled inputs.
 fn is_as_its_twin(
-    network: &Network<'_>,
+    twin: &fixed16::Network<'_>,
     [scaled, found, expected]: &mut [Guarded; 3],
     numbers: &mut Numbers,
 ) -> Option<bool> {
+    let network = Network::from(*twin);
     let Shape { inputs, outputs, .. } = network.shape();
     let mut same = true;
     for reach in REACHES_OHM {
@@ -189,21 +168,14 @@ fn is_as_its_twin(
         scaled.guard();
         found.guard();
         network.scale(readings, scaled.first(inputs)).ok()?;
-        let (of_scaled, of_twin) = (scaled.first(inputs), expected.first(outputs));
-        match network {
-            Network::F32Direct(_) => return None,
-            Network::F32(network) => network.infer_scaled_portably(of_scaled, of_twin),
-            Network::Fixed16(network) => network.infer_scaled_portably(of_scaled, of_twin),
-        }
+        twin.infer_scaled_portably(scaled.first(inputs), expected.first(outputs));
         for from_readings in [true, false] {
             found.first(outputs).fill(f32::NAN);
             if from_readings {
                 network.infer(readings, scaled.first(inputs), found.first(outputs)).ok()?;
             } else {
                 network.scale(readings, scaled.first(inputs)).ok()?;
-                network
-                    .infer_scaled_with::<Polynomial>(scaled.first(inputs), found.first(outputs))
-                    .ok()?;
+                network.infer_scaled(scaled.first(inputs), found.first(outputs)).ok()?;
             }
             same &= same_bits(found.first(outputs), expected.first(outputs));
             same &= scaled.is_untouched_from(inputs) && found.is_untouched_from(outputs);
@@ -212,24 +184,15 @@ fn is_as_its_twin(
     Some(same)
 }
 
-/// Compares networks of every shape in `format`, with an affine tail and without. `None` if a network is unsound.
+/// Compares networks in `fixed16` of every shape, with an affine tail and without. `None` if a network is unsound.
 #[inline(never)] // frees the stack that this needs
-pub fn networks(memory: &mut Memory, format: Format) -> Option<Comparison> {
+pub fn networks(memory: &mut Memory) -> Option<Comparison> {
     let mut numbers = Numbers::new(6);
     let mut comparison = Comparison::default();
     for (shape, affine) in shapes().flat_map(|shape| [(shape, false), (shape, true)]) {
-        let count = if format == Format::F32 {
-            expanded::Network::block_words(shape, affine)
-        } else {
-            fixed16::Network::block_words(shape, affine)
-        };
-        let words = last(memory.words, count);
-        write_network(words, format, shape, affine, &mut numbers);
-        let network = if format == Format::F32 {
-            Network::from(expanded::Network::try_new(shape, affine, words).ok()?)
-        } else {
-            Network::from(fixed16::Network::try_new(shape, affine, words).ok()?)
-        };
+        let words = last(memory.words, fixed16::Network::block_words(shape, affine));
+        write_network(words, shape, affine, &mut numbers);
+        let network = fixed16::Network::try_new(shape, affine, words).ok()?;
         comparison.add(is_as_its_twin(&network, &mut memory.buffers, &mut numbers)?);
     }
     Some(comparison)

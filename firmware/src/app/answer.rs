@@ -1,7 +1,6 @@
 //! Requests and their answers.
 
 use taxel_core::blob::Floats;
-use taxel_core::exp::{ExpKernel, Polynomial};
 
 use super::Core;
 use super::link::Link;
@@ -179,7 +178,6 @@ impl Models {
             rows: self.capacity.rows as u8,
             columns: self.capacity.columns as u8,
             outputs: self.capacity.outputs as u8,
-            kernel: Polynomial::NAME,
             model: model.identity,
             model_name: model.name(),
             slot_bytes: spare.bytes().len() as u32,

@@ -25,15 +25,9 @@ pub struct Buffers<
     pub(super) scratch: [[[f32; COLUMNS]; ROWS]; 2],
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     /// State of the filter in time.
-    #[cfg(feature = "filter")]
     pub(super) tracks: [[Track; OUTPUTS]; ROWS],
-    #[cfg(not(feature = "filter"))]
-    pub(super) tracks: [[Track; OUTPUTS]; 0],
     /// Standard deviations of the outputs.
-    #[cfg(feature = "confidence")]
     pub(super) deviations: [[f32; OUTPUTS]; ROWS],
-    #[cfg(not(feature = "confidence"))]
-    pub(super) deviations: [[f32; OUTPUTS]; 0],
 }
 
 /// Outputs of all rows, and their status.

@@ -8,9 +8,6 @@ use taxel_core::health::Limits;
 use crate::link::message::{ConfidenceSent, Configuration, ConfigurationField};
 use crate::readout::ScanSettings;
 
-/// Longest time constant in µs of the filter in time: 0 in an image without.
-const MOST_TIME_CONSTANT_US: u32 = if cfg!(feature = "filter") { Settings::MOST_US } else { 0 };
-
 impl Configuration {
     /// Range of frame periods in µs, besides 0.
     pub const FRAME_PERIOD_US: RangeInclusive<u32> = 100..=1_000_000_000;
@@ -57,7 +54,7 @@ impl Configuration {
             (limits[0] < limits[1], ConfigurationField::Limits),
             (positive(self.contact_threshold), ConfigurationField::ContactThreshold),
             (
-                self.filter_time_constant_us <= MOST_TIME_CONSTANT_US,
+                self.filter_time_constant_us <= Settings::MOST_US,
                 ConfigurationField::FilterTimeConstant,
             ),
             (self.filter_lead_us <= Settings::MOST_US, ConfigurationField::FilterLead),

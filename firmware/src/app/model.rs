@@ -2,7 +2,6 @@
 
 use taxel_core::blob::{Columns, DecodeError, Model};
 use taxel_core::checksum::CRC_32;
-use taxel_core::rbf::NetworkError;
 use taxel_core::{Decoder, scratch_floats};
 
 use crate::capacity::Capacity;
@@ -157,11 +156,6 @@ fn fault(error: &DecodeError) -> ModelFault {
         DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. } => ModelFault::Length,
         DecodeError::Corrupt { .. } => ModelFault::Corrupt,
         DecodeError::TooManyRows { .. } => ModelFault::Shape,
-        DecodeError::Network { cause: NetworkError::NotBuilt { feature }, .. }
-        | DecodeError::Confidence { cause: NetworkError::NotBuilt { feature } }
-        | DecodeError::Fill { cause: NetworkError::NotBuilt { feature } } => {
-            ModelFault::NotBuilt(*feature)
-        }
         _ => ModelFault::Invalid,
     }
 }

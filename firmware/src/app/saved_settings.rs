@@ -35,18 +35,12 @@ const fn version(setting: Setting) -> u8 {
     }
 }
 
-/// Whether the image keeps settings.
-const KEEPS: bool = cfg!(feature = "settings");
-
 /// Largest size of a configuration in bytes.
 const CONFIGURATION_BYTES: usize = 64;
 
 impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
     /// Puts the configuration and the constants that are kept in force.
     pub(super) fn load_settings<P: Platform>(&mut self, link: &mut Link<'_, P>) {
-        if !KEEPS {
-            return;
-        }
         if let Some(configuration) = link.kept_configuration() {
             self.configuration = configuration;
             info!("configuration as kept: a frame every {=u32} us", configuration.frame_period_us);
@@ -64,9 +58,6 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
     /// Puts the baseline that is kept in force, if it is of the wires that are scanned, and was read with the
     /// constants in force.
     pub(super) fn load_baseline<P: Platform>(&mut self, link: &mut Link<'_, P>) {
-        if !KEEPS {
-            return;
-        }
         let (origin_crc, length) = (self.origin_crc(), 4 * self.wiring.readings);
         match link.platform().journal().read(Kind::Baseline).and_then(baseline) {
             Some(kept) if kept.origin_crc == origin_crc && kept.readings.0.len() == length => {
@@ -85,7 +76,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         link: &mut Link<'_, P>,
     ) -> Result<(), Refusal> {
         const NOTHING: Refusal = Refusal::Keep(KeepFault::Nothing);
-        link.may_keep()?;
+        link.may_write()?;
         let origin_crc = self.origin_crc();
         let journal = link.platform().journal();
         let version = version(setting);
@@ -138,23 +129,15 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
 }
 
 impl<P: Platform> Link<'_, P> {
-    /// Checks that the host may have a setting kept, or forgotten.
-    fn may_keep(&self) -> Result<(), Refusal> {
-        if KEEPS { self.may_write() } else { Err(Refusal::Keep(KeepFault::Unsupported)) }
-    }
-
     /// The configuration that is kept.
     pub(super) fn kept_configuration(&mut self) -> Option<Configuration> {
         let journal = self.platform().journal();
-        journal.read(Kind::Configuration).and_then(configuration).filter(|_| KEEPS)
+        journal.read(Kind::Configuration).and_then(configuration)
     }
 
     /// The settings that are kept.
     pub(super) fn kept(&mut self) -> Kept {
         let writes_left = self.writes_left;
-        if !KEEPS {
-            return Kept { configuration: None, constants: false, baseline: None, writes_left };
-        }
         let configuration = self.kept_configuration();
         let journal = self.platform().journal();
         let constants = journal.read(Kind::Constants).and_then(constants).is_some();
@@ -169,7 +152,7 @@ impl<P: Platform> Link<'_, P> {
 
     /// Keeps a setting no longer.
     pub(super) fn forget(&mut self, setting: Setting) -> Result<(), Refusal> {
-        self.may_keep()?;
+        self.may_write()?;
         let written = self.platform().journal().keep(setting.into(), &[]);
         self.count_write(written)
     }

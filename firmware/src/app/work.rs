@@ -60,7 +60,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             if mem::take(&mut sensor.is_configured_anew) {
                 self.filter.restart();
             }
-            if let Some(start_us) = filtered_us.filter(|_| cfg!(feature = "filter")) {
+            if let Some(start_us) = filtered_us {
                 self.filter.filter(sensor.configuration.filter(), start_us, &mut estimate);
             }
             if decoder.metadata().relative_inputs && !self.has_reciprocals {

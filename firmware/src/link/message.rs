@@ -5,7 +5,6 @@
 
 use serde::{Deserialize, Serialize};
 use taxel_core::blob::Floats;
-use taxel_core::feature::Feature;
 
 use crate::circuit::{Constants, ConstantsFault};
 use crate::readout::ScanSettings;
@@ -174,9 +173,6 @@ pub struct Identity<'a> {
     pub columns: u8,
     /// Largest number of outputs a row.
     pub outputs: u8,
-    /// Name of the exponential for activations of networks in `f32-direct`
-    /// ([`ExpKernel::NAME`](taxel_core::exp::ExpKernel::NAME)).
-    pub kernel: &'a str,
     /// The model in force; `None` if there is none.
     pub model: Option<ModelIdentity>,
     /// Name of the scene or data set of the model in force, cut after 40 bytes; empty without a model.
@@ -518,8 +514,6 @@ pub enum KeepFault {
     TooLarge,
     /// Settings and undos were written too often since the start; a restart allows more.
     TooOften,
-    /// The image keeps no settings: it was built without the feature `settings`.
-    Unsupported,
 }
 
 /// A field of [`Configuration`] that can be out of range.
@@ -535,7 +529,7 @@ pub enum ConfigurationField {
     Limits,
     /// The threshold for contact: positive and finite.
     ContactThreshold,
-    /// The filter's time constant: at most 1 s; 0 in an image that was built without the feature `filter`.
+    /// The filter's time constant: at most 1 s.
     FilterTimeConstant,
     /// The filter's lead: at most 1 s.
     FilterLead,
@@ -556,8 +550,6 @@ pub enum ModelFault {
     Invalid,
     /// The device has no room for a model of this shape.
     Shape,
-    /// The device's image was built without a part that the model needs.
-    NotBuilt(Feature),
     /// The board lacks wires that the names of the inputs say, or their order is unknown.
     Wires,
 }

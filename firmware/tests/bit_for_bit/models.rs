@@ -4,11 +4,11 @@ use taxel_core::AlignedBytes;
 use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::confidence::Confidence;
 use taxel_core::projection::Projection;
-use taxel_core::rbf::direct::Parameters;
 use taxel_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, EXPONENT_MARGIN,
 };
-use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::rbf::float32::Parameters;
+use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
 use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 
 use crate::checks::{ARRAY_CONFIDENCE, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_confidence};
@@ -20,16 +20,13 @@ const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8
 type Maker = fn() -> AlignedBytes;
 
 /// Every model: the name of its file, and the function that makes it.
-pub const FILES: [(&str, Maker); 10] = [
+pub const FILES: [(&str, Maker); 7] = [
     ("hand-made.bin", hand_made),
     ("kernels-f32.bin", || of_format(Format::F32)),
     ("kernels-fixed16.bin", || of_format(Format::Fixed16)),
-    ("kernels-f32-direct.bin", || of_format(Format::F32Direct)),
-    ("array-f32.bin", || of_array(Format::F32, 131, true)),
-    ("array-f32-no-tail.bin", || of_array(Format::F32, 130, false)),
+    ("array-f32.bin", || of_array(Format::F32, 17, true)),
     ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true)),
     ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false)),
-    ("array-f32-direct.bin", || of_array(Format::F32Direct, 17, true)),
     ("array-fixed16-confidence.bin", of_confidence),
 ];
 
@@ -41,9 +38,9 @@ fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32
 fn hand_made() -> AlignedBytes {
     let mut numbers = Numbers::new(0);
     let shape = row_shape(12);
-    let mut words = || direct_words(&mut numbers, shape, true, 12);
+    let mut words = || float32_words(&mut numbers, shape, true, 12);
     let (even, odd) = (words(), words());
-    let networks = [&even, &odd].map(|words| network(Format::F32Direct, shape, false, true, words));
+    let networks = [&even, &odd].map(|words| network(Format::F32, shape, true, words));
     encoded("hand-made", None, &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
 }
 
@@ -52,16 +49,15 @@ fn row_shape(centres: usize) -> Shape {
 }
 
 /// A model of networks with an affine tail and without. K is no multiple of the centres that a routine takes at
-/// once. In f32, the last row's K is larger than the number of activations that the assembly keeps.
+/// once.
 fn of_format(format: Format) -> AlignedBytes {
     let mut numbers = Numbers::new(5);
-    let of_last_row = if format == Format::F32 { 131 } else { 33 };
-    let kinds = [(18, true), (17, false), (of_last_row, true)];
+    let kinds = [(18, true), (17, false), (33, true)];
     let words =
         kinds.map(|(centres, affine)| words_of(format, &mut numbers, row_shape(centres), affine));
     let networks = [0, 1, 2].map(|index| {
         let (centres, affine) = kinds[index];
-        network(format, row_shape(centres), true, affine, &words[index])
+        network(format, row_shape(centres), affine, &words[index])
     });
     encoded(format.name(), None, &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
 }
@@ -77,42 +73,33 @@ fn of_array(format: Format, centres: usize, affine: bool) -> AlignedBytes {
     let projection = Projection::new(readings, COLS, &block).unwrap();
     let shape = Shape { inputs: COLS, centres, outputs: ARRAY_ROWS * OUTPUTS };
     let words = words_of(format, &mut numbers, shape, affine);
-    let network = network(format, shape, true, affine, &words);
+    let network = network(format, shape, affine, &words);
     encoded(format.name(), Some(projection), &[network], &[0; ARRAY_ROWS])
 }
 
 fn words_of(format: Format, numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
     match format {
-        Format::F32Direct => direct_words(numbers, shape, affine, 1),
-        Format::F32 => expanded_words(numbers, shape, affine),
+        Format::F32 => float32_words(numbers, shape, affine, 1),
         Format::Fixed16 => fixed16_words(numbers, shape, affine),
     }
 }
 
-fn network(
-    format: Format,
-    shape: Shape,
-    common_width: bool,
-    affine: bool,
-    words: &[u32],
-) -> Network<'_> {
+fn network(format: Format, shape: Shape, affine: bool, words: &[u32]) -> Network<'_> {
     match format {
-        Format::F32Direct => {
-            direct::Network::of_words(shape, common_width, affine, words).unwrap().into()
-        }
-        Format::F32 => expanded::Network::try_new(shape, affine, words).unwrap().into(),
+        Format::F32 => float32::Network::of_words(shape, affine, words).unwrap().into(),
         Format::Fixed16 => fixed16::Network::try_new(shape, affine, words).unwrap().into(),
     }
 }
 
-fn direct_words(numbers: &mut Numbers, shape: Shape, affine: bool, widths: usize) -> Vec<u32> {
+/// Parameters whose centres have so many different `widths`, in turn.
+fn float32_words(numbers: &mut Numbers, shape: Shape, affine: bool, widths: usize) -> Vec<u32> {
     let Shape { centres, outputs, .. } = shape;
     let mut draw = |count, middle, reach| draw(numbers, count, middle, reach);
     let parameters = Parameters {
         input_minimum: &draw(COLS, 54.0, 1.0),
         input_per_span: &draw(COLS, 0.08, 0.01),
         centres: &draw(centres * COLS, 0.5, 0.5),
-        decay: &draw(widths, 0.75, 0.5),
+        decay: &draw(widths, 0.75, 0.5).repeat(centres / widths),
         output_weights: &draw(centres * outputs, 0.0, 1.0),
         bias: &draw(outputs, 0.0, 1.0),
         affine: &draw(if affine { COLS * outputs } else { 0 }, 0.0, 0.1),
@@ -127,34 +114,6 @@ fn scaling(numbers: &mut Numbers) -> [Vec<f32>; 2] {
     // A channel that never changed.
     per_unit[COLS - 1] = 0.0;
     [midpoint, per_unit]
-}
-
-fn expanded_words(numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
-    let Shape { centres, outputs, .. } = shape;
-    let [midpoint, per_unit] = scaling(numbers);
-    let unit = f64::from(HALF_RANGE) / f64::from(UNITS);
-    let decay = DECAY_PER_SPAN_SQUARED * unit * unit;
-    let stored = centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
-    let mut exponents = Vec::new();
-    for _ in 0..centres {
-        let centre: Vec<f64> =
-            draw(numbers, COLS, 0.0, 0.5).iter().map(|c| f64::from(*c) / unit).collect();
-        exponents.push(-(decay * centre.iter().map(|c| c * c).sum::<f64>()) as f32);
-        exponents.extend(centre.iter().map(|c| (2.0 * decay * c) as f32));
-    }
-    exponents.resize(stored * (1 + COLS), 0.0);
-    let mut weights = draw(numbers, centres * outputs, 0.0, 1.0);
-    weights.resize(stored * outputs, 0.0);
-    let parameters = expanded::Parameters {
-        input_midpoint: &midpoint,
-        input_per_unit: &per_unit,
-        decay: decay as f32,
-        bias: &draw(numbers, outputs, 0.0, 1.0),
-        affine: &draw(numbers, if affine { COLS * outputs } else { 0 }, 0.0, 0.1 / UNITS),
-        exponents: &exponents,
-        output_weights: &weights,
-    };
-    parameters.words().collect()
 }
 
 fn fixed16_words(numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
@@ -209,7 +168,7 @@ fn of_confidence() -> AlignedBytes {
     let mut numbers = Numbers::new(8);
     let shape = row_shape(1);
     let words = words_of(Format::Fixed16, &mut numbers, shape, false);
-    let network = network(Format::Fixed16, shape, true, false, &words);
+    let network = network(Format::Fixed16, shape, false, &words);
     let mut block = vec![0.0; ARRAY_CONFIDENCE.block_floats()];
     write_confidence(ARRAY_CONFIDENCE, &mut block, &mut numbers);
     let confidence = Confidence::new(ARRAY_CONFIDENCE, &block).unwrap();

@@ -8,7 +8,7 @@ use taxel_learn::cost::{Cost, Design, Prices};
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::decoders::mean::Mean;
 use taxel_learn::outliers::Outliers;
-use taxel_learn::{Decoder, Exponential, ModelBlob, Options, PreparedModel};
+use taxel_learn::{Decoder, ModelBlob, Options, PreparedModel};
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::{Synthesis, World};
 
@@ -159,7 +159,7 @@ pub fn run(
     progress.step();
 
     let blob = training.blob(options, progress)?;
-    let network = blob.prepare(Exponential::default()).of_inputs();
+    let network = blob.prepare().of_inputs();
 
     let (measure, limit) = subject.measure(None, progress);
     progress.stage("decode and evaluate", 1);
@@ -314,7 +314,7 @@ fn model_summary(
 ) -> Result<ModelSummary> {
     let model = prepared.model();
     let shape = model.shape();
-    let frame_cost = Prices::accepted()?.frame(&Design::new(blob), Exponential::default())?;
+    let frame_cost = Prices::accepted()?.frame(&Design::new(blob))?;
     Ok(ModelSummary {
         training_frames: training.frames.frames(),
         test_frames,

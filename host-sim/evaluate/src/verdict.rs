@@ -1,7 +1,7 @@
 //! Verdict on a model in plain words: what it is worth, and what to beware of.
 
 use serde::Serialize;
-use taxel_core::rbf::{Format, Shape, expanded, fixed16};
+use taxel_core::rbf::{Format, Shape, fixed16};
 use taxel_data::columns::READINGS;
 use taxel_learn::ModelBlob;
 use taxel_learn::cost::Design;
@@ -147,8 +147,7 @@ impl Verdict {
 /// Number of centres that a network of so many takes room and time for.
 fn stored_centres(format: Format, centres: usize) -> usize {
     match format {
-        Format::F32Direct => centres,
-        Format::F32 => centres.next_multiple_of(expanded::CENTRES_AT_ONCE),
+        Format::F32 => centres,
         Format::Fixed16 => centres.next_multiple_of(fixed16::CENTRES_AT_ONCE),
     }
 }

@@ -7,7 +7,7 @@ use taxel_core::confidence::{Confidence, Sizes};
 use taxel_data::{Dataset, require};
 
 use crate::error::{Result, no_regression};
-use crate::infer::{Exponential, assess_lines};
+use crate::infer::assess_lines;
 use crate::packing::ModelBlob;
 use crate::parallel;
 
@@ -112,8 +112,7 @@ impl HeldOut {
     /// # Panics
     /// If the data set has other columns than the model.
     pub fn add(&mut self, blob: &ModelBlob, density: &Density, dataset: &Dataset) {
-        let decoded =
-            blob.prepare(Exponential::default()).of_inputs().decode_table(&dataset.inputs);
+        let decoded = blob.prepare().of_inputs().decode_table(&dataset.inputs);
         let errors = decoded.values.iter().zip(&dataset.outputs.values);
         self.errors.extend(errors.map(|(estimate, truth)| estimate - truth));
         self.surprises.extend(density.surprises(&dataset.inputs.values));

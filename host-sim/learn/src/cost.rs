@@ -14,11 +14,9 @@ pub use design::{Design, NetworkDesign};
 pub use memory::DecoderRam;
 use serde::Serialize;
 use taxel_core::blob::ModelShape;
-use taxel_core::rbf::Format;
 pub use terms::{Terms, filter_terms, terms};
 
 use crate::error::{Error, Result};
-use crate::infer::Exponential;
 
 /// The price list in the repository.
 const FITTED: &str = taxel_firmware::timing::DECODING_PRICES;
@@ -112,12 +110,12 @@ impl Prices {
         format!("{COMPILER}{compiler}\n{HEAD}\n{}", prices.iter().map(line).collect::<String>())
     }
 
-    /// What one frame costs a model of this `design`, with the `exponential` of networks in `f32-direct`.
+    /// What one frame costs a model of this `design`.
     ///
     /// # Errors
     /// [`Error`] names a term that the list lacks.
-    pub fn frame(&self, design: &Design, exponential: Exponential) -> Result<Cost> {
-        let cost = self.of(&terms(design, exponential))?;
+    pub fn frame(&self, design: &Design) -> Result<Cost> {
+        let cost = self.of(&terms(design))?;
         let waiting = design.least_waiting_for_weights();
         Ok(Cost { flash_cycles: cost.flash_cycles + waiting, ..cost })
     }
@@ -165,19 +163,10 @@ pub fn least_waiting_for_weights(bytes: usize) -> u64 {
     bytes.div_ceil(FLASH_LINE_BYTES) as u64 * WAIT_STATES
 }
 
-/// Name of a number format with an exponential, as `cargo xtask cycles` spells it.
-#[must_use]
-pub fn kernel_name(format: Format, exponential: Exponential) -> String {
-    match (format, exponential) {
-        (Format::F32Direct, Exponential::Libm | Exponential::Micromath) => {
-            format!("{}-{}", format.name(), exponential.name())
-        }
-        _ => format.name().into(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use taxel_core::rbf::Format;
+
     use super::*;
 
     #[test]
@@ -199,7 +188,7 @@ mod tests {
             Prices::parse(&Prices::text("rustc", &[("rows".to_owned(), [1.0; 3])])).unwrap();
         let shape = ModelShape { rows: 1, inputs: 2, outputs: 3 };
         let design = Design::of_rows(shape, Format::F32, 4, false);
-        let error = prices.frame(&design, Exponential::default()).unwrap_err();
+        let error = prices.frame(&design).unwrap_err();
         assert!(error.to_string().contains("no price for \"f32"), "{error}");
     }
 }

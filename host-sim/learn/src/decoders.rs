@@ -3,7 +3,7 @@
 use taxel_data::{Dataset, RowTable};
 
 use crate::decoder::{Decoder, Estimates, FrameDecoder, Frames};
-use crate::infer::{Exponential, infer};
+use crate::infer::infer;
 use crate::parallel;
 use crate::train::FittedNetwork;
 
@@ -51,7 +51,7 @@ pub struct Rows<D> {
 
 impl RowDecoder for FittedNetwork {
     fn predict(&self, readings: &[f64]) -> Vec<f64> {
-        infer(&self.network(), Exponential::default(), readings)
+        infer(&self.network(), readings)
     }
 }
 

@@ -31,7 +31,6 @@ pub mod cost;
 
 pub use decoder::{Decoder, Estimates, FrameDecoder, Frames, Timing};
 pub use filtered::Filtered;
-pub use infer::Exponential;
 pub use packing::{ModelBlob, Origin, pack};
 pub use prepared::PreparedModel;
 pub use taxel_data::error::{Error, Result};

@@ -12,7 +12,7 @@ use taxel_core::rbf::Network;
 use taxel_data::{Dataset, columns, input};
 
 use crate::error::{Error, Result, not_packed};
-use crate::infer::{Exponential, infer};
+use crate::infer::infer;
 use crate::train::{self, FittedNetwork, Trained};
 
 /// Largest blob in bytes that is read: 256 MB.
@@ -118,7 +118,7 @@ fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
     let mut rmse = Vec::new();
     for (row, network) in networks.iter().enumerate() {
         let table = dataset.row_table(row);
-        let predicted = infer(network, Exponential::default(), &table.inputs.values);
+        let predicted = infer(network, &table.inputs.values);
         let squares = table.outputs.squared_errors(&predicted);
         let counts = table.outputs.counts();
         rmse.extend(squares.iter().zip(counts).map(|(s, count)| (s / count as f64).sqrt()));

@@ -9,7 +9,7 @@ use taxel_core::scale::CLAMP;
 use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
-use crate::infer::{Exponential, assess_lines, infer_in_turn, is_missing};
+use crate::infer::{assess_lines, infer_in_turn, is_missing};
 use crate::packing::ModelBlob;
 use crate::parallel;
 use crate::relative::{ratios, reciprocals};
@@ -27,19 +27,18 @@ pub struct PreparedModel<'b> {
     model: Model<'b>,
     /// Network of each row-wire, or the one network behind a projection.
     networks: Arc<[Network<'b>]>,
-    exponential: Exponential,
     output_names: Vec<String>,
     /// One over the baseline of each reading; `None` for a model that takes what it is given.
     reciprocals: Option<Vec<f32>>,
 }
 
 impl ModelBlob {
-    /// Prepares the model for decoding with `exponential`; [`Exponential::default`] is that of the
-    /// devices. A model with relative inputs then needs a [baseline](PreparedModel::with_baseline).
+    /// Prepares the model for decoding. A model with relative inputs then needs a
+    /// [baseline](PreparedModel::with_baseline).
     ///
     /// # Panics
     /// Never: every row of a model that was checked has a network.
-    pub fn prepare(&self, exponential: Exponential) -> PreparedModel<'_> {
+    pub fn prepare(&self) -> PreparedModel<'_> {
         let model = self.parse();
         let networks: Vec<Network<'_>> = model.networks().collect();
         let of_row = |row| networks[model.network_of_row(row).expect("a row of the model")];
@@ -51,7 +50,6 @@ impl ModelBlob {
         let readings = model.shape().rows * model.shape().inputs;
         PreparedModel {
             networks: in_turn.into(),
-            exponential,
             output_names,
             reciprocals: model.metadata().relative_inputs.then(|| vec![f32::NAN; readings]),
             model,
@@ -115,7 +113,7 @@ impl<'b> PreparedModel<'b> {
 
     /// Decodes `readings` (`frames × inputs`) to outputs (`frames × outputs`), line after line.
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
-        infer_in_turn(&self.networks, self.exponential, &self.inputs_of_networks(readings))
+        infer_in_turn(&self.networks, &self.inputs_of_networks(readings))
     }
 
     /// Network of each row-wire, or the one network behind a projection.

@@ -383,8 +383,7 @@ impl Unit {
     /// The `network` in its own number format, with its inputs shifted. Every format's words begin with the zeros.
     fn shifted(&self, network: &Network<'_>, shift: &[f64]) -> Result<FittedNetwork> {
         let mut words: Vec<u32> = match network {
-            Network::F32Direct(network) => network.parameters().words().collect(),
-            Network::F32(network) => network.block().to_vec(),
+            Network::F32(network) => network.parameters().words().collect(),
             Network::Fixed16(network) => network.block().to_vec(),
         };
         let scale = self.network.zeros.iter().zip(&self.network.per_unit);

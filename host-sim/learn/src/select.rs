@@ -5,7 +5,7 @@ use taxel_data::{BadValue, Dataset, Progress, Silent};
 
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
-use crate::infer::{Exponential, infer};
+use crate::infer::infer;
 use crate::parallel;
 use crate::train::{
     self, Examples, FittedNetwork, Layers, Options, Refinement,
@@ -184,7 +184,7 @@ impl<'d> Judge<'d> {
             let of_row = |(row, network): (usize, &FittedNetwork)| {
                 let test = test.row_table(row);
                 let network = network.network();
-                let predicted = infer(&network, Exponential::default(), &test.inputs.values);
+                let predicted = infer(&network, &test.inputs.values);
                 test.outputs.squared_errors(&predicted)
             };
             networks.flat_map(of_row).collect()

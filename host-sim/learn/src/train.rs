@@ -231,9 +231,6 @@ pub struct Trained {
 
 /// Trains one network for each row-wire of `dataset`, or one for all of them.
 ///
-/// All networks have one format. Direct distances replace [`Format::F32`] if the rounding of expanded
-/// ones is not proved harmless for every row.
-///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) for options that do not fit the data,
 /// [`Error::Unfit`](crate::Error::Unfit) for a column that f32 does not hold, and other
@@ -287,31 +284,17 @@ pub(crate) fn fit_each(
     penalties: &[Option<f64>],
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<FittedNetwork>>> {
-    // One list of networks a row-wire, one network a penalty.
-    let fit_rows = |options: &Options, penalties: &[Option<f64>]| {
-        let fitted = parallel::map(layers.hidden.len(), &|row| {
-            let layer = &layers.hidden[row];
-            let table = layers.seen.row_table(row);
-            let fitted = Samples::new(&table).fit_each(layer, options, penalties);
-            progress.step();
-            fitted
-        });
-        fitted.into_iter().collect::<Result<Vec<Vec<FittedNetwork>>>>()
-    };
     progress.stage("fit weights", layers.hidden.len());
-    let mut rows: Vec<_> = fit_rows(options, penalties)?.into_iter().map(Vec::into_iter).collect();
-    let mut models = Vec::with_capacity(penalties.len());
-    for penalty in penalties {
-        let mut networks: Vec<FittedNetwork> = rows.iter_mut().filter_map(Iterator::next).collect();
-        let formats = || networks.iter().map(FittedNetwork::format);
-        if !formats().all(|format| Some(format) == formats().next()) {
-            progress.stage("fit weights with direct distances", layers.hidden.len());
-            let direct = Options { format: Format::F32Direct, ..*options };
-            networks = fit_rows(&direct, &[*penalty])?.into_iter().flatten().collect();
-        }
-        models.push(networks);
-    }
-    Ok(models)
+    let fitted = parallel::map(layers.hidden.len(), &|row| {
+        let table = layers.seen.row_table(row);
+        let fitted = Samples::new(&table).fit_each(&layers.hidden[row], options, penalties);
+        progress.step();
+        fitted
+    });
+    // One list of networks a row-wire, one network a penalty.
+    let fitted = fitted.into_iter().collect::<Result<Vec<Vec<FittedNetwork>>>>()?;
+    let mut rows: Vec<_> = fitted.into_iter().map(Vec::into_iter).collect();
+    Ok(penalties.iter().map(|_| rows.iter_mut().filter_map(Iterator::next).collect()).collect())
 }
 
 /// Squared distance ‖a − b‖².

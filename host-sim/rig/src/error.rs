@@ -145,9 +145,7 @@ fn configuration_range(field: ConfigurationField) -> String {
             "the change that is a contact (--contact-threshold: above 0)".into()
         }
         Field::FilterTimeConstant => {
-            format!(
-                "the filter's time constant (--filter-ms: 0 to {MOST_FILTER_MS}; 0 in an image without the feature `filter`)"
-            )
+            format!("the filter's time constant (--filter-ms: 0 to {MOST_FILTER_MS})")
         }
         Field::FilterLead => format!("the filter's lead (--lead-ms: 0 to {MOST_FILTER_MS})"),
         Field::ReportEvery => "the scans of which one is reported (--report-every: from 1)".into(),
@@ -166,16 +164,11 @@ fn why(refusal: Refusal) -> String {
         Refusal::NoUpload => "no upload has begun, or no model is on trial".into(),
         Refusal::OutOfPlace { received } => format!("it has {received} bytes of the upload so far"),
         Refusal::BadModel(ModelFault::Shape) => "it has no room for a model of this shape".into(),
-        Refusal::BadModel(ModelFault::NotBuilt(feature)) => format!(
-            "its image is built without the feature `{}`, which the model needs: flash an image with it, or train \
-             without it (another --format, or no --confidence or --fill)",
-            feature.name()
-        ),
         Refusal::BadModel(ModelFault::Wires) => {
             "its board lacks wires that the model's inputs name; `inspect` names the first".into()
         }
         Refusal::BadModel(fault) => {
-            format!("the model is faulty ({fault:?}), or of a newer version than the device's program: if `inspect` finds nothing, flash the \
+            format!("the model is faulty ({fault:?}), or of another version than the device's program: if `inspect` finds nothing, flash the \
                  program again (docs/board.md)")
         }
         Refusal::Flash => "its flash could not be written".into(),
@@ -190,9 +183,6 @@ fn why(refusal: Refusal) -> String {
         Refusal::Keep(KeepFault::TooLarge) => "it has no room to keep that".into(),
         Refusal::Keep(KeepFault::TooOften) => {
             "settings or undos were written too often since its start, which wears its flash; restart it to go on".into()
-        }
-        Refusal::Keep(KeepFault::Unsupported) => {
-            "its image keeps no settings: build one with the feature `settings` (docs/board.md)".into()
         }
         Refusal::TooSoon { wait_us } => format!(
             "its flash was erased too often; upload again in {} s",

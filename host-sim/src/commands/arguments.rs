@@ -1,4 +1,4 @@
-//! Parsers of options: names of formats and exponentials, and errors that name an option.
+//! Parsers of options: names of formats, and errors that name an option.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,6 @@ use crate::{Error, Result};
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use taxel_core::rbf::Format;
 use taxel_data::BadValue;
-use taxel_learn::Exponential;
 use taxel_learn::train::Solver;
 
 /// Parser for the name of a number format.
@@ -19,12 +18,6 @@ pub fn format() -> impl TypedValueParser<Value = Format> {
 pub fn solver() -> impl TypedValueParser<Value = Solver> {
     let named = |solver: Solver| PossibleValue::new(solver.name()).help(solver.description());
     one_of(Solver::ALL.map(|solver| (named(solver), solver)))
-}
-
-/// Parser for the name of an exponential.
-pub fn exponential() -> impl TypedValueParser<Value = Exponential> {
-    let named = |e: Exponential| PossibleValue::new(e.name()).help(e.description());
-    one_of(Exponential::ALL.map(|exponential| (named(exponential), exponential)))
 }
 
 /// Parser for the path of a folder that receives several files: not `-`, which stands for stdout elsewhere.

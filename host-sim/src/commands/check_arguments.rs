@@ -8,7 +8,7 @@ use clap::Args;
 use taxel_core::blob::Metadata;
 use taxel_data::{DataFile, Rest, Stream};
 use taxel_firmware::link::message::Memory;
-use taxel_learn::{Exponential, ModelBlob};
+use taxel_learn::ModelBlob;
 use taxel_rig::device::check::{Findings, Frames, Plan};
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::{Synthesis, synthesise};
@@ -102,7 +102,7 @@ impl CheckArguments {
         };
         let model = ModelBlob::read(path)?;
         let file = DataFile::read(Path::new(&self.source))?;
-        let readings = model_inputs(&model.prepare(Exponential::default()), &file)?;
+        let readings = model_inputs(&model.prepare(), &file)?;
         let parsed = model.parse();
         let metadata = parsed.metadata();
         let rest = self.untouched.rest_if_relative(&file, metadata, None)?;
@@ -211,7 +211,6 @@ fn page_of(f: &Findings) -> print::Page {
             if m.in_ram { "RAM" } else { "flash" }
         ));
     }
-    page.line(format_args!("{:<17} {}", "exponential", d.exponential));
     page.line(format_args!(
         "{:<17} {} of {} bit-identical to the host's, {:.0} a second",
         "frames", f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s

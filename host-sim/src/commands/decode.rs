@@ -16,10 +16,9 @@ use taxel_data::table::Table;
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::filtered::filter_frames;
 use taxel_learn::infer::is_missing;
-use taxel_learn::{Exponential, ModelBlob, PreparedModel};
+use taxel_learn::{ModelBlob, PreparedModel};
 use taxel_recording::{Extras, Frame};
 
-use super::arguments::exponential;
 use super::data_file::DataFileArguments;
 use super::filter_arguments::{FilterArguments, PeriodArgument};
 use super::health::{Health, HealthArguments};
@@ -67,9 +66,6 @@ pub struct Arguments {
     filter: FilterArguments,
     #[command(flatten)]
     period: PeriodArgument,
-    /// Exponential of the activations.
-    #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
-    exponential: Exponential,
     #[command(flatten)]
     file: DataFileArguments,
 }
@@ -85,7 +81,6 @@ struct Summary {
     health: Health,
     /// Number of novel frames, if confidence was asked for.
     frames_novel: Option<usize>,
-    exponential: Exponential,
     file: PathBuf,
 }
 
@@ -99,7 +94,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return Err(Error::Usage(message.into()));
     }
     let blob = ModelBlob::read(&arguments.model)?;
-    let model = blob.prepare(arguments.exponential);
+    let model = blob.prepare();
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
     let file = if arguments.keep.is_empty() {
         arguments.file.read(&arguments.readings)?
@@ -154,7 +149,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         frames_clamped: flags.iter().filter(|flags| *flags & EstimateReport::CLAMPED != 0).count(),
         health,
         frames_novel: assessed.map(|(_, frames)| novel(&frames)),
-        exponential: arguments.exponential,
         file: arguments.output.clone(),
     };
     if common.json {

@@ -18,11 +18,10 @@ use serde::Serialize;
 use taxel_core::blob::Metadata;
 use taxel_data::dataset::UnusedInputs;
 use taxel_data::{Clock, DataFile, output};
+use taxel_learn::ModelBlob;
 use taxel_learn::decoders::mean;
-use taxel_learn::{Exponential, ModelBlob};
 use taxel_limit::Refusal;
 
-use super::arguments::exponential;
 use super::coverage_page;
 use super::data_file::{DATA_FILES, DataFileArguments};
 use super::health::{Health, HealthArguments};
@@ -52,9 +51,6 @@ pub struct Arguments {
     /// Column with the time of each line [default: one called time, t, timestamp, …; without one lines are counted].
     #[arg(long, value_name = "NAME", help_heading = DATA_FILES)]
     time: Option<String>,
-    /// Exponential of the activations.
-    #[arg(long, alias = "kernel", value_parser = exponential(), default_value = "polynomial")]
-    exponential: Exponential,
     /// Write a page with the same figures as run's.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
@@ -76,7 +72,6 @@ struct Summary {
     values: usize,
     /// Number of these that count: neither they nor a reading they need is missing.
     values_evaluated: usize,
-    exponential: Exponential,
     /// Faulty readings, and how many of them were filled.
     health: Health,
     /// Errors of the model, and of always predicting the mean of these outputs.
@@ -103,7 +98,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         print::check_output(html, &inputs)?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
-    let model = blob.prepare(arguments.exponential);
+    let model = blob.prepare();
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
     let file = arguments.file.read(&arguments.data)?;
     let parsed = blob.parse();
@@ -181,7 +176,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         frames_evaluated,
         values: truth.values.len(),
         values_evaluated,
-        exponential: arguments.exponential,
         health,
         by_depth: by_depth(&truth, &estimate.values, &measure),
         over_time,

@@ -19,14 +19,14 @@ use super::{Common, print};
 ///
 /// In Rust, it is a file with one `static` of `taxel_core::Fixed` a row-wire, and a function `decode` from the readings of a
 /// frame to its outputs. Nothing in it can fail, and it gives the bits that the blob gives. A Fixed holds networks of single
-/// rows in the number format f32-direct, and nothing else (docs/formats.md).
+/// rows in the number format f32, and nothing else (docs/formats.md).
 #[derive(Args)]
 #[command(group(ArgGroup::new("language").required(true)))]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
   host-sim export press.bin --c lib/press --name press
 
-  host-sim train press --format f32-direct -o press.bin
+  host-sim train press --format f32 -o press.bin
   host-sim export press.bin --rust src/press.rs")]
 pub struct Arguments {
     /// Weight blob.
@@ -110,6 +110,6 @@ fn remedy(part: Unheld) -> &'static str {
         Unheld::RelativeInputs => "without --relative-inputs",
         Unheld::Confidence => "without --confidence",
         Unheld::Fill => "without --fill",
-        Unheld::Format(_) => "with --format f32-direct",
+        Unheld::Format(_) => "with --format f32",
     }
 }

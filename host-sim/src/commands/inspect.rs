@@ -10,8 +10,8 @@ use serde::Serialize;
 use taxel_core::blob::{Metadata, Model};
 use taxel_firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
 use taxel_firmware::timing::ScanPlan;
+use taxel_learn::ModelBlob;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
-use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::image;
 
 use super::model_outputs::{self, ModelOutput};
@@ -162,7 +162,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         weights_in_ram: design.weights_in_ram,
         needs: needs(&model, &design, blob.bytes().len()),
         scan: scan(&model),
-        frame_cost: Prices::accepted()?.frame(&design, Exponential::default())?,
+        frame_cost: Prices::accepted()?.frame(&design)?,
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: model_outputs::of(&model),
     })

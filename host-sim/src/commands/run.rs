@@ -15,7 +15,7 @@ use taxel_learn::{ModelBlob, Options};
 
 use super::model_argument::ModelArguments;
 use super::subject_argument::SubjectArgument;
-use super::{Common, arguments, command_line, direct_format, print, refused_readings, stderr};
+use super::{Common, arguments, command_line, print, refused_readings, stderr};
 
 const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
@@ -96,8 +96,6 @@ fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common
     let started = std::time::Instant::now();
     let (result, blob) = run::run(subject, options, &Terminal::new())?;
     let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
-    let frames = subject.measurements().map(|data| &data.training);
-    direct_format::note(&blob.parse(), options, frames);
     let files = write_files(folder, &result, &blob, command)?;
     if common.json {
         return print::json(&result);

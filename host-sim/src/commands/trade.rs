@@ -25,8 +25,8 @@ mod page;
 
 /// Trade speed for accuracy: measure every decoder, and choose the best.
 ///
-/// Trains and judges every number format, exponential, K, number of columns read, number of samples averaged,
-/// and on contacts that move filter in time. Marks the Pareto front of error and time from the start of a scan to its
+/// Trains and judges every number format, K, number of columns read, number of samples averaged, and on contacts
+/// that move filter in time. Marks the Pareto front of error and time from the start of a scan to its
 /// estimate, and chooses the best point within your bounds.
 ///
 /// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/`, and with a bound chosen.bin, all together

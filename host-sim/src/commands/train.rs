@@ -22,7 +22,7 @@ use super::model_argument::ModelArguments;
 use super::model_outputs::{self, ModelOutput};
 use super::scene_argument::Sizes;
 use super::subject_argument::SubjectOptions;
-use super::{Common, direct_format, print, refused_readings};
+use super::{Common, print, refused_readings};
 
 mod choice;
 
@@ -146,7 +146,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
-    direct_format::note(&model, &options, Some(&set.frames));
     let summary = Summary {
         subject: subject.name().into(),
         seed: set.origin.seed,

@@ -5,7 +5,6 @@ use host_sim::evaluate::table1::{self, NETWORK};
 use host_sim::experiment::Experiment;
 use host_sim::metrics::{self, Definition, Errors};
 use taxel_data::{Dataset, Silent, Stream};
-use taxel_learn::Exponential;
 use taxel_learn::decoders::{linear, mean};
 use taxel_simulate::synthesise;
 
@@ -25,7 +24,7 @@ fn network_and_linear(scene: &str, noise_level: f64) -> (Vec<Errors>, Vec<Errors
     assert!(scene.training.centres <= 128 && scene.training.affine_tail);
     let blob = scene.train(&Silent).unwrap();
     let measure = scene.measure();
-    let network = metrics::judge(&blob.prepare(Exponential::default()), &test, &measure);
+    let network = metrics::judge(&blob.prepare(), &test, &measure);
     let linear = metrics::judge(&linear::fit(&training), &test, &measure);
     (network.errors, linear.errors)
 }
@@ -89,7 +88,7 @@ fn a_few_frames_without_noise_train_a_network_for_others_too() {
     (scene.training.frames, scene.training.centres) = (300, 8);
     let test = synthesise(&scene.world, Stream::Test, 2000);
     let blob = scene.train(&Silent).unwrap();
-    let errors = metrics::judge(&blob.prepare(Exponential::default()), &test, &scene.measure());
+    let errors = metrics::judge(&blob.prepare(), &test, &scene.measure());
     let z = errors.errors.iter().find(|errors| errors.group == "dz_mm").unwrap();
     // 0.127 mm if nothing holds the affine tail; 0.029 mm as measured.
     assert!(z.rmse < 0.06, "{} mm", z.rmse);

@@ -15,7 +15,7 @@ use taxel_data::{Silent, Stream, Table};
 use taxel_firmware::link::message::{
     Configuration, EstimateReport, Refusal, Report, Request, UploadStep,
 };
-use taxel_learn::{Decoder, Exponential, Filtered, ModelBlob, Timing};
+use taxel_learn::{Decoder, Filtered, ModelBlob, Timing};
 use taxel_rig::Error;
 use taxel_rig::device::check::{Frames, Plan, check};
 use taxel_rig::device::{Device, Wire, request_bytes, upload};
@@ -552,14 +552,14 @@ pub mod serial_port {
         let start_us: Vec<u64> = log.lines().map(|line| (line[0] * 1e6).round() as u64).collect();
         let readings = log.columns(1, 144);
         let filter = Settings { time_constant_us: 30_000, lead_us: 4000 };
-        let filtered = Filtered::new(model.prepare(Exponential::default()), filter);
+        let filtered = Filtered::new(model.prepare(), filter);
         let timing = Some(Timing { start_us: &start_us, reading_offset_us: &[] });
         let frames = taxel_learn::Frames { readings: &readings.values, timing };
         let expected = filtered.decode_frames(frames, 8).values;
         let outputs = found.columns(0, 144).values;
         let is_same = |(a, b): (&f64, &f64)| (*a as f32).to_bits() == (*b as f32).to_bits();
         assert!(outputs.iter().zip(&expected).all(is_same));
-        assert_ne!(outputs, model.prepare(Exponential::default()).decode_table(&readings).values);
+        assert_ne!(outputs, model.prepare().decode_table(&readings).values);
 
         // What the device filters is saved, too, or one of some.
         let options = ["--filter-ms", "30", "--report-every", "3", "--json"];

@@ -44,22 +44,21 @@ fn numbers(source: &str) -> impl Iterator<Item = u32> {
 
 #[test]
 fn every_number_of_networks_of_several_sizes_is_written_to_the_bit() {
-    let source = exported(&Folder::new("export_numbers"), "kernels-f32-direct.bin");
-    let blob = AlignedBytes::copy_of(&fs::read(in_testdata("kernels-f32-direct.bin")).unwrap());
+    let source = exported(&Folder::new("export_numbers"), "kernels-f32.bin");
+    let blob = AlignedBytes::copy_of(&fs::read(in_testdata("kernels-f32.bin")).unwrap());
     let model = Model::decode(&blob).unwrap();
     let statics: Vec<&str> = source.split("pub static ").skip(1).collect();
     assert_eq!(statics.len(), model.network_count());
     for (network, source) in model.networks().zip(statics) {
-        let Network::F32Direct(network) = network else { panic!("another format") };
+        let Network::F32(network) = network else { panic!("another format") };
         let (shape, p) = (network.shape(), network.parameters());
         let head = format!("Fixed<{}, {}, {}>", shape.inputs, shape.centres, shape.outputs);
         assert!(source.contains(&head), "{head}");
         let (body, _) = source.split_once(".checked()").unwrap();
         let (_, body) = body.split_once('{').unwrap();
-        let decay = vec![p.decay[0]; shape.centres];
         let no_tail = vec![0.0; shape.inputs * shape.outputs];
         let tail = if p.affine.is_empty() { &no_tail } else { p.affine };
-        let arrays = [p.input_minimum, p.input_per_span, p.centres, &decay];
+        let arrays = [p.input_minimum, p.input_per_span, p.centres, p.decay];
         let arrays = arrays.into_iter().chain([p.output_weights, p.bias, tail]);
         assert!(numbers(body).eq(arrays.flatten().map(|value| value.to_bits())), "{head}");
     }
@@ -71,7 +70,7 @@ fn every_number_of_networks_of_several_sizes_is_written_to_the_bit() {
 fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
     let folder = Folder::new("export_refused");
     folder.write("scene.toml", small_scene().replace("frames = 3000", "frames = 400"));
-    let train = ["train", "scene.toml", "--format", "f32-direct", "-o", "m.bin"];
+    let train = ["train", "scene.toml", "--format", "f32", "-o", "m.bin"];
     for (option, says) in [
         ("--confidence", "has no room for a confidence: train it without --confidence"),
         ("--fill", "has no room for a fill of missing readings: train it without --fill"),
@@ -80,8 +79,7 @@ fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
             "inputs relative to the baseline: train it without --relative-inputs",
         ),
         ("--whole-array", "a projection of the whole array: train it without --whole-array"),
-        ("--format=f32", "the number format f32: train it with --format f32-direct"),
-        ("--format=fixed16", "the number format fixed16: train it with --format f32-direct"),
+        ("--format=fixed16", "the number format fixed16: train it with --format f32"),
     ] {
         let given = match option.strip_prefix("--format") {
             Some(_) => vec!["train", "scene.toml", option, "-o", "m.bin"],

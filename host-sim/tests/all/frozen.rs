@@ -37,11 +37,11 @@ fn json(folder: &Folder, line: &str) -> Value {
 
 /// Decodes the frames in `frames` by a model of each number format, and holds the estimates.
 fn hold_estimates(folder: &Folder, name: &str, train: &str, frames: &str) {
-    for (format, file) in [("f32-direct", "f32"), ("fixed16", "fixed16")] {
-        run(folder, &format!("train {train} --format {format} -o {file}.bin --quiet"));
-        run(folder, &format!("decode {file}.bin {frames} -o {file}.csv --quiet"));
-        let estimates = std::fs::read_to_string(folder.path(&format!("{file}.csv"))).unwrap();
-        hold(&format!("{name}-{file}.csv"), &estimates);
+    for format in ["f32", "fixed16"] {
+        run(folder, &format!("train {train} --format {format} -o {format}.bin --quiet"));
+        run(folder, &format!("decode {format}.bin {frames} -o {format}.csv --quiet"));
+        let estimates = std::fs::read_to_string(folder.path(&format!("{format}.csv"))).unwrap();
+        hold(&format!("{name}-{format}.csv"), &estimates);
     }
 }
 

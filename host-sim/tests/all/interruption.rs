@@ -286,7 +286,6 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
                 rows: 8,
                 columns: 18,
                 outputs: 18,
-                kernel: "polynomial",
                 model: None,
                 model_name: "",
                 slot_bytes: 1000,

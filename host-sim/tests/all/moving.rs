@@ -6,7 +6,7 @@ use host_sim::subject::Subject;
 use taxel_core::filter::Settings;
 use taxel_data::Silent;
 use taxel_evaluate::moving::Moving;
-use taxel_learn::{Exponential, ModelBlob};
+use taxel_learn::ModelBlob;
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
@@ -60,10 +60,7 @@ fn four_samples_are_chosen_for_still_contacts_and_one_for_moving_ones() {
         let scan = ([times.scan_ms.unwrap(), period_ms], 1);
         let seen = Moving::new(&scene, &synthesis, path, scan);
         let seen = seen.unwrap();
-        let model = blob.prepare(Exponential::default());
-        if point.arithmetic.exponential != Exponential::default() {
-            continue;
-        }
+        let model = blob.prepare();
         let estimates = model.decode_lines(&seen.frames.inputs.values);
         let us = |ms: f64| (1000.0 * ms).round() as u32;
         let filter = point.filter.map(|filter| Settings {

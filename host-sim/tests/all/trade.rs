@@ -9,7 +9,7 @@ use host_sim::evaluate::trade::{self, Bounds, Device, Memory, Plan, Trade};
 use host_sim::experiment::Experiment;
 use host_sim::subject::Subject;
 use taxel_data::{Silent, Stream};
-use taxel_learn::{Exponential, ModelBlob};
+use taxel_learn::ModelBlob;
 use taxel_simulate::Synthesis;
 
 fn press() -> Experiment {
@@ -50,15 +50,10 @@ fn traded() -> &'static Trade {
 fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     let trade = traded();
     assert_eq!(trade.chosen, None);
-    let count = |name: &str| trade.points.iter().filter(|p| p.arithmetic.name() == name).count();
-    for kernel in ["fixed16", "f32-direct"] {
-        assert_eq!(count(kernel), 2 * 2 * 2, "{kernel}"); // rows or the array, K, samples
+    let count = |name: &str| trade.points.iter().filter(|p| p.format.name() == name).count();
+    for format in ["fixed16", "f32"] {
+        assert_eq!(count(format), 2 * 2 * 2, "{format}"); // rows or the array, K, samples
     }
-    for kernel in ["f32-direct-libm", "f32-direct-micromath"] {
-        assert_eq!(count(kernel), 2 * 2 * 2, "{kernel}");
-    }
-    // Expanded distances appear only where their rounding is proved harmless.
-    assert!((1..40).contains(&count("f32")), "{}", count("f32"));
 
     let rank = |p: &trade::Point| (p.times.frame_ms, p.rmse("dz_mm"));
     for point in &trade.points {
@@ -96,7 +91,7 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     };
     let [once, often] = [1, 16].map(|samples| find("fixed16", 64, samples).rmse("dz_mm"));
     assert!(often < 0.8 * once, "{often} against {once}");
-    let (fixed, float) = (find("fixed16", 64, 1), find("f32-direct", 64, 1));
+    let (fixed, float) = (find("fixed16", 64, 1), find("f32", 64, 1));
     assert!(fixed.rmse("dz_mm") < 1.01 * float.rmse("dz_mm"));
     assert!(fixed.frame.cycles < float.frame.cycles / 3);
     assert!(fixed.blob_bytes < 6 * float.blob_bytes / 10);
@@ -123,7 +118,7 @@ fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
     assert_eq!(model.bytes().len(), point.blob_bytes);
     let frames = Synthesis::new(&scene.world).noise_level(scene.world.noise.level / 4.0);
     let test = frames.frames(Stream::Test, scene.training.test_frames);
-    let estimate = model.prepare(Exponential::Polynomial).decode_table(&test.inputs);
+    let estimate = model.prepare().decode_table(&test.inputs);
     let errors = test.outputs.squared_errors(&estimate.values);
     let z = errors.iter().skip(2).step_by(3);
     let count = errors.len() / 3 * test.frames();
@@ -170,7 +165,7 @@ fn the_files_and_the_table_tell_every_point() {
         lines
             .next()
             .unwrap()
-            .starts_with("kernel,whole_array,centres,spread,columns,samples_averaged,filter_ms,")
+            .starts_with("format,whole_array,centres,spread,columns,samples_averaged,filter_ms,")
     );
     assert_eq!(lines.count(), every.len());
     let json: serde_json::Value = serde_json::from_str(&read("out/few/trade.json")).unwrap();
@@ -269,13 +264,13 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
             .all(|note| note.starts_with("fixed16 array, K = 20, 18 columns: spread = 0.2501: "))
     );
     let of_array = |trade: &Trade, name: &str| {
-        trade.points.iter().filter(|p| p.whole_array && p.arithmetic.name() == name).count()
+        trade.points.iter().filter(|p| p.whole_array && p.format.name() == name).count()
     };
     assert!(!narrow.left_out.is_empty() && of_array(&narrow, "fixed16") == 0);
     assert!(
         narrow.left_out[0].ends_with("spread (in a scene's [training], or by `train --spread`)")
     );
-    assert!(of_array(&narrow, "f32-direct") == 1);
+    assert!(of_array(&narrow, "f32") == 1);
 }
 
 #[test]

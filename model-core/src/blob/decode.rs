@@ -14,9 +14,7 @@ use crate::checksum::CRC_32;
 use crate::confidence::{Confidence, Sizes};
 use crate::fill::Fill;
 use crate::projection::Projection;
-use crate::rbf::{
-    Cut, Format, Layout, Network, NetworkError, Packed, Shape, direct, expanded, fixed16,
-};
+use crate::rbf::{Cut, Format, Network, NetworkError, Shape, fixed16, float32};
 
 /// A model, borrowed from a blob whose every byte and value has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -164,7 +162,7 @@ impl<'a> Model<'a> {
         let [directions, components] = self.confidence_sizes.map(usize::from);
         let (readings, outputs) = (rows.wrapping_mul(inputs), rows.wrapping_mul(outputs));
         let sizes = Sizes { readings, directions, components, outputs };
-        self.confidence.and_then(|block| Confidence::of_checked(sizes, block))
+        self.confidence.map(|block| Confidence::of_checked(sizes, block))
     }
 
     /// What fills missing readings from the others; `None` if a missing reading stays missing.
@@ -320,7 +318,6 @@ fn checked_metadata<'a>(
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NetworkSection<'a> {
     format: Format,
-    common_width: bool,
     affine: bool,
     centres: u16,
     block: &'a [u32],
@@ -328,13 +325,7 @@ pub(crate) struct NetworkSection<'a> {
 
 impl<'a> NetworkSection<'a> {
     /// A section without a network: [`network`](Self::network) returns an error.
-    pub const EMPTY: Self = Self {
-        format: Format::F32Direct,
-        common_width: true,
-        affine: false,
-        centres: 0,
-        block: &[],
-    };
+    pub const EMPTY: Self = Self { format: Format::F32, affine: false, centres: 0, block: &[] };
 
     /// Cuts a network's section from the front of `bytes`; checks lengths, but no values.
     fn take(
@@ -349,19 +340,18 @@ impl<'a> NetworkSection<'a> {
             return Err(DecodeError::NetworkOrder { expected: index, found: header.index });
         }
         let (block, rest) = take_block(rest, SECTION)?;
-        let RbfHeader { common_width, affine, centres, .. } = header;
+        let RbfHeader { affine, centres, .. } = header;
         let words = {
             let shape = network_shape(shape, centres);
             match format {
-                Format::F32Direct => direct::Network::block_words(shape, common_width, affine),
-                Format::F32 => expanded::Network::block_words(shape, affine),
+                Format::F32 => float32::Network::block_words(shape, affine),
                 Format::Fixed16 => fixed16::Network::block_words(shape, affine),
             }
         };
         check_count("bytes of weights", words.saturating_mul(4), block.len())?;
         let block = bytemuck::try_cast_slice::<u8, u32>(block)
             .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-        let section = Self { format, common_width, affine, centres, block };
+        let section = Self { format, affine, centres, block };
         section.network(shape).map_err(|cause| DecodeError::Network { index, cause })?;
         Ok((section, rest))
     }
@@ -369,9 +359,8 @@ impl<'a> NetworkSection<'a> {
     /// The section's network; its values are not checked again.
     pub fn network(&self, shape: ModelShape) -> Result<Network<'a>, NetworkError> {
         match self.format {
-            Format::F32Direct => self.direct(shape).map(Network::F32Direct),
-            Format::F32 => self.packed(shape).map(Network::F32),
-            Format::Fixed16 => self.packed(shape).map(Network::Fixed16),
+            Format::F32 => self.float32(shape).map(Network::F32),
+            Format::Fixed16 => self.fixed16(shape).map(Network::Fixed16),
         }
     }
 
@@ -380,18 +369,18 @@ impl<'a> NetworkSection<'a> {
         self.format
     }
 
-    /// The section's network if its format is `f32-direct`; else an error.
+    /// The section's network if its format is `f32`; else an error.
     #[inline]
-    pub fn direct(&self, shape: ModelShape) -> Result<direct::Network<'a>, NetworkError> {
+    pub fn float32(&self, shape: ModelShape) -> Result<float32::Network<'a>, NetworkError> {
         let shape = network_shape(shape, self.centres);
-        direct::Network::from_block(shape, self.common_width, self.affine, Cut(self.block))
+        float32::Network::from_block(shape, self.affine, Cut(self.block))
     }
 
-    /// The section's network if its format has the [`Layout`] `L`; else an error.
+    /// The section's network if its format is `fixed16`; else an error.
     #[inline]
-    pub fn packed<L: Layout>(&self, shape: ModelShape) -> Result<Packed<'a, L>, NetworkError> {
+    pub fn fixed16(&self, shape: ModelShape) -> Result<fixed16::Network<'a>, NetworkError> {
         let shape = network_shape(shape, self.centres);
-        Packed::with_length_checked(shape, self.affine, self.block)
+        fixed16::Network::with_length_checked(shape, self.affine, self.block)
     }
 }
 

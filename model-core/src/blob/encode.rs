@@ -9,7 +9,7 @@ use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, ConfidenceHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, FillHeader, LinearSection, MAGIC,
     MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_CONFIDENCE, TAG_FILL,
-    TAG_LINEAR, TAG_METADATA, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
+    TAG_LINEAR, TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Floats, Metadata};
 use crate::checksum::CRC_32;
@@ -130,12 +130,8 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         writer.put(&TAG_RELATIVE_INPUTS)?;
     }
     if let Some(projection) = parts.projection {
-        if projection.features() == inputs {
-            writer.put(&TAG_PROJECTION)?;
-        } else {
-            let features = fit("number of features", projection.features(), u16::MAX)?;
-            writer.put(&ProjectionHeader { tag: TAG_PROJECTION_TO, features })?;
-        }
+        let features = fit("number of features", projection.features(), u16::MAX)?;
+        writer.put(&ProjectionHeader { tag: TAG_PROJECTION, features })?;
         writer.put_block(&[bytemuck::cast_slice(projection.block())])?;
     }
     if let Some(confidence) = parts.confidence {
@@ -205,12 +201,10 @@ impl Writer<'_> {
     }
 
     fn put_network(&mut self, index: u8, network: &Network<'_>) -> Result<(), EncodeError> {
-        let common_width = network.widths().count() == 1;
         let header = RbfHeader {
             tag: network.format().tag(),
             index,
             centres: fit("number of centres", network.shape().centres, u16::MAX)?,
-            common_width,
             affine: network.has_affine_tail(),
         };
         self.put(&header)?;

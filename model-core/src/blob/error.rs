@@ -12,7 +12,10 @@ pub enum DecodeError {
     #[error("not a weight blob: it does not start with \"TAXL\"")]
     BadMagic,
     /// The blob was written in another version of the format.
-    #[error("blob format version {found}; this build reads version {supported}")]
+    #[error(
+        "blob format version {found}; this program reads version {supported}: train the model again with it, or use a \
+         program of version {found}"
+    )]
     UnsupportedVersion {
         /// Version in the blob.
         found: u8,

@@ -9,7 +9,7 @@ use crate::rbf::Format;
 /// The first four bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"TAXL";
 /// Version of the blob format that this crate parses and encodes.
-pub const FORMAT_VERSION: u8 = 1;
+pub const FORMAT_VERSION: u8 = 2;
 
 /// Number of bytes before the postcard fields: magic, version, length.
 pub(super) const PREFIX_BYTES: usize = 9;
@@ -21,14 +21,12 @@ pub(super) const FLOAT_ALIGNMENT: usize = 4;
 /// Tag of the metadata section. Each kind of section has its own tag, and networks have
 /// [one for each format](Format::tag); an unknown tag is rejected.
 pub(super) const TAG_METADATA: u8 = 0;
-pub(super) const TAG_PROJECTION: u8 = 4;
 /// Tag of a section without fields: the model's inputs are relative to the baseline.
-pub(super) const TAG_RELATIVE_INPUTS: u8 = 5;
-pub(super) const TAG_CONFIDENCE: u8 = 7;
-/// Tag of a projection to another number of features than a row has readings.
-pub(super) const TAG_PROJECTION_TO: u8 = 8;
-pub(super) const TAG_FILL: u8 = 9;
-pub(super) const TAG_LINEAR: u8 = 10;
+pub(super) const TAG_RELATIVE_INPUTS: u8 = 3;
+pub(super) const TAG_PROJECTION: u8 = 4;
+pub(super) const TAG_CONFIDENCE: u8 = 5;
+pub(super) const TAG_LINEAR: u8 = 6;
+pub(super) const TAG_FILL: u8 = 7;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -87,28 +85,18 @@ pub(super) struct RbfHeader {
     /// Index of the network; networks are in the order 0, 1, …
     pub index: u8,
     pub centres: u16,
-    /// Whether all centres have one width; else each has its own.
-    pub common_width: bool,
     pub affine: bool,
 }
 
 impl RbfHeader {
-    /// The network's format, from its tag. Only [`Format::F32Direct`] may have a width for each centre.
+    /// The network's format, from its tag.
     pub fn format(&self) -> Result<Format, DecodeError> {
-        match Format::from_tag(self.tag) {
-            None => Err(DecodeError::SectionOrder {
-                expected: Format::F32Direct.tag(),
-                found: self.tag,
-            }),
-            Some(Format::F32 | Format::Fixed16) if !self.common_width => {
-                Err(DecodeError::Malformed { section: "network section" })
-            }
-            Some(format) => Ok(format),
-        }
+        let (expected, found) = (Format::F32.tag(), self.tag);
+        Format::from_tag(found).ok_or(DecodeError::SectionOrder { expected, found })
     }
 }
 
-/// Header of the section of a projection to any number of features; padding and its floats follow.
+/// Header of the projection's section; padding and its floats follow.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ProjectionHeader {
     pub tag: u8,
@@ -141,8 +129,8 @@ mod tests {
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
         let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS];
-        let newer = [TAG_CONFIDENCE, TAG_PROJECTION_TO, TAG_FILL, TAG_LINEAR];
-        for tag in others.into_iter().chain(newer) {
+        let more = [TAG_CONFIDENCE, TAG_FILL, TAG_LINEAR];
+        for tag in others.into_iter().chain(more) {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

@@ -3,7 +3,7 @@
 use super::error::DecodeError;
 use super::format::{
     ConfidenceHeader, FLOAT_ALIGNMENT, FillHeader, LinearSection, ProjectionHeader, TAG_CONFIDENCE,
-    TAG_FILL, TAG_LINEAR, TAG_PROJECTION, TAG_PROJECTION_TO, TAG_RELATIVE_INPUTS,
+    TAG_FILL, TAG_LINEAR, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Floats, ModelShape};
 use crate::confidence::{Confidence, Sizes};
@@ -85,15 +85,11 @@ pub(super) fn take_projection(
     shape: ModelShape,
 ) -> Result<(Option<Projection<'_>>, &[u8]), DecodeError> {
     const SECTION: &str = "projection section";
-    let (features, rest) = match bytes.split_first() {
-        Some((&TAG_PROJECTION, rest)) => (shape.inputs, rest),
-        Some((&TAG_PROJECTION_TO, _)) => {
-            let (header, rest) = take::<ProjectionHeader>(bytes, SECTION)?;
-            (header.features.into(), rest)
-        }
-        _ => return Ok((None, bytes)),
-    };
-    let readings = shape.rows * shape.inputs;
+    if bytes.first() != Some(&TAG_PROJECTION) {
+        return Ok((None, bytes));
+    }
+    let (header, rest) = take::<ProjectionHeader>(bytes, SECTION)?;
+    let (readings, features) = (shape.rows * shape.inputs, header.features.into());
     let floats = projection::block_floats(readings, features);
     let (block, rest) = take_floats(rest, SECTION, "bytes of projection", floats)?;
     let projection = Projection::new(readings, features, block)
@@ -137,6 +133,5 @@ pub(super) fn cut_fill(
     let (readings, factors) = (shape.rows.saturating_mul(shape.inputs), header.factors.into());
     let floats = fill::block_floats(readings, factors);
     let (block, rest) = take_floats(rest, SECTION, "bytes of fill", floats)?;
-    let fill = Fill::of_checked(readings, factors, block);
-    Ok((Some(fill.map_err(|cause| DecodeError::Fill { cause })?), rest))
+    Ok((Some(Fill::of_checked(readings, factors, block)), rest))
 }

@@ -1,9 +1,9 @@
-@ Inner loops of the projection, the confidence and the two fast number formats for a Cortex-M4F: any number of inputs,
+@ Inner loops of the projection, the confidence and the number format fixed16 for a Cortex-M4F: any number of inputs,
 @ centres and outputs.
 @
 @ The compiler cannot be led here: it neither keeps 18 accumulators in registers while it streams the
 @ weights through the rest by load-multiple, nor pairs 16-bit products (docs/cycles.md has both figures).
-@ routines.rs declares these functions; projection.rs, confidence.rs, expanded.rs and fixed16.rs hold their twins
+@ routines.rs declares these functions; projection.rs, confidence.rs and fixed16.rs hold their twins
 @ in Rust, which do the same operations in the same order: outputs agree bit for bit, which tests check.
 @
 @ Every loop is at most 1 KiB long, so that it fits the instruction cache of an STM32F4. Loops run over a *batch* of

@@ -8,9 +8,9 @@ use super::Block;
 
 core::arch::global_asm!(
     include_str!("common.s"),
-    include_str!("f32.s"),
     include_str!("fixed16.s"),
     include_str!("mixture.s"),
+    include_str!("projection.s"),
     options(raw)
 );
 
@@ -47,13 +47,6 @@ impl Inputs<'_> {
 unsafe extern "C" {
     // A block holds a slice. Its layout is asserted where it is defined.
     #[expect(improper_ctypes, reason = "assembly reads the slice's address, which stands first")]
-    fn taxel_f32(
-        block: *const Block<'_>,
-        inputs: *const f32,
-        output: *mut f32,
-        space: *mut f32,
-    ) -> u32;
-    #[expect(improper_ctypes, reason = "assembly reads the slice's address, which stands first")]
     fn taxel_fixed16(
         block: *const Block<'_>,
         inputs: *const f32,
@@ -77,29 +70,17 @@ fn has_clamped(fpscr: u32) -> bool {
     fpscr & INVALID_OPERATION != 0
 }
 
-/// Infers the outputs of a network with expanded distances. Returns whether an input was clamped, NaN or infinite.
+/// Infers the outputs of a network in 16-bit fixed point. Returns whether an input was clamped, NaN or infinite.
 ///
 /// # Safety
 /// The caller must check that `block` has no count of 0 and all words of such a network, and that there are as many
 /// inputs, words of space, and outputs as it says.
 #[inline(always)]
-pub(crate) unsafe fn expanded(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
+pub(crate) unsafe fn fixed16(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
     debug_assert!(inputs.are(block.inputs) && output.len() == block.outputs);
     let (inputs, space) = inputs.addresses();
     // SAFETY: the caller has checked all lengths. The routine reads the inputs and the block's words, and writes the
     // space and the outputs.
-    has_clamped(unsafe { taxel_f32(block, inputs, output.as_mut_ptr(), space) })
-}
-
-/// Infers the outputs of a network in 16-bit fixed point. Returns whether an input was clamped, NaN or infinite.
-///
-/// # Safety
-/// As for [`expanded`].
-#[inline(always)]
-pub(crate) unsafe fn fixed16(block: &Block<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
-    debug_assert!(inputs.are(block.inputs) && output.len() == block.outputs);
-    let (inputs, space) = inputs.addresses();
-    // SAFETY: as in `expanded`.
     has_clamped(unsafe { taxel_fixed16(block, inputs, output.as_mut_ptr(), space) })
 }
 

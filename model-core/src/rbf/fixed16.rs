@@ -1,8 +1,8 @@
 //! The network in 16-bit fixed point.
 //!
-//! It computes as [`expanded`](super::expanded) does, in integers. Inputs x have 16 bits, the upper halves of
-//! saturated integers in [`UNITS`]. The exponent v = g‖x − c‖² is an unsigned 6.26 number: v = b + a·x + g‖x‖².
-//! There a = −2g·c has 16 bits, so c is exactly −a/(2g) after a was rounded, and b = g‖c‖² +
+//! With g = log₂e/(2σ²), exp(−‖x − c‖²/(2σ²)) = 2^−v. Inputs x have 16 bits, the upper halves of saturated integers in
+//! [`UNITS`], counted from the middle of the training range. The exponent v = g‖x − c‖² is an unsigned 6.26 number:
+//! v = b + a·x + g‖x‖². There a = −2g·c has 16 bits, so c is exactly −a/(2g) after a was rounded, and b = g‖c‖² +
 //! [`EXPONENT_MARGIN`]. The activation 2^−v has 16 bits (Q15): a cubic for the fraction, a shift for the integer
 //! part. Weights have 16 bits and a scale for each output; sums have 32 bits.
 //!
@@ -19,14 +19,11 @@
 
 use core::f32::consts::LOG2_E;
 
-use super::packed::{self, Layout};
-use super::parameters::{
-    Cut, NetworkError, Shape, check_finite, check_spans, range_about, scale_about,
-};
+use super::parameters::{Cut, NetworkError, Shape, check_finite, check_length, check_spans};
 #[cfg(cortex_m4f)]
 use crate::cortex_m4::{self, Inputs};
-use crate::feature::{Feature, Fixed16Built};
-use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
+use crate::cortex_m4::{Block, INPUTS, OUTPUTS};
+use crate::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps, saturates};
 
 /// Number of centres in a group: K is rounded up to a multiple of it in the block.
 pub const CENTRES_AT_ONCE: usize = 16;
@@ -82,22 +79,48 @@ impl Parameters<'_> {
     }
 }
 
-/// The layout of a block in 16-bit fixed point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fixed16;
+/// A network in 16-bit fixed point, whose block of words has been checked against its shape.
+///
+/// A Cortex-M4F infers by an assembly routine. Elsewhere the routine's compiled twin is used: portable Rust that gives
+/// the same bits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Network<'a>(Block<'a>);
 
-/// A network in 16-bit fixed point; its block is what [`Parameters::words`] lists.
-pub type Network<'a> = packed::Network<'a, Fixed16>;
+impl<'a> Network<'a> {
+    /// Makes a network after checking the length and values of `block`, the words of [`Parameters::words`].
+    ///
+    /// After that, no reading can drive an exponent out of the format's range, nor an output out of f32. That the
+    /// sums of 16-bit weights fit is not checked here: it is proved where a network is quantised.
+    ///
+    /// # Errors
+    /// Every variant of [`NetworkError`]; the length is checked before values.
+    pub fn try_new(shape: Shape, affine: bool, block: &'a [u32]) -> Result<Self, NetworkError> {
+        let network = Self::with_length_checked(shape, affine, block)?;
+        network.check_values()?;
+        Ok(network)
+    }
 
-impl Layout for Fixed16 {
-    const BATCH: usize = 256;
-    const FEATURE: Feature = Feature::Fixed16;
-    type Proof = Fixed16Built;
+    /// Makes a network after checking the length alone, for a block whose values were checked before.
+    #[inline(always)]
+    pub(crate) fn with_length_checked(
+        shape: Shape,
+        affine: bool,
+        block: &'a [u32],
+    ) -> Result<Self, NetworkError> {
+        let Shape { inputs, centres, outputs } = shape;
+        if inputs == 0 || centres == 0 || outputs == 0 {
+            return Err(NetworkError::Empty);
+        }
+        if inputs > MOST_INPUTS {
+            return Err(NetworkError::TooManyInputs { most: MOST_INPUTS, found: inputs });
+        }
+        check_length("block", block, Self::block_words(shape, affine))?;
+        Ok(Self(Block::new([inputs, centres, outputs], affine, block)))
+    }
 
-    type Parameters<'a> = Parameters<'a>;
-
+    /// Number of words in the block of a network of this shape, with an affine tail or without.
     #[inline]
-    fn block_words(shape: Shape, affine: bool) -> usize {
+    pub fn block_words(shape: Shape, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let pairs = inputs.div_ceil(2);
         let affine = if affine { pairs.saturating_mul(outputs) } else { 0 };
@@ -107,16 +130,51 @@ impl Layout for Fixed16 {
             .fold(0, usize::saturating_add)
     }
 
-    #[inline(always)]
-    fn check_shape(shape: Shape) -> Result<(), NetworkError> {
-        if shape.inputs > MOST_INPUTS {
-            return Err(NetworkError::TooManyInputs { most: MOST_INPUTS, found: shape.inputs });
-        }
-        Ok(())
+    /// The network's numbers of inputs, centres and outputs.
+    pub fn shape(&self) -> Shape {
+        let Block { inputs, centres, outputs, .. } = self.0;
+        Shape { inputs, centres, outputs }
     }
 
-    fn check_values(network: &Network<'_>) -> Result<(), NetworkError> {
-        let p = network.parameters();
+    /// Whether the network has an affine tail.
+    pub fn has_affine_tail(&self) -> bool {
+        self.0.affine()
+    }
+
+    /// All words of the network.
+    pub fn block(&self) -> &'a [u32] {
+        self.0.words
+    }
+
+    /// The network's parameters, cut from its block.
+    pub fn parameters(&self) -> Parameters<'a> {
+        let Shape { inputs, centres, outputs } = self.shape();
+        let mut cut = Cut(self.block());
+        Parameters {
+            input_midpoint: cut.floats(inputs),
+            input_per_unit: cut.floats(inputs),
+            decay: cut.words(1).first().copied().unwrap_or_default(),
+            bias: bytemuck::cast_slice(cut.words(outputs)),
+            output_scale: cut.floats(outputs),
+            affine: cut.words(if self.has_affine_tail() {
+                inputs.div_ceil(2) * outputs
+            } else {
+                0
+            }),
+            centres: cut.words(centres.div_ceil(CENTRES_AT_ONCE) * words_at_once(self.shape())),
+        }
+    }
+
+    /// Width σ of all centres on inputs scaled to [0, 1].
+    pub fn width(&self) -> f32 {
+        // 2^60 is where the decay's last place stands.
+        let per_step_squared = self.parameters().decay as f32 / 1_152_921_504_606_846_976.0;
+        let step = HALF_RANGE / UNITS * UNITS_PER_STEP;
+        libm::sqrtf(LOG2_E / (2.0 * per_step_squared)) * step
+    }
+
+    pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
+        let p = self.parameters();
         let decay = u64::from(p.decay);
         if decay == 0 {
             return Err(NetworkError::InvalidWidth { centre: 0 });
@@ -130,9 +188,9 @@ impl Layout for Fixed16 {
         if p.output_scale.iter().any(|scale| !(scale * UNITS).is_finite()) {
             return Err(NetworkError::NotFinite { what: "the largest output" });
         }
-        let most_shared = (((network.shape().inputs as u64) << 26) * decay) >> 30;
-        let line = 1 + network.shape().inputs.div_ceil(2);
-        let lines = network.centres().flat_map(|(exponents, _)| exponents.chunks_exact(line));
+        let most_shared = (((self.shape().inputs as u64) << 26) * decay) >> 30;
+        let line = 1 + self.shape().inputs.div_ceil(2);
+        let lines = self.centres().flat_map(|(exponents, _)| exponents.chunks_exact(line));
         for (centre, line) in lines.enumerate() {
             let Some((&b, a)) = line.split_first() else { continue };
             let b = u64::from(b);
@@ -151,44 +209,74 @@ impl Layout for Fixed16 {
         Ok(())
     }
 
-    fn parameters<'a>(network: &Network<'a>) -> Parameters<'a> {
-        let Shape { inputs, centres, outputs } = network.shape();
-        let mut cut = Cut(network.block());
-        Parameters {
-            input_midpoint: cut.floats(inputs),
-            input_per_unit: cut.floats(inputs),
-            decay: cut.words(1).first().copied().unwrap_or_default(),
-            bias: bytemuck::cast_slice(cut.words(outputs)),
-            output_scale: cut.floats(outputs),
-            affine: cut.words(if network.has_affine_tail() {
-                inputs.div_ceil(2) * outputs
-            } else {
-                0
-            }),
-            centres: cut.words(centres.div_ceil(CENTRES_AT_ONCE) * words_at_once(network.shape())),
-        }
+    /// Lowest and highest reading of `input` in training, in its unit; NaN if there is no such input.
+    pub(super) fn training_range(&self, input: usize) -> [f32; 2] {
+        let p = self.parameters();
+        let limits = (p.input_midpoint.get(input), p.input_per_unit.get(input));
+        let (Some(&midpoint), Some(&per_unit)) = limits else { return [f32::NAN; 2] };
+        let half = if per_unit > 0.0 { 0.5 / HALF_RANGE * UNITS / per_unit } else { 0.0 };
+        [midpoint - half, midpoint + half]
     }
 
-    fn scale(network: &Network<'_>, reading: &[f32], scaled: &mut [f32]) -> bool {
-        let p = network.parameters();
-        scale_about(p.input_midpoint, p.input_per_unit, reading, scaled)
-    }
-
-    fn training_range(network: &Network<'_>, input: usize) -> [f32; 2] {
-        let p = network.parameters();
-        range_about(p.input_midpoint.get(input), p.input_per_unit.get(input))
-    }
-
-    fn width(parameters: &Parameters<'_>) -> f32 {
-        // 2^60 is where the decay's last place stands.
-        let per_step_squared = parameters.decay as f32 / 1_152_921_504_606_846_976.0;
-        let step = HALF_RANGE / UNITS * UNITS_PER_STEP;
-        libm::sqrtf(LOG2_E / (2.0 * per_step_squared)) * step
-    }
-
+    /// Converts readings to units counted from the middle of the training range, not clamped yet. Returns whether one
+    /// [will be clamped](saturates), or is NaN.
     #[inline(always)]
-    fn infer_scaled_in_rust(network: &Network<'_>, scaled: &mut [f32], output: &mut [f32]) {
-        let p = network.parameters();
+    pub(crate) fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> bool {
+        let p = self.parameters();
+        let limits = p.input_midpoint.iter().zip(p.input_per_unit);
+        let mut any_saturates = false;
+        for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
+            *x = (r - midpoint) * per_unit;
+            any_saturates |= saturates(*x);
+        }
+        any_saturates
+    }
+
+    /// Infers `output` from one row of readings; `scaled` is working space. All must have the lengths of the shape.
+    /// Returns whether a reading was clamped, NaN or infinite.
+    #[inline(always)]
+    pub(crate) fn infer(&self, reading: &[f32], scaled: &mut [f32], output: &mut [f32]) -> bool {
+        #[cfg(cortex_m4f)]
+        if reading.len() == self.0.inputs && self.fit(scaled, output) {
+            // SAFETY: the lengths are the network's, as was just checked. When the network was made, its block was
+            // found to be as long as its shape asks for, and no dimension to be 0.
+            return unsafe {
+                cortex_m4::fixed16(&self.0, Inputs::Readings(reading, scaled), output)
+            };
+        }
+        #[cfg(not(cortex_m4f))]
+        {
+            let clamped = self.scale(reading, scaled);
+            self.infer_scaled_in_rust(scaled, output);
+            clamped
+        }
+        #[cfg(cortex_m4f)]
+        true
+    }
+
+    /// Infers `output` from `scaled` inputs, which are overwritten. Both must have the lengths of the shape.
+    #[inline(always)]
+    pub(crate) fn infer_scaled(&self, scaled: &mut [f32], output: &mut [f32]) {
+        #[cfg(cortex_m4f)]
+        if self.fit(scaled, output) {
+            // SAFETY: as in `infer`.
+            unsafe { cortex_m4::fixed16(&self.0, Inputs::Scaled(scaled), output) };
+        }
+        #[cfg(not(cortex_m4f))]
+        self.infer_scaled_in_rust(scaled, output);
+    }
+
+    /// Whether buffers have the lengths of the shape.
+    #[cfg(cortex_m4f)]
+    #[inline(always)]
+    fn fit(&self, scaled: &[f32], output: &[f32]) -> bool {
+        scaled.len() == self.0.inputs && output.len() == self.0.outputs
+    }
+
+    /// Infers `output` from `scaled` inputs, which are overwritten, in Rust: the same bits as the routine's.
+    #[inline(always)]
+    fn infer_scaled_in_rust(&self, scaled: &mut [f32], output: &mut [f32]) {
+        let p = self.parameters();
         // The caller's buffers also hold the integers: no others have the right length.
         let x = bytemuck::cast_slice_mut::<f32, i32>(scaled);
         x.iter_mut().for_each(|x| *x = clamp_steps(f32::from_bits(*x as u32)));
@@ -198,7 +286,7 @@ impl Layout for Fixed16 {
         for (sum, row) in sums.iter_mut().zip(p.affine.chunks_exact(pairs)) {
             *sum = add_products(*sum, row, x);
         }
-        for (exponents, weights) in network.centres() {
+        for (exponents, weights) in self.centres() {
             let activations = activations_of(exponents, shared, x);
             for (sum, row) in sums.iter_mut().zip(weights.chunks_exact(CENTRES_AT_ONCE / 2)) {
                 *sum = add_products(*sum, row, &activations);
@@ -209,30 +297,26 @@ impl Layout for Fixed16 {
         }
     }
 
-    #[cfg(cortex_m4f)]
-    #[inline(always)]
-    unsafe fn routine(network: &Network<'_>, inputs: Inputs<'_>, output: &mut [f32]) -> bool {
-        // SAFETY: the caller has compared the lengths with the shape. When the network was made, its block was found
-        // to be as long as its shape asks for, and no dimension to be 0.
-        unsafe { cortex_m4::fixed16(network.counted(), inputs, output) }
+    /// Infers as [`rbf::Network::infer_scaled`](super::Network::infer_scaled) does, to the bit, by the assembly's
+    /// compiled twin, with separate code for the usual sizes. It is public to measure what the assembly saves.
+    ///
+    /// `scaled` and `output` must have the lengths of the shape; elements beyond are ignored.
+    #[inline(never)]
+    pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
+        let usual: (Result<&mut [f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
+            ((&mut *scaled).try_into(), (&mut *output).try_into());
+        if let (Ok(scaled), Ok(output)) = usual {
+            self.infer_scaled_in_rust(scaled, output);
+        } else {
+            self.infer_scaled_in_rust(scaled, output);
+        }
     }
-}
 
-impl<'a> Network<'a> {
     /// The groups of sixteen centres: for each, the lines of its exponents, and its weights.
     fn centres(&self) -> impl Iterator<Item = (&'a [u32], &'a [u32])> {
         let exponents = CENTRES_AT_ONCE * (1 + self.shape().inputs.div_ceil(2));
         let at_once = self.parameters().centres.chunks_exact(words_at_once(self.shape()).max(1));
         at_once.map(move |words| words.split_at_checked(exponents).unwrap_or_default())
-    }
-
-    /// Infers as [`rbf::Network::infer_scaled_with`](super::Network::infer_scaled_with) does, to the bit, by the assembly's
-    /// compiled twin in portable Rust. It is public to measure what the assembly saves.
-    ///
-    /// `scaled` and `output` must have the lengths of the shape; elements beyond are ignored.
-    #[inline(never)]
-    pub fn infer_scaled_portably(&self, scaled: &mut [f32], output: &mut [f32]) {
-        self.infer_scaled_by_twin(scaled, output);
     }
 
     /// Activations in Q15, for one group of sixteen centres after the other, of inputs `x` in steps

@@ -1,13 +1,11 @@
 //! The number formats of networks, in one list.
 
-/// Number format of a network: the types of its numbers, and the form of its distances.
+/// Number format of a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// f32 with distances from differences ([`direct`](super::direct)).
-    F32Direct,
-    /// f32 with distances from products ([`expanded`](super::expanded)).
+    /// f32 ([`float32`](super::float32)).
     F32,
-    /// 16-bit fixed point with distances from products ([`fixed16`](super::fixed16)).
+    /// 16-bit fixed point ([`fixed16`](super::fixed16)).
     Fixed16,
 }
 
@@ -24,26 +22,19 @@ impl Format {
     /// ```
     /// use taxel_core::rbf::Format;
     /// let names = Format::ALL.map(Format::name);
-    /// assert_eq!(names, ["f32-direct", "f32", "fixed16"]);
+    /// assert_eq!(names, ["f32", "fixed16"]);
     /// ```
-    pub const ALL: [Self; 3] = [Self::F32Direct, Self::F32, Self::Fixed16];
+    pub const ALL: [Self; 2] = [Self::F32, Self::Fixed16];
 
     const fn declaration(self) -> Declaration {
         match self {
-            Self::F32Direct => Declaration {
-                name: "f32-direct",
-                tag: 1,
-                description: "f32, distances from differences: safe at any width",
-            },
-            Self::F32 => Declaration {
-                name: "f32",
-                tag: 2,
-                description: "f32, distances from products: where rounding is proved harmless",
-            },
+            Self::F32 => {
+                Declaration { name: "f32", tag: 1, description: "f32: exact, at any width" }
+            }
             Self::Fixed16 => Declaration {
                 name: "fixed16",
-                tag: 3,
-                description: "16-bit fixed point: half the flash and less than half the time",
+                tag: 2,
+                description: "16-bit fixed point: half the flash, and a sixth of the time",
             },
         }
     }

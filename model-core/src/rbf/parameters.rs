@@ -1,8 +1,5 @@
 //! Parts shared by all formats: the shape of a network, its errors, and cutting arrays from a block.
 
-use crate::feature::{Built, Feature};
-use crate::scale::{HALF_RANGE, UNITS, saturates};
-
 /// Numbers of inputs, centres and outputs of one network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
@@ -68,23 +65,6 @@ pub enum NetworkError {
         /// Number of inputs found.
         found: usize,
     },
-    /// The program was built without this part of decoding.
-    #[error("this program is built without the feature `{}`", feature.name())]
-    NotBuilt {
-        /// What is missing.
-        feature: Feature,
-    },
-}
-
-impl NetworkError {
-    /// The proof that `feature` is built.
-    ///
-    /// # Errors
-    /// [`NotBuilt`](Self::NotBuilt).
-    #[inline(always)]
-    pub(crate) fn proof<B: Built>(feature: Feature) -> Result<B, Self> {
-        B::PROOF.ok_or(Self::NotBuilt { feature })
-    }
 }
 
 /// Cuts arrays of four-byte words from the front of a network's block.
@@ -115,31 +95,6 @@ pub(super) fn check_length<T>(
     }
 }
 
-/// Converts readings to units counted from the middle of the training range, not clamped yet. Returns whether one
-/// [will be clamped](saturates), or is NaN.
-pub(super) fn scale_about(
-    midpoint: &[f32],
-    per_unit: &[f32],
-    reading: &[f32],
-    scaled: &mut [f32],
-) -> bool {
-    let limits = midpoint.iter().zip(per_unit);
-    let mut any_saturates = false;
-    for ((x, &r), (&midpoint, &per_unit)) in scaled.iter_mut().zip(reading).zip(limits) {
-        *x = (r - midpoint) * per_unit;
-        any_saturates |= saturates(*x);
-    }
-    any_saturates
-}
-
-/// Lowest and highest reading, computed from the middle of the training range and the number of
-/// [`UNITS`](crate::scale::UNITS) in one unit of the reading.
-pub(super) fn range_about(midpoint: Option<&f32>, per_unit: Option<&f32>) -> [f32; 2] {
-    let (Some(&midpoint), Some(&per_unit)) = (midpoint, per_unit) else { return [f32::NAN; 2] };
-    let half = if per_unit > 0.0 { 0.5 / HALF_RANGE * UNITS / per_unit } else { 0.0 };
-    [midpoint - half, midpoint + half]
-}
-
 pub(super) fn check_finite(arrays: &[(&'static str, &[f32])]) -> Result<(), NetworkError> {
     let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
     match arrays.iter().find(|(_, values)| !finite(values)) {
@@ -148,21 +103,9 @@ pub(super) fn check_finite(arrays: &[(&'static str, &[f32])]) -> Result<(), Netw
     }
 }
 
-/// Sum of the magnitudes of `values`.
-pub(super) fn magnitudes(values: &[f32]) -> f32 {
-    values.iter().map(|value| value.abs()).sum()
-}
-
 pub(super) fn check_spans(per_span: &[f32]) -> Result<(), NetworkError> {
     match per_span.iter().position(|s| *s < 0.0) {
         Some(input) => Err(NetworkError::NegativeSpan { input }),
         None => Ok(()),
-    }
-}
-
-#[inline(always)]
-pub(super) fn accumulate(output: &mut [f32], factor: f32, weights: &[f32]) {
-    for (y, &w) in output.iter_mut().zip(weights) {
-        *y += factor * w;
     }
 }

@@ -6,7 +6,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use taxel_core::rbf::Format;
 use taxel_data::{Silent, Stream};
 use taxel_learn::train::train;
-use taxel_learn::{Exponential, Options, Origin, pack};
+use taxel_learn::{Options, Origin, pack};
 use taxel_simulate::{Synthesis, World};
 
 /// Lines in a table; `compare/decode.py` divides by it.
@@ -30,7 +30,7 @@ fn decode(criterion: &mut Criterion) {
             let options = Options { format, centres, ..Options::default() };
             let trained = train(&dataset, &options, &Silent).expect("a network");
             let blob = pack(&trained, &dataset, &origin).expect("a blob");
-            let model = blob.prepare(Exponential::default());
+            let model = blob.prepare();
             assert!(model.model().networks().all(|network| network.format() == format));
             group.bench_function(BenchmarkId::new(format.name(), centres), |bencher| {
                 one_thread.install(|| bencher.iter(|| model.decode_lines(black_box(&readings))));

@@ -4,10 +4,9 @@
 //! host and on a device, to the bit.
 
 use taxel_core::blob::Model;
-use taxel_core::exp::{ExpKernel, Libm, Micromath};
 use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Estimate, Frame, RowStatus};
-use taxel_learn::{Exponential, ModelBlob};
+use taxel_learn::ModelBlob;
 
 use crate::draws::Draws;
 use crate::seal;
@@ -65,13 +64,11 @@ pub fn check(body: &[u8]) -> bool {
         let mut estimate = decoder.decode(frame).expect("a frame of the model's shape");
         check_estimate(&model, readings_ohm, &estimate.borrowed());
         on_device.extend(estimate.outputs.iter().map(|output| f64::from(*output)));
-        with_exponential::<Libm>(&decoder, frame);
-        with_exponential::<Micromath>(&decoder, frame);
         assess(&decoder, frame, outputs);
         fill(&decoder, frame);
     }
     let blob = ModelBlob::of_bytes(&bytes).expect("a model, as the device says");
-    let host = blob.prepare(Exponential::Polynomial).with_baseline(&baseline);
+    let host = blob.prepare().with_baseline(&baseline);
     let frames: Vec<f64> = frames.into_iter().map(f64::from).collect();
     for (device, host) in on_device.iter().zip(host.decode_lines(&frames)) {
         let same = device.to_bits() == host.to_bits() || (device.is_nan() && host.is_nan());
@@ -128,16 +125,6 @@ fn check_estimate(model: &Model<'_>, readings: &[f32], estimate: &Estimate<'_>) 
             }
         }
     }
-}
-
-fn with_exponential<E: ExpKernel>(decoder: &Decoder<'_, ROWS>, frame: Frame<'_>) {
-    let shape = decoder.shape();
-    let mut outputs = vec![f32::NAN; shape.rows * shape.outputs];
-    let mut status = vec![RowStatus::MissingReading; shape.rows];
-    let mut scratch = vec![0.0; decoder.scratch_floats()];
-    let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
-    decoder.decode_with::<E>(frame, &mut scratch, &mut estimate).expect("the model's shape");
-    check_estimate(decoder.model(), frame.readings_ohm, &estimate);
 }
 
 /// Confidence: a variance is never negative, so a deviation is a number from 0 on, or missing.

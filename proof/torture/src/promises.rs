@@ -24,9 +24,6 @@ use crate::promise::Promise;
 /// Every promise: numbers, sensor, device, hostile input.
 pub const PROMISES: &[Promise] = &[
     exponentials::POLYNOMIAL,
-    exponentials::LIBM,
-    exponentials::MICROMATH,
-    exponentials::EXP2,
     inference::F32,
     inference::FIXED16,
     training::EXTREMES,

@@ -8,7 +8,7 @@ use std::process::Command;
 use taxel_firmware::timing::ScanPlan;
 
 use super::Options;
-use crate::images::{NUCLEO_FIXED16, NUCLEO_ONCHIP, NUCLEO_WIDE};
+use crate::images::{NUCLEO_ONCHIP, NUCLEO_WIDE};
 use crate::process::{Outcome, cargo, first_line, root, run, target_dir};
 use crate::toolchain::elf;
 
@@ -51,7 +51,6 @@ impl Emulator {
             ("--model", model),
             ("--directory", folder),
             ("--wide-image", elf(NUCLEO_WIDE)),
-            ("--fixed16-image", elf(NUCLEO_FIXED16)),
             ("--onchip-image", elf(NUCLEO_ONCHIP)),
         ];
         let mut arguments = vec![root().join(FOLDER).join("run.py").into_os_string()];

@@ -8,7 +8,6 @@ use std::thread;
 use std::time::Duration;
 
 use object::{Object, ObjectSymbol};
-use taxel_learn::Exponential;
 use taxel_learn::cost::{Design, Prices};
 
 use super::build::{ARM, Build, machine};
@@ -46,7 +45,7 @@ pub fn print(models: &[Model], folder: &Path, build: &Build) -> Outcome {
     let mut failed = Vec::new();
     for (model, measured) in models.iter().zip(measured) {
         let Measured { count, flash: [code, constants] } = measured?;
-        let own = prices.frame(&Design::new(&model.blob), Exponential::default());
+        let own = prices.frame(&Design::new(&model.blob));
         let own = own.map_err(|cause| cause.to_string())?;
         let times = |count: u64, own: u64| count as f64 / own as f64;
         let of_instructions = times(count.instructions, own.instructions);

@@ -4,8 +4,7 @@ use std::ops::RangeInclusive;
 
 use taxel_core::blob::{Floats, Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::projection::Projection;
-use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
-use taxel_core::scale::UNITS;
+use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
 use taxel_data::{Purpose, Random, Stream};
 use taxel_learn::cost::{Design, NetworkDesign};
 
@@ -29,7 +28,7 @@ pub type Sizes = [Ranges; 4];
 /// Designs as users have them.
 pub const USUAL: Sizes = [&[1..=16], &[1..=64], &[1..=48], &[4..=256]];
 
-/// Designs that bring out every branch of the code: sizes at which it changes are frequent. Of `f32-direct`, those of 18
+/// Designs that bring out every branch of the code: sizes at which it changes are frequent. Of `f32`, those of 18
 /// inputs and outputs are.
 pub const TELLING: Sizes = [
     &[1..=1, 2..=8],
@@ -55,14 +54,13 @@ fn draw(sizes: Sizes, random: &mut Random) -> Option<Design> {
         let range = &ranges[random.below(ranges.len())];
         range.start() + random.below(range.end() - range.start() + 1)
     });
-    let [tail, array, relative, other] = [0.5, 0.3, 0.3, 0.3].map(|part| random.unit() < part);
+    let [tail, array, relative] = [0.5, 0.3, 0.3].map(|part| random.unit() < part);
     let shape = ModelShape { rows, inputs, outputs };
     let design = if array { Design::of_array } else { Design::of_rows };
     let mut design = design(shape, format, centres, tail);
     design.networks.truncate(1);
     design.row_network.fill(0);
     design.relative_inputs = relative;
-    design.networks[0].common_width = format != Format::F32Direct || !other || centres == 1;
     let fits = design.parameter_bytes() <= MOST_BYTES;
     let fits = fits && rows * inputs <= MOST_OF_FRAME && rows * outputs <= MOST_OF_FRAME;
     fits.then(|| design.in_ram_if_it_fits())
@@ -106,7 +104,7 @@ fn words(design: &NetworkDesign) -> Vec<u32> {
     let bias = vec![0.5; outputs];
     let tail = if design.affine_tail { inputs * outputs } else { 0 };
     match design.format {
-        Format::F32Direct => {
+        Format::F32 => {
             // Exponentials branch by their arguments: these are spread as a trained network's are.
             let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
             let mut centre = |_| {
@@ -114,27 +112,14 @@ fn words(design: &NetworkDesign) -> Vec<u32> {
                 (0..inputs).map(|_| (0.5 + spread * (random.unit() - 0.5)) as f32).collect()
             };
             let places: Vec<Vec<f32>> = (0..centres).map(&mut centre).collect();
-            let parameters = direct::Parameters {
+            let parameters = float32::Parameters {
                 input_minimum: &vec![MIDDLE - 10.0; inputs],
                 input_per_span: &vec![0.05; inputs],
                 centres: &places.concat(),
-                decay: &vec![12.0 / inputs as f32; if design.common_width { 1 } else { centres }],
+                decay: &vec![12.0 / inputs as f32; centres],
                 output_weights: &vec![0.5; centres * outputs],
                 bias: &bias,
                 affine: &vec![0.25; tail],
-            };
-            parameters.words().collect()
-        }
-        Format::F32 => {
-            let stored = centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
-            let parameters = expanded::Parameters {
-                input_midpoint: &middle,
-                input_per_unit: &per_unit,
-                decay: 1.0 / inputs as f32 / UNITS / UNITS,
-                bias: &bias,
-                affine: &vec![0.0; tail],
-                exponents: &vec![0.0; stored * (1 + inputs)],
-                output_weights: &vec![0.25; stored * outputs],
             };
             parameters.words().collect()
         }
@@ -158,12 +143,9 @@ fn words(design: &NetworkDesign) -> Vec<u32> {
 }
 
 fn network<'w>(design: &NetworkDesign, words: &'w [u32]) -> Outcome<Network<'w>> {
-    let NetworkDesign { format, shape, affine_tail, common_width } = *design;
+    let NetworkDesign { format, shape, affine_tail } = *design;
     let network = match format {
-        Format::F32Direct => {
-            direct::Network::of_words(shape, common_width, affine_tail, words).map(Network::from)
-        }
-        Format::F32 => expanded::Network::try_new(shape, affine_tail, words).map(Network::from),
+        Format::F32 => float32::Network::of_words(shape, affine_tail, words).map(Network::from),
         Format::Fixed16 => fixed16::Network::try_new(shape, affine_tail, words).map(Network::from),
     };
     network.map_err(|cause| cause.to_string())

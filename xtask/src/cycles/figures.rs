@@ -23,28 +23,21 @@ const SAME_COMPILER_PERCENT: [u64; 3] = [0, 1, 1];
 /// [`COMPILED`] are not, and standing elsewhere alone takes them from 17 % less to 13.5 % more.
 const OTHER_COMPILER_PERCENT: [u64; 3] = [u64::MAX / 2, 2, 16];
 const COMPILED_FROM_FLASH_PERCENT: u64 = 30;
-const COMPILED: &str = "f32-direct";
+const COMPILED: &str = "f32";
 
 /// Budgets for any compiler: kernel, K, scope, and the most cycles of a model without an affine tail.
-const BUDGETS: [(&str, u64, &str, u64); 7] = [
+const BUDGETS: [(&str, u64, &str, u64); 4] = [
     // Loops that fit 1 KiB hand exponents over in memory, which takes 30 cycles for sixteen centres.
     ("fixed16", 16, "inference", 1250),
     ("fixed16", 64, "inference", 4000),
     ("fixed16", 256, "inference", 15_000),
-    ("f32", 16, "inference", 2600),
-    ("f32", 64, "inference", 9300),
-    ("f32", 256, "inference", 36_500),
     // This is 0.2 ms at 168 MHz.
     ("fixed16", 64, "frame", 33_600),
 ];
 
-/// Budget in cycles of one power of two.
-const EXPONENTIAL: u64 = 32;
-
 /// Budgets of an inference with K = 64 from flash, with weights in RAM: kernel, and per cent of its cycles at zero
-/// wait. The loops of `fixed16` fit the flash's instruction cache. In `f32`, most of the allowance is for the reading
-/// of the manual by which prefetched lines are not kept: instructions are long, and prefetching cannot keep up.
-const FROM_FLASH_PERCENT: [(&str, u64); 2] = [("fixed16", 115), ("f32", 145)];
+/// wait. The loops of `fixed16` fit the flash's instruction cache.
+const FROM_FLASH_PERCENT: [(&str, u64); 1] = [("fixed16", 115)];
 
 /// A region of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -222,7 +215,6 @@ pub fn over_budget(figures: &[Figure]) -> Vec<String> {
             .iter()
             .find(|(of, k, of_scope, _)| (*of, *k, *of_scope) == (kernel, centres, scope));
         let most = match scope {
-            "exponential" => EXPONENTIAL * centres,
             _ => own.map_or(u64::MAX, |(.., most)| *most),
         };
         let percent = FROM_FLASH_PERCENT
@@ -274,26 +266,31 @@ pub mod tests {
 
     #[test]
     fn figures_are_compared_exactly_with_their_compilers_and_by_their_excess_with_others() {
-        let accepted =
-            Accepted { compiler: "a, b".into(), figures: vec![figure("f32", "row", false, 1000)] };
+        let accepted = Accepted {
+            compiler: "a, b".into(),
+            figures: vec![figure("fixed16", "row", false, 1000)],
+        };
         assert_eq!(Accepted::parse(&accepted.data()).as_ref(), Ok(&accepted));
         let said = |compiler: &str, instructions, cycles, flash_cycles| {
             let count = Count { instructions, cycles, flash_cycles };
-            let now = Figure { count, ..figure("f32", "row", false, 0) };
+            let now = Figure { count, ..figure("fixed16", "row", false, 0) };
             accepted.differences(compiler, &[now]).concat()
         };
         assert_eq!(said("a, b", 100, 1010, 1089), "");
         assert_eq!(
             said("a, b", 99, 1000, 1100),
-            "f32, K = 64, row: 99 instructions, accepted are 100"
+            "fixed16, K = 64, row: 99 instructions, accepted are 100"
         );
-        assert_eq!(said("a, b", 100, 989, 1100), "f32, K = 64, row: 989 cycles, accepted are 1000");
+        assert_eq!(
+            said("a, b", 100, 989, 1100),
+            "fixed16, K = 64, row: 989 cycles, accepted are 1000"
+        );
         assert!(said("a, b", 100, 1000, 1112).ends_with("cycles from flash, accepted are 1100"));
         assert_eq!(said("c", 900, 1020, 1276), "");
         assert_eq!(said("c", 1, 1, 1), "");
         assert!(said("c", 100, 1021, 1100).contains("1021 cycles"));
         assert!(said("c", 100, 1000, 1277).contains("1277 cycles from flash"));
-        let other = accepted.differences("c", &[figure("f32", "frame", true, 1)]);
+        let other = accepted.differences("c", &[figure("fixed16", "frame", true, 1)]);
         assert!(other[0].ends_with("not accepted yet") && other[1].ends_with("not measured"));
     }
 
@@ -303,20 +300,19 @@ pub mod tests {
             figure("fixed16", "inference", false, 4000),
             figure("fixed16", "frame", false, 33_600),
             figure("fixed16", "inference", true, 4001),
-            figure("f32", "exponential", false, 64 * 32),
         ];
         assert_eq!(over_budget(&within), [""; 0]);
         let more = |it: &Figure| {
             over_budget(&[figure(&it.kernel, &it.scope, it.affine, it.count.cycles + 1)])
         };
         assert_eq!(within.iter().flat_map(more).count(), 3);
-        let mut figure = figure("f32", "inference", false, 1000);
-        figure.count.flash_cycles = 1450;
+        let mut figure = figure("fixed16", "inference", false, 1000);
+        figure.count.flash_cycles = 1150;
         assert_eq!(over_budget(std::slice::from_ref(&figure)), [""; 0]);
-        figure.count.flash_cycles = 1451;
+        figure.count.flash_cycles = 1151;
         assert_eq!(
             over_budget(&[figure]),
-            ["f32, K = 64, inference: 1451 from flash, 1450 allowed"]
+            ["fixed16, K = 64, inference: 1151 from flash, 1150 allowed"]
         );
     }
 }

@@ -6,9 +6,8 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use taxel_core::rbf::Format;
+use taxel_learn::ModelBlob;
 use taxel_learn::cost::{Cost, Design, Price, Prices, Terms, filter_terms, terms};
-use taxel_learn::{Exponential, ModelBlob};
 
 use super::designs;
 use super::figures::Measured;
@@ -54,14 +53,12 @@ pub fn frames(design: &Design, measured: &[Measured]) -> Vec<Frame> {
             }
             _ => return None,
         }
-        let exponential = match kernel.strip_prefix(Format::F32Direct.name()) {
-            Some(name) if !name.is_empty() => Exponential::by_name(name.strip_prefix('-')?)?,
-            // Compiled twins are no code of the firmware.
-            _ if kernel.ends_with("-portable") => return None,
-            _ => Exponential::default(),
-        };
+        // Compiled twins are no code of the firmware.
+        if kernel.ends_with("-portable") {
+            return None;
+        }
         let (kernel, scope, count) = (kernel.clone(), scope.clone(), region.whole);
-        Some(Frame { kernel, scope, terms: terms(design, exponential), count })
+        Some(Frame { kernel, scope, terms: terms(design), count })
     };
     measured.iter().filter_map(frame).collect()
 }

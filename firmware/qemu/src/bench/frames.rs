@@ -5,9 +5,7 @@ use core::hint::black_box;
 use defmt::{assert, unwrap};
 use qemu_image::checks::Numbers;
 use taxel_core::blob::{Model, ModelShape};
-use taxel_core::exp::{ExpKernel, Libm, Micromath, Polynomial};
 use taxel_core::filter::{Settings, State};
-use taxel_core::rbf::Format;
 use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Estimate, RowStatus};
 
@@ -68,14 +66,14 @@ impl Outcome {
     /// Decodes `frame` as the firmware does.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the firmware's call alone is measured")]
-    fn decode<E: ExpKernel>(
+    fn decode(
         &mut self,
         decoder: &Decoder<'_, MOST_ROWS>,
         frame: taxel_core::Frame<'_>,
         scratch: &mut [f32],
     ) {
         let mut estimate = self.estimate();
-        let _ = decoder.decode_with::<E>(frame, scratch, &mut estimate);
+        let _ = decoder.decode_into(frame, scratch, &mut estimate);
     }
 }
 
@@ -88,16 +86,12 @@ struct Bench<'a> {
     scratch: &'a mut [f32],
 }
 
-/// Measures frames of `model` with every exponential that its format can have.
+/// Measures frames of `model`.
 #[inline(never)]
 pub fn measure(model: &Model<'_>, frame: &[f32], arena: &mut Arena) {
     let mut bench = bench(model, frame, arena);
     let format = unwrap!(model.networks().next()).format();
-    bench.measure::<Polynomial>(format.name());
-    if format == Format::F32Direct {
-        bench.measure::<Libm>("f32-direct-libm");
-        bench.measure::<Micromath>("f32-direct-micromath");
-    }
+    bench.measure(format.name());
     bench.filter(format.name(), arena);
     if model.confidence().is_some() {
         bench.assess(format.name(), arena);
@@ -117,13 +111,13 @@ fn bench<'a>(model: &Model<'a>, frame: &'a [f32], arena: &mut Arena) -> Bench<'a
 }
 
 impl Bench<'_> {
-    #[inline(never)] // so that the stack holds the values of one exponential at a time
-    fn measure<E: ExpKernel>(&mut self, name: &str) {
+    #[inline(never)]
+    fn measure(&mut self, name: &str) {
         let Self { decoder, frame, reciprocals, outcome, scratch } = self;
         let scope = if decoder.model().projection().is_some() { "array-frame" } else { "frame" };
         let frame = taxel_core::Frame { readings_ohm: frame, reciprocals };
         region(name, scope, || {
-            outcome.decode::<E>(black_box(decoder), black_box(frame), black_box(scratch));
+            outcome.decode(black_box(decoder), black_box(frame), black_box(scratch));
         });
         let all = outcome.status().iter().all(|row| *row == RowStatus::Decoded);
         assert!(all, "a row is not decoded in {=str}", scope);

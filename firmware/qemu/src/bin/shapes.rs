@@ -7,7 +7,6 @@ use cortex_m_rt::entry;
 use defmt::{info, unwrap};
 use qemu_image::exit;
 use qemu_image::shapes::{self, Comparison, Memory};
-use taxel_core::rbf::Format;
 
 fn log(what: &str, comparison: Comparison) {
     let Comparison { compared, different } = comparison;
@@ -19,8 +18,7 @@ fn main() -> ! {
     let peripherals = unwrap!(cortex_m::Peripherals::take());
     // SAFETY: the memory and the MPU are used here only.
     let mut memory = unsafe { Memory::take(&peripherals.MPU) };
-    log("f32", unwrap!(shapes::networks(&mut memory, Format::F32)));
-    log("fixed16", unwrap!(shapes::networks(&mut memory, Format::Fixed16)));
+    log("fixed16", unwrap!(shapes::networks(&mut memory)));
     log("projection", unwrap!(shapes::projections(&mut memory)));
     exit::success()
 }

@@ -1,8 +1,8 @@
 //! What a model asks of a device: time, memory, and whether a slot holds it.
 
 use serde::Serialize;
+use taxel_learn::ModelBlob;
 use taxel_learn::cost::{DecoderRam, Design, Prices};
-use taxel_learn::{Exponential, ModelBlob};
 
 use crate::error::Result;
 use crate::verdict::SLOT_BYTES;
@@ -34,7 +34,7 @@ impl DeviceCost {
     /// Cost of the model in `blob`, by the price list in the repository.
     pub fn new(blob: &ModelBlob) -> Result<Self> {
         let design = Design::new(blob);
-        let frame = Prices::accepted()?.frame(&design, Exponential::default())?;
+        let frame = Prices::accepted()?.frame(&design)?;
         let blob_bytes = blob.bytes().len();
         Ok(Self {
             cycles: frame.cycles,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 use taxel_data::{Progress, Stream};
-use taxel_learn::{Exponential, ModelBlob};
+use taxel_learn::ModelBlob;
 use taxel_limit::identify::{self, Observability, Prior};
 use taxel_limit::reference::{EffectiveSamples, GroupLimit};
 use taxel_limit::{Reference, Refusal};
@@ -179,7 +179,7 @@ fn judge(
     frames: usize,
     measure: &Measure,
 ) -> DecoderErrors {
-    let decoder = model.blob.prepare(Exponential::default()).of_inputs();
+    let decoder = model.blob.prepare().of_inputs();
     let mut experiment = experiment.clone();
     experiment.training.relative_inputs = decoder.model().metadata().relative_inputs;
     let test = experiment.dataset(&Synthesis::new(&experiment.world), Stream::Test, frames);

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use taxel_data::{BadValue, columns};
 use taxel_learn::cost::{Design, Prices};
-use taxel_learn::{Decoder, Exponential, ModelBlob};
+use taxel_learn::{Decoder, ModelBlob};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
@@ -113,9 +113,9 @@ impl<'s> Judged<'s> {
         device: Device,
         samples: usize,
     ) -> Result<Self> {
-        let model = blob.prepare(Exponential::default()).of_inputs();
+        let model = blob.prepare().of_inputs();
         let prices = Prices::accepted()?;
-        let cost = prices.frame(&Design::new(blob), Exponential::default())?;
+        let cost = prices.frame(&Design::new(blob))?;
         let scan_ms = device.scan_ms(Some(Wires::of(&scene.world)), samples);
         let names = scene.output_names();
         let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();

@@ -39,7 +39,7 @@ pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Readout, Times, Wires};
 use frames::Frames;
 use judge::Judged;
 pub use line::Line;
-pub use point::{Arithmetic, FilterSettings, Point};
+pub use point::{FilterSettings, Point};
 pub use readings::Readings;
 pub(super) use touches::{Touched, Touches, Way};
 use ways::Ways;
@@ -105,7 +105,7 @@ pub struct Trade {
     pub chosen: Option<usize>,
     /// What that point is worth.
     pub verdict: Option<Verdict>,
-    /// Index of every point's blob: points that differ only in the exponential share one.
+    /// Index of every point's blob: points that differ only in gate or filter share one.
     #[serde(skip)]
     blobs: Vec<usize>,
     #[serde(skip)]

@@ -4,7 +4,7 @@ use serde::Serialize;
 use taxel_data::{Dataset, Stream, columns};
 use taxel_learn::decoders::{BASELINES, mean};
 use taxel_learn::select::Selection;
-use taxel_learn::{Exponential, ModelBlob, Options};
+use taxel_learn::{ModelBlob, Options};
 use taxel_limit::Refusal;
 use taxel_simulate::Synthesis;
 
@@ -102,7 +102,7 @@ fn on_frames(
     frames: &Dataset,
     measure: &Measure,
 ) -> Vec<DecoderErrors> {
-    let model = blob.prepare(Exponential::default()).of_inputs();
+    let model = blob.prepare().of_inputs();
     let network = metrics::judge(&model, frames, measure);
     let baselines = BASELINES.iter();
     let baselines =

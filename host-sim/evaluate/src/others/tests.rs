@@ -1,5 +1,4 @@
 use taxel_data::{Dataset, Silent};
-use taxel_learn::Exponential;
 use taxel_learn::decoders::mean::Mean;
 
 use super::*;
@@ -82,7 +81,7 @@ fn press() -> Experiment {
 fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
     let scene = press();
     let blob = scene.train(&Silent).unwrap();
-    let model = blob.prepare(Exponential::default());
+    let model = blob.prepare();
     let measure = scene.measure();
     let subject = Subject::Scene(scene.into());
     let frames = frames(&subject, None);

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use taxel_data::{Dataset, Silent, columns};
-use taxel_learn::{Exponential, Options, pack, relative, train::train};
+use taxel_learn::{Options, pack, relative, train::train};
 
 use crate::measurements::Measurements;
 use crate::metrics::{self, ALL};
@@ -61,7 +61,7 @@ impl RelativeTrial {
         let last = frames.subset(&last.collect::<Vec<_>>());
         let trained = train(&first, options, &Silent).ok()?;
         let blob = pack(&trained, &first, &data.origin()).ok()?;
-        let model = blob.prepare(Exponential::default()).of_inputs();
+        let model = blob.prepare().of_inputs();
         Some(metrics::judge(&model, &last, &data.measure()).errors)
     }
 }

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use taxel_core::rbf::Format;
 use taxel_data::Silent;
-use taxel_learn::Exponential;
 use taxel_learn::cost::{DecoderRam, Design, Prices};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::World;
@@ -172,13 +171,13 @@ pub fn compute(plan: &Plan, point: &Point, shared: &mut Shared) -> Result<Result
     let measure = Measure { limit, ..own };
     let (training, test) = subject.sets(None);
     let blob = training.blob(&subject.options(), &Silent)?;
-    let model = blob.prepare(Exponential::default()).of_inputs();
+    let model = blob.prepare().of_inputs();
     for errors in metrics::judge(&model, &test, &measure).errors {
         results.add(&format!("rmse_{}", errors.group), Some(errors.rmse));
         results.add(&format!("ratio_to_limit_{}", errors.group), errors.ratio_to_limit);
     }
     let design = Design::new(&blob);
-    let cost = Prices::accepted()?.frame(&design, Exponential::default())?;
+    let cost = Prices::accepted()?.frame(&design)?;
     let times = point.device.times(scan_ms, &cost);
     results.add("decode_ms", Some(times.decode_ms));
     results.add("frame_ms", Some(times.frame_ms));

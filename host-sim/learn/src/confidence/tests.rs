@@ -29,7 +29,7 @@ fn row_4() -> (World, Dataset, ModelBlob, ModelBlob) {
 fn intervals_cover_the_errors_of_frames_that_nothing_was_fitted_to() {
     let (world, _, _, blob) = row_4();
     let test = synthesise(&world, Stream::Test, 4000);
-    let model = blob.prepare(Exponential::default());
+    let model = blob.prepare();
     let decoded = model.decode_table(&test.inputs).values;
     let (deviations, novelty) = model.assess(&test.inputs.values).unwrap();
     let ratios = blob.parse().confidence().unwrap().ratios_95();
@@ -61,7 +61,7 @@ fn frames_that_the_sensor_cannot_give_are_novel() {
         let both = 1.0 / (1.0 / frame[7] + 1.0 / frame[8]);
         frame[7..9].fill(both);
     }
-    let (_, novelty) = blob.prepare(Exponential::default()).assess(&frames).unwrap();
+    let (_, novelty) = blob.prepare().assess(&frames).unwrap();
     assert!(novelty.iter().all(|novelty| *novelty > 10.0));
 }
 
@@ -69,9 +69,8 @@ fn frames_that_the_sensor_cannot_give_are_novel() {
 fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
     let (world, training, without, with) = row_4();
     let test = synthesise(&world, Stream::Test, 50);
-    let prepared = with.prepare(Exponential::default());
-    let decoded =
-        |blob: &ModelBlob| blob.prepare(Exponential::default()).decode_table(&test.inputs).values;
+    let prepared = with.prepare();
+    let decoded = |blob: &ModelBlob| blob.prepare().decode_table(&test.inputs).values;
     assert_eq!(decoded(&with), decoded(&without));
     let (deviations, novelty) = prepared.assess(&test.inputs.values).unwrap();
     let decoder = Decoder::<1>::load(with.bytes()).unwrap();
@@ -110,7 +109,7 @@ fn share_novel(readings: usize, reading: impl Fn(usize, usize) -> f64) -> f64 {
     let mut held_out = HeldOut::default();
     held_out.add(&blob, &density, &others);
     let blob = add(&blob, &density, &held_out).unwrap();
-    let model = blob.prepare(Exponential::default());
+    let model = blob.prepare();
     let (deviations, novelty) = model.assess(&others.inputs.values).unwrap();
     assert!(deviations.iter().all(|d| d.is_finite()) && novelty.iter().all(|n| n.is_finite()));
     novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / 2000.0
@@ -151,7 +150,7 @@ fn deviations_of_an_output_are_those_of_the_frames_that_have_it() {
         let mut held_out = HeldOut::default();
         held_out.add(&blob, &density, calibration);
         let with = add(&blob, &density, &held_out).unwrap();
-        with.prepare(Exponential::default()).assess(&training.inputs.values).unwrap().0
+        with.prepare().assess(&training.inputs.values).unwrap().0
     };
     let (all, partly) = (deviations(&calibration), deviations(&partly));
     for (place, (all, partly)) in all.iter().zip(&partly).enumerate() {

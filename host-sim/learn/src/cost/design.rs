@@ -1,7 +1,7 @@
 //! What the cost of decoding depends on: sizes and options of a model, without its numbers.
 
 use taxel_core::blob::ModelShape;
-use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
 use taxel_firmware::capacity::WEIGHT_RAM_BYTES;
 
 use crate::packing::ModelBlob;
@@ -32,8 +32,6 @@ pub struct NetworkDesign {
     pub shape: Shape,
     /// Whether it has an affine tail.
     pub affine_tail: bool,
-    /// Whether all centres share one width; in other formats than `f32-direct` they do.
-    pub common_width: bool,
 }
 
 impl Design {
@@ -57,8 +55,7 @@ impl Design {
     pub fn of_rows(shape: ModelShape, format: Format, centres: usize, affine_tail: bool) -> Self {
         let ModelShape { rows, inputs, outputs } = shape;
         let shape_of_row = Shape { inputs, centres, outputs };
-        let network =
-            NetworkDesign { format, shape: shape_of_row, affine_tail, common_width: true };
+        let network = NetworkDesign { format, shape: shape_of_row, affine_tail };
         let design = Self {
             shape,
             networks: vec![network; rows],
@@ -116,16 +113,14 @@ impl NetworkDesign {
             format: network.format(),
             shape: network.shape(),
             affine_tail: network.has_affine_tail(),
-            common_width: network.shape().centres == 1 || network.widths().count() == 1,
         }
     }
 
     /// Bytes of the network's parameters in a blob.
     pub fn bytes(&self) -> usize {
-        let Self { format, shape, affine_tail, common_width } = *self;
+        let Self { format, shape, affine_tail } = *self;
         let words = match format {
-            Format::F32Direct => direct::Network::block_words(shape, common_width, affine_tail),
-            Format::F32 => expanded::Network::block_words(shape, affine_tail),
+            Format::F32 => float32::Network::block_words(shape, affine_tail),
             Format::Fixed16 => fixed16::Network::block_words(shape, affine_tail),
         };
         words * size_of::<u32>()

@@ -32,8 +32,7 @@ impl DecoderRam {
         let readings = shape.inputs * float;
         let features = design.features() * float;
         let batch = |format, centres: usize| match format {
-            Format::F32Direct => 0,
-            Format::F32 => 128,
+            Format::F32 => 0,
             Format::Fixed16 => centres.next_multiple_of(16).min(256),
         };
         let activations = design.networks.iter().map(|it| batch(it.format, it.shape.centres));

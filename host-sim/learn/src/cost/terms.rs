@@ -10,7 +10,6 @@ use taxel_core::blob::ModelShape;
 use taxel_core::rbf::{Format, Shape};
 
 use super::{Design, NetworkDesign};
-use crate::infer::Exponential;
 
 /// Inputs and outputs for which there is code of its own.
 const EIGHTEEN: usize = 18;
@@ -20,7 +19,7 @@ pub type Terms = BTreeMap<String, usize>;
 
 /// The terms of one frame of a model of this `design`.
 #[must_use]
-pub fn terms(design: &Design, exponential: Exponential) -> Terms {
+pub fn terms(design: &Design) -> Terms {
     let mut sum = Sum::default();
     let ModelShape { rows, inputs, .. } = design.shape;
     let one = design.projection;
@@ -38,7 +37,6 @@ pub fn terms(design: &Design, exponential: Exponential) -> Terms {
         match network.format {
             Format::Fixed16 => fixed16(network, &mut sum),
             Format::F32 => f32(network, &mut sum),
-            Format::F32Direct => direct(network, exponential, &mut sum),
         }
     }
     sum.0
@@ -71,7 +69,7 @@ fn project(readings: usize, features: usize, sum: &mut Sum) {
     sums(readings, features, sum);
 }
 
-/// `f32_sums`: so many lines of weights, summed two at a time in groups of outputs.
+/// `projection_sums`: so many lines of weights, summed two at a time in groups of outputs.
 fn sums(lines: usize, outputs: usize, sum: &mut Sum) {
     let pairs = lines / 2;
     for width in groups(outputs) {
@@ -88,66 +86,12 @@ fn sums(lines: usize, outputs: usize, sum: &mut Sum) {
     }
 }
 
-/// Numbers of outputs that `f32_sums` takes at once, as `f32_width` chooses them: 18, else 6, else those that are left.
+/// Numbers of outputs that `projection_sums` takes at once, as `projection_width` chooses them: 18, else 6, else those that are left.
 fn groups(outputs: usize) -> impl Iterator<Item = usize> {
     let (eighteens, left) = (outputs / EIGHTEEN, outputs % EIGHTEEN);
     let sixes = left / 6;
     let last = Some(left % 6).filter(|last| *last > 0);
     [EIGHTEEN].repeat(eighteens).into_iter().chain([6].repeat(sixes)).chain(last)
-}
-
-/// `taxel_f32`, from readings that are not scaled yet. It takes centres by fours, in batches of 128.
-fn f32(network: &NetworkDesign, sum: &mut Sum) {
-    let Shape { inputs, centres, outputs } = network.shape;
-    let fours = centres.div_ceil(4);
-    let more_batches = centres.div_ceil(128) - 1;
-    if (inputs, outputs, more_batches) == (EIGHTEEN, EIGHTEEN, 0) {
-        let tail = usize::from(network.affine_tail);
-        sum.add("f32, 18 inputs, 18 outputs", [("", 1), ("4 centres", fours), ("tail", tail)]);
-        return;
-    }
-    if inputs == EIGHTEEN {
-        sum.add("f32, 18 inputs", [("", 1), ("batch more", more_batches), ("4 centres", fours)]);
-    } else {
-        let of_inputs = [("", 1), ("input", inputs), ("input beyond fours", inputs % 4)];
-        sum.add("f32", of_inputs);
-        sum.add("f32", [("batch more", more_batches)]);
-        if inputs > 16 {
-            // Those beyond the last four stream by, in passes of sixteen.
-            let streamed = (inputs - 1) / 4;
-            sum.add(
-                "f32, more than 16 inputs",
-                [
-                    ("", 1),
-                    ("batch more, input", more_batches * inputs),
-                    ("4 centres", fours),
-                    ("4 centres, 4 inputs", fours * streamed),
-                    ("4 centres, 16 inputs", fours * streamed.div_ceil(4)),
-                ],
-            );
-        } else {
-            let of_inputs = fours * inputs.div_ceil(4);
-            sum.add(
-                "f32, up to 16 inputs",
-                [("4 centres", fours), ("4 centres, 4 inputs", of_inputs)],
-            );
-        }
-    }
-    let groups = groups(outputs).count();
-    sum.add(
-        "f32",
-        [
-            ("group", groups),
-            ("output", outputs),
-            ("group, batch more", groups * more_batches),
-            ("output, batch more", outputs * more_batches),
-        ],
-    );
-    sums(4 * fours, outputs, sum);
-    if network.affine_tail {
-        sum.add("f32, tail", [("group", groups), ("output", outputs)]);
-        sums(inputs, outputs, sum);
-    }
 }
 
 /// `taxel_fixed16`, from readings that are not scaled yet. It takes centres by sixteens in batches of 256, inputs by
@@ -214,24 +158,23 @@ fn fixed16(network: &NetworkDesign, sum: &mut Sum) {
     }
 }
 
-/// A network with direct distances, from readings that are not scaled yet. The compiler takes four inputs and four
+/// A network in f32, from readings that are not scaled yet. The compiler takes four inputs and four
 /// outputs at a time, and unrolls the loops of 18 inputs and outputs.
-fn direct(network: &NetworkDesign, exponential: Exponential, sum: &mut Sum) {
+fn f32(network: &NetworkDesign, sum: &mut Sum) {
     let Shape { inputs, centres, outputs } = network.shape;
-    let centre = format!("centre, {}", exponential.name());
     let tail = usize::from(network.affine_tail);
     if (inputs, outputs) == (EIGHTEEN, EIGHTEEN) {
-        let kind = "f32-direct, 18 inputs, 18 outputs";
-        sum.add(kind, [("", 1), (&centre, centres), ("tail", tail)]);
+        let kind = "f32, 18 inputs, 18 outputs";
+        sum.add(kind, [("", 1), ("centre", centres), ("tail", tail)]);
         return;
     }
     sum.add(
-        "f32-direct",
+        "f32",
         [
             ("", 1),
             ("input", inputs),
             ("output", outputs),
-            (&centre, centres),
+            ("centre", centres),
             ("centre, 4 inputs", centres * (inputs / 4)),
             ("centre, input beyond fours", centres * (inputs % 4)),
             ("centre of inputs beyond fours", centres * usize::from(!inputs.is_multiple_of(4))),

@@ -3,7 +3,7 @@
 use std::fmt::{self, Write as _};
 
 use taxel_core::blob::Model;
-use taxel_core::rbf::direct::{self, Parameters};
+use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Format, Network};
 
 use super::text::{columns, rows_of};
@@ -19,7 +19,7 @@ pub enum Unheld {
     Confidence,
     /// Filling of missing readings.
     Fill,
-    /// Network in another number format than `f32-direct`.
+    /// Network in another number format than `f32`.
     Format(Format),
 }
 
@@ -55,7 +55,7 @@ pub fn source(model: &Model<'_>) -> Result<String, Unheld> {
 }
 
 /// Networks of `model`, if a `Fixed` has room for all of it.
-fn held<'a>(model: &Model<'a>) -> Result<Vec<direct::Network<'a>>, Unheld> {
+fn held<'a>(model: &Model<'a>) -> Result<Vec<float32::Network<'a>>, Unheld> {
     let parts = [
         (model.projection().is_some(), Unheld::Projection),
         (model.metadata().relative_inputs, Unheld::RelativeInputs),
@@ -65,11 +65,11 @@ fn held<'a>(model: &Model<'a>) -> Result<Vec<direct::Network<'a>>, Unheld> {
     if let Some((_, part)) = parts.into_iter().find(|(present, _)| *present) {
         return Err(part);
     }
-    let direct = |network| match network {
-        Network::F32Direct(network) => Ok(network),
+    let in_f32 = |network| match network {
+        Network::F32(network) => Ok(network),
         other => Err(Unheld::Format(other.format())),
     };
-    model.networks().map(direct).collect()
+    model.networks().map(in_f32).collect()
 }
 
 /// Comment on the model: its name and CRC, a call, and its columns.
@@ -94,14 +94,10 @@ fn header(model: &Model<'_>) -> String {
 }
 
 /// Adds the static of a `network` that decodes these `rows`; nothing if it decodes none.
-fn write_static(source: &mut String, rows: &[usize], network: &direct::Network<'_>) {
+fn write_static(source: &mut String, rows: &[usize], network: &float32::Network<'_>) {
     let Some(first) = rows.first() else { return };
     let (shape, p) = (network.shape(), network.parameters());
-    let Parameters { input_minimum, input_per_span, centres, output_weights, bias, .. } = *p;
-    let decay = match *p.decay {
-        [common] => vec![common; shape.centres],
-        ref each => each.to_vec(),
-    };
+    let Parameters { input_minimum, input_per_span, centres, decay, output_weights, bias, .. } = *p;
     let affine = match p.affine {
         [] => &vec![0.0; shape.inputs * shape.outputs][..],
         affine => affine,
@@ -170,6 +166,6 @@ fn write_decode(source: &mut String, model: &Model<'_>) {
 /// Number of bytes that the statics of `model`'s networks take.
 #[must_use]
 pub fn weight_bytes(model: &Model<'_>) -> usize {
-    let floats = |network: Network<'_>| direct::Network::block_words(network.shape(), false, true);
+    let floats = |network: Network<'_>| float32::Network::block_words(network.shape(), true);
     4 * model.networks().map(floats).sum::<usize>()
 }

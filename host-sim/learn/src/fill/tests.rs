@@ -2,7 +2,6 @@ use taxel_data::{Silent, Stream};
 use taxel_simulate::{World, synthesise};
 
 use super::*;
-use crate::infer::Exponential;
 use crate::train::train;
 use crate::{Options, Origin, pack};
 
@@ -20,7 +19,7 @@ fn model() -> (ModelBlob, Table) {
 #[test]
 fn filled_readings_are_as_near_as_noise_lets_them_be() {
     let (blob, fresh) = model();
-    let model = blob.prepare(Exponential::default());
+    let model = blob.prepare();
     let deviations = fresh.deviations();
     for missing in [vec![4], (0..36).step_by(18).map(|row| row + 9).collect::<Vec<_>>()] {
         let mut faulty = fresh.clone();

@@ -1,10 +1,10 @@
 use taxel_data::{Purpose, Random, Silent, Stream};
 
 use super::*;
+use crate::Decoder as _;
 use crate::decoders::linear;
 use crate::packing::{Origin, pack};
 use crate::train::{Options, train};
-use crate::{Decoder as _, Exponential};
 
 /// Readings of six channels and two outputs that follow them, in so many lines.
 fn measured(lines: usize, seed: u64) -> Dataset {
@@ -182,7 +182,7 @@ fn errors(training: &Dataset, test: &Dataset) -> [f64; 2] {
     let options = Options { centres: 20, spread: 0.5, ..Options::default() };
     let trained = train(&kept, &options, &Silent).unwrap();
     let blob = pack(&trained, &kept, &Origin::of_data("data", 0, 1, &kept)).unwrap();
-    let network = blob.prepare(Exponential::default()).decode_lines(&test.inputs.values);
+    let network = blob.prepare().decode_lines(&test.inputs.values);
     let linear = linear::fit(&kept).decode_all(&test.inputs.values, 1).values;
     [network, linear].map(|predicted| {
         let squares: f64 = test.outputs.squared_errors(&predicted).iter().sum();

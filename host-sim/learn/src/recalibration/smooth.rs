@@ -5,7 +5,7 @@ use std::f64::consts::LN_2;
 use taxel_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, HIGHEST_ACTIVATION, words_at_once,
 };
-use taxel_core::rbf::{Network, Shape, direct, expanded, fixed16};
+use taxel_core::rbf::{Network, Shape, fixed16, float32};
 use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS, UNITS_PER_STEP};
 
 /// One of [`UNITS`], in spans of the training range.
@@ -37,42 +37,22 @@ impl Smooth {
     pub fn new(network: &Network<'_>) -> Self {
         let shape = network.shape();
         match network {
-            Network::F32Direct(network) => Self::from_direct(shape, network.parameters()),
-            Network::F32(network) => Self::from_expanded(shape, &network.parameters()),
+            Network::F32(network) => Self::from_float32(shape, network.parameters()),
             Network::Fixed16(network) => Self::from_fixed16(shape, &network.parameters()),
         }
     }
 
-    fn from_direct(shape: Shape, p: &direct::Parameters<'_>) -> Self {
-        let decay = p.decay.iter().cycle().take(shape.centres);
+    fn from_float32(shape: Shape, p: &float32::Parameters<'_>) -> Self {
         Self {
             shape,
             zeros: scaled(p.input_minimum, 1.0),
             per_unit: scaled(p.input_per_span, 1.0),
             clamp: CLAMP.map(f64::from),
             centres: scaled(p.centres, 1.0),
-            decay: decay.map(|decay| f64::from(*decay)).collect(),
+            decay: scaled(p.decay, 1.0),
             weights: scaled(p.output_weights, 1.0),
             bias: scaled(p.bias, 1.0),
             affine: scaled(p.affine, 1.0),
-        }
-    }
-
-    fn from_expanded(shape: Shape, p: &expanded::Parameters<'_>) -> Self {
-        let Shape { inputs, centres, outputs } = shape;
-        let decay = f64::from(p.decay);
-        // a = 2g·c stands behind b.
-        let of_centre = |line: &[f32]| scaled(&line[1..], SPANS_PER_UNIT / (2.0 * decay));
-        Self {
-            shape,
-            zeros: scaled(p.input_midpoint, 1.0),
-            per_unit: scaled(p.input_per_unit, SPANS_PER_UNIT),
-            clamp: [-1.0, 1.0].map(|end| end * f64::from(HALF_RANGE)),
-            centres: p.exponents.chunks(1 + inputs).take(centres).flat_map(of_centre).collect(),
-            decay: vec![decay * LN_2 / SPANS_PER_UNIT.powi(2); centres],
-            weights: scaled(&p.output_weights[..centres * outputs], 1.0),
-            bias: scaled(p.bias, 1.0),
-            affine: scaled(p.affine, 1.0 / SPANS_PER_UNIT),
         }
     }
 

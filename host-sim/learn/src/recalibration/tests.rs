@@ -7,7 +7,7 @@ use taxel_simulate::{Synthesis, World, synthesise};
 
 use super::*;
 use crate::train::train;
-use crate::{Exponential, Options, Origin, confidence, fill, pack, relative};
+use crate::{Options, Origin, confidence, fill, pack, relative};
 
 /// How much is trained and decoded.
 #[derive(Clone, Copy)]
@@ -102,7 +102,7 @@ impl Bench {
     }
 
     fn prepare<'b>(&self, blob: &'b ModelBlob) -> PreparedModel<'b> {
-        blob.prepare(Exponential::default()).with_baseline(&self.rest.values)
+        blob.prepare().with_baseline(&self.rest.values)
     }
 
     /// Root mean square error in z of the model after a drift.
@@ -152,7 +152,6 @@ fn two_hundred_presses_bring_every_format_within_3_percent_of_fresh_training_of_
 fn every_format(size: Size) {
     for (format, whole_array, relative_inputs) in [
         (Format::F32, false, false),
-        (Format::F32Direct, false, false),
         (Format::Fixed16, false, false),
         (Format::Fixed16, true, false),
         (Format::F32, false, true),
@@ -255,13 +254,11 @@ fn a_smooth_network_has_the_outputs_of_decoding_and_the_slopes_of_its_outputs() 
     for (format, affine_tail, tolerance) in [
         (Format::F32, true, 1e-4),
         (Format::F32, false, 1e-4),
-        (Format::F32Direct, true, 1e-4),
-        (Format::F32Direct, false, 1e-4),
         (Format::Fixed16, true, 4e-3), // inputs, activations and weights have 16 bits
         (Format::Fixed16, false, 4e-3),
     ] {
         let (blob, frames) = small(Options { affine_tail, format, ..Options::default() });
-        let model = blob.prepare(Exponential::default());
+        let model = blob.prepare();
         let decoded = model.decode_table(&frames.inputs);
         let size = decoded.values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
         for (row, network) in model.networks().iter().enumerate() {
@@ -301,12 +298,10 @@ fn a_smooth_network_has_the_outputs_of_decoding_and_the_slopes_of_its_outputs() 
 
 #[test]
 fn errors_before_and_after_are_those_of_decoding_and_of_presses_that_no_fit_has_seen() {
-    for (format, tolerance) in
-        [(Format::F32, 1e-3), (Format::F32Direct, 1e-3), (Format::Fixed16, 3e-2)]
-    {
+    for (format, tolerance) in [(Format::F32, 1e-3), (Format::Fixed16, 3e-2)] {
         let (blob, frames) = small(Options { format, ..Options::default() });
         let frames = first(&frames, 80);
-        let model = blob.prepare(Exponential::default());
+        let model = blob.prepare();
         // Far beyond the clamp.
         let readings = drifted(&frames.inputs, &[[1.3, 0.0]; 36]);
         let inputs = model.inputs_of_networks(&readings.values);
@@ -332,10 +327,10 @@ fn errors_before_and_after_are_those_of_decoding_and_of_presses_that_no_fit_has_
 
 #[test]
 fn zeros_of_inputs_that_have_drifted_change_and_nothing_else() {
-    for format in [Format::F32, Format::F32Direct, Format::Fixed16] {
+    for format in Format::ALL {
         let (blob, frames) = small(Options { format, ..Options::default() });
         let frames = first(&frames, 80);
-        let model = blob.prepare(Exponential::default());
+        let model = blob.prepare();
         // Row 5 has drifted; in row 4, a press misses a reading and another has a wild one.
         let mut readings = frames.inputs.clone();
         for line in readings.values.chunks_exact_mut(36) {
@@ -366,7 +361,7 @@ fn zeros_of_inputs_that_have_drifted_change_and_nothing_else() {
 #[test]
 fn what_cannot_be_recalibrated_is_refused_by_name() {
     let (blob, frames) = small(Options::default());
-    let model = blob.prepare(Exponential::default());
+    let model = blob.prepare();
     let say = |outcome: Result<Recalibrated>| outcome.unwrap_err().to_string();
     let with = |count: usize, line: Option<usize>| {
         let lines: Vec<usize> = (0..count).map(|number| line.unwrap_or(number)).collect();

@@ -6,7 +6,7 @@
 
 use std::cell::OnceCell;
 
-use taxel_core::rbf::{Format, Network, NetworkError, Shape, direct, expanded, fixed16};
+use taxel_core::rbf::{self, Format, Network, NetworkError, Shape};
 
 use taxel_data::{RowTable, Table};
 
@@ -15,13 +15,10 @@ use super::samples::{Ridge, Samples};
 use super::tasks::{Factors, Task};
 use super::{HiddenLayer, Options, Solver};
 use crate::error::{Error, Result, parameter_not_held};
-use crate::infer::{Exponential, infer};
+use crate::infer::infer;
 
-mod direct_f32;
-pub(super) mod expanded_f32;
-mod fixed_point;
-
-pub use expanded_f32::rounding_bounds;
+mod fixed16;
+mod float32;
 
 /// Most that a format may take from the R² of an output on the training frames, unless its squared error grows by no
 /// more than [`MOST_GROWTH`].
@@ -69,7 +66,7 @@ impl FittedNetwork {
         left: &[f64],
     ) -> Result<Self> {
         let outputs = &table.outputs;
-        let predicted = infer(&self.network(), Exponential::default(), &table.inputs.values);
+        let predicted = infer(&self.network(), &table.inputs.values);
         let found = outputs.squared_errors(&predicted);
         let totals = column_squares(&targets.deviations.values, targets.outputs());
         let errors = found.into_iter().zip(left).zip(totals).zip(&targets.means);
@@ -93,13 +90,8 @@ impl FittedNetwork {
     fn try_network(&self) -> std::result::Result<Network<'_>, NetworkError> {
         let Self { shape, format, affine, words, .. } = self;
         Ok(match format {
-            Format::F32Direct => {
-                let common_width =
-                    words.len() == direct::Network::block_words(*shape, true, *affine);
-                direct::Network::of_words(*shape, common_width, *affine, words)?.into()
-            }
-            Format::F32 => expanded::Network::try_new(*shape, *affine, words)?.into(),
-            Format::Fixed16 => fixed16::Network::try_new(*shape, *affine, words)?.into(),
+            Format::F32 => rbf::float32::Network::of_words(*shape, *affine, words)?.into(),
+            Format::Fixed16 => rbf::fixed16::Network::try_new(*shape, *affine, words)?.into(),
         })
     }
 
@@ -192,18 +184,17 @@ pub(super) fn held(
 ) -> Result<Box<dyn Held>> {
     let (centres, of_width) = (&layer.centres, &Options { spread: layer.spread, ..*options });
     Ok(match format {
-        Format::F32 => Box::new(expanded_f32::Expanded::new(samples, centres, of_width)),
-        Format::Fixed16 => Box::new(fixed_point::Exponents::new(samples, centres, of_width)?),
-        Format::F32Direct => Box::new(direct_f32::Direct::new(samples, layer, options)),
+        Format::F32 => Box::new(float32::Gaussians::new(samples, layer, options)),
+        Format::Fixed16 => Box::new(fixed16::Exponents::new(samples, centres, of_width)?),
     })
 }
 
 /// Samples of a table that weights are fitted to.
-struct Fit<'s, H: ?Sized> {
+struct Fit<'s> {
     table: &'s RowTable,
     targets: &'s Targets,
     solver: Solver,
-    held: &'s H,
+    held: &'s dyn Held,
     /// Number of frames that the penalties on each output's weights are counted over.
     frames: &'s [usize],
     tasks: Vec<Task<'s>>,
@@ -211,9 +202,9 @@ struct Fit<'s, H: ?Sized> {
     decomposed: Vec<OnceCell<Decomposed>>,
 }
 
-impl<'s, H: Held + ?Sized> Fit<'s, H> {
+impl<'s> Fit<'s> {
     fn new(
-        held: &'s H,
+        held: &'s dyn Held,
         table: &'s RowTable,
         targets: &'s Targets,
         solver: Solver,
@@ -289,34 +280,7 @@ pub(super) fn fit(
     let targets = Targets::new(&samples.table.outputs);
     let (table, solver) = (samples.table, options.solver);
     let frames = table.outputs.counts();
-    if options.format != Format::F32 {
-        let held = held(samples, layer, options, options.format)?;
-        let fit = Fit::new(&*held, table, &targets, solver, &frames);
-        return ridges.iter().map(|ridge| fit.network(*ridge)).collect();
-    }
-    let of_width = Options { spread: layer.spread, ..*options };
-    let expanded = expanded_f32::Expanded::new(samples, &layer.centres, &of_width);
-    let few = expanded.few(table);
-    let few_targets = few.as_ref().map(|few| targets.of_others(&few.outputs));
-    let fit_few = few.as_ref().zip(few_targets.as_ref());
-    let fit_few = fit_few.map(|(few, targets)| Fit::new(&expanded, few, targets, solver, &frames));
-    let fit = Fit::new(&expanded, table, &targets, solver, &frames);
-    let direct = direct_f32::Direct::new(samples, layer, options);
-    let direct = Fit::new(&direct, table, &targets, solver, &frames);
-    let proved = |ridge: Ridge| {
-        if let Some(few) = &fit_few {
-            let network = few.held.network(&few.factors(ridge), few.targets).ok()?;
-            if expanded_f32::worst_share(&network, table) > expanded_f32::HOPELESS {
-                return None;
-            }
-        }
-        let factors = fit.factors(ridge);
-        let network = expanded.network(&factors, &targets).ok()?;
-        let is_harmless = expanded_f32::worst_share(&network, table) <= expanded_f32::HARMLESS;
-        // What this format loses, direct distances may hold.
-        is_harmless
-            .then(|| network.unless_lost(table, &targets, &fit.left(&factors)).ok())
-            .flatten()
-    };
-    ridges.iter().map(|ridge| proved(*ridge).map_or_else(|| direct.network(*ridge), Ok)).collect()
+    let held = held(samples, layer, options, options.format)?;
+    let fit = Fit::new(&*held, table, &targets, solver, &frames);
+    ridges.iter().map(|ridge| fit.network(*ridge)).collect()
 }

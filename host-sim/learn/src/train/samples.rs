@@ -1,6 +1,6 @@
 //! Samples of one network, scaled as the device scales them, and what is fitted to them.
 
-use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS, clamp_units};
+use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS};
 use taxel_data::{Purpose, Random, RowTable, Stream};
 
 use super::{Options, kmeans};
@@ -59,8 +59,7 @@ impl InputScale {
     }
 }
 
-/// Middle of every input's range, and scale about it: the scaling of the formats with expanded
-/// distances.
+/// Middle of every input's range, and scale about it: the scaling of the format fixed16.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CentredScale {
     pub midpoint: Vec<f32>,
@@ -92,12 +91,6 @@ impl CentredScale {
             let ranges = self.midpoint.iter().zip(&self.per_unit);
             line.iter().zip(ranges).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
         })
-    }
-
-    /// Scales all inputs of `table` to [0, 1] and clamps them, line after line.
-    pub fn apply(&self, table: &RowTable) -> Vec<f64> {
-        let spans = f64::from(HALF_RANGE) / f64::from(UNITS);
-        self.units(table).map(|x| 0.5 + f64::from(clamp_units(x)) * spans).collect()
     }
 }
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::decoders::RowDecoder;
 use crate::decoders::linear::LinearRow;
 use crate::decoders::standard::StandardNetwork;
-use crate::infer::{Exponential, infer};
+use crate::infer::infer;
 
 /// Table of `frames` of a smooth function of two inputs, with a little noise.
 fn table(frames: usize, noise: f64) -> RowTable {
@@ -35,7 +35,7 @@ fn a_trained_network_learns_a_smooth_function() {
     let samples = Samples::new(&table);
     let options = Options { centres: 40, spread: 0.3, ..Options::default() };
     let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
-    let predicted = infer(&fitted.network(), Exponential::Libm, &table.inputs.values);
+    let predicted = infer(&fitted.network(), &table.inputs.values);
     let relative = relative_difference(&predicted, &table.outputs.values);
     assert!(relative < 2e-3, "{relative}");
 }
@@ -49,7 +49,7 @@ fn an_input_that_never_changes_is_no_obstacle() {
     let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
     let [lowest, highest] = fitted.network().training_range(1);
     assert_eq!(lowest, highest);
-    let predicted = infer(&fitted.network(), Exponential::Libm, &table.inputs.values);
+    let predicted = infer(&fitted.network(), &table.inputs.values);
     assert!(predicted.iter().all(|y| y.is_finite()));
 }
 
@@ -84,7 +84,7 @@ fn an_offset_of_the_outputs_costs_no_more_than_f32_itself() {
         let samples = Samples::new(&table);
         let options = Options { centres: 30, spread: 0.5, ..Options::default() };
         let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
-        let predicted = infer(&fitted.network(), Exponential::Polynomial, &table.inputs.values);
+        let predicted = infer(&fitted.network(), &table.inputs.values);
         let squares = predicted.iter().zip(&table.outputs.values).map(|(p, t)| (p - t).powi(2));
         (squares.sum::<f64>() / predicted.len() as f64).sqrt()
     };
@@ -177,7 +177,7 @@ fn each_output_has_the_network_that_the_lines_with_it_alone_would_give() {
     let table = with_missing_outputs(3000);
     let samples = Samples::new(&table);
     let mut solvers = vec![(Format::F32, Solver::Rls)];
-    solvers.extend([Format::F32, Format::F32Direct, Format::Fixed16].map(|it| (it, Solver::Qr)));
+    solvers.extend(Format::ALL.map(|it| (it, Solver::Qr)));
     for (format, solver) in solvers {
         let usual = Options { centres: 20, spread: 0.4, format, solver, ..Options::default() };
         let centres = samples.centres(&usual, 0);
@@ -185,10 +185,7 @@ fn each_output_has_the_network_that_the_lines_with_it_alone_would_give() {
             let options = Options { penalty, ..usual };
             let predicted = |table: &RowTable| {
                 let fitted = Samples::new(table).fit(&centres, &options).unwrap();
-                (
-                    fitted.format(),
-                    infer(&fitted.network(), Exponential::Libm, &samples.table.inputs.values),
-                )
+                (fitted.format(), infer(&fitted.network(), &samples.table.inputs.values))
             };
             let (format, together) = predicted(&table);
             for column in 0..2 {

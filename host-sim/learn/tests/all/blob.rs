@@ -5,7 +5,7 @@ use taxel_core::rbf::{Format, Network};
 use taxel_core::{AlignedBytes, Decoder};
 use taxel_data::{Silent, Stream};
 use taxel_learn::train::train;
-use taxel_learn::{Exponential, ModelBlob, Options, Origin, pack};
+use taxel_learn::{ModelBlob, Options, Origin, pack};
 use taxel_simulate::outputs::{ElectrodeOutputs, Quantity};
 use taxel_simulate::sensor::Axis;
 use taxel_simulate::{World, synthesise};
@@ -20,7 +20,7 @@ fn world() -> World {
 /// Blob of a model trained on `press`: two rows, 18 readings to 6 outputs, K = 8.
 fn real_blob() -> Vec<u8> {
     let dataset = synthesise(&world(), Stream::Training, 400);
-    let options = Options { format: Format::F32Direct, centres: 8, ..Options::default() };
+    let options = Options { format: Format::F32, centres: 8, ..Options::default() };
     let trained = train(&dataset, &options, &Silent).unwrap();
     let origin = Origin::of_data("press", 0, 1, &dataset);
     pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
@@ -136,13 +136,13 @@ fn inconsistent_structure_and_bad_numbers_under_a_valid_crc_are_refused() {
     assert_eq!(refused(15, 2), DecodeError::UnknownNetwork { row: 1, network: 2, networks: 2 });
     assert_eq!(refused(16, 9), DecodeError::SectionOrder { expected: 0, found: 9 });
 
-    // A network section: tag, index, centres, common width, affine; then padding and floats.
+    // A network section: tag, index, centres, affine; then padding and floats.
     let floats = offset_of(&blob, |model| {
         let network = model.networks().nth(1).unwrap();
-        let Network::F32Direct(network) = network else { panic!("{network:?}") };
+        let Network::F32(network) = network else { panic!("{network:?}") };
         bytemuck::cast_slice(network.parameters().input_minimum)
     });
-    let header = (0..floats).rev().find(|i| blob[*i..*i + 5] == [1, 1, 8, 1, 1]).unwrap();
+    let header = (0..floats).rev().find(|i| blob[*i..*i + 4] == [1, 1, 8, 1]).unwrap();
     assert_eq!(refused(header, 7), DecodeError::SectionOrder { expected: 1, found: 7 });
     assert_eq!(refused(header + 1, 0), DecodeError::NetworkOrder { expected: 1, found: 0 });
     assert!(matches!(refused(header + 2, 9), DecodeError::CountMismatch { .. }));
@@ -168,7 +168,7 @@ fn device_and_host_decode_alike() {
 fn decodes_alike(blob: &[u8]) {
     let loaded = ModelBlob::of_bytes(blob).unwrap();
     let test = synthesise(&world(), Stream::Test, 500);
-    let host = loaded.prepare(Exponential::Polynomial).decode_table(&test.inputs);
+    let host = loaded.prepare().decode_table(&test.inputs);
     with_aligned(blob, |bytes| {
         let decoder = Decoder::<2>::load(bytes).unwrap();
         for (readings, expected) in test.inputs.lines().zip(host.lines()) {

@@ -4,13 +4,12 @@ use std::fmt::Write as _;
 
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::Format;
-use taxel_learn::Exponential;
-use taxel_learn::cost::{Cost, DecoderRam, Design, Prices, kernel_name};
+use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
 
 const PAPER: ModelShape = ModelShape { rows: 8, inputs: 18, outputs: 18 };
 
 fn frame(prices: &Prices, design: &Design) -> Cost {
-    prices.frame(design, Exponential::default()).unwrap()
+    prices.frame(design).unwrap()
 }
 
 #[test]
@@ -105,11 +104,7 @@ fn the_accepted_figures_of_trained_models_are_told() {
         if compiler.replace(';', ",") != prices.compiler {
             continue;
         }
-        let exponential = Exponential::ALL.into_iter().find_map(|exponential| {
-            let named = |format: &Format| kernel_name(*format, exponential) == kernel;
-            Some((Format::ALL.into_iter().find(named)?, exponential))
-        });
-        let Some((format, exponential)) = exponential else { continue };
+        let Some(format) = Format::from_name(kernel) else { continue };
         let centres = centres.parse().unwrap();
         let design: fn(_, _, _, _) -> Design = match scope {
             "array-frame" => Design::of_array,
@@ -117,7 +112,7 @@ fn the_accepted_figures_of_trained_models_are_told() {
             _ => continue,
         };
         let design = design(PAPER, format, centres, affine == "yes");
-        let predicted = prices.frame(&design, exponential).unwrap();
+        let predicted = prices.frame(&design).unwrap();
         let percent = |predicted: u64, counted: &str| {
             100.0 * (predicted as f64 / counted.parse::<f64>().unwrap() - 1.0)
         };

@@ -7,7 +7,7 @@ use taxel_data::{RowTable, Silent, Stream, Table, columns};
 use taxel_learn::infer::infer;
 use taxel_learn::train::least_squares::{Factor, Regressors};
 use taxel_learn::train::{InputScale, Samples, train};
-use taxel_learn::{Exponential, Options, Origin, pack};
+use taxel_learn::{Options, Origin, pack};
 use taxel_simulate::{Synthesis, World, synthesise};
 
 const NOISE_LEVELS: [f64; 5] = [0.0, 0.005, 0.01, 0.05, 0.1];
@@ -70,8 +70,7 @@ fn errors(name: &str, noise: f64) -> [Vec<f64>; 3] {
             let exact = by_axis(&test.outputs, &in_f64(&training, &centres, &options, &test));
             let [float, fixed] = [Format::F32, Format::Fixed16].map(|format| {
                 let fitted = samples.fit(&centres, &Options { format, ..options }).unwrap();
-                let estimate =
-                    infer(&fitted.network(), Exponential::default(), &test.inputs.values);
+                let estimate = infer(&fitted.network(), &test.inputs.values);
                 by_axis(&test.outputs, &estimate)
             });
             [exact, float, fixed]
@@ -112,7 +111,7 @@ fn errors_of_array(noise: f64, spread: f64, format: Format) -> Vec<f64> {
     let options = Options { whole_array: true, format, spread, ..Options::default() };
     let trained = train(&training, &options, &Silent).unwrap();
     let blob = pack(&trained, &training, &Origin::of_data("press", 0, 1, &training)).unwrap();
-    let estimate = blob.prepare(Exponential::default()).decode_table(&test.inputs);
+    let estimate = blob.prepare().decode_table(&test.inputs);
     let values = (test.outputs.values.len() / 3) as f64;
     let squares = by_axis(&test.outputs, &estimate.values);
     squares.iter().map(|square| (square / values).sqrt()).collect()

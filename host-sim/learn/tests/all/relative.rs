@@ -3,7 +3,7 @@
 use taxel_core::blob::Model;
 use taxel_data::{Dataset, Silent, Stream};
 use taxel_learn::train::train;
-use taxel_learn::{Exponential, ModelBlob, Options, Origin, PreparedModel, pack, relative};
+use taxel_learn::{ModelBlob, Options, Origin, PreparedModel, pack, relative};
 use taxel_simulate::{Synthesis, World};
 
 const ROWS: usize = 2;
@@ -47,9 +47,7 @@ fn by_model_core(model: &Model<'_>, readings: &[f64], baseline: &[f64]) -> Vec<f
         for (row, network) in model.networks().enumerate() {
             let (mut scaled, mut outputs) = ([0.0; 18], [0.0; 18]);
             let inputs = &ratios[row * 18..][..18];
-            network
-                .infer_with::<taxel_core::exp::Polynomial>(inputs, &mut scaled, &mut outputs)
-                .unwrap();
+            network.infer(inputs, &mut scaled, &mut outputs).unwrap();
             all.extend(outputs.map(f64::from));
         }
     }
@@ -59,7 +57,7 @@ fn by_model_core(model: &Model<'_>, readings: &[f64], baseline: &[f64]) -> Vec<f
 #[test]
 fn readings_are_divided_as_model_core_does_before_everything_else() {
     let blob = blob(Options { centres: 16, ..Options::default() });
-    let model = blob.prepare(Exponential::default());
+    let model = blob.prepare();
     let metadata = model.model().metadata();
     assert!(metadata.relative_inputs);
     assert!(metadata.input_units.iter().all(str::is_empty));
@@ -80,7 +78,7 @@ fn readings_are_divided_as_model_core_does_before_everything_else() {
 fn what_multiplies_readings_and_baseline_changes_nothing() {
     for whole_array in [false, true] {
         let blob = blob(Options { centres: 16, whole_array, ..Options::default() });
-        let model = blob.prepare(Exponential::default());
+        let model = blob.prepare();
         let (readings, baseline) = readings_and_baseline();
         let decode = |gain: f64| {
             let drifted = |values: &[f64]| values.iter().map(|v| gain * v).collect::<Vec<_>>();
@@ -112,8 +110,7 @@ fn a_channel_without_a_baseline_is_missing_and_no_baseline_leaves_nothing() {
         };
         (0..READINGS).map(of_frame).collect()
     };
-    let (rows, array) =
-        (rows.prepare(Exponential::default()), array.prepare(Exponential::default()));
+    let (rows, array) = (rows.prepare(), array.prepare());
     assert!(missing(&rows).iter().all(|missing| *missing));
     for unusable in [f64::NAN, 0.0, f64::INFINITY, 1e300, 1e-300] {
         let mut baseline = baseline.clone();
@@ -130,7 +127,7 @@ fn a_model_of_readings_takes_no_notice_of_a_baseline() {
     let training = Synthesis::new(&world).frames(Stream::Training, 500);
     let trained = train(&training, &Options { centres: 8, ..Options::default() }, &Silent).unwrap();
     let blob = pack(&trained, &training, &Origin::of_data("plain", 0, 1, &training)).unwrap();
-    let model = blob.prepare(Exponential::default());
+    let model = blob.prepare();
     assert!(!model.model().metadata().relative_inputs);
     let (readings, baseline) = readings_and_baseline();
     let outputs = model.decode_lines(&readings);

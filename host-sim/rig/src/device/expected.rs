@@ -8,11 +8,11 @@ use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Frame};
 use taxel_data::{Progress, Table};
 use taxel_firmware::link::message::{Configuration, EstimateReport};
+use taxel_learn::ModelBlob;
 use taxel_learn::filtered::filter_frames;
-use taxel_learn::{Exponential, ModelBlob};
 
-use super::{Device, DeviceIdentity, stream, upload};
-use crate::error::{Error, Result, check_room};
+use super::{Device, stream, upload};
+use crate::error::{Result, check_room};
 
 /// Frames that a device is to decode.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,15 +41,14 @@ pub(super) struct Expected {
 }
 
 impl Expected {
-    /// Answers of the model of `blob` to `frames`, with this exponential, through this filter, and with their baseline if
+    /// Answers of the model of `blob` to `frames`, through this filter, and with their baseline if
     /// its inputs are relative.
     pub(super) fn new(
         blob: &ModelBlob,
-        exponential: Exponential,
         Frames { readings, baseline_ohm, start_us }: &Frames,
         filter: Settings,
     ) -> Self {
-        let (model, start_us) = (blob.prepare(exponential), start_us.clone());
+        let (model, start_us) = (blob.prepare(), start_us.clone());
         let baseline_ohm = baseline_ohm.as_deref();
         let model = match baseline_ohm {
             Some(baseline) => model.with_baseline(baseline),
@@ -154,29 +153,19 @@ fn confidence(
     frames.map_while(|frame| frame).collect()
 }
 
-/// Activates the model of `blob` unless it is active already, and returns the exponential that the
-/// device decodes with.
+/// Activates the model of `blob` unless it is active already.
 pub(super) fn prepare(
     device: &mut Device,
     blob: &ModelBlob,
     progress: &dyn Progress,
-) -> Result<Exponential> {
+) -> Result<()> {
     let identity = device.identify()?;
     let model = blob.parse();
-    let exponential = fitting_exponential(&identity, &model)?;
+    check_room(identity.capacity(), &model)?;
     if !identity.has_in_force(model.crc()) {
         upload::replace(device, blob.bytes(), progress)?;
     }
-    Ok(exponential)
-}
-
-/// Exponential that the device decodes with, if the device has room for this model.
-fn fitting_exponential(identity: &DeviceIdentity, model: &Model<'_>) -> Result<Exponential> {
-    check_room(identity.capacity(), model)?;
-    let name = &identity.exponential;
-    Exponential::by_name(name).ok_or_else(|| {
-        Error::failed(format!("the device decodes with {name:?}, which this host does not know"))
-    })
+    Ok(())
 }
 
 #[cfg(test)]

@@ -19,8 +19,6 @@ pub struct DeviceIdentity {
     pub columns: usize,
     /// Largest number of outputs of a row.
     pub outputs: usize,
-    /// Name of the exponential that it decodes with.
-    pub exponential: String,
     /// Active model, if there is one; checksums are text in JSON, as hexadecimal digits.
     #[serde(serialize_with = "model_with_text")]
     pub model: Option<ModelIdentity>,
@@ -150,7 +148,6 @@ impl From<&Identity<'_>> for DeviceIdentity {
             rows: identity.rows.into(),
             columns: identity.columns.into(),
             outputs: identity.outputs.into(),
-            exponential: identity.kernel.into(),
             model: identity.model,
             model_name: identity.model_name.into(),
             slot_bytes: identity.slot_bytes as usize,

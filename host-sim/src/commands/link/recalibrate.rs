@@ -10,9 +10,9 @@ use taxel_core::blob::Model;
 use taxel_core::health::Limits;
 use taxel_data::{DataFile, Table, output};
 use taxel_firmware::link::message::{Configuration, Refusal};
+use taxel_learn::ModelBlob;
 use taxel_learn::health::judge;
 use taxel_learn::recalibration::{self, Recalibrated};
-use taxel_learn::{Exponential, ModelBlob};
 use taxel_rig::device::{Device, DeviceIdentity, upload};
 
 use super::super::data_file::FieldArguments;
@@ -57,7 +57,7 @@ pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> R
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let (fields, limits) = (FieldArguments::default(), Some(Limits::USUAL));
-    let model = blob.prepare(Exponential::default());
+    let model = blob.prepare();
     let model = arguments.baseline.apply(model, &arguments.model, &fields, limits)?;
     recalibration::check(model.model())?;
     let metadata = model.model().metadata();

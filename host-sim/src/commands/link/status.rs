@@ -28,8 +28,8 @@ pub fn show(device: &mut Device, common: &Common) -> Result<()> {
     let mut page = print::Page::default();
     page.line(format_args!("{:<17} {}, firmware {}", "device", d.board, d.firmware));
     page.line(format_args!(
-        "{:<17} {} rows, {} columns, {} outputs a row; {} exponential",
-        "room for", d.rows, d.columns, d.outputs, d.exponential
+        "{:<17} {} rows, {} columns, {} outputs a row",
+        "room for", d.rows, d.columns, d.outputs
     ));
     if let Some(m) = &d.model {
         page.line(format_args!(

@@ -37,7 +37,7 @@ fn csv_of(trade: &Trade) -> String {
         .groups()
         .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
     let mut csv = format!(
-        "kernel,whole_array,centres,spread,columns,samples_averaged,filter_ms,lead_ms,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
+        "format,whole_array,centres,spread,columns,samples_averaged,filter_ms,lead_ms,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -49,7 +49,7 @@ fn csv_of(trade: &Trade) -> String {
         let _ = writeln!(
             csv,
             "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-            p.arithmetic.name(),
+            p.format.name(),
             p.whole_array,
             p.centres,
             p.spread,

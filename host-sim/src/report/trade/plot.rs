@@ -20,7 +20,6 @@ fn shape(format: Format) -> Shape {
     match format {
         Format::Fixed16 => Shape::Circle,
         Format::F32 => Shape::Square,
-        Format::F32Direct => Shape::Triangle,
     }
 }
 
@@ -52,15 +51,14 @@ pub fn draw(trade: &Trade, [width, height]: [f64; 2]) -> (String, usize) {
 fn marks(trade: &Trade, axes: &Axes) -> Vec<Series> {
     let mut shown: Vec<&Point> = trade.points.iter().filter(|it| axes.hold(trade, it)).collect();
     let style = |point: &Point| {
-        let format = Format::ALL.iter().rev().position(|it| *it == point.arithmetic.format);
+        let format = Format::ALL.iter().rev().position(|it| *it == point.format);
         (point.whole_array, format)
     };
     let chosen = trade.chosen.map(|i| &trade.points[i]);
     let is_pale = |point: &Point| {
         !point.on_front && !chosen.is_some_and(|chosen| std::ptr::eq(point, chosen))
     };
-    let pale =
-        shown.iter().find(|point| is_pale(point)).map(|point| shape(point.arithmetic.format));
+    let pale = shown.iter().find(|point| is_pale(point)).map(|point| shape(point.format));
     let both = shown.iter().any(|p| p.whole_array) && shown.iter().any(|p| !p.whole_array);
     let is_chosen_shown = chosen.is_some_and(|chosen| axes.hold(trade, chosen));
     shown.sort_by_key(|point| style(point));
@@ -71,7 +69,7 @@ fn marks(trade: &Trade, axes: &Axes) -> Vec<Series> {
             (true, false) => " rows",
             (true, true) => " array",
         };
-        let format = point.arithmetic.format;
+        let format = point.format;
         let class = class(point).trim_end_matches(" mark");
         let name = format!("{}{network}", format.name());
         Series::new(&name, class, Mark::Points(shape(format)), vec![])
@@ -126,7 +124,7 @@ impl Place {
         for (i, point) in trade.points.iter().enumerate() {
             match self.of(trade, point) {
                 Some(at) if !point.on_front && trade.chosen != Some(i) => {
-                    svg.path(&shape(point.arithmetic.format).path(at, 0.7), class(point));
+                    svg.path(&shape(point.format).path(at, 0.7), class(point));
                 }
                 Some(_) => {}
                 None => outside += 1,
@@ -149,7 +147,7 @@ impl Place {
         for i in front.into_iter().chain(chosen) {
             let point = &trade.points[i];
             let Some(at) = self.of(trade, point) else { continue };
-            let path = shape(point.arithmetic.format).path(at, 1.0);
+            let path = shape(point.format).path(at, 1.0);
             svg.open("");
             svg.add(format_args!("<title>{}</title>", escape(&words::in_full(trade, point))));
             svg.path(&path, class(point));

@@ -1,7 +1,6 @@
-//! Networks with expanded distances, in f32 and in fixed point, compared with their formulas in f64.
+//! Networks in fixed point, compared with their formulas in f64.
 
 use super::super::*;
-use crate::exp::exp2;
 use crate::scale::{CLAMP, HALF_RANGE, UNITS, UNITS_PER_STEP};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -80,33 +79,6 @@ impl Formula {
         core::f64::consts::LOG2_E / (2.0 * self.sigma * self.sigma) * unit * unit
     }
 
-    fn expanded(&self) -> Vec<u32> {
-        let unit = f64::from(HALF_RANGE / UNITS);
-        let decay = self.decay(unit);
-        let stored = self.shape.centres.next_multiple_of(expanded::CENTRES_AT_ONCE);
-        let mut exponents = vec![0.0; stored * (1 + self.shape.inputs)];
-        let lines = self.centres.chunks(self.shape.inputs);
-        for (row, centre) in exponents.chunks_mut(1 + self.shape.inputs).zip(lines) {
-            let [b, a @ ..] = row else { continue };
-            let middle = |c: &f64| (c - 0.5) / unit;
-            *b = -centre.iter().map(|c| decay * middle(c) * middle(c)).sum::<f64>() as f32;
-            a.iter_mut().zip(centre).for_each(|(a, c)| *a = (2.0 * decay * middle(c)) as f32);
-        }
-        let mut weights: Vec<f32> = self.weights.iter().map(|w| *w as f32).collect();
-        weights.resize(stored * self.shape.outputs, 0.0);
-        let [midpoint, per_unit] = self.scaling();
-        let parameters = expanded::Parameters {
-            input_midpoint: &midpoint,
-            input_per_unit: &per_unit,
-            decay: decay as f32,
-            bias: &self.bias.iter().map(|b| *b as f32).collect::<Vec<_>>(),
-            affine: &self.affine.iter().map(|a| (a * unit) as f32).collect::<Vec<_>>(),
-            exponents: &exponents,
-            output_weights: &weights,
-        };
-        parameters.words().collect()
-    }
-
     fn fixed16(&self) -> Vec<u32> {
         let Shape { inputs, centres, outputs } = self.shape;
         let unit = f64::from(HALF_RANGE / UNITS * UNITS_PER_STEP);
@@ -174,7 +146,7 @@ const SHAPES: [Shape; 4] = [
 
 proptest! {
     #[test]
-    fn both_formats_follow_the_formula(
+    fn fixed16_follows_the_formula(
         which in 0..4_usize,
         sigma in 0.6..2.0_f64,
         affine: bool,
@@ -185,18 +157,12 @@ proptest! {
         let formula = Formula::random(shape, sigma, affine, seed);
         let place = &place[..shape.inputs];
 
-        let words = formula.expanded();
-        let network = expanded::Network::try_new(shape, affine, &words).unwrap();
-        prop_assert!((f64::from(network.width()) - sigma).abs() < 1e-5);
-        let [low, high] = network.training_range(0).map(f64::from);
-        prop_assert!((low - formula.minimum[0]).abs() < 1e-4);
-        prop_assert!((high - low - formula.span[0]).abs() < 1e-4);
-        let error = formula.error_of(&network.into(), place);
-        prop_assert!(error < 2e-5 * shape.centres as f64, "f32: {error}");
-
         let words = formula.fixed16();
         let network = fixed16::Network::try_new(shape, affine, &words).unwrap();
         prop_assert!((f64::from(network.width()) - sigma).abs() < 1e-4);
+        let [low, high] = network.training_range(0).map(f64::from);
+        prop_assert!((low - formula.minimum[0]).abs() < 1e-4);
+        prop_assert!((high - low - formula.span[0]).abs() < 1e-4);
         // The error comes from the cubic (within 1.1e-4), from rounded centres, and from weights of at most 16
         // bits.
         let error = formula.error_of(&network.into(), place);
@@ -206,21 +172,7 @@ proptest! {
 
 #[test]
 fn exponents_beyond_their_range_are_refused() {
-    let narrow = Formula::random(SHAPES[0], 0.2, false, 1);
-    let words = narrow.expanded();
-    let refused = expanded::Network::try_new(SHAPES[0], false, &words);
-    assert!(matches!(refused, Err(NetworkError::ExponentOutOfRange { .. })), "{refused:?}");
-
     let formula = Formula::random(SHAPES[1], 0.8, false, 1);
-    let sound = formula.expanded();
-    let first = SHAPES[1].inputs * 2 + 1 + SHAPES[1].outputs;
-    for (b, centre) in [(0.3_f32, 0), (-200.0, 0)] {
-        let mut words = sound.clone();
-        words[first] = b.to_bits();
-        let refused = expanded::Network::try_new(SHAPES[1], false, &words);
-        assert_eq!(refused, Err(NetworkError::ExponentOutOfRange { centre }), "{b}");
-    }
-
     let sound = formula.fixed16();
     let first = SHAPES[1].inputs * 2 + 1 + SHAPES[1].outputs * 2;
     for b in [sound[first] - 2, u32::MAX, 0] {
@@ -237,10 +189,6 @@ fn exponents_beyond_their_range_are_refused() {
 #[test]
 fn numbers_that_could_overflow_an_output_are_refused() {
     let formula = Formula::random(SHAPES[1], 0.8, false, 1);
-    let mut words = formula.expanded();
-    *words.last_mut().unwrap() = 3e38_f32.to_bits();
-    let refused = expanded::Network::try_new(SHAPES[1], false, &words);
-    assert_eq!(refused, Err(NetworkError::NotFinite { what: "the sum of weights" }));
     let mut words = formula.fixed16();
     words[SHAPES[1].inputs * 2 + 1 + SHAPES[1].outputs] = 1e30_f32.to_bits();
     let refused = fixed16::Network::try_new(SHAPES[1], false, &words);
@@ -273,49 +221,12 @@ fn activations_are_continuous_and_fall_with_distance() {
     assert!(before < 40, "{before}"); // nearly ten octaves below
 }
 
-#[test]
-fn exp2_is_within_two_ulp_over_all_its_range() {
-    let worst = |from: f32, to: f32| {
-        (0..=4_000_000)
-            .map(|i| {
-                let u = from + (to - from) * (i as f32 / 4e6);
-                let truth = f64::from(u).exp2();
-                let ulp = f64::from((truth as f32).next_up() - truth as f32);
-                (f64::from(exp2(u)) - truth).abs() / ulp
-            })
-            .fold(0.0, f64::max)
-    };
-    // e^x from −87 to 0 is 2^u from −125.5 to 0.
-    for (from, to) in [(-125.5, 0.125), (-1.0, 0.0), (-0.5, 0.5)] {
-        let worst = worst(from, to);
-        assert!(worst <= 2.0, "{worst} ulp from {from} to {to}");
-    }
-    assert_eq!(exp2(0.0), 1.0);
-}
-
 /// One input, one centre and one output.
 const SMALLEST: Shape = Shape { inputs: 1, centres: 1, outputs: 1 };
 
 #[test]
 fn exponents_beyond_their_range_are_refused_by_the_decay_alone() {
     let refused = Err(NetworkError::ExponentOutOfRange { centre: 0 });
-    let expanded = |decay: f32| {
-        let zeros = vec![0.0; 2 * expanded::CENTRES_AT_ONCE];
-        let parameters = expanded::Parameters {
-            input_midpoint: &[60.0],
-            input_per_unit: &[1.0],
-            decay,
-            bias: &[0.0],
-            affine: &[],
-            exponents: &zeros,
-            output_weights: &zeros[expanded::CENTRES_AT_ONCE..],
-        };
-        let words: Vec<u32> = parameters.words().collect();
-        expanded::Network::try_new(SMALLEST, false, &words).map(|_| ())
-    };
-    let most = -expanded::LOWEST_EXPONENT / UNITS / UNITS;
-    assert_eq!([0.99, 1.01].map(|times| expanded(times * most)), [Ok(()), refused]);
-
     // What the input adds is 2^28 here, a step less.
     let fixed16 = |start: u32| {
         let mut group = vec![0; fixed16::words_at_once(SMALLEST)];
@@ -337,8 +248,8 @@ fn exponents_beyond_their_range_are_refused_by_the_decay_alone() {
 }
 
 #[test]
-fn a_network_in_f32_direct_tells_its_training_range() {
-    let parameters = direct::Parameters {
+fn a_network_in_f32_tells_its_training_range() {
+    let parameters = float32::Parameters {
         input_minimum: &[50.0],
         input_per_span: &[0.125],
         centres: &[0.5],
@@ -347,6 +258,6 @@ fn a_network_in_f32_direct_tells_its_training_range() {
         bias: &[2.0],
         affine: &[3.0],
     };
-    let network = Network::from(direct::Network::try_new(SMALLEST, parameters).unwrap());
+    let network = Network::from(float32::Network::try_new(SMALLEST, parameters).unwrap());
     assert_eq!(network.training_range(0), [50.0, 58.0]);
 }

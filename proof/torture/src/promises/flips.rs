@@ -34,9 +34,8 @@ const FLIPS: u64 = 512;
 const PAIRS: u64 = 1504;
 
 /// Files with blobs of every number format, with and without projection, expansion and confidence.
-const FILES: [&str; 6] = [
+const FILES: [&str; 5] = [
     "array-f32-components.bin",
-    "array-f32-direct-components.bin",
     "array-fixed16-components.bin",
     "array-fixed16-confidence.bin",
     "array-fixed16-no-tail.bin",

@@ -4,7 +4,7 @@
 use std::sync::OnceLock;
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
-use taxel_core::rbf::{Format, Network, Shape, direct, expanded, fixed16};
+use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
 use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 use taxel_data::dataset::Dataset;
 use taxel_data::progress::Silent;
@@ -20,7 +20,7 @@ pub const F32: Promise = Promise {
     name: "inference-f32",
     text: "f32, any reading: as f64, in training RMSEs",
     share: 1,
-    check: |effort, _| inference(effort, &[Format::F32, Format::F32Direct], 0.1),
+    check: |effort, _| inference(effort, &[Format::F32], 0.1),
 };
 
 pub const FIXED16: Promise = Promise {
@@ -178,8 +178,7 @@ fn extreme([low, high]: [f32; 2], random: &mut Random) -> f32 {
 /// fixed16, its inputs.
 fn in_f64(network: &Network<'_>, readings: &[f32]) -> Vec<f64> {
     match network {
-        Network::F32Direct(network) => direct(network, readings),
-        Network::F32(network) => expanded(network, readings),
+        Network::F32(network) => float(network, readings),
         Network::Fixed16(network) => fixed(network, readings),
     }
 }
@@ -192,7 +191,7 @@ fn wide(values: &[f32]) -> impl Iterator<Item = f64> {
     values.iter().copied().map(f64::from)
 }
 
-fn direct(network: &direct::Network<'_>, readings: &[f32]) -> Vec<f64> {
+fn float(network: &float32::Network<'_>, readings: &[f32]) -> Vec<f64> {
     let p = network.parameters();
     let scales = wide(p.input_minimum).zip(wide(p.input_per_span));
     let x = wide(readings)
@@ -205,10 +204,9 @@ fn direct(network: &direct::Network<'_>, readings: &[f32]) -> Vec<f64> {
         add(&mut outputs, *x, wide(row));
     }
     let weights = p.output_weights.chunks_exact(count);
-    for ((k, centre), weights) in p.centres.chunks_exact(x.len()).enumerate().zip(weights) {
+    for ((centre, decay), weights) in p.centres.chunks_exact(x.len()).zip(p.decay).zip(weights) {
         let square: f64 = x.iter().zip(wide(centre)).map(|(x, c)| (x - c) * (x - c)).sum();
-        let decay = f64::from(*p.decay.get(k).unwrap_or(&p.decay[0]));
-        add(&mut outputs, (-decay * square).exp(), wide(weights));
+        add(&mut outputs, (-f64::from(*decay) * square).exp(), wide(weights));
     }
     outputs
 }
@@ -219,24 +217,6 @@ fn units(midpoint: &[f32], per_unit: &[f32], readings: &[f32]) -> Vec<f64> {
     let of =
         |(r, (middle, per_unit)): (f64, (f64, f64))| ((r - middle) * per_unit).clamp(-UNITS, UNITS);
     wide(readings).zip(scales).map(of).collect()
-}
-
-fn expanded(network: &expanded::Network<'_>, readings: &[f32]) -> Vec<f64> {
-    let p = network.parameters();
-    let x = units(p.input_midpoint, p.input_per_unit, readings);
-    let mut outputs: Vec<f64> = wide(p.bias).collect();
-    let count = outputs.len();
-    for (x, row) in x.iter().zip(p.affine.chunks_exact(count)) {
-        add(&mut outputs, *x, wide(row));
-    }
-    let square: f64 = x.iter().map(|x| x * x).sum();
-    let lines = p.exponents.chunks_exact(1 + x.len());
-    for (line, weights) in lines.zip(p.output_weights.chunks_exact(count)) {
-        let products: f64 = wide(&line[1..]).zip(&x).map(|(a, x)| a * x).sum();
-        let exponent = f64::from(line[0]) + products - f64::from(p.decay) * square;
-        add(&mut outputs, exponent.exp2(), wide(weights));
-    }
-    outputs
 }
 
 fn fixed(network: &fixed16::Network<'_>, readings: &[f32]) -> Vec<f64> {

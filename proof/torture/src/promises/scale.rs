@@ -128,7 +128,7 @@ fn lost(changes: [Change; 2], outcome: Outcome, base: f64) -> Result<Option<f64>
     }
 }
 
-const FORMATS: [&str; 3] = ["f32", "f32-direct", "fixed16"];
+const FORMATS: [&str; 2] = ["f32", "fixed16"];
 
 /// Path of the program from any folder.
 fn path_of(tools: &Tools) -> Result<PathBuf, String> {

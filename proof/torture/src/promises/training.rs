@@ -6,7 +6,7 @@ use taxel_data::dataset::Dataset;
 use taxel_data::progress::Silent;
 use taxel_data::random::{Purpose, Random, Stream};
 use taxel_learn::train::train;
-use taxel_learn::{Exponential, Options, Origin, pack};
+use taxel_learn::{Options, Origin, pack};
 use taxel_simulate::{Synthesis, World};
 
 use crate::effort::Effort;
@@ -127,7 +127,7 @@ fn judge(
     };
     let packed = pack(&trained, data, &Origin::of_data("extreme", 0, 1, data));
     let blob = packed.map_err(|refusal| refusal.to_string())?;
-    let prepared = blob.prepare(Exponential::default());
+    let prepared = blob.prepare();
     let means = data.outputs.means();
     let over_mean = |frames: &Dataset| {
         let decoded = prepared.decode_lines(&frames.inputs.values);

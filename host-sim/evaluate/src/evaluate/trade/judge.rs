@@ -14,7 +14,7 @@ use super::progress::Part;
 use super::readings::in_words;
 use super::touches::Way;
 use super::ways::{Ways, formats};
-use super::{Arithmetic, Device, Point, SLOT_BYTES};
+use super::{Device, Point, SLOT_BYTES};
 use crate::error::Result;
 use crate::metrics::{self, Measure};
 
@@ -57,15 +57,10 @@ impl Judged {
             let noise = (origin.noise.0, frames.noise_level());
             let origin = Origin { noise, ..origin.clone() };
             let blob = pack(&trained, frames.training(), &origin)?;
-            // A network that fell back to direct distances is the point of that format.
-            let fell_back = trained.networks.iter().any(|network| network.format() != format);
-            let fits = !whole_array || blob.bytes().len() <= SLOT_BYTES;
-            if fell_back || !fits {
+            if whole_array && blob.bytes().len() > SLOT_BYTES {
                 continue;
             }
-            for arithmetic in Arithmetic::all().filter(|a| a.format == format) {
-                self.points(&blob, ways, arithmetic, readings, (device, prices))?;
-            }
+            self.points(&blob, ways, format, readings, (device, prices))?;
             self.distinct.push(blob.bytes().to_vec());
         }
         Ok(())
@@ -94,27 +89,22 @@ impl Judged {
         &mut self,
         blob: &ModelBlob,
         Ways { frames, inputs, .. }: &Ways<'_>,
-        arithmetic: Arithmetic,
+        format: Format,
         (readings, measure): (usize, &Measure),
         (device, prices): (&Device, &Prices),
     ) -> Result<()> {
         let test = &frames.test;
-        let model = blob.prepare(arithmetic.exponential).of_inputs();
-        // Points that differ only in the exponential share their errors there.
-        let before = self.blobs.last().filter(|blob| **blob == self.distinct.len());
-        let others = match before.and(self.points.last()) {
-            Some(same) => same.others.clone(),
-            None => frames.others.errors(&model, measure),
-        };
+        let model = blob.prepare().of_inputs();
+        let others = frames.others.errors(&model, measure);
         let design = Design::new(blob);
         let ram = DecoderRam::new(&design);
         // Fewer than asked for where there are fewer distinct samples.
         let centres = design.networks.iter().map(|network| network.shape.centres).max();
         let centres = centres.unwrap_or_default();
-        let cost = prices.frame(&design, arithmetic.exponential)?;
+        let cost = prices.frame(&design)?;
         let mut add = |filter: Settings, frame: Cost, errors| {
             self.points.push(Point {
-                arithmetic,
+                format,
                 whole_array: inputs.whole_array(),
                 centres,
                 spread: blob.spread(),

@@ -3,8 +3,7 @@
 use serde::Serialize;
 use taxel_core::filter::Settings;
 use taxel_core::rbf::Format;
-use taxel_learn::Exponential;
-use taxel_learn::cost::{Cost, kernel_name};
+use taxel_learn::cost::Cost;
 
 use super::choice::Offer;
 use super::device::Times;
@@ -12,39 +11,12 @@ use super::readings::in_words;
 use super::worst::OtherError;
 use crate::metrics::{self, Errors};
 
-/// Number format and exponential with which networks are decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Arithmetic {
-    pub format: Format,
-    pub exponential: Exponential,
-}
-
-impl Arithmetic {
-    /// Every arithmetic of the points, the cheapest format first.
-    ///
-    /// Direct distances are decoded with every exponential, the other formats with their own.
-    pub fn all() -> impl Iterator<Item = Self> {
-        Format::ALL.into_iter().rev().flat_map(|format| {
-            let all: &[Exponential] = match format {
-                Format::F32Direct => &Exponential::ALL,
-                _ => &[Exponential::Polynomial],
-            };
-            all.iter().map(move |&exponential| Self { format, exponential })
-        })
-    }
-
-    /// Name of the arithmetic, as `cargo xtask cycles` spells it.
-    pub fn name(self) -> String {
-        kernel_name(self.format, self.exponential)
-    }
-}
-
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn by_name<S: serde::Serializer>(
-    arithmetic: &Arithmetic,
+    format: &Format,
     serializer: S,
 ) -> std::result::Result<S::Ok, S::Error> {
-    serializer.serialize_str(&arithmetic.name())
+    serializer.serialize_str(format.name())
 }
 
 /// Settings of a filter in time, as a device is configured with them.
@@ -66,9 +38,9 @@ impl From<Settings> for FilterSettings {
 /// Way to decode, with its cost and its errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
-    /// Format and exponential.
-    #[serde(rename = "kernel", serialize_with = "by_name")]
-    pub arithmetic: Arithmetic,
+    /// Number format.
+    #[serde(serialize_with = "by_name")]
+    pub format: Format,
     /// Whether one network decodes all rows, behind a projection, instead of one a row.
     pub whole_array: bool,
     /// Number of centres K of each network.
@@ -114,9 +86,9 @@ impl Point {
         self.errors.iter().find(|e| e.group == group)?.ratio_to_limit
     }
 
-    /// Arithmetic of the point, and whether it decodes the whole array at once.
+    /// Number format of the point, and whether it decodes the whole array at once.
     pub fn way(&self) -> String {
-        format!("{}{}", self.arithmetic.name(), if self.whole_array { " array" } else { "" })
+        format!("{}{}", self.format.name(), if self.whole_array { " array" } else { "" })
     }
 
     /// Settings of the point in a few words.

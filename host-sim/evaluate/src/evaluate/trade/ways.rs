@@ -11,7 +11,7 @@ use taxel_learn::train::projection;
 
 use super::choice::Offer;
 use super::frames::{Frames, Inputs};
-use super::{Arithmetic, Device, Plan, SLOT_BYTES};
+use super::{Device, Plan, SLOT_BYTES};
 use crate::error::Result;
 
 /// Ways to decode with networks that share their inputs, and have so many centres.
@@ -48,11 +48,9 @@ impl<'f> Ways<'f> {
             if self.inputs.whole_array() && blob_bytes > SLOT_BYTES {
                 continue;
             }
-            for arithmetic in Arithmetic::all().filter(|it| it.format == format) {
-                let cost = prices.frame(&design, arithmetic.exponential)?;
-                let times = device.times(self.frames.scan_ms, &cost);
-                offers.push(Offer { rmse: 0.0, cycles: cost.cycles, blob_bytes, times });
-            }
+            let cost = prices.frame(&design)?;
+            let times = device.times(self.frames.scan_ms, &cost);
+            offers.push(Offer { rmse: 0.0, cycles: cost.cycles, blob_bytes, times });
         }
         Ok(offers)
     }

@@ -8,7 +8,6 @@ use super::template::Values;
 use crate::cost::{Cost, Design, Prices};
 use crate::error::Result;
 use crate::export::text::columns;
-use crate::infer::Exponential;
 use crate::packing::ModelBlob;
 
 /// Facts of a model.
@@ -31,7 +30,7 @@ impl<'b> Facts<'b> {
     /// Facts of the model in `blob`.
     pub fn new(blob: &'b ModelBlob) -> Result<Self> {
         let design = Design::new(blob);
-        let cost = Prices::accepted()?.frame(&design, Exponential::default())?;
+        let cost = Prices::accepted()?.frame(&design)?;
         Ok(Self { model: blob.parse(), constant_bytes: constant_bytes(blob), cost })
     }
 

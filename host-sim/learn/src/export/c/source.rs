@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use taxel_core::blob::Model;
-use taxel_core::exp::{EXP_COEFFICIENTS, EXP2_COEFFICIENTS, LN_2_PARTS};
-use taxel_core::rbf::{Format, Network, direct, expanded, fixed16};
+use taxel_core::exp::{EXP_COEFFICIENTS, LN_2_PARTS};
+use taxel_core::rbf::{Format, Network, fixed16, float32};
 
 use super::name::Name;
 use super::numbers::{array, float, floats, string, word, words};
@@ -14,10 +14,7 @@ use crate::error::Result;
 
 const HEADER: &str = include_str!("source/model.h");
 const START: &str = include_str!("source/start.c");
-const ACCUMULATE: &str = include_str!("source/accumulate.c");
-const UNITS: &str = include_str!("source/units.c");
-const DIRECT: &str = include_str!("source/direct.c");
-const F32: &str = include_str!("source/f32.c");
+const FLOAT32: &str = include_str!("source/float32.c");
 const FIXED16: &str = include_str!("source/fixed16.c");
 const DECODE: &str = include_str!("source/decode.c");
 const CONFIDENCE: &str = include_str!("source/confidence.c");
@@ -31,11 +28,9 @@ pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
     let fill = model.fill().is_some();
     let affine = model.networks().any(|network| network.has_affine_tail());
     let flags = [
-        ("direct", has(Format::F32Direct)),
         ("f32", has(Format::F32)),
         ("fixed16", has(Format::Fixed16)),
         ("affine", affine),
-        ("accumulate", has(Format::F32Direct) || affine),
         ("rows", !array),
         ("array", array),
         ("relative", model.metadata().relative_inputs),
@@ -43,8 +38,7 @@ pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
         ("fill", fill),
         ("project", array || confidence),
         ("root", confidence || fill),
-        ("bits", confidence || has(Format::F32)),
-        ("exp", confidence || has(Format::F32Direct)),
+        ("exp", confidence || has(Format::F32)),
     ];
     flags.into_iter().filter(|(_, set)| *set).map(|(flag, _)| flag).collect()
 }
@@ -67,14 +61,8 @@ pub fn code(model: &Model<'_>, name: &Name, flags: &[&str], facts: &mut Values) 
     let has = |flag| flags.contains(&flag);
     let text = |template| fill(template, name, flags, facts);
     let mut code = text(START);
-    for (needed, template) in [
-        (has("direct") || has("f32"), ACCUMULATE),
-        (has("f32") || has("fixed16"), UNITS),
-        (has("direct"), DIRECT),
-        (has("f32"), F32),
-        (has("fixed16"), FIXED16),
-    ] {
-        if needed {
+    for (format, template) in [("f32", FLOAT32), ("fixed16", FIXED16)] {
+        if has(format) {
             code += &text(template);
         }
     }
@@ -121,9 +109,7 @@ fn sizes(model: &Model<'_>) -> String {
 /// Constants of formulas.
 fn tell_constants(facts: &mut Values) {
     let exp = ["EXP_6", "EXP_5", "EXP_4", "EXP_3", "EXP_2", "EXP_1", "EXP_0"];
-    let exp2 = ["EXP2_5", "EXP2_4", "EXP2_3", "EXP2_2", "EXP2_1", "EXP2_0"];
     let floats = exp.into_iter().zip(EXP_COEFFICIENTS);
-    let floats = floats.chain(exp2.into_iter().zip(EXP2_COEFFICIENTS));
     for (key, value) in floats.chain(["LN_2_HIGH", "LN_2_LOW"].into_iter().zip(LN_2_PARTS)) {
         facts.set(key, float(value));
     }
@@ -139,9 +125,8 @@ fn networks(model: &Model<'_>) -> String {
     let (mut tables, mut cases) = (String::new(), Vec::new());
     for (index, network) in model.networks().enumerate() {
         let of = |part: &str| format!("network_{index}_{part}");
-        let (kind, suffix, affine, fields) = match network {
-            Network::F32Direct(inner) => direct(inner.parameters(), &of, &mut tables),
-            Network::F32(inner) => f32(&inner.parameters(), &of, &mut tables),
+        let (kind, affine, fields) = match network {
+            Network::F32(inner) => float32(inner.parameters(), &of, &mut tables),
             Network::Fixed16(inner) => fixed16(&inner.parameters(), &of, &mut tables),
         };
         let affine = match (any_affine, affine) {
@@ -154,7 +139,7 @@ fn networks(model: &Model<'_>) -> String {
             tables,
             "static const struct {kind} network_{index} = {{\n    {fields}{affine}\n}};\n\n"
         );
-        cases.push(format!("return infer_{suffix}(&network_{index}, inputs, scratch, outputs);\n"));
+        cases.push(format!("return infer_{kind}(&network_{index}, inputs, scratch, outputs);\n"));
     }
     if let Some(projection) = model.projection() {
         tables += &floats("projection", projection.block());
@@ -174,10 +159,10 @@ fn networks(model: &Model<'_>) -> String {
     tables + "    default:\n        " + &last + "    }\n}\n\n"
 }
 
-/// A network's struct and function, whether it has an affine tail, and the fields of the struct before that.
-type Parts = (&'static str, &'static str, bool, String);
+/// Name of a network's struct, whether it has an affine tail, and the fields of the struct before that.
+type Parts = (&'static str, bool, String);
 
-fn direct(p: &direct::Parameters<'_>, of: &dyn Fn(&str) -> String, tables: &mut String) -> Parts {
+fn float32(p: &float32::Parameters<'_>, of: &dyn Fn(&str) -> String, tables: &mut String) -> Parts {
     let arrays = [
         ("minimum", p.input_minimum),
         ("per_span", p.input_per_span),
@@ -188,28 +173,10 @@ fn direct(p: &direct::Parameters<'_>, of: &dyn Fn(&str) -> String, tables: &mut 
         ("affine", p.affine),
     ];
     write_floats(&arrays, of, tables);
-    let widths = usize::from(p.decay.len() > 1);
-    let count = p.centres.len() / p.input_minimum.len().max(1);
+    let count = p.decay.len();
     let (before, after) = (["minimum", "per_span", "centres", "decay"], ["weights", "bias"]);
-    let fields = format!("{}, {widths}, {count}, {}", listed(before, of), listed(after, of));
-    ("direct", "direct", !p.affine.is_empty(), fields)
-}
-
-fn f32(p: &expanded::Parameters<'_>, of: &dyn Fn(&str) -> String, tables: &mut String) -> Parts {
-    let arrays = [
-        ("midpoint", p.input_midpoint),
-        ("per_unit", p.input_per_unit),
-        ("exponents", p.exponents),
-        ("weights", p.output_weights),
-        ("bias", p.bias),
-        ("affine", p.affine),
-    ];
-    write_floats(&arrays, of, tables);
-    let count = p.output_weights.len() / p.bias.len().max(1);
-    let (before, after) = (["midpoint", "per_unit"], ["exponents", "weights", "bias"]);
-    let decay = float(p.decay);
-    let fields = format!("{}, {decay}, {count}, {}", listed(before, of), listed(after, of));
-    ("expanded", "f32", !p.affine.is_empty(), fields)
+    let fields = format!("{}, {count}, {}", listed(before, of), listed(after, of));
+    ("float32", !p.affine.is_empty(), fields)
 }
 
 fn fixed16(p: &fixed16::Parameters<'_>, of: &dyn Fn(&str) -> String, tables: &mut String) -> Parts {
@@ -231,7 +198,7 @@ fn fixed16(p: &fixed16::Parameters<'_>, of: &dyn Fn(&str) -> String, tables: &mu
     let (before, after) = (["midpoint", "per_unit"], ["centres", "bias", "scale"]);
     let decay = p.decay;
     let fields = format!("{}, {decay}u, {groups}, {}", listed(before, of), listed(after, of));
-    ("fixed16", "fixed16", !p.affine.is_empty(), fields)
+    ("fixed16", !p.affine.is_empty(), fields)
 }
 
 /// Names of arrays, as fields of a struct.

@@ -17,15 +17,12 @@ fn source_of(blob: &ModelBlob) -> String {
     file(&library(blob, &Name::new("mat").unwrap()).unwrap(), "src/mat.c")
 }
 
-const MODELS: [&str; 11] = [
-    "array-f32-direct",
-    "array-f32-no-tail",
+const MODELS: [&str; 8] = [
     "array-f32",
     "array-fixed16-confidence",
     "array-fixed16-no-tail",
     "array-fixed16",
     "hand-made",
-    "kernels-f32-direct",
     "kernels-f32",
     "kernels-fixed16",
     "row4",
@@ -116,8 +113,7 @@ fn every_file_is_filled_for_every_model() {
 #[test]
 fn only_what_a_model_needs_is_written() {
     let parts = [
-        "struct direct",
-        "struct expanded",
+        "struct float32",
         "struct fixed16",
         "exponential(",
         "project(",
@@ -131,8 +127,7 @@ fn only_what_a_model_needs_is_written() {
         let source = source_of(&in_testdata(model));
         parts.into_iter().filter(|part| source.contains(part)).collect()
     };
-    assert_eq!(of("row4"), ["struct direct", "exponential(", "affine"]);
-    assert_eq!(of("kernels-f32"), ["struct expanded", "affine"]);
+    assert_eq!(of("row4"), ["struct float32", "exponential(", "affine"]);
     assert_eq!(of("kernels-fixed16"), ["struct fixed16", "affine"]);
     assert_eq!(of("array-fixed16-no-tail"), ["struct fixed16", "project("]);
     let confident = ["struct fixed16", "exponential(", "project(", "mat_assess(", "square_root("];
@@ -164,26 +159,18 @@ fn float_of(text: &str) -> u32 {
 #[test]
 fn every_number_of_a_network_is_written_to_the_bit() {
     let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
-    for name in ["kernels-f32-direct", "kernels-f32", "kernels-fixed16"] {
+    for name in ["kernels-f32", "kernels-fixed16"] {
         let blob = in_testdata(name);
         let source = source_of(&blob);
         for (index, network) in blob.parse().networks().enumerate() {
             let found = |part: &str| numbers_of(&source, &format!("network_{index}_{part}"));
             match network {
-                Network::F32Direct(it) => {
+                Network::F32(it) => {
                     let p = it.parameters();
                     assert_eq!(found("minimum"), bits(p.input_minimum));
                     assert_eq!(found("per_span"), bits(p.input_per_span));
                     assert_eq!(found("centres"), bits(p.centres));
                     assert_eq!(found("decay"), bits(p.decay));
-                    assert_eq!(found("weights"), bits(p.output_weights));
-                    assert_eq!(found("bias"), bits(p.bias));
-                }
-                Network::F32(it) => {
-                    let p = it.parameters();
-                    assert_eq!(found("midpoint"), bits(p.input_midpoint));
-                    assert_eq!(found("per_unit"), bits(p.input_per_unit));
-                    assert_eq!(found("exponents"), bits(p.exponents));
                     assert_eq!(found("weights"), bits(p.output_weights));
                     assert_eq!(found("bias"), bits(p.bias));
                 }

@@ -20,8 +20,6 @@ pub(super) struct Descent {
     /// Outputs of each task.
     tasks: Vec<Vec<usize>>,
     adam: Adam,
-    /// Largest floor that the width is kept above.
-    floor_at_most: f64,
     format: Format,
     /// Ranges that inputs are scaled by, unless they are mixed: those change.
     ranges: Vec<[f64; 2]>,
@@ -45,7 +43,6 @@ impl Descent {
             movable,
             tasks,
             adam,
-            floor_at_most: width::floor_at_most(options.format, layer.spread),
             format: options.format,
             ranges,
             ridge: options.penalty.unwrap_or(settings.ridge),
@@ -81,9 +78,9 @@ impl Descent {
 
     /// Makes the width so large that the format holds it.
     pub(super) fn hold(&mut self, pieces: &[&Piece]) {
-        if self.floor_at_most > 0.0 {
-            let least = width::least(self.format, self.movable.centres(), &self.ranges(pieces));
-            self.movable.widen_to(least.min(self.floor_at_most));
+        if self.format == Format::Fixed16 {
+            let least = width::least(self.movable.centres(), &self.ranges(pieces));
+            self.movable.widen_to(least);
         }
     }
 

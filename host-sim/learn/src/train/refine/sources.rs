@@ -120,7 +120,7 @@ impl Sources {
             // As the blob holds them.
             layer.centres.iter_mut().for_each(|c| *c = f64::from(*c as f32));
             if format == Format::Fixed16 {
-                let least = width::least(format, &layer.centres, &self.ranges(network));
+                let least = width::least(&layer.centres, &self.ranges(network));
                 layer.spread = layer.spread.max(least);
             }
         }

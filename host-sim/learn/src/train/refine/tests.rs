@@ -9,7 +9,7 @@ use super::loss::{Loss, held_out_errors, on_held_out, on_same};
 use super::movable::{Movable, Piece, Sizes};
 use super::products::{Line, SIDE, add_combinations, add_products, normal_equations};
 use super::*;
-use crate::infer::{Exponential, infer};
+use crate::infer::infer;
 use crate::train::{train, train_refined};
 
 fn draws(purpose: u64) -> impl FnMut() -> f64 {
@@ -208,7 +208,7 @@ fn quick() -> Refinement {
 fn rmse(trained: &crate::train::Trained, test: &Dataset) -> f64 {
     let seen = crate::train::projection::seen(trained.projection.as_deref(), test);
     let network = trained.networks[0].network();
-    let estimate = infer(&network, Exponential::default(), &seen.inputs.values);
+    let estimate = infer(&network, &seen.inputs.values);
     let squares: f64 = test.outputs.squared_errors(&estimate).iter().skip(2).step_by(3).sum();
     (3.0 * squares / estimate.len() as f64).sqrt()
 }
@@ -323,7 +323,7 @@ fn refinement_helps_outputs_that_are_missing_in_some_frames_and_those_that_are_n
     let start = train(&training, &options, &Silent).unwrap();
     let [refined, start] = [&refined, &start].map(|trained| {
         let network = trained.networks[0].network();
-        let estimate = infer(&network, Exponential::default(), &test.inputs.values);
+        let estimate = infer(&network, &test.inputs.values);
         let squares = test.outputs.squared_errors(&estimate);
         let of_z = |outputs: Range<usize>| squares[outputs].iter().skip(2).step_by(3).sum::<f64>();
         [of_z(0..9), of_z(9..18)]
@@ -342,8 +342,7 @@ fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
     data.outputs.values.fill_with(&mut draw);
     let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
     let start = Layers::start(&data, &options).unwrap();
-    let least = width::least(Format::Fixed16, &start.hidden[0].centres, &[[0.0, 1.0]; 2]);
-    assert!(least > width::least(Format::F32, &start.hidden[0].centres, &[[0.0, 1.0]; 2]));
+    let least = width::least(&start.hidden[0].centres, &[[0.0, 1.0]; 2]);
     let held = |spread: f64| {
         let mut layers = start.clone();
         layers.hidden[0].spread = spread;
@@ -415,7 +414,7 @@ fn refinement_leaves_narrow_gaussians_narrow() {
         let start = train(&data, &options, &Silent).unwrap();
         let error = |trained: &crate::train::Trained| {
             let network = trained.networks[0].network();
-            let estimate = infer(&network, Exponential::default(), &data.inputs.values);
+            let estimate = infer(&network, &data.inputs.values);
             (data.outputs.squared_errors(&estimate)[0] / x.len() as f64).sqrt()
         };
         let (before, after) = (error(&start), error(&refined));

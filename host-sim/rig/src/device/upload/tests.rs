@@ -107,7 +107,6 @@ fn identity(on_trial: bool) -> Report<'static> {
         rows: 1,
         columns: 1,
         outputs: 1,
-        kernel: "polynomial",
         model: Some(model),
         model_name: "",
         slot_bytes: 4096,

@@ -36,7 +36,7 @@
 #endif
 
 @SIZES@
-//@if bits
+//@if confidence
 /* The bits of a float: a copy, because C forbids to look at a float as at an integer. */
 static uint32_t bits_of(float value)
 {

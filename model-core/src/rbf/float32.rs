@@ -1,13 +1,13 @@
-//! The network in f32 with direct distances: safe at any width, with any exponential.
+//! The network in f32: exact, at any width.
 //!
 //! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
 
-use super::parameters::{
-    Cut, NetworkError, Shape, accumulate, check_finite, check_length, check_spans,
-};
+use core::marker::PhantomData;
+
+use super::parameters::{Cut, NetworkError, Shape, check_finite, check_length, check_spans};
 use crate::cortex_m4::{INPUTS, OUTPUTS};
-use crate::feature::{F32DirectBuilt, Feature};
+use crate::exp::{Exponential, Polynomial};
 use crate::scale::scale_and_tell;
 
 /// The parameters of one network, borrowed from where they lie.
@@ -19,7 +19,7 @@ pub struct Parameters<'a> {
     pub input_per_span: &'a [f32],
     /// Centres on scaled inputs, centre after centre: `[centres × inputs]`.
     pub centres: &'a [f32],
-    /// 1/(2σ²) on scaled inputs: `[1]` for one common width, or `[centres]`.
+    /// 1/(2σ²) of each centre, on scaled inputs: `[centres]`.
     pub decay: &'a [f32],
     /// Output weights ω, centre after centre: `[centres × outputs]`.
     pub output_weights: &'a [f32],
@@ -38,13 +38,15 @@ impl Parameters<'_> {
     }
 }
 
-/// A network whose parameters have been checked against its shape.
+/// A network in f32, whose parameters have been checked against its shape.
+///
+/// `E` computes the activations. Blobs are decoded with [`Polynomial`]; others serve to compare exponentials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)] // the shape first, so that it is at the same place in a network of any format
-pub struct Network<'a> {
+pub struct Network<'a, E = Polynomial> {
     shape: Shape,
     parameters: Parameters<'a>,
-    proof: F32DirectBuilt,
+    exponential: PhantomData<E>,
 }
 
 impl<'a> Network<'a> {
@@ -62,14 +64,9 @@ impl<'a> Network<'a> {
     ///
     /// # Errors
     /// Every variant of [`NetworkError`]. If there are too few words, the last arrays have the wrong length.
-    pub fn of_words(
-        shape: Shape,
-        common_width: bool,
-        affine: bool,
-        words: &'a [u32],
-    ) -> Result<Self, NetworkError> {
-        check_length("block", words, Self::block_words(shape, common_width, affine))?;
-        let network = Self::from_block(shape, common_width, affine, Cut(words))?;
+    pub fn of_words(shape: Shape, affine: bool, words: &'a [u32]) -> Result<Self, NetworkError> {
+        check_length("block", words, Self::block_words(shape, affine))?;
+        let network = Self::from_block(shape, affine, Cut(words))?;
         network.check_values()?;
         Ok(network)
     }
@@ -88,22 +85,18 @@ impl<'a> Network<'a> {
         check_length("input_minimum", p.input_minimum, inputs)?;
         check_length("input_per_span", p.input_per_span, inputs)?;
         check_length("centres", p.centres, centres * inputs)?;
-        if p.decay.len() != 1 {
-            check_length("decay", p.decay, centres)?;
-        }
+        check_length("decay", p.decay, centres)?;
         check_length("output_weights", p.output_weights, centres * outputs)?;
         check_length("bias", p.bias, outputs)?;
         if !p.affine.is_empty() {
             check_length("affine", p.affine, inputs * outputs)?;
         }
-        let proof = NetworkError::proof(Feature::F32Direct)?;
-        Ok(Self { shape, parameters, proof })
+        Ok(Self::of_arrays(shape, parameters))
     }
 
-    /// Makes a network of parameters whose lengths their types ensure; no value is checked.
-    #[cfg(feature = "f32-direct")]
+    /// Makes a network of parameters whose lengths fit the shape; no value is checked.
     pub(crate) const fn of_arrays(shape: Shape, parameters: Parameters<'a>) -> Self {
-        Self { shape, parameters, proof: crate::feature::Yes }
+        Self { shape, parameters, exponential: PhantomData }
     }
 
     pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
@@ -132,16 +125,15 @@ impl<'a> Network<'a> {
         &self.parameters
     }
 
-    /// Number of words in the block of a network of this shape, with one width for all centres or one for each.
-    pub fn block_words(shape: Shape, common_width: bool, affine: bool) -> usize {
+    /// Number of words in the block of a network of this shape, with an affine tail or without.
+    pub fn block_words(shape: Shape, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
-        let decay = if common_width { 1 } else { centres };
         let affine = if affine { inputs.saturating_mul(outputs) } else { 0 };
         [
             inputs,
             inputs,
             centres.saturating_mul(inputs),
-            decay,
+            centres,
             centres.saturating_mul(outputs),
             outputs,
             affine,
@@ -154,7 +146,6 @@ impl<'a> Network<'a> {
     #[inline(always)]
     pub(crate) fn from_block(
         shape: Shape,
-        common_width: bool,
         affine: bool,
         mut block: Cut<'a>,
     ) -> Result<Self, NetworkError> {
@@ -163,7 +154,7 @@ impl<'a> Network<'a> {
             input_minimum: block.floats(inputs),
             input_per_span: block.floats(inputs),
             centres: block.floats(centres * inputs),
-            decay: block.floats(if common_width { 1 } else { centres }),
+            decay: block.floats(centres),
             output_weights: block.floats(centres * outputs),
             bias: block.floats(outputs),
             affine: block.floats(if affine { inputs * outputs } else { 0 }),
@@ -202,23 +193,40 @@ impl<'a> Network<'a> {
         any_clamped
     }
 
-    /// Infers `output` from `scaled` inputs with the exponential `exp`. Not inlined on a device, so that other
-    /// formats need not save the registers it uses. Not generic, so that it is compiled with this crate, for
-    /// speed.
+    /// Infers `output` from `scaled` inputs as [`infer_scaled`](Self::infer_scaled) does.
+    ///
+    /// On a device all callers share it: compiled with this crate, for speed, and not inlined, so that `fixed16` need not
+    /// save the registers it uses.
     #[cfg_attr(cortex_m4f, inline(never))]
     #[cfg_attr(not(cortex_m4f), inline(always))]
-    pub(crate) fn infer_scaled(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
+    pub(crate) fn infer_scaled_shared(&self, scaled: &[f32], output: &mut [f32]) {
+        self.infer_scaled(scaled, output);
+    }
+
+    /// The same network, whose activations `E` computes.
+    pub fn with_exponential<E>(self) -> Network<'a, E> {
+        let Self { shape, parameters, .. } = self;
+        Network { shape, parameters, exponential: PhantomData }
+    }
+}
+
+impl<E: Exponential> Network<'_, E> {
+    /// Infers `output` from `scaled` inputs.
+    ///
+    /// `scaled` and `output` must have the lengths of the shape; elements beyond are ignored.
+    #[inline(always)]
+    pub fn infer_scaled(&self, scaled: &[f32], output: &mut [f32]) {
         let usual: (Result<&[f32; INPUTS], _>, Result<&mut [f32; OUTPUTS], _>) =
             (scaled.try_into(), (&mut *output).try_into());
         if let (Ok(scaled), Ok(output)) = usual {
-            self.add_up(scaled, output, exp);
+            self.add_up(scaled, output);
         } else {
-            self.add_up(scaled, output, exp);
+            self.add_up(scaled, output);
         }
     }
 
     #[inline(always)]
-    fn add_up(&self, scaled: &[f32], output: &mut [f32], exp: fn(f32) -> f32) {
+    fn add_up(&self, scaled: &[f32], output: &mut [f32]) {
         let p = &self.parameters;
         output.fill(0.0);
         // `max(1)`: a checked network has no empty dimension; this tells the compiler.
@@ -227,16 +235,21 @@ impl<'a> Network<'a> {
         for (&x, row) in scaled.iter().zip(p.affine.chunks_exact(outputs)) {
             accumulate(output, x, row);
         }
-        let common = p.decay.first().copied().unwrap_or(0.0);
         let centres = p.centres.chunks_exact(inputs).zip(p.output_weights.chunks_exact(outputs));
-        for (k, (centre, weights)) in centres.enumerate() {
-            let decay = p.decay.get(k).copied().unwrap_or(common);
-            let activation = exp(-decay * squared_distance(scaled, centre));
+        for ((centre, weights), decay) in centres.zip(p.decay) {
+            let activation = E::exp(-decay * squared_distance(scaled, centre));
             accumulate(output, activation, weights);
         }
         for (y, &b) in output.iter_mut().zip(p.bias) {
             *y += b;
         }
+    }
+}
+
+#[inline(always)]
+fn accumulate(output: &mut [f32], factor: f32, weights: &[f32]) {
+    for (y, &w) in output.iter_mut().zip(weights) {
+        *y += factor * w;
     }
 }
 

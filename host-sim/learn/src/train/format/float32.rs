@@ -1,6 +1,6 @@
-//! Networks in f32 with direct distances.
+//! Fit of networks in f32.
 
-use taxel_core::rbf::direct::Parameters;
+use taxel_core::rbf::float32::Parameters;
 use taxel_core::rbf::{Format, Shape};
 use taxel_data::RowTable;
 
@@ -11,7 +11,7 @@ use super::{FittedNetwork, Held, Targets, Weights};
 use crate::error::Result;
 
 /// Gaussians as this format holds them.
-pub(super) struct Direct {
+pub(super) struct Gaussians {
     scale: InputScale,
     centres: Vec<f64>,
     /// Decay of all centres, rounded to f32 as the device will use it, so that weights fit the device's activations.
@@ -19,7 +19,7 @@ pub(super) struct Direct {
     affine_tail: bool,
 }
 
-impl Direct {
+impl Gaussians {
     pub(super) fn new(samples: &Samples<'_>, layer: &HiddenLayer, options: &Options) -> Self {
         Self {
             scale: samples.scale.clone(),
@@ -39,7 +39,7 @@ impl Direct {
     }
 }
 
-impl Held for Direct {
+impl Held for Gaussians {
     fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't> {
         Box::new(self.regressors().of(self.scale.apply(&table.inputs.values)))
     }
@@ -53,13 +53,13 @@ impl Held for Direct {
             input_minimum: &round(&self.scale.minimum),
             input_per_span: &round(&self.scale.per_span),
             centres: &round(&self.centres),
-            decay: &[self.decay as f32],
+            decay: &vec![self.decay as f32; count],
             output_weights: &round(&weights.centres),
             bias: &round(&weights.bias),
             affine: &round(&weights.affine),
         };
         let shape = Shape { inputs, centres: count, outputs: targets.outputs() };
         let words = parameters.words().collect();
-        FittedNetwork::try_new(shape, Format::F32Direct, self.affine_tail, words)
+        FittedNetwork::try_new(shape, Format::F32, self.affine_tail, words)
     }
 }

@@ -1,9 +1,30 @@
-/* A network in f32 with distances from differences. */
-struct direct {
+/* Adds the weights of one centre, or of one input, times a factor. */
+static void accumulate(float *sums, float factor, const float *weights)
+{
+    for (unsigned j = 0; j < NETWORK_OUTPUTS; j++) {
+        sums[j] += factor * weights[j];
+    }
+}
+
+/* Adds the weights of four centres, one after the other: sums are loaded once for four. */
+static void accumulate_four(float *sums, const float *factors, const float *weights)
+{
+    const float f0 = factors[0], f1 = factors[1], f2 = factors[2], f3 = factors[3];
+    for (unsigned j = 0; j < NETWORK_OUTPUTS; j++) {
+        float sum = sums[j];
+        sum += f0 * weights[j];
+        sum += f1 * weights[NETWORK_OUTPUTS + j];
+        sum += f2 * weights[2 * NETWORK_OUTPUTS + j];
+        sum += f3 * weights[3 * NETWORK_OUTPUTS + j];
+        sums[j] = sum;
+    }
+}
+
+/* A network in f32. */
+struct float32 {
     const float *minimum, *per_span; /* of each input in training */
     const float *centres;            /* inputs of one centre after the other */
-    const float *decay;              /* 1/(2 width^2) */
-    unsigned widths;                 /* 1 if each centre has a decay of its own, 0 if all share one */
+    const float *decay;              /* 1/(2 width^2) of each centre */
     unsigned count;                  /* centres */
     const float *weights;            /* outputs of one centre after the other */
     const float *bias;
@@ -33,14 +54,14 @@ static float squared_distance(const float *a, const float *b)
     return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-static float activation_of(const struct direct *network, unsigned centre, const float *scaled)
+static float activation_of(const struct float32 *network, unsigned centre, const float *scaled)
 {
     const float square = squared_distance(scaled, network->centres + centre * INPUTS);
-    return exponential(-network->decay[centre * network->widths] * square);
+    return exponential(-network->decay[centre] * square);
 }
 
 /* Infers outputs; `scaled` is room for the inputs. Returns whether one was clamped, or is not finite. */
-static int infer_direct(const struct direct *network, const float *inputs, float *scaled, float *outputs)
+static int infer_float32(const struct float32 *network, const float *inputs, float *scaled, float *outputs)
 {
     int clamped = 0;
     for (unsigned i = 0; i < INPUTS; i++) {
