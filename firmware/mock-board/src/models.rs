@@ -14,14 +14,14 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
     let (centre, weights) = (list(1, centres * COLS), list(2, centres * OUTPUTS));
-    let (bias, affine) = (list(3, OUTPUTS), list(4, COLS * OUTPUTS));
+    let (bias, affine, decay) = (list(3, OUTPUTS), list(4, COLS * OUTPUTS), vec![1.5; centres]);
     let network = float32::Network::try_new(
         Shape { inputs: COLS, centres, outputs: OUTPUTS },
         Parameters {
             input_minimum: &[50.0; COLS],
             input_per_span: &[0.05; COLS],
             centres: &centre,
-            decay: &[1.5],
+            decay: &decay,
             output_weights: &weights,
             bias: &bias,
             affine: &affine,
