@@ -53,20 +53,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn polynomial_is_within_two_ulp_down_to_minus_87() {
-        let steps = 4_000_000;
-        let worst = (0..=steps)
-            .map(|i| {
-                let x = -87.0 * (i as f32 / steps as f32);
-                let truth = f64::from(x).exp();
-                let ulp = f64::from((truth as f32).next_up() - truth as f32);
-                (f64::from(Polynomial::exp(x)) - truth).abs() / ulp
-            })
-            .fold(0.0, f64::max);
-        assert!(worst <= 2.0, "{worst} ulp");
-    }
-
-    #[test]
     fn polynomial_ends_at_zero_for_huge_distances_and_panics_for_no_argument() {
         for x in [-87.1, -1e3, -1e30, f32::NEG_INFINITY] {
             assert_eq!(Polynomial::exp(x), 0.0, "exp({x})");

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use std::{env, thread};
 
-use crate::process::{Outcome, PROOF_TESTED, cargo, root, target_dir};
+use crate::process::{Outcome, cargo, root, target_dir};
 
 /// A step's name and command.
 type Step = (&'static str, Command);
@@ -42,7 +42,7 @@ pub fn run() -> Outcome {
 }
 
 /// The steps: two rows that build in different folders, and what follows both. QEMU's devices answer in time only if the
-/// machine has a core for QEMU and one for its host; the torture takes all cores.
+/// machine has a core for QEMU and one for its host.
 fn steps(this: &Path) -> [Vec<Step>; 3] {
     let own = |name, arguments: &[&str]| -> Step {
         let mut command = Command::new(this);
@@ -65,9 +65,6 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             // Plain `cargo test`, as users run it, for the default crates.
             ("tests", cargo(&["test"])),
             ("xtask-tests", cargo(&["test", "--package", "xtask"])),
-            ("proof-tests", cargo(&[&["test"][..], &PROOF_TESTED].concat())),
-            // What `cargo xtask torture` runs, after both rows.
-            ("torture-build", cargo(&["build", "--package", "torture"])),
             // Docs need what clippy has checked.
             ("clippy", clippy),
             ("docs", docs),
@@ -85,11 +82,7 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             // The emulated board's time is virtual: it answers alike on a busy machine.
             own("board", &["board"]),
         ],
-        vec![
-            own("emulate", &["emulate"]),
-            own("accept", &["accept", "--emulated"]),
-            own("torture", &["torture", "--short"]),
-        ],
+        vec![own("emulate", &["emulate"]), own("accept", &["accept", "--emulated"])],
     ]
 }
 

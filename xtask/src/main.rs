@@ -2,10 +2,8 @@
 
 mod process;
 mod structure;
-mod lines;
 mod toolchain;
 mod queue;
-mod copy;
 
 mod panics;
 mod images;
@@ -22,10 +20,6 @@ mod c;
 
 mod accept;
 
-mod torture;
-
-mod mutants;
-
 mod python;
 
 mod publish;
@@ -36,12 +30,9 @@ mod release;
 
 mod ci;
 
-use std::env::args_os;
-use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
 /// Everything that people and CI run. `bash firmware/setup.sh` installs on Debian what the commands need.
 #[derive(Parser)]
@@ -61,8 +52,6 @@ enum Command {
     Ci,
     /// Check that no crate depends on one above it or on one that it does not use, and none for a device on one for a desk.
     Structure,
-    /// Print the lines of Rust of each crate: all, source code (no comments, blank lines and tests), test code.
-    Lines,
     /// Build and lint all code for a device (thumbv7em-none-eabihf), and prove by linking that it cannot panic.
     Firmware {
         /// Build this image alone: the emulator's `qemu-app`, or the board's `nucleo-f446re` or `nucleo-f446re-onchip`.
@@ -108,51 +97,14 @@ enum Command {
     /// Pack every crate that is published, and build it from its package; those of a device with their oldest Rust, too.
     /// Nothing is published (docs/crates.md).
     Publish(publish::Options),
-    /// Put every promise of reliability to the test, and print a table: `torture --help`. As the first option, --self-test
-    /// builds a copy of the product with planted faults instead, and fails unless each line sees those that proof/mutants
-    /// names it for.
-    #[command(disable_help_flag = true)]
-    Torture(Rest),
-    /// Plant faults in a copy of the product, those of these names or all of proof/mutants, and tell which test and which
-    /// line of torture sees each. Fails if none sees a fault that was seen before. The tests that proof/mutants/score.csv
-    /// names come first.
-    Mutants(mutants::Options),
-}
-
-/// Arguments that are passed on.
-#[derive(clap::Args)]
-struct Rest {
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    arguments: Vec<String>,
-}
-
-impl Rest {
-    fn all(&self) -> Vec<&str> {
-        self.arguments.iter().map(String::as_str).collect()
-    }
-}
-
-/// The arguments, with names that exist.
-fn parsed(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, clap::Error> {
-    let arguments = Arguments::try_parse_from(arguments)?;
-    let unknown = match &arguments.command {
-        Command::Mutants(options) => options.unknown(),
-        _ => None,
-    };
-    unknown.map_or(Ok(()), |name| {
-        let cause = format!("nothing to plant is called `{name}`\n");
-        Err(Arguments::command().error(ErrorKind::InvalidValue, cause))
-    })?;
-    Ok(arguments)
 }
 
 fn main() -> ExitCode {
     let success = |()| ExitCode::SUCCESS;
-    let arguments = parsed(args_os()).unwrap_or_else(|error| error.exit());
+    let arguments = Arguments::parse();
     let outcome = match arguments.command {
         Command::Ci => ci::run().map(success),
         Command::Structure => structure::run().map(success),
-        Command::Lines => lines::run().map(success),
         Command::Firmware { image } => images::run(image.as_deref()).map(success),
         Command::Cores => cores::run().map(success),
         Command::Emulate(options) => emulate::run(&options).map(success),
@@ -167,31 +119,9 @@ fn main() -> ExitCode {
         Command::Docs(options) => docs::run(&options).map(success),
         Command::Site => docs::site::build(&process::target_dir().join("site")).map(success),
         Command::Release => release::run().map(success),
-        Command::Torture(rest) => torture::run(&rest.all()),
-        Command::Mutants(options) => mutants::run(&options).map(success),
     };
     outcome.unwrap_or_else(|cause| {
         eprintln!("error: {cause}");
         ExitCode::FAILURE
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_fault_or_mutant_that_does_not_exist_is_wrong_usage() {
-        let exit = |line: &str| {
-            let arguments = ["cargo-xtask"].into_iter().chain(line.split(' ')).map(OsString::from);
-            parsed(arguments).map_or_else(|error| error.exit_code(), |_| 0)
-        };
-        for (line, code) in [
-            ("mutants no-feed-before-erase", 0),
-            ("mutants no-feed-before-eras", 2),
-            ("mutants --second no-feed-before-erase", 2),
-        ] {
-            assert_eq!(exit(line), code, "{line}");
-        }
-    }
 }

@@ -15,9 +15,6 @@ pub fn root() -> &'static Path {
     here.parent().unwrap_or(here)
 }
 
-/// Packages of what proves the product that have tests.
-pub const PROOF_TESTED: [&str; 4] = ["--package", "hostile", "--package", "torture"];
-
 /// Folder for cargo's builds for the host.
 pub fn target_dir() -> PathBuf {
     root().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))

@@ -1,5 +1,5 @@
 //! What a device goes through when its power is cut at every operation of its flash, and again while it recovers: one case
-//! for each seed. Tests take a few seeds, torture takes many.
+//! for each seed.
 
 mod cuts;
 

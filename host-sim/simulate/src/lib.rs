@@ -22,6 +22,8 @@ pub mod readout;
 pub mod world;
 pub mod synth;
 pub mod forward;
+#[cfg(test)]
+mod extremes;
 
 pub use synth::{Synthesis, synthesise};
 pub use taxel_data::error::{Error, Result};

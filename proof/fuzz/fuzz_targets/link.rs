@@ -1,8 +1,192 @@
+//! The whole device, at the end of a line that says anything at any time, and loses its power at any time.
+//!
+//! Bytes are steps, each an operation, a length and so many bytes of it: raw bytes, packets whose CRC is right, steps of
+//! an upload, passing time, a host that does not read, readings, restarts and power cuts. Whatever came before, a device
+//! that has power answers, and has a model in force. What is decoded of a packet is the same when it is sent again.
 #![no_main]
 
-use hostile::target;
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use libfuzzer_sys::fuzz_target;
+use mock_board::{
+    Bench, Board, Flash, Memory, Running, TestFrame, blob, model_crc, quiet, request_bytes,
+    upload_steps,
+};
+use taxel_core::AlignedBytes;
+use taxel_core::checksum::CRC_32;
+use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::link::message::{Report, Request};
+use taxel_firmware::link::packet::PROTOCOL_VERSION;
+use taxel_firmware::link::{cobs, packet};
+
+/// Most starts of the device in one run.
+const MOST_STARTS: usize = 12;
+/// Most turns of the loop for the bytes of one step: far more than are needed.
+const MOST_TURNS: usize = 20_000;
+/// Length in bytes of the chunks of an upload.
+const CHUNK: usize = 60;
+/// Number of the requests of an upload.
+const NUMBER: u16 = 9;
 
 fuzz_target!(|bytes: &[u8]| {
-    (target("link").check)(bytes);
+    let models = [blob(3, 4), blob(4, 3), blob(5, 6)];
+    let mut slots = Flash::slots_with(&models[0]);
+    let mut journal = Flash::journal();
+    let mut memory = Memory::new();
+    let mut steps = Steps(bytes);
+    let mut cut_after = None;
+    for _ in 0..MOST_STARTS {
+        if let Some(operations) = cut_after.take() {
+            slots[0].cut_power_after(operations);
+            journal.pages()[0].cut_power_after(operations);
+        }
+        let mut bench = Bench::on(Board::new(journal), &mut memory, quiet());
+        let mut device = Device {
+            board: bench.board.clone(),
+            frame: bench.frame.clone(),
+            session: Session::start(&mut bench.app, &mut slots, &mut []),
+        };
+        device.answers();
+        loop {
+            let Some((operation, bytes)) = steps.next() else { return };
+            match operation % 12 {
+                10 => break,
+                11 => {
+                    cut_after = Some(u64::from(number_of(bytes) % 1024));
+                    break;
+                }
+                operation => {
+                    let end = device.step(operation, bytes, &models);
+                    // A first request may end a frame that the bytes have begun. The next is answered.
+                    let identify = || request_bytes(NUMBER, &Request::Identify);
+                    if end.or_else(|| device.send(identify())).is_some() {
+                        break;
+                    }
+                    device.answers();
+                }
+            }
+        }
+        drop(device);
+        journal = bench.journal();
+        let _ = (slots[0].power_on(), journal.pages()[0].power_on());
+    }
 });
+
+/// Steps that are left.
+struct Steps<'b>(&'b [u8]);
+
+impl<'b> Iterator for Steps<'b> {
+    type Item = (u8, &'b [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (operation, rest) = self.0.split_first()?;
+        let (length, rest) = rest.split_first().unwrap_or((&0, rest));
+        let (bytes, rest) = rest.split_at(rest.len().min(usize::from(*length)));
+        self.0 = rest;
+        Some((*operation, bytes))
+    }
+}
+
+/// Decodes a packet of a message `$kind`. What is found must be the same when it is encoded and decoded again. Messages
+/// borrow, so this is written once for each kind.
+macro_rules! same_again {
+    ($kind:ty, $packet:expr) => {
+        if let Ok(found) = packet::decode::<$kind>($packet) {
+            let mut buffer = vec![0; $packet.len()];
+            // Numbers may arrive longer than they need to be, but are not sent so.
+            let again = packet::encode(found.number, &found.body, &mut buffer).expect("no longer");
+            let again = packet::decode::<$kind>(again).expect("what was just encoded");
+            // As texts, in which NaN equals NaN.
+            assert_eq!(format!("{found:?}"), format!("{again:?}"));
+        }
+    };
+}
+
+/// A device that runs.
+struct Device<'d, 'm> {
+    session: Running<'d, 'm>,
+    board: Board,
+    frame: Rc<RefCell<TestFrame>>,
+}
+
+impl Device<'_, '_> {
+    /// Takes a step; returns why the session ended, if it did.
+    fn step(
+        &mut self,
+        operation: u8,
+        bytes: &[u8],
+        models: &[AlignedBytes; 3],
+    ) -> Option<SessionEnd> {
+        match operation {
+            0 => self.send(bytes.to_vec()),
+            1..=4 => {
+                // A packet of this protocol, whatever message the bytes are.
+                let covered = [&[PROTOCOL_VERSION, operation], bytes].concat();
+                let packet = [&covered[..], &CRC_32.checksum(&covered).to_le_bytes()].concat();
+                same_again!(Request<'_>, &packet);
+                same_again!(Report<'_>, &packet);
+                let mut line = Vec::new();
+                cobs::encode(&packet, |byte| {
+                    line.push(byte);
+                    true
+                });
+                self.send(line)
+            }
+            5 | 6 => {
+                let mut choices = bytes.iter().map(|byte| usize::from(*byte));
+                let model = &models[choices.next().unwrap_or(0) % models.len()];
+                let (from, count) = (choices.next().unwrap_or(0), choices.next().unwrap_or(255));
+                let steps = upload_steps(model, CHUNK).into_iter().skip(from).take(count);
+                steps.map(Request::Upload).find_map(|it| self.send(request_bytes(NUMBER, &it)))
+            }
+            7 => {
+                let mut pins = self.board.pins.borrow_mut();
+                pins.now_us = pins.now_us.wrapping_add(number_of(bytes));
+                drop(pins);
+                self.session.step()
+            }
+            8 => {
+                // A host that takes a few bytes more, and then reads on.
+                self.board.pins.borrow_mut().room = Some(number_of(bytes) as usize % 512);
+                let end = self.send(request_bytes(NUMBER, &Request::Statistics));
+                self.board.pins.borrow_mut().room = None;
+                end
+            }
+            _ => {
+                let mut frame = self.frame.borrow_mut();
+                let readings = frame.as_flattened_mut().iter_mut();
+                readings
+                    .zip(bytes.as_chunks().0)
+                    .for_each(|(ohm, it)| *ohm = f32::from_le_bytes(*it));
+                drop(frame);
+                self.session.step()
+            }
+        }
+    }
+
+    /// Sends bytes, and runs until the device has read them.
+    fn send(&mut self, bytes: Vec<u8>) -> Option<SessionEnd> {
+        self.board.pins.borrow_mut().to_device.extend(bytes);
+        let mut turns = 0;
+        while !self.board.pins.borrow().to_device.is_empty() {
+            if let Some(end) = self.session.step() {
+                return Some(end);
+            }
+            turns += 1;
+            assert!(turns < MOST_TURNS, "the device reads no more");
+        }
+        self.board.pins.borrow_mut().to_host.clear();
+        None
+    }
+
+    /// Checks that the device answers, and has a model in force.
+    fn answers(&mut self) {
+        assert!(model_crc(&mut self.session, &self.board).is_some(), "no model in force");
+    }
+}
+
+/// The first four bytes as a number.
+fn number_of(bytes: &[u8]) -> u32 {
+    bytes.iter().take(4).fold(0, |number, byte| number << 8 | u32::from(*byte))
+}

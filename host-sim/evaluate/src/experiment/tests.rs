@@ -1,3 +1,5 @@
+use taxel_data::{Purpose, Random, Stream};
+use taxel_simulate::Synthesis;
 use taxel_simulate::readout::{Circuit, Readout};
 use taxel_simulate::sensor::Sensor;
 use taxel_simulate::synthesise;
@@ -139,4 +141,44 @@ fn deep_nesting_is_refused_and_quoted_in_part_only() {
     let refused = Experiment::parse("test", &format!("name = {}", "[".repeat(200_000)));
     let refused = refused.unwrap_err().to_string();
     assert!(refused.contains("recurs") && refused.len() < 1000, "{} bytes", refused.len());
+}
+
+/// Scenes with a character or a digit changed, cut short, or with a line of another place.
+#[test]
+fn a_damaged_scene_is_refused_or_synthesised_to_positive_readings() {
+    let mut random = Random::new(1, Stream::Test, Purpose::Damage, 0, 0);
+    let mut taken = 0;
+    for case in 0..600 {
+        let (_, text) = taxel_scenes::ALL[case % taxel_scenes::ALL.len()];
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let [at, from] = [0; 2].map(|_| random.below(lines.len()));
+        match random.below(4) {
+            0 => lines.truncate(at),
+            1 => lines[at] = lines[from].clone(),
+            change => {
+                let line = &mut lines[at];
+                let digits = line.char_indices().filter(|(_, letter)| letter.is_ascii_digit());
+                let places: Vec<usize> = digits.map(|(place, _)| place).collect();
+                if places.is_empty() || change == 2 {
+                    line.pop();
+                } else {
+                    let place = places[random.below(places.len())];
+                    line.replace_range(
+                        place..=place,
+                        ["-", "9e9", "nan", ".", "0"][random.below(5)],
+                    );
+                }
+            }
+        }
+        let Ok(experiment) = Experiment::parse("damaged", &lines.join("\n")) else { continue };
+        let sensor = &experiment.world.sensor;
+        if sensor.upper_electrodes_mm.len() * sensor.lower_electrodes_mm.len() > 20_000 {
+            continue;
+        }
+        taken += 1;
+        let frames = Synthesis::new(&experiment.world).ideal().frames(Stream::Training, 2);
+        let readings = &frames.inputs.values;
+        assert!(readings.iter().all(|ohm| ohm.is_finite() && *ohm > 0.0), "{}", lines.join("\n"));
+    }
+    assert!((100..600).contains(&taken), "{taken} scenes were taken");
 }

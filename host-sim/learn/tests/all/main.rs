@@ -1,6 +1,10 @@
 //! Every integration test in one program: it is linked once.
 
+#[path = "../../../../proof/extremes.rs"]
+mod table;
+
 mod cost;
 mod blob;
 mod number_formats;
+mod extremes;
 mod relative;

@@ -1,4 +1,5 @@
 use super::*;
+use crate::random::{Purpose, Random, Stream};
 
 /// The text as it is parsed, of any dialect.
 fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataFile> {
@@ -177,4 +178,34 @@ fn words_for_missing_values_and_columns_without_a_name_are_known() {
     assert!(file.rows().all(|row| row[1].is_nan()) && file.not_numbers.is_empty());
     let refused = parse(path, b",c1\n1,2\n", false).unwrap_err().to_string();
     assert!(refused.contains("header: column \"c1\" stands twice"), "{refused}");
+}
+
+/// Texts of several dialects with a byte flipped, cut short, or with a part that stands twice.
+#[test]
+fn a_damaged_file_is_refused_or_read_to_finite_numbers() {
+    let sound: [&[u8]; 4] = [
+        b"time_s,r1c1_ohm,\"a,b\"\n0.0,57.5,1e3\n0.1,N/A,-2.5\n0.2,60,7\n",
+        b"\xef\xbb\xbft;x [N]\r\n1,5;2,25\r\n2,5;\r\n",
+        b"# log\nsep=\t\nt\tf\n2026-11-01T00:00:00Z\t1\n2026-11-01T00:00:01Z\t2\n",
+        b"a b  c\n1 2  3\n4 5  6\n",
+    ];
+    let mut random = Random::new(1, Stream::Test, Purpose::Damage, 0, 0);
+    let mut read = 0;
+    for case in 0..4000 {
+        let mut bytes = sound[case % sound.len()].to_vec();
+        for _ in 0..=random.below(3) {
+            let (one, other) = (random.below(bytes.len()), random.below(bytes.len()));
+            let part = bytes[one.min(other)..one.max(other)].to_vec();
+            match random.below(3) {
+                0 => bytes[one] ^= 1 << random.below(8),
+                1 => bytes.truncate(one.max(1)),
+                _ => drop(bytes.splice(one..one, part)),
+            }
+        }
+        let Ok(file) = parse(Path::new("test.csv"), &bytes, case % 2 == 0) else { continue };
+        read += 1;
+        assert!(file.rows().all(|line| line.len() == file.header.len()), "{bytes:?}");
+        assert!(!file.rows().flatten().any(|value| value.is_infinite()), "{bytes:?}");
+    }
+    assert!((1000..4000).contains(&read), "{read} files were read");
 }

@@ -1,8 +1,0 @@
-#![no_main]
-
-use hostile::target;
-use libfuzzer_sys::fuzz_target;
-
-fuzz_target!(|bytes: &[u8]| {
-    (target("gzip").check)(bytes);
-});
