@@ -87,6 +87,14 @@ impl Folder {
         String::from_utf8(output.stdout).unwrap()
     }
 
+    /// Runs `host-sim` and expects success; returns what it says on stderr.
+    pub fn notes(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{arguments:?}: {stderr}");
+        stderr
+    }
+
     /// Runs `host-sim` with `--json` and expects success; returns its result.
     pub fn json(&self, arguments: &[&str]) -> serde_json::Value {
         let text = self.succeed(&[arguments, &["--json"]].concat());

@@ -18,14 +18,6 @@ fn log() -> String {
     text
 }
 
-/// Stderr of a command that succeeds.
-fn notes(folder: &Folder, arguments: &[&str]) -> String {
-    let output = folder.run(arguments);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{arguments:?}: {stderr}");
-    stderr
-}
-
 fn read(folder: &Folder, name: &str) -> String {
     std::fs::read_to_string(folder.path(name)).unwrap()
 }
@@ -39,7 +31,7 @@ fn a_log_trains_the_same_in_another_dialect_and_its_fields_are_kept_as_they_are_
     folder.write("numbered.csv", "1,2,3,4\n".to_owned() + &log());
     let train = |file: &'static str, more: &[&'static str]| {
         let train = ["train", file, "--missing", "-1", "--no-refine", "--centres", "8"];
-        notes(&folder, &[&train[..], &["-o", "m.bin"], more].concat())
+        folder.notes(&[&train[..], &["-o", "m.bin"], more].concat())
     };
     let said = train("log.csv", &["--inputs", "c2..c3", "--outputs", "c4"]);
     assert!(said.contains("log.csv names no columns: they are called c1 to c4 "), "{said}");

@@ -40,14 +40,6 @@ fn column(folder: &Folder, file: &str, name: &str) -> Vec<String> {
     lines.map(|line| line.split(',').nth(at).unwrap().to_owned()).collect()
 }
 
-/// What a command says on stderr, which must succeed.
-fn notes(folder: &Folder, arguments: &[&str]) -> String {
-    let output = folder.run(arguments);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{arguments:?}: {stderr}");
-    stderr
-}
-
 #[test]
 fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
     let folder = prepared("health");
@@ -62,7 +54,7 @@ fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
     assert_eq!(sound.to_bits(), rmse("plain.bin", "sound.csv", &[]).to_bits());
     for (value, kind) in [("0.02", "shorted"), ("", "missing")] {
         changed(&folder, "faulty.csv", |name, _| (name == "r4c5_ohm").then_some(value));
-        let said = notes(&folder, &["decode", "fills.bin", "faulty.csv", "-o", "e.csv"]);
+        let said = folder.notes(&["decode", "fills.bin", "faulty.csv", "-o", "e.csv"]);
         assert!(said.contains(&format!("note: r4c5 {kind} in 100 % of lines")), "{said}");
         assert!(said.contains("missing readings of 100 % of lines were filled"), "{said}");
         assert!(column(&folder, "e.csv", "status").iter().all(|flags| flags == "2"));
@@ -72,13 +64,13 @@ fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
         if !value.is_empty() {
             assert!(rmse("fills.bin", "faulty.csv", &["--limits", "none"]) > 3.0 * sound);
         }
-        let said = notes(&folder, &["decode", "plain.bin", "faulty.csv", "-o", "e.csv"]);
+        let said = folder.notes(&["decode", "plain.bin", "faulty.csv", "-o", "e.csv"]);
         assert!(said.contains("r4c5") && !said.contains("filled"), "{said}");
         assert!(column(&folder, "e.csv", "r4e1_dz_mm").iter().all(String::is_empty));
         let refused = folder.fail(&["eval", "plain.bin", "faulty.csv"], 2);
         assert!(refused.contains("no line has") && refused.contains("--fill"), "{refused}");
     }
-    let whole = notes(&folder, &["decode", "fills.bin", "sound.csv", "-o", "e.csv"]);
+    let whole = folder.notes(&["decode", "fills.bin", "sound.csv", "-o", "e.csv"]);
     assert_eq!(whole, "");
     assert!(column(&folder, "e.csv", "status").iter().all(|flags| flags == "0"));
 }
@@ -87,7 +79,7 @@ fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
 fn wires_are_named_and_columns_can_be_left_out() {
     let folder = prepared("health_wires");
     changed(&folder, "open.csv", |name, _| name.starts_with("r4c").then_some("1e9"));
-    let said = notes(&folder, &["decode", "fills.bin", "open.csv", "-o", "e.csv"]);
+    let said = folder.notes(&["decode", "fills.bin", "open.csv", "-o", "e.csv"]);
     assert!(said.contains("note: row-wire 4 open in 100 % of lines"), "{said}");
     assert!(!said.contains("r4c1_ohm"), "{said}");
     let eval = ["eval", "fills.bin", "sound.csv", "--json", "--without"];
@@ -96,9 +88,9 @@ fn wires_are_named_and_columns_can_be_left_out() {
     assert_eq!(result["health"]["readings_filled"], 18 * 200);
     assert_eq!(result["values_evaluated"], 144 * 200);
     let decode = ["decode", "fills.bin", "sound.csv", "-o", "e.csv", "--without"];
-    let said = notes(&folder, &[&decode[..], &["r1c*_ohm,r2c*_ohm,r3c1_ohm"]].concat());
+    let said = folder.notes(&[&decode[..], &["r1c*_ohm,r2c*_ohm,r3c1_ohm"]].concat());
     assert!(said.contains("100 % of lines were not filled: more than 1 in 4 of a frame"), "{said}");
-    let said = notes(&folder, &[&decode[..], &["r4c5_ohm", "--no-fill"]].concat());
+    let said = folder.notes(&[&decode[..], &["r4c5_ohm", "--no-fill"]].concat());
     assert!(said.contains("100 % of lines were not filled: by --no-fill"), "{said}");
     // Also by the names that notes give them.
     let without = |names: &str| {
@@ -115,7 +107,7 @@ fn files_that_are_cut_off_stand_still_or_have_other_units_are_noted() {
     let folder = prepared("health_cut_off");
     let text = std::fs::read_to_string(folder.path("sound.csv")).unwrap();
     folder.write("cut.csv", &text[..text.len() - 8]);
-    let decode = |file| notes(&folder, &["decode", "fills.bin", file, "-o", "e.csv"]);
+    let decode = |file| folder.notes(&["decode", "fills.bin", file, "-o", "e.csv"]);
     let said = decode("cut.csv");
     assert!(said.contains("the last number of line 201 may be wrong"), "{said}");
     let lines: Vec<&str> = text.lines().collect();
@@ -134,7 +126,7 @@ fn readings_far_beyond_the_training_range_are_flagged() {
     changed(&folder, "far.csv", |name, line| {
         (name.ends_with("_ohm") && line % 2 == 1).then_some("30")
     });
-    let said = notes(&folder, &["decode", "plain.bin", "far.csv", "-o", "e.csv"]);
+    let said = folder.notes(&["decode", "plain.bin", "far.csv", "-o", "e.csv"]);
     assert!(said.contains("readings-out-of-range"), "{said}");
     let status = column(&folder, "e.csv", "status");
     assert!(status.iter().enumerate().all(|(line, it)| *it == ["0", "64"][line % 2]), "{status:?}");

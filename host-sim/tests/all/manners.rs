@@ -2,30 +2,22 @@
 
 use crate::common::{Folder, small_scene};
 
-/// What a command says on stderr.
-fn told(folder: &Folder, arguments: &[&str]) -> String {
-    let output = folder.run(arguments);
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{arguments:?}: {told}");
-    told
-}
-
 #[test]
 fn quiet_work_says_nothing_and_verbose_work_the_time_of_each_stage() {
     let folder = Folder::new("manners");
     folder.write("scene.toml", small_scene());
     let run = ["run", "scene.toml", "--no-refine"];
-    let usual = told(&folder, &run);
+    let usual = folder.notes(&run);
     assert!(usual.contains("fit weights …") && !usual.contains("took"), "{usual}");
-    let verbose = told(&folder, &[&run[..], &["-v"]].concat());
+    let verbose = folder.notes(&[&run[..], &["-v"]].concat());
     assert!(verbose.contains("fit weights: took 0."), "{verbose}");
-    assert_eq!(told(&folder, &[&run[..], &["--quiet"]].concat()), "");
+    assert_eq!(folder.notes(&[&run[..], &["--quiet"]].concat()), "");
     // Notes of a data file too.
     folder.write("log.csv", "ch1,ch2,f_n\n1,7,2\n3,7,4\n5,7,5\n7,7,9\n9,7,9\n");
     let train = ["train", "log.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
     let train = [&train[..], &["--centres", "2", "--no-refine"]].concat();
-    assert!(told(&folder, &train).contains("ch2"));
-    assert_eq!(told(&folder, &[&train[..], &["-q"]].concat()), "");
+    assert!(folder.notes(&train).contains("ch2"));
+    assert_eq!(folder.notes(&[&train[..], &["-q"]].concat()), "");
     // Errors are said.
     assert!(folder.fail(&["-q", "inspect", "none.bin"], 2).contains("none.bin"));
 }

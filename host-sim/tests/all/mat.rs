@@ -68,33 +68,3 @@ fn a_mat_of_numbered_columns_is_named_after_its_wires_and_told_its_image() {
             && !page.contains("href=\"figures")
     );
 }
-
-#[test]
-fn a_trade_says_what_stands_in_the_way_of_a_rate_and_asks_for_a_scan_that_it_does_not_know() {
-    let folder = Folder::new("mat-trade");
-    folder.write("mat.csv", log([16, 16], 120));
-    let ask = [
-        "trade",
-        "mat.csv",
-        "--outputs",
-        "x_mm,force_n",
-        "--no-refine",
-        "--centres",
-        "8",
-        "--frame-rate",
-        "400",
-    ];
-    let refused = folder.fail(&[&ask[..], &["--inputs", "adc_*"]].concat(), 2);
-    for words in [
-        "a frame may take 2.500 ms, of which the scan takes 9.366 ms",
-        "columns (--inputs) take",
-        "--scan-ms",
-    ] {
-        assert!(refused.contains(words), "{words}: {refused}");
-    }
-    let refused = folder.fail(&[&ask[..], &["--inputs", "adc_0..adc_11"]].concat(), 2);
-    assert!(
-        refused.contains("whose time is not known") && refused.contains("--scan-ms MS"),
-        "{refused}"
-    );
-}

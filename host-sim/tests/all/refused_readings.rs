@@ -5,14 +5,6 @@ use crate::common::{Folder, small_scene};
 const NOTE: &str =
     "lie outside of 5 to 1000 Ω: a device, `decode` and `eval` take them for missing";
 
-/// What the program says on stderr, in success.
-fn said(folder: &Folder, arguments: &[&str]) -> String {
-    let output = folder.run(arguments);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{arguments:?}: {stderr}");
-    stderr
-}
-
 #[test]
 fn training_tells_of_readings_that_a_device_would_refuse() {
     let folder = Folder::new("refused-readings");
@@ -24,9 +16,9 @@ fn training_tells_of_readings_that_a_device_would_refuse() {
     let train = |source: &'static str, more: &[&'static str]| {
         [&["train", source, "--centres", "8", "--no-refine", "-o", "m.bin"], more].concat()
     };
-    let quiet = said(&folder, &train("sound.toml", &["-n", "300"]));
+    let quiet = folder.notes(&train("sound.toml", &["-n", "300"]));
     assert!(!quiet.contains("outside"), "{quiet}");
-    let noted = said(&folder, &train("shorted.toml", &["-n", "300"]));
+    let noted = folder.notes(&train("shorted.toml", &["-n", "300"]));
     assert!(noted.contains(NOTE) && noted.contains("all readings shorted in 100 %"), "{noted}");
 
     folder.succeed(&["synth", "sound.toml", "-n", "300", "-o", "sound.csv"]);
@@ -41,7 +33,7 @@ fn training_tells_of_readings_that_a_device_would_refuse() {
     };
     let broken: String = text.lines().enumerate().map(line).collect();
     folder.write("broken.csv", broken);
-    let noted = said(&folder, &train("broken.csv", &["--whole-array"]));
+    let noted = folder.notes(&train("broken.csv", &["--whole-array"]));
     assert!(noted.contains(NOTE) && noted.contains("r4c5_ohm open in 30 % of frames"), "{noted}");
     assert!(noted.contains("--open-above-ohm") && noted.contains("--limits"), "{noted}");
 }

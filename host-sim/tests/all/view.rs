@@ -266,24 +266,6 @@ fn a_data_file_of_any_columns_is_decoded_by_its_model_and_a_line_of_numbers_too(
 }
 
 #[test]
-fn what_cannot_be_watched_is_refused_before_a_page_opens() {
-    let folder = Folder::new("view_refused");
-    folder.write("no.mcap", "no recording");
-    folder.succeed(&["synth", "press", "-n", "5", "-o", "press.mcap"]);
-    let blob = format!("{}/../testdata/row4.bin", env!("CARGO_MANIFEST_DIR"));
-    for (arguments, says) in [
-        (&["no.mcap"][..], "no.mcap"),
-        (&["press.mcap", "--model", &blob], "--model: it takes other readings"),
-        (&["press", "--shape", "0x4"], "--shape"),
-        (&["press.mcap", "--protocol", "csv"], "--protocol is for a sensor on a serial port"),
-        (&["press.mcap", "--frame-rate", "5"], "--frame-rate is for a simulation"),
-    ] {
-        let said = folder.fail(&[&["view"], arguments, &["--no-browser"]].concat(), 2);
-        assert!(said.contains(says), "{arguments:?}: {said}");
-    }
-}
-
-#[test]
 fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wrong() {
     let folder = Folder::new("view_reconnects");
     let port = folder.path("port");

@@ -85,50 +85,6 @@ fn moving_contacts_are_written_as_a_log_and_still_ones_as_a_model_is_trained_on(
 }
 
 #[test]
-fn columns_with_any_names_train_one_network() {
-    let folder = Folder::new("any-names");
-    let mut data = String::from("left,right,load_n,place_mm,day\n");
-    for i in 0..400 {
-        let (load, place) = (f64::from(i % 20) / 20.0, f64::from(i / 20) / 20.0);
-        let line = format!("{},{},{load},{place},{}\n", load * (1.0 - place), load * place, i % 4);
-        data.push_str(&line);
-    }
-    folder.write("d.csv", data);
-    let chosen = folder.succeed(&[
-        "train",
-        "d.csv",
-        "--inputs",
-        "left,right",
-        "--outputs",
-        "*_n",
-        "--select",
-        "--fold-column",
-        "day",
-        "--centres",
-        "4,16",
-        "--spread",
-        "0.3,0.6",
-        "--penalty",
-        "1e-7",
-        "--no-refine",
-        "-o",
-        "m.bin",
-        "--json",
-    ]);
-    let chosen = json(&chosen);
-    assert_eq!(chosen["selection"]["scored"].as_array().unwrap().len(), 4);
-    // The load is the sum of the two readings, so a linear decoder is exact.
-    let linear = &chosen["selection"]["baselines"][0];
-    assert_eq!(linear["decoder"], "linear");
-    assert!(linear["rmse"][0].as_f64().unwrap() < 1e-6, "{chosen}");
-    assert_eq!(chosen["outputs"][0]["name"], "load_n");
-    assert!(chosen["outputs"][0]["training_rmse"].as_f64().unwrap() < 0.01, "{chosen}");
-    folder.succeed(&["decode", "m.bin", "d.csv", "-o", "e.csv"]);
-    let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
-    assert!(estimate.starts_with("load_n,status\n"));
-}
-
-#[test]
 fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     let folder = Folder::new("array");
     folder.write("scene.toml", small_scene());
