@@ -90,10 +90,9 @@ pub fn message(error: &Error) -> String {
 fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
     let of_field = |field: &str| match field {
-        "whole_array" => " (--whole-array)",
         "fill" => " (leave --fill or training.fill out)",
         "folds" => " (--folds or --fold-column, --no-refine)",
-        "memory" => " (--centres, --no-affine, --most-memory)",
+        "memory" => " (--centres, --most-memory)",
         "qemu" => " (--qemu)",
         "image" => " (--image)",
         "port" => " (PORT)",
@@ -134,7 +133,7 @@ mod tests {
         };
         let of_rig = errors().map(|error| Error::from(taxel_rig::Error::from(error)));
         for error in of_rig.into_iter().chain(errors().map(Error::Data)) {
-            assert_eq!(advice(&error), " (--centres, --no-affine, --most-memory)", "{error}");
+            assert_eq!(advice(&error), " (--centres, --most-memory)", "{error}");
             assert_eq!(exit_status(&error), 2, "{error}");
         }
     }

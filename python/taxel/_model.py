@@ -59,15 +59,13 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         Width σ on scaled inputs, where refinement starts; None for 0.8.
     penalty : float or None
         Ridge penalty on squared weights for each line; None for the usual one.
-    affine_tail : bool
-        Whether outputs have an affine part besides.
     refine : bool
         Whether centres and widths are refined after K-means: better, and minutes instead of seconds.
-    format : {"f32", "fixed16"} or None
-        Number format of the weights; None for f32.
-    whole_array : bool
-        One network behind a projection of all readings. For columns named as wires (`r1c1_ohm`), whose outputs belong to
-        rows, this is instead of a network for each row.
+    format : {"fixed16", "f32"} or None
+        Number format of the weights; None for fixed16, or f32 where that does not hold the model.
+    each_row : bool
+        A network for each row, instead of one behind a projection of all readings. It is for columns named as wires
+        (`r1c1_ohm`), whose outputs belong to rows.
     features : int or None
         Features of that projection.
     grid : (int, int) or None
@@ -99,10 +97,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         *,
         spread: float | None = None,
         penalty: float | None = None,
-        affine_tail: bool = True,
         refine: bool = True,
         format: str | None = None,
-        whole_array: bool = False,
+        each_row: bool = False,
         features: int | None = None,
         grid: tuple[int, int] | None = None,
         relative_inputs: bool = False,
@@ -113,10 +110,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.centres = centres
         self.spread = spread
         self.penalty = penalty
-        self.affine_tail = affine_tail
         self.refine = refine
         self.format = format
-        self.whole_array = whole_array
+        self.each_row = each_row
         self.features = features
         self.grid = grid
         self.relative_inputs = relative_inputs
@@ -155,9 +151,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             columns["group"] = np.unique(np.asarray(groups), return_inverse=True)[1].astype(float)
             arguments += ["--fold-column", "group"]
         arguments += option("--centres", min(self.centres, len(lines) - 1)) + option("--spread", self.spread)
-        arguments += option("--penalty", self.penalty) + option("--no-affine", not self.affine_tail)
+        arguments += option("--penalty", self.penalty)
         arguments += option("--no-refine", not self.refine) + option("--format", self.format)
-        arguments += option("--whole-array", self.whole_array) + option("--features", self.features)
+        arguments += option("--each-row", self.each_row) + option("--features", self.features)
         arguments += option("--fill", self.fill) + option("--grid", grid)
         if self.relative_inputs:
             arguments += ["--relative-inputs", *option("--rest", [pattern(names_y)])]

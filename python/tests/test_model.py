@@ -34,7 +34,7 @@ def frames():
     return taxel.synth("press", 600, stream="training", seed=3)
 
 
-@pytest.mark.parametrize("parameters", [{}, {"format": "fixed16", "confidence": True}, {"affine_tail": False}])
+@pytest.mark.parametrize("parameters", [{}, {"format": "fixed16", "confidence": True}])
 def test_the_blob_is_that_of_the_command_line(tmp_path, parameters):
     x, y = smooth()
     model = taxel.Model(12, refine=False, **parameters).fit(x, y)
@@ -57,7 +57,7 @@ def test_one_frame_after_the_other_has_the_bits_of_all_at_once(frames):
     scene = taxel.Scene("press")
     assert (scene.rows, scene.columns, frames.readings.shape) == (8, 18, (600, 144))
     x, y = frames.to_pandas()
-    model = taxel.Model(16, refine=False, whole_array=True, format="fixed16").fit(x, y)
+    model = taxel.Model(16, refine=False).fit(x, y)
     decoder = taxel.Decoder(model)
     together = model.predict(x)
     for line in range(20):

@@ -44,7 +44,7 @@ def test_a_trade_has_points_a_front_and_what_was_chosen():
 def test_errors_of_a_model_are_those_of_the_command():
     frames = taxel.synth("press", 400, stream="training")
     x, y = frames.to_pandas()
-    model = taxel.Model(8, refine=False, whole_array=True).fit(x, y)
+    model = taxel.Model(8, refine=False).fit(x, y)
     fresh = taxel.synth("press", 100)
     errors = taxel.evaluate(model, fresh.readings, fresh.outputs)
     left = (model.predict(fresh.readings) - fresh.outputs)[:, 2::3]

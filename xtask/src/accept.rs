@@ -156,7 +156,7 @@ fn own_folder() -> PathBuf {
 
 /// Uploads a model of every format and size, and lets each decode the same frames as the host.
 fn decode_all(device: &mut Device, frames: &Dataset) -> Outcome<Vec<Decoding>> {
-    let wanted = |options: &taxel_learn::Options| match (options.whole_array, options.affine_tail) {
+    let wanted = |options: &taxel_learn::Options| match (!options.each_row, options.affine_tail) {
         (false, false) => CENTRES.contains(&options.centres),
         (array, affine) => array && affine && options.centres == CENTRES[0],
     };

@@ -76,23 +76,24 @@ pub struct Training {
     pub test_frames: usize,
     /// Number of centres K of each row's network.
     pub centres: usize,
-    /// Width σ on scaled inputs; the mean width if each centre has its own.
+    /// Width σ on scaled inputs.
     pub spread: f64,
-    /// Whether the networks add an affine tail A·x.
-    pub affine_tail: bool,
-    /// How output weights are computed.
+    /// How the model is trained.
+    #[serde(default)]
+    pub method: Method,
+    /// How output weights are computed; the paper's method has its own way.
     #[serde(default)]
     pub solver: Solver,
-    /// Number format of the weights.
-    #[serde(default = "default_format", deserialize_with = "file::format::deserialize")]
-    pub format: Format,
+    /// Number format of the weights; `None` for fixed16, or f32 where that does not hold the model.
+    #[serde(default, deserialize_with = "file::format::deserialize")]
+    pub format: Option<Format>,
     /// Whether the model decodes readings, or predicts them.
     #[serde(default)]
     pub direction: Direction,
-    /// Whether one network serves all rows, behind a projection of all readings, instead of one a row.
+    /// Whether each row has a network of its own, instead of one network for all rows behind a projection of all readings.
     #[serde(default)]
-    pub whole_array: bool,
-    /// Number of features that this network sees.
+    pub each_row: bool,
+    /// Number of features that the network of all rows sees.
     pub features: Option<usize>,
     /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
     #[serde(default)]
@@ -106,6 +107,17 @@ pub struct Training {
     /// Whether the model fills missing readings from the others of their frame.
     #[serde(default)]
     pub fill: bool,
+}
+
+/// Way to train a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// As accurate as it can be: centres and projection are refined, and networks have an affine tail.
+    #[default]
+    Best,
+    /// As the paper has it ([`Options::as_in_paper`]): nothing is refined.
+    Paper,
 }
 
 /// Settings of the paper's Table 1.
@@ -122,8 +134,6 @@ pub struct Table1 {
     pub test_frames: usize,
     /// Number of centres K of each row's network.
     pub centres: usize,
-    /// Whether the networks add an affine tail A·x (the paper's network has none).
-    pub affine_tail: bool,
     /// Number of frames, and of centres, of the standard network (K = N).
     pub standard_frames: usize,
     /// How output weights are computed; the paper's way is recursive least squares.
@@ -162,10 +172,6 @@ fn by_recursion() -> Solver {
 
 fn yes() -> bool {
     true
-}
-
-fn default_format() -> Format {
-    Options::default().format
 }
 
 impl Experiment {
@@ -256,16 +262,23 @@ impl Experiment {
     /// Options for training the scene's model.
     pub fn options(&self) -> Options {
         let t = &self.training;
-        Options {
+        let usual = Options::default();
+        let options = Options {
             centres: t.centres,
             spread: t.spread,
-            affine_tail: t.affine_tail,
             solver: t.solver,
             seed: self.world.seed,
-            format: t.format,
-            whole_array: t.whole_array,
+            format: t.format.unwrap_or(usual.format),
+            or_f32: t.format.is_none(),
+            each_row: t.each_row,
             features: t.features,
-            ..Options::default()
+            ..usual
+        };
+        match t.method {
+            Method::Best => options,
+            Method::Paper => {
+                Options { format: t.format.unwrap_or(Format::F32), ..options.as_in_paper() }
+            }
         }
     }
 
@@ -424,9 +437,6 @@ fn check_table1(t: &Table1, noise_kind: NoiseKind) -> Check {
         let field = "table1.open.initial_covariance";
         require((1e-12..=1e12).contains(&delta), field, format!("{delta:?}"), || {
             "give a number from 1e-12 to 1e12; the penalty on squared weights is one over it".into()
-        })?;
-        require(!t.affine_tail, "table1.affine_tail", true, || {
-            "networks with [table1.open] have none; set it to false".into()
         })?;
     }
     let holds = (2..=2000).contains(&t.standard_frames) && t.standard_frames <= t.frames;

@@ -123,8 +123,6 @@ pub struct ModelSummary {
     pub spread: f64,
     /// Whether centres, widths and the projection were refined after K-means.
     pub refined: bool,
-    /// Whether the networks add an affine tail A·x.
-    pub affine_tail: bool,
     pub blob_bytes: usize,
     /// CRC-32 of the blob, in hexadecimal.
     pub model_crc: String,
@@ -326,7 +324,6 @@ fn model_summary(
         outputs_per_network: model.networks().next().map_or(0, |n| n.shape().outputs),
         spread: if training.refine { blob.spread() } else { options.spread },
         refined: training.refine,
-        affine_tail: options.affine_tail,
         blob_bytes: blob.bytes().len(),
         model_crc: format!("{:08x}", model.crc()),
         frame_cost,

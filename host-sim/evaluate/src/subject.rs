@@ -82,6 +82,14 @@ impl Subject {
         }
     }
 
+    /// Leaves centres of its model where K-means puts them.
+    pub fn refine_not(&mut self) {
+        match self {
+            Self::Scene(scene) => scene.training.refine = false,
+            Self::Measured(data) => data.refine = false,
+        }
+    }
+
     /// Origin of its frames, for the model's metadata.
     pub fn origin(&self) -> Origin {
         match self {

@@ -312,7 +312,7 @@ mod tests {
         let mut random = Random::new(8, Stream::Training, Purpose::Noise, 0, 0);
         dataset.outputs.values.iter_mut().for_each(|y| *y += 0.3 * random.normal());
         let folds = block_folds(dataset.frames(), 4);
-        let options = Options { centres: 1, spread: 1.0, ..Options::default() };
+        let options = Options { centres: 1, spread: 1.0, ..Options::of_rows() };
         let select = |penalties: &[f64], most_penalties: usize| {
             let penalties = penalties.iter().copied().map(Some).collect();
             let (centres, spreads) = (vec![60], vec![0.2]);
@@ -337,7 +337,7 @@ mod tests {
     fn best_spread(outputs: &[&str]) -> f64 {
         let dataset = dataset(outputs);
         let folds = random_folds(dataset.frames(), 4, 1);
-        let options = Options { centres: 1, spread: 1.0, ..Options::default() };
+        let options = Options { centres: 1, spread: 1.0, ..Options::of_rows() };
         let candidates = Candidates {
             centres: vec![20],
             spreads: vec![0.05, 0.2, 3.0],
@@ -365,7 +365,7 @@ mod tests {
             line[1] = if number % 3 == 0 { f64::NAN } else { line[0] };
         }
         let folds = block_folds(both.frames(), 4);
-        let options = Options { centres: 1, spread: 1.0, ..Options::default() };
+        let options = Options { centres: 1, spread: 1.0, ..Options::of_rows() };
         let (centres, spreads, penalties) = (vec![20], vec![0.5], vec![None]);
         let candidates =
             Candidates { centres, spreads, penalties, most_spreads: 0, most_penalties: 0 };

@@ -71,14 +71,17 @@ pub const INITIAL_COVARIANCE: f64 = 1e6;
 /// 256 better (`docs/projection.md`).
 pub const WHOLE_ARRAY_SPREAD: f64 = 0.5;
 
-/// Options of training.
+/// Usual spread of a network that is given the readings of a row.
+pub const ROW_SPREAD: f64 = 0.8;
+
+/// Options of training. The default is one network for all rows in fixed16.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Number of centres, K. Fewer are used where there are fewer distinct samples.
     pub centres: usize,
     /// Width σ of all Gaussians, on scaled inputs.
     pub spread: f64,
-    /// Whether the network adds an affine tail A·x.
+    /// Whether the network adds an affine tail A·x. Only the [paper's own way](Options::as_in_paper) has none.
     pub affine_tail: bool,
     /// Ridge penalty on squared weights, for each training frame: at 1 it is as strong as an input that is always 1,
     /// and as strong as all activations that are fully on. `None` for the usual one: 1/[`INITIAL_COVARIANCE`] for all
@@ -92,9 +95,11 @@ pub struct Options {
     pub search: kmeans::Search,
     /// Number format of the network.
     pub format: Format,
-    /// Whether one network serves all rows, behind a projection of all readings, instead of one network
-    /// a row.
-    pub whole_array: bool,
+    /// Whether f32 takes the place of a format that does not hold the network.
+    pub or_f32: bool,
+    /// Whether each row has a network of its own, instead of one network for all rows behind a projection of all
+    /// readings.
+    pub each_row: bool,
     /// Number of features that all readings are projected to; `None` for the usual one ([`projection::fit`]).
     pub features: Option<usize>,
     /// Memory in bytes that training may take, about. More is refused before it is taken.
@@ -108,14 +113,15 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             centres: 64,
-            spread: 0.8,
+            spread: ROW_SPREAD * WHOLE_ARRAY_SPREAD,
             affine_tail: true,
             penalty: None,
             solver: Solver::Qr,
             seed: 1,
             search: kmeans::Search::default(),
-            format: Format::F32,
-            whole_array: false,
+            format: Format::Fixed16,
+            or_f32: true,
+            each_row: false,
             features: None,
             most_memory_bytes: USUAL_MEMORY_BYTES,
         }
@@ -123,6 +129,49 @@ impl Default for Options {
 }
 
 impl Options {
+    /// Options for a network for each row in f32.
+    #[must_use]
+    pub fn of_rows() -> Self {
+        let usual = Self::default();
+        Self { each_row: true, spread: ROW_SPREAD, format: Format::F32, or_f32: false, ..usual }
+    }
+
+    /// The usual options for frames of `dataset`.
+    #[must_use]
+    pub fn usual_for(dataset: &Dataset) -> Self {
+        let usual = Self::default();
+        usual.for_each_row(!usual.projects(dataset))
+    }
+
+    /// These options as the paper trains: a network for each row in f32, without an affine tail, with weights by
+    /// recursion. The paper refines nothing, either.
+    #[must_use]
+    pub fn as_in_paper(self) -> Self {
+        let (affine_tail, solver) = (false, Solver::Rls);
+        Self { format: Format::F32, affine_tail, solver, ..self.for_each_row(true) }
+    }
+
+    /// These options with a network for each row, which no features stand before, or one for all. The spread is that of
+    /// the other kind times [`WHOLE_ARRAY_SPREAD`], or over it.
+    #[must_use]
+    pub fn for_each_row(self, each_row: bool) -> Self {
+        let spread = match (self.each_row, each_row) {
+            (true, false) => self.spread * WHOLE_ARRAY_SPREAD,
+            (false, true) => self.spread / WHOLE_ARRAY_SPREAD,
+            _ => self.spread,
+        };
+        let features = self.features.filter(|_| !each_row);
+        Self { each_row, spread, features, ..self }
+    }
+
+    /// Whether the network of `dataset` stands behind a projection of all readings. A single row needs more readings than
+    /// the usual number of features, and outputs that give as many; else its network is given the readings themselves,
+    /// unless a number of features is asked for.
+    pub fn projects(&self, dataset: &Dataset) -> bool {
+        !self.each_row
+            && (dataset.rows > 1 || self.features.is_some() || projection::is_usual_for(dataset))
+    }
+
     /// Checks the options against the frames of `dataset` and the outputs that these have.
     ///
     /// # Errors
@@ -151,9 +200,8 @@ impl Options {
                 "there must be fewer than the {frames} training frames; lower it or add data"
             ));
         }
-        if let (Some(features), false) = (self.features, self.whole_array) {
-            let rule =
-                "only one network for the whole array has a projection to features: leave it out";
+        if let (Some(features), false) = (self.features, !self.each_row) {
+            let rule = "only one network for all rows has a projection to features: leave it out";
             return Err(BadValue::new("features", features, rule));
         }
         self.penalty.map_or(Ok(()), check_penalty)?;
@@ -285,14 +333,23 @@ pub(crate) fn fit_each(
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<FittedNetwork>>> {
     progress.stage("fit weights", layers.hidden.len());
-    let fitted = parallel::map(layers.hidden.len(), &|row| {
-        let table = layers.seen.row_table(row);
-        let fitted = Samples::new(&table).fit_each(&layers.hidden[row], options, penalties);
-        progress.step();
-        fitted
-    });
-    // One list of networks a row-wire, one network a penalty.
-    let fitted = fitted.into_iter().collect::<Result<Vec<Vec<FittedNetwork>>>>()?;
+    let fit_rows = |options: &Options| {
+        let fitted = parallel::map(layers.hidden.len(), &|row| {
+            let table = layers.seen.row_table(row);
+            let fitted = Samples::new(&table).fit_each(&layers.hidden[row], options, penalties);
+            progress.step();
+            fitted
+        });
+        // One list of networks a row-wire, one network a penalty.
+        fitted.into_iter().collect::<Result<Vec<Vec<FittedNetwork>>>>()
+    };
+    let fitted = match fit_rows(options) {
+        Err(_) if options.or_f32 => {
+            progress.stage("fit weights in f32", layers.hidden.len());
+            fit_rows(&Options { format: Format::F32, ..*options })?
+        }
+        fitted => fitted?,
+    };
     let mut rows: Vec<_> = fitted.into_iter().map(Vec::into_iter).collect();
     Ok(penalties.iter().map(|_| rows.iter_mut().filter_map(Iterator::next).collect()).collect())
 }

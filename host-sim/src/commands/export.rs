@@ -106,7 +106,7 @@ fn write_rust(arguments: &Arguments, file: &Path, blob: &ModelBlob) -> Result<()
 /// How to train a model without this part.
 fn remedy(part: Unheld) -> &'static str {
     match part {
-        Unheld::Projection => "without --whole-array",
+        Unheld::Projection => "with --each-row",
         Unheld::RelativeInputs => "without --relative-inputs",
         Unheld::Confidence => "without --confidence",
         Unheld::Fill => "without --fill",

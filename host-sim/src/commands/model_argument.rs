@@ -1,27 +1,31 @@
 //! Options of a model, over those of its scene or the usual ones.
 
 use clap::Args;
+use taxel_core::blob::Model;
 use taxel_core::rbf::Format;
 use taxel_learn::Options;
-use taxel_learn::train::{Solver, WHOLE_ARRAY_SPREAD};
+use taxel_learn::train::Solver;
 
 use super::arguments::{format, gigabytes, solver};
+use super::stderr;
+use crate::subject::Subject;
 
 /// What a model computes, and how its numbers are held.
 #[derive(Args, Default)]
 pub struct ModelArguments {
-    /// Train without the affine tail A·x.
+    /// Train as the paper does: a network for each row in f32 without an affine tail, centres by K-means, weights by
+    /// recursion, and nothing refined.
     #[arg(long)]
-    no_affine: bool,
-    /// Train one network for all rows, behind a projection of all readings, instead of one a row. It is
-    /// more accurate, and faster from K = 64 on, but one missing reading leaves nothing to decode.
+    paper: bool,
+    /// Train a network for each row, instead of one for all rows behind a projection of all readings. It is less accurate,
+    /// but one missing reading costs only its row.
     #[arg(long)]
-    whole_array: bool,
-    /// Features that --whole-array projects all readings to: no more than outputs and products of two or three of these
-    /// [default: as many as a row has readings, or 18 for outputs that belong to no row].
+    each_row: bool,
+    /// Features that all readings are projected to: no more than outputs and products of two or three of these [default:
+    /// as many as a row has readings; none for outputs that belong to no row].
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     features: Option<usize>,
-    /// Number format of the weights [default: the scene's, or f32].
+    /// Number format of the weights [default: the scene's, or fixed16, or f32 where that does not hold the model].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
     /// How output weights are computed. Both ways give the same estimates [default: the scene's, or qr].
@@ -33,17 +37,37 @@ pub struct ModelArguments {
 }
 
 impl ModelArguments {
-    /// `options` with what was given.
-    pub fn over(&self, mut options: Options) -> Options {
-        options.affine_tail &= !self.no_affine;
-        if self.whole_array && !options.whole_array {
-            options.whole_array = true;
-            options.spread *= WHOLE_ARRAY_SPREAD;
+    /// Options of the `subject` with what was given. As the paper trains it, it is not refined.
+    pub fn over(&self, subject: &mut Subject) -> Options {
+        let mut options = subject.options();
+        if self.paper {
+            subject.refine_not();
+            options = options.as_in_paper();
+        }
+        if self.each_row {
+            options = options.for_each_row(true);
+        } else if self.features.is_some() {
+            options = options.for_each_row(false);
         }
         options.features = self.features.or(options.features);
         options.most_memory_bytes = self.most_memory.unwrap_or(options.most_memory_bytes);
-        options.format = self.format.unwrap_or(options.format);
         options.solver = self.solver.unwrap_or(options.solver);
+        if let Some(format) = self.format {
+            (options.format, options.or_f32) = (format, false);
+        }
         options
+    }
+}
+
+/// Notes on stderr that a `model` is in f32, because no other format was asked for and fixed16 does not hold it. A frame of it
+/// takes so many `cycles`.
+pub fn note_format(model: &Model<'_>, options: &Options, cycles: u64) {
+    let is_other = model.networks().any(|network| network.format() != options.format);
+    if options.or_f32 && is_other {
+        stderr::remark(format_args!(
+            "note: {} does not hold this model (--format {0} tells why), so it is in {}: a frame takes {cycles} cycles",
+            options.format.name(),
+            Format::F32.name()
+        ));
     }
 }

@@ -13,7 +13,7 @@ use clap::Args;
 use taxel_data::output::FileSet;
 use taxel_learn::{ModelBlob, Options};
 
-use super::model_argument::ModelArguments;
+use super::model_argument::{ModelArguments, note_format};
 use super::subject_argument::SubjectArgument;
 use super::{Common, arguments, command_line, print, refused_readings, stderr};
 
@@ -50,8 +50,8 @@ pub struct Arguments {
     /// Centres K of each network [default: the scene's, or 64].
     #[arg(long, value_name = "K")]
     centres: Option<usize>,
-    /// Width σ on scaled inputs, where refinement starts [default: the scene's, or 0.8; half of that for
-    /// `--whole-array`].
+    /// Width σ on scaled inputs, where refinement starts [default: the scene's, or 0.4; 0.8 for the
+    /// readings of a row].
     #[arg(long, value_name = "S")]
     spread: Option<f64>,
     /// Ridge penalty on squared weights, for each frame, as `train` takes it.
@@ -80,8 +80,8 @@ impl Default for Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let subject = arguments.subject.load_with(common, arguments.centres)?;
-    let mut options = arguments.model.over(subject.options());
+    let mut subject = arguments.subject.load_with(common, arguments.centres)?;
+    let mut options = arguments.model.over(&mut subject);
     options.centres = arguments.centres.unwrap_or(options.centres);
     options.spread = arguments.spread.unwrap_or(options.spread);
     options.penalty = arguments.penalty.or(options.penalty);
@@ -96,6 +96,7 @@ fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common
     let started = std::time::Instant::now();
     let (result, blob) = run::run(subject, options, &Terminal::new())?;
     let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
+    note_format(&blob.parse(), options, result.device_cost.cycles);
     let files = write_files(folder, &result, &blob, command)?;
     if common.json {
         return print::json(&result);

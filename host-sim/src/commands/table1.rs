@@ -90,10 +90,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 fn page_of(table: &Table1, group: &str) -> print::Page {
     let mut page = print::Page::default();
     page.line(format_args!(
-        "{group}: K = {}, affine tail: {}, {} training and {} test frames, weights by {}\n\
+        "{group}: K = {}, {} training and {} test frames, weights by {}\n\
          (in brackets: the standard network, K = N = {})",
         table.centres,
-        if table.affine_tail { "yes" } else { "no" },
         table.training_frames,
         table.test_frames,
         if table.solver == "rls" { "recursive least squares" } else { "QR decomposition" },

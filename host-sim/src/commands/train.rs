@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
+use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::worth::Worth;
 use crate::measurements::Measurements;
 use crate::metrics::{self, Errors, NETWORK};
@@ -18,7 +19,7 @@ use taxel_learn::select::Selection;
 use taxel_learn::train::Solver;
 
 use super::data_argument::JudgedBy;
-use super::model_argument::ModelArguments;
+use super::model_argument::{ModelArguments, note_format};
 use super::model_outputs::{self, ModelOutput};
 use super::scene_argument::Sizes;
 use super::subject_argument::SubjectOptions;
@@ -28,12 +29,13 @@ mod choice;
 
 /// Train a model on a scene or a CSV file, and write its blob.
 ///
-/// A CSV file trains one network for all selected columns. If the columns have the project's own names
-/// (r4c17_ohm, r4e2_dz_mm), it trains one for each row-wire.
+/// A CSV file trains one network for all selected columns, as a scene does for all rows. If the columns have the project's own
+/// names (r4c17_ohm, r4e2_dz_mm), --each-row trains one for each row-wire.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
-  host-sim train press --whole-array --centres 256 --format fixed16 -o press.bin
+  host-sim train press --centres 256 -o press.bin
+  host-sim train press --paper -o paper.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
   host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
   host-sim train log.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs -o m.bin
@@ -47,8 +49,8 @@ pub struct Arguments {
     /// Centres K; with --select, candidates [default: the scene's, or 64].
     #[arg(long, value_name = "K", value_delimiter = ',')]
     centres: Vec<usize>,
-    /// Width σ on scaled inputs, where refinement starts; with --select, candidates [default: the scene's, or 0.8;
-    /// half of that for `--whole-array`].
+    /// Width σ on scaled inputs, where refinement starts; with --select, candidates [default: the scene's, or 0.4;
+    /// 0.8 for the readings of a row].
     #[arg(long, value_name = "S", value_delimiter = ',')]
     spread: Vec<f64>,
     /// Ridge penalty on squared weights, for each frame: 1 is as strong as an input that is always 1. More of it
@@ -97,7 +99,6 @@ struct Summary {
     solver: &'static str,
     /// Whether centres, widths and the projection were refined after K-means.
     refined: bool,
-    affine_tail: bool,
     /// Whether inputs are readings relative to the baseline.
     relative_inputs: bool,
     /// Whether the model tells deviations and novelty.
@@ -126,18 +127,17 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
     let inputs = [source, baseline];
     print::check_output(&arguments.output, &inputs)?;
-    let subject = load(arguments, common)?;
+    let mut subject = load(arguments, common)?;
     refused_readings::note_scene(&subject);
-    let mut options = arguments.model.over(subject.options());
+    let mut options = arguments.model.over(&mut subject);
     let mut set = subject.training_set(None);
     set.fill |= arguments.fill;
     if set.fill {
         fill::check(&set.frames)?;
     }
-    if arguments.select && options.whole_array {
-        return Err(Error::Usage(
-            "--select chooses for one network a row: give --centres, --spread and --penalty with --whole-array".into(),
-        ));
+    if arguments.select && options.projects(&set.frames) {
+        let message = "--select chooses for networks that are given readings: add --each-row, or leave it out";
+        return Err(Error::Usage(message.into()));
     }
     let selection = choice::choose(arguments, &subject, &set, &mut options)?;
 
@@ -146,6 +146,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
+    note_format(&model, &options, DeviceCost::new(&blob)?.cycles);
     let summary = Summary {
         subject: subject.name().into(),
         seed: set.origin.seed,
@@ -158,7 +159,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         penalty: options.penalty,
         solver: options.solver.name(),
         refined: set.refine,
-        affine_tail: options.affine_tail,
         relative_inputs: set.frames.relative_inputs,
         confidence: model.confidence().is_some(),
         fill: model.fill().is_some(),
@@ -232,7 +232,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}{}{}, affine tail: {}, {} frames{}{}{}{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}{}{}, {} frames{}{}{}{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.model_crc,
@@ -241,7 +241,6 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         summary.spread,
         if summary.refined { " (refined)" } else { "" },
         summary.penalty.map_or(String::new(), |p| format!(", penalty = {}", choice::short(p))),
-        if summary.affine_tail { "yes" } else { "no" },
         summary.training_frames,
         if summary.solver == Solver::Rls.name() { ", weights by recursion" } else { "" },
         if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },

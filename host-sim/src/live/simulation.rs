@@ -56,10 +56,10 @@ const AT_REST: usize = 64;
 pub fn small_model(scene: &Experiment) -> Result<ModelBlob> {
     let mut scene = scene.clone();
     scene.training.frames = scene.training.frames.min(TRAINING_FRAMES);
-    let whole_array = scene.world.motion.largest_contact(&scene.world.sensor).is_some();
+    let each_row = scene.world.motion.largest_contact(&scene.world.sensor).is_none();
     let subject = Subject::Scene(Box::new(scene));
     let usual = subject.options();
-    let options = Options { whole_array, centres: usual.centres.min(CENTRES), ..usual };
+    let options = Options { centres: usual.centres.min(CENTRES), ..usual.for_each_row(each_row) };
     let mut training: TrainingSet<'_> = subject.training_set(None);
     (training.refine, training.confidence, training.fill) = (false, true, true);
     let full = training.blob(&options, &Silent);

@@ -104,7 +104,6 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
         series,
         end_labels: true,
     };
-    let tail = if table.affine_tail { " and an affine tail" } else { "" };
     let clipped = if clipped {
         " Arrows at the upper edge mark values off the scale, with their numbers."
     } else {
@@ -119,7 +118,7 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
         "error-by-noise",
         format!(
             "RMSE of {name} in {unit} against noise level (logarithmic). Network: K = {} \
-             centres{tail}, {} training frames. Standard: the standard RBF network, one centre for \
+             centres, {} training frames. Standard: the standard RBF network, one centre for \
              each of its {} training frames. Both are shown at their best spread of the table, \
              chosen on the test frames. Linear: the best linear decoder. Mean: always the training \
              mean.{known}{clipped}{silent}",

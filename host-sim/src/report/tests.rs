@@ -153,7 +153,6 @@ fn result(groups: &[&str]) -> RunResult {
             outputs_per_network: groups.len() * PER_ROW,
             spread: 0.8,
             refined: true,
-            affine_tail: true,
             blob_bytes: 12_345,
             model_crc: "deadbeef".into(),
             frame_cost: taxel_learn::cost::Cost {
@@ -177,7 +176,6 @@ fn result(groups: &[&str]) -> RunResult {
         distribution,
         table1: Some(Table1 {
             centres: 48,
-            affine_tail: false,
             noise_kind: NoiseKind::Relative,
             training_frames: 600,
             test_frames: 300,

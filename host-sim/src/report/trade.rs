@@ -51,7 +51,7 @@ pub fn html(trade: &Trade, command: &str) -> Page {
         1 => " One dominated point lies outside.".into(),
         outside => format!(" {outside} dominated points lie outside."),
     };
-    let networks = if trade.points.iter().any(|point| point.whole_array) {
+    let networks = if trade.points.iter().any(|point| !point.each_row) {
         " Rows: a network for each row-wire; array: one for all of them."
     } else {
         ""

@@ -96,7 +96,6 @@ impl<'a> View<'a> {
 
 fn facts(result: &RunResult, noise: Option<&str>) -> Vec<(&'static str, String)> {
     let (scene, model) = (&result.scene, &result.model);
-    let tail = if model.affine_tail { "affine tail" } else { "no affine tail" };
     let readings = if model.relative_inputs { "relative readings" } else { "readings" };
     let inputs = match model.projected_readings {
         0 => format!("{} {readings}", model.inputs_per_network),
@@ -125,7 +124,7 @@ fn facts(result: &RunResult, noise: Option<&str>) -> Vec<(&'static str, String)>
         (
             "Model",
             format!(
-                "{} network{plural}: {inputs} → K = {} → {outputs}; spread {}{refined}; {tail}",
+                "{} network{plural}: {inputs} → K = {} → {outputs}; spread {}{refined}",
                 model.networks,
                 model.centres,
                 super::format::significant(model.spread, 3)

@@ -21,7 +21,7 @@ fn network_and_linear(scene: &str, noise_level: f64) -> (Vec<Errors>, Vec<Errors
     let scene = row_4(scene, noise_level);
     let frames = |stream| -> Dataset { synthesise(&scene.world, stream, 20_000) };
     let (training, test) = (frames(Stream::Training), frames(Stream::Test));
-    assert!(scene.training.centres <= 128 && scene.training.affine_tail);
+    assert!(scene.training.centres <= 128);
     let blob = scene.train(&Silent).unwrap();
     let measure = scene.measure();
     let network = metrics::judge(&blob.prepare(), &test, &measure);

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Output};
 
-use host_sim::experiment::Experiment;
+use host_sim::experiment::{Experiment, Method};
+use taxel_learn::Options;
 
 /// Folder that is removed after the test.
 pub struct Folder(PathBuf);
@@ -123,19 +124,23 @@ pub fn untimed(json: &str) -> String {
     untimed
 }
 
-/// Built-in scene without refinement, which takes tests too long.
+/// A built-in scene with a network for each row in f32, whose centres stay where K-means puts them.
 pub fn unrefined(scene: &str) -> Experiment {
     let mut experiment = Experiment::load(scene).unwrap();
-    experiment.training.refine = false;
+    let Options { format, spread, each_row, .. } = Options::of_rows();
+    let training = &mut experiment.training;
+    (training.method, training.refine, training.format) = (Method::Best, false, Some(format));
+    (training.spread, training.each_row) = (spread, each_row);
     experiment
 }
 
-/// Scene that runs in a moment: rows 4 and 5 of `press`, without refinement.
+/// Scene that runs in a moment: rows 4 and 5 of `press`, without refinement; a network for each row in f32.
 pub fn small_scene() -> String {
     let mut scene = include_str!("../../../scenes/press.toml").to_owned();
     for (from, to) in [
         ("name = \"press\"", "name = \"small\""),
-        ("[training]", "[training]\nrefine = false"),
+        ("[training]", "[training]\nrefine = false\neach_row = true\nformat = \"f32\""),
+        ("spread = 0.4", "spread = 0.8"),
         ("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]"),
         ("frames = 20000", "frames = 3000"),
         ("test_frames = 8000", "test_frames = 500"),

@@ -234,10 +234,10 @@ fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
 
 #[test]
 fn a_device_divides_by_its_baseline_as_the_host_does() {
-    for whole_array in [false, true] {
+    for each_row in [true, false] {
         let mut scene = unrefined("press");
         (scene.training.frames, scene.training.centres) = (500, 5);
-        (scene.training.relative_inputs, scene.training.whole_array) = (true, whole_array);
+        (scene.training.relative_inputs, scene.training.each_row) = (true, each_row);
         let model = scene.train(&Silent).unwrap();
         let mut device = device(SOUND, &model);
         // A device without a baseline decodes nothing, and says why.
@@ -343,7 +343,7 @@ fn a_model_without_room_is_not_begun() {
     let mut world = press();
     world.readout.row_wires = Some(vec![4]);
     let frames = synthesise(&world, Stream::Training, 100);
-    let options = taxel_learn::Options { centres: 2, ..taxel_learn::Options::default() };
+    let options = taxel_learn::Options { centres: 2, ..taxel_learn::Options::of_rows() };
     let trained = taxel_learn::train::train(&frames, &options, &Silent).unwrap();
     let origin = taxel_learn::Origin::of_data("row", 0, 1, &frames);
     let mut blob = taxel_learn::pack(&trained, &frames, &origin).unwrap().bytes().to_vec();

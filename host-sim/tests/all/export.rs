@@ -78,7 +78,7 @@ fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
             "--relative-inputs",
             "inputs relative to the baseline: train it without --relative-inputs",
         ),
-        ("--whole-array", "a projection of the whole array: train it without --whole-array"),
+        ("--features=18", "a projection of the whole array: train it with --each-row"),
         ("--format=fixed16", "the number format fixed16: train it with --format f32"),
     ] {
         let given = match option.strip_prefix("--format") {

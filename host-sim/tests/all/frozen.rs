@@ -52,9 +52,9 @@ fn synthesised_frames_and_estimates_of_the_papers_shape_are_the_frozen_ones() {
     hold("press.csv", &std::fs::read_to_string(folder.path("press.csv")).unwrap());
     let common =
         "press --noise 0.005 --seed 12 -n 3000 --centres 16 --penalty 1e-9 --solver qr --no-refine";
-    let rows = format!("{common} --spread 0.8");
+    let rows = format!("{common} --spread 0.8 --each-row");
     hold_estimates(&folder, "rows", &rows, "press.csv");
-    let array = format!("{common} --spread 0.4 --features 18 --whole-array");
+    let array = format!("{common} --spread 0.4 --features 18");
     hold_estimates(&folder, "array", &array, "press.csv");
 }
 
@@ -65,7 +65,7 @@ fn estimates_of_a_mat_are_the_frozen_ones() {
     run(&folder, "synth mat.toml --noise 0.01 --seed 13 -n 1500 -o mat.csv --quiet");
     run(&folder, "synth mat.toml --noise 0.01 --seed 14 -n 80 -o test.csv --quiet");
     let train = "mat.csv --inputs r*c*_ohm --outputs contact_* --grid 8x8 --rest none --seed 15 --centres 24 --spread 0.4 \
-                 --features 9 --penalty 1e-7 --solver qr --no-refine --whole-array";
+                 --features 9 --penalty 1e-7 --solver qr --no-refine";
     hold_estimates(&folder, "mat", train, "test.csv");
 }
 

@@ -9,7 +9,7 @@ fn prepared(name: &str) -> Folder {
     let folder = Folder::new(name);
     let train = |file: &'static str, fill: &[&'static str]| {
         let train = ["train", "press", "-n", "1500", "--centres", "16", "--no-refine"];
-        folder.succeed(&[&train[..], &["--whole-array", "-o", file], fill].concat());
+        folder.succeed(&[&train[..], &["-o", file], fill].concat());
     };
     train("fills.bin", &["--fill"]);
     train("plain.bin", &[]);

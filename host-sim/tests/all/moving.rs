@@ -51,7 +51,7 @@ fn four_samples_are_chosen_for_still_contacts_and_one_for_moving_ones() {
     // Errors are those of the model's newest estimates, as they are and filtered.
     let scene = scene(true);
     let path = scene.world.path.unwrap();
-    for (i, point) in moving.points.iter().enumerate().filter(|(_, point)| point.whole_array) {
+    for (i, point) in moving.points.iter().enumerate().filter(|(_, point)| !point.each_row) {
         let samples = point.samples_averaged as f64;
         let synthesis = Synthesis::new(&scene.world).noise_level(0.005 / samples.sqrt());
         let (times, blob) = (point.times, ModelBlob::of_bytes(moving.blob(i)).unwrap());

@@ -165,7 +165,7 @@ fn the_files_and_the_table_tell_every_point() {
         lines
             .next()
             .unwrap()
-            .starts_with("format,whole_array,centres,spread,columns,samples_averaged,filter_ms,")
+            .starts_with("format,each_row,centres,spread,columns,samples_averaged,filter_ms,")
     );
     assert_eq!(lines.count(), every.len());
     let json: serde_json::Value = serde_json::from_str(&read("out/few/trade.json")).unwrap();
@@ -251,7 +251,7 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
     };
     let one_row = compute_plan(&scene, &plan, Bounds::default()).unwrap();
     assert!(one_row.points.len() >= 4 && one_row.left_out.is_empty());
-    assert!(one_row.points.iter().all(|point| !point.whole_array && point.centres == 20));
+    assert!(one_row.points.iter().all(|point| point.each_row && point.centres == 20));
 
     // One network for the array has half of the spread, which 16 bits cannot hold.
     scene.world.read_rows = vec![3, 4];
@@ -264,7 +264,7 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
             .all(|note| note.starts_with("fixed16 array, K = 20, 18 columns: spread = 0.2501: "))
     );
     let of_array = |trade: &Trade, name: &str| {
-        trade.points.iter().filter(|p| p.whole_array && p.format.name() == name).count()
+        trade.points.iter().filter(|p| !p.each_row && p.format.name() == name).count()
     };
     assert!(!narrow.left_out.is_empty() && of_array(&narrow, "fixed16") == 0);
     assert!(
@@ -343,7 +343,7 @@ fn a_choice_of_columns_tells_how_to_use_it_and_what_the_line_carries() {
     assert!(page.contains(", 1 column.") && !page.contains("decode fewer outputs"), "{page}");
 
     // Six columns of two rows have 12 readings, and so fewer features than the scene asks for.
-    let whole = "[training]\nwhole_array = true\nfeatures = 20";
+    let whole = "[training]\nfeatures = 20";
     folder.write("whole.toml", few_frames_of_two_rows().replacen("[training]", whole, 1));
     let steps = ["trade", "whole.toml", "--no-refine", "--centres", "16", "--column-step", "1,3"];
     let page = folder.succeed(&steps);
@@ -374,14 +374,14 @@ fn a_pad_for_pressure_alone_and_a_contact_are_traded() {
     let pad = compute_plan(&small(&pad), &plan, Bounds::default()).unwrap();
     // The board samples its other columns now and then.
     assert!(pad.points.iter().all(|point| point.times.scan_ms == Some(0.804)));
-    assert!(pad.points.iter().any(|point| point.whole_array));
+    assert!(pad.points.iter().any(|point| !point.each_row));
 
     let contact = Subject::Scene(Box::new(small(include_str!("../../../scenes/contact.toml"))));
     let bounds = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
     let mut contact =
         trade::compute(&contact, &plan, "contact_depth_mm", &bounds, &Silent).unwrap();
     contact.choose(&bounds).unwrap();
-    assert!(contact.points.iter().all(|point| point.whole_array));
+    assert!(contact.points.iter().all(|point| !point.each_row));
     assert!(contact.points[contact.chosen.unwrap()].times.frames_per_s > 140.0);
 }
 

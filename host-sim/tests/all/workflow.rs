@@ -89,8 +89,10 @@ fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     let folder = Folder::new("array");
     folder.write("scene.toml", small_scene());
     folder.succeed(&["train", "scene.toml", "-n", "2000", "-o", "rows.bin"]);
-    let array = ["train", "scene.toml", "-n", "2000", "--whole-array", "-o", "array.bin"];
-    folder.succeed(&array);
+    let scene =
+        small_scene().replace("each_row = true\n", "").replace("spread = 0.8", "spread = 0.4");
+    folder.write("array.toml", scene);
+    folder.succeed(&["train", "array.toml", "-n", "2000", "-o", "array.bin"]);
     let printed = folder.succeed(&["inspect", "array.bin"]);
     assert!(printed.contains("36 readings → 18 features for all rows"), "{printed}");
     assert!(printed.contains("\nnetwork 0 ") && !printed.contains("network 1"), "{printed}");
@@ -105,16 +107,11 @@ fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
     let (of_array, of_rows) = (rmse("array.bin"), rmse("rows.bin"));
     assert!(of_array < of_rows, "{of_array} {of_rows}");
 
-    // The scene asks for the same, but with a width of its own, of which --whole-array takes half.
-    let scene = small_scene()
-        .replace("affine_tail = true", "affine_tail = true\nwhole_array = true")
-        .replace("spread = 0.8", "spread = 0.4");
-    assert!(scene.contains("whole_array") && scene.contains("spread = 0.4"));
-    folder.write("array.toml", scene);
-    folder.succeed(&["train", "array.toml", "-n", "2000", "-o", "scene.bin"]);
-    let network =
+    // The spread of the array's network is half of that of a row's.
+    folder.succeed(&["train", "array.toml", "-n", "2000", "--each-row", "-o", "rows2.bin"]);
+    let networks =
         |model: &str| json(&folder.succeed(&["inspect", model, "--json"]))["networks"].clone();
-    assert_eq!(network("scene.bin"), network("array.bin"));
+    assert_eq!(networks("rows2.bin"), networks("rows.bin"));
 
     let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
     let mut lines: Vec<Vec<&str>> = data.lines().map(|l| l.split(',').collect()).collect();
@@ -270,8 +267,7 @@ fn every_command_has_help_with_an_example() {
 #[test]
 fn table1_shows_the_papers_cells_beside_its_own() {
     let folder = Folder::new("printed");
-    let few =
-        "frames = 60\ntest_frames = 50\ncentres = 6\naffine_tail = false\nstandard_frames = 20\n";
+    let few = "frames = 60\ntest_frames = 50\ncentres = 6\nstandard_frames = 20\n";
     let scene = include_str!("../../../scenes/paper.toml");
     let (before, _) = scene.split_once("frames = 6000").unwrap();
     let table = before.replace("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]") + few;

@@ -27,7 +27,7 @@ fn decode(criterion: &mut Criterion) {
     group.sample_size(30).throughput(Throughput::Elements(LINES as u64));
     for format in Format::ALL {
         for centres in CENTRES {
-            let options = Options { format, centres, ..Options::default() };
+            let options = Options { format, centres, ..Options::of_rows() };
             let trained = train(&dataset, &options, &Silent).expect("a network");
             let blob = pack(&trained, &dataset, &origin).expect("a blob");
             let model = blob.prepare();

@@ -32,7 +32,7 @@ fn training(criterion: &mut Criterion) {
     leave("inputs", &InputScale::new(&table).apply(&table.inputs.values));
     leave("outputs", &table.outputs.values);
     let options =
-        Options { search: SEARCH, centres: CENTRES, spread: SPREAD, ..Options::default() };
+        Options { search: SEARCH, centres: CENTRES, spread: SPREAD, ..Options::of_rows() };
     let mut group = criterion.benchmark_group("training");
     group.sample_size(15);
     group.bench_function("whole", |bencher| {

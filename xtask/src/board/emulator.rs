@@ -21,7 +21,8 @@ const OWN_PYTHON: &str = "proof/board-emulator/.venv/bin/python";
 const NEEDS: &str = "import elftools, unicorn; print(unicorn.__version__)";
 
 /// Arguments that train the model which scenarios upload, small enough that an upload takes seconds.
-const TRAIN: [&str; 5] = ["train", "press", "--no-refine", "--centres=16", "--output"];
+const TRAIN: [&str; 7] =
+    ["train", "press", "--no-refine", "--each-row", "--format=f32", "--centres=16", "--output"];
 
 /// What a scenario needs besides the image.
 pub struct Emulator {

@@ -91,12 +91,12 @@ fn made(shape: Shape, format: Format, frames: usize) -> Outcome<Model> {
         _ => dataset,
     };
     let (dataset, held_out) = (of_model(dataset), of_model(held_out));
-    let usual = Options::default();
+    let usual = Options::of_rows();
     let array = shape == Shape::Array;
     let options = Options {
         format,
         affine_tail: shape != Shape::Mat,
-        whole_array: array,
+        each_row: !array,
         spread: if array { SPREAD_OF_ARRAY } else { usual.spread },
         ..usual
     };

@@ -56,16 +56,22 @@ pub fn train(directory: &Path, wanted: impl Fn(&Options) -> bool) -> Outcome<Vec
             for (whole_array, affine_tail) in
                 [(false, false), (false, true), (true, false), (true, true)]
             {
-                let usual = Options::default();
+                let usual = Options::of_rows();
                 let spread = if whole_array { SPREAD_OF_ARRAY } else { usual.spread };
-                let options =
-                    Options { format, centres, whole_array, affine_tail, spread, ..usual };
+                let options = Options {
+                    format,
+                    centres,
+                    each_row: !whole_array,
+                    affine_tail,
+                    spread,
+                    ..usual
+                };
                 tried.push(options);
             }
         }
     }
     let model = |options: &Options| {
-        let array = if options.whole_array { "-array" } else { "" };
+        let array = if !options.each_row { "-array" } else { "" };
         let tail = if options.affine_tail { "-affine" } else { "" };
         let name = format!("{}-{}{array}{tail}", options.format.name(), options.centres);
         let blob = blob(&dataset, options, &origin).map_err(|cause| format!("{name}: {cause}"))?;

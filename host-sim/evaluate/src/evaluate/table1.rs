@@ -27,7 +27,6 @@ pub use crate::metrics::NETWORK;
 pub struct Table1 {
     /// Number of centres of each row-wire's network.
     pub centres: usize,
-    pub affine_tail: bool,
     pub noise_kind: NoiseKind,
     pub training_frames: usize,
     /// Number of frames on which each cell was evaluated.
@@ -146,7 +145,6 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
     };
     Ok(Table1 {
         centres: settings.centres,
-        affine_tail: settings.affine_tail,
         noise_kind: experiment.world.noise.kind,
         training_frames: settings.frames,
         test_frames: if on_training { settings.frames } else { settings.test_frames },
@@ -303,10 +301,9 @@ fn row_networks(
     let table = training.row_table(row);
     let samples = Samples::new(&table);
     let options = |spread| {
-        let (centres, affine_tail) = (settings.centres, settings.affine_tail);
-        let solver = settings.solver;
-        let mut options =
-            Options { centres, spread, affine_tail, solver, seed, ..Options::default() };
+        let (centres, solver) = (settings.centres, settings.solver);
+        let paper = Options::of_rows().as_in_paper();
+        let mut options = Options { centres, spread, solver, seed, ..paper };
         options.search.most_points = 4096;
         options.search.restarts = 1;
         options

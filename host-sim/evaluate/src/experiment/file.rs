@@ -14,7 +14,7 @@ use taxel_simulate::sensor::{self, Sensor, Vector3};
 use taxel_simulate::world::check_counts;
 
 use super::others::{self, OtherContact};
-use super::{Direction, Experiment, Table1, Training};
+use super::{Direction, Experiment, Method, Table1, Training};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -91,9 +91,11 @@ pub(super) mod format {
     use serde::{Deserialize, Deserializer, de::Error};
     use taxel_core::rbf::Format;
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Format, D::Error> {
+    pub fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Format>, D::Error> {
         let name = String::deserialize(deserializer)?;
-        Format::from_name(&name).ok_or_else(|| {
+        Format::from_name(&name).map(Some).ok_or_else(|| {
             let known: Vec<String> =
                 Format::ALL.iter().map(|format| format!("`{}`", format.name())).collect();
             D::Error::custom(format!("unknown format `{name}`, expected {}", known.join(", ")))
@@ -174,7 +176,10 @@ impl SceneFile {
             None if is_forward => vec![],
             None => others::derived(&world),
         };
-        let (training, table1) = (self.training, self.table1);
+        let (mut training, table1) = (self.training, self.table1);
+        // What a row's readings follow from is its own deformations.
+        training.each_row |= is_forward || training.method == Method::Paper;
+        training.refine &= training.method != Method::Paper;
         Ok(Experiment { name: self.name, digest, world, training, table1, others })
     }
 }

@@ -202,9 +202,8 @@ struct MeasuredFile {
 struct TrainingFile {
     centres: Option<usize>,
     spread: Option<f64>,
-    affine_tail: Option<bool>,
     format: Option<String>,
-    whole_array: Option<bool>,
+    each_row: Option<bool>,
     features: Option<usize>,
     refine: Option<bool>,
     confidence: Option<bool>,
@@ -221,13 +220,12 @@ pub fn measured(data: &Measurements, text: &str) -> std::result::Result<Measurem
     options.seed = file.seed.unwrap_or(options.seed);
     options.centres = t.centres.unwrap_or(options.centres);
     options.spread = t.spread.unwrap_or(options.spread);
-    options.affine_tail = t.affine_tail.unwrap_or(options.affine_tail);
     if let Some(name) = &t.format {
         let known = Format::ALL.map(Format::name);
         let unknown = || format!("unknown format `{name}`; {}", nearest(name, &known));
         options.format = Format::from_name(name).ok_or_else(unknown)?;
     }
-    options.whole_array = t.whole_array.unwrap_or(options.whole_array);
+    options.each_row = t.each_row.unwrap_or(options.each_row);
     options.features = t.features.or(options.features);
     data.refine = t.refine.unwrap_or(data.refine);
     data.confidence = t.confidence.unwrap_or(data.confidence);

@@ -219,7 +219,7 @@ fn what_makes_a_blob_fit_into_a_slot_is_computed() {
         Warning::larger_than_slot(bytes, design).unwrap().text
     };
     let found = message(&mat(160));
-    let fixes = "it fits with --format fixed16, or with --centres 112, or with --whole-array";
+    let fixes = "it fits with --format fixed16, or with --centres 112, or with --features 18";
     assert!(found.ends_with(fixes), "{found}");
     // Half of that is still too much: no format helps.
     let found = message(&mat(320));

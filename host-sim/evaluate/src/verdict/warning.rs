@@ -315,7 +315,7 @@ fn smaller(bytes: usize, design: &Design) -> Vec<String> {
             Design::of_array(design.shape, first.format, first.shape.centres, first.affine_tail);
         array.networks.iter_mut().for_each(|it| it.shape.inputs = features);
         if fits(&array) {
-            fixes.push("--whole-array".to_owned());
+            fixes.push(format!("--features {features}"));
         }
     }
     fixes

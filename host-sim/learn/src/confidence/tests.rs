@@ -18,7 +18,7 @@ fn fitted(world: &World, training: &Dataset, blob: &ModelBlob) -> ModelBlob {
 fn row_4() -> (World, Dataset, ModelBlob, ModelBlob) {
     let world = World { read_rows: vec![3], ..World::press() };
     let training = synthesise(&world, Stream::Training, 4000);
-    let options = Options { centres: 16, ..Options::default() };
+    let options = Options { centres: 16, ..Options::of_rows() };
     let trained = train(&training, &options, &Silent).unwrap();
     let blob = pack(&trained, &training, &Origin::of_data("row 4", 0, 1, &training)).unwrap();
     let with = fitted(&world, &training, &blob);
@@ -102,7 +102,7 @@ fn share_novel(readings: usize, reading: impl Fn(usize, usize) -> f64) -> f64 {
         dataset
     };
     let (seen, others) = (half(0), half(2000));
-    let options = Options { centres: 4, ..Options::default() };
+    let options = Options { centres: 4, ..Options::of_rows() };
     let trained = train(&seen, &options, &Silent).unwrap();
     let blob = pack(&trained, &seen, &Origin::of_data("data", 0, 1, &seen)).unwrap();
     let density = Density::fit(&seen, &Settings::default());

@@ -9,7 +9,7 @@ use crate::{Options, Origin, pack};
 fn model() -> (ModelBlob, Table) {
     let world = World { read_rows: vec![3, 4], ..World::press() };
     let frames = synthesise(&world, Stream::Training, 1500);
-    let options = Options { centres: 8, ..Options::default() };
+    let options = Options { centres: 8, ..Options::of_rows() };
     let trained = train(&frames, &options, &Silent).unwrap();
     let blob = pack(&trained, &frames, &Origin::of_data("rows", 0, 1, &frames)).unwrap();
     let blob = add(&blob, &frames.inputs).unwrap();

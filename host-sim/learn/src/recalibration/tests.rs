@@ -157,7 +157,7 @@ fn every_format(size: Size) {
         (Format::F32, false, true),
     ] {
         let bench = Bench::new(
-            Options { format, whole_array, ..Options::default() },
+            Options { format, each_row: !whole_array, ..Options::of_rows() },
             relative_inputs,
             size,
         );
@@ -192,7 +192,7 @@ fn few_presses_other_drifts_and_wrong_outputs_cost_a_tenth_at_most_of_all_rows()
 }
 
 fn other_presses(size: Size) {
-    let bench = Bench::new(Options::default(), false, size);
+    let bench = Bench::new(Options::of_rows(), false, size);
     let means = bench.training.inputs.means();
     let model = bench.train(&vec![STILL; means.len()]);
     // Training sees inputs scaled to their range, so neither gains nor offsets change what it reaches.
@@ -257,7 +257,7 @@ fn a_smooth_network_has_the_outputs_of_decoding_and_the_slopes_of_its_outputs() 
         (Format::Fixed16, true, 4e-3), // inputs, activations and weights have 16 bits
         (Format::Fixed16, false, 4e-3),
     ] {
-        let (blob, frames) = small(Options { affine_tail, format, ..Options::default() });
+        let (blob, frames) = small(Options { affine_tail, format, ..Options::of_rows() });
         let model = blob.prepare();
         let decoded = model.decode_table(&frames.inputs);
         let size = decoded.values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
@@ -299,7 +299,7 @@ fn a_smooth_network_has_the_outputs_of_decoding_and_the_slopes_of_its_outputs() 
 #[test]
 fn errors_before_and_after_are_those_of_decoding_and_of_presses_that_no_fit_has_seen() {
     for (format, tolerance) in [(Format::F32, 1e-3), (Format::Fixed16, 3e-2)] {
-        let (blob, frames) = small(Options { format, ..Options::default() });
+        let (blob, frames) = small(Options { format, ..Options::of_rows() });
         let frames = first(&frames, 80);
         let model = blob.prepare();
         // Far beyond the clamp.
@@ -328,7 +328,7 @@ fn errors_before_and_after_are_those_of_decoding_and_of_presses_that_no_fit_has_
 #[test]
 fn zeros_of_inputs_that_have_drifted_change_and_nothing_else() {
     for format in Format::ALL {
-        let (blob, frames) = small(Options { format, ..Options::default() });
+        let (blob, frames) = small(Options { format, ..Options::of_rows() });
         let frames = first(&frames, 80);
         let model = blob.prepare();
         // Row 5 has drifted; in row 4, a press misses a reading and another has a wild one.
@@ -360,7 +360,7 @@ fn zeros_of_inputs_that_have_drifted_change_and_nothing_else() {
 
 #[test]
 fn what_cannot_be_recalibrated_is_refused_by_name() {
-    let (blob, frames) = small(Options::default());
+    let (blob, frames) = small(Options::of_rows());
     let model = blob.prepare();
     let say = |outcome: Result<Recalibrated>| outcome.unwrap_err().to_string();
     let with = |count: usize, line: Option<usize>| {

@@ -20,15 +20,15 @@ pub struct Layers<'d> {
 }
 
 impl<'d> Layers<'d> {
-    /// Layers as the paper has them: K-means centres of the frames, and widths by a rule; for the whole array behind a
-    /// projection by regression.
+    /// Layers as the paper has them: K-means centres of the frames; for one network of all rows behind a projection by
+    /// regression.
     ///
     /// # Errors
     /// [`Error`](crate::Error) for data without a projection, or training that takes more memory than is allowed.
     pub fn start(dataset: &'d Dataset, options: &Options) -> Result<Self> {
         memory::check(dataset, options, None)?;
         let fit = || projection::fit(dataset, options.features);
-        Ok(Self::behind(options.whole_array.then(fit).transpose()?, dataset, options))
+        Ok(Self::behind(options.projects(dataset).then(fit).transpose()?, dataset, options))
     }
 
     /// K-means centres behind a given projection, or none.

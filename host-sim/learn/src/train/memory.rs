@@ -24,8 +24,8 @@ pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -
             .map(|count| count as f64);
     let usual = projection::usual_features(dataset.rows, dataset.inputs.names.len());
     let features = options.features.unwrap_or(usual) as f64;
-    let (networks, inputs) =
-        if options.whole_array { (1.0, features) } else { (rows, readings / rows) };
+    let projects = options.projects(dataset);
+    let (networks, inputs) = if projects { (1.0, features) } else { (rows, readings / rows) };
     let outputs = all_outputs / networks;
     let weights = options.centres as f64 + 1.0 + if options.affine_tail { inputs } else { 0.0 };
     let at_once = networks.min(rayon::current_num_threads() as f64);
@@ -33,7 +33,7 @@ pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -
     let tasks = dataset.outputs.missing_together().len() as f64;
     let fit = TRIANGLES * tasks * square * F64;
     let of_refinement = pieces.map_or(0.0, |pieces| (pieces as f64 + 2.0 + tasks) * square * F64);
-    let projected = if options.whole_array { (readings + all_outputs).powi(2) } else { 0.0 };
+    let projected = if projects { (readings + all_outputs).powi(2) } else { 0.0 };
     // The linear decoder that every model is judged beside.
     let linear = (readings / rows + 1.0).powi(2) * TRIANGLES * F64;
     // Where outputs are missing, each task has its own copy.
@@ -54,8 +54,8 @@ pub(super) fn check(
     let (needed, most) = (peak_bytes(dataset, options, pieces), options.most_memory_bytes);
     require(needed <= most, "memory", format!("about {}", in_words(needed)), || {
         format!(
-            "training may take at most {}; memory grows with the square of the number of centres and, with an affine \
-             tail, of inputs: give fewer, leave out the affine tail, or allow more memory",
+            "training may take at most {}; memory grows with the square of the number of centres and of inputs: give \
+             fewer, or allow more memory",
             in_words(most)
         )
     })

@@ -45,6 +45,13 @@ pub fn features_at_most(dataset: &Dataset, wanted: usize) -> usize {
     wanted.min(readings.saturating_sub(1)).min(factors(&dataset.outputs, wanted).len())
 }
 
+/// Whether all readings of `dataset` can be projected to the [usual](usual_features) number of features.
+pub(super) fn is_usual_for(dataset: &Dataset) -> bool {
+    let readings = dataset.inputs.names.len();
+    let usual = usual_features(dataset.rows, readings);
+    usual < readings && factors(&dataset.outputs, usual).len() >= usual
+}
+
 /// Fits the projection of `dataset`'s readings to so many `features`; by default to the [usual](usual_features) number,
 /// or to fewer if there are [no more](features_at_most).
 ///
@@ -64,12 +71,6 @@ pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
                 dataset.outputs.names.len()
             )
         })?;
-    } else if usual >= readings {
-        let reason = format!(
-            "whole-array input needs the readings of two row-wires or more, or more than {USUAL_FEATURES} readings; \
-             the data has {readings} of one: leave it out"
-        );
-        return Err(Error::unfit_for("whole_array", reason));
     }
     let features = features.unwrap_or(usual);
     let targets = targets(&dataset.outputs, features);

@@ -33,7 +33,7 @@ fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
 fn a_trained_network_learns_a_smooth_function() {
     let table = table(4000, 0.0);
     let samples = Samples::new(&table);
-    let options = Options { centres: 40, spread: 0.3, ..Options::default() };
+    let options = Options { centres: 40, spread: 0.3, ..Options::of_rows() };
     let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
     let predicted = infer(&fitted.network(), &table.inputs.values);
     let relative = relative_difference(&predicted, &table.outputs.values);
@@ -45,7 +45,7 @@ fn an_input_that_never_changes_is_no_obstacle() {
     let mut table = table(500, 0.0);
     table.inputs.values.iter_mut().skip(1).step_by(2).for_each(|v| *v = 77.0);
     let samples = Samples::new(&table);
-    let options = Options { centres: 10, spread: 0.3, ..Options::default() };
+    let options = Options { centres: 10, spread: 0.3, ..Options::of_rows() };
     let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
     let [lowest, highest] = fitted.network().training_range(1);
     assert_eq!(lowest, highest);
@@ -58,7 +58,7 @@ fn duplicate_samples_give_fewer_centres() {
     let mut table = table(6, 0.0);
     table.inputs.values = [[50.0, 99.0], [51.0, 99.0], [50.0, 98.0]].as_flattened().repeat(2);
     let samples = Samples::new(&table);
-    let options = Options { centres: 6, spread: 0.3, affine_tail: false, ..Options::default() };
+    let options = Options { centres: 6, spread: 0.3, affine_tail: false, ..Options::of_rows() };
     assert_eq!(samples.centres(&options, 0).len(), 3 * 2);
 }
 
@@ -82,7 +82,7 @@ fn an_offset_of_the_outputs_costs_no_more_than_f32_itself() {
         let mut table = table(500, 0.0);
         table.outputs.values.iter_mut().for_each(|value| *value += offset);
         let samples = Samples::new(&table);
-        let options = Options { centres: 30, spread: 0.5, ..Options::default() };
+        let options = Options { centres: 30, spread: 0.5, ..Options::of_rows() };
         let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
         let predicted = infer(&fitted.network(), &table.inputs.values);
         let squares = predicted.iter().zip(&table.outputs.values).map(|(p, t)| (p - t).powi(2));
@@ -102,7 +102,7 @@ fn penalties_that_share_a_decomposition_give_the_networks_that_each_gives_alone(
     let samples = Samples::new(&table);
     let penalties = [None, Some(1e-9), Some(1e-5), Some(1e-2)];
     for format in Format::ALL {
-        let options = Options { centres: 12, spread: 0.4, format, ..Options::default() };
+        let options = Options { centres: 12, spread: 0.4, format, ..Options::of_rows() };
         let centres = samples.centres(&options, 0);
         let layer = samples.layer(centres.clone(), &options);
         let together = samples.fit_each(&layer, &options, &penalties).unwrap();
@@ -116,7 +116,7 @@ fn penalties_that_share_a_decomposition_give_the_networks_that_each_gives_alone(
 
 #[test]
 fn a_penalty_is_for_each_frame() {
-    let with = |penalty| Options { penalty, ..Options::default() };
+    let with = |penalty| Options { penalty, ..Options::of_rows() };
     assert!((with(Some(1e-7)).initial_covariance(2000) * 2e-4 - 1.0).abs() < 1e-12);
     assert_eq!(with(None).initial_covariance(2000), INITIAL_COVARIANCE);
     for penalty in [0.0, -1e-7, 2.0, f64::NAN] {
@@ -130,7 +130,7 @@ fn a_penalty_is_for_each_frame() {
 fn training_that_takes_more_memory_than_is_allowed_is_refused_before_it_is_taken() {
     let names = |count: usize| (0..count).map(|column| format!("c{column}")).collect();
     let wide = Dataset::empty(names(20_000), vec!["y".into()], 1, 60);
-    let options = Options { centres: 10, ..Options::default() };
+    let options = Options { centres: 10, ..Options::of_rows() };
     let refused = train(&wide, &options, &Silent).unwrap_err().to_string();
     assert!(
         refused.starts_with("memory = about 12.9 GB: training may take at most 8.0 GB"),
@@ -179,7 +179,7 @@ fn each_output_has_the_network_that_the_lines_with_it_alone_would_give() {
     let mut solvers = vec![(Format::F32, Solver::Rls)];
     solvers.extend(Format::ALL.map(|it| (it, Solver::Qr)));
     for (format, solver) in solvers {
-        let usual = Options { centres: 20, spread: 0.4, format, solver, ..Options::default() };
+        let usual = Options { centres: 20, spread: 0.4, format, solver, ..Options::of_rows() };
         let centres = samples.centres(&usual, 0);
         for penalty in [None, Some(1e-6)] {
             let options = Options { penalty, ..usual };
@@ -219,9 +219,9 @@ fn outputs_with_too_few_frames_are_refused_by_name() {
     let refused = |data: &Dataset, options: &Options| {
         train(data, options, &Silent).expect_err("refused").to_string()
     };
-    let options = Options { centres: count, ..Options::default() };
+    let options = Options { centres: count, ..Options::of_rows() };
     let message = refused(&data, &options);
     assert!(message.contains("wave_mm") && message.contains(&format!("the {count} ")), "{message}");
     data.outputs.values.iter_mut().step_by(2).for_each(|value| *value = f64::NAN);
-    assert!(refused(&data, &Options { centres: 1, ..Options::default() }).contains("wave_mm"));
+    assert!(refused(&data, &Options { centres: 1, ..Options::of_rows() }).contains("wave_mm"));
 }

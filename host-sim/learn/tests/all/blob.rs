@@ -20,7 +20,7 @@ fn world() -> World {
 /// Blob of a model trained on `press`: two rows, 18 readings to 6 outputs, K = 8.
 fn real_blob() -> Vec<u8> {
     let dataset = synthesise(&world(), Stream::Training, 400);
-    let options = Options { format: Format::F32, centres: 8, ..Options::default() };
+    let options = Options { format: Format::F32, centres: 8, ..Options::of_rows() };
     let trained = train(&dataset, &options, &Silent).unwrap();
     let origin = Origin::of_data("press", 0, 1, &dataset);
     pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()
@@ -30,7 +30,7 @@ fn real_blob() -> Vec<u8> {
 fn blob_of_array(format: Format) -> Vec<u8> {
     let dataset = synthesise(&world(), Stream::Training, 400);
     let options =
-        Options { format, centres: 8, spread: 0.6, whole_array: true, ..Options::default() };
+        Options { format, centres: 8, spread: 0.6, each_row: false, ..Options::of_rows() };
     let trained = train(&dataset, &options, &Silent).unwrap();
     let origin = Origin::of_data("press", 0, 1, &dataset);
     pack(&trained, &dataset, &origin).unwrap().bytes().to_vec()

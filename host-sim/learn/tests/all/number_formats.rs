@@ -60,7 +60,7 @@ fn errors(name: &str, noise: f64) -> [Vec<f64>; 3] {
     let world = world(name, noise);
     let training = synthesise(&world, Stream::Training, 8000);
     let test = synthesise(&world, Stream::Test, 4000);
-    let options = Options::default();
+    let options = Options::of_rows();
     let of_rows: Vec<[Vec<f64>; 3]> = (0..ROWS.len())
         .into_par_iter()
         .map(|row| {
@@ -108,7 +108,7 @@ fn errors_of_array(noise: f64, spread: f64, format: Format) -> Vec<f64> {
     let frames = Synthesis::new(&world).noise_level(noise);
     let training = frames.frames(Stream::Training, 20000);
     let test = frames.frames(Stream::Test, 4000);
-    let options = Options { whole_array: true, format, spread, ..Options::default() };
+    let options = Options { each_row: false, format, spread, ..Options::of_rows() };
     let trained = train(&training, &options, &Silent).unwrap();
     let blob = pack(&trained, &training, &Origin::of_data("press", 0, 1, &training)).unwrap();
     let estimate = blob.prepare().decode_table(&test.inputs);

@@ -56,7 +56,7 @@ fn by_model_core(model: &Model<'_>, readings: &[f64], baseline: &[f64]) -> Vec<f
 
 #[test]
 fn readings_are_divided_as_model_core_does_before_everything_else() {
-    let blob = blob(Options { centres: 16, ..Options::default() });
+    let blob = blob(Options { centres: 16, ..Options::of_rows() });
     let model = blob.prepare();
     let metadata = model.model().metadata();
     assert!(metadata.relative_inputs);
@@ -77,7 +77,7 @@ fn readings_are_divided_as_model_core_does_before_everything_else() {
 #[test]
 fn what_multiplies_readings_and_baseline_changes_nothing() {
     for whole_array in [false, true] {
-        let blob = blob(Options { centres: 16, whole_array, ..Options::default() });
+        let blob = blob(Options { centres: 16, each_row: !whole_array, ..Options::of_rows() });
         let model = blob.prepare();
         let (readings, baseline) = readings_and_baseline();
         let decode = |gain: f64| {
@@ -97,8 +97,8 @@ fn what_multiplies_readings_and_baseline_changes_nothing() {
 
 #[test]
 fn a_channel_without_a_baseline_is_missing_and_no_baseline_leaves_nothing() {
-    let rows = blob(Options { centres: 8, ..Options::default() });
-    let array = blob(Options { centres: 8, whole_array: true, ..Options::default() });
+    let rows = blob(Options { centres: 8, ..Options::of_rows() });
+    let array = blob(Options { centres: 8, each_row: false, ..Options::of_rows() });
     let (readings, baseline) = readings_and_baseline();
     let missing = |model: &PreparedModel<'_>| -> Vec<bool> {
         let outputs = model.decode_lines(&readings);
@@ -125,7 +125,7 @@ fn a_channel_without_a_baseline_is_missing_and_no_baseline_leaves_nothing() {
 fn a_model_of_readings_takes_no_notice_of_a_baseline() {
     let world = world();
     let training = Synthesis::new(&world).frames(Stream::Training, 500);
-    let trained = train(&training, &Options { centres: 8, ..Options::default() }, &Silent).unwrap();
+    let trained = train(&training, &Options { centres: 8, ..Options::of_rows() }, &Silent).unwrap();
     let blob = pack(&trained, &training, &Origin::of_data("plain", 0, 1, &training)).unwrap();
     let model = blob.prepare();
     assert!(!model.model().metadata().relative_inputs);

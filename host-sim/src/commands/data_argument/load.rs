@@ -79,7 +79,8 @@ impl DataArguments {
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
         let inputs = training.inputs.names.len() / training.rows;
         let centres = Warning::enough_frames_for(training.fewest_values(), inputs);
-        let centres = Options::default().centres.min(centres);
+        let usual = Options::usual_for(&training);
+        let centres = usual.centres.min(centres);
         let measurements = Measurements {
             name: name.into_owned(),
             digest,
@@ -97,7 +98,7 @@ impl DataArguments {
             left_out,
             unused,
             rest,
-            options: Options { seed: how.seed, centres, ..Options::default() },
+            options: Options { seed: how.seed, centres, ..usual },
             refine: how.refine,
             confidence: how.confidence,
         };

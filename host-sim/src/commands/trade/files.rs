@@ -37,7 +37,7 @@ fn csv_of(trade: &Trade) -> String {
         .groups()
         .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
     let mut csv = format!(
-        "format,whole_array,centres,spread,columns,samples_averaged,filter_ms,lead_ms,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
+        "format,each_row,centres,spread,columns,samples_averaged,filter_ms,lead_ms,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -50,7 +50,7 @@ fn csv_of(trade: &Trade) -> String {
             csv,
             "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             p.format.name(),
-            p.whole_array,
+            p.each_row,
             p.centres,
             p.spread,
             p.columns.map_or(String::new(), |columns| columns.to_string()),

@@ -141,7 +141,7 @@ fn legend(trade: &Trade, all: bool) -> String {
                 .into(),
         );
     }
-    if trade.points.iter().any(|point| point.whole_array) {
+    if trade.points.iter().any(|point| !point.each_row) {
         lines.push("array: one network for all rows, behind a projection; not listed if larger than a slot".into());
     }
     lines.join("\n")

@@ -25,7 +25,7 @@ fn shape(format: Format) -> Shape {
 
 /// Colour of a point: by what its networks see.
 fn class(point: &Point) -> &'static str {
-    if point.whole_array { "c4 mark" } else { "c1 mark" }
+    if point.each_row { "c1 mark" } else { "c4 mark" }
 }
 
 /// Picture in this size, and the number of points that lie outside it.
@@ -52,19 +52,19 @@ fn marks(trade: &Trade, axes: &Axes) -> Vec<Series> {
     let mut shown: Vec<&Point> = trade.points.iter().filter(|it| axes.hold(trade, it)).collect();
     let style = |point: &Point| {
         let format = Format::ALL.iter().rev().position(|it| *it == point.format);
-        (point.whole_array, format)
+        (!point.each_row, format)
     };
     let chosen = trade.chosen.map(|i| &trade.points[i]);
     let is_pale = |point: &Point| {
         !point.on_front && !chosen.is_some_and(|chosen| std::ptr::eq(point, chosen))
     };
     let pale = shown.iter().find(|point| is_pale(point)).map(|point| shape(point.format));
-    let both = shown.iter().any(|p| p.whole_array) && shown.iter().any(|p| !p.whole_array);
+    let both = shown.iter().any(|p| p.each_row) && shown.iter().any(|p| !p.each_row);
     let is_chosen_shown = chosen.is_some_and(|chosen| axes.hold(trade, chosen));
     shown.sort_by_key(|point| style(point));
     shown.dedup_by_key(|point| style(point));
     let of_point = |point: &&Point| {
-        let network = match (both, point.whole_array) {
+        let network = match (both, !point.each_row) {
             (false, _) => "",
             (true, false) => " rows",
             (true, true) => " array",
@@ -204,7 +204,7 @@ impl Place {
         let mut known = Vec::new();
         for i in trade.front() {
             let point = &trade.points[i];
-            let which = (point.whole_array, point.centres, point.readings);
+            let which = (point.each_row, point.centres, point.readings);
             let Some(at) = self.of(trade, point).filter(|_| !known.contains(&which)) else {
                 continue;
             };

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use taxel_data::dataset::Dataset;
 use taxel_learn::Options;
+use taxel_learn::train::Solver;
 use taxel_learn::train::projection::{self, features_at_most};
 use taxel_simulate::Synthesis;
 use taxel_simulate::noise::Noise;
@@ -45,9 +46,9 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    /// Whether one network sees the whole array.
-    pub fn whole_array(&self) -> bool {
-        self.projection.is_some()
+    /// Whether each row has a network of its own.
+    pub fn each_row(&self) -> bool {
+        self.projection.is_none()
     }
 }
 
@@ -82,23 +83,24 @@ impl<'s> Frames<'s> {
             let passes = plan.device.passes(samples_averaged);
             Some(Touches::new(scene, synthesis, (scene.world.path?, passes), group))
         });
-        let mut options = subject.options();
+        // The paper's own way is none that a device would choose.
+        let own = subject.options();
+        let mut options = Options { affine_tail: true, solver: Solver::Qr, or_f32: false, ..own };
         if subject.scene().is_some_and(|scene| scene.world.sensor.read_columns.is_some()) {
             // A choice of fewer columns has fewer features: as many as there are.
             let possible = |wanted| features_at_most(&set.frames, wanted).max(1);
             options.features = options.features.map(possible);
         }
-        let arrays: &[bool] = match (of_array, set.frames.rows) {
-            (true, _) => &[true],
-            (false, 1) => &[false],
-            (false, _) => &[false, true],
+        let each_row: &[bool] = match (of_array, set.frames.rows) {
+            (true, _) => &[false],
+            (false, 1) => &[true],
+            (false, _) => &[true, false],
         };
-        let inputs = |&whole_array: &bool| {
-            let projection =
-                whole_array.then(|| projection::fit(&set.frames, options.features)).transpose()?;
-            Ok(Inputs { projection })
+        let inputs = |&each_row: &bool| {
+            let fit = || projection::fit(&set.frames, options.features);
+            Ok(Inputs { projection: (!each_row).then(fit).transpose()? })
         };
-        let inputs = arrays.iter().map(inputs).collect::<Result<_>>()?;
+        let inputs = each_row.iter().map(inputs).collect::<Result<_>>()?;
         let scan_ms = plan.device.scan_ms(wires, samples_averaged);
         Ok(Self {
             samples_averaged,

@@ -5,9 +5,7 @@ use taxel_core::filter::{Settings, Track};
 use taxel_core::rbf::Format;
 use taxel_data::progress::Progress;
 use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
-use taxel_learn::train::{
-    Examples, FittedNetwork, Layers, Refinement, Samples, WHOLE_ARRAY_SPREAD, refine,
-};
+use taxel_learn::train::{Examples, FittedNetwork, Layers, Refinement, Samples, refine};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 
 use super::progress::Part;
@@ -41,7 +39,7 @@ impl Judged {
         (device, prices): (&Device, &Prices),
         progress: &dyn Progress,
     ) -> Result<()> {
-        let (frames, whole_array) = (ways.frames, ways.inputs.whole_array());
+        let frames = ways.frames;
         let (projection, fitted) = fit(ways, progress)?;
         for (index, format) in formats().enumerate() {
             let of_rows = fitted.iter().map(|row| row[index].as_ref().cloned());
@@ -57,7 +55,7 @@ impl Judged {
             let noise = (origin.noise.0, frames.noise_level());
             let origin = Origin { noise, ..origin.clone() };
             let blob = pack(&trained, frames.training(), &origin)?;
-            if whole_array && blob.bytes().len() > SLOT_BYTES {
+            if !ways.inputs.each_row() && blob.bytes().len() > SLOT_BYTES {
                 continue;
             }
             self.points(&blob, ways, format, readings, (device, prices))?;
@@ -68,7 +66,7 @@ impl Judged {
 
     /// Notes why a format cannot hold a network of these settings.
     fn leave_out(&mut self, format: Format, ways: &Ways<'_>, cause: &taxel_learn::Error) {
-        let of = if ways.inputs.whole_array() { " array" } else { "" };
+        let of = if ways.inputs.each_row() { "" } else { " array" };
         let (name, centres) = (format.name(), ways.centres);
         let readings = in_words(ways.frames.wires.map(|wires| wires.columns), None);
         let cause = match cause {
@@ -105,7 +103,7 @@ impl Judged {
         let mut add = |filter: Settings, frame: Cost, errors| {
             self.points.push(Point {
                 format,
-                whole_array: inputs.whole_array(),
+                each_row: inputs.each_row(),
                 centres,
                 spread: blob.spread(),
                 readings,
@@ -146,7 +144,7 @@ pub(super) fn steps(ways: &Ways<'_>) -> usize {
 
 /// Steps of refinement, and of fitting weights, which take about as long each.
 fn parts(Ways { frames, inputs, .. }: &Ways<'_>) -> [usize; 2] {
-    let networks = if inputs.whole_array() { 1 } else { frames.training().rows };
+    let networks = if inputs.each_row() { frames.training().rows } else { 1 };
     let steps = Refinement::default().steps;
     let refining = match frames.set.examples() {
         None => 0,
@@ -170,15 +168,10 @@ fn fit(
     ways @ Ways { frames, inputs, centres }: &Ways<'_>,
     progress: &dyn Progress,
 ) -> Result<(Option<Vec<f32>>, Vec<OfFormats>)> {
-    let (dataset, whole_array) = (frames.training(), inputs.whole_array());
-    let features = frames.options.features.filter(|_| whole_array);
-    let spread = match (frames.options.whole_array, whole_array) {
-        (false, true) => WHOLE_ARRAY_SPREAD * frames.options.spread,
-        (true, false) => frames.options.spread / WHOLE_ARRAY_SPREAD,
-        _ => frames.options.spread,
-    };
+    let dataset = frames.training();
+    let own = frames.options.for_each_row(inputs.each_row());
     let centres = *centres;
-    let mut options = Options { whole_array, features, centres, spread, ..frames.options };
+    let mut options = Options { centres, ..own };
     options.check_for(dataset)?;
     let [refining, fitting] = parts(ways).map(|steps| Part::new(progress, steps, weight(centres)));
     // Layers are shared by all formats.

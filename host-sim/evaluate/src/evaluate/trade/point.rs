@@ -41,8 +41,8 @@ pub struct Point {
     /// Number format.
     #[serde(serialize_with = "by_name")]
     pub format: Format,
-    /// Whether one network decodes all rows, behind a projection, instead of one a row.
-    pub whole_array: bool,
+    /// Whether each row is decoded by a network of its own, instead of all by one behind a projection.
+    pub each_row: bool,
     /// Number of centres K of each network.
     pub centres: usize,
     /// Width σ on scaled inputs.
@@ -88,7 +88,7 @@ impl Point {
 
     /// Number format of the point, and whether it decodes the whole array at once.
     pub fn way(&self) -> String {
-        format!("{}{}", self.format.name(), if self.whole_array { " array" } else { "" })
+        format!("{}{}", self.format.name(), if self.each_row { "" } else { " array" })
     }
 
     /// Settings of the point in a few words.

@@ -45,7 +45,7 @@ impl<'f> Ways<'f> {
         for format in formats() {
             let design = self.design(format, &distinct);
             let blob_bytes = names_bytes + design.parameter_bytes();
-            if self.inputs.whole_array() && blob_bytes > SLOT_BYTES {
+            if !self.inputs.each_row() && blob_bytes > SLOT_BYTES {
                 continue;
             }
             let cost = prices.frame(&design)?;

@@ -94,10 +94,10 @@ impl Exponents {
             let b = (u128::from(square) << 32).div_ceil(decay as u128) as u64;
             let b = u32::try_from(b + u64::from(EXPONENT_MARGIN) + 1);
             let too_far = |_| {
-                let fewer = if options.whole_array || inputs <= FEW_INPUTS {
+                let fewer = if options.features.is_some() || inputs <= FEW_INPUTS {
                     String::new()
                 } else {
-                    format!(" (--whole-array --features {FEW_INPUTS} gives a network fewer inputs)")
+                    format!(" (--features {FEW_INPUTS} gives the network fewer inputs)")
                 };
                 refused(format!("exponents of fixed16 end at 64{fewer}"))
             };

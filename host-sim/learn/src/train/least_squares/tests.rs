@@ -195,7 +195,7 @@ fn the_recursion_has_the_weights_of_batch_ridge_on_a_press() {
     world.read_rows = vec![3];
     let table = taxel_simulate::synthesise(&world, Stream::Training, 2000).row_table(0);
     let samples = Samples::new(&table);
-    let options = Options { centres: 40, ..Options::default() };
+    let options = Options { centres: 40, ..Options::of_rows() };
     let centres = samples.centres(&options, 0);
     let regressors =
         Regressors { centres: &centres, inputs: 18, decays: &[0.78], affine_tail: true };

@@ -225,7 +225,8 @@ fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
         let (training, test) =
             (synthesis.frames(Stream::Training, 3000), synthesis.frames(Stream::Test, 1000));
         let spread = if whole_array { 0.4 } else { 0.8 };
-        let options = Options { centres: 12, spread, format, whole_array, ..Options::default() };
+        let options =
+            Options { centres: 12, spread, format, each_row: !whole_array, ..Options::of_rows() };
         let fresh = Fresh(synthesis);
         let refined = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -259,7 +260,7 @@ fn steps_look_at_more_frames_the_more_centres_there_are() {
     let training = Synthesis::new(&world).frames(Stream::Training, 200);
     for (centres, frames) in [(8, 300), (40, 640)] {
         let fresh = Counted(Fresh(Synthesis::new(&world)), AtomicUsize::new(0));
-        let options = Options { centres, ..Options::default() };
+        let options = Options { centres, ..Options::of_rows() };
         let settings = Refinement { steps: 2, frames: 300, ..Refinement::default() };
         let examples = Examples::Fresh(&fresh);
         train_refined(&training, &options, &settings, examples, &Silent).unwrap();
@@ -287,7 +288,7 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let synthesis = Synthesis::new(&world).noise_level(noise);
         let [training, test] = [(Stream::Training, frames), (Stream::Test, 2000)]
             .map(|(stream, frames)| synthesis.frames(stream, frames));
-        let options = Options { centres: 12, ..Options::default() };
+        let options = Options { centres: 12, ..Options::of_rows() };
         let fold_of: Vec<usize> = (0..frames).map(|frame| frame % 4).collect();
         let examples = Examples::Folds(&fold_of);
         let taken = Taken(AtomicUsize::new(0));
@@ -316,7 +317,7 @@ fn refinement_helps_outputs_that_are_missing_in_some_frames_and_those_that_are_n
             line[..9].fill(f64::NAN);
         }
     }
-    let options = Options { centres: 12, ..Options::default() };
+    let options = Options { centres: 12, ..Options::of_rows() };
     let fold_of: Vec<usize> = (0..6000).map(|frame| frame % 4).collect();
     let examples = Examples::Folds(&fold_of);
     let refined = train_refined(&training, &options, &quick(), examples, &Silent).unwrap();
@@ -340,7 +341,7 @@ fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
     let mut data = Dataset::empty(names(2), vec!["y_n".into()], 1, 300);
     data.inputs.values.fill_with(&mut draw);
     data.outputs.values.fill_with(&mut draw);
-    let options = Options { centres: 12, format: Format::Fixed16, ..Options::default() };
+    let options = Options { centres: 12, format: Format::Fixed16, ..Options::of_rows() };
     let start = Layers::start(&data, &options).unwrap();
     let least = width::least(&start.hidden[0].centres, &[[0.0, 1.0]; 2]);
     let held = |spread: f64| {
@@ -379,7 +380,7 @@ fn evened_features_are_rotated_and_span_less() {
 fn settings_that_cannot_be_used_are_refused_by_name() {
     let world = World { read_rows: vec![3], ..World::press() };
     let training = Synthesis::new(&world).frames(Stream::Training, 50);
-    let options = Options { centres: 4, ..Options::default() };
+    let options = Options { centres: 4, ..Options::of_rows() };
     let start = Layers::start(&training, &options).unwrap();
     let refused = |settings: Refinement, folds: usize, field: &str| {
         let fold_of: Vec<usize> = (0..50).map(|frame| frame % folds).collect();
@@ -407,7 +408,7 @@ fn refinement_leaves_narrow_gaussians_narrow() {
             line[0] = *x;
         }
         data.outputs.values = x.iter().map(|x| libm::sin(30.0 * x) + 0.02 * draw()).collect();
-        let options = Options { centres: 40, spread: 0.03, ..Options::default() };
+        let options = Options { centres: 40, spread: 0.03, ..Options::of_rows() };
         let fold_of: Vec<usize> = (0..x.len()).map(|frame| frame % 5).collect();
         let examples = Examples::Folds(&fold_of);
         let refined = train_refined(&data, &options, &quick(), examples, &Silent).unwrap();
