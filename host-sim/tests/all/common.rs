@@ -157,5 +157,5 @@ pub fn small_scene_with_table1() -> String {
     small_scene()
         + "\n[table1]\nspreads = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]\n\
            noise_levels = [0.01]\nframes = 1500\ntest_frames = 300\ncentres = 10\n\
-           affine_tail = false\nstandard_frames = 40\n"
+           standard_frames = 40\n"
 }
