@@ -63,7 +63,7 @@ fn models(format: Format) -> Vec<ModelBlob> {
                 *output = (3.0 * a + i as f64).sin() * (2.0 * b).cos() + 0.02 * random.normal();
             }
         }
-        let options = Options { format, centres, ..Options::default() };
+        let options = Options { format, centres, ..Options::of_rows() };
         let trained = train(&data, &options, &Silent).unwrap();
         pack(&trained, &data, &Origin::of_data("shapes", 0, 1, &data)).unwrap()
     };

@@ -69,7 +69,7 @@ fn r_squared(changes: [Change; 2], format: Format) -> Option<f64> {
         *y = of_output((3.0 * a).sin() * (2.0 * b).cos() + 0.5 * b * b);
     }
     let ranges = [data.inputs.ranges(), data.outputs.ranges()].concat();
-    let options = Options { centres: 14, format, ..Options::default() };
+    let options = Options { centres: 14, format, ..Options::of_rows() };
     let trained = match train(&data, &options, &Silent) {
         Ok(trained) => trained,
         Err(refusal) => {

@@ -28,7 +28,7 @@ fn a_model_of_extreme_data_is_no_worse_than_the_mean() {
             spread: DISTANCE * 10_f64.powf(random.between([-3.0, 3.0])),
             centres: [1, 2, 20, SAMPLES - 1, SAMPLES, 10 * SAMPLES][random.below(6)],
             seed,
-            ..Options::default()
+            ..Options::of_rows()
         };
         let [data, fresh] = [SAMPLES, 200].map(|count| law.frames(count, &mut random));
         let errors = over_mean([&data, &fresh], &options);
