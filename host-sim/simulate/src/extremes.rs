@@ -1,10 +1,12 @@
 //! The forward model where electrodes come close, touch, or would pass through each other: readings fall while layers are
 //! pressed together, or the scene is refused because electrodes may touch.
 
+use taxel_data::LANES;
 use taxel_data::random::{Purpose, Random, Stream};
 
 use crate::World;
 use crate::motion::Independent;
+use crate::sensor::{LaneModel, Precision, Scratch};
 
 #[path = "../../../proof/extremes.rs"]
 mod table;
@@ -51,16 +53,19 @@ fn world(random: &mut Random) -> World {
 /// Largest relative rise of a reading while the layers are pressed together.
 fn rise(world: &World) -> f64 {
     let most_mm = world.motion.range_mm()[2][1];
+    let model = LaneModel::new(&world.sensor);
+    let (mut scratch, mut readings) = (Scratch::default(), [[0.0; LANES]; 2]);
     let (mut before, mut worst) = ([f64::INFINITY; 2], 0.0_f64);
     for step in 0..=STEPS {
         let pressed = [0.0, 0.0, most_mm * f64::from(step) / f64::from(STEPS)];
-        let linearised = world.sensor.linearise(0, &[pressed; 2]);
-        let readings = [0, 1].map(|column| linearised[column].resistance_ohm);
-        for (now, before) in readings.iter().zip(&before) {
+        let pressed = [pressed.map(|along| [along; LANES]); 2];
+        let precision = Precision::F64;
+        model.row_column_resistance_ohm(0, precision, &pressed, &mut scratch, &mut readings);
+        for ([now, ..], before) in readings.iter().zip(&mut before) {
             assert!(now.is_finite() && *now > 0.0, "a reading is {now:e} Ω");
-            worst = worst.max(now / before - 1.0);
+            worst = worst.max(now / *before - 1.0);
+            *before = *now;
         }
-        before = readings;
     }
     worst
 }

@@ -142,8 +142,6 @@ impl Default for Kind {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
-
     use super::*;
 
     const SOLID: StandardLinearSolid =
@@ -195,34 +193,6 @@ mod tests {
             assert!((ahead_mm - (wanted_mm - 0.3 * lag_mm)).abs() < 1e-9, "{ahead_mm} {time_s}");
             response.advance(step_s, &of(wanted_mm));
             assert!((reached_mm(&*response, 0.0, wanted_mm) - ahead_mm).abs() < 1e-12);
-        }
-    }
-
-    /// In steady state a sine of ω is followed by the factor s + (1 − s)/(1 + iωτ).
-    #[test]
-    fn a_sine_is_followed_with_the_amplitude_and_phase_of_the_complex_compliance() {
-        let step_s = 1e-4;
-        for rate_hz in [0.5, 2.0, 10.0] {
-            let omega = TAU * rate_hz;
-            let (squared, lagging) = (1.0 + (0.08 * omega).powi(2), 0.08 * omega);
-            let (in_phase, behind) = (0.7 + 0.3 / squared, 0.3 * lagging / squared);
-            let mut response = SOLID.at_rest(1).unwrap();
-            let (mut sum_sine, mut sum_cosine) = (0.0, 0.0);
-            let period = (1.0 / (rate_hz * step_s)).round() as usize;
-            let settled = ((1.6 / step_s) as usize).next_multiple_of(period);
-            for step in 1..=settled + period {
-                let wanted_mm = (omega * step as f64 * step_s).sin();
-                response.advance(step_s, &of(wanted_mm));
-                if step > settled {
-                    let reached = reached_mm(&*response, 0.0, wanted_mm) * 2.0 / period as f64;
-                    sum_sine += reached * (omega * step as f64 * step_s).sin();
-                    sum_cosine += reached * (omega * step as f64 * step_s).cos();
-                }
-            }
-            let (amplitude, phase) = (in_phase.hypot(behind), -behind.atan2(in_phase));
-            // Between steps the sine is taken for straight: (ω·step)²/8 of it, and exp(−1.6/0.08) of how it began.
-            assert!((sum_sine.hypot(sum_cosine) - amplitude).abs() < 1e-5, "{rate_hz} Hz");
-            assert!((sum_cosine.atan2(sum_sine) - phase).abs() < 1e-5, "{rate_hz} Hz");
         }
     }
 

@@ -109,35 +109,29 @@ fn ratios<'t>(a: &'t Table, b: &'t Table) -> impl Iterator<Item = Vec<f64>> + 't
 
 #[test]
 fn a_drifting_gain_multiplies_all_readings_of_a_session_and_its_baseline() {
-    let gain = 0.02;
-    let still = World::press();
+    let (still, gain, frames) = (World::press(), 0.02, 5000);
     let drifting = World { drift: Some(Drift { gain }), ..still.clone() };
-    let frames = 5000;
-    let drifted = synthesise(&drifting, Stream::Test, frames);
-    let undrifted = synthesise(&still, Stream::Test, frames);
+    let [drifted, undrifted] = [&drifting, &still].map(|it| synthesise(it, Stream::Test, frames));
     assert_eq!(drifted.outputs, undrifted.outputs);
     let baselines =
-        [&drifting, &still].map(|w| Synthesis::new(w).baselines(Stream::Test, frames, 100));
-    let pairs = ratios(&drifted.inputs, &undrifted.inputs)
-        .zip(ratios(&baselines[0], &baselines[1]))
-        .map(|(readings, baseline)| [readings, baseline].concat());
+        [&drifting, &still].map(|it| Synthesis::new(it).baselines(Stream::Test, frames, 100));
     let mut factors = Vec::new();
-    for ratios in pairs {
-        assert!(ratios.iter().all(|ratio| (ratio / ratios[0] - 1.0).abs() < 1e-14));
-        factors.push(ratios[0]);
+    for (readings, baseline) in
+        ratios(&drifted.inputs, &undrifted.inputs).zip(ratios(&baselines[0], &baselines[1]))
+    {
+        let factor = readings[0];
+        let mut ratios = readings.iter().chain(&baseline);
+        assert!(ratios.all(|ratio| (ratio / factor - 1.0).abs() < 1e-14));
+        factors.push((factor - 1.0) / gain);
     }
-    // Uniform on [0.98, 1.02]: its range, its mean and its variance, within five standard errors.
-    let (n, least) = (frames as f64, factors.iter().copied().fold(f64::INFINITY, f64::min));
-    let most = factors.iter().copied().fold(0.0, f64::max);
-    assert!(least >= 1.0 - gain && least < 0.981 && most < 1.0 + gain && most > 1.019);
+    // Uniform on [−1, 1]: its range, its mean and its variance, within five standard errors.
+    let n = frames as f64;
+    let ends = factors.iter().fold([0.0_f64; 2], |[a, b], it| [a.min(*it), b.max(*it)]);
+    assert!(ends[0] >= -1.0 && ends[0] < -0.95 && ends[1] < 1.0 && ends[1] > 0.95, "{ends:?}");
     let mean = factors.iter().sum::<f64>() / n;
-    let variance = factors.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / n;
-    assert!((mean - 1.0).abs() < 5.0 * gain / (3.0 * n).sqrt(), "{mean}");
-    assert!((variance / (gain * gain / 3.0) - 1.0).abs() < 5.0 * (0.8 / n).sqrt(), "{variance}");
-    assert_ne!(
-        synthesise(&drifting, Stream::Training, 1).inputs.values,
-        drifted.inputs.values[..144]
-    );
+    let variance = factors.iter().map(|it| it * it).sum::<f64>() / n;
+    assert!(mean.abs() < 5.0 / (3.0 * n).sqrt(), "{mean}");
+    assert!((3.0 * variance - 1.0).abs() < 5.0 * (0.8 / n).sqrt(), "{variance}");
     let few = synthesise(&drifting, Stream::Test, 7);
     assert_eq!(few.inputs.values, drifted.inputs.values[..7 * 144]);
 }
@@ -149,30 +143,18 @@ fn deformations_stay_in_their_ranges_and_fill_them() {
         let floor = if name.ends_with("dz_mm") { 0.0 } else { -1.0 };
         assert!((floor..floor + 0.05).contains(&low) && (0.95..1.0).contains(&high), "{name}");
     }
-    let press = synthesise(&World::press(), Stream::Training, 5000);
-    for line in press.outputs.lines() {
-        for electrode in line.chunks_exact(3) {
-            let [dx, dy, dz] = electrode else { panic!("three axes") };
-            assert!((0.0..=1.0).contains(dz));
-            assert!(dx.hypot(*dy) <= 0.5 * dz + 1e-12, "shear exceeds its ratio");
-        }
-    }
 }
 
 #[test]
 fn a_press_has_the_spread_that_the_design_states() {
     // RMSE of the prior mean over all electrodes: 0.158 mm, computed independently to 3.5 %.
-    let press = synthesise(&World::press(), Stream::Training, 20_000);
-    let z: Vec<usize> = (0..144).filter(|c| c % 3 == 2).collect();
-    let (mut squares, mut means) = (0.0, vec![0.0; 144]);
-    let frames = press.frames() as f64;
-    for line in press.outputs.lines() {
-        means.iter_mut().zip(line).for_each(|(mean, v)| *mean += v / frames);
-    }
-    for line in press.outputs.lines() {
-        squares += z.iter().map(|c| (line[*c] - means[*c]).powi(2)).sum::<f64>();
-    }
-    let rmse_mm = (squares / (frames * z.len() as f64)).sqrt();
+    let press = synthesise(&World::press(), Stream::Training, 20_000).outputs;
+    let means = press.means();
+    let squares = press.lines().flat_map(|line| {
+        let along_z = line.iter().zip(&means).skip(2).step_by(3);
+        along_z.map(|(value, mean)| (value - mean).powi(2))
+    });
+    let rmse_mm = (squares.sum::<f64>() / (20_000.0 * 48.0)).sqrt();
     assert!((rmse_mm / 0.158 - 1.0).abs() < 0.05, "{rmse_mm} mm");
 }
 
@@ -203,20 +185,9 @@ fn world_of_contact() -> World {
 #[test]
 fn the_contact_is_the_one_that_moves_the_electrodes() {
     let (of_contact, press) = (world_of_contact(), World::press());
-    let frames = 300;
-    let [contact, press] =
-        [&of_contact, &press].map(|world| synthesise(world, Stream::Training, frames));
+    let [contact, press] = [&of_contact, &press].map(|it| synthesise(it, Stream::Training, 300));
     assert_eq!(contact.inputs, press.inputs, "the same readings, to the bit");
-    assert_eq!((contact.rows, contact.frames()), (1, frames));
-    let names = [
-        "contact_x_mm",
-        "contact_y_mm",
-        "contact_depth_mm",
-        "contact_shear_x_mm",
-        "contact_shear_y_mm",
-        "contact_force_n",
-    ];
-    assert_eq!(contact.outputs.names, names);
+    assert_eq!((contact.rows, contact.frames()), (1, 300));
     let electrodes = &of_contact.sensor.upper_electrodes_mm;
     for (contact, deformation) in contact.outputs.lines().zip(press.outputs.lines()) {
         let [x, y, depth, shear_x, shear_y, force] = contact[..] else { panic!("six outputs") };
@@ -245,21 +216,6 @@ fn nothing_touches_an_untouched_sensor() {
     for line in untouched.outputs.lines() {
         assert!(line[..2].iter().all(|centre| centre.is_nan()));
         assert_eq!(line[2..], [0.0; 4]);
-    }
-}
-
-#[test]
-fn contacts_of_motions_without_one_are_refused() {
-    let refused = |world: World| world.check().unwrap_err().to_string();
-    let contact = |wanted: &[ContactOutput]| Outputs::Contact(wanted.to_vec());
-    let message = refused(World { outputs: contact(&ContactOutput::ALL), ..World::paper() });
-    assert!(message.contains("outputs.contact = [\"centre\", \"depth\", \"shear\", \"force\"]"));
-    assert!(message.contains("set deformation.kind = \"press\""), "{message}");
-    for wanted in
-        [&[][..], &[ContactOutput::Force, ContactOutput::Centre], &[ContactOutput::Depth; 2]]
-    {
-        let message = refused(World { outputs: contact(wanted), ..World::press() });
-        assert!(message.contains("always in this order"), "{message}");
     }
 }
 
@@ -434,23 +390,6 @@ fn noise_with_a_memory_is_more_variance_on_still_frames_and_hardly_less_in_a_bas
     assert!(together.abs() / 57_600.0 < 0.05 * 0.005 * left, "{together}");
 }
 
-#[test]
-fn noise_with_half_a_memory_is_refused() {
-    for (level, correlated, time_constant_ms, field) in [
-        (0.005, 1.5, 20.0, "noise.correlated_level = 1.5"),
-        (0.005, 0.01, 0.0, "noise.time_constant_ms = 0"),
-        (0.005, 0.01, f64::INFINITY, "noise.time_constant_ms = inf"),
-        (0.005, 0.0, 20.0, "noise.time_constant_ms = 20"),
-    ] {
-        let mut world = World::press();
-        world.noise.level = level;
-        (world.noise.correlated_level, world.noise.time_constant_ms) =
-            (correlated, time_constant_ms);
-        let refused = world.check().unwrap_err().to_string();
-        assert!(refused.contains(field), "{refused}");
-    }
-}
-
 /// Rubber that reaches half of a deformation at once, and the rest with a time constant of 50 ms.
 const CREEPING: StandardLinearSolid =
     StandardLinearSolid { instant_share: 0.5, time_constant_ms: 50.0 };
@@ -543,21 +482,13 @@ fn rubber_with_a_memory_changes_where_electrodes_are_and_not_what_pushes_them() 
 }
 
 #[test]
-fn rubber_with_a_memory_is_refused_where_it_would_change_nothing_or_nobody_knows_the_answer() {
+fn rubber_with_a_memory_is_refused_where_nobody_knows_the_answer() {
     let refused = |world: World| world.check().unwrap_err().to_string();
     let creeping = World { rubber: CREEPING.into(), ..moving(50.0, 3.0) };
-    let message = refused(World { path: None, ..creeping.clone() });
-    assert!(message.contains("rubber = [rubber]: still contacts"), "{message}");
     let wanted = vec![ContactOutput::Depth, ContactOutput::Force];
     let message = refused(World { outputs: Outputs::Contact(wanted), ..creeping.clone() });
     assert!(message.contains("outputs.contact") && message.contains("[rubber]"), "{message}");
     let path = Path { duration_s: 3600.0, ..creeping.path.unwrap() };
-    let message = refused(World { path: Some(path), ..creeping.clone() });
-    assert!(
-        message.contains("motion.duration_s") && message.contains("3600000 steps"),
-        "{message}"
-    );
-    let solid = StandardLinearSolid { instant_share: 1.5, ..CREEPING };
-    let message = refused(World { rubber: solid.into(), ..creeping });
-    assert!(message.contains("rubber.instant_share = 1.5"), "{message}");
+    let message = refused(World { path: Some(path), ..creeping });
+    assert!(message.contains("motion.duration_s") && message.contains("3600000 steps"));
 }

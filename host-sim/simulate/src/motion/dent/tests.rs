@@ -41,69 +41,40 @@ fn compression_mm(contact: &Contact, places_mm: &[[f64; 2]]) -> Vec<f64> {
 
 #[test]
 fn dents_have_the_depths_computed_by_hand() {
-    let (far, near) = (8.0_f64.sqrt(), 0.5_f64.sqrt());
-    for (dent, centre, places, expected) in [
-        // Flat to 2 mm; 0.5·e⁻¹ half a millimetre farther, and 0.5·e⁻² one millimetre.
-        (
-            dent(Profile::Punch, &[2.0, 0.5]),
-            [10.0, 9.0],
-            [[11.2, 7.4], [12.5, 9.0], [10.0, 12.0]],
-            [0.5, 0.183_939_7, 0.067_667_6],
-        ),
-        // Along x, of a length of 3 deviations to each side: the end has (Φ(6) − ½)/(2Φ(3) − 1) of the depth.
-        (
-            dent(Profile::Edge, &[6.0, 1.0, 0.0]),
-            [10.0, 9.0],
-            [[10.0, 9.0], [13.0, 9.0], [10.0, 10.0]],
-            [0.5, 0.250_676_7, 0.303_265_3],
-        ),
-        // Turned by 90°, the line is along y.
-        (
-            dent(Profile::Edge, &[6.0, 1.0, 90.0]),
-            [10.0, 9.0],
-            [[10.0, 9.0], [10.0, 12.0], [11.0, 9.0]],
-            [0.5, 0.250_676_7, 0.303_265_3],
-        ),
-        // Radii of 4 and 1 mm: one deviation away along either, 0.5·e^(−½) is left.
-        (
-            dent(Profile::Ellipse, &[2.0, 4.0, 0.0]),
-            [10.0, 9.0],
-            [[10.0, 9.0], [14.0, 9.0], [10.0, 10.0]],
-            [0.5, 0.303_265_3, 0.303_265_3],
-        ),
-        // 45°: √8 along each axis are 4 mm, and √½ to one side are 1 mm.
-        (
-            dent(Profile::Ellipse, &[2.0, 4.0, 45.0]),
-            [10.0, 9.0],
-            [[10.0, 9.0], [10.0 + far, 9.0 + far], [10.0 - near, 9.0 + near]],
-            [0.5, 0.303_265_3, 0.303_265_3],
-        ),
-        // At ρ = s: 2^(−5/2) of the depth; at 2s: 5^(−5/2).
-        (
-            dent(Profile::Tail, &[2.0]),
-            [10.0, 9.0],
-            [[10.0, 9.0], [8.0, 9.0], [10.0, 13.0]],
-            [0.5, 0.088_388_3, 0.008_944_3],
-        ),
-        // Two dents 4 radii apart: each has e⁻⁸ of the other's depth, and their middle e⁻² of both.
-        (
-            dent(Profile::Pair, &[1.0, 4.0, 0.0, 0.6]),
-            [10.0, 9.0],
-            [[10.0, 9.0], [14.0, 9.0], [12.0, 9.0]],
-            [0.500_100_6, 0.300_167_7, 0.108_268_2],
-        ),
-        // Where the second would leave the face, it lies on the other side.
-        (
-            dent(Profile::Pair, &[1.0, 4.0, 0.0, 0.6]),
-            [17.0, 9.0],
-            [[17.0, 9.0], [13.0, 9.0], [20.0, 9.0]],
-            [0.500_100_6, 0.300_167_7, 0.005_554_5],
-        ),
-    ] {
-        for (found, expected) in compression_mm(&at(dent, centre), &places).iter().zip(expected) {
-            assert!((found - expected).abs() < 1e-6, "{dent:?}: {found} for {expected}");
+    let check = |profile, values: &[f64], centre_mm, expected: &[([f64; 2], f64)]| {
+        let contact = at(dent(profile, values), centre_mm);
+        for (place, expected) in expected {
+            let found = compression_mm(&contact, &[*place])[0];
+            assert!((found - expected).abs() < 1e-6, "{profile:?} {place:?}: {found}");
         }
-    }
+    };
+    let middle = [10.0, 9.0];
+    // Flat to 2 mm; 0.5·e⁻¹ half a millimetre farther, and 0.5·e⁻² one millimetre.
+    let expected = [([11.2, 7.4], 0.5), ([12.5, 9.0], 0.183_939_7), ([10.0, 12.0], 0.067_667_6)];
+    check(Profile::Punch, &[2.0, 0.5], middle, &expected);
+    // Along x, of a length of 3 deviations to each side: the end has (Φ(6) − ½)/(2Φ(3) − 1) of the depth.
+    let expected = [(middle, 0.5), ([13.0, 9.0], 0.250_676_7), ([10.0, 10.0], 0.303_265_3)];
+    check(Profile::Edge, &[6.0, 1.0, 0.0], middle, &expected);
+    // Turned by 90°, the line is along y.
+    let expected = [(middle, 0.5), ([10.0, 12.0], 0.250_676_7), ([11.0, 9.0], 0.303_265_3)];
+    check(Profile::Edge, &[6.0, 1.0, 90.0], middle, &expected);
+    // Radii of 4 and 1 mm: one deviation away along either, 0.5·e^(−½) is left.
+    let expected = [(middle, 0.5), ([14.0, 9.0], 0.303_265_3), ([10.0, 10.0], 0.303_265_3)];
+    check(Profile::Ellipse, &[2.0, 4.0, 0.0], middle, &expected);
+    // 45°: √8 along each axis are 4 mm, and √½ to one side are 1 mm.
+    let (far, near) = (8.0_f64.sqrt(), 0.5_f64.sqrt());
+    let [along, across] = [[10.0 + far, 9.0 + far], [10.0 - near, 9.0 + near]];
+    let expected = [(along, 0.303_265_3), (across, 0.303_265_3)];
+    check(Profile::Ellipse, &[2.0, 4.0, 45.0], middle, &expected);
+    // At ρ = s: 2^(−5/2) of the depth; at 2s: 5^(−5/2).
+    let expected = [(middle, 0.5), ([8.0, 9.0], 0.088_388_3), ([10.0, 13.0], 0.008_944_3)];
+    check(Profile::Tail, &[2.0], middle, &expected);
+    // Two dents 4 radii apart: each has e⁻⁸ of the other's depth, and their middle e⁻² of both.
+    let expected = [(middle, 0.500_100_6), ([14.0, 9.0], 0.300_167_7), ([12.0, 9.0], 0.108_268_2)];
+    check(Profile::Pair, &[1.0, 4.0, 0.0, 0.6], middle, &expected);
+    // Where the second would leave the face, it lies on the other side.
+    let expected = [([13.0, 9.0], 0.300_167_7), ([20.0, 9.0], 0.005_554_5)];
+    check(Profile::Pair, &[1.0, 4.0, 0.0, 0.6], [17.0, 9.0], &expected);
 }
 
 #[test]
@@ -143,7 +114,15 @@ fn the_force_is_the_integral_of_the_pressure_over_the_face() {
     for dent in dents() {
         for centre_mm in [[10.0, 9.0], [0.0, 18.0], [17.5, 4.0], [0.01, 9.0]] {
             let contact = at(dent, centre_mm);
-            let sum: f64 = compression_mm(&contact, &cells).iter().sum();
+            // A cell a lane: moving the contact is moving the place.
+            let (mut moved, mut sum) = (contact.clone(), 0.0);
+            for cells in cells.chunks_exact(LANES) {
+                moved.centre_mm =
+                    [0, 1].map(|axis| std::array::from_fn(|it| centre_mm[axis] - cells[it][axis]));
+                let mut delta = [[[0.0; LANES]; 3]];
+                moved.deform(&[[0.0; 3]], &mut delta);
+                sum += delta[0][2].iter().sum::<f64>();
+            }
             let (found, expected) =
                 (contact.force_n(&sensor)[LANES - 1], sum * stiffness * cell * cell);
             let within = if dent.profile == Profile::Punch { 5e-3 } else { 1e-4 };
