@@ -16,10 +16,6 @@ pub const NUCLEO_MHZ: u32 = 180;
 /// Speed of the NUCLEO-F446RE's serial line in bits a second, unless its image is built for another.
 pub const NUCLEO_BAUD: u32 = 921_600;
 
-/// What a Cortex-M4F's code takes to decode, piece by piece, in instructions and cycles: lines of CSV, from which
-/// `taxel-learn` predicts the cost of any model. `cargo xtask cycles --fit` fits them to counts in an emulator.
-pub const DECODING_PRICES: &str = include_str!("../prices.csv");
-
 /// Bytes that a sample of an MCP3208 takes on its bus.
 const MCP3208_BYTES: u32 = 3;
 

@@ -13,11 +13,11 @@ use taxel_data::{Dataset, Silent, Stream};
 use taxel_firmware::link::message::{Configuration, Memory, ModelIdentity, UploadState};
 use taxel_firmware::timing::ScanPlan;
 use taxel_learn::ModelBlob;
-use taxel_learn::cost::{Design, Prices};
+use taxel_learn::cost::{Cost, Design};
 use taxel_rig::device::{Device, stream, upload};
 use taxel_simulate::{Synthesis, World};
 
-use crate::cycles::models;
+use crate::cycles::{Model, train_all};
 use crate::images::NUCLEO_SPI;
 use crate::process::{Outcome, cargo, first_line, root, run as run_command, target_dir};
 use crate::size::Size;
@@ -25,8 +25,8 @@ use crate::toolchain::{Toolchain, elf};
 use board::Board;
 use record::{Beside, Decoding, Record};
 
-/// Numbers of centres of the models that are tried, in every format.
-const CENTRES: [usize; 3] = [16, 64, 256];
+/// Bytes below which models are tried: larger ones say nothing more, and take longer to upload.
+const SMALL_BYTES: usize = 60_000;
 
 /// Frames that each model decodes, of other presses than it was trained with.
 const FRAMES: usize = 10;
@@ -154,15 +154,14 @@ fn own_folder() -> PathBuf {
     target_dir().join("accept")
 }
 
-/// Uploads a model of every format and size, and lets each decode the same frames as the host.
+/// Uploads models of every format and several sizes, and lets each decode the same frames as the host.
 fn decode_all(device: &mut Device, frames: &Dataset) -> Outcome<Vec<Decoding>> {
-    let wanted = |options: &taxel_learn::Options| match (!options.each_row, options.affine_tail) {
-        (false, false) => CENTRES.contains(&options.centres),
-        (array, affine) => array && affine && options.centres == CENTRES[0],
-    };
     let folder = own_folder();
-    let mut models: Vec<PathBuf> =
-        models::train(&folder, wanted)?.into_iter().map(|model| model.path).collect();
+    fs::create_dir_all(&folder).map_err(text)?;
+    let small = |model: &&Model| model.is_of_press() && model.blob.bytes().len() < SMALL_BYTES;
+    let models = train_all()?;
+    let files = models.iter().filter(small).map(|model| Ok(model.write(&folder)?.model));
+    let mut models: Vec<PathBuf> = files.collect::<Outcome<_>>()?;
     let assessed = folder.join("fixed16-16-confidence.bin");
     run_command(cargo(&TRAIN_CONFIDENCE).arg(&assessed))?;
     models.push(assessed);
@@ -191,9 +190,7 @@ fn decode(device: &mut Device, path: &Path, frames: &Dataset) -> Outcome<Decodin
     });
     decoded.map_err(text)?;
     let measured = u64::from(device.statistics().map_err(text)?.shortest_decode_cycles);
-    let prices = Prices::accepted().map_err(text)?;
-    let cost = prices.frame(&Design::new(&blob));
-    let predicted = cost.map_err(text)?.flash_cycles;
+    let predicted = Cost::of_frame(&Design::new(&blob)).cycles;
     let model = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     println!(
         "{model:24} {bit_identical} of {FRAMES} frames bit-identical, {measured} cycles a frame, predicted {predicted}"
@@ -214,7 +211,7 @@ fn erase_and_scan(device: &mut Device) -> Outcome<(Beside<Vec<u32>>, Beside<u32>
     let scanning = Configuration { frame_period_us: PERIOD_US, send_estimates: false, ..own };
     device.configure(scanning).map_err(text)?;
     let missed_before = device.statistics().map_err(text)?.frames_missed;
-    let head = fs::read(own_folder().join("fixed16-16.bin")).map_err(text)?;
+    let head = fs::read(own_folder().join("fixed16-rows-16.bin")).map_err(text)?;
     let begun = upload::step(device, upload::begin(&head)).map_err(text)?;
     if !matches!(begun, Ok(UploadState::Receiving { .. })) {
         return Err(format!("an upload begins with {begun:?}"));

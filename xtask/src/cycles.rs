@@ -1,150 +1,182 @@
-//! Cost of decoding on a Cortex-M4: exact instructions from QEMU, and cycles by a model of the processor.
+//! Cost of decoding on a Cortex-M4: instructions counted exactly in QEMU, beside those that `host-sim` predicts.
 //!
-//! A *kernel*, as in the column of `firmware/cycles.csv`, is one way to decode: a number format, with another
-//! exponential than the default if its name ends with one, or its compiled twin (portable Rust instead of
-//! assembly) if it ends with `-portable`. `docs/cycles.md` explains all this, and has the accepted figures.
+//! `docs/cycles.md` explains all this, and has the accepted figures.
 
-mod designs;
-pub mod models;
-
-mod flash;
-mod instruction;
+mod models;
 pub mod trace;
-
-mod figures;
 mod image;
 
-mod fit;
-mod table;
-
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use taxel_learn::cost::{Cost, Design};
 
 use crate::emulate::qemu;
 use crate::images::{BENCH, build_image};
 use crate::process::{Outcome, read, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
-use figures::{Accepted, Figure};
 use image::Image;
+use models::Files;
+pub use models::{Model, train_all};
 
 /// Name of the image that is measured.
 const IMAGE: &str = "qemu-bench";
 
-/// Files of the accepted figures, and of the tables that are made from them behind a heading.
+/// Files of the accepted figures, and of the table that is made from them behind a heading.
 const DATA: &str = "firmware/cycles.csv";
 const DOCUMENT: &str = "docs/cycles.md";
 const HEADING: &str = "## Figures\n";
 
-/// What to do besides comparing with budgets and accepted figures.
+/// First line of the accepted figures.
+const HEAD: &str = "compiler,model,scope,instructions,predicted";
+
+/// Scope of the filter in time of a frame's estimate.
+const FILTER: &str = "filter";
+
+/// Most per cent by which a prediction may be off.
+const PREDICTED_PERCENT: f64 = 10.0;
+/// Most per cent by which instructions may exceed those accepted for another compiler, which makes other code. Fewer are
+/// no fault.
+const OTHER_COMPILER_PERCENT: u64 = 5;
+
+/// What to do besides comparing with accepted figures.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Print a list of objects to stdout, and nothing else.
-    #[arg(long)]
-    json: bool,
-    /// Write firmware/cycles.csv and the tables of docs/cycles.md instead of comparing.
+    /// Write firmware/cycles.csv and the table of docs/cycles.md instead of comparing.
     #[arg(long)]
     accept: bool,
-    /// Fit firmware/prices.csv anew, from which `host-sim` predicts any model's cost, to 750 random models.
-    #[arg(long, conflicts_with = "accept")]
-    fit: bool,
-    /// Count frames of this model, of any shape, and print what is predicted beside.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["accept", "fit"])]
-    model: Option<PathBuf>,
-    /// Show this kernel only, and compare it with its budget only.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["accept", "fit", "model"])]
-    kernel: Option<String>,
 }
 
-/// Measures, prints, and compares with budgets and accepted figures.
+/// Instructions of one scope of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Figure {
+    model: String,
+    /// What is counted: a frame, or the filter in time of its estimate.
+    scope: String,
+    instructions: u64,
+    predicted: u64,
+}
+
+/// Counts, prints, and compares with predictions and accepted figures.
 pub fn run(options: &Options) -> Outcome {
-    if let Some(model) = options.model.as_ref().filter(|model| !model.is_file()) {
-        return Err(format!("--model {}: there is no such file", model.display()));
-    }
     qemu::present()?;
     let toolchain = Toolchain::find()?;
     build_image(&toolchain, BENCH)?;
-    let image = Image::read(elf(IMAGE))?;
-    let (directory, compiler) = (target_dir().join("cycles"), toolchain.compiler()?);
-    if options.fit {
-        fit::fit(&image, &directory, &compiler)?;
-        eprintln!("{}", fit::judge(&image, &directory, &compiler)?);
-        return Ok(());
-    }
-    if let Some(model) = &options.model {
-        return fit::compare(model, &image, options.json);
-    }
-    let measured = measure(&image, &directory, options.kernel.as_deref())?;
-    print!("{}", if options.json { table::json(&measured) } else { table::markdown(&measured) });
-    let over_budget = figures::over_budget(&measured);
-    if !over_budget.is_empty() {
-        return Err(over_budget.join("; "));
-    }
-    if options.kernel.is_some() {
-        return Ok(());
-    }
+    let (image, compiler) = (Image::read(elf(IMAGE))?, toolchain.compiler()?);
+    let directory = target_dir().join("cycles");
+    fs::create_dir_all(&directory).map_err(|cause| cause.to_string())?;
+    let measured = |model: &Model| measure(model, &image, &model.write(&directory)?);
+    let measured: Vec<_> = train_all()?.par_iter().map(measured).collect::<Outcome<_>>()?;
+    let measured = measured.concat();
+    print!("{}", markdown(&measured));
+    let mut faults: Vec<String> = measured.iter().filter_map(off).collect();
     if options.accept {
-        let accepted = Accepted { compiler, figures: measured };
-        let document = in_document(&read(DOCUMENT)?, &accepted)?;
-        for (file, text) in [(DATA, accepted.data()), (DOCUMENT, document)] {
+        let document = in_document(&read(DOCUMENT)?, &compiler, &measured)?;
+        for (file, text) in [(DATA, data(&compiler, &measured)), (DOCUMENT, document)] {
             fs::write(root().join(file), text).map_err(|cause| format!("{file}: {cause}"))?;
         }
-        return Ok(());
+    } else {
+        let (accepted_by, accepted) = parse(&read(DATA)?)?;
+        faults.extend(differences(&accepted, &measured, accepted_by == compiler));
     }
-    let accepted = Accepted::parse(&read(DATA)?).map_err(|cause| format!("{DATA}: {cause}"))?;
-    if accepted.compiler != compiler {
-        eprintln!(
-            "{DATA} is exact for {} alone; the compiler in use is {compiler}",
-            accepted.compiler
-        );
-    }
-    let differences = accepted.differences(&compiler, &measured);
-    if !differences.is_empty() {
-        let differences = differences.join("\n  ");
-        return Err(format!(
-            "other than accepted in {DATA}:\n  {differences}\nif this is meant, cargo xtask cycles --accept"
-        ));
-    }
-    eprintln!("as accepted in {DATA}");
-    let judged = fit::judge(&image, &directory, &compiler);
-    let advice =
-        |said| format!("{said}\nif the code was changed on purpose, cargo xtask cycles --fit");
-    // With --json, stdout has the objects only.
-    eprintln!("{}", judged.map_err(advice)?);
-    Ok(())
+    if faults.is_empty() { Ok(()) } else { Err(faults.join("\n")) }
 }
 
-/// Measures the models whose cost is accepted: those of a `kernel`, or all. Figures come sorted by kernel, in the order
-/// of their first appearance, and then by K.
-fn measure(image: &Image, directory: &Path, kernel: Option<&str>) -> Outcome<Vec<Figure>> {
-    let models = models::train(directory, |_| true)?;
-    // Images are measured on all cores at once, since QEMU runs an image on one.
-    let figures = models.par_iter().map(|model| {
-        let mut measured = image.run(&model.path)?;
-        measured.retain(|it| it.scope != fit::FILTER);
-        Ok(Figure::of_run(measured, model.centres as u64, model.affine))
-    });
-    let mut figures = figures.collect::<Outcome<Vec<_>>>()?.concat();
-    let mut kernels: Vec<String> = figures.iter().map(|figure| figure.kernel.clone()).collect();
-    let mut seen = std::collections::HashSet::new();
-    kernels.retain(|kernel| seen.insert(kernel.clone()));
-    if let Some(kernel) = kernel {
-        figures.retain(|figure| figure.kernel == kernel);
-        if figures.is_empty() {
-            return Err(format!("--kernel {kernel}: measured were {}", kernels.join(", ")));
-        }
-    }
-    let place = |figure: &Figure| kernels.iter().position(|kernel| *kernel == figure.kernel);
-    figures.sort_by_key(|figure| (place(figure), figure.centres));
-    Ok(figures)
+/// Counts the scopes of a model.
+fn measure(model: &Model, image: &Image, files: &Files) -> Outcome<Vec<Figure>> {
+    let design = Design::new(&model.blob);
+    let figure = |(scope, instructions): (String, u64)| {
+        let predicted = match scope.as_str() {
+            FILTER => Cost::of_filter(design.shape),
+            _ => Cost::of_frame(&design),
+        };
+        Figure { model: model.name(), scope, instructions, predicted: predicted.instructions }
+    };
+    Ok(image.run(&files.model, &files.frame)?.into_iter().map(figure).collect())
 }
 
-/// The `document` with the tables of `accepted` figures at its end.
-fn in_document(document: &str, accepted: &Accepted) -> Outcome<String> {
+/// What is wrong with a figure's prediction.
+fn off(Figure { model, scope, instructions, predicted }: &Figure) -> Option<String> {
+    let percent = 100.0 * (*predicted as f64 / *instructions as f64 - 1.0);
+    (percent.abs() > PREDICTED_PERCENT).then(|| {
+        format!(
+            "{model}, {scope}: {instructions} instructions, and {predicted} predicted ({percent:+.1} %): change the \
+             constants in host-sim/learn/src/cost.rs"
+        )
+    })
+}
+
+/// Figures that differ from the accepted ones by more than they may.
+fn differences(accepted: &[Figure], measured: &[Figure], same_compiler: bool) -> Vec<String> {
+    let key = |figure: &Figure| (figure.model.clone(), figure.scope.clone());
+    let find = |all: &[Figure], one: &Figure| all.iter().find(|it| key(it) == key(one)).cloned();
+    let advice = "if this is meant, cargo xtask cycles --accept";
+    let of_one = |now: &Figure| {
+        let name = format!("{}, {}", now.model, now.scope);
+        let Some(then) = find(accepted, now) else {
+            return Some(format!("{name}: not accepted yet; {advice}"));
+        };
+        let most = then.instructions * (100 + OTHER_COMPILER_PERCENT) / 100;
+        let differs = if same_compiler {
+            now.instructions != then.instructions
+        } else {
+            now.instructions > most
+        };
+        let (now, then) = (now.instructions, then.instructions);
+        differs.then(|| format!("{name}: {now} instructions, accepted are {then}; {advice}"))
+    };
+    let gone = accepted.iter().filter(|it| find(measured, it).is_none());
+    let gone = gone.map(|it| format!("{}, {}: accepted, but not measured", it.model, it.scope));
+    measured.iter().filter_map(of_one).chain(gone).collect()
+}
+
+/// Parses the accepted figures: their compiler, and themselves.
+fn parse(data: &str) -> Outcome<(String, Vec<Figure>)> {
+    let rest = data.strip_prefix(HEAD).ok_or(format!("{DATA}: the first line is not {HEAD}"))?;
+    let mut compiler = String::new();
+    let mut figures = Vec::new();
+    for line in rest.lines().skip(1) {
+        let wrong = || format!("{DATA}: not understood: {line}");
+        let [by, model, scope, instructions, predicted] = line.split(',').collect::<Vec<_>>()[..]
+        else {
+            return Err(wrong());
+        };
+        compiler = by.replace(';', ",");
+        figures.push(Figure {
+            model: model.to_owned(),
+            scope: scope.to_owned(),
+            instructions: instructions.parse().map_err(|_| wrong())?,
+            predicted: predicted.parse().map_err(|_| wrong())?,
+        });
+    }
+    Ok((compiler, figures))
+}
+
+/// Contents of the file of accepted figures.
+fn data(compiler: &str, figures: &[Figure]) -> String {
+    // No comma may stand in a field.
+    let compiler = compiler.replace(',', ";");
+    let line = |Figure { model, scope, instructions, predicted }: &Figure| {
+        format!("{compiler},{model},{scope},{instructions},{predicted}\n")
+    };
+    format!("{HEAD}\n{}", figures.iter().map(line).collect::<String>())
+}
+
+/// Table of frames in Markdown.
+fn markdown(figures: &[Figure]) -> String {
+    let line = |Figure { model, instructions, predicted, .. }: &Figure| {
+        format!("| {model} | {instructions} | {predicted} |\n")
+    };
+    let head = "| model | instructions | predicted |\n|---|--:|--:|\n";
+    let frames = figures.iter().filter(|figure| figure.scope != FILTER);
+    head.to_owned() + &frames.map(line).collect::<String>()
+}
+
+/// The `document` with the table of accepted figures at its end.
+fn in_document(document: &str, compiler: &str, figures: &[Figure]) -> Outcome<String> {
     let start = document.find(HEADING).ok_or(format!("{DOCUMENT} lacks {}", HEADING.trim()))?;
     let head = &document[..start + HEADING.len()];
-    Ok(format!("{head}\n### {}\n\n{}", accepted.compiler, table::markdown(&accepted.figures)))
+    Ok(format!("{head}\nBy {compiler}:\n\n{}", markdown(figures)))
 }
 
 #[cfg(test)]
@@ -152,13 +184,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_tables_of_the_document_are_those_of_the_data() {
-        let [data, document] = [DATA, DOCUMENT].map(|file| read(file).unwrap());
-        let accepted = Accepted::parse(&data).unwrap();
-        assert_eq!(accepted.data(), data);
+    fn the_table_of_the_document_is_that_of_the_data() {
+        let [text, document] = [DATA, DOCUMENT].map(|file| read(file).unwrap());
+        let (compiler, figures) = parse(&text).unwrap();
+        assert_eq!(data(&compiler, &figures), text);
         assert!(
-            in_document(&document, &accepted).unwrap() == document,
+            in_document(&document, &compiler, &figures).unwrap() == document,
             "{DOCUMENT} has other figures than {DATA}: cargo xtask cycles --accept"
         );
+    }
+
+    #[test]
+    fn figures_are_compared_exactly_with_their_compilers_and_by_their_excess_with_others() {
+        let figure = |scope: &str, instructions, predicted| Figure {
+            model: "f32 K = 16".into(),
+            scope: scope.into(),
+            instructions,
+            predicted,
+        };
+        let accepted = [figure("frame", 1000, 0)];
+        let said = |instructions, same| {
+            differences(&accepted, &[figure("frame", instructions, 0)], same).concat()
+        };
+        assert_eq!((said(1000, true), said(1050, false), said(1, false)), Default::default());
+        assert!(said(999, true).contains("999 instructions, accepted are 1000"));
+        assert!(said(1051, false).contains("1051 instructions"));
+        let other = differences(&accepted, &[figure("filter", 1, 0)], true);
+        assert!(other[0].contains("not accepted yet") && other[1].ends_with("not measured"));
+        assert!([900, 1100].iter().all(|it| off(&figure("frame", 1000, *it)).is_none()));
+        assert!([899, 1101].iter().all(|it| off(&figure("frame", 1000, *it)).is_some()));
     }
 }

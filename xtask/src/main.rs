@@ -78,9 +78,8 @@ enum Command {
     },
     /// Print the flash and RAM of the images; fail if one takes more than firmware/budget.txt allows.
     Size,
-    /// Count in QEMU what decoding costs a Cortex-M4, for K = 16 to 256 and every kernel (a number format with an
-    /// exponential, or its portable Rust version), and compare with budgets and firmware/cycles.csv. Then judge what
-    /// firmware/prices.csv predicts by 40 random models.
+    /// Count in QEMU what decoding costs a Cortex-M4, and compare with firmware/cycles.csv and with what `host-sim`
+    /// predicts.
     Cycles(cycles::Options),
     /// Export models as C, compile them with gcc, clang and arm-none-eabi-gcc in many ways, and compare all bits with
     /// taxel-core's, on this machine and in QEMU. Then count what a frame costs a Cortex-M4F. docs/c.md has the tables.

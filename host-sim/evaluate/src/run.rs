@@ -4,7 +4,7 @@ use serde::Serialize;
 use taxel_data::columns::READINGS;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{Dataset, Progress, Stream, Table};
-use taxel_learn::cost::{Cost, Design, Prices};
+use taxel_learn::cost::{Cost, Design};
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::decoders::mean::Mean;
 use taxel_learn::outliers::Outliers;
@@ -205,7 +205,7 @@ pub fn run(
         scene: None,
         data: None,
         model: model_summary(&training, (options, test.frames()), &network, &blob)?,
-        device_cost: DeviceCost::new(&blob)?,
+        device_cost: DeviceCost::new(&blob),
         decoders,
         limit,
         by_depth: by_depth(&test.outputs, &estimate.values, &measure),
@@ -312,7 +312,7 @@ fn model_summary(
 ) -> Result<ModelSummary> {
     let model = prepared.model();
     let shape = model.shape();
-    let frame_cost = Prices::accepted()?.frame(&Design::new(blob))?;
+    let frame_cost = Cost::of_frame(&Design::new(blob));
     Ok(ModelSummary {
         training_frames: training.frames.frames(),
         test_frames,

@@ -314,7 +314,7 @@ fn page_of(
         title: format!("{model_file} on {data_file}"),
         facts,
         verdict: &summary.verdict,
-        device: &DeviceCost::new(blob)?,
+        device: &DeviceCost::new(blob),
         decoders: &summary.decoders,
         linear_at_training: &summary.linear_at_training,
         limit: &limit,

@@ -11,7 +11,7 @@ use taxel_core::blob::{Metadata, Model};
 use taxel_firmware::capacity::{Capacity, WEIGHT_RAM_BYTES};
 use taxel_firmware::timing::ScanPlan;
 use taxel_learn::ModelBlob;
-use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
+use taxel_learn::cost::{Cost, DecoderRam, Design};
 use taxel_rig::image;
 
 use super::model_outputs::{self, ModelOutput};
@@ -162,7 +162,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         weights_in_ram: design.weights_in_ram,
         needs: needs(&model, &design, blob.bytes().len()),
         scan: scan(&model),
-        frame_cost: Prices::accepted()?.frame(&design)?,
+        frame_cost: Cost::of_frame(&design),
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: model_outputs::of(&model),
     })
@@ -206,17 +206,10 @@ fn scan(model: &Model<'_>) -> Option<ScanSummary> {
 }
 
 /// Cost of a frame for people.
-fn costs(cost: Cost, weights_in_ram: bool) -> String {
-    // What weights in flash cost is a lower bound.
-    let least = if weights_in_ram { "" } else { "at least " };
-    let at = |cycles: u64, clock_mhz: f64| cycles as f64 / clock_mhz;
+fn costs(Cost { instructions, cycles }: Cost) -> String {
     format!(
-        "{} instructions, {} cycles ({:.0} µs at 168 MHz); from flash {least}{} ({:.0} µs at 180 MHz)",
-        cost.instructions,
-        cost.cycles,
-        at(cost.cycles, 168.0),
-        cost.flash_cycles,
-        at(cost.flash_cycles, 180.0)
+        "{instructions} instructions, {cycles} cycles ({:.0} µs at 168 MHz)",
+        cycles as f64 / 168.0
     )
 }
 
@@ -311,7 +304,7 @@ fn page_of(s: &Summary) -> print::Page {
             ),
         );
     }
-    line("a frame", costs(s.frame_cost, s.weights_in_ram));
+    line("a frame", costs(s.frame_cost));
     let relative = if s.relative_inputs { "; relative to the baseline, R/R₀" } else { "" };
     let names = ends(&s.inputs.iter().map(|c| c.name.as_str()).collect::<Vec<_>>());
     line("inputs", format!("{names}{relative}"));

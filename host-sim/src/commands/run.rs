@@ -199,8 +199,8 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         model.model_crc
     ));
     page.line(format_args!(
-        "a frame on a Cortex-M4F: {} instructions, {} cycles at zero wait, {} from flash",
-        model.frame_cost.instructions, model.frame_cost.cycles, model.frame_cost.flash_cycles
+        "a frame on a Cortex-M4F: {} instructions, {} cycles",
+        model.frame_cost.instructions, model.frame_cost.cycles
     ));
     page.line("");
     let decoders: Vec<_> =

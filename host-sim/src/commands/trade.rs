@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use crate::error::{Bounded, NoPoint};
-use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Memory, Plan, Readout, Wires};
+use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Plan, Readout, Wires};
 use crate::metrics;
 use crate::subject::Subject;
 use crate::verdict::Warning;
@@ -31,8 +31,8 @@ mod page;
 ///
 /// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/`, and with a bound chosen.bin, all together
 /// at the end; those of an earlier trade go.
-/// That time is the scan's, by the plan of the board's firmware for either readout (docs/board.md), and the decoding's, by
-/// the price list of the firmware's code (docs/cycles.md). Bounds that nothing can meet are refused before anything is trained.
+/// That time is the scan's, by the plan of the board's firmware for either readout (docs/board.md), and the decoding's, as
+/// predicted (docs/cycles.md). Bounds that nothing can meet are refused before anything is trained.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim trade press
@@ -84,10 +84,6 @@ pub struct Arguments {
     /// Clock of the device.
     #[arg(long, value_name = "MHZ", default_value_t = BOARD_CLOCK_MHZ, allow_negative_numbers = true)]
     clock_mhz: f64,
-    /// Memory that the device runs its code from: flash with the wait states of an STM32F446 at 180 MHz, or memory
-    /// that never waits.
-    #[arg(long, value_enum, default_value_t = MemoryOption::Flash)]
-    memory: MemoryOption,
     /// Readout of the board: converters on a bus, or the chip's own, which scan while the frame before is decoded
     /// (docs/board.md).
     #[arg(long, value_enum, default_value_t = ReadoutOption::Spi)]
@@ -125,7 +121,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let device = Device {
         clock_mhz: arguments.clock_mhz,
-        memory: arguments.memory.into(),
         readout: arguments.readout.into(),
         scan_ms: arguments.scan_ms,
     };
@@ -221,22 +216,6 @@ const fn option(bounded: Bounded) -> &'static str {
         Bounded::Flash => "--max-flash",
         Bounded::FrameRate => "--frame-rate",
         Bounded::Latency => "--max-latency-ms",
-    }
-}
-
-/// Value of `--memory`.
-#[derive(Clone, Copy, ValueEnum)]
-enum MemoryOption {
-    Flash,
-    Ram,
-}
-
-impl From<MemoryOption> for Memory {
-    fn from(option: MemoryOption) -> Self {
-        match option {
-            MemoryOption::Flash => Self::Flash,
-            MemoryOption::Ram => Self::Ram,
-        }
     }
 }
 

@@ -146,7 +146,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     output::write_bytes(&arguments.output, blob.bytes())?;
 
     let model = blob.parse();
-    note_format(&model, &options, DeviceCost::new(&blob)?.cycles);
+    note_format(&model, &options, DeviceCost::new(&blob).cycles);
     let summary = Summary {
         subject: subject.name().into(),
         seed: set.origin.seed,

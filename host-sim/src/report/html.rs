@@ -234,14 +234,12 @@ fn cost(view: &View<'_>) -> String {
         bytes => format!("{} of them weights", grouped(bytes)),
     };
     let fits = if device.fits_slot { "fits" } else { "does not fit" };
-    let least = if device.weights_in_ram { "" } else { "at least " };
     format!(
-        "<dl>\n<div><dt>Decoding a frame</dt><dd>{least}{}\u{a0}<span>µs</span></dd><dd class=\"small\">{least}{} cycles \
-         from flash at 180\u{a0}MHz; {} without waiting</dd></div>\n\
+        "<dl>\n<div><dt>Decoding a frame</dt><dd>{}\u{a0}<span>µs</span></dd><dd class=\"small\">{} cycles \
+         at 180\u{a0}MHz, without waiting</dd></div>\n\
          <div><dt>RAM</dt><dd>{ram}\u{a0}<span>B</span></dd><dd class=\"small\">{of_ram}</dd></div>\n\
          <div><dt>Blob</dt><dd>{}\u{a0}<span>B</span></dd><dd class=\"small\">{fits} a slot of {}\u{a0}B</dd></div>\n</dl>\n",
-        significant(device.flash_us, 3),
-        grouped(device.flash_cycles as usize),
+        significant(device.us, 3),
         grouped(device.cycles as usize),
         grouped(device.blob_bytes),
         grouped(device.slot_bytes)
@@ -269,5 +267,5 @@ fn made(view: &View<'_>) -> String {
     }
     let version = env!("CARGO_PKG_VERSION");
     let _ = writeln!(html, "<div><dt>Program</dt><dd>host-sim {version}</dd></div>\n</dl>");
-    html + "<p class=\"note\">Cycles and RAM are those of a Cortex-M4F by the price list in docs/cycles.md.</p>\n"
+    html + "<p class=\"note\">Cycles and RAM are those of a Cortex-M4F as docs/cycles.md predicts them.</p>\n"
 }

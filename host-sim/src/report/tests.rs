@@ -130,8 +130,7 @@ fn result(groups: &[&str]) -> RunResult {
         }),
         device_cost: DeviceCost {
             cycles: 34_000,
-            flash_cycles: 36_000,
-            flash_us: 200.0,
+            us: 200.0,
             ram_bytes: 2000,
             weights_in_ram: true,
             blob_bytes: 12_345,
@@ -155,11 +154,7 @@ fn result(groups: &[&str]) -> RunResult {
             refined: true,
             blob_bytes: 12_345,
             model_crc: "deadbeef".into(),
-            frame_cost: taxel_learn::cost::Cost {
-                instructions: 20_000,
-                cycles: 34_000,
-                flash_cycles: 36_000,
-            },
+            frame_cost: taxel_learn::cost::Cost { instructions: 20_000, cycles: 34_000 },
         },
         decoders: [("network", 0.1), ("linear", 0.2), ("mean", 0.3)]
             .map(|(name, rmse)| DecoderErrors {

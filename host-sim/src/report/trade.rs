@@ -6,7 +6,7 @@ use super::figures::{Figure, Figures, Page};
 use super::format::{fixed, grouped, noise, significant, symbol, unbroken};
 use super::html::document;
 use super::svg::escape;
-use taxel_evaluate::evaluate::trade::{Memory, Trade};
+use taxel_evaluate::evaluate::trade::Trade;
 
 mod scales;
 mod labels;
@@ -32,12 +32,8 @@ pub fn html(trade: &Trade, command: &str) -> Page {
         ),
         None => tested,
     };
-    let memory = match trade.device.memory {
-        Memory::Flash => "code in flash with 5 wait states",
-        Memory::Ram => "memory that never waits",
-    };
     let mut body = format!(
-        "<header>\n<h1>{}</h1>\n<p>{}; {} ways to decode on a Cortex-M4F at {}\u{a0}MHz, {memory}.</p>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n<p>{}; {} ways to decode on a Cortex-M4F at {}\u{a0}MHz.</p>\n</header>\n",
         escape(&title),
         escape(&unbroken(&tested)),
         trade.points.len(),
@@ -69,13 +65,12 @@ pub fn html(trade: &Trade, command: &str) -> Page {
         body,
         "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> The Pareto front, from fast to slow. \
          <a href=\"trade.csv\">trade.csv</a> has all {} points and all outputs.</figcaption>\n{}<p class=\"note\">{}</p>\n\
-         <p class=\"note\">Cycles are those of decoding, by the project’s models of a Cortex-M4F at zero wait and from flash \
-         (not checked against silicon), code of {}. {}</p>\n</figure>\n\
+         <p class=\"note\">Cycles are those of decoding by a Cortex-M4F whose memory never waits, predicted to a tenth \
+         (not checked against silicon). {}</p>\n</figure>\n\
          <p class=\"note\">Made by <code>{}</code></p>\n",
         grouped(trade.points.len()),
         table::of_front(trade),
         escape(&named(trade, &references(trade))),
-        escape(&trade.compiler),
         unbroken(&scan(trade)),
         escape(command),
     );

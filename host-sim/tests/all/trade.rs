@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use crate::common::{Folder, small_scene, unrefined};
 use host_sim::Result;
-use host_sim::evaluate::trade::{self, Bounds, Device, Memory, Plan, Trade};
+use host_sim::evaluate::trade::{self, Bounds, Device, Plan, Trade};
 use host_sim::experiment::Experiment;
 use host_sim::subject::Subject;
 use taxel_data::{Silent, Stream};
@@ -23,7 +23,7 @@ fn plan() -> Plan {
         centres: vec![16, 64],
         column_steps: vec![1],
         samples_averaged: vec![1, 16],
-        device: Device { clock_mhz: 100.0, memory: Memory::Ram, ..Device::default() },
+        device: Device { clock_mhz: 100.0, ..Device::default() },
         worst_case: false,
     }
 }

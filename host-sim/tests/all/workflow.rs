@@ -328,7 +328,7 @@ fn inspect_says_what_image_a_model_needs() {
         let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "--centres", "8"];
         folder.succeed(&[&train[..], &["--no-refine", "-o", "m.bin"]].concat());
         let printed = folder.succeed(&["inspect", "m.bin"]);
-        assert!(printed.contains("a frame ") && printed.contains("from flash"), "{printed}");
+        assert!(printed.contains("a frame ") && printed.contains(" cycles ("), "{printed}");
         match says {
             Some(says) => assert!(printed.contains(says), "{printed}"),
             None => assert!(!printed.contains("TAXEL_CAPACITY"), "{printed}"),

@@ -1,4 +1,4 @@
-//! Instructions and cycles of the C code on a Cortex-M4F, counted in QEMU, beside what Taxel's own routines take.
+//! Instructions of the C code on a Cortex-M4F, counted in QEMU, beside what Taxel's own routines take.
 
 use std::fs;
 use std::io::BufReader;
@@ -8,12 +8,12 @@ use std::thread;
 use std::time::Duration;
 
 use object::{Object, ObjectSymbol};
-use taxel_learn::cost::{Design, Prices};
+use taxel_learn::cost::{Cost, Design};
 
 use super::build::{ARM, Build, machine};
 use super::frames;
 use super::models::Model;
-use crate::cycles::trace::{self, Count, Marks};
+use crate::cycles::trace::{self, Marks};
 use crate::emulate::qemu::{reader, wait};
 use crate::process::Outcome;
 use crate::queue;
@@ -27,7 +27,7 @@ const MOST_OF_FIXED16: f64 = 2.0;
 
 /// Cost of the C code of a model.
 struct Measured {
-    count: Count,
+    instructions: u64,
     /// Bytes of code and of constants.
     flash: [u64; 2],
 }
@@ -36,30 +36,20 @@ struct Measured {
 pub fn print(models: &[Model], folder: &Path, build: &Build) -> Outcome {
     let measured =
         queue::results(models, |model, _| measure(model, &folder.join(model.name()), build));
-    let prices = Prices::accepted().map_err(|cause| cause.to_string())?;
     println!("\nA frame on a Cortex-M4F, by {}:\n", build.name());
-    println!(
-        "| model | instructions in C | of the firmware | times | cycles in C | of the firmware | times | code | constants |"
-    );
-    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
+    println!("| model | instructions in C | of the firmware | times | code | constants |");
+    println!("|---|--:|--:|--:|--:|--:|");
     let mut failed = Vec::new();
     for (model, measured) in models.iter().zip(measured) {
-        let Measured { count, flash: [code, constants] } = measured?;
-        let own = prices.frame(&Design::new(&model.blob));
-        let own = own.map_err(|cause| cause.to_string())?;
-        let times = |count: u64, own: u64| count as f64 / own as f64;
-        let of_instructions = times(count.instructions, own.instructions);
+        let Measured { instructions, flash: [code, constants] } = measured?;
+        let own = Cost::of_frame(&Design::new(&model.blob)).instructions;
+        let times = instructions as f64 / own as f64;
         println!(
-            "| {} | {} | {} | {of_instructions:.2} | {} | {} | {:.2} | {code} | {constants} |",
-            model.name(),
-            count.instructions,
-            own.instructions,
-            count.cycles,
-            own.cycles,
-            times(count.cycles, own.cycles)
+            "| {} | {instructions} | {own} | {times:.2} | {code} | {constants} |",
+            model.name()
         );
-        if model.format == taxel_core::rbf::Format::Fixed16 && of_instructions > MOST_OF_FIXED16 {
-            failed.push(format!("{}: {of_instructions:.2} times the instructions", model.name()));
+        if model.format == taxel_core::rbf::Format::Fixed16 && times > MOST_OF_FIXED16 {
+            failed.push(format!("{}: {times:.2} times the instructions", model.name()));
         }
     }
     if failed.is_empty() { Ok(()) } else { Err(failed.join("\n")) }
@@ -86,10 +76,9 @@ fn measure(model: &Model, folder: &Path, build: &Build) -> Outcome<Measured> {
         })
     });
     let (regions, _) = counted.map_err(|cause| format!("{}: {cause}", model.name()))?;
-    let mut count = regions.last().ok_or("no frame was counted")?.whole;
-    // The call at the end.
-    (count.instructions, count.cycles) = (count.instructions - 1, count.cycles - 3);
-    Ok(Measured { count, flash: sizes(&program.with_file_name("model.o"))? })
+    // Without the call at the end.
+    let instructions = regions.last().ok_or("no frame was counted")? - 1;
+    Ok(Measured { instructions, flash: sizes(&program.with_file_name("model.o"))? })
 }
 
 fn marks(program: &Path) -> Outcome<Marks> {
@@ -100,7 +89,7 @@ fn marks(program: &Path) -> Outcome<Marks> {
         let found = file.symbols().find(|symbol| symbol.name() == Ok(name));
         found.map(|it| it.address() as u32 & !1).ok_or_else(|| failed(&format!("no {name}")))
     };
-    Ok(Marks { begin: address("region_begin")?, end: address("region_end")?, exponential: 0..0 })
+    Ok(Marks { begin: address("region_begin")?, end: address("region_end")? })
 }
 
 /// Bytes of code and of constants in an object, but for the self-test, which a linker leaves out if nobody calls it.

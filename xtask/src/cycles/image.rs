@@ -1,4 +1,4 @@
-//! The image that is measured: its symbols, and its runs in QEMU.
+//! The image whose regions are counted: its symbols, and its runs in QEMU.
 
 use std::fs;
 use std::io::BufReader;
@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use object::{Object, ObjectSymbol};
 
-use super::figures::{self, Measured};
 use super::trace::{self, Marks};
 use crate::emulate::qemu::{QEMU, decode, machine, reader, wait};
 use crate::process::Outcome;
@@ -16,14 +15,15 @@ use crate::process::Outcome;
 /// Time limit of a run; none takes more than half a minute.
 const LIMIT: Duration = Duration::from_mins(5);
 
+/// Regions that begin every run, and their instructions: an empty one, and a loop that was counted by hand.
+const CALIBRATION: [(&str, u64); 2] = [("empty", 0), ("loop", 2001)];
+
 /// An image whose regions are counted.
 pub struct Image {
     elf: PathBuf,
     marks: Marks,
-    /// First address of the slot in which the image expects a model, and the one behind it.
-    slot: [u32; 2],
-    /// Addresses to be traced, for QEMU's `-dfilter`. A search for readings is left out, which is most of a run.
-    traced: String,
+    /// First addresses of the slots in which the image expects a model and a frame.
+    slots: [u32; 2],
 }
 
 impl Image {
@@ -35,57 +35,36 @@ impl Image {
         let failed = |cause: &dyn ToString| format!("{}: {}", elf.display(), cause.to_string());
         let bytes = fs::read(&elf).map_err(|cause| failed(&cause))?;
         let file = object::File::parse(&*bytes).map_err(|cause| failed(&cause))?;
-        let find = |is_meant: &dyn Fn(&str) -> bool| {
-            file.symbols().find(|symbol| symbol.name().is_ok_and(is_meant))
-        };
         // The lowest bit of a function's address only marks Thumb code.
         let address = |name: &str| {
-            let found = find(&|other| other == name).map(|symbol| symbol.address() as u32 & !1);
+            let found = file.symbols().find(|symbol| symbol.name() == Ok(name));
+            let found = found.map(|symbol| symbol.address() as u32 & !1);
             found.ok_or_else(|| failed(&format!("no symbol {name}")))
         };
-        let marks = Marks {
-            begin: address("region_begin")?,
-            end: address("region_end")?,
-            exponential: 0..0,
-        };
-        let slot = [address("_slot_a_start")?, address("_slot_a_end")?];
-        let left_out = find(&|name| name.contains("6inputs8approach"));
-        let left_out = left_out.map_or(0..0, |symbol| {
-            let start = symbol.address() as u32 & !1;
-            start..start + symbol.size() as u32
-        });
-        let traced = match left_out.start.checked_sub(1) {
-            Some(last) => format!("0x0..{last:#x},{:#x}..{:#x}", left_out.end, u32::MAX),
-            None => format!("0x0..{:#x}", u32::MAX),
-        };
-        Ok(Self { elf, marks, slot, traced })
+        let marks = Marks { begin: address("region_begin")?, end: address("region_end")? };
+        let slots = [address("_slot_a_start")?, address("_slot_b_start")?];
+        Ok(Self { elf, marks, slots })
     }
 
-    /// Runs the image with the blob `model` in its slot, and returns what it measured.
+    /// Runs the image with the files `model` and `frame` in its slots. Returns the instructions of each region by its
+    /// name.
     ///
     /// # Errors
-    /// The image does not run to its end, an instruction has no known cost, or the image fails; then its log.
-    pub fn run(&self, model: &Path) -> Outcome<Vec<Measured>> {
-        self.measure(model).map_err(|cause| format!("{}: {cause}", model.display()))
-    }
-
-    fn measure(&self, model: &Path) -> Outcome<Vec<Measured>> {
-        let [start, end] = self.slot;
-        let (length, room) = (model.metadata().map_err(|it| it.to_string())?.len(), end - start);
-        if length > room.into() {
-            return Err(format!("{length} bytes; the image's slot has room for {room}"));
-        }
+    /// The image does not run to its end, or the image fails; then its log.
+    pub fn run(&self, model: &Path, frame: &Path) -> Outcome<Vec<(String, u64)>> {
         let mut command = machine(&self.elf);
-        command.args(["-d", "exec,nochain,in_asm", "-dfilter", &self.traced]);
-        // QEMU reads a comma as the end of an option unless it is doubled.
-        let path = model.display().to_string().replace(',', ",,");
-        command.arg("-device").arg(format!("loader,file={path},addr={start:#x},force-raw=on"));
+        command.args(["-d", "exec,nochain,in_asm"]);
+        for (file, start) in [model, frame].into_iter().zip(self.slots) {
+            // QEMU reads a comma as the end of an option unless it is doubled.
+            let file = file.display().to_string().replace(',', ",,");
+            command.arg("-device").arg(format!("loader,file={file},addr={start:#x},force-raw=on"));
+        }
         let mut child = command.spawn().map_err(|cause| format!("cannot start {QEMU}: {cause}"))?;
         let logged = reader(child.stdout.take());
         let trace = child.stderr.take().ok_or_else(|| format!("{QEMU} has no trace"))?;
         let (status, traced) = thread::scope(|scope| {
             let trace = BufReader::with_capacity(1 << 16, trace);
-            let traced = scope.spawn(|| trace::count(trace, self.marks.clone()));
+            let traced = scope.spawn(|| trace::count(trace, self.marks));
             let status = wait(&mut child, LIMIT);
             (status, traced.join().unwrap_or_else(|_| Err("the trace's reader stopped".into())))
         });
@@ -94,9 +73,36 @@ impl Image {
         let (counts, complaints) = traced?;
         eprint!("{complaints}");
         match status?.and_then(|status| status.code()) {
-            Some(0) => figures::measured(&log, &counts),
-            Some(_) => Err(format!("the image failed; it logged\n{log}")),
+            Some(0) => named(&log, &counts),
+            Some(_) => Err(format!("{}: the image failed; it logged\n{log}", model.display())),
             None => Err(format!("no end within {} s; it logged\n{log}", LIMIT.as_secs())),
+        }
+    }
+}
+
+/// Joins `counts` with the regions' names in the `log`. The call at the end of each is taken off.
+fn named(log: &str, counts: &[u64]) -> Outcome<Vec<(String, u64)>> {
+    let names = log.lines().filter_map(|line| line.strip_prefix("INFO region "));
+    let names: Vec<&str> = names.collect();
+    let less = |(name, count): (&&str, &u64)| ((*name).to_owned(), count.saturating_sub(1));
+    let mut regions: Vec<(String, u64)> = names.iter().zip(counts).map(less).collect();
+    let known = CALIBRATION.map(|(name, count)| (name.to_owned(), count));
+    if names.len() != counts.len() || !regions.starts_with(&known) {
+        return Err(format!("{} regions were counted wrong: {regions:?}\n{log}", counts.len()));
+    }
+    Ok(regions.split_off(known.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_are_named_and_the_call_at_their_end_is_taken_off() {
+        let log = "INFO region empty\nINFO region loop\nINFO other\nINFO region frame\n";
+        assert_eq!(named(log, &[1, 2002, 11]), Ok(vec![("frame".to_owned(), 10)]));
+        for wrong in [&[1, 2003, 11][..], &[2, 2002, 11], &[1, 2002], &[1, 2002, 11, 21]] {
+            assert!(named(log, wrong).is_err(), "{wrong:?}");
         }
     }
 }

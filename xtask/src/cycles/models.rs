@@ -1,114 +1,174 @@
-//! The models whose cost is accepted: trained on the scene `press`, as by `host-sim train press -n 500 --noise 0.05`, in
-//! every number format.
+//! The models whose cost is accepted: trained on the scene `press`, with all of its sensor or parts of it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use taxel_core::blob::{Floats, ModelParts, encode_to_vec};
 use taxel_core::rbf::Format;
-use taxel_data::{Dataset, Silent, Stream};
-use taxel_learn::{ModelBlob, Options, Origin, pack, train as trainer};
+use taxel_data::{Silent, Stream};
+use taxel_learn::train::train;
+use taxel_learn::{ModelBlob, Options, Origin, pack};
+use taxel_simulate::outputs::{ContactOutput, ElectrodeOutputs, Outputs, Quantity};
+use taxel_simulate::sensor::{Axis, Sensor, default_lower_electrodes_mm};
 use taxel_simulate::{Synthesis, World};
 
 use crate::process::Outcome;
 
-/// Numbers of centres K.
-const CENTRES: [usize; 5] = [16, 32, 64, 128, 256];
-
-/// Largest blob in bytes that a slot holds, in the image as on every device.
-const SLOT_BYTES: usize = 131_072;
-
 /// Noise level of the scene: large enough for widths and weights that every number format can hold.
 const NOISE: f64 = 0.05;
-
 /// Number of frames of the scene: somewhat more than centres.
 const FRAMES: usize = 500;
-
 /// Spread of one network for the whole array that every number format can hold.
 const SPREAD_OF_ARRAY: f64 = 0.4;
 
-/// A model to be measured.
-pub struct Model {
-    pub path: PathBuf,
-    /// Number of centres K.
-    pub centres: usize,
-    /// Whether it has an affine tail.
-    pub affine: bool,
+/// What of the scene's sensor models decode, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shape {
+    /// A network for each of the paper's rows: 18 readings to 18 deformations.
+    Rows,
+    /// One network for all of them.
+    Array,
+    /// One network for all readings and the contact's place and force.
+    Contact,
+    /// A network for each of four rows of seven readings, to 6 compressions.
+    Mat,
+    /// A network for each of eight rows of 32 readings, to 6 compressions.
+    Wide,
+    /// One row of 12 readings, to 6 compressions.
+    Row,
 }
 
-/// Trains models of every format and size, with a network a row and with one for the whole array, with affine tail and
-/// without, as far as they are `wanted`, and writes them into `directory`.
-///
-/// All rows get the first row's network, so that the largest model fits the image's slot. A model that does not
-/// fit is left out.
+impl Shape {
+    /// Every shape, with the numbers of centres that are accepted.
+    const ALL: [(Self, &'static [usize]); 6] = [
+        (Self::Rows, &[16, 64]),
+        (Self::Array, &[16, 64, 128]),
+        (Self::Contact, &[64]),
+        (Self::Mat, &[64]),
+        (Self::Wide, &[64]),
+        (Self::Row, &[64]),
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Rows => "8 x (18 -> 18)",
+            Self::Array => "144 -> 144",
+            Self::Contact => "144 -> 3",
+            Self::Mat => "4 x (7 -> 6)",
+            Self::Wide => "8 x (32 -> 6)",
+            Self::Row => "1 x (12 -> 6)",
+        }
+    }
+
+    fn is_array(self) -> bool {
+        matches!(self, Self::Array | Self::Contact)
+    }
+
+    fn world(self) -> World {
+        let mut world = World::press();
+        let z = ElectrodeOutputs { quantity: Quantity::Deformation, axes: vec![Axis::Z] };
+        let (rows, columns) = match self {
+            Self::Rows | Self::Array => return world,
+            Self::Contact => {
+                let contact = vec![ContactOutput::Centre, ContactOutput::Force];
+                return World { outputs: Outputs::Contact(contact), ..world };
+            }
+            Self::Mat => (4, 7),
+            Self::Wide => (8, 32),
+            Self::Row => (1, 12),
+        };
+        world.read_rows.truncate(rows);
+        world.outputs = z.into();
+        let paper = Sensor::paper();
+        let per_column = paper.electrodes_per_column_wire;
+        world.sensor = Sensor {
+            column_wires: columns,
+            lower_electrodes_mm: default_lower_electrodes_mm(columns, per_column, paper.size_mm),
+            ..paper
+        };
+        world
+    }
+}
+
+/// Files of a model, and of a frame for it.
+pub struct Files {
+    pub model: PathBuf,
+    pub frame: PathBuf,
+}
+
+/// A model, and a frame of its training, none of whose readings is clamped.
+pub struct Model {
+    shape: Shape,
+    format: Format,
+    centres: usize,
+    pub blob: ModelBlob,
+    /// Readings in Ω.
+    frame: Vec<f32>,
+}
+
+impl Model {
+    /// Name of the model in tables.
+    pub fn name(&self) -> String {
+        format!("{} {} K = {}", self.format.name(), self.shape.name(), self.centres)
+    }
+
+    /// Whether it decodes frames of the scene `press`.
+    pub fn is_of_press(&self) -> bool {
+        matches!(self.shape, Shape::Rows | Shape::Array | Shape::Contact)
+    }
+
+    /// Writes model and frame into `directory`.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, directory: &Path) -> Outcome<Files> {
+        let Self { shape, format, centres, .. } = self;
+        let stem = format!("{}-{shape:?}-{centres}", format.name()).to_lowercase();
+        let frame: Vec<u8> = self.frame.iter().flat_map(|reading| reading.to_le_bytes()).collect();
+        let written = |kind, bytes: &[u8]| {
+            let path = directory.join(&stem).with_extension(kind);
+            fs::write(&path, bytes).map_err(|cause| format!("{}: {cause}", path.display()))?;
+            Ok::<_, String>(path)
+        };
+        Ok(Files { model: written("bin", self.blob.bytes())?, frame: written("frame", &frame)? })
+    }
+}
+
+/// Trains the models of all shapes and number formats.
 ///
 /// # Errors
-/// Training fails, or makes another model than requested.
-pub fn train(directory: &Path, wanted: impl Fn(&Options) -> bool) -> Outcome<Vec<Model>> {
-    fs::create_dir_all(directory).map_err(|cause| cause.to_string())?;
-    let world = World::press();
-    let dataset = Synthesis::new(&world).noise_level(NOISE).frames(Stream::Training, FRAMES);
-    let origin = Origin::of_data("press", 0, world.seed, &dataset);
-    let mut tried = Vec::new();
-    for format in Format::ALL {
-        for centres in CENTRES {
-            for (whole_array, affine_tail) in
-                [(false, false), (false, true), (true, false), (true, true)]
-            {
-                let usual = Options::of_rows();
-                let spread = if whole_array { SPREAD_OF_ARRAY } else { usual.spread };
-                let options = Options {
-                    format,
-                    centres,
-                    each_row: !whole_array,
-                    affine_tail,
-                    spread,
-                    ..usual
-                };
-                tried.push(options);
-            }
-        }
-    }
-    let model = |options: &Options| {
-        let array = if !options.each_row { "-array" } else { "" };
-        let tail = if options.affine_tail { "-affine" } else { "" };
-        let name = format!("{}-{}{array}{tail}", options.format.name(), options.centres);
-        let blob = blob(&dataset, options, &origin).map_err(|cause| format!("{name}: {cause}"))?;
-        if blob.len() > SLOT_BYTES {
-            eprintln!("left out: {name} is larger than a slot");
-            return Ok(None);
-        }
-        let path = directory.join(format!("{name}.bin"));
-        fs::write(&path, blob).map_err(|cause| format!("{}: {cause}", path.display()))?;
-        Ok(Some(Model { path, centres: options.centres, affine: options.affine_tail }))
+/// Training fails, or makes another format than was asked for.
+pub fn train_all() -> Outcome<Vec<Model>> {
+    let of_shape = |(shape, centres): (Shape, &'static [usize])| {
+        Format::ALL
+            .into_iter()
+            .flat_map(move |format| centres.iter().map(move |k| (format, shape, *k)))
     };
-    tried.retain(wanted);
-    let models: Vec<Option<Model>> = tried.par_iter().map(model).collect::<Outcome<_>>()?;
-    Ok(models.into_iter().flatten().collect())
+    let wanted: Vec<_> = Shape::ALL.into_iter().flat_map(of_shape).collect();
+    let made = wanted.into_par_iter().map(|(format, shape, centres)| made(format, shape, centres));
+    made.collect()
 }
 
-/// The blob of a model in which every row has the first row's network.
-fn blob(dataset: &Dataset, options: &Options, origin: &Origin) -> Outcome<Vec<u8>> {
-    let trained = trainer::train(dataset, options, &Silent).map_err(|cause| cause.to_string())?;
-    let blob: ModelBlob = pack(&trained, dataset, origin).map_err(|cause| cause.to_string())?;
-    let model = blob.parse();
-    let first = model.networks().next().ok_or("a model without networks")?;
-    let parts = ModelParts {
-        projection: model.projection(),
-        confidence: None,
-        linear_rmse: Floats(&[]),
-        fill: None,
-        networks: &[first],
-        row_network: &vec![0; model.shape().rows],
-        metadata: *model.metadata(),
+fn made(format: Format, shape: Shape, centres: usize) -> Outcome<Model> {
+    let world = shape.world();
+    let dataset = Synthesis::new(&world).noise_level(NOISE).frames(Stream::Training, FRAMES);
+    let usual = Options::of_rows();
+    let each_row = !shape.is_array();
+    let spread = if each_row { usual.spread } else { SPREAD_OF_ARRAY };
+    let options = Options { format, centres, each_row, spread, ..usual };
+    let origin = Origin::of_data("press", 0, world.seed, &dataset);
+    let failed = |cause: taxel_learn::Error| format!("{} in {format:?}: {cause}", shape.name());
+    let trained = train(&dataset, &options, &Silent).map_err(failed)?;
+    let blob = pack(&trained, &dataset, &origin).map_err(failed)?;
+    let frame =
+        dataset.inputs.lines().next().ok_or("no frame")?.iter().map(|it| *it as f32).collect();
+    let model = Model { shape, format, centres, blob, frame };
+    let as_asked = |network: taxel_core::rbf::Network<'_>| {
+        (network.format(), network.shape().centres) == (format, centres)
     };
-    let bytes = encode_to_vec(&parts).map_err(|cause| cause.to_string())?.to_vec();
-    let is_as_asked = (first.format(), first.shape().centres) == (options.format, options.centres);
-    // What does not fit is left out, whatever it is.
-    if is_as_asked || bytes.len() > SLOT_BYTES {
-        return Ok(bytes);
+    if model.blob.parse().networks().all(as_asked) {
+        Ok(model)
+    } else {
+        Err(format!("training made another model than {}", model.name()))
     }
-    let made = first.format().name();
-    Err(format!("training made {made} of {} centres", first.shape().centres))
 }

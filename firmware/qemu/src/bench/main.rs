@@ -1,108 +1,70 @@
-//! Decodes with every number format, for `cargo xtask cycles`, which traces this program and
-//! counts the instructions of each region. The model lies in slot A, and may have any shape.
+//! Decodes a frame, for `cargo xtask cycles`, which traces this program and counts the instructions of each region. The
+//! model lies in slot A, and may have any shape; a frame of its readings in Ω lies in slot B.
 #![no_std]
 #![no_main]
 
-mod kernel;
 mod region;
-
-mod inputs;
-
-mod frames;
 
 use core::hint::black_box;
 
 use board_common::region::take_weights;
 use cortex_m_rt::entry;
-use defmt::{info, unwrap};
-use qemu_image::checks::Numbers;
+use defmt::{assert, unwrap};
 use qemu_image::exit;
 use qemu_image::slot::Slot;
 use taxel_core::blob::Model;
-use taxel_core::rbf::Network;
-use taxel_core::scale::UNITS;
+use taxel_core::filter::{Settings, State};
+use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 
-use frames::Arena;
-use kernel::{COLS, OUTPUTS};
 use region::{calibrate, region};
 
-/// Baseline of every reading, for models with relative inputs.
-const BASELINE_OHM: f32 = 60.0;
+/// Most rows of a model.
+const MOST_ROWS: usize = 32;
 
-/// Measures one inference and one row of the paper's shape, in `fixed16` also by the compiled twin of the assembly.
-#[inline(never)]
-fn measure_row(model: &Model<'_>, network: &Network<'_>, frame: &[[f32; COLS]]) {
-    let readings = unwrap!(frame.first());
-    let (mut scaled, mut outputs) = ([0.0; COLS], [0.0; OUTPUTS]);
-    unwrap!(network.scale(readings, &mut scaled).ok());
-    let name = network.format().name();
-    region(name, "inference", || {
-        kernel::infer(black_box(network), black_box(&mut scaled), black_box(&mut outputs));
-    });
-    region(name, "row", || {
-        let (scaled, outputs) = (black_box(&mut scaled), black_box(&mut outputs));
-        kernel::infer_row(black_box(network), black_box(readings), scaled, outputs);
-    });
-    let Network::Fixed16(network) = network else { return };
-    unwrap!(Network::from(*network).scale(readings, &mut scaled).ok());
-    region("fixed16-portable", "inference", || {
-        let (scaled, outputs) = (black_box(&mut scaled), black_box(&mut outputs));
-        kernel::infer_portably(black_box(network), scaled, outputs);
-    });
-    region("fixed16-portable", "row", || {
-        let (scaled, outputs) = (black_box(&mut scaled), black_box(&mut outputs));
-        kernel::infer_row_portably(black_box(network), black_box(readings), scaled, outputs);
-    });
-    let mut outputs = [[0.0; OUTPUTS]; ROWS];
-    region("fixed16-portable", "frame", || {
-        kernel::decode_portably(black_box(model), black_box(frame), black_box(&mut outputs));
-    });
+/// Takes so many `floats` of RAM, filled with 0.
+fn take(ram: &mut &'static mut [f32], floats: usize) -> &'static mut [f32] {
+    let all = core::mem::take(ram);
+    let (taken, rest) =
+        unwrap!(all.split_at_mut_checked(floats), "the model is too large for the RAM");
+    *ram = rest;
+    taken.fill(0.0);
+    taken
 }
-
-/// Number of rows of the paper's sensor.
-const ROWS: usize = 8;
 
 #[entry]
 fn main() -> ! {
     calibrate();
     // SAFETY: the slots, and the RAM for weights, are taken here only.
-    let (([slot, _], ..), ram) = unsafe { (Slot::take(), take_weights()) };
-    let mut arena = Arena(bytemuck::cast_slice_mut(ram));
+    let (([slot, frame], ..), ram) = unsafe { (Slot::take(), take_weights()) };
+    let mut ram: &'static mut [f32] = bytemuck::cast_slice_mut(ram);
     let length = unwrap!(Model::declared_length(slot.bytes()), "slot A holds no model");
     let blob = unwrap!(slot.bytes().get(..length), "the model in slot A is cut off");
-    let model = unwrap!(checked(blob), "the model in slot A is unsound");
-    // The first row's network is measured for all.
-    let network = model.network_of_row(0).and_then(|index| model.networks().nth(index));
-    let network = unwrap!(network, "the model has no network for its first row");
-    info!("centres {=usize}", network.shape().centres);
-    let frame = frames::frame(&model, &mut arena);
+    let model = unwrap!(Model::decode(blob).ok(), "the model in slot A is unsound");
     let shape = model.shape();
-    let is_papers = (shape.rows, shape.inputs, shape.outputs) == (ROWS, COLS, OUTPUTS);
-    if model.projection().is_none() {
-        if is_papers && !model.metadata().relative_inputs {
-            measure_row(&model, &network, frame.as_chunks().0);
-        } else {
-            measure_inference(&network, &mut arena);
-        }
-    }
-    frames::measure(&model, frame, &mut arena);
-    exit::success()
-}
+    let readings = take(&mut ram, shape.rows * shape.inputs);
+    let bytes = frame.bytes().as_chunks().0;
+    readings
+        .iter_mut()
+        .zip(bytes)
+        .for_each(|(reading, bytes)| *reading = f32::from_le_bytes(*bytes));
+    let decoder: Decoder<'_, MOST_ROWS> = unwrap!(Decoder::new(model).ok(), "too many rows");
+    let scratch = take(&mut ram, decoder.scratch_floats());
+    let mut status = [RowStatus::MissingReading; MOST_ROWS];
+    let outputs = take(&mut ram, shape.rows * shape.outputs);
+    let mut estimate = Estimate { outputs, status: unwrap!(status.get_mut(..shape.rows)) };
 
-/// Parses `blob` to a model; it is checked only here.
-#[inline(never)] // frees the stack that checking needs
-fn checked(blob: &[u8]) -> Option<Model<'_>> {
-    Model::decode(blob).ok()
-}
-
-/// Measures one inference of a network of any shape.
-#[inline(never)]
-fn measure_inference(network: &Network<'_>, arena: &mut Arena) {
-    let shape = network.shape();
-    let (scaled, outputs) = (arena.take(shape.inputs), arena.take(shape.outputs));
-    let mut numbers = Numbers::new(3);
-    scaled.fill_with(|| 0.9 * UNITS * numbers.draw());
-    region(network.format().name(), "inference", || {
-        kernel::infer(black_box(network), black_box(scaled), black_box(outputs));
+    region("frame", || {
+        let frame = Frame { readings_ohm: black_box(readings), reciprocals: &[] };
+        let _ = black_box(&decoder).decode_into(frame, black_box(scratch), &mut estimate);
     });
+    assert!(estimate.status.iter().all(|row| *row == RowStatus::Decoded), "a row is not decoded");
+
+    let settings = Settings { time_constant_us: 5000, lead_us: 1000 };
+    let tracks = take(&mut ram, 2 * shape.rows * shape.outputs).as_chunks_mut().0;
+    let mut state = State::new(tracks);
+    state.filter(settings, 0, &mut estimate);
+    region("filter", || {
+        black_box(&mut state).filter(black_box(settings), 1000, black_box(&mut estimate));
+    });
+    exit::success()
 }

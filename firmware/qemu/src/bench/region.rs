@@ -23,8 +23,8 @@ extern "C" fn region_end() {
 /// log in the same order.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "the work itself must stand between the two calls")]
-pub fn region(kernel: &str, scope: &str, work: impl FnOnce()) {
-    info!("region {=str} {=str}", kernel, scope);
+pub fn region(name: &str, work: impl FnOnce()) {
+    info!("region {=str}", name);
     region_begin();
     work();
     region_end();
@@ -32,8 +32,8 @@ pub fn region(kernel: &str, scope: &str, work: impl FnOnce()) {
 
 /// Runs regions whose cost is known: an empty one, and a loop that was counted by hand.
 pub fn calibrate() {
-    region("calibration", "empty", || ());
-    region("calibration", "loop", || {
+    region("empty", || ());
+    region("loop", || {
         // SAFETY: the code changes only r0 and the flags.
         unsafe {
             asm!("mov.w r0, #1000", "2:", "subs r0, #1", "bne 2b", out("r0") _, options(nomem, nostack));

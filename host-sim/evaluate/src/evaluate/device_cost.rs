@@ -2,12 +2,11 @@
 
 use serde::Serialize;
 use taxel_learn::ModelBlob;
-use taxel_learn::cost::{DecoderRam, Design, Prices};
+use taxel_learn::cost::{Cost, DecoderRam, Design};
 
-use crate::error::Result;
 use crate::verdict::SLOT_BYTES;
 
-/// Clock of the STM32F446 at which its flash makes it wait as `flash_cycles` count.
+/// Clock of the STM32F446, in MHz.
 const CLOCK_MHZ: f64 = 180.0;
 
 /// Cost of decoding a frame on a Cortex-M4F, and the memory that a model takes.
@@ -15,10 +14,8 @@ const CLOCK_MHZ: f64 = 180.0;
 pub struct DeviceCost {
     /// Cycles with memory that never waits.
     pub cycles: u64,
-    /// Cycles with code in an STM32F446's flash at 180 MHz.
-    pub flash_cycles: u64,
     /// Time in µs that these take at 180 MHz.
-    pub flash_us: f64,
+    pub us: f64,
     /// RAM in bytes for decoding, without weights.
     pub ram_bytes: usize,
     /// Whether the images copy the weights to RAM, which takes as many bytes more as the blob has.
@@ -31,20 +28,19 @@ pub struct DeviceCost {
 }
 
 impl DeviceCost {
-    /// Cost of the model in `blob`, by the price list in the repository.
-    pub fn new(blob: &ModelBlob) -> Result<Self> {
+    /// Cost of the model in `blob`.
+    pub fn new(blob: &ModelBlob) -> Self {
         let design = Design::new(blob);
-        let frame = Prices::accepted()?.frame(&design)?;
+        let frame = Cost::of_frame(&design);
         let blob_bytes = blob.bytes().len();
-        Ok(Self {
+        Self {
             cycles: frame.cycles,
-            flash_cycles: frame.flash_cycles,
-            flash_us: frame.flash_cycles as f64 / CLOCK_MHZ,
+            us: frame.cycles as f64 / CLOCK_MHZ,
             ram_bytes: DecoderRam::new(&design).bytes(),
             weights_in_ram: design.weights_in_ram,
             blob_bytes,
             slot_bytes: SLOT_BYTES,
             fits_slot: blob_bytes <= SLOT_BYTES,
-        })
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use taxel_data::{BadValue, columns};
-use taxel_learn::cost::{Design, Prices};
+use taxel_learn::cost::{Cost, Design};
 use taxel_learn::{Decoder, ModelBlob};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
@@ -114,13 +114,12 @@ impl<'s> Judged<'s> {
         samples: usize,
     ) -> Result<Self> {
         let model = blob.prepare().of_inputs();
-        let prices = Prices::accepted()?;
-        let cost = prices.frame(&Design::new(blob))?;
+        let cost = Cost::of_frame(&Design::new(blob));
         let scan_ms = device.scan_ms(Some(Wires::of(&scene.world)), samples);
         let names = scene.output_names();
         let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();
         let touches = Touches::new(scene, synthesis, (path, device.passes(samples)), &group);
-        let (cost, device) = ((cost, &prices), (&device, scan_ms));
+        let device = (&device, scan_ms);
         let touched = touches.judge((blob, &model), cost, device, &scene.measure())?;
         Ok(Self { touches, touched, group })
     }

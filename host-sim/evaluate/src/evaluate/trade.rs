@@ -1,7 +1,7 @@
 //! Trade between speed and accuracy: every setting of a subject's decoder, its errors and its cost.
 //!
 //! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are predicted by
-//! the price list of the firmware's own code ([`Prices`]), the time of a scan by the firmware's own plan ([`Device`]).
+//! a formula of the firmware's own code ([`Cost`](taxel_learn::cost::Cost)), the time of a scan by the firmware's own plan ([`Device`]).
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use taxel_data::BadValue;
 use taxel_data::progress::Progress;
-use taxel_learn::cost::Prices;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{ModelBlob, Options};
 use taxel_limit::Refusal;
@@ -35,7 +34,7 @@ mod judge;
 
 pub use choice::Bounds;
 use choice::{Offer, SAME_ERROR};
-pub use device::{BOARD_CLOCK_MHZ, Device, Memory, Readout, Times, Wires};
+pub use device::{BOARD_CLOCK_MHZ, Device, Readout, Times, Wires};
 use frames::Frames;
 use judge::Judged;
 pub use line::Line;
@@ -84,8 +83,6 @@ pub struct Trade {
     pub motion: Option<Path>,
     /// Outliers among measured frames; `None` for a scene.
     pub outliers: Option<Outliers>,
-    /// Compiler of the code whose costs are given.
-    pub compiler: String,
     pub device: Device,
     pub line: Line,
     /// Group of outputs by which front and choice are determined, or [`metrics::ALL`].
@@ -226,7 +223,6 @@ pub fn compute(
     bounds: &Bounds,
     progress: &dyn Progress,
 ) -> Result<Trade> {
-    let prices = Prices::accepted()?;
     check(subject, plan)?;
     let subjects: Vec<Cow<'_, Subject>> =
         plan.column_steps.iter().map(|step| subject.with_every_column(*step)).collect();
@@ -245,7 +241,7 @@ pub fn compute(
     let mut offers = Vec::new();
     for (place, ways) in ways.iter().enumerate() {
         for ways in ways {
-            let of_ways = ways.offers(&plan.device, &prices)?;
+            let of_ways = ways.offers(&plan.device);
             offers.extend(of_ways.into_iter().map(|offer| (place, offer)));
         }
     }
@@ -270,7 +266,7 @@ pub fn compute(
     let mut judged = Judged::default();
     for (place, (ways, (measure, _))) in ways.iter().zip(&measures).enumerate() {
         for ways in ways {
-            judged.add(ways, (place, measure), (&plan.device, &prices), progress)?;
+            judged.add(ways, (place, measure), &plan.device, progress)?;
         }
     }
     let Judged { mut points, left_out, blobs, distinct } = judged;
@@ -301,7 +297,6 @@ pub fn compute(
         },
         motion: subject.moving_scene().map(|(_, path)| path),
         outliers: subject.measurements().map(|data| data.outliers.clone()),
-        compiler: prices.compiler,
         device: plan.device,
         line,
         group: group.into(),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use taxel_core::rbf::Format;
 use taxel_data::Silent;
-use taxel_learn::cost::{DecoderRam, Design, Prices};
+use taxel_learn::cost::{Cost, DecoderRam, Design};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::World;
 
@@ -177,13 +177,13 @@ pub fn compute(plan: &Plan, point: &Point, shared: &mut Shared) -> Result<Result
         results.add(&format!("ratio_to_limit_{}", errors.group), errors.ratio_to_limit);
     }
     let design = Design::new(&blob);
-    let cost = Prices::accepted()?.frame(&design)?;
+    let cost = Cost::of_frame(&design);
     let times = point.device.times(scan_ms, &cost);
     results.add("decode_ms", Some(times.decode_ms));
     results.add("frame_ms", Some(times.frame_ms));
     results.add("frames_per_s", Some(times.frames_per_s));
     results.add("age_ms", times.age_ms);
-    results.add("cycles", Some(point.device.cycles(&cost) as f64));
+    results.add("cycles", Some(cost.cycles as f64));
     results.add("blob_bytes", Some(blob.bytes().len() as f64));
     results.add("ram_bytes", Some(DecoderRam::new(&design).bytes() as f64));
     Ok(results)

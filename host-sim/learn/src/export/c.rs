@@ -49,10 +49,10 @@ fn header_path(name: &Name) -> String {
 /// The files of a library that decodes as the model in `blob` does, to the bit; all that it declares begins with `name`.
 ///
 /// # Errors
-/// [`Error`](crate::Error) if the prices from which its cost is predicted are not sound.
+/// [`Error`](crate::Error) if the model does not decode the frames of its self-test.
 pub fn library(blob: &ModelBlob, name: &Name) -> Result<Vec<SourceFile>> {
     let model = blob.parse();
-    let facts = Facts::new(blob)?;
+    let facts = Facts::new(blob);
     let (flags, mut values) = (source::flags(&model), Values::default());
     facts.tell(&mut values);
     let filled = |text| template::fill(text, name, &flags, &values);

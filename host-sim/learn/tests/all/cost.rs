@@ -1,49 +1,17 @@
-//! Costs of decoding, predicted by the price list in the repository.
+//! Costs of decoding, as predicted, beside those that were counted.
 
 use std::fmt::Write as _;
 
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::Format;
-use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
+use taxel_learn::cost::{Cost, DecoderRam, Design};
 
 const PAPER: ModelShape = ModelShape { rows: 8, inputs: 18, outputs: 18 };
 
-fn frame(prices: &Prices, design: &Design) -> Cost {
-    prices.frame(design).unwrap()
-}
-
-#[test]
-fn every_shape_has_a_price() {
-    let prices = Prices::accepted().unwrap();
-    let sizes = || [1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 24, 37, 64, 144].into_iter();
-    let shapes = [1, 2, 3, 8].into_iter().flat_map(|rows| {
-        let shapes = sizes().flat_map(|inputs| sizes().map(move |outputs| (inputs, outputs)));
-        shapes.map(move |(inputs, outputs)| ModelShape { rows, inputs, outputs })
-    });
-    for shape in shapes {
-        for format in Format::ALL {
-            for centres in [60, 300] {
-                for affine in [false, true] {
-                    for design in [Design::of_rows, Design::of_array] {
-                        let design = design(shape, format, centres, affine);
-                        for relative_inputs in [false, true] {
-                            let design = Design { relative_inputs, ..design.clone() };
-                            let cost = frame(&prices, &design);
-                            assert!(cost.instructions < cost.cycles, "{design:?}: {cost:?}");
-                            assert!(cost.cycles < cost.flash_cycles, "{design:?}: {cost:?}");
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
 /// Sensors that leave out something of the paper's, or have more of it: name, shape and centres a row.
-const SENSORS: [(&str, ModelShape, usize); 7] = [
+const SENSORS: [(&str, ModelShape, usize); 6] = [
     ("paper", PAPER, 64),
     ("z only", ModelShape { outputs: 6, ..PAPER }, 64),
-    ("three rows", ModelShape { rows: 3, ..PAPER }, 64),
     ("one row", ModelShape { rows: 1, ..PAPER }, 64),
     ("4 × 4 pad", ModelShape { rows: 4, inputs: 4, ..PAPER }, 64),
     ("own CSV file", ModelShape { rows: 1, inputs: 12, outputs: 5 }, 64),
@@ -52,95 +20,75 @@ const SENSORS: [(&str, ModelShape, usize); 7] = [
 
 #[test]
 fn a_sensor_that_leaves_something_out_takes_less_and_the_page_says_what_each_takes() {
-    let prices = Prices::accepted().unwrap();
     let page = include_str!("../../../../docs/cycles.md");
     let mut table = String::new();
-    for format in [Format::F32, Format::Fixed16] {
-        let takes = |(_, shape, centres): (&str, ModelShape, usize)| {
-            let design = Design::of_rows(shape, format, centres, true);
-            let cost = frame(&prices, &design);
-            let ram = DecoderRam::new(&design).bytes() as u64;
-            [
-                design.parameter_bytes() as u64,
-                ram,
-                cost.instructions,
-                cost.cycles,
-                cost.flash_cycles,
-            ]
-        };
-        let paper = takes(SENSORS[0]);
-        for sensor @ (name, shape, _) in SENSORS {
-            let figures = takes(sensor);
-            let ModelShape { rows, inputs, outputs } = shape;
-            let within_paper =
-                rows <= PAPER.rows && inputs <= PAPER.inputs && outputs <= PAPER.outputs;
-            if shape != PAPER && within_paper {
-                let less = figures.iter().zip(&paper).all(|(part, all)| part < all);
-                assert!(less, "{name} in {format:?}: {figures:?}");
-            }
-            let figures = figures.map(|figure| figure.to_string()).join(" | ");
-            let format = format.name();
-            let _ = writeln!(
-                table,
-                "| {name} | {rows} × ({inputs} → {outputs}) | {format} | {figures} |"
-            );
+    let takes = |(_, shape, centres): (&str, ModelShape, usize)| {
+        let [fixed16, f32] = [Format::Fixed16, Format::F32]
+            .map(|format| Design::of_rows(shape, format, centres, true));
+        let ram = DecoderRam::new(&fixed16).bytes() as u64;
+        let cycles = [&fixed16, &f32].map(|design| Cost::of_frame(design).cycles);
+        [fixed16.parameter_bytes() as u64, ram, cycles[0], cycles[1]]
+    };
+    let paper = takes(SENSORS[0]);
+    for sensor @ (name, shape, _) in SENSORS {
+        let figures = takes(sensor);
+        let ModelShape { rows, inputs, outputs } = shape;
+        let within_paper = rows <= PAPER.rows && inputs <= PAPER.inputs && outputs <= PAPER.outputs;
+        if shape != PAPER && within_paper {
+            // Not so in f32, whose loops over 18 inputs and outputs the compiler unrolls.
+            let less = figures.iter().zip(&paper).take(3).all(|(part, all)| part < all);
+            assert!(less, "{name}: {figures:?}");
         }
+        let figures = figures.map(|figure| figure.to_string()).join(" | ");
+        let _ = writeln!(table, "| {name} | {rows} × ({inputs} → {outputs}) | {figures} |");
     }
     assert!(page.contains(&table), "docs/cycles.md must have\n{table}");
 }
 
-/// The accepted figures are counts of trained models, which the price list was not made from.
+/// Design of a model by its name in `firmware/cycles.csv`, such as `f32 8 x (18 -> 6) K = 64`.
+fn design(name: &str) -> Option<Design> {
+    let (format, rest) = name.split_once(' ')?;
+    let format = Format::ALL.into_iter().find(|it| it.name() == format)?;
+    let (shape, centres) = rest.split_once(" K = ")?;
+    let centres = centres.parse().ok()?;
+    if shape == "144 -> 144" {
+        return Some(Design::of_array(PAPER, format, centres, true));
+    }
+    let (rows, row) = shape.split_once(" x ")?;
+    let (inputs, outputs) = row.trim_matches(['(', ')']).split_once(" -> ")?;
+    let [rows, inputs, outputs] = [rows, inputs, outputs].map(|count| count.parse().ok());
+    let shape = ModelShape { rows: rows?, inputs: inputs?, outputs: outputs? };
+    Some(Design::of_rows(shape, format, centres, true))
+}
+
 #[test]
-fn the_accepted_figures_of_trained_models_are_told() {
-    let prices = Prices::accepted().unwrap();
+fn counted_frames_are_predicted_to_a_tenth() {
     let figures = include_str!("../../../../firmware/cycles.csv");
     let mut compared = 0;
     for line in figures.lines().skip(1) {
-        let [compiler, kernel, centres, affine, scope, instructions, cycles, flash] =
-            line.split(',').collect::<Vec<_>>()[..]
-        else {
+        let [_, model, scope, counted, _] = line.split(',').collect::<Vec<_>>()[..] else {
             panic!("{line}");
         };
-        if compiler.replace(';', ",") != prices.compiler {
-            continue;
-        }
-        let Some(format) = Format::from_name(kernel) else { continue };
-        let centres = centres.parse().unwrap();
-        let design: fn(_, _, _, _) -> Design = match scope {
-            "array-frame" => Design::of_array,
-            "frame" => Design::of_rows,
-            _ => continue,
-        };
-        let design = design(PAPER, format, centres, affine == "yes");
-        let predicted = prices.frame(&design).unwrap();
-        let percent = |predicted: u64, counted: &str| {
-            100.0 * (predicted as f64 / counted.parse::<f64>().unwrap() - 1.0)
-        };
-        let errors =
-            [percent(predicted.instructions, instructions), percent(predicted.cycles, cycles)];
-        assert!(errors.iter().all(|error| error.abs() < 1.0), "{line}: {errors:?} %");
-        // The image that counts has all weights in RAM.
-        let waiting = design.least_waiting_for_weights();
-        let error = percent(predicted.flash_cycles - waiting, flash);
-        assert!(error.abs() < 10.0, "{line}: {error} % from flash");
+        let (Some(design), "frame") = (design(model), scope) else { continue };
+        let predicted = Cost::of_frame(&design).instructions as f64;
+        let error = predicted / counted.parse::<f64>().unwrap() - 1.0;
+        assert!(error.abs() < 0.1, "{line}: {predicted}");
         compared += 1;
     }
-    assert!(compared > 100, "{compared}");
+    assert!(compared > 12, "{compared}");
 }
 
 #[test]
 fn a_filter_takes_what_its_page_says() {
-    let prices = Prices::accepted().unwrap();
     let page = include_str!("../../../../docs/filter.md");
     for (name, rows, outputs) in [
         ("144 outputs of 8 rows", 8, 18),
         ("48 outputs of 8 rows", 8, 6),
         ("6 outputs of one row", 1, 6),
     ] {
-        let Cost { instructions, cycles, flash_cycles } =
-            prices.filter(ModelShape { outputs, rows, ..PAPER }).unwrap();
-        let us = flash_cycles as f64 / 180.0;
-        let line = format!("| {name} | {instructions} | {cycles} | {flash_cycles} | {us:.0} µs |");
+        let Cost { instructions, cycles } = Cost::of_filter(ModelShape { outputs, rows, ..PAPER });
+        let us = cycles as f64 / 180.0;
+        let line = format!("| {name} | {instructions} | {cycles} | {us:.0} µs |");
         assert!(page.contains(&line), "docs/filter.md should say\n{line}");
     }
 }

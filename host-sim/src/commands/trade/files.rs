@@ -37,7 +37,7 @@ fn csv_of(trade: &Trade) -> String {
         .groups()
         .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
     let mut csv = format!(
-        "format,each_row,centres,spread,columns,samples_averaged,filter_ms,lead_ms,{},instructions,cycles,flash_cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
+        "format,each_row,centres,spread,columns,samples_averaged,filter_ms,lead_ms,{},instructions,cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
          on_front,chosen\n",
         rmse.collect::<Vec<_>>().join(",")
     );
@@ -48,7 +48,7 @@ fn csv_of(trade: &Trade) -> String {
         let errors = errors.collect::<Vec<_>>();
         let _ = writeln!(
             csv,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             p.format.name(),
             p.each_row,
             p.centres,
@@ -60,7 +60,6 @@ fn csv_of(trade: &Trade) -> String {
             errors.join(","),
             p.frame.instructions,
             p.frame.cycles,
-            p.frame.flash_cycles,
             p.times.scan_ms.map_or(String::new(), |ms| ms.to_string()),
             p.times.decode_ms,
             p.times.frame_ms,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::evaluate::trade::{Memory, Point, Trade, Wires};
+use crate::evaluate::trade::{Point, Trade, Wires};
 use crate::metrics;
 use crate::verdict::Verdict;
 
@@ -30,7 +30,7 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         if trade.unit.is_empty() { String::new() } else { format!(" in {}", trade.unit) }
     ));
     page.line(format_args!(
-        "\n  {:<26} {:>3} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
+        "\n  {:<26} {:>3} {:>4} {:>3} {:>4} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
         "format",
         "K",
         "cols",
@@ -42,7 +42,6 @@ pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
         "age ms",
         "Hz",
         "cycles",
-        "flash",
         "blob",
         "RAM"
     ));
@@ -107,13 +106,9 @@ fn legend(trade: &Trade, all: bool) -> String {
             "ms: time of decoding a frame alone; the scan's is unknown (--scan-ms)".into()
         }
     };
-    let memory = match trade.device.memory {
-        Memory::Flash => "from flash",
-        Memory::Ram => "at zero wait",
-    };
     let mut lines = vec![
-        format!("{scan}, {memory} at {} MHz", trade.device.clock_mhz),
-        "cycles, flash: of decoding on a Cortex-M4F, at zero wait and from flash (docs/cycles.md); blob, RAM: bytes".into(),
+        format!("{scan}, at {} MHz", trade.device.clock_mhz),
+        "cycles: of decoding on a Cortex-M4F whose memory never waits (docs/cycles.md); blob, RAM: bytes".into(),
         "× limit: RMSE relative to the least possible one with as many samples a reading and the same columns".into(),
         "avg: samples a reading; Hz: frames a second on the device, the serial line may carry fewer".into(),
     ];
@@ -170,7 +165,7 @@ fn line_of(trade: &Trade, i: usize) -> String {
     };
     let ratio = point.ratio_to_limit(&trade.group).map_or("-".into(), |r| format!("{r:.2}"));
     format!(
-        "{mark} {:<26} {:>3} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
+        "{mark} {:<26} {:>3} {:>4} {:>3} {:>4} {:>7} {ratio:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5}",
         point.way(),
         point.centres,
         point.columns.map_or("-".into(), |columns| columns.to_string()),
@@ -181,7 +176,6 @@ fn line_of(trade: &Trade, i: usize) -> String {
         point.times.age_ms.map_or("-".into(), ms),
         rate(point.times.frames_per_s),
         point.frame.cycles,
-        point.frame.flash_cycles,
         point.blob_bytes,
         point.ram_bytes,
     )
@@ -253,8 +247,8 @@ fn cost(point: &Point) -> String {
         None => format!("Decoding a frame takes {} ms, besides its scan", ms(times.decode_ms)),
     };
     format!(
-        "{time}; {} cycles ({} from flash), {} bytes of flash, {} bytes of RAM.",
-        point.frame.cycles, point.frame.flash_cycles, point.blob_bytes, point.ram_bytes
+        "{time}; {} cycles, {} bytes of flash, {} bytes of RAM.",
+        point.frame.cycles, point.blob_bytes, point.ram_bytes
     )
 }
 

@@ -89,7 +89,6 @@ fn columns(trade: &Trade) -> Vec<Column> {
         number("age, ms", |_, p| known(p.times.age_ms, |ms| fixed(ms, 3))),
         number("frames/s", |_, p| rate(p.times.frames_per_s)),
         number("cycles", |_, p| grouped(p.frame.cycles as usize)),
-        number("from flash", |_, p| grouped(p.frame.flash_cycles as usize)),
         number("blob, B", |_, p| grouped(p.blob_bytes)),
         number("RAM, B", |_, p| grouped(p.ram_bytes)),
     ]

@@ -34,13 +34,12 @@ pub fn times(times: &Times) -> String {
 /// All settings, the error and the cost of a point.
 pub fn in_full(trade: &Trade, point: &Point) -> String {
     format!(
-        "{}: RMSE of {} {}; {}; {} cycles, {} from flash; blob {} B, RAM {} B",
+        "{}: RMSE of {} {}; {}; {} cycles; blob {} B, RAM {} B",
         point.name(),
         symbol(&trade.group),
         error(trade, point.rmse(&trade.group)),
         times(&point.times),
         grouped(point.frame.cycles as usize),
-        grouped(point.frame.flash_cycles as usize),
         grouped(point.blob_bytes),
         grouped(point.ram_bytes)
     )

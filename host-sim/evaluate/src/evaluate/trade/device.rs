@@ -14,17 +14,6 @@ use crate::moving::age_ms;
 /// Clock of the NUCLEO-F446RE in MHz.
 pub const BOARD_CLOCK_MHZ: f64 = 180.0;
 
-/// Memory that a device runs its code from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Memory {
-    /// Flash with the wait states of an STM32F446 at 180 MHz ([`Cost::flash_cycles`]).
-    #[default]
-    Flash,
-    /// Memory that never waits ([`Cost::cycles`]).
-    Ram,
-}
-
 /// Readout of the NUCLEO-F446RE (docs/board.md): what samples columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -51,8 +40,6 @@ impl Readout {
 #[serde(deny_unknown_fields, default)]
 pub struct Device {
     pub clock_mhz: f64,
-    /// Memory that its code runs from.
-    pub memory: Memory,
     pub readout: Readout,
     /// Time of a scan with one sample a reading, instead of what the readout takes.
     pub scan_ms: Option<f64>,
@@ -61,12 +48,7 @@ pub struct Device {
 impl Default for Device {
     /// The NUCLEO-F446RE.
     fn default() -> Self {
-        Self {
-            clock_mhz: BOARD_CLOCK_MHZ,
-            memory: Memory::default(),
-            readout: Readout::default(),
-            scan_ms: None,
-        }
+        Self { clock_mhz: BOARD_CLOCK_MHZ, readout: Readout::default(), scan_ms: None }
     }
 }
 
@@ -169,17 +151,9 @@ impl Device {
         Noise { level: noise.level / (samples as f64).sqrt(), ..left }
     }
 
-    /// Cycles of a frame with this `cost` in the device's memory.
-    pub fn cycles(&self, cost: &Cost) -> u64 {
-        match self.memory {
-            Memory::Flash => cost.flash_cycles,
-            Memory::Ram => cost.cycles,
-        }
-    }
-
     /// Times of a frame whose decoding has this `cost`.
     pub fn times(&self, scan_ms: Option<f64>, cost: &Cost) -> Times {
-        let decode_ms = self.cycles(cost) as f64 / (self.clock_mhz * 1000.0);
+        let decode_ms = cost.cycles as f64 / (self.clock_mhz * 1000.0);
         let scanned_ms = scan_ms.unwrap_or(0.0);
         let [sums_ms, readings_ms] = match self.readout {
             Readout::OnChip if scan_ms.is_some() => {
@@ -211,7 +185,7 @@ mod tests {
     #[test]
     fn a_frame_takes_its_scan_and_then_its_decoding() {
         let board = Device::default();
-        let cost = Cost { instructions: 1, cycles: 18_000, flash_cycles: 36_000 };
+        let cost = Cost { instructions: 1, cycles: 36_000 };
         let paper = Some(Wires { rows: 8, columns: 18 });
         // docs/board.md: 5.6 ms with one sample a reading, 21 ms with four.
         let scans = [1, 4].map(|samples| board.scan_ms(paper, samples).unwrap());
@@ -234,9 +208,9 @@ mod tests {
         let times = onchip.times(Some(0.2), &cost);
         assert!((times.period_ms() - 0.461).abs() < 1e-12);
         assert!((times.frame_ms - (0.461 + 0.4)).abs() < 1e-12);
-        let ram = Device { memory: Memory::Ram, clock_mhz: 90.0, ..board };
-        assert_eq!(ram.times(None, &cost).frame_ms, 0.2);
-        assert_eq!(ram.times(None, &cost).frames_per_s, 5000.0);
+        let slower = Device { clock_mhz: 90.0, ..board };
+        assert_eq!(slower.times(None, &cost).frame_ms, 0.4);
+        assert_eq!(slower.times(None, &cost).frames_per_s, 2500.0);
     }
 
     #[test]

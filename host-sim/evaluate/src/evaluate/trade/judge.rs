@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use taxel_core::filter::{Settings, Track};
 use taxel_core::rbf::Format;
 use taxel_data::progress::Progress;
-use taxel_learn::cost::{Cost, DecoderRam, Design, Prices};
+use taxel_learn::cost::{Cost, DecoderRam, Design};
 use taxel_learn::train::{Examples, FittedNetwork, Layers, Refinement, Samples, refine};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 
@@ -36,7 +36,7 @@ impl Judged {
         &mut self,
         ways: &Ways<'_>,
         readings: (usize, &Measure),
-        (device, prices): (&Device, &Prices),
+        device: &Device,
         progress: &dyn Progress,
     ) -> Result<()> {
         let frames = ways.frames;
@@ -58,7 +58,7 @@ impl Judged {
             if !ways.inputs.each_row() && blob.bytes().len() > SLOT_BYTES {
                 continue;
             }
-            self.points(&blob, ways, format, readings, (device, prices))?;
+            self.points(&blob, ways, format, readings, device)?;
             self.distinct.push(blob.bytes().to_vec());
         }
         Ok(())
@@ -89,7 +89,7 @@ impl Judged {
         Ways { frames, inputs, .. }: &Ways<'_>,
         format: Format,
         (readings, measure): (usize, &Measure),
-        (device, prices): (&Device, &Prices),
+        device: &Device,
     ) -> Result<()> {
         let test = &frames.test;
         let model = blob.prepare().of_inputs();
@@ -99,7 +99,7 @@ impl Judged {
         // Fewer than asked for where there are fewer distinct samples.
         let centres = design.networks.iter().map(|network| network.shape.centres).max();
         let centres = centres.unwrap_or_default();
-        let cost = prices.frame(&design)?;
+        let cost = Cost::of_frame(&design);
         let mut add = |filter: Settings, frame: Cost, errors| {
             self.points.push(Point {
                 format,
@@ -123,7 +123,7 @@ impl Judged {
             self.blobs.push(self.distinct.len());
         };
         if let Some(touches) = &frames.touches {
-            let (cost, device) = ((cost, prices), (device, frames.scan_ms));
+            let device = (device, frames.scan_ms);
             let touched = touches.judge((blob, &model), cost, device, measure)?;
             for Way { filter, cost, errors, .. } in touched.ways {
                 add(filter, cost, errors);

@@ -7,7 +7,7 @@ use taxel_data::columns;
 use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
-use taxel_learn::cost::{Cost, Prices};
+use taxel_learn::cost::Cost;
 use taxel_learn::filtered::{Movement, settings_for};
 use taxel_learn::{ModelBlob, PreparedModel};
 use taxel_simulate::Synthesis;
@@ -85,15 +85,15 @@ impl<'s> Touches<'s> {
     /// Its decoding has this `cost`.
     ///
     /// # Errors
-    /// [`Error`](crate::Error) for times that [`Moving::new`] refuses, and a model that `prices` do not cover.
+    /// [`Error`](crate::Error) for times that [`Moving::new`] refuses.
     pub fn judge(
         &self,
         (blob, model): (&ModelBlob, &PreparedModel<'_>),
-        (cost, prices): (Cost, &Prices),
+        cost: Cost,
         (device, scan_ms): (&Device, Option<f64>),
         measure: &Measure,
     ) -> Result<Touched> {
-        let behind_filter = cost.plus(prices.filter(blob.parse().shape())?);
+        let behind_filter = cost.plus(Cost::of_filter(blob.parse().shape()));
         let [times, filter_times] = [cost, behind_filter].map(|cost| device.times(scan_ms, &cost));
         let decode =
             |of_period: &OfPeriod| model.decode_lines(&of_period.moving.frames.inputs.values);

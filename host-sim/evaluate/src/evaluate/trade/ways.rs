@@ -6,13 +6,12 @@ use std::collections::HashSet;
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::Format;
 use taxel_data::dataset::Dataset;
-use taxel_learn::cost::{Design, Prices};
+use taxel_learn::cost::{Cost, Design};
 use taxel_learn::train::projection;
 
 use super::choice::Offer;
 use super::frames::{Frames, Inputs};
 use super::{Device, Plan, SLOT_BYTES};
-use crate::error::Result;
 
 /// Ways to decode with networks that share their inputs, and have so many centres.
 pub(super) struct Ways<'f> {
@@ -36,7 +35,7 @@ impl<'f> Ways<'f> {
 
     /// What every way can offer at best, with an error of 0. Blobs are larger than is said here by less than their units
     /// and headers.
-    pub fn offers(&self, device: &Device, prices: &Prices) -> Result<Vec<Offer>> {
+    pub fn offers(&self, device: &Device) -> Vec<Offer> {
         let dataset = self.frames.training();
         let columns = dataset.inputs.names.iter().chain(&dataset.outputs.names);
         let names_bytes: usize = columns.map(|name| name.len() + 1).sum();
@@ -48,11 +47,11 @@ impl<'f> Ways<'f> {
             if !self.inputs.each_row() && blob_bytes > SLOT_BYTES {
                 continue;
             }
-            let cost = prices.frame(&design)?;
+            let cost = Cost::of_frame(&design);
             let times = device.times(self.frames.scan_ms, &cost);
             offers.push(Offer { rmse: 0.0, cycles: cost.cycles, blob_bytes, times });
         }
-        Ok(offers)
+        offers
     }
 
     /// Design of the model that training gives, with at most as many centres as `distinct` samples of each network.

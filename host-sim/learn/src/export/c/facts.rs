@@ -5,8 +5,7 @@ use taxel_core::{RowStatus, scratch_floats};
 
 use super::numbers::comment;
 use super::template::Values;
-use crate::cost::{Cost, Design, Prices};
-use crate::error::Result;
+use crate::cost::{Cost, Design};
 use crate::export::text::columns;
 use crate::packing::ModelBlob;
 
@@ -28,10 +27,10 @@ pub fn constant_bytes(blob: &ModelBlob) -> usize {
 
 impl<'b> Facts<'b> {
     /// Facts of the model in `blob`.
-    pub fn new(blob: &'b ModelBlob) -> Result<Self> {
+    pub fn new(blob: &'b ModelBlob) -> Self {
         let design = Design::new(blob);
-        let cost = Prices::accepted()?.frame(&design)?;
-        Ok(Self { model: blob.parse(), constant_bytes: constant_bytes(blob), cost })
+        let cost = Cost::of_frame(&design);
+        Self { model: blob.parse(), constant_bytes: constant_bytes(blob), cost }
     }
 
     /// Bytes of RAM that a caller's arrays take; the self-test has such arrays of its own.
