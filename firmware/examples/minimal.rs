@@ -16,7 +16,7 @@ use taxel_firmware::readout::{
 mod row4;
 
 /// Resistors and voltages of the circuit. `docs/readout.md` says how to measure them.
-static CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
+const CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 /// A row settles for 20 µs. Each column is sampled once.
 const SETTINGS: ScanSettings = ScanSettings { settling_us: 20, oversampling: 1 };
 /// Row-wire 4 and its 18 column-wires.
@@ -28,14 +28,14 @@ type Columns<S> = Mcp3208s<S, 3>;
 
 /// Sensor behind a 74HC595, which drives its row-wires, and three MCP3208, which sample its column-wires.
 pub struct Sensor<P, S, T> {
-    scanner: Scanner<Rows<P>, Columns<S>, T, &'static ZeroPotential<8, 18>, 8, 18>,
+    scanner: Scanner<Rows<P>, Columns<S>, T, 8, 18>,
 }
 
 impl<P: OutputPin, S: SpiDevice, T: DelayNs> Sensor<P, S, T> {
     /// Makes a sensor of the register's pins, a SPI device for each converter, and a delay.
     pub fn new([data, clock, latch]: [P; 3], chips: [S; 3], delay: T) -> Self {
         let (rows, columns) = (ShiftRegister595 { data, clock, latch }, Mcp3208s { chips });
-        Self { scanner: Scanner::new(rows, columns, delay, &CIRCUIT) }
+        Self { scanner: Scanner::new(rows, columns, delay, CIRCUIT) }
     }
 
     /// Scans the row and estimates how far each electrode is pressed in, in mm; NaN if a reading could not be taken.

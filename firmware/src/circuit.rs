@@ -1,8 +1,8 @@
-//! From ADC counts to Ω: the two circuits that a sensor can be read with, as pure arithmetic.
+//! From ADC counts to Ω: the circuit that a sensor is read with, as pure arithmetic.
 //!
-//! `docs/readout.md` draws both, derives the equations, and explains how to measure the constants.
+//! `docs/readout.md` draws it, derives the equations, and explains how to measure the constants.
 //! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω. A resistance
-//! in series with a row is therefore never negligible, and both circuits correct for it.
+//! in series with a row is therefore never negligible, and is corrected for.
 
 use serde::{Deserialize, Serialize};
 use taxel_core::blob::Floats;
@@ -10,46 +10,6 @@ use taxel_core::{ColumnWires, RowWire, Wires};
 
 /// Smallest current in counts that counts as one; below it, the reading is open.
 pub const NO_CURRENT_COUNTS: f32 = 4.0;
-
-/// Converts the samples of one row to readings.
-///
-/// A reading is NaN if its sample (or its idle sample) could not be taken, and [`f32::INFINITY`] if no current
-/// flows (open). It is 0 if the sample is saturated, or the resistance too small to be measured (short).
-pub trait Circuit {
-    /// Whether the circuit needs a sample of every column while all rows idle.
-    const IDLE_SAMPLES: bool;
-
-    /// Converts the samples of a row to Ω, in place.
-    ///
-    /// `readings` holds averaged counts of the scanned columns, NaN where none could be taken, and Ω afterwards. `idle`
-    /// holds idle counts of every column; it is ignored unless [`IDLE_SAMPLES`](Self::IDLE_SAMPLES).
-    /// `full_scale_counts` is the converter's largest count.
-    fn row_ohm(&self, row: ScannedRow, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]);
-
-    /// The [`load`](ScannedRow::load) of a row, from the `counts` of every column; what cannot be told is that of equal
-    /// columns.
-    fn load(&self, columns: ColumnWires, idle: &[f32], counts: &[f32]) -> f32;
-
-    /// Corrects a whole `frame` (Ω, rows of `columns` readings) for the influence of its rows on each other, as far
-    /// as that is known. Does nothing unless a circuit overrides it.
-    fn correct(&self, columns: ColumnWires, frame: &mut [f32]) {
-        let _ = (columns, frame);
-    }
-
-    /// The constants, if they can be asked for. A circuit has none unless it overrides this.
-    fn constants(&self) -> Option<Constants<'_>> {
-        None
-    }
-
-    /// Replaces all constants. A circuit takes none unless it overrides this.
-    ///
-    /// # Errors
-    /// [`ConstantsFault`], which leaves the constants as they were.
-    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
-        let _ = constants;
-        Err(ConstantsFault::Fixed)
-    }
-}
 
 /// A row of which some columns, or all, were sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,85 +86,6 @@ impl Constants<'_> {
 const MOST_V: f32 = 100.0;
 const MOST_OHM: f32 = 1e6;
 
-/// A reference to a circuit is a circuit too, so that its constants can stay in flash.
-impl<C: Circuit> Circuit for &C {
-    const IDLE_SAMPLES: bool = C::IDLE_SAMPLES;
-
-    fn row_ohm(&self, row: ScannedRow, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
-        C::row_ohm(self, row, idle, full_scale_counts, readings);
-    }
-
-    fn load(&self, columns: ColumnWires, idle: &[f32], counts: &[f32]) -> f32 {
-        C::load(self, columns, idle, counts)
-    }
-
-    fn correct(&self, columns: ColumnWires, frame: &mut [f32]) {
-        C::correct(self, columns, frame);
-    }
-
-    fn constants(&self) -> Option<Constants<'_>> {
-        C::constants(self)
-    }
-}
-
-/// The divider circuit: the active row is at the reference voltage, idle rows float, and every column goes to
-/// ground through its own resistor.
-///
-/// V = V_row·R_ref/(R_ref + R). The converter shares the reference, so its voltage need not be known.
-/// The floating rows connect all columns with each other. This circuit therefore reads a sensor of many rows
-/// wrongly, whatever its calibration (`docs/readout.md` shows by how much).
-///
-/// ```
-/// use taxel_firmware::circuit::{Circuit, Divider, ScannedRow};
-/// use taxel_core::{ColumnWires, RowWire};
-/// let divider = Divider::<1, 1> { row_source_ohm: [0.0], ..Divider::TYPICAL };
-/// // 470 Ω below 58.75 Ω: eight ninths of 4096.
-/// let mut reading = [4096.0 * 8.0 / 9.0];
-/// let row = ScannedRow { row: RowWire(0), columns: ColumnWires::first(1), load: 1.0 };
-/// divider.row_ohm(row, &[f32::NAN], 4095, &mut reading);
-/// assert!((reading[0] - 58.75).abs() < 1e-3);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Divider<const ROWS: usize, const COLS: usize> {
-    /// Resistance in Ω between the reference voltage and each row-wire: switch and lead.
-    pub row_source_ohm: [f32; ROWS],
-    /// Resistance in Ω from each column to ground.
-    pub reference_ohm: [f32; COLS],
-    /// Resistance in Ω in series with each column, not part of the sensor.
-    pub series_ohm: [f32; COLS],
-}
-
-impl<const ROWS: usize, const COLS: usize> Divider<ROWS, COLS> {
-    /// Typical constants: 470 Ω to ground (6 mA a column and 112 mA a row at 3.3 V), and a switch of 0.26 Ω.
-    pub const TYPICAL: Self = Self {
-        row_source_ohm: [0.26; ROWS],
-        reference_ohm: [470.0; COLS],
-        series_ohm: [0.0; COLS],
-    };
-}
-
-impl<const ROWS: usize, const COLS: usize> Circuit for Divider<ROWS, COLS> {
-    const IDLE_SAMPLES: bool = false;
-
-    fn row_ohm(&self, row: ScannedRow, _: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
-        let counts = counts_at_reference(full_scale_counts);
-        // Voltages in units of the reference.
-        let columns = || row.columns.pick(self.reference_ohm.iter().zip(&self.series_ohm));
-        let currents = readings.iter().zip(columns()).map(|(n, (r, _))| n / counts / r);
-        let row_v = 1.0 - voltage_drop(&self.row_source_ohm, row, currents);
-        for (reading, (r, series)) in readings.iter_mut().zip(columns()) {
-            let n = *reading;
-            let (across, current) = (row_v - n / counts, n / counts / r);
-            *reading = reading_of(n, n, full_scale_counts, across / current - series);
-        }
-    }
-
-    fn load(&self, columns: ColumnWires, _: &[f32], counts: &[f32]) -> f32 {
-        let currents = || counts.iter().zip(&self.reference_ohm).map(|(n, r)| (*n, n / r));
-        load(columns, currents)
-    }
-}
-
 /// The zero-potential circuit: an op-amp with a feedback resistor holds every column at V_b, idle rows are at V_b
 /// too, and the active row is pulled below it by `drive_v`.
 ///
@@ -212,10 +93,13 @@ impl<const ROWS: usize, const COLS: usize> Circuit for Divider<ROWS, COLS> {
 /// other rows do not disturb (D'Alessio, Sensors and Actuators A 72, 1999). Subtracting the idle sample removes
 /// V_b and the op-amp's offset exactly. The row's own drop V_d − R_s·ΣI is known because all its columns are
 /// measured, or their share is known. A lead in series with a column lets the idle rows feed it: it divides all currents of the column by
-/// 1 + s·Σ1/R, which [`correct`](Circuit::correct) undoes.
+/// 1 + s·Σ1/R, which [`correct`](Self::correct) undoes.
+///
+/// A reading is NaN if its sample (or its idle sample) could not be taken, and [`f32::INFINITY`] if no current
+/// flows (open). It is 0 if the sample is saturated, or the resistance too small to be measured (short).
 ///
 /// ```
-/// use taxel_firmware::circuit::{Circuit, ScannedRow, ZeroPotential};
+/// use taxel_firmware::circuit::{ScannedRow, ZeroPotential};
 /// use taxel_core::{ColumnWires, RowWire};
 /// let circuit = ZeroPotential::<1, 1> { row_source_ohm: [0.0], ..ZeroPotential::TYPICAL };
 /// // 0.2 V across 62.5 Ω drive 3.2 mA through 560 Ω: 1.792 V above the idle 0.2 V.
@@ -252,12 +136,18 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
         feedback_ohm: [560.0; COLS],
         series_ohm: [0.0; COLS],
     };
-}
 
-impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS> {
-    const IDLE_SAMPLES: bool = true;
-
-    fn row_ohm(&self, row: ScannedRow, idle: &[f32], full_scale_counts: u16, readings: &mut [f32]) {
+    /// Converts the samples of a row to Ω, in place.
+    ///
+    /// `readings` holds averaged counts of the scanned columns, NaN where none could be taken, and Ω afterwards. `idle`
+    /// holds counts of every column while all rows idle. `full_scale_counts` is the converter's largest count.
+    pub fn row_ohm(
+        &self,
+        row: ScannedRow,
+        idle: &[f32],
+        full_scale_counts: u16,
+        readings: &mut [f32],
+    ) {
         let volt_per_count = self.reference_v / counts_at_reference(full_scale_counts);
         let current = |n: f32, idle: f32, r: f32| (n - idle) * volt_per_count / r;
         let columns = || row.columns.pick(idle.iter().zip(&self.feedback_ohm));
@@ -269,14 +159,17 @@ impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS>
         }
     }
 
-    fn load(&self, columns: ColumnWires, idle: &[f32], counts: &[f32]) -> f32 {
+    /// The [`load`](ScannedRow::load) of a row, from the `counts` of every column; what cannot be told is that of equal
+    /// columns.
+    pub fn load(&self, columns: ColumnWires, idle: &[f32], counts: &[f32]) -> f32 {
         let parts = || counts.iter().zip(idle.iter().zip(&self.feedback_ohm));
         load(columns, || parts().map(|(n, (idle, r))| (n - idle, (n - idle) / r)))
     }
 
-    /// Corrects each reading to R·(1 − s·Σ1/R), with the sum over the column's rows. A row that was not measured, or
-    /// is not read, counts as the mean of the others.
-    fn correct(&self, columns: ColumnWires, frame: &mut [f32]) {
+    /// Corrects a whole `frame` (Ω, rows of `columns` readings) for leads in series with columns: each reading to
+    /// R·(1 − s·Σ1/R), with the sum over the column's rows. A row that was not measured, or is not read, counts as the mean
+    /// of the others.
+    pub fn correct(&self, columns: ColumnWires, frame: &mut [f32]) {
         let count = columns.count().max(1);
         let leads = columns.pick(&self.series_ohm).enumerate();
         for (column, series) in leads.filter(|(_, series)| **series != 0.0) {
@@ -294,17 +187,22 @@ impl<const ROWS: usize, const COLS: usize> Circuit for ZeroPotential<ROWS, COLS>
         }
     }
 
-    fn constants(&self) -> Option<Constants<'_>> {
-        Some(Constants {
+    /// The constants.
+    pub fn constants(&self) -> Constants<'_> {
+        Constants {
             reference_v: self.reference_v,
             drive_v: self.drive_v,
             row_source_ohm: Floats::new(&self.row_source_ohm),
             feedback_ohm: Floats::new(&self.feedback_ohm),
             series_ohm: Floats::new(&self.series_ohm),
-        })
+        }
     }
 
-    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+    /// Replaces all constants.
+    ///
+    /// # Errors
+    /// [`ConstantsFault`], which leaves the constants as they were.
+    pub fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
         constants.check(Wires { rows: ROWS, columns: COLS })?;
         (self.reference_v, self.drive_v) = (constants.reference_v, constants.drive_v);
         copy(constants.row_source_ohm, &mut self.row_source_ohm);
@@ -371,19 +269,6 @@ mod tests {
 
     const COUNTS: f64 = 4096.0;
 
-    /// Unrounded counts of a row that is read by `divider`, without other rows.
-    fn divider_counts(divider: &Divider<2, 18>, ohm: &[f64; 18]) -> [f32; 18] {
-        let source = f64::from(divider.row_source_ohm[1]);
-        let branch = |k: usize| {
-            ohm[k] + f64::from(divider.series_ohm[k]) + f64::from(divider.reference_ohm[k])
-        };
-        let load: f64 = (0..18).map(|k| 1.0 / branch(k)).sum();
-        let row = 1.0 / (1.0 + source * load);
-        core::array::from_fn(|k| {
-            (COUNTS * row * f64::from(divider.reference_ohm[k]) / branch(k)) as f32
-        })
-    }
-
     /// Unrounded counts of a row, and of idle columns, for `circuit`.
     fn zero_potential_counts(circuit: &ZeroPotential<2, 18>, ohm: &[f64; 18]) -> [[f32; 18]; 2] {
         let branch = |k: usize| ohm[k] + f64::from(circuit.series_ohm[k]);
@@ -398,8 +283,8 @@ mod tests {
     }
 
     /// Readings of the row `row` from its samples.
-    fn read<const N: usize>(
-        circuit: &impl Circuit,
+    fn read<const R: usize, const N: usize>(
+        circuit: &ZeroPotential<R, N>,
         row: usize,
         sampled: &[f32; N],
         idle: &[f32; N],
@@ -412,7 +297,7 @@ mod tests {
 
     /// A frame after the circuit has corrected it.
     fn corrected<const R: usize, const C: usize>(
-        circuit: &impl Circuit,
+        circuit: &ZeroPotential<R, C>,
         frame: [[f32; C]; R],
     ) -> [[f32; C]; R] {
         let mut corrected = frame;
@@ -432,20 +317,14 @@ mod tests {
     }
 
     #[test]
-    fn both_circuits_return_the_resistances_whatever_each_rows_source_and_each_columns_parts() {
+    fn the_circuit_returns_the_resistances_whatever_each_rows_source_and_each_columns_parts() {
         for source_ohm in [0.0, 0.3, 5.0] {
-            let mut divider = Divider { row_source_ohm: [9.0, source_ohm], ..Divider::TYPICAL };
             let mut circuit =
                 ZeroPotential { row_source_ohm: [9.0, source_ohm], ..ZeroPotential::TYPICAL };
             for k in 0..18 {
-                divider.reference_ohm[k] += k as f32;
-                divider.series_ohm[k] = 0.1 * k as f32;
                 circuit.feedback_ohm[k] -= k as f32;
                 circuit.series_ohm[k] = 0.1 * k as f32;
             }
-            let counts = divider_counts(&divider, &row());
-            // The divider subtracts two voltages that differ by a tenth: fewer digits are left.
-            assert_close(&read(&divider, 1, &counts, &[f32::NAN; 18]), &row(), 1e-5);
             let [sampled, idle] = zero_potential_counts(&circuit, &row());
             let ohm = read(&circuit, 1, &sampled, &idle);
             // The other row is open: it feeds no column.
@@ -477,14 +356,6 @@ mod tests {
         assert!(ohm[0].is_nan() && ohm[3].is_nan());
         assert_eq!((ohm[1], ohm[2], ohm[4]), (0.0, f32::INFINITY, f32::INFINITY));
         assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 2e-6);
-
-        let divider = Divider { row_source_ohm: [0.0; 2], ..Divider::TYPICAL };
-        let mut counts = divider_counts(&divider, &row());
-        (counts[0], counts[1], counts[2]) = (f32::NAN, 4095.0, 0.0);
-        let ohm = read(&divider, 1, &counts, &idle);
-        assert!(ohm[0].is_nan());
-        assert_eq!((ohm[1], ohm[2]), (0.0, f32::INFINITY));
-        assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 1e-5);
     }
 
     #[test]
@@ -526,8 +397,6 @@ mod tests {
         assert!((without - 17.0 / 18.0).abs() < 1e-2, "{without}");
         // Nothing is known of a row without current.
         assert_eq!(circuit.load(columns, &idle, &idle), 6.0);
-        let equal = Divider::<2, 18>::TYPICAL.load(columns, &[], &[100.0; 18]);
-        assert!((equal - 6.0).abs() < 1e-5, "{equal}");
     }
 
     #[test]
@@ -554,8 +423,6 @@ mod tests {
 
     #[test]
     fn a_negative_resistance_is_a_short() {
-        let divider = Divider::<1, 1> { series_ohm: [1000.0], ..Divider::TYPICAL };
-        assert_eq!(read(&divider, 0, &[3000.0], &[250.0]), [0.0]);
         let circuit = ZeroPotential::<1, 1> { series_ohm: [1000.0], ..ZeroPotential::TYPICAL };
         assert_eq!(corrected(&circuit, [[60.0]]), [[0.0]]);
     }

@@ -1,11 +1,10 @@
 //! Reading a frame: rows are driven one after the other, and every column is sampled.
 //!
-//! A board picks one [`RowDrive`], one [`ColumnSampler`] and one [`Circuit`](crate::circuit::Circuit);
-//! [`Scanner`] makes a [`FrameSource`] of them. Everything is generic over embedded-hal 1.0, whose
-//! version lacks an ADC trait: [`OnChipAdc`] stands in. A scan never fails as a whole: a reading
-//! that could not be taken is NaN, and counted.
+//! A board picks a [`RowDrive`] and a [`ColumnSampler`], such as [`ShiftRegister595`] and [`Mcp3208s`] over embedded-hal
+//! 1.0; [`Scanner`] makes a [`FrameSource`] of them. Hardware that scans by itself is a [`Sequencer`], for
+//! [`PassScanner`]. A scan never fails as a whole: a reading that could not be taken is NaN, and counted.
 //!
-//! `docs/readout.md` has the circuits, their parts and the timing.
+//! `docs/readout.md` has the circuit, its parts and the timing.
 
 use serde::{Deserialize, Serialize};
 use taxel_core::{ColumnWire, ColumnWires, RowWire};
@@ -21,9 +20,9 @@ mod passes;
 mod tests;
 
 pub use baseline::Baseline;
-pub use columns::{Mcp3208s, MultiplexedAdc, OnChipAdc, SampleError};
+pub use columns::{Mcp3208s, SampleError};
 pub use passes::{PassScanner, Sequencer, SequencerFault, add_samples};
-pub use rows::{DirectPins, DriveError, Multiplexer4051, ShiftRegister595};
+pub use rows::{DriveError, ShiftRegister595};
 pub use scanner::Scanner;
 
 /// Selects the row-wire that is active; all others idle.
@@ -62,8 +61,7 @@ pub trait ColumnSampler {
 /// Settings of a scan. They may come from the host: a value out of range is replaced by the nearest one within.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScanSettings {
-    /// Waiting time in µs after every change of the rows, up to [`MOST_SETTLING_US`](Self::MOST_SETTLING_US);
-    /// [`settling_us`](crate::timing::settling_us) computes it.
+    /// Waiting time in µs after every change of the rows, up to [`MOST_SETTLING_US`](Self::MOST_SETTLING_US).
     pub settling_us: u32,
     /// Number of samples averaged for a reading, from 1 to [`MOST_OVERSAMPLING`](Self::MOST_OVERSAMPLING).
     pub oversampling: u16,

@@ -1,4 +1,4 @@
-//! Times of settling, samples and scans, as pure functions.
+//! Times of samples and scans, as pure functions.
 //!
 //! Waiting times are rounded up; a time that does not fit its type becomes the type's largest number.
 
@@ -105,37 +105,6 @@ impl RowCounts {
     }
 }
 
-/// Gain–bandwidth product of an MCP6024, the op-amp of docs/readout.md, in Hz.
-pub const OP_AMP_HZ: f32 = 10e6;
-
-/// Noise gain of the op-amp that holds a column: 1 + R_f/R, with R the cells of all rows in parallel.
-///
-/// ```
-/// let gain = taxel_firmware::timing::noise_gain(560.0, 55.0, 8); // the paper's sensor at rest
-/// assert!((gain - 82.5).abs() < 0.1);
-/// ```
-pub fn noise_gain(feedback_ohm: f32, cell_ohm: f32, rows: u16) -> f32 {
-    1.0 + feedback_ohm * f32::from(rows) / cell_ohm
-}
-
-/// Time constant in ns with which an op-amp follows, closed around this noise gain.
-pub fn time_constant_ns(noise_gain: f32, gain_bandwidth_hz: f32) -> f32 {
-    noise_gain / (2.0 * core::f32::consts::PI * gain_bandwidth_hz) * 1e9
-}
-
-/// Time in µs until a voltage is within half a count of its final value: τ·ln 2^(bits + 1).
-///
-/// ```
-/// use taxel_firmware::timing::{OP_AMP_HZ, settling_us, time_constant_ns};
-/// let time_constant_ns = time_constant_ns(82.5, OP_AMP_HZ); // 1.3 µs
-/// assert_eq!(settling_us(time_constant_ns, 12), 12); // nine time constants
-/// ```
-pub fn settling_us(time_constant_ns: f32, bits: u8) -> u32 {
-    let us = time_constant_ns * 1e-3 * ((f32::from(bits) + 1.0) * core::f32::consts::LN_2);
-    let whole = us as u32; // saturates; NaN and negative times become 0
-    whole.saturating_add(u32::from((whole as f32) < us))
-}
-
 /// Time in ns of so many bytes over SPI, without gaps; `u32::MAX` for a clock of 0 Hz.
 ///
 /// ```
@@ -158,8 +127,6 @@ pub struct ScanPlan {
     pub columns: u16,
     /// Number of columns that the board can sample.
     pub board_columns: u16,
-    /// Whether every column is sampled once a round while all rows idle.
-    pub idle_samples: bool,
     /// Waiting time in µs after every change of the rows.
     pub settling_us: u32,
     /// Number of samples averaged for a reading.
@@ -187,7 +154,6 @@ impl ScanPlan {
             rows,
             columns,
             board_columns: columns.max(Capacity::PAPER.columns as u16),
-            idle_samples: true,
             settling_us: Configuration::DEFAULT.scan.settling_us,
             oversampling,
             pass_samples: u16::MAX,
@@ -213,7 +179,6 @@ impl ScanPlan {
             rows,
             columns,
             board_columns: columns,
-            idle_samples: true,
             settling_us: Configuration::DEFAULT.scan.settling_us,
             oversampling,
             pass_samples: ONCHIP_SAMPLES,
@@ -233,7 +198,6 @@ impl ScanPlan {
     ///     rows: 8,
     ///     columns: 18,
     ///     board_columns: 18,
-    ///     idle_samples: true,
     ///     settling_us: 20,
     ///     oversampling: 2,
     ///     pass_samples: u16::MAX,
@@ -268,10 +232,11 @@ impl ScanPlan {
         u64::from(self.rows).saturating_mul(row_ns).saturating_add(between_ns)
     }
 
-    /// Time in ns that the first scan of a round takes besides its rows.
+    /// Time in ns that the first scan of a round takes besides its rows: for samples of every column while all rows idle, and
+    /// of columns that are not read.
     fn of_round_ns(&self) -> u64 {
-        let idle_ns = if self.idle_samples { self.step_ns(self.board_columns) } else { 0 };
-        idle_ns.saturating_add(self.samples_ns(self.board_columns.saturating_sub(self.columns)))
+        let others = self.board_columns.saturating_sub(self.columns);
+        self.step_ns(self.board_columns).saturating_add(self.samples_ns(others))
     }
 
     /// Time in ns to change the rows, wait, and sample so many columns.
@@ -290,7 +255,7 @@ impl ScanPlan {
     ///
     /// ```
     /// # use taxel_firmware::timing::ScanPlan;
-    /// # let plan = ScanPlan { rows: 8, columns: 18, board_columns: 18, idle_samples: true, settling_us: 20,
+    /// # let plan = ScanPlan { rows: 8, columns: 18, board_columns: 18, settling_us: 20,
     /// #     oversampling: 1, pass_samples: 256, sample_ns: 24_000, reading_ns: 0, row_ns: 0,
     /// #     between_passes_ns: 0 };
     /// assert_eq!(plan.most_oversampling(10_000), Some(2));
@@ -323,7 +288,6 @@ mod tests {
         rows: 8,
         columns: 18,
         board_columns: 18,
-        idle_samples: false,
         settling_us: 10,
         oversampling: 1,
         pass_samples: u16::MAX,
@@ -334,30 +298,12 @@ mod tests {
     };
 
     #[test]
-    fn settling_leaves_less_than_half_a_count() {
-        for bits in [8, 10, 12, 16] {
-            for time_constant_us in [0.7_f64, 5.0, 123.4] {
-                let wait_us = f64::from(settling_us((time_constant_us * 1e3) as f32, bits));
-                let left_counts = (-wait_us / time_constant_us).exp() * 2_f64.powi(bits.into());
-                assert!(left_counts <= 0.5 + 1e-5, "{bits} bits: {left_counts} counts");
-                let sooner_us = wait_us - 1.0;
-                let left_counts = (-sooner_us / time_constant_us).exp() * 2_f64.powi(bits.into());
-                assert!(left_counts > 0.5 - 1e-5, "{bits} bits waits a µs too long");
-            }
-        }
-    }
-
-    #[test]
     fn extremes_end_at_the_largest_number_or_nothing() {
-        assert_eq!(settling_us(f32::INFINITY, 12), u32::MAX);
-        assert_eq!(settling_us(f32::MAX, u8::MAX), u32::MAX);
-        assert_eq!((settling_us(f32::NAN, 12), settling_us(-1.0, 12)), (0, 0));
         assert_eq!((spi_transfer_ns(3, 0), spi_transfer_ns(u32::MAX, 1)), (u32::MAX, u32::MAX));
         let most = ScanPlan {
             rows: u16::MAX,
             columns: u16::MAX,
             board_columns: u16::MAX,
-            idle_samples: true,
             settling_us: u32::MAX,
             oversampling: u16::MAX,
             pass_samples: 0,
@@ -368,18 +314,8 @@ mod tests {
         };
         assert_eq!(most.scan_us(), u32::MAX);
         let nothing = ScanPlan { rows: 0, columns: 0, board_columns: 0, ..PLAN };
-        assert_eq!((nothing.scan_us(), nothing.most_oversampling(0)), (0, Some(u16::MAX)));
-    }
-
-    #[test]
-    fn the_boards_wait_is_what_its_op_amp_needs_with_a_margin() {
-        let needed_us = |cell_ohm: f32, hz: f32| {
-            settling_us(time_constant_ns(noise_gain(560.0, cell_ohm, 8), hz), 12)
-        };
-        let waited_us = Configuration::DEFAULT.scan.settling_us;
-        assert_eq!((needed_us(55.0, OP_AMP_HZ), waited_us), (12, 20));
-        // With all cells pressed to 42 Ω, an op-amp that is a fifth slower will do.
-        assert!(needed_us(42.0, 0.8 * OP_AMP_HZ) <= waited_us);
+        // All rows idle all the same.
+        assert_eq!((nothing.scan_us(), nothing.longest_us()), (1, 12));
     }
 
     #[test]
@@ -440,18 +376,17 @@ mod tests {
     #[test]
     fn a_scan_is_its_waits_and_its_samples() {
         let [row_ns, sample_ns] = [12_000, 1_500];
-        assert_eq!(PLAN.scan_us(), 8 * row_ns / 1000 + 8 * 18 * sample_ns / 1000);
-        assert_eq!(PLAN.longest_us(), PLAN.scan_us());
         // Idle samples are a row more, once in 16 scans.
-        let idle = ScanPlan { idle_samples: true, ..PLAN };
-        assert_eq!(idle.longest_us(), 9 * row_ns / 1000 + 9 * 18 * sample_ns / 1000);
-        assert_eq!(idle.scan_us(), PLAN.scan_us() + (12_000_u32 + 18 * 1500).div_ceil(16_000));
+        let rows_us = 8 * row_ns / 1000 + 8 * 18 * sample_ns / 1000;
+        assert_eq!(PLAN.longest_us(), rows_us + row_ns / 1000 + 18 * sample_ns / 1000);
+        assert_eq!(PLAN.scan_us(), rows_us + (12_000_u32 + 18 * 1500).div_ceil(16_000));
         // A part of the columns, and the others of one row once in 16 scans.
-        let part = ScanPlan { columns: 3, ..idle };
+        let part = ScanPlan { columns: 3, ..PLAN };
         assert_eq!(part.longest_us(), 9 * row_ns / 1000 + (8 * 3 + 18 + 15) * 3 / 2 + 1);
-        assert_eq!(ScanPlan { oversampling: 4, ..PLAN }.scan_us(), 8 * 12 + 4 * 8 * 18 * 3 / 2);
+        let four = ScanPlan { oversampling: 4, ..PLAN };
+        assert_eq!(four.longest_us(), 9 * 12 + 4 * 9 * 18 * 3 / 2);
         let most = PLAN.most_oversampling(10_000).unwrap();
-        assert!(ScanPlan { oversampling: most, ..PLAN }.scan_us() <= 10_000);
-        assert!(ScanPlan { oversampling: most + 1, ..PLAN }.scan_us() > 10_000);
+        assert!(ScanPlan { oversampling: most, ..PLAN }.longest_us() <= 10_000);
+        assert!(ScanPlan { oversampling: most + 1, ..PLAN }.longest_us() > 10_000);
     }
 }

@@ -2,7 +2,7 @@
 
 use mock_board::request_bytes;
 use taxel_core::blob::Floats;
-use taxel_firmware::circuit::{Circuit, ConstantsFault, ZeroPotential};
+use taxel_firmware::circuit::{ConstantsFault, ZeroPotential};
 use taxel_firmware::link::cobs;
 use taxel_firmware::link::message::{
     Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
@@ -117,7 +117,7 @@ fn identity() -> Report<'static> {
 /// Messages about constants of the circuit and settings that are kept.
 fn about_settings() -> [(&'static str, Vec<u8>); 9] {
     let circuit = ZeroPotential::<1, 2>::TYPICAL;
-    let constants = circuit.constants().unwrap();
+    let constants = circuit.constants();
     let kept = Kept {
         configuration: None,
         constants: true,

@@ -3,7 +3,7 @@
 use mock_board::*;
 use taxel_core::blob::Floats;
 use taxel_firmware::app::Session;
-use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{
     Configuration, KeepFault, Kept, KeptBaseline, Refusal, Report, Request, Setting,
 };
@@ -55,9 +55,9 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         let mut bench = Bench::with_journal(quiet(), journal.clone());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         let constants = circuit();
-        let set = Request::SetConstants(constants.constants().unwrap());
+        let set = Request::SetConstants(constants.constants());
         ask(&mut session, &bench.board, &set, |report| match report {
-            Report::Constants(found) => assert_eq!(Some(found), constants.constants()),
+            Report::Constants(found) => assert_eq!(found, constants.constants()),
             other => panic!("{other:?}"),
         });
         let capture = [Request::Configure(scanning), Request::CaptureBaseline { frames: 3 }];
@@ -90,7 +90,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
             other => panic!("{other:?}"),
         });
         ask(&mut session, &bench.board, &Request::Constants, |report| match report {
-            Report::Constants(found) => assert_eq!(Some(found), circuit().constants()),
+            Report::Constants(found) => assert_eq!(found, circuit().constants()),
             other => panic!("{other:?}"),
         });
         // The baseline is in force: a frame that differs from it is a contact.
@@ -109,7 +109,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         assert_eq!(decode(&mut session, 40.0) & 16, 16);
         // With other constants it means nothing, and with the former ones it does again.
         for (circuit, contact) in [(ZeroPotential::TYPICAL, 0), (circuit(), 16)] {
-            let set = Request::SetConstants(circuit.constants().unwrap());
+            let set = Request::SetConstants(circuit.constants());
             ask(&mut session, &bench.board, &set, |_| ());
             assert_eq!(decode(&mut session, 40.0) & 16, contact);
         }
@@ -127,7 +127,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     ask(&mut session, &bench.board, &Request::Constants, |report| match report {
         Report::Constants(found) => {
-            assert_eq!(Some(found), ZeroPotential::<ROWS, COLS>::TYPICAL.constants());
+            assert_eq!(found, ZeroPotential::<ROWS, COLS>::TYPICAL.constants());
         }
         other => panic!("{other:?}"),
     });
@@ -187,8 +187,8 @@ fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let good = circuit();
-    let mut set = |circuit: &dyn AnyCircuit| {
-        let request = Request::SetConstants(circuit.all());
+    let mut set = |constants: Constants<'_>| {
+        let request = Request::SetConstants(constants);
         ask(&mut session, &bench.board, &request, |report| match report {
             Report::Refused(Refusal::Constants(fault)) => Err(fault),
             Report::Constants(_) => Ok(()),
@@ -205,27 +205,16 @@ fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
         (ZeroPotential { feedback_ohm: [f32::INFINITY; 3], ..good }, ConstantsFault::Feedback),
         (ZeroPotential { series_ohm, ..good }, ConstantsFault::Series),
     ];
-    assert_eq!(set(&good), Ok(()));
+    assert_eq!(set(good.constants()), Ok(()));
     for (circuit, fault) in &bad {
-        assert_eq!(set(circuit), Err(*fault));
+        assert_eq!(set(circuit.constants()), Err(*fault));
     }
-    assert_eq!(set(&ZeroPotential::<2, 2>::TYPICAL), Err(ConstantsFault::Length));
-    assert_eq!(set(&ZeroPotential::<3, 3>::TYPICAL), Err(ConstantsFault::Length));
+    assert_eq!(set(ZeroPotential::<2, 2>::TYPICAL.constants()), Err(ConstantsFault::Length));
+    assert_eq!(set(ZeroPotential::<3, 3>::TYPICAL.constants()), Err(ConstantsFault::Length));
     ask(&mut session, &bench.board, &Request::Constants, |report| match report {
-        Report::Constants(found) => assert_eq!(Some(found), good.constants()),
+        Report::Constants(found) => assert_eq!(found, good.constants()),
         other => panic!("{other:?}"),
     });
-}
-
-/// A circuit of any size.
-trait AnyCircuit {
-    fn all(&self) -> Constants<'_>;
-}
-
-impl<C: Circuit> AnyCircuit for C {
-    fn all(&self) -> Constants<'_> {
-        self.constants().unwrap()
-    }
 }
 
 #[test]

@@ -18,7 +18,6 @@ const DESK: &[&str] = &[
     "taxel-data",
     "taxel-recording",
     "taxel-simulate",
-    "taxel-virtual-board",
     "taxel-learn",
     "taxel-limit",
     "taxel-rig",

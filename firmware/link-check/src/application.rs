@@ -2,7 +2,7 @@
 
 use taxel_firmware::app::{App, Buffers};
 use taxel_firmware::capacity::Capacity;
-use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{Configuration, Memory};
 use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
@@ -78,7 +78,7 @@ impl FrameSource for Sensor {
     }
 
     fn constants(&self) -> Option<Constants<'_>> {
-        self.0.constants()
+        Some(self.0.constants())
     }
 
     fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {

@@ -1,17 +1,15 @@
 //! Calls every way of reading a frame, with pins and buses that are opaque to the optimiser.
 
 use core::array;
-use core::convert::Infallible;
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
 use taxel_core::{ColumnWires, RowWire};
-use taxel_firmware::circuit::{Circuit, Divider, ZeroPotential};
+use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::readout::{
-    Baseline, ColumnSampler, DirectPins, FrameSource, Mcp3208s, MultiplexedAdc, Multiplexer4051,
-    OnChipAdc, PassScanner, RowDrive, ScanSettings, Scanner, Selection, Sequencer, SequencerFault,
-    ShiftRegister595, add_samples,
+    Baseline, FrameSource, Mcp3208s, PassScanner, ScanSettings, Scanner, Selection, Sequencer,
+    SequencerFault, ShiftRegister595, add_samples,
 };
 use taxel_firmware::timing;
 
@@ -57,21 +55,11 @@ impl DelayNs for Part {
     }
 }
 
-impl OnChipAdc for Part {
-    type Error = Infallible;
-    const FULL_SCALE_COUNTS: u16 = 4095;
-
-    fn start(&mut self) -> Result<(), Infallible> {
-        Ok(())
-    }
-
-    fn poll(&mut self) -> Result<Option<u16>, Infallible> {
-        Ok(opaque(Some(2048)))
-    }
-}
-
-fn scan<D: RowDrive, S: ColumnSampler, C: Circuit>(drive: D, sampler: S, circuit: C) {
-    let mut scanner = Scanner::<_, _, _, _, 8, 18>::new(drive, sampler, Part, circuit);
+fn scan() {
+    let drive = ShiftRegister595::<_, 8> { data: Part, clock: Part, latch: Part };
+    let circuit = opaque(ZeroPotential::TYPICAL);
+    let mut scanner =
+        Scanner::<_, _, _, 8, 18>::new(drive, Mcp3208s { chips: [Part; 3] }, Part, circuit);
     let settings = ScanSettings { settling_us: opaque(46), oversampling: opaque(2) };
     let rows: [RowWire; 8] = array::from_fn(|_| RowWire(opaque(0)));
     let wires = Selection { rows: &rows, columns: ColumnWires(opaque(0x24904)) };
@@ -86,24 +74,6 @@ fn scan<D: RowDrive, S: ColumnSampler, C: Circuit>(drive: D, sampler: S, circuit
     baseline.add(frame);
     opaque(baseline.frames());
     opaque(baseline.largest_relative_deviation(frame));
-}
-
-/// Constants of a circuit, which stay in flash.
-static DIVIDER: Divider<8, 18> = Divider::TYPICAL;
-
-fn scan_with_every_sampler<D: RowDrive>(drive: impl Fn() -> D) {
-    scan(drive(), Mcp3208s { chips: [Part; 3] }, opaque(ZeroPotential::<8, 18>::TYPICAL));
-    let adc = || MultiplexedAdc { adc: Part, address: [Part; 3], enable: [Part; 3] };
-    scan(drive(), adc(), opaque(&DIVIDER));
-    let adc = MultiplexedAdc { adc: Part, address: [Part; 4], enable: [Part; 2] };
-    scan(
-        drive(),
-        adc,
-        opaque(ZeroPotential {
-            feedback_ohm: array::from_fn(|_| opaque(560.0)),
-            ..ZeroPotential::<8, 18>::TYPICAL
-        }),
-    );
 }
 
 impl Sequencer<18> for Part {
@@ -142,23 +112,16 @@ fn scan_by_passes() {
 
 pub fn exercise() {
     scan_by_passes();
-    scan_with_every_sampler(|| DirectPins { rows: [Part; 8] });
-    scan_with_every_sampler(|| Multiplexer4051 { address: [Part; 3], enable: Part });
-    scan_with_every_sampler(|| ShiftRegister595::<_, 8> { data: Part, clock: Part, latch: Part });
+    scan();
 
     let mut sensor = minimal::Sensor::new([Part; 3], [Part; 3], Part);
     opaque(sensor.estimate_dz_mm());
 
-    let time_constant_ns = timing::time_constant_ns(
-        timing::noise_gain(opaque(560.0), opaque(55.0), opaque(8)),
-        opaque(timing::OP_AMP_HZ),
-    );
     let plan = timing::ScanPlan {
         rows: opaque(8),
         columns: opaque(18),
         board_columns: opaque(18),
-        idle_samples: opaque(true),
-        settling_us: timing::settling_us(time_constant_ns, opaque(12)),
+        settling_us: opaque(20),
         oversampling: opaque(2),
         pass_samples: opaque(16),
         sample_ns: timing::spi_transfer_ns(opaque(3), opaque(1_000_000)),

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 
 use crate::board::Board;
@@ -86,7 +86,7 @@ impl FrameSource for Source {
     }
 
     fn constants(&self) -> Option<Constants<'_>> {
-        self.circuit.constants()
+        Some(self.circuit.constants())
     }
 
     fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {

@@ -12,7 +12,7 @@ mod device {
     /// Constants of the circuit, until others are kept: `host-sim link PORT constants FILE` sets your own.
     const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
 
-    type BoardScanner<D, S, T, C> = Scanner<D, S, T, C, { CAPACITY.rows }, { CAPACITY.columns }>;
+    type BoardScanner<D, S, T> = Scanner<D, S, T, { CAPACITY.rows }, { CAPACITY.columns }>;
 
     #[entry]
     fn main() -> ! {

@@ -15,7 +15,7 @@ use qemu_image::slot::Slot;
 use qemu_image::uart::Uart;
 use qemu_image::watchdog::Watchdog;
 use qemu_image::{exit, memory};
-use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{Configuration, Memory};
 use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
@@ -34,7 +34,7 @@ impl FrameSource for NoSensor {
     }
 
     fn constants(&self) -> Option<Constants<'_>> {
-        self.0.constants()
+        Some(self.0.constants())
     }
 
     fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {

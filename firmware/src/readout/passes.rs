@@ -4,7 +4,7 @@ use taxel_core::{ColumnWires, RowWire};
 
 use super::scanner::count_failures;
 use super::{FrameSource, SCANS_A_ROUND, ScanReport, ScanSettings, Selection};
-use crate::circuit::{Circuit, Constants, ConstantsFault, ScannedRow};
+use crate::circuit::{Constants, ConstantsFault, ScannedRow, ZeroPotential};
 
 /// Hardware that drives rows one after the other and samples all `COLUMNS` columns by itself: a *pass*.
 pub trait Sequencer<const COLUMNS: usize> {
@@ -33,15 +33,16 @@ pub struct SequencerFault;
 /// Looks at a pass until it has failed: 2 s or more, at ten cycles a look.
 const MOST_LOOKS: u32 = 40_000_000;
 
-/// Scanner of a sensor by a [`Sequencer`] and a circuit. `LINES` is one more than the largest number of rows.
+/// Scanner of a sensor by a [`Sequencer`] and the circuit's constants. `LINES` is one more than `ROWS`, the largest number
+/// of rows.
 ///
 /// All columns are sampled, and those asked for are picked. The first scan, every one in [`SCANS_A_ROUND`] from there on, and
 /// the one behind a failure, other settings or constants begins with a line in which all rows idle. More samples than fit into a
 /// pass are taken in several.
 #[derive(Debug)]
-pub struct PassScanner<'m, Q, C, const LINES: usize, const COLUMNS: usize> {
+pub struct PassScanner<'m, Q, const ROWS: usize, const LINES: usize, const COLUMNS: usize> {
     sequencer: Q,
-    circuit: C,
+    circuit: ZeroPotential<ROWS, COLUMNS>,
     /// Idle counts of each column.
     idle: [f32; COLUMNS],
     /// The scan that was started last, and the one that has ended.
@@ -82,11 +83,15 @@ impl<const LINES: usize> Plan<LINES> {
     }
 }
 
-impl<'m, Q: Sequencer<COLUMNS>, C: Circuit, const LINES: usize, const COLUMNS: usize>
-    PassScanner<'m, Q, C, LINES, COLUMNS>
+impl<'m, Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS: usize>
+    PassScanner<'m, Q, ROWS, LINES, COLUMNS>
 {
     /// Makes a scanner of its parts, with memory for sums.
-    pub const fn new(sequencer: Q, circuit: C, sums: &'m mut [[u32; COLUMNS]; LINES]) -> Self {
+    pub const fn new(
+        sequencer: Q,
+        circuit: ZeroPotential<ROWS, COLUMNS>,
+        sums: &'m mut [[u32; COLUMNS]; LINES],
+    ) -> Self {
         Self {
             sequencer,
             circuit,
@@ -131,8 +136,8 @@ impl<'m, Q: Sequencer<COLUMNS>, C: Circuit, const LINES: usize, const COLUMNS: u
     }
 }
 
-impl<Q: Sequencer<COLUMNS>, C: Circuit, const LINES: usize, const COLUMNS: usize> FrameSource
-    for PassScanner<'_, Q, C, LINES, COLUMNS>
+impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS: usize> FrameSource
+    for PassScanner<'_, Q, ROWS, LINES, COLUMNS>
 {
     fn scan(
         &mut self,
@@ -205,7 +210,7 @@ impl<Q: Sequencer<COLUMNS>, C: Circuit, const LINES: usize, const COLUMNS: usize
     }
 
     fn constants(&self) -> Option<Constants<'_>> {
-        self.circuit.constants()
+        Some(self.circuit.constants())
     }
 
     fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {

@@ -1,4 +1,4 @@
-//! The scan itself: the same sequence for every drive, sampler and circuit.
+//! The scan itself: the same sequence for every drive and sampler.
 
 use embedded_hal::delay::DelayNs;
 use taxel_core::{ColumnWire, ColumnWires, RowWire};
@@ -6,24 +6,24 @@ use taxel_core::{ColumnWire, ColumnWires, RowWire};
 use super::{
     ColumnSampler, FrameSource, RowDrive, SCANS_A_ROUND, ScanReport, ScanSettings, Selection,
 };
-use crate::circuit::{Circuit, Constants, ConstantsFault, ScannedRow};
+use crate::circuit::{Constants, ConstantsFault, ScannedRow, ZeroPotential};
 
 /// Scanner of a sensor with at most `ROWS` rows and `COLUMNS` columns, made of a row drive, a column sampler, a delay
-/// and a circuit.
+/// and the circuit's constants.
 ///
 /// It drives row by row, waits until the row has settled, samples the columns and converts the counts. It releases the
 /// rows, and corrects the whole frame. The rows are released at the end even if something failed.
 ///
 /// A scan measures more once in [`SCANS_A_ROUND`], and when other columns, settings or constants are asked for or a
-/// sample has failed. If the circuit needs it, it samples every column with all rows released. And if not all columns are
+/// sample has failed. It samples every column with all rows released. And if not all columns are
 /// scanned, it samples all of them for one row, in turn, since all of them load the row; in the first scan for every row.
 /// RAM: its parts, and a number a row and a column.
 #[derive(Debug)]
-pub struct Scanner<D, S, T, C, const ROWS: usize, const COLUMNS: usize> {
+pub struct Scanner<D, S, T, const ROWS: usize, const COLUMNS: usize> {
     drive: D,
     sampler: S,
     delay: T,
-    circuit: C,
+    circuit: ZeroPotential<ROWS, COLUMNS>,
     /// Idle counts of each column.
     idle: [f32; COLUMNS],
     /// Load of each row by columns that are not scanned; NaN if it is not known.
@@ -37,12 +37,17 @@ pub struct Scanner<D, S, T, C, const ROWS: usize, const COLUMNS: usize> {
     next_row: usize,
 }
 
-impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const ROWS: usize, const COLUMNS: usize>
-    Scanner<D, S, T, C, ROWS, COLUMNS>
+impl<D: RowDrive, S: ColumnSampler, T: DelayNs, const ROWS: usize, const COLUMNS: usize>
+    Scanner<D, S, T, ROWS, COLUMNS>
 {
     /// Makes a scanner of its parts: `drive` selects rows, `sampler` samples columns, `delay` waits for a row to
-    /// settle, and `circuit` converts counts to Ω. The circuit may be a reference.
-    pub const fn new(drive: D, sampler: S, delay: T, circuit: C) -> Self {
+    /// settle, and `circuit` converts counts to Ω.
+    pub const fn new(
+        drive: D,
+        sampler: S,
+        delay: T,
+        circuit: ZeroPotential<ROWS, COLUMNS>,
+    ) -> Self {
         Self {
             drive,
             sampler,
@@ -72,7 +77,7 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const ROWS: usize, c
     /// Samples all columns while all rows idle; without a valid idle sample the circuit gives NaN.
     fn sample_idle(&mut self, report: &mut ScanReport) {
         self.idle.fill(f32::NAN);
-        if self.release(report) && C::IDLE_SAMPLES {
+        if self.release(report) {
             settle(&mut self.delay, self.settings);
             let samples = self.settings.oversampling;
             sample_columns(&mut self.sampler, samples, self.columns, &mut self.idle, report);
@@ -162,8 +167,8 @@ pub(super) fn count_failures(report: &mut ScanReport, failures: usize) {
     report.failed_samples = report.failed_samples.saturating_add(failures);
 }
 
-impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const ROWS: usize, const COLUMNS: usize>
-    FrameSource for Scanner<D, S, T, C, ROWS, COLUMNS>
+impl<D: RowDrive, S: ColumnSampler, T: DelayNs, const ROWS: usize, const COLUMNS: usize> FrameSource
+    for Scanner<D, S, T, ROWS, COLUMNS>
 {
     fn scan(
         &mut self,
@@ -196,7 +201,7 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, C: Circuit, const ROWS: usize, c
     }
 
     fn constants(&self) -> Option<Constants<'_>> {
-        self.circuit.constants()
+        Some(self.circuit.constants())
     }
 
     fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {

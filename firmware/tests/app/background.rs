@@ -1,7 +1,7 @@
 //! Scans that go on by themselves while the frame before is decoded.
 
 use taxel_firmware::app::Session;
-use taxel_firmware::circuit::{Circuit, ZeroPotential};
+use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request};
 
 use taxel_core::blob::{Columns, Metadata, ModelShape};
@@ -102,7 +102,7 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
     let slower = Configuration { frame_period_us: 2000, send_readings: true, ..quiet() };
     let changes = [
         Request::Configure(slower),
-        Request::SetConstants(constants.constants().unwrap()),
+        Request::SetConstants(constants.constants()),
         Request::CaptureBaseline { frames: 1 },
     ];
     for (index, change) in changes.iter().enumerate() {

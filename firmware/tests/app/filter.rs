@@ -98,7 +98,7 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
         drive_v: 0.21,
         ..taxel_firmware::circuit::ZeroPotential::TYPICAL
     };
-    let constants = taxel_firmware::circuit::Circuit::constants(&circuit).unwrap();
+    let constants = circuit.constants();
     let other = Configuration { filter_lead_us: 1501, ..filtering() };
     for (request, is_new) in [
         (Request::Identify, false),

@@ -28,10 +28,6 @@ pub enum Purpose {
     Centres = 4,
     /// Assignment of samples to folds.
     Folds = 5,
-    /// Offsets of a readout's op-amps.
-    OpAmpOffset = 6,
-    /// Noise of a readout's converter.
-    AdcNoise = 7,
     /// Damage that a device must survive.
     Damage = 8,
     /// Drift of the gain in one session.

@@ -18,7 +18,6 @@ pub mod rubber;
 pub mod noise;
 pub mod drift;
 pub mod outputs;
-pub mod readout;
 pub mod world;
 pub mod synth;
 pub mod forward;

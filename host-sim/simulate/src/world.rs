@@ -2,7 +2,6 @@
 
 use taxel_data::input::MOST_VALUES;
 use taxel_data::{BadValue, require};
-use taxel_firmware::readout::ScanSettings;
 
 use crate::drift::Drift;
 use crate::motion::{self, Dent, Independent};
@@ -10,7 +9,6 @@ use crate::noise::{Noise, NoiseKind};
 use crate::outputs::{ContactOutput, ElectrodeOutputs, Outputs};
 use crate::path::Path;
 use crate::profile::Profile;
-use crate::readout::Readout;
 use crate::rubber;
 use crate::sensor::Sensor;
 use crate::timetable::MOST_SCANS;
@@ -40,8 +38,6 @@ pub struct World {
     pub drift: Option<Drift>,
     /// Row-wires that are read, from 0, ascending.
     pub read_rows: Vec<usize>,
-    /// Circuit and parts of the readout.
-    pub readout: Readout,
     pub outputs: Outputs,
 }
 
@@ -58,7 +54,6 @@ impl World {
             noise: Noise::white(NoiseKind::Relative, 0.005),
             drift: None,
             read_rows: (0..sensor.row_wires).collect(),
-            readout: Readout::default(),
             outputs: Outputs::all_deformations(),
             sensor,
         }
@@ -131,7 +126,6 @@ impl World {
         noise(&self.noise)?;
         self.drift.map_or(Ok(()), |drift| check_gain("drift.gain", drift.gain))?;
         rows(self)?;
-        readout(&self.readout)?;
         self.rubber.check()?;
         require(!self.remembers() || self.path.is_some(), "rubber", "[rubber]", || {
             "still contacts have been held until nothing creeps any more, so it would change nothing; add [motion], or leave it out".into()
@@ -336,42 +330,6 @@ fn rows(world: &World) -> Check {
     require(holds, "readout.row_wires", format!("{listed:?}"), || {
         format!("list rows from 1 to {most}, ascending")
     })
-}
-
-fn readout(r: &Readout) -> Check {
-    let whole = |field: &str, value: Option<u32>, [low, high]: [u32; 2]| {
-        let holds = value.is_none_or(|value| (low..=high).contains(&value));
-        require(holds, format!("readout.{field}"), value.unwrap_or_default(), || {
-            format!("it must be from {low} to {high}")
-        })
-    };
-    let most_oversampling = ScanSettings::MOST_OVERSAMPLING.into();
-    whole("adc_bits", r.adc_bits.map(u32::from), [4, 12])?;
-    whole("oversampling", r.oversampling.map(u32::from), [1, most_oversampling])?;
-    whole("settling_us", r.settling_us, [0, ScanSettings::MOST_SETTLING_US])?;
-    for (field, value, most) in [
-        ("row_switch_ohm", r.row_switch_ohm, 1e3),
-        ("line_ohm", r.line_ohm, 1e3),
-        ("op_amp_offset_v", r.op_amp_offset_v, 0.1),
-        ("adc_noise_counts", r.adc_noise_counts, 100.0),
-        ("time_constant_us", r.time_constant_us, 1e3),
-    ] {
-        let holds = value.is_none_or(|value| (0.0..=most).contains(&value));
-        require(holds, format!("readout.{field}"), value.unwrap_or_default(), || {
-            format!("it must be from 0 to {most}")
-        })?;
-    }
-    for (field, value) in [("row_switch_ohm", r.row_switch_ohm), ("line_ohm", r.line_ohm)] {
-        let shared = value.unwrap_or_default();
-        let holds = shared == 0.0 || r.cross_talk == Some(true);
-        require(holds, format!("readout.{field}"), shared, || {
-            format!(
-                "what the readings of a wire share couples them; set readout.cross_talk = true, or leave \
-                 {field} out"
-            )
-        })?;
-    }
-    Ok(())
 }
 
 fn outputs_of_electrodes(outputs: &ElectrodeOutputs) -> Check {

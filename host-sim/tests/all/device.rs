@@ -340,9 +340,7 @@ fn a_device_that_never_pauses_does_not_hold_the_host() {
 
 #[test]
 fn a_model_without_room_is_not_begun() {
-    let mut world = press();
-    world.readout.row_wires = Some(vec![4]);
-    let frames = synthesise(&world, Stream::Training, 100);
+    let frames = synthesise(&press(), Stream::Training, 100);
     let options = taxel_learn::Options { centres: 2, ..taxel_learn::Options::of_rows() };
     let trained = taxel_learn::train::train(&frames, &options, &Silent).unwrap();
     let origin = taxel_learn::Origin::of_data("row", 0, 1, &frames);

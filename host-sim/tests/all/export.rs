@@ -6,11 +6,10 @@ use taxel_core::AlignedBytes;
 use taxel_core::blob::Model;
 use taxel_core::rbf::Network;
 use taxel_data::Stream;
-use taxel_simulate::readout::Drive;
 use taxel_simulate::{World, synthesise};
-use taxel_virtual_board::{Pin, VirtualBoard, all_readings};
 
 use crate::common::{Folder, small_scene};
+use crate::virtual_board::{NoDelay, Series, VirtualBoard, all_readings};
 
 #[path = "../../../firmware/examples/minimal.rs"]
 mod minimal;
@@ -163,13 +162,10 @@ fn wrong_usage_of_export_is_refused_and_nothing_is_written() {
 #[test]
 fn the_example_estimates_compression_from_pins_and_converters() {
     const FRAMES: usize = 200;
-    let mut world = World::press();
-    world.readout.row_drive = Some(Drive::ShiftRegister);
-    world.readout.row_switch_ohm = Some(0.26); // for which the example corrects
-    let board = VirtualBoard::new(&world).unwrap();
-    let pins = [Pin::RowData, Pin::RowClock, Pin::RowLatch].map(|pin| board.pin(pin));
-    let chips = [0, 1, 2].map(|chip| board.spi(chip));
-    let mut sensor = minimal::Sensor::new(pins, chips, board.delay());
+    let world = World::press();
+    // The example corrects for its switches.
+    let board = VirtualBoard::new(Series { row_switch: 0.26, lead: 0.0 });
+    let mut sensor = minimal::Sensor::new(board.pins(), board.chips(), NoDelay);
     let truth = synthesise(&world, Stream::Test, FRAMES);
     let names = (1..=6).map(|electrode| format!("r4e{electrode}_dz_mm"));
     let places: Vec<usize> =
@@ -183,7 +179,6 @@ fn the_example_estimates_compression_from_pins_and_converters() {
             of_mean += outputs[*place].powi(2);
         }
     }
-    board.check().unwrap();
     let rmse_mm = (squares / (FRAMES * places.len()) as f64).sqrt();
     assert!(rmse_mm < 0.055, "{rmse_mm} mm");
     assert!(squares < 0.15 * of_mean, "{squares} against {of_mean}");

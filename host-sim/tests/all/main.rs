@@ -2,6 +2,7 @@
 
 mod common;
 mod confidence;
+mod virtual_board;
 mod virtual_device;
 
 mod accuracy;

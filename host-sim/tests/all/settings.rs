@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use taxel_firmware::circuit::{Circuit, Constants, ConstantsFault, ZeroPotential};
+use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{Configuration, Setting};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use taxel_rig::device::Device;
@@ -62,7 +62,7 @@ impl FrameSource for AtRest {
     }
 
     fn constants(&self) -> Option<Constants<'_>> {
-        self.0.constants()
+        Some(self.0.constants())
     }
 
     fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {

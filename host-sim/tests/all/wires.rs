@@ -6,16 +6,15 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use mock_board::blob_of_a_row;
+use taxel_core::Decoder;
 use taxel_core::blob::{Columns, Metadata, ModelShape};
-use taxel_core::{ColumnWires, Decoder};
 use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_firmware::link::message::{Configuration, Report};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use taxel_rig::device::{Device, upload};
 use taxel_simulate::World;
-use taxel_simulate::readout::Readout;
-use taxel_virtual_board::{FrameScanner, SeriesResistance, VirtualBoard, all_readings};
 
+use crate::virtual_board::{Series, VirtualBoard, VirtualScanner, WIRES, all_readings};
 use crate::virtual_device::mailbox::pair;
 use crate::virtual_device::{Line, run_with};
 
@@ -23,12 +22,11 @@ use crate::virtual_device::{Line, run_with};
 #[derive(Clone)]
 struct Pressed;
 
-/// Readings of the pressed sensor, of all wires.
-fn board(readout: Readout) -> VirtualBoard {
-    let world = World { readout, ..World::press() };
-    let board = VirtualBoard::new(&world).unwrap();
-    board.set_readings(all_readings(&world, 1).lines().next().unwrap());
-    board
+/// The firmware's scanner, and the pressed sensor before it.
+fn scanner() -> VirtualScanner {
+    let board = VirtualBoard::new(Series::NONE);
+    board.set_readings(all_readings(&World::press(), 1).lines().next().unwrap());
+    board.scanner()
 }
 
 impl FrameSource for Pressed {
@@ -39,8 +37,7 @@ impl FrameSource for Pressed {
         frame: &mut [f32],
     ) -> ScanReport {
         thread_local! {
-            static SCANNER: RefCell<FrameScanner> =
-                RefCell::new(board(Readout::default()).scanner(SeriesResistance::NONE));
+            static SCANNER: RefCell<VirtualScanner> = RefCell::new(scanner());
         }
         SCANNER.with_borrow_mut(|scanner| scanner.scan(settings, wires, frame))
     }
@@ -68,10 +65,8 @@ fn cells(random: &mut Random) -> Vec<usize> {
 
 #[test]
 fn fifty_random_subsets_of_wires_are_read_and_decoded_as_on_the_virtual_board() {
-    let all = board(Readout::default());
     let mut readings_ohm = vec![f32::NAN; 144];
-    let mut scanner = all.scanner(SeriesResistance::NONE);
-    scanner.scan(Configuration::DEFAULT.scan, all.wires(), &mut readings_ohm);
+    scanner().scan(Configuration::DEFAULT.scan, WIRES, &mut readings_ohm);
     let different: BTreeSet<u32> = readings_ohm.iter().map(|ohm| ohm.to_bits()).collect();
     assert!(different.len() > 100, "readings of other places must show");
 
@@ -125,29 +120,4 @@ fn fifty_random_subsets_of_wires_are_read_and_decoded_as_on_the_virtual_board() 
         assert_eq!(estimate, bits(&outputs), "subset {subset}: {names:?}");
     }
     assert!((2..48).contains(&in_order), "{in_order} subsets in the order of their wires");
-}
-
-#[test]
-fn three_columns_read_within_three_hundredths_of_a_percent_of_the_wires_while_the_sensor_is_pressed()
- {
-    let readout =
-        Readout { cross_talk: Some(true), row_switch_ohm: Some(0.26), ..Readout::default() };
-    let world = World { readout, ..World::press() };
-    let board = VirtualBoard::new(&world).unwrap();
-    let mut scanner = board.scanner(board.series_resistance());
-    let wires = Selection { columns: ColumnWires(1 << 2 | 1 << 8 | 1 << 14), ..board.wires() };
-    let mut squares = Vec::new();
-    for line in all_readings(&world, 200).lines() {
-        board.set_readings(line);
-        let mut frame = [f32::NAN; 24];
-        scanner.scan(board.scan_settings(), wires, &mut frame);
-        let truth = line.chunks(18).flat_map(|row| [row[2], row[8], row[14]]);
-        squares.extend(
-            frame.iter().zip(truth).map(|(ohm, truth)| (f64::from(*ohm) / truth - 1.0).powi(2)),
-        );
-    }
-    board.check().unwrap();
-    let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-    println!("{:.4} % RMS", 100.0 * rms);
-    assert!(rms < 3e-4, "{rms}");
 }

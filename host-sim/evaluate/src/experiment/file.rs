@@ -8,7 +8,6 @@ use taxel_simulate::motion;
 use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::path::Path;
-use taxel_simulate::readout::Readout;
 use taxel_simulate::rubber;
 use taxel_simulate::sensor::{self, Sensor, Vector3};
 use taxel_simulate::world::check_counts;
@@ -35,6 +34,16 @@ pub(super) struct SceneFile {
     training: Training,
     table1: Option<Table1>,
     others: Option<Vec<OtherContact>>,
+}
+
+/// Wires that are read.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Readout {
+    /// Row-wires, from 1.
+    row_wires: Option<Vec<usize>>,
+    /// Column-wires, from 1.
+    column_wires: Option<Vec<usize>>,
 }
 
 #[derive(Deserialize)]
@@ -146,12 +155,12 @@ impl SceneFile {
             resistance_ohm_per_mm: s.resistance_ohm_per_mm,
             stiffness_n_per_mm: s.stiffness_n_per_mm,
         };
-        let mut readout = self.readout;
-        let sensor = match readout.column_wires.take() {
+        let Readout { row_wires, column_wires } = self.readout;
+        let sensor = match column_wires {
             Some(columns) => sensor.with_columns(&columns_from_0(&columns, sensor.column_wires)?),
             None => sensor,
         };
-        let read_rows = match readout.row_wires.take() {
+        let read_rows = match row_wires {
             // Row 0 does not exist in a file; it becomes one that the check refuses.
             Some(rows) => rows.into_iter().map(|row| row.wrapping_sub(1)).collect(),
             None => (0..sensor.row_wires).collect(),
@@ -165,7 +174,6 @@ impl SceneFile {
             noise: self.noise,
             drift: self.drift,
             read_rows,
-            readout,
             outputs: self.outputs,
         };
         // Settings that hold are needed to derive others; a scene is checked first.

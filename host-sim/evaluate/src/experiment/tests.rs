@@ -1,8 +1,6 @@
 use taxel_data::{Purpose, Random, Stream};
 use taxel_simulate::Synthesis;
-use taxel_simulate::readout::{Circuit, Readout};
 use taxel_simulate::sensor::Sensor;
-use taxel_simulate::synthesise;
 
 use super::*;
 
@@ -12,7 +10,6 @@ fn embedded_scenes_are_sound_and_named_as_they_are_called() {
         let scene = Experiment::load(name).unwrap();
         assert_eq!(scene.name, name);
         assert_eq!(scene.world.read_rows, (0..8).collect::<Vec<_>>());
-        assert_eq!(scene.world.readout, Readout::default());
         assert_eq!(scene.world.sensor, Sensor::paper());
     }
 }
@@ -77,27 +74,6 @@ fn full_scales_of_a_contact_are_the_face_and_the_largest_contact() {
     // lies beyond the face, 4.55 % along x and 7.19 % along y.
     let whole = 2.0 * 48.0 / 360.0 * std::f64::consts::TAU * 25.0;
     assert!((force / whole - (1.0 - 0.0455) * (1.0 - 0.0719)).abs() < 1e-4, "{force}");
-}
-
-#[test]
-fn a_readout_changes_nothing_that_is_synthesised() {
-    let read = "[readout]\nrow_wires = [2, 7]\ncircuit = \"divider\"\ncross_talk = true\n\
-                row_switch_ohm = 0.4\nadc_bits = 10\noversampling = 4\n\n[outputs]";
-    let text = taxel_scenes::ALL[1].1.replace("[outputs]", read);
-    let scene = Experiment::parse("test", &text).unwrap().world;
-    assert_eq!(scene.read_rows, [1, 6]);
-    let expected = Readout {
-        circuit: Some(Circuit::Divider),
-        cross_talk: Some(true),
-        row_switch_ohm: Some(0.4),
-        adc_bits: Some(10),
-        oversampling: Some(4),
-        ..Readout::default()
-    };
-    assert_eq!(scene.readout, expected);
-    let plain = World { readout: Readout::default(), ..scene.clone() };
-    let frames = |world| synthesise(world, Stream::Training, 20);
-    assert_eq!(frames(&scene), frames(&plain));
 }
 
 #[test]

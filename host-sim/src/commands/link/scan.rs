@@ -106,7 +106,6 @@ fn longest_period(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
         rows: identity.rows as u16,
         columns: identity.columns as u16,
         board_columns: identity.columns as u16,
-        idle_samples: true,
         settling_us: scan.settling_us,
         oversampling: scan.oversampling,
         pass_samples: u16::MAX,

@@ -17,14 +17,8 @@ const LEAKAGE_S: f64 = 1e-15;
 /// Potentials in V of all row-wires, then all column-wires.
 ///
 /// `conductance_s` has the conductances in S between them, row after row; `rows` and `columns` the
-/// connections of every wire. `links` are wires that touch, and the conductance between them: rows count from 0, columns
-/// behind them.
-pub(super) fn potentials_v(
-    conductance_s: &[f64],
-    rows: &[Tie],
-    columns: &[Tie],
-    links: &[([usize; 2], f64)],
-) -> Vec<f64> {
+/// connections of every wire.
+pub(super) fn potentials_v(conductance_s: &[f64], rows: &[Tie], columns: &[Tie]) -> Vec<f64> {
     let ties = || rows.iter().chain(columns);
     let mut potentials: Vec<f64> = ties()
         .map(|tie| match tie {
@@ -48,7 +42,7 @@ pub(super) fn potentials_v(
     let nodes = conductance_s.iter().enumerate();
     let nodes = nodes
         .map(|(at, siemens)| ([at / columns.len(), rows.len() + at % columns.len()], *siemens));
-    for (ends, siemens) in nodes.chain(links.iter().copied()) {
+    for (ends, siemens) in nodes {
         for (near, far) in [(ends[0], ends[1]), (ends[1], ends[0])] {
             let (near_place, far_place) = (place_of[near], place_of[far]);
             if near_place == usize::MAX {
@@ -78,7 +72,7 @@ mod tests {
     fn a_divider_divides() {
         let rows = [Tie::Held { volt: 3.0, through_ohm: 10.0 }];
         let columns = [Tie::Held { volt: 0.0, through_ohm: 30.0 }];
-        let [row, column] = potentials_v(&[1.0 / 20.0], &rows, &columns, &[])[..] else { panic!() };
+        let [row, column] = potentials_v(&[1.0 / 20.0], &rows, &columns)[..] else { panic!() };
         assert!((row - 2.5).abs() < 1e-12 && (column - 1.5).abs() < 1e-12, "{row} {column}");
     }
 
@@ -88,7 +82,7 @@ mod tests {
         let rows = [Tie::Held { volt: 1.0, through_ohm: 0.0 }, Tie::Floating];
         let columns = [Tie::Held { volt: 0.0, through_ohm: 100.0 }; 2];
         let ohm = [50.0, 200.0, 40.0, 60.0];
-        let v = potentials_v(&ohm.map(|r: f64| 1.0 / r), &rows, &columns, &[]);
+        let v = potentials_v(&ohm.map(|r: f64| 1.0 / r), &rows, &columns);
         // By hand: 100 Ω lie between the columns over row 1.
         //   (1 − a)/50 = a/100 + (a − b)/100,  (1 − b)/200 = b/100 + (b − a)/100
         //   2 − 2a = 2a − b,  1 − b = 4b − 2a  →  4a − b = 2,  −2a + 5b = 1  →  a = 11/18, b = 4/9
@@ -103,7 +97,7 @@ mod tests {
         let mut rows = [Tie::Floating; 8];
         rows[3] = Tie::Held { volt: 3.3, through_ohm: 0.3 };
         let columns = [Tie::Held { volt: 0.0, through_ohm: 470.0 }; 18];
-        let v = potentials_v(&conductance, &rows, &columns, &[]);
+        let v = potentials_v(&conductance, &rows, &columns);
         for m in (0..8).filter(|m| *m != 3) {
             let sum: f64 = (0..18).map(|k| (v[m] - v[8 + k]) * conductance[m * 18 + k]).sum();
             assert!(sum.abs() < 1e-12, "row {m}: {sum} A");
@@ -116,18 +110,7 @@ mod tests {
 
     #[test]
     fn a_wire_without_connection_is_at_no_voltage() {
-        let v = potentials_v(&[0.0, 0.0], &[Tie::Floating], &[Tie::Floating, GROUND], &[]);
+        let v = potentials_v(&[0.0, 0.0], &[Tie::Floating], &[Tie::Floating, GROUND]);
         assert_eq!(v, [0.0; 3]);
-    }
-
-    #[test]
-    fn wires_that_touch_share_a_potential_and_their_currents() {
-        // Two rows at 1 V and 0 V, each through 2 Ω, that touch; a column of 10 Ω each, to ground.
-        let of = |volt| Tie::Held { volt, through_ohm: 2.0 };
-        let apart = potentials_v(&[0.1, 0.1], &[of(1.0), of(0.0)], &[GROUND], &[]);
-        assert!(apart[0] > 0.8 && apart[1] == 0.0, "{apart:?}");
-        let v = potentials_v(&[0.1, 0.1], &[of(1.0), of(0.0)], &[GROUND], &[([0, 1], 1e6)]);
-        // By hand: (1 − v)/2 = v/2 + 2v/10, so v = 5/12.
-        assert!((v[0] - 5.0 / 12.0).abs() < 1e-5 && (v[1] - v[0]).abs() < 1e-5, "{v:?}");
     }
 }
