@@ -1,6 +1,6 @@
 //! The journal survives power cuts at any word, flipped bits, and pages that hold anything.
 
-use mock_board::Flash;
+use crate::mock::Flash;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use taxel_core::checksum::CRC_32;

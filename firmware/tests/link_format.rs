@@ -1,6 +1,6 @@
 //! The link's bytes, compared with those in `testdata/link-examples.txt` and in `docs/link.md`.
 
-use mock_board::request_bytes;
+use crate::mock::request_bytes;
 use taxel_core::blob::Floats;
 use taxel_firmware::circuit::{ConstantsFault, ZeroPotential};
 use taxel_firmware::link::cobs;

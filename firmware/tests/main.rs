@@ -5,13 +5,15 @@ mod checks;
 #[path = "../qemu/src/fixed.rs"]
 mod fixed;
 
+mod mock;
+
 mod app;
 mod bit_for_bit;
 mod journal;
 mod link_format;
+mod power_cuts;
 mod settings;
 mod store;
-mod sweeps;
 mod trial;
 mod undo;
 mod upload;

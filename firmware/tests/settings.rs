@@ -1,6 +1,6 @@
 //! Settings are kept over restarts, and what does not fit the device is not believed.
 
-use mock_board::*;
+use crate::mock::*;
 use taxel_core::blob::Floats;
 use taxel_firmware::app::Session;
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};

@@ -1,6 +1,6 @@
 //! Loading blobs from slots of flash.
 
-use mock_board::{ROWS, blob};
+use crate::mock::{ROWS, blob};
 use taxel_core::blob::DecodeError;
 use taxel_core::{AlignedBytes, Decoder};
 use taxel_firmware::store::blob_in_slot;

@@ -1,6 +1,6 @@
 //! A new model is on trial until it is confirmed: until then every restart brings the previous one back.
 
-use mock_board::*;
+use crate::mock::*;
 use taxel_firmware::app::{Session, SessionEnd};
 use taxel_firmware::link::message::{
     ModelIdentity, Refusal, Report, Request, UploadState, UploadStep,

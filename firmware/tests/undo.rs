@@ -1,6 +1,6 @@
 //! Undo over the link: the previous model comes into force again, whole and for good.
 
-use mock_board::*;
+use crate::mock::*;
 use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{KeepFault, Refusal, UploadState};
 

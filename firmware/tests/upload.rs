@@ -1,6 +1,6 @@
 //! Uploading a model: sound models come into force, and nothing else ever does.
 
-use mock_board::*;
+use crate::mock::*;
 use taxel_core::rbf::Shape;
 use taxel_core::rbf::float32::{Network, Parameters};
 use taxel_firmware::app::{Session, SessionEnd};

@@ -7,7 +7,7 @@ use crate::rbf::{Format, NetworkError, fixed16};
 use crate::relative::relative;
 
 /// RAM in bytes that a [`Decoder`] for at most so many `rows` takes on a 32-bit target, for any K: slices into the
-/// blob. The firmware's link check compares it with the compiler's own figure.
+/// blob. The emulator's application compares it with the compiler's own figure.
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
     160 + 28 * rows
 }

@@ -6,7 +6,7 @@ use crate::panics;
 use crate::process::{Outcome, Watched, run as run_command, watch};
 use crate::toolchain::{Toolchain, elf};
 
-/// Function that the link check's panic handler calls, and that is defined nowhere.
+/// Function that the panic handler of [`NO_PANIC`] calls, and that is defined nowhere.
 const SYMBOL: &str = "taxel_reachable_panic";
 
 /// Profile of everything that is built for a device.
@@ -38,12 +38,16 @@ pub const NUCLEO_ONCHIP: &str = "nucleo-f446re-onchip";
 pub const NUCLEO_WIDE: &str = "nucleo-f446re-wide";
 const WIDE: &str = "16x32x18";
 
-/// Libraries of the images, and the link check.
-const LIBRARIES: Packages =
-    &["--package", "taxel-core", "--package", "taxel-firmware", "--package", "link-check"];
+/// Libraries of the images.
+const LIBRARIES: Packages = &["--package", "taxel-core", "--package", "taxel-firmware"];
 
-/// Builds one `image` for people. Without one, builds and lints everything that runs on a device. Links the link check, and once more with a panic in it,
-/// which must fail. The board's image may hold panics of others alone, as they are listed.
+/// Programs that link only if no panic can be reached in them: the application, and the example, which scans by pins.
+const NO_PANIC: Packages =
+    &["--package", "qemu-image", "--bin", APPLICATION, "--bin", "minimal", "--features"];
+
+/// Builds one `image` for people. Without one, builds and lints everything that runs on a device. Links the emulator's
+/// application without a panic handler, and once more with a panic in it, which must fail. The board's image may hold panics
+/// of others alone, as they are listed.
 pub fn run(image: Option<&str>) -> Outcome {
     let toolchain = Toolchain::find()?;
     println!("toolchain: {toolchain}");
@@ -54,7 +58,7 @@ pub fn run(image: Option<&str>) -> Outcome {
         println!("{}", elf(image).display());
         return Ok(());
     }
-    link_check(&toolchain)?;
+    prove_no_panic(&toolchain)?;
     build_image(&toolchain, QEMU)?;
     build_image(&toolchain, NUCLEO)?;
     panics::check(&elf(NUCLEO_SPI), true)?;
@@ -82,33 +86,30 @@ fn lint(toolchain: &Toolchain, packages: Packages) -> Outcome {
     run_command(command.args(PROFILE).args(packages).args(["--", "-D", "warnings"]))
 }
 
-fn link_check(toolchain: &Toolchain) -> Outcome {
-    let as_it_stands = build(toolchain, &[], true)?;
-    if names_symbol(&as_it_stands.messages) {
-        return Err("a panic is reachable on the device; firmware/link-check/src/main.rs tells \
-                    how to find it"
-            .into());
+fn prove_no_panic(toolchain: &Toolchain) -> Outcome {
+    let link =
+        |feature, echo| watch(toolchain.build().args(PROFILE).args(NO_PANIC).arg(feature), echo);
+    let Watched { messages, success } = link("no-panic", true)?;
+    if names_symbol(&messages) {
+        return Err(
+            "a panic is reachable on the device; firmware/qemu/src/no_panic.rs tells how to \
+                    find it"
+                .into(),
+        );
     }
-    if !as_it_stands.success {
+    if !success {
         return Err("the firmware does not build".into());
     }
-
-    let with_panic = build(toolchain, &["--features", "link-check/must-fail"], false)?;
-    if with_panic.success {
-        return Err("the link check proves nothing: it links with a reachable panic too".into());
+    let Watched { messages, success } = link("must-fail", false)?;
+    if success {
+        return Err("the proof shows nothing: it links with a reachable panic too".into());
     }
-    if !names_symbol(&with_panic.messages) {
-        eprint!("{}", with_panic.messages);
-        return Err("the link check with a panic failed for another reason than that".into());
+    if !names_symbol(&messages) {
+        eprint!("{messages}");
+        return Err("the program with a panic failed for another reason than that".into());
     }
-    println!("no panic is reachable on the device; with one put in, the check does not link");
+    println!("no panic is reachable on the device; with one put in, the program does not link");
     Ok(())
-}
-
-/// Builds all libraries in one command: otherwise they would be compiled twice.
-fn build(toolchain: &Toolchain, more: &[&str], echo: bool) -> Outcome<Watched> {
-    let mut command = toolchain.build();
-    watch(command.args(PROFILE).args(LIBRARIES).args(more), echo)
 }
 
 /// Whether `messages` contain a linker's complaint that [`SYMBOL`] is undefined.

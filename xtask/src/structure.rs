@@ -10,9 +10,7 @@ use crate::process::{Outcome, capture, cargo, root};
 
 /// The workspace's crates from the ground up, floor by floor: none depends on one above it.
 const DEVICE: &[&str] =
-    &["taxel-core", "taxel-firmware", "board-common", "link-check", "qemu-image", "nucleo-f446re"];
-/// Crates that stand in for a device in its tests, and in proofs.
-const MOCKS: &[&str] = &["mock-board"];
+    &["taxel-core", "taxel-firmware", "board-common", "qemu-image", "nucleo-f446re"];
 const DESK: &[&str] = &[
     "taxel-scenes",
     "taxel-data",
@@ -32,7 +30,7 @@ const DESK: &[&str] = &[
 const PROOF: &[&str] = &["taxel-fuzz", "benchmarks"];
 
 /// Number of crates of the product, which depends on none that proves it.
-const PRODUCT: usize = DEVICE.len() + MOCKS.len() + DESK.len();
+const PRODUCT: usize = DEVICE.len() + DESK.len();
 
 /// Fails if a crate depends on one above it, or on one that it does not use, or is not declared.
 pub fn run() -> Outcome {
@@ -96,11 +94,10 @@ fn sources(folder: &Path) -> String {
     text
 }
 
-/// Breaches of the order. Crates of the desk may be tested with any others, crates of the device with mocks besides
-/// their own kind.
+/// Breaches of the order. Crates of the desk may be tested with any others, crates of the device with their own kind.
 fn broken(metadata: &Value) -> Vec<String> {
     let place = |name: &Value| {
-        let mut all = DEVICE.iter().chain(MOCKS).chain(DESK).chain(PROOF);
+        let mut all = DEVICE.iter().chain(DESK).chain(PROOF);
         all.position(|declared| name == declared)
     };
     let mut broken = Vec::new();
@@ -113,7 +110,7 @@ fn broken(metadata: &Value) -> Vec<String> {
         for dependency in package["dependencies"].as_array().into_iter().flatten() {
             let Some(other) = place(&dependency["name"]) else { continue };
             let allowed = match dependency["kind"].as_str() {
-                Some("dev") if own < DEVICE.len() => DEVICE.len() + MOCKS.len(),
+                Some("dev") if own < DEVICE.len() => DEVICE.len(),
                 Some("dev") if own < PRODUCT => PRODUCT,
                 _ => own,
             };
@@ -175,7 +172,7 @@ mod tests {
         for (name, on, kind) in [
             ("taxel-core", "taxel-firmware", None),
             ("taxel-core", "taxel-data", Some("dev")),
-            ("taxel-firmware", "mock-board", None),
+            ("taxel-firmware", "taxel-data", Some("dev")),
             ("taxel-firmware", "taxel-learn", Some("build")),
             ("taxel-data", "taxel-simulate", None),
             ("host-sim", "benchmarks", Some("dev")),
@@ -185,7 +182,7 @@ mod tests {
         }
         for (name, on, kind) in [
             ("taxel-firmware", "taxel-core", None),
-            ("taxel-firmware", "mock-board", Some("dev")),
+            ("taxel-core", "taxel-firmware", Some("dev")),
             ("taxel-data", "host-sim", Some("dev")),
             ("taxel-simulate", "taxel-firmware", None),
             ("taxel-fuzz", "taxel-core", None),

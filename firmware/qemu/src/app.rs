@@ -15,11 +15,15 @@ use qemu_image::slot::Slot;
 use qemu_image::uart::Uart;
 use qemu_image::watchdog::Watchdog;
 use qemu_image::{exit, memory};
+use taxel_core::{Decoder, decoder_ram_bytes};
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{Configuration, Memory};
 use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use taxel_firmware::store::Journal;
+
+/// The RAM figure of `host-sim inspect` must be at least the compiler's.
+const _: () = assert!(size_of::<Decoder<'static, 8>>() <= decoder_ram_bytes(8));
 
 /// Watchdog period in ms: longer than a loop takes even on a very slow computer.
 const WATCHDOG_MS: u32 = 20_000;
@@ -121,6 +125,8 @@ fn main() -> ! {
     let clock = Clock::start();
     let carrier = Carrier::find();
     info!("link: {=str}", carrier.name());
+    #[cfg(feature = "must-fail")]
+    info!("{=u8}", [0_u8; 4][clock.now_us() as usize]);
     // SAFETY: the slots are taken here only.
     let (mut slots, pages) = unsafe { Slot::take() };
     let board = Board {

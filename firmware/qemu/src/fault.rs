@@ -1,9 +1,11 @@
 //! Panics, faults and stack overflows: each is logged, and ends QEMU with a failure.
 
+#[cfg(not(feature = "no-panic"))]
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::SCB;
+#[cfg(not(feature = "no-panic"))]
 use defmt_semihosting as _;
 
 use crate::exit;
@@ -24,6 +26,7 @@ fn report_once() {
     }
 }
 
+#[cfg(not(feature = "no-panic"))]
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     report_once();

@@ -16,6 +16,8 @@ pub mod uart;
 pub mod watchdog;
 pub mod exit;
 mod fault;
+#[cfg(feature = "no-panic")]
+mod no_panic;
 pub mod slot;
 pub mod checks;
 pub mod fixed;

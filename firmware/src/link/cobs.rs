@@ -1,7 +1,7 @@
 //! Consistent overhead byte stuffing (Cheshire & Baker, IEEE/ACM Transactions on Networking 1999).
 //!
 //! It is implemented here for two reasons: it needs no second buffer in either direction, and no panic is
-//! reachable in it, which the link check proves. Tests compare it with the `cobs` crate.
+//! reachable in it, which `cargo xtask firmware` proves. Tests compare it with the `cobs` crate.
 
 /// Longest run of bytes behind one code byte.
 const LONGEST_RUN: usize = 254;

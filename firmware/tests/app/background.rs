@@ -7,7 +7,7 @@ use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Reque
 use taxel_core::blob::{Columns, Metadata, ModelShape};
 
 use super::requests::decode;
-use mock_board::*;
+use crate::mock::*;
 
 /// A board whose sensor scans by itself for `scan_us` and 10 µs.
 fn bench(period_us: u32, scan_us: u32) -> Bench<'static> {

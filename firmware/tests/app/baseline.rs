@@ -5,7 +5,7 @@ use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 
 use super::requests::{capture, decode};
-use mock_board::*;
+use crate::mock::*;
 
 #[test]
 fn a_baseline_is_captured_and_contact_is_told_against_it() {

@@ -9,7 +9,7 @@ use taxel_firmware::link::message::{
 };
 
 use super::requests::bits;
-use mock_board::*;
+use crate::mock::*;
 
 /// What an estimate has of a confidence, as bits, and whether it is flagged as novel.
 #[derive(Debug, PartialEq)]

@@ -5,7 +5,7 @@ use taxel_firmware::link::message::{
     Configuration, ConfigurationField, Refusal, Report, Request, Setting,
 };
 
-use mock_board::*;
+use crate::mock::*;
 
 #[test]
 fn configurations_are_checked_and_a_bad_one_changes_nothing() {

@@ -7,7 +7,7 @@ use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 
 use super::requests::{bits, capture, decode, expected};
-use mock_board::*;
+use crate::mock::*;
 
 #[test]
 fn readings_from_the_host_are_decoded_as_model_core_does() {

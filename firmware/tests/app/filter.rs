@@ -7,7 +7,7 @@ use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
 use super::requests::{bits, expected};
-use mock_board::*;
+use crate::mock::*;
 
 /// A configuration that filters, and scans only on request.
 fn filtering() -> Configuration {

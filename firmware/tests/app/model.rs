@@ -9,7 +9,7 @@ use taxel_firmware::link::message::{
 };
 
 use super::requests::{bits, decode, expected};
-use mock_board::*;
+use crate::mock::*;
 
 #[test]
 fn the_identity_tells_what_the_model_was_trained_on() {

@@ -4,7 +4,7 @@ use taxel_core::blob::Floats;
 use taxel_core::{Aligned, Decoder};
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
-use mock_board::*;
+use crate::mock::*;
 
 /// Outputs of taxel-core itself.
 pub fn expected(blob: &[u8], frame: &TestFrame) -> [[f32; OUTPUTS]; ROWS] {

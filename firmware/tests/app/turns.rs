@@ -5,7 +5,7 @@ use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Reque
 use taxel_firmware::link::packet;
 use taxel_firmware::link::receive::{Received, Receiver};
 
-use mock_board::*;
+use crate::mock::*;
 
 #[test]
 fn frames_are_scanned_on_time_numbered_and_reported() {

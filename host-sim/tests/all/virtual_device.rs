@@ -2,14 +2,13 @@
 use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
-use mock_board::Flash;
 use taxel_data::{Purpose, Random, Stream};
 use taxel_firmware::app::{App, Buffers};
 use taxel_firmware::capacity::Capacity;
 use taxel_firmware::link::message::{Configuration, Memory};
 use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use taxel_firmware::store::Journal;
+use taxel_firmware::store::{FlashError, Journal, PAGE_BYTES, Slot};
 
 pub mod mailbox;
 
@@ -17,6 +16,37 @@ pub mod mailbox;
 #[derive(Debug, Clone, Copy)]
 pub struct Line {
     pub one_in: Option<usize>,
+}
+
+/// Flash without faults: a model slot, or a page of the journal.
+struct Flash(Vec<u32>);
+
+impl Flash {
+    /// Erased flash of so many bytes.
+    fn erased(bytes: usize) -> Self {
+        Self(vec![u32::MAX; bytes / 4])
+    }
+}
+
+impl Slot for Flash {
+    fn erase_interval_s(&self) -> u32 {
+        0
+    }
+
+    fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.0)
+    }
+
+    fn erase(&mut self) -> Result<(), FlashError> {
+        self.0.fill(u32::MAX);
+        Ok(())
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        let place: &mut [u8] = bytemuck::cast_slice_mut(&mut self.0);
+        place[offset..offset + bytes.len()].copy_from_slice(bytes);
+        Ok(())
+    }
 }
 
 /// Board whose serial line is `W`, whose reads must not block.
@@ -190,9 +220,10 @@ fn run_on_its_own(
     // Half of a large model fits: both ways are taken.
     let mut weights = vec![0; 8 * 1024];
     std::thread::spawn(move || {
-        let mut slots = Flash::pair(128 * 1024);
-        slots[0].flash(0, &model);
-        let mut journal = Flash::journal();
+        let mut slots = [0, 1].map(|_| Flash::erased(128 * 1024));
+        let flashed: &mut [u8] = bytemuck::cast_slice_mut(&mut slots[0].0);
+        flashed[..model.len()].copy_from_slice(&model);
+        let mut journal = Journal::new([0, 1].map(|_| Flash::erased(PAGE_BYTES)));
         for life in 0.. {
             let board = Board {
                 wire: &mut wire,

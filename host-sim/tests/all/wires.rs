@@ -5,7 +5,6 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use mock_board::blob_of_a_row;
 use taxel_core::Decoder;
 use taxel_core::blob::{Columns, Metadata, ModelShape};
 use taxel_data::{Purpose, Random, Silent, Stream};
@@ -17,6 +16,11 @@ use taxel_simulate::World;
 use crate::virtual_board::{Series, VirtualBoard, VirtualScanner, WIRES, all_readings};
 use crate::virtual_device::mailbox::pair;
 use crate::virtual_device::{Line, run_with};
+
+#[path = "../../../firmware/tests/mock/row_model.rs"]
+mod row_model;
+
+use row_model::blob_of_a_row;
 
 /// The firmware's scanner on a virtual board with a pressed sensor, in whatever thread scans it.
 #[derive(Clone)]

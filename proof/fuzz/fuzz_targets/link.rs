@@ -9,16 +9,21 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use libfuzzer_sys::fuzz_target;
-use mock_board::{
-    Bench, Board, Flash, Memory, Running, TestFrame, blob, model_crc, quiet, request_bytes,
-    upload_steps,
-};
 use taxel_core::AlignedBytes;
 use taxel_core::checksum::CRC_32;
 use taxel_firmware::app::{Session, SessionEnd};
 use taxel_firmware::link::message::{Report, Request};
 use taxel_firmware::link::packet::PROTOCOL_VERSION;
 use taxel_firmware::link::{cobs, packet};
+
+#[path = "../../../firmware/tests/mock/mod.rs"]
+#[expect(dead_code, unused_imports, reason = "the firmware's tests use all of it")]
+mod mock;
+
+use mock::bench::Memory;
+use mock::{
+    Bench, Board, Flash, Running, TestFrame, blob, model_crc, quiet, request_bytes, upload_steps,
+};
 
 /// Most starts of the device in one run.
 const MOST_STARTS: usize = 12;
@@ -69,7 +74,8 @@ fuzz_target!(|bytes: &[u8]| {
         }
         drop(device);
         journal = bench.journal();
-        let _ = (slots[0].power_on(), journal.pages()[0].power_on());
+        slots[0].power_on();
+        journal.pages()[0].power_on();
     }
 });
 

@@ -1,5 +1,5 @@
-//! The one mock flash: NOR cells of which programming can only clear bits, and an erase sets all. It is as real parts
-//! are at their worst. Power may be lost in any erase and any word, bits stay weak, words wear out, and time passes.
+//! The one mock flash: NOR cells of which programming can only clear bits, and an erase sets all. Power may be lost in any
+//! erase and any word, and bits stay weak.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -8,58 +8,13 @@ use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use taxel_firmware::store::{FlashError, Journal, PAGE_BYTES, Slot};
 
-/// What an erase leaves of a slot when the power is cut meanwhile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Torn {
-    /// Any bits are set, over the whole slot.
-    AnyBits,
-    /// All words are programmed to zeros first.
-    ZerosFirst,
-    /// A bit in a hundred is set.
-    FewBits,
-    /// All bits are set but one in a hundred.
-    NearlyAll,
-    /// Bits that read as 0 or 1 anew after each start. So do bits of torn words.
-    Weak,
-    /// Any of these at each cut. Weak bits may be few, in a slot that else reads as erased or as before; at a start they
-    /// may all read alike.
-    Mixed,
-}
-
-impl Torn {
-    /// Number of kinds.
-    pub const COUNT: usize = 6;
-
-    /// Every kind.
-    pub const ALL: [Self; Self::COUNT] =
-        [Self::AnyBits, Self::ZerosFirst, Self::FewBits, Self::NearlyAll, Self::Weak, Self::Mixed];
-
-    /// The kind of case number `seed`: they take turns.
-    pub fn new(seed: u64) -> Self {
-        Self::ALL[(seed % Self::COUNT as u64) as usize]
-    }
-
-    /// Its name in the table.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::AnyBits => "any bits",
-            Self::ZerosFirst => "zeros first",
-            Self::FewBits => "few bits",
-            Self::NearlyAll => "nearly all",
-            Self::Weak => "weak bits",
-            Self::Mixed => "mixed",
-        }
-    }
-}
-
 /// Power of a device.
 pub struct Supply {
     /// Number of operations until it is cut; `None` if it is not.
     left: Option<u64>,
     pub gone: bool,
-    /// Number of operations since [`Supply::on`].
+    /// Number of operations and of erases since [`Supply::on`].
     pub operations: u64,
-    /// Number of erases since [`Supply::on`].
     pub erases: u64,
     random: Xoshiro256PlusPlus,
 }
@@ -92,10 +47,11 @@ impl Supply {
         match &mut self.left {
             Some(0) => {
                 self.gone = true;
-                // Just before the operation, just after it, or in the middle.
-                match self.random.next_u32() % 8 {
-                    0 => Course::Nowhere,
-                    _ => Course::Torn,
+                // Just before the operation, or in the middle.
+                if self.random.next_u32().is_multiple_of(8) {
+                    Course::Nowhere
+                } else {
+                    Course::Torn
                 }
             }
             Some(left) => {
@@ -104,11 +60,6 @@ impl Supply {
             }
             None => Course::Whole,
         }
-    }
-
-    /// Bits of which one in a hundred is set.
-    fn few(&mut self) -> u32 {
-        self.sparse(7)
     }
 
     /// Bits of which one in 2 to the power of `halvings` is set.
@@ -120,19 +71,6 @@ impl Supply {
         self.random.next_u32() % end
     }
 }
-
-/// A word that has worn out.
-#[derive(Debug, Clone, Copy)]
-pub struct Worn {
-    pub place: usize,
-    /// Bits that no erase sets.
-    pub zeros: u32,
-    /// Bits that no programming clears.
-    pub ones: u32,
-}
-
-/// Lets so many µs pass.
-pub type Wait = Rc<dyn Fn(u32)>;
 
 /// What the cells of a flash hold.
 #[derive(Clone)]
@@ -149,15 +87,6 @@ pub struct Cells {
 pub struct Flash {
     cells: Cells,
     supply: Rc<RefCell<Supply>>,
-    torn: Torn,
-    /// Words that have worn out.
-    pub worn: Vec<Worn>,
-    /// Whether all weak bits of a word read alike at every other start: the word is the old or the new one.
-    pub swings: bool,
-    /// Whether erases fail at their end.
-    pub fails_to_erase: bool,
-    /// Times in µs that an erase and a word take, and who lets them pass.
-    pub slow: Option<(u32, u32, Wait)>,
     /// Mean time in s between erases that it endures; 0 for ever.
     pub erase_interval_s: u32,
     /// Number of erases that were begun.
@@ -170,27 +99,18 @@ impl Flash {
     /// Length in bytes of a model slot.
     pub const SLOT_BYTES: usize = 2048;
 
-    /// Erased flash of so many `words`.
-    pub fn erased(words: usize, supply: &Rc<RefCell<Supply>>, torn: Torn) -> Self {
+    /// Erased flash of so many `bytes`.
+    pub fn erased(bytes: usize, supply: &Rc<RefCell<Supply>>) -> Self {
+        let words = bytes / 4;
         let cells = Cells { words: vec![u32::MAX; words], weak: vec![0; words], has_weak: false };
-        Self {
-            cells,
-            supply: supply.clone(),
-            torn,
-            worn: Vec::new(),
-            swings: false,
-            fails_to_erase: false,
-            slow: None,
-            erase_interval_s: 0,
-            erases: 0,
-            words_written: 0,
-        }
+        let supply = supply.clone();
+        Self { cells, supply, erase_interval_s: 0, erases: 0, words_written: 0 }
     }
 
     /// A pair of erased flashes of so many `bytes`, with one power supply.
-    pub fn pair(bytes: usize) -> [Self; 2] {
+    fn pair(bytes: usize) -> [Self; 2] {
         let supply = Supply::new(bytes as u64);
-        [0, 1].map(|_| Self::erased(bytes / 4, &supply, Torn::AnyBits))
+        [0, 1].map(|_| Self::erased(bytes, &supply))
     }
 
     /// A pair of erased model slots.
@@ -227,12 +147,9 @@ impl Flash {
         self.supply.borrow_mut().on(Some(operations));
     }
 
-    /// Switches the power on; returns whether it had been cut.
-    pub fn power_on(&self) -> bool {
-        let mut supply = self.supply.borrow_mut();
-        let gone = supply.gone;
-        supply.on(None);
-        gone
+    /// Switches the power on.
+    pub fn power_on(&self) {
+        self.supply.borrow_mut().on(None);
     }
 
     /// What it holds, to be put back by [`Flash::restore`].
@@ -256,25 +173,16 @@ impl Flash {
         self.cells.words[place] ^= bits;
     }
 
-    fn wait(&self, erases: u32, words: u32) {
-        if let Some((erase_us, word_us, wait)) = &self.slow {
-            wait(erases * erase_us + words * word_us);
-        }
-    }
-
-    /// Lets weak bits settle one way or the other, as they do at a start.
+    /// Lets weak bits settle, as they do at a start: each by itself, or those of a word alike, the old one or the new.
     pub fn settle(&mut self) {
         if self.cells.has_weak {
             let mut supply = self.supply.borrow_mut();
-            let at_once = if self.torn == Torn::Mixed { supply.below(4) } else { 0 };
+            let are_alike = supply.below(2) == 0;
             for (word, weak) in self.cells.words.iter_mut().zip(&self.cells.weak) {
                 let any = supply.random.next_u32();
-                let bits = match (at_once, any % 4) {
-                    (1, _) => 0,
-                    (2, _) => u32::MAX,
-                    (3, _) => *word,
-                    (_, 0) if self.swings => 0,
-                    (_, 1) if self.swings => u32::MAX,
+                let bits = match any % 4 {
+                    0 if are_alike => 0,
+                    1 if are_alike => u32::MAX,
                     _ => any,
                 };
                 *word = (*word & !weak) | (bits & weak);
@@ -282,31 +190,18 @@ impl Flash {
         }
     }
 
+    /// Leaves of an erase what a cut leaves: some bits are set, few or nearly all, and of the others some are weak.
     fn tear(&mut self, supply: &mut Supply) {
-        let Cells { words, weak, has_weak } = &mut self.cells;
-        let is_early = supply.random.next_u32().is_multiple_of(2);
-        let sparse = [1, 5, 9, 14][supply.below(4) as usize];
-        let torn = match self.torn {
-            Torn::Mixed => Torn::new(supply.random.next_u64()),
-            torn => torn,
-        };
-        for (word, weak) in words.iter_mut().zip(weak) {
-            let any = supply.random.next_u32();
-            match torn {
-                Torn::AnyBits => *word |= any,
-                Torn::ZerosFirst if is_early => *word &= any,
-                Torn::ZerosFirst => *word = any,
-                Torn::FewBits => *word |= supply.few(),
-                Torn::NearlyAll => *word |= !supply.few(),
-                Torn::Weak => {
-                    *weak = (*weak | !*word) & any;
-                    *has_weak = true;
-                }
-                Torn::Mixed => {
-                    *weak = (*weak | !*word) & supply.sparse(sparse);
-                    *word |= if is_early { 0 } else { u32::MAX };
-                    *has_weak = true;
-                }
+        let halvings = [1, 5, 9, 14][supply.below(4) as usize];
+        let (is_early, has_weak) = (supply.below(2) == 0, supply.below(2) == 0);
+        self.cells.has_weak |= has_weak;
+        for (word, weak) in self.cells.words.iter_mut().zip(&mut self.cells.weak) {
+            let some = supply.sparse(halvings);
+            if has_weak {
+                *weak = (*weak | !*word) & some;
+                *word |= if is_early { 0 } else { u32::MAX };
+            } else {
+                *word |= if is_early { some } else { !some };
             }
         }
     }
@@ -323,7 +218,6 @@ impl Slot for Flash {
 
     fn erase(&mut self) -> Result<(), FlashError> {
         self.erases += 1;
-        self.wait(1, 0);
         let supply = self.supply.clone();
         let mut supply = supply.borrow_mut();
         supply.erases += 1;
@@ -338,35 +232,26 @@ impl Slot for Flash {
         self.cells.words.fill(u32::MAX);
         self.cells.weak.fill(0);
         self.cells.has_weak = false;
-        for worn in &self.worn {
-            self.cells.words[worn.place] &= !worn.zeros;
-        }
-        if self.fails_to_erase { Err(FlashError) } else { Ok(()) }
+        Ok(())
     }
 
     fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
         assert!(offset.is_multiple_of(4) && bytes.len().is_multiple_of(4), "whole words");
-        self.wait(0, bytes.len() as u32 / 4);
         for (place, bytes) in (offset / 4..).zip(bytes.as_chunks::<4>().0) {
             self.words_written += 1;
             let wanted = u32::from_le_bytes(*bytes);
             let mut supply = self.supply.borrow_mut();
             let Cells { words, weak, has_weak } = &mut self.cells;
             let (word, weak) = (&mut words[place], &mut weak[place]);
-            let mut worn = self.worn.iter().filter(|worn| worn.place == place).peekable();
-            let may_write = *word == u32::MAX || wanted == 0 || worn.peek().is_some();
-            assert!(may_write, "word {place} is not erased");
+            assert!(*word == u32::MAX || wanted == 0, "word {place} is not erased");
             match supply.operate() {
                 Course::Nowhere => return Err(FlashError),
-                Course::Torn
-                    if self.torn == Torn::Weak
-                        || self.torn == Torn::Mixed && supply.below(2) == 0 =>
-                {
+                Course::Torn if supply.below(2) == 0 => {
                     // All bits that change, half of them, or one: the others are as they should be.
                     let change = *word & !wanted;
-                    let one = 1 << (supply.random.next_u32() % 32);
+                    let one = 1 << supply.below(32);
                     let some = [u32::MAX, supply.random.next_u32(), one];
-                    *weak |= change & some[(supply.random.next_u32() % 3) as usize];
+                    *weak |= change & some[supply.below(3) as usize];
                     *word = wanted;
                     *has_weak = true;
                     return Err(FlashError);
@@ -379,9 +264,6 @@ impl Slot for Flash {
             }
             *word &= wanted;
             *weak &= wanted;
-            for worn in worn {
-                *word |= worn.ones;
-            }
             if *word != wanted {
                 return Err(FlashError);
             }

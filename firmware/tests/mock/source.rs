@@ -6,8 +6,8 @@ use std::rc::Rc;
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 
-use crate::board::Board;
-use crate::shape::{COLS, ROWS, TestFrame};
+use super::board::Board;
+use super::shape::{COLS, ROWS, TestFrame};
 
 /// Least time in µs of a scan.
 const SCAN_US: u32 = 10;

@@ -7,11 +7,11 @@ use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{ModelIdentity, Report, Request, UploadState, UploadStep};
 use taxel_firmware::store::{Journal, KeepError, Kind};
 
-use crate::bench::{Bench, Memory, Running, quiet};
-use crate::board::Board;
-use crate::flash::{Cells, Flash, Supply};
-use crate::host::{self, Answer, ask, model_crc, undo, upload_steps};
-use crate::models::crc_of;
+use super::bench::{Bench, Memory, Running, quiet};
+use super::board::Board;
+use super::flash::{Cells, Flash, Supply};
+use super::host::{self, Answer, ask, model_crc, undo, upload_steps};
+use super::models::crc_of;
 
 /// Bytes of a chunk of an upload.
 const CHUNK: usize = 100;

@@ -7,10 +7,10 @@ use taxel_firmware::app::{App, Buffers, Session};
 use taxel_firmware::link::message::Configuration;
 use taxel_firmware::store::Journal;
 
-use crate::board::Board;
-use crate::flash::Flash;
-use crate::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
-use crate::source::Source;
+use super::board::Board;
+use super::flash::Flash;
+use super::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
+use super::source::Source;
 
 /// Memory of an application.
 pub type Memory = Buffers<ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;

@@ -7,7 +7,7 @@ use taxel_core::projection::Projection;
 use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
 
-use crate::shape::{COLS, OUTPUTS, ROWS};
+use super::shape::{COLS, OUTPUTS, ROWS};
 
 /// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
@@ -59,19 +59,6 @@ pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
     blob_with(model.networks().next().unwrap(), Some(confidence), relative_inputs)
 }
 
-/// A blob of so many bytes, most of which are its name.
-pub fn blob_of_length(bytes: usize) -> AlignedBytes {
-    let small = blob(3, 4);
-    let model = Model::decode(&small).unwrap();
-    let networks: Vec<_> = model.networks().collect();
-    let named = |length: usize| {
-        let name = &"x".repeat(length);
-        let parts = ModelParts::new(&networks, &[0; ROWS], Metadata { name, ..*model.metadata() });
-        encode_to_vec(&parts).unwrap()
-    };
-    (0..bytes).map(named).find(|blob| blob.len() == bytes).unwrap()
-}
-
 fn blob_with(
     network: Network<'_>,
     confidence: Option<Confidence<'_>>,
@@ -114,29 +101,6 @@ pub fn blob_of_features(features: usize) -> AlignedBytes {
         ..ModelParts::new(&networks, &[0; ROWS], metadata)
     };
     encode_to_vec(&parts).unwrap()
-}
-
-/// A blob of one network with this `shape`, which has one row, and this `metadata`.
-pub fn blob_of_a_row(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
-    let ModelShape { inputs, outputs, .. } = shape;
-    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
-    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
-    let (centre, weights, bias) = (list(1, inputs), list(2, outputs), list(3, outputs));
-    let (minimum, per_span) = (vec![50.0; inputs], vec![0.05; inputs]);
-    let network = float32::Network::try_new(
-        Shape { inputs, centres: 1, outputs },
-        Parameters {
-            input_minimum: &minimum,
-            input_per_span: &per_span,
-            centres: &centre,
-            decay: &[1.5],
-            output_weights: &weights,
-            bias: &bias,
-            affine: &[],
-        },
-    );
-    let networks = &[network.unwrap().into()];
-    encode_to_vec(&ModelParts::new(networks, &[0], metadata)).unwrap()
 }
 
 /// The CRC-32 that closes a blob.

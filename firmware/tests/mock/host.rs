@@ -8,9 +8,9 @@ use taxel_firmware::link::message::{
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
 
-use crate::bench::{Bench, Running};
-use crate::board::Board;
-use crate::flash::Flash;
+use super::bench::{Bench, Running};
+use super::board::Board;
+use super::flash::Flash;
 
 /// Number of the requests of [`ask`].
 const ASKED: u16 = 77;

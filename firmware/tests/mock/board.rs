@@ -8,7 +8,7 @@ use taxel_firmware::link::message::Memory;
 use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::store::Journal;
 
-use crate::flash::Flash;
+use super::flash::Flash;
 
 /// State of the board, which a test can see while the application owns the board.
 #[derive(Default)]

@@ -1,0 +1,27 @@
+//! A board without hardware: sensor, serial line, clock and flash as mocks, and the host at the other end
+//! of the line. All are stricter than real parts, and panic where a test asks for what cannot be.
+//!
+//! [`Bench`] puts an application together with what it is connected to.
+
+// From the ground up: a module imports only what is declared before it.
+mod shape;
+mod flash;
+mod board;
+mod source;
+mod row_model;
+mod models;
+pub mod bench;
+mod host;
+mod device;
+
+pub use bench::{Bench, Running, TestSession, quiet};
+pub use board::Board;
+pub use device::{Device, confirmed, model, trial_steps};
+pub use flash::{Flash, Supply};
+pub use host::{
+    Answer, ask, begin, find_report, install, model_crc, reports, request_bytes, settle,
+    statistics, undo, upload, upload_step, upload_steps,
+};
+pub use models::{blob, blob_of, blob_of_features, blob_with_confidence, crc_of};
+pub use row_model::blob_of_a_row;
+pub use shape::{COLS, OUTPUTS, ROWS, TestFrame, frame_at_rest};
