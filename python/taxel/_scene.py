@@ -34,7 +34,8 @@ class Scene:
 
     def replace(self, **fields: Any) -> Scene:
         """This scene with other values. A field's tables stand before it, with two underlines between:
-        `Scene("press").replace(noise__level=0.01, training__centres=32)`."""
+        `Scene("press").replace(noise__level=0.01, training__centres=32)`. A dict is a table as a whole:
+        `noise={"kind": "absolute", "level_ohm": 0.5}`."""
         values = [(name.replace("__", "."), as_toml(value)) for name, value in fields.items()]
         return self._of(self._native.with_values(values))
 
@@ -112,8 +113,10 @@ def as_toml(value: Any) -> str:
         value = value.tolist()
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(as_toml(it) for it in value) + "]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {as_toml(it)}" for key, it in value.items()) + " }"
     if isinstance(value, (bool, str)):
         return json.dumps(value)
     if isinstance(value, (int, float)):
         return repr(value)
-    raise ValueError(f"{value!r}: a scene takes numbers, text, and lists of these")
+    raise ValueError(f"{value!r}: a scene takes numbers, text, lists and dicts of these")

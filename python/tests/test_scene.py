@@ -15,6 +15,9 @@ def test_fields_of_a_scene_are_replaced():
     noisy = scene.replace(noise__level=0.02)
     few = [taxel.synth(of, 3, seed=1).readings for of in (scene, noisy, scene.replace(noise__level=0))]
     assert np.allclose(few[1] - few[2], 4 * (few[0] - few[2]))  # four times 0.5 %
+    in_ohm = [scene.replace(noise={"kind": "absolute", "level_ohm": level}) for level in (0.5, 1)]
+    in_ohm = [taxel.synth(of, 3, seed=1).readings - few[2] for of in in_ohm]
+    assert np.allclose(in_ohm[1], 2 * in_ohm[0]) and np.allclose(in_ohm[1] * few[2] * 0.005, few[0] - few[2])
     assert taxel.Scene.from_toml(noisy.to_toml()).outputs == scene.outputs
     with pytest.raises(ValueError, match="no_such"):
         scene.replace(noise__no_such=1)
