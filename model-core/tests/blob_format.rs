@@ -7,7 +7,7 @@ use taxel_core::blob::{
 };
 use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
-use taxel_core::{Aligned, Decoder, RowStatus};
+use taxel_core::{Aligned, AlignedBytes, Decoder, RowStatus};
 
 fn parameters() -> Parameters<'static> {
     Parameters {
@@ -169,6 +169,72 @@ fn bytes_left_over_behind_the_networks_are_refused() {
     longer[at..at + 4].copy_from_slice(&(length as u32 + 4).to_le_bytes());
     seal(longer);
     assert_eq!(Model::decode(longer).unwrap_err(), DecodeError::LeftOver { bytes: 4 });
+}
+
+/// The blob of the page, and one that was trained.
+fn blobs() -> [AlignedBytes; 2] {
+    let mut buffer = Aligned([0; 512]);
+    let trained = include_bytes!("../../testdata/row4.bin");
+    [small_model(&mut buffer.0), trained].map(AlignedBytes::copy_of)
+}
+
+#[test]
+fn every_single_bit_flip_is_refused_with_its_error() {
+    for mut blob in blobs() {
+        assert!(Model::decode(&blob).is_ok());
+        for (offset, bit) in (0..blob.len()).flat_map(|offset| (0..8).map(move |bit| (offset, bit)))
+        {
+            blob[offset] ^= 1 << bit;
+            let refused = Model::decode(&blob).unwrap_err();
+            let as_expected = match offset {
+                0..4 => matches!(refused, DecodeError::BadMagic),
+                4 => matches!(refused, DecodeError::UnsupportedVersion { .. }),
+                5..9 => matches!(
+                    refused,
+                    DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. }
+                ),
+                _ => matches!(refused, DecodeError::Corrupt { .. }),
+            };
+            assert!(as_expected, "byte {offset} bit {bit}: {refused}");
+            blob[offset] ^= 1 << bit;
+        }
+    }
+}
+
+#[test]
+fn every_truncation_and_any_trailing_byte_is_refused() {
+    for blob in blobs() {
+        for found in 0..blob.len() {
+            let expected = if found < 9 { 13 } else { blob.len() };
+            let refused = Model::decode(&blob[..found]).unwrap_err();
+            assert_eq!(refused, DecodeError::Truncated { expected, found });
+        }
+        let longer = AlignedBytes::copy_of(&[&blob[..], &[0]].concat());
+        assert!(matches!(Model::decode(&longer), Err(DecodeError::TrailingBytes { .. })));
+    }
+}
+
+#[test]
+fn sections_out_of_order_and_bad_metadata_are_refused_under_a_valid_crc() {
+    let [blob, _] = blobs();
+    let refused = |offset: usize, bytes: &[u8]| {
+        let mut blob = blob.clone();
+        blob[offset..offset + bytes.len()].copy_from_slice(bytes);
+        seal(&mut blob);
+        Model::decode(&blob).unwrap_err()
+    };
+    // Rows, inputs, outputs and networks are one byte each, at 9 to 12; then the map of the rows, and the metadata.
+    assert_eq!(blob[9..17], [2, 2, 1, 1, 2, 0, 0, 0]);
+    assert_eq!(refused(15, &[2]), DecodeError::UnknownNetwork { row: 1, network: 2, networks: 1 });
+    assert_eq!(refused(16, &[9]), DecodeError::SectionOrder { expected: 0, found: 9 });
+    // The network's section: its tag, and its number.
+    assert_eq!(refused(131, &[3]), DecodeError::NetworkOrder { expected: 0, found: 3 });
+    let rmse = [0, 0, 0x80, 0x3d, 0, 0, 0x80, 0x3d];
+    let rmse = blob.windows(8).position(|bytes| bytes == rmse).unwrap();
+    let field = "training error";
+    for value in [f32::NAN, f32::INFINITY, -1.0] {
+        assert_eq!(refused(rmse, &value.to_le_bytes()), DecodeError::InvalidMetadata { field });
+    }
 }
 
 #[test]

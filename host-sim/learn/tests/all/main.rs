@@ -4,7 +4,7 @@
 mod table;
 
 mod cost;
-mod blob;
+mod decoding;
 mod number_formats;
 mod extremes;
 mod relative;

@@ -160,17 +160,6 @@ fn latents_have_the_distribution_that_frames_are_drawn_from() {
 }
 
 #[test]
-fn a_mix_of_the_same_kind_twice_has_the_limit_of_that_kind() {
-    let press = World::press().motion;
-    let parts = [0.3, 0.7].map(|weight| Part { weight, deformation: press.clone() }).to_vec();
-    let world = World { read_rows: vec![3], ..World::of_motion(Mix { parts }) };
-    let reference = Reference::new(&world, 150, &Silent).unwrap();
-    let (z, (_, expected, standard_error)) = (&reference.limits()[2], ROW_4[0]);
-    let allowed = 2.0 * standard_error.hypot(z.limit_standard_error);
-    assert!((z.limit - expected).abs() < allowed, "{z:?}");
-}
-
-#[test]
 fn noise_of_a_span_is_that_of_each_row() {
     let mut world = World::paper();
     world.noise.kind = NoiseKind::Span;

@@ -1,38 +1,7 @@
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-use super::super::{Options, Samples};
 use super::*;
-use taxel_data::{Purpose, Random, Stream, Table};
-
-/// Oracle by batch: ridge regression with penalty 1/δ through nalgebra's QR decomposition of all samples
-/// at once.
-fn fit_batch(
-    regressors: &Regressors<'_>,
-    scaled: &[f64],
-    outputs: &Table,
-    initial_covariance: f64,
-) -> Vec<f64> {
-    let (n, o, samples) = (regressors.count(), outputs.names.len(), outputs.len());
-    let mut h = DMatrix::zeros(samples + n, n);
-    let mut row = vec![0.0; n];
-    for (i, input) in scaled.chunks_exact(regressors.inputs).enumerate() {
-        regressors.evaluate(input, &mut row);
-        row.iter().enumerate().for_each(|(j, value)| h[(i, j)] = *value);
-    }
-    let root = 1.0 / initial_covariance.sqrt();
-    (0..n).for_each(|i| h[(samples + i, i)] = root);
-    let qr = h.qr();
-    let r = qr.r();
-    let mut weights = vec![0.0; n * o];
-    for output in 0..o {
-        let mut y = DVector::zeros(samples + n);
-        outputs.lines().enumerate().for_each(|(i, line)| y[i] = line[output]);
-        qr.q_tr_mul(&mut y);
-        let solved = r.solve_upper_triangular(&y.rows(0, n)).expect("the ridge keeps R regular");
-        solved.iter().enumerate().for_each(|(i, w)| weights[i * o + output] = *w);
-    }
-    weights
-}
+use taxel_data::{Purpose, Random, Stream};
 
 fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
@@ -185,26 +154,5 @@ fn regressors_that_are_never_excited_get_no_weight() {
     for (i, weight) in weights.iter().enumerate() {
         let expected = if i < 15 { i as f64 } else { 0.0 };
         assert!((weight - expected).abs() < 1e-6, "{i}: {weight}");
-    }
-}
-
-/// Row 4 of `press` as the program trains it, K-means centres of width 0.8: Gaussians that all look alike.
-#[test]
-fn the_recursion_has_the_weights_of_batch_ridge_on_a_press() {
-    let mut world = taxel_simulate::World::press();
-    world.read_rows = vec![3];
-    let table = taxel_simulate::synthesise(&world, Stream::Training, 2000).row_table(0);
-    let samples = Samples::new(&table);
-    let options = Options { centres: 40, ..Options::of_rows() };
-    let centres = samples.centres(&options, 0);
-    let regressors =
-        Regressors { centres: &centres, inputs: 18, decays: &[0.78], affine_tail: true };
-    let design = regressors.of(&samples.scaled);
-    for covariance in [1e2, 1e6] {
-        let (targets, outputs) = (&table.outputs.values, table.outputs.names.len());
-        let found = Factor::by_recursion(&design, targets, outputs, covariance).weights();
-        let batch = fit_batch(&regressors, &samples.scaled, &table.outputs, covariance);
-        let relative = relative_difference(&found, &batch);
-        assert!(relative <= 1e-8, "δ = {covariance:e}: {relative:e}");
     }
 }

@@ -1,4 +1,3 @@
-use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use taxel_core::rbf::Format;
@@ -303,34 +302,6 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let steps = taken.0.into_inner() - quick().steps;
         assert!(steps.is_multiple_of(20) && (steps > 0) == (ratio < 0.99), "{steps}");
     }
-}
-
-/// The first electrodes' outputs are missing in a third of the frames, and in a whole fold.
-#[test]
-fn refinement_helps_outputs_that_are_missing_in_some_frames_and_those_that_are_not() {
-    let world = World { read_rows: vec![3], ..World::press() };
-    let synthesis = Synthesis::new(&world).noise_level(0.005);
-    let [mut training, test] = [(Stream::Training, 6000), (Stream::Test, 2000)]
-        .map(|(stream, frames)| synthesis.frames(stream, frames));
-    for (frame, line) in training.outputs.values.chunks_exact_mut(18).enumerate() {
-        if frame % 3 == 0 || frame % 4 == 1 {
-            line[..9].fill(f64::NAN);
-        }
-    }
-    let options = Options { centres: 12, ..Options::of_rows() };
-    let fold_of: Vec<usize> = (0..6000).map(|frame| frame % 4).collect();
-    let examples = Examples::Folds(&fold_of);
-    let refined = train_refined(&training, &options, &quick(), examples, &Silent).unwrap();
-    let start = train(&training, &options, &Silent).unwrap();
-    let [refined, start] = [&refined, &start].map(|trained| {
-        let network = trained.networks[0].network();
-        let estimate = infer(&network, &test.inputs.values);
-        let squares = test.outputs.squared_errors(&estimate);
-        let of_z = |outputs: Range<usize>| squares[outputs].iter().skip(2).step_by(3).sum::<f64>();
-        [of_z(0..9), of_z(9..18)]
-    });
-    let ratios = [0, 1].map(|half| (refined[half] / start[half]).sqrt());
-    assert!(ratios.iter().all(|ratio| *ratio < 0.97), "{ratios:?}");
 }
 
 /// Few inputs are near each other: there the decay's 32 bits are what ends.
