@@ -1,4 +1,4 @@
-//! Recursive least squares in f32 and f64 through what a sensor does, against batch least squares of the same samples.
+//! Recursive least squares through what a sensor does: f32 against f64, and without forgetting against ridge regression.
 
 use taxel_data::{Purpose, Random, Stream};
 use taxel_learn::rls::{Real, Rls};
@@ -31,7 +31,8 @@ enum Life {
 const LIVES: [Life; 4] = [Life::Rich, Life::Rest, Life::Burst, Life::Unusable];
 const FORGETTING_FACTORS: [f64; 4] = [0.9, 0.99, 0.999, 1.0];
 const COVARIANCES: [f64; 3] = [1e2, 1e4, 1e6];
-const CASES: u64 = (LIVES.len() * FORGETTING_FACTORS.len() * COVARIANCES.len()) as u64;
+/// Places at which predictions are compared.
+const PLACES: [f64; 11] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
 /// A number that the recursion works in.
 trait Number: Real + Into<f64> {
@@ -50,54 +51,68 @@ impl Number for f64 {
     }
 }
 
-#[test]
-fn the_recursion_in_f32_predicts_as_batch_least_squares_within_the_noise() {
-    hold("recursion-f32", 1.0, CASES, |seed| Some(off::<f32>(seed)));
+/// Samples that the recursion takes, weights that it ends with.
+struct Run {
+    design: Dense,
+    targets: Vec<f64>,
+    weights: Vec<f64>,
 }
 
 #[test]
-fn the_recursion_in_f64_predicts_as_batch_least_squares() {
-    hold("recursion-f64", 0.001, CASES, |seed| Some(off::<f64>(seed)));
+fn the_recursion_in_f32_predicts_as_in_f64_within_the_noise() {
+    let cases = LIVES.len() * FORGETTING_FACTORS.len() * COVARIANCES.len();
+    hold("recursion-f32", 1.0, cases as u64, |seed| {
+        let which = seed as usize / LIVES.len();
+        let life = LIVES[seed as usize % LIVES.len()];
+        let factor = FORGETTING_FACTORS[which % FORGETTING_FACTORS.len()];
+        let covariance = COVARIANCES[which / FORGETTING_FACTORS.len() % COVARIANCES.len()];
+        let single = run::<f32>(life, factor, covariance, seed).weights;
+        let double = run::<f64>(life, factor, covariance, seed).weights;
+        // A sensor that rests for good forgets all other places, and f32 need not forget as f64 does.
+        let places = if life == Life::Rest && factor < 1.0 { &PLACES[5..6] } else { &PLACES[..] };
+        Some(difference(&single, &double, places))
+    });
 }
 
-/// Root mean square difference of what recursion and batch predict, in deviations of the noise.
-fn off<T: Number>(seed: u64) -> f64 {
-    let which = |count: usize, step: usize| seed as usize / step % count;
-    let life = LIVES[which(LIVES.len(), 1)];
-    let factor = FORGETTING_FACTORS[which(FORGETTING_FACTORS.len(), LIVES.len())];
-    let covariance = COVARIANCES[which(COVARIANCES.len(), LIVES.len() * FORGETTING_FACTORS.len())];
+#[test]
+fn the_recursion_that_forgets_nothing_predicts_as_ridge_regression() {
+    let cases = LIVES.len() * COVARIANCES.len();
+    hold("recursion-f64", 1.0, cases as u64, |seed| {
+        let life = LIVES[seed as usize % LIVES.len()];
+        let covariance = COVARIANCES[seed as usize / LIVES.len() % COVARIANCES.len()];
+        let Run { design, targets, weights } = run::<f64>(life, 1.0, covariance, seed);
+        let batch = Factor::new(&design, &targets, 1, covariance).weights();
+        Some(difference(&weights, &batch, &PLACES) / 0.001)
+    });
+}
+
+fn run<T: Number>(life: Life, factor: f64, covariance: f64, seed: u64) -> Run {
     let mut random = Random::new(seed, Stream::Test, Purpose::Noise, 0, 0);
     let mut recursion = Rls::new([REGRESSORS, 1], T::of(covariance), T::of(factor)).unwrap();
     let (mut design, mut targets) = (Dense { columns: REGRESSORS, values: vec![] }, vec![]);
     for update in 0..UPDATES {
         let (h, y) = sample(life, update, &mut random);
         let is_usable = h.iter().chain([&y]).all(|value| value.abs() <= f32::LARGEST.into());
-        // Forgotten is as much as the recursion forgets by the end.
-        let root = factor.powf((UPDATES - 1 - update) as f64 / 2.0);
         if is_usable {
-            design.values.extend(h.map(|h| root * h));
-            targets.push(root * y);
+            design.values.extend(h);
+            targets.push(y);
         }
+        // What f32 refuses is kept from f64, too, which could take it.
         if is_usable || size_of::<T>() == size_of::<f32>() {
             let taken = recursion.update(&mut h.map(T::of), &mut [T::of(y)]).is_ok();
             assert_eq!(taken, is_usable, "{life:?}, update {update}");
         }
     }
-    let weights = recursion.weights();
-    let batch = Factor::new(&design, &targets, 1, covariance).weights();
-    // A sensor that rests for good forgets all other places, and f32 need not forget as f64 does.
-    let places = if life == Life::Rest && factor < 1.0 { 5..=5 } else { 0..=10 };
-    let count = places.clone().count() as f64;
-    let squares = places.map(|place| {
-        let weights = weights.iter().zip(&batch).map(|(own, batch)| (*own).into() - batch);
-        regressors(f64::from(place) / 10.0)
-            .iter()
-            .zip(weights)
-            .map(|(h, w)| h * w)
-            .sum::<f64>()
-            .powi(2)
-    });
-    (squares.sum::<f64>() / count).sqrt() / NOISE
+    Run { design, targets, weights: recursion.weights().into_iter().map(Into::into).collect() }
+}
+
+/// Root mean square difference of what two weights predict, in deviations of the noise.
+fn difference(one: &[f64], other: &[f64], places: &[f64]) -> f64 {
+    let square = |place: &f64| {
+        let weights = one.iter().zip(other).map(|(one, other)| one - other);
+        regressors(*place).iter().zip(weights).map(|(h, w)| h * w).sum::<f64>().powi(2)
+    };
+    (places.iter().map(square).sum::<f64>() / places.len() as f64).sqrt() / NOISE
 }
 
 /// Sample number `update`: regressors, and the target with noise.
