@@ -10,8 +10,7 @@ use std::path::{Path, PathBuf};
 
 use taxel_learn::export::c::{Name, library};
 
-use crate::process::{Outcome, first_line, target_dir};
-use crate::queue;
+use crate::process::{Outcome, first_line, target_dir, two_at_a_time};
 use build::Build;
 use models::Model;
 
@@ -38,7 +37,7 @@ pub fn run(options: &Options) -> Outcome {
     let missing = missing(&builds);
     let is_there = |build: &&Build| build.needs().iter().all(|it| !missing.contains(it));
     let present: Vec<&Build> = builds.iter().filter(is_there).collect();
-    let mut failed = compare(&present, &models, &folder, frames);
+    let mut failed = compare(&present, &models, &folder, frames)?;
     if let Some(build) = present.iter().find(|build| build.needs().contains(&build::ARM)) {
         failed.extend(count::print(&models, &folder, build).err());
     }
@@ -50,11 +49,16 @@ pub fn run(options: &Options) -> Outcome {
 }
 
 /// Tries all models in all these ways, prints a table, and returns what differs and should not.
-fn compare(builds: &[&Build], models: &[Model], folder: &Path, frames: usize) -> Vec<String> {
+fn compare(
+    builds: &[&Build],
+    models: &[Model],
+    folder: &Path,
+    frames: usize,
+) -> Outcome<Vec<String>> {
     let jobs: Vec<(&Build, &Model)> =
         builds.iter().flat_map(|build| models.iter().map(move |model| (*build, model))).collect();
     let outcomes =
-        queue::results(&jobs, |(build, model), _| build.compare(&folder.join(model.name())));
+        two_at_a_time(&jobs, |(build, model)| build.compare(&folder.join(model.name())))?;
     let names: Vec<String> = models.iter().map(Model::name).collect();
     println!("{frames} frames of each model, all bits:\n");
     println!("| compiler | {} |\n|---|{}", names.join(" | "), "---|".repeat(names.len()));
@@ -85,7 +89,7 @@ fn compare(builds: &[&Build], models: &[Model], folder: &Path, frames: usize) ->
             ));
         }
     }
-    failed
+    Ok(failed)
 }
 
 /// Programs that builds need and that are not there.

@@ -9,8 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::images::{QEMU, build_image};
-use crate::process::{Outcome, Said, root};
-use crate::queue;
+use crate::process::{Outcome, Said, root, two_at_a_time};
 use crate::toolchain::{Toolchain, elf};
 
 /// Name of the application among the programs.
@@ -51,15 +50,15 @@ pub fn run(options: &Options) -> Outcome {
         }
     }
     jobs.extend(chosen.into_iter().map(Job::Program));
-    let work = |job: &Job, _| match job {
+    let work = |job: &Job| match job {
         Job::Program(program) => run_program(program, options.accept, !names.is_empty()),
         Job::Application(check) => check.run(),
     };
-    queue::work_through(&jobs, work, |job, said: Said| {
+    for (job, said) in jobs.iter().zip(two_at_a_time(&jobs, work)?) {
         eprint!("{}", said.err);
         print!("{}", said.out);
         conclude(&job.name(), said.outcome, &mut failed);
-    });
+    }
     if jobs.iter().any(|job| matches!(job, Job::Application(_))) {
         println!("the application's log: cargo xtask log {}", application::log().display());
     }

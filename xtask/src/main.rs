@@ -3,7 +3,6 @@
 mod process;
 mod structure;
 mod toolchain;
-mod queue;
 
 mod panics;
 mod images;

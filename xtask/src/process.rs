@@ -6,6 +6,8 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 
+use rayon::prelude::*;
+
 /// Result of a step: its value, or the reason why it failed.
 pub type Outcome<T = ()> = Result<T, String>;
 
@@ -31,6 +33,17 @@ pub fn cargo(arguments: &[&str]) -> Command {
     let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(arguments).current_dir(root());
     command
+}
+
+/// Results of `work` on all `pieces`, in their order. Two are done at a time: a program in QEMU takes one core, and small
+/// computers have two.
+pub fn two_at_a_time<T: Sync, R: Send>(
+    pieces: &[T],
+    work: impl Fn(&T) -> R + Sync,
+) -> Outcome<Vec<R>> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+    let pool = pool.map_err(|cause| cause.to_string())?;
+    Ok(pool.install(|| pieces.par_iter().with_max_len(1).map(&work).collect()))
 }
 
 /// Prints and runs `command`; its output is passed through.

@@ -15,8 +15,7 @@ use super::frames;
 use super::models::Model;
 use crate::cycles::trace::{self, Marks};
 use crate::emulate::qemu::{reader, wait};
-use crate::process::Outcome;
-use crate::queue;
+use crate::process::{Outcome, two_at_a_time};
 
 /// Frames that are counted, and the time limit of a run.
 const COUNTED: usize = 3;
@@ -35,7 +34,7 @@ struct Measured {
 /// Prints what a frame of each model costs, as the way of `build` compiles it.
 pub fn print(models: &[Model], folder: &Path, build: &Build) -> Outcome {
     let measured =
-        queue::results(models, |model, _| measure(model, &folder.join(model.name()), build));
+        two_at_a_time(models, |model| measure(model, &folder.join(model.name()), build))?;
     println!("\nA frame on a Cortex-M4F, by {}:\n", build.name());
     println!("| model | instructions in C | of the firmware | times | code | constants |");
     println!("|---|--:|--:|--:|--:|--:|");

@@ -82,7 +82,7 @@ fn the_recursion_that_forgets_nothing_predicts_as_ridge_regression() {
         let covariance = COVARIANCES[seed as usize / LIVES.len() % COVARIANCES.len()];
         let Run { design, targets, weights } = run::<f64>(life, 1.0, covariance, seed);
         let batch = Factor::new(&design, &targets, 1, covariance).weights();
-        Some(difference(&weights, &batch, &PLACES) / 0.001)
+        Some(difference(&weights, &batch, &PLACES) / 1e-6)
     });
 }
 
