@@ -77,10 +77,14 @@ impl FittedNetwork {
             let rounding = count as f64 * (4.0 * f64::EPSILON * mean).powi(2);
             if total > rounding && lost > MOST_LOST && found > MOST_GROWTH * left {
                 let (format, output) = (self.format.name(), &outputs.names[output]);
+                let other = match self.format {
+                    Format::F32 => "",
+                    Format::Fixed16 => "another format (f32) or ",
+                };
                 return Err(Error::unfit(format!(
                     "the format {format} loses the output {output:?}: R² on the training frames would be {lost:.3} lower \
-                     than with the same centres in f64. Subtract {mean:?}, its mean, from the output; or choose another \
-                     format (f32) or a smaller spread"
+                     than with the same centres in f64. Subtract {mean:?}, its mean, from the output; or choose {other}a \
+                     smaller spread"
                 )));
             }
         }
@@ -161,7 +165,7 @@ impl Weights {
 }
 
 /// Gaussians of a network as a number format holds them: all that is rounded before weights are fitted.
-pub(super) trait Held: Send + Sync {
+trait Held: Send + Sync {
     /// Regressors that a device computes for the inputs of `table`, line after line.
     fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't>;
 
@@ -170,23 +174,6 @@ pub(super) trait Held: Send + Sync {
     /// # Errors
     /// [`Error`] if the format does not hold the network.
     fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork>;
-}
-
-/// Gaussians of `layer`, held in the `format`.
-///
-/// # Errors
-/// [`Error`] if the format does not hold them.
-pub(super) fn held(
-    samples: &Samples<'_>,
-    layer: &HiddenLayer,
-    options: &Options,
-    format: Format,
-) -> Result<Box<dyn Held>> {
-    let (centres, of_width) = (&layer.centres, &Options { spread: layer.spread, ..*options });
-    Ok(match format {
-        Format::F32 => Box::new(float32::Gaussians::new(samples, layer, options)),
-        Format::Fixed16 => Box::new(fixed16::Exponents::new(samples, centres, of_width)?),
-    })
 }
 
 /// Samples of a table that weights are fitted to.
@@ -280,7 +267,10 @@ pub(super) fn fit(
     let targets = Targets::new(&samples.table.outputs);
     let (table, solver) = (samples.table, options.solver);
     let frames = table.outputs.counts();
-    let held = held(samples, layer, options, options.format)?;
-    let fit = Fit::new(&*held, table, &targets, solver, &frames);
+    let held: &dyn Held = match options.format {
+        Format::F32 => &float32::Gaussians::new(samples, layer, options),
+        Format::Fixed16 => &fixed16::Exponents::new(samples, layer, options)?,
+    };
+    let fit = Fit::new(held, table, &targets, solver, &frames);
     ridges.iter().map(|ridge| fit.network(*ridge)).collect()
 }

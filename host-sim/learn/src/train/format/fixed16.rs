@@ -18,7 +18,7 @@ use taxel_data::{BadValue, RowTable};
 use super::super::least_squares::{Design, Factor};
 use super::super::samples::CentredScale;
 use super::super::tasks::Factors;
-use super::super::{Options, Samples, squared_distance};
+use super::super::{HiddenLayer, Options, Samples, squared_distance};
 use super::{FittedNetwork, Held, Targets};
 use crate::error::{Error, Result, parameter_not_held};
 
@@ -51,24 +51,29 @@ pub(super) struct Exponents {
 }
 
 impl Exponents {
-    pub(super) fn new(samples: &Samples<'_>, centres: &[f64], options: &Options) -> Result<Self> {
+    pub(super) fn new(
+        samples: &Samples<'_>,
+        layer: &HiddenLayer,
+        options: &Options,
+    ) -> Result<Self> {
+        let (centres, spread) = (&layer.centres, layer.spread);
         let (inputs, outputs) = (samples.inputs(), samples.table.outputs.names.len());
         let refused = |why: String| {
             let rule = format!("{why}; give a larger spread, or another format (f32)");
-            Error::from(BadValue::new("spread", options.spread, rule))
+            Error::from(BadValue::new("spread", spread, rule))
         };
         if inputs > MOST_INPUTS {
             return Err(Error::unfit(format!(
                 "{inputs} inputs a row: the format fixed16 holds at most {MOST_INPUTS}; give another format (f32)"
             )));
         }
-        let exponent_per_step = LOG2_E / (2.0 * options.spread.powi(2)) * STEP * STEP;
+        let exponent_per_step = LOG2_E / (2.0 * spread.powi(2)) * STEP * STEP;
         let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
         let decay = (exponent_per_step * 2_f64.powi(bits.cast_signed())).round();
         if decay < 1.0 {
             let rule = "the format fixed16 does not hold so wide a Gaussian; give a smaller spread, or another format \
                         (f32)";
-            return Err(BadValue::new("spread", options.spread, rule).into());
+            return Err(BadValue::new("spread", spread, rule).into());
         }
         if decay > f64::from(u32::MAX) {
             return Err(refused("the format fixed16 does not hold so narrow a Gaussian".into()));
