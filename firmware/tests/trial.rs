@@ -120,22 +120,6 @@ fn on_trial_nothing_overwrites_the_previous_model() {
 }
 
 #[test]
-fn a_model_that_decays_on_trial_is_left() {
-    let (old, new) = (blob(1, 3), blob(2, 5));
-    for words in [0, 512] {
-        let (mut slots, mut bench) = on_trial(&old, &new);
-        slots[1].decay(20, 4);
-        let mut weights = vec![0; words];
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-        let found = model(&mut session, &bench.board).unwrap();
-        assert_eq!((found.crc_32, found.on_trial), (crc_of(&old), false));
-        let _ = session;
-        let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
-        assert_eq!(refused, Err(Refusal::NoUpload));
-    }
-}
-
-#[test]
 fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let (mut slots, mut bench) = on_trial(&old, &new);

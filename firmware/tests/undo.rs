@@ -71,13 +71,3 @@ fn undos_wear_flash_and_are_limited_between_restarts() {
         in_force.reverse();
     }
 }
-
-#[test]
-fn a_model_that_decayed_does_not_come_back() {
-    let (old, new) = (blob(1, 3), blob(2, 5));
-    let mut device = device(&old, &[&new]);
-    assert!(device.undo(crc_of(&new)).is_ok());
-    device.slots[1].decay(20, 4);
-    assert_eq!(device.undo(crc_of(&old)), Err(Refusal::NothingToUndo));
-    assert_eq!(device.restart(), Some(crc_of(&old)));
-}

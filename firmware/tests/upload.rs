@@ -43,20 +43,6 @@ fn a_good_model_comes_into_force_and_stays_through_restarts() {
 }
 
 #[test]
-fn a_device_without_a_model_takes_one() {
-    let mut device = Device::new(Flash::slots());
-    let new = blob(4, 3);
-    device.session(|session, board| {
-        assert_eq!(model_crc(session, board), None);
-        let (_, end) = upload(session, board, &trial_steps(&new));
-        assert_eq!(end, Some(SessionEnd::NewModel));
-    });
-    assert_eq!(device.restart(), None, "it was on trial");
-    assert_eq!(device.install(&new), confirmed(&new));
-    assert_eq!(device.restart(), Some(crc_of(&new)));
-}
-
-#[test]
 fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor_is_silent() {
     let mut slots = Flash::slots();
     let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
@@ -75,20 +61,6 @@ fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor
         let (outcome, _) = upload(&mut session, &board, &[begin(blob)]);
         assert_eq!((outcome.is_ok(), feeds() - fed), (more == 3, more));
     }
-}
-
-#[test]
-fn the_watchdog_is_fed_after_an_erase_that_fails_too() {
-    let mut slots = Flash::slots();
-    slots[0].cut_power_after(0);
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let board = bench.board.clone();
-    let before = board.pins.borrow().feeds;
-    *bench.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
-    assert_eq!(upload(&mut session, &board, &[begin(&blob(4, 3))]).0, Err(Refusal::Flash));
-    let feeds = board.pins.borrow().feeds - before;
-    assert_eq!(feeds, 4, "before and after the journal and the erase, and in the turn");
 }
 
 #[test]

@@ -123,15 +123,6 @@ fn without_a_confidence_nothing_is_sent() {
 }
 
 #[test]
-fn without_a_model_nothing_is_sent() {
-    let mut slots = Flash::slots();
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(decode(&mut session, &board, &frame_at_rest()).0, Sent::NOTHING);
-}
-
-#[test]
 fn of_a_scan_comes_what_the_configuration_says() {
     let blob = blob_with_confidence(false);
     let mut slots = Flash::slots_with(&blob);

@@ -2,7 +2,7 @@
 
 use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{
-    Configuration, ConfigurationField, Refusal, Report, Request, Setting,
+    Configuration, ConfigurationField as Field, Refusal, Report, Request, Setting,
 };
 
 use crate::mock::*;
@@ -22,9 +22,14 @@ fn configurations_are_checked_and_a_bad_one_changes_nothing() {
     };
     let good = Configuration { frame_period_us: 20_000, send_readings: true, ..quiet() };
     assert_eq!(outcome(good), Ok(good));
-    let bad = Configuration { frame_period_us: 1, ..good };
-    let refusal = Refusal::Configuration(ConfigurationField::FramePeriod);
-    assert_eq!(outcome(bad), Err(refusal));
+    for (bad, field) in [
+        (Configuration { frame_period_us: 1, ..good }, Field::FramePeriod),
+        (Configuration { filter_time_constant_us: u32::MAX, ..good }, Field::FilterTimeConstant),
+        (Configuration { filter_lead_us: 1_000_001, ..good }, Field::FilterLead),
+        (Configuration { report_every: 0, ..good }, Field::ReportEvery),
+    ] {
+        assert_eq!(outcome(bad), Err(Refusal::Configuration(field)));
+    }
     assert_eq!(in_force(&mut session, &bench.board), good);
 }
 

@@ -10,18 +10,6 @@ use super::requests::{bits, capture, decode, expected};
 use crate::mock::*;
 
 #[test]
-fn readings_from_the_host_are_decoded_as_model_core_does() {
-    let blob = blob(3, 4);
-    let mut slots = Flash::slots_with(&blob);
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let frame = frame_at_rest();
-    let (flags, status, found) = decode(&mut session, &bench.board, &frame);
-    assert_eq!((flags, &status[..]), (0, &[0, 0][..]));
-    assert_eq!(found, bits(expected(&blob, &frame).into_iter().flatten()));
-}
-
-#[test]
 fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
     let blob = blob(3, 4);
     let mut slots = Flash::slots_with(&blob);

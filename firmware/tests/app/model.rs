@@ -151,31 +151,6 @@ fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
 }
 
 #[test]
-fn a_model_of_other_rows_does_not_take_the_baseline_of_the_rows_before() {
-    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
-    let [first, second] = ["r1c1_ohm\nr1c2_ohm", "r2c1_ohm\nr2c2_ohm"].map(|names| {
-        blob_of_a_row(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
-    });
-    for (next, contact) in [(&first, EstimateReport::CONTACT), (&second, 0)] {
-        let mut slots = Flash::slots_with(&first);
-        let mut bench = Bench::new(quiet());
-        let board = bench.board.clone();
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let baseline = Request::SetBaseline { readings_ohm: Floats::new(&[60.0; 2]) };
-        ask(&mut session, &board, &baseline, |_| ());
-        let _ = session;
-        upload(&mut bench, &mut slots, &mut [], &upload_steps(next, 64)).unwrap();
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let request =
-            Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats::new(&[30.0; 2]) };
-        ask(&mut session, &board, &request, |report| match report {
-            Report::Estimate(it) => assert_eq!(it.flags & EstimateReport::CONTACT, contact),
-            other => panic!("{other:?}"),
-        });
-    }
-}
-
-#[test]
 fn a_model_without_room_is_not_put_in_force() {
     for (inputs, outputs) in [(4, 1), (7, 1), (3, 5)] {
         let mut slots = Flash::slots_with(&blob_of_one_row(inputs, outputs));

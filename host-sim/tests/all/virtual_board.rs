@@ -158,7 +158,8 @@ impl State {
 impl Register {
     fn set(&mut self, pin: usize, high: bool) {
         let [data, ..] = self.levels;
-        let rises = high && !std::mem::replace(&mut self.levels[pin], high);
+        let was_high = std::mem::replace(&mut self.levels[pin], high);
+        let rises = high && !was_high;
         match pin {
             1 if rises => {
                 self.stages.rotate_right(1);
