@@ -34,7 +34,7 @@ const HEAD: &str = "compiler,model,scope,instructions,predicted";
 const FILTER: &str = "filter";
 
 /// Most per cent by which a prediction may be off.
-const PREDICTED_PERCENT: f64 = 10.0;
+const PREDICTED_PERCENT: u64 = 10;
 /// Most per cent by which instructions may exceed those accepted for another compiler, which makes other code. Fewer are
 /// no fault.
 const OTHER_COMPILER_PERCENT: u64 = 5;
@@ -98,7 +98,7 @@ fn measure(model: &Model, image: &Image, files: &Files) -> Outcome<Vec<Figure>> 
 /// What is wrong with a figure's prediction.
 fn off(Figure { model, scope, instructions, predicted }: &Figure) -> Option<String> {
     let percent = 100.0 * (*predicted as f64 / *instructions as f64 - 1.0);
-    (percent.abs() > PREDICTED_PERCENT).then(|| {
+    (predicted.abs_diff(*instructions) * 100 > PREDICTED_PERCENT * instructions).then(|| {
         format!(
             "{model}, {scope}: {instructions} instructions, and {predicted} predicted ({percent:+.1} %): change the \
              constants in host-sim/learn/src/cost.rs"
