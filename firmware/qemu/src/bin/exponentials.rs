@@ -80,7 +80,10 @@ fn compare<E: Exponential>(name: &str, network: float32::Network<'_>, clock: &mu
     let centres = network.shape().centres as u64;
     let each = (instructions::<E>(network, clock) - besides + centres / 2) / centres;
     let billionths = error::<E>();
-    info!("{=str}: {=u64} instructions, error up to {=u32} billionths", name, each, billionths);
+    info!(
+        "{=str}: about {=u64} instructions, error up to {=u32} billionths",
+        name, each, billionths
+    );
 }
 
 #[entry]
