@@ -120,7 +120,7 @@ impl Verdict {
     }
 
     /// Adds what a blob, trained on so many `frames`, gives reason to beware of: too few frames, centres that the format
-    /// pads, a size beyond a slot.
+    /// pads where there are frames for more, a size beyond a slot.
     #[must_use]
     pub fn of_blob(self, blob: &ModelBlob, frames: usize) -> Self {
         let model = blob.parse();
@@ -129,6 +129,7 @@ impl Verdict {
         };
         let (used, inputs) = (of_networks(|it| it.centres), of_networks(|it| it.inputs));
         let stored = model.networks().map(|network| stored_centres(network.format(), used)).max();
+        let stored = stored.filter(|k| Warning::few_frames(frames, *k, inputs).is_none());
         self.with(Warning::other_image(&model))
             .with(Warning::few_frames(frames, used, inputs))
             .with(Warning::padded_centres(used, stored.unwrap_or(used)))

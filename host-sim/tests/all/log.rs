@@ -141,7 +141,7 @@ fn folds_of_a_log_are_blocks_and_those_of_shuffled_lines_are_not() {
     lines.clear();
     folder.write("shuffled.csv", shuffled.join("\n") + "\n");
     let train = |name: &str, more: &[&str]| -> Vec<u8> {
-        let columns = ["--inputs", "ch*", "--outputs", "f_n", "--centres", "4", "-o", "m.bin"];
+        let columns = ["--inputs", "ch*", "--outputs", "f_n", "--centres", "16", "-o", "m.bin"];
         folder.succeed(&[&["train", name], &columns[..], more].concat());
         std::fs::read(folder.path("m.bin")).unwrap()
     };
@@ -157,7 +157,7 @@ fn folds_of_a_log_are_blocks_and_those_of_shuffled_lines_are_not() {
         "--outputs",
         "f_n",
         "--centres",
-        "4",
+        "16",
         "--folds",
         "5",
         "--json",

@@ -181,7 +181,7 @@ fn the_files_and_the_table_tell_every_point() {
         classes.filter(|class| class.ends_with(" mark")).map(str::to_owned).collect()
     };
     let mut in_plot = marks(plot);
-    assert!(in_plot.len() > 3 && plot.contains("<g class=\"dominated\">"), "{in_plot:?}");
+    assert!(in_plot.len() > 2 && plot.contains("<g class=\"dominated\">"), "{in_plot:?}");
     in_plot.insert("muted dominated mark".into());
     assert_eq!(marks(legend), in_plot);
     let cells = html.split("data-name=\"").skip(1);
@@ -250,7 +250,7 @@ fn scenes_of_any_shape_are_traded_and_what_a_format_cannot_hold_is_named() {
         worst_case: false,
     };
     let one_row = compute_plan(&scene, &plan, Bounds::default()).unwrap();
-    assert!(one_row.points.len() >= 4 && one_row.left_out.is_empty());
+    assert!(one_row.points.len() == 2 && one_row.left_out.is_empty());
     assert!(one_row.points.iter().all(|point| point.each_row && point.centres == 20));
 
     // One network for the array has half of the spread, which 16 bits cannot hold.

@@ -14,7 +14,7 @@ fn a_csv_file_trains_decodes_and_evaluates() {
     folder.write("scene.toml", small_scene());
     folder.succeed(&["synth", "scene.toml", "-n", "1500", "-o", "train.csv"]);
     folder.succeed(&["synth", "scene.toml", "-n", "500", "--seed", "2", "-o", "test.csv"]);
-    folder.succeed(&["train", "train.csv", "--centres", "12", "-o", "m.bin"]);
+    folder.succeed(&["train", "train.csv", "--each-row", "--centres", "12", "-o", "m.bin"]);
     folder.succeed(&["decode", "m.bin", "test.csv", "-o", "estimate.csv"]);
 
     let estimate = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();
@@ -22,7 +22,7 @@ fn a_csv_file_trains_decodes_and_evaluates() {
     assert!(estimate.starts_with("r4e1_dx_mm,r4e1_dy_mm,r4e1_dz_mm,r4e2_dx_mm,"));
 
     let inspected = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
-    assert_eq!(inspected["rows"], 2); // the names tell the row-wires: a network each
+    assert_eq!(inspected["rows"], 2); // the names tell the row-wires
     assert_eq!(inspected["networks"][1]["centres"], 12);
     assert_eq!(inspected["outputs"][0]["unit"], "mm");
 
@@ -179,6 +179,7 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
             &[
                 "train",
                 "d.2",
+                "--each-row",
                 "--select",
                 "--no-refine",
                 "--centres",
