@@ -144,7 +144,7 @@ fn the_files_and_the_table_tell_every_point() {
         let points =
             page.lines().filter(|line| line.contains(" fixed16 ") || line.contains(" f32"));
         let points = points.filter(|line| line.starts_with(['*', ' ']));
-        let times = points.map(|line| line.split_whitespace().rev().nth(6).unwrap());
+        let times = points.map(|line| line.split_whitespace().rev().nth(5).unwrap());
         times.map(|ms| ms.parse().unwrap()).collect()
     };
     let front = folder.succeed(&few);
