@@ -268,10 +268,11 @@ fn every_command_has_help_with_an_example() {
 #[test]
 fn table1_shows_the_papers_cells_beside_its_own() {
     let folder = Folder::new("printed");
-    let few = "frames = 60\ntest_frames = 50\ncentres = 6\nstandard_frames = 20\n";
+    // The limit of electrodes that move by themselves is slow: few frames.
+    let few = "frames = 60\ntest_frames = 3\ncentres = 6\nstandard_frames = 20\n";
     let scene = include_str!("../../../scenes/paper.toml");
     let (before, _) = scene.split_once("frames = 6000").unwrap();
-    let table = before.replace("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]") + few;
+    let table = before.replace("[outputs]", "[readout]\nrow_wires = [4]\n\n[outputs]") + few;
     folder.write("paper.toml", &table);
     folder.write("other.toml", table.replace("0.05, 0.1]", "0.06, 0.1]"));
     folder.write("wider.toml", table.replace("[20.0, 18.0, 5.0]", "[21.0, 18.0, 5.0]"));
