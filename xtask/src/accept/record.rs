@@ -21,7 +21,7 @@ pub struct Decoding {
     pub frames: usize,
     /// Frames whose every output has the bits of the host's; all are predicted.
     pub bit_identical: Beside<usize>,
-    /// Cycles of the fastest frame, its readings checked and its contact told; predicted is decoding alone, from flash.
+    /// Cycles of the fastest frame, its readings checked and its contact told; predicted is decoding alone, from memory that never waits.
     pub cycles: Beside<u64>,
     /// What the stack has taken at most since the start with this model.
     pub stack_bytes: u32,
