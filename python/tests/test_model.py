@@ -127,7 +127,7 @@ def test_groups_are_held_out_and_relative_inputs_take_a_baseline():
     assert taxel.Model(8, confidence=True, refine=False).fit(x, y, groups=groups).blob_.has_confidence
     rest = np.array([50.0, 52.0, 47.0])
     y[:60], x[:60] = 0, rest + RANDOM.normal(0, 0.02, (60, 3))
-    model = taxel.Model(8, refine=False, relative_inputs=True)
+    model = taxel.Model(8, refine=False, relative_inputs=True, format="f32")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         model.fit(x, y)

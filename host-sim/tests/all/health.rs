@@ -1,19 +1,28 @@
 //! Faulty readings in data files: judged as by a device, noted, flagged and filled.
 
+use std::sync::OnceLock;
+
 use serde_json::Value;
 
 use crate::common::Folder;
 
-/// Folder with a model of the whole array that fills missing readings, one that does not, and frames.
+/// Folder with a model of the whole array that fills missing readings, one that does not, and frames; made once for all tests.
 fn prepared(name: &str) -> Folder {
+    const FILES: [&str; 3] = ["fills.bin", "plain.bin", "sound.csv"];
+    static MADE: OnceLock<[Vec<u8>; 3]> = OnceLock::new();
+    let made = MADE.get_or_init(|| {
+        let folder = Folder::new("health-made");
+        let train = |file: &'static str, fill: &[&'static str]| {
+            let train = ["train", "press", "-n", "1500", "--centres", "16", "--no-refine"];
+            folder.succeed(&[&train[..], &["-o", file], fill].concat());
+        };
+        train("fills.bin", &["--fill"]);
+        train("plain.bin", &[]);
+        folder.succeed(&["synth", "press", "-n", "200", "--seed", "5", "-o", "sound.csv"]);
+        FILES.map(|file| std::fs::read(folder.path(file)).unwrap())
+    });
     let folder = Folder::new(name);
-    let train = |file: &'static str, fill: &[&'static str]| {
-        let train = ["train", "press", "-n", "1500", "--centres", "16", "--no-refine"];
-        folder.succeed(&[&train[..], &["-o", file], fill].concat());
-    };
-    train("fills.bin", &["--fill"]);
-    train("plain.bin", &[]);
-    folder.succeed(&["synth", "press", "-n", "200", "--seed", "5", "-o", "sound.csv"]);
+    FILES.iter().zip(made).for_each(|(file, bytes)| drop(folder.write(file, bytes)));
     folder
 }
 
