@@ -86,7 +86,7 @@ impl Scene {
 
     #[getter]
     fn output_names(&self) -> Vec<String> {
-        self.experiment.output_names()
+        self.experiment.world.output_names()
     }
 
     /// Frames of the scene's still contacts.

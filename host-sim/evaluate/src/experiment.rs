@@ -14,7 +14,7 @@ use taxel_data::{BadValue, Dataset, Progress, Stream, input, require};
 use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
 use taxel_learn::train::{FreshFrames, Solver, check_spread};
 use taxel_learn::{Options, Origin, relative};
-use taxel_limit::{Reference, Refusal};
+use taxel_limit::Reference;
 use taxel_simulate::noise::{Noise, NoiseKind};
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::synth::BASELINE_FRAMES;
@@ -24,12 +24,9 @@ use taxel_simulate::{Synthesis, World};
 use crate::error::{Error, Result};
 use crate::metrics::{LimitSummary, Measure};
 
-mod direction;
 mod others;
 mod file;
 
-pub use direction::Direction;
-use direction::noise_ohm;
 pub use others::OtherContact;
 
 type Check = std::result::Result<(), BadValue>;
@@ -87,9 +84,6 @@ pub struct Training {
     /// Number format of the weights; `None` for fixed16, or f32 where that does not hold the model.
     #[serde(default, deserialize_with = "file::format::deserialize")]
     pub format: Option<Format>,
-    /// Whether the model decodes readings, or predicts them.
-    #[serde(default)]
-    pub direction: Direction,
     /// Whether each row has a network of its own, instead of one network for all rows behind a projection of all readings.
     #[serde(default)]
     pub each_row: bool,
@@ -296,7 +290,7 @@ impl Experiment {
             noise: (kind, noise.total_level()),
             seed: self.world.seed,
             thickness_mm: Some(self.world.sensor.size_mm[2]),
-            full_scale: self.full_scales(),
+            full_scale: self.world.full_scales(),
             linear_rmse: vec![],
         }
     }
@@ -304,7 +298,7 @@ impl Experiment {
     /// Measure for errors of the scene's outputs.
     pub fn measure(&self) -> Measure {
         Measure {
-            full_scale: self.full_scales(),
+            full_scale: self.world.full_scales(),
             thickness_mm: Some(self.world.sensor.size_mm[2]),
             limit: None,
         }
@@ -322,10 +316,6 @@ impl Experiment {
     ) -> (Measure, LimitSummary) {
         let mut world = self.world.clone();
         world.noise = noise;
-        if self.is_forward() {
-            let noise_ohm = noise_ohm(&world, test_frames);
-            return (self.measure(), LimitSummary::new(&Err(Refusal::OwnNoise { noise_ohm })));
-        }
         let frames = Reference::few_frames(&world).min(test_frames);
         let limit = Reference::new(&world, frames, progress);
         let summary = LimitSummary::new(&limit);
@@ -334,8 +324,7 @@ impl Experiment {
 
     /// Data set of so many `frames` of `stream`, for training and for decoders that see what it saw.
     ///
-    /// Its inputs are deformations and its outputs readings if the scene's models predict readings. Otherwise its
-    /// inputs are readings. These may be relative to the baseline of each session: the mean of [`BASELINE_FRAMES`]
+    /// Its inputs are readings, which may be relative to the baseline of each session: the mean of [`BASELINE_FRAMES`]
     /// frames of the untouched sensor. `synthesis` is one of the experiment's world.
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
         self.dataset_from(synthesis, stream, 0, frames)
@@ -349,10 +338,7 @@ impl Experiment {
         first: usize,
         frames: usize,
     ) -> Dataset {
-        let mut readings = synthesis.frames_from(stream, first, frames);
-        if self.is_forward() {
-            std::mem::swap(&mut readings.inputs, &mut readings.outputs);
-        }
+        let readings = synthesis.frames_from(stream, first, frames);
         if !self.training.relative_inputs {
             return readings;
         }
@@ -375,7 +361,6 @@ impl Experiment {
         let noise_kind = self.world.noise.kind;
         self.table1.as_ref().map_or(Ok(()), |table| check_table1(table, noise_kind))?;
         self.check_outputs()?;
-        self.check_direction()?;
         let Some(t) = &self.table1 else { return Ok(()) };
         self.world.check_frames("table1.frames", t.frames)?;
         self.world.check_frames("table1.test_frames", t.test_frames)

@@ -48,7 +48,7 @@ pub type OtherFrames = Vec<(String, Dataset)>;
 /// Frames of all other contacts of a subject, with this noise or that of the scene. Measurements, and scenes whose
 /// models predict readings, have none.
 pub fn frames(subject: &Subject, noise: Option<Noise>) -> OtherFrames {
-    let Some(scene) = subject.scene().filter(|scene| !scene.is_forward()) else { return vec![] };
+    let Some(scene) = subject.scene() else { return vec![] };
     let synthesis = Subject::synthesis(scene, noise);
     let of = |other: &OtherContact| {
         let moved = synthesis.clone().moved_by(&other.deformation);

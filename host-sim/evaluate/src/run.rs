@@ -184,7 +184,7 @@ pub fn run(
         .of_blob(&blob, training.frames.frames())
         .of_frames(subject.measurements().map(|data| &data.outliers), test.frames())
         .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)))
-        .with(decoding(subject).and_then(|_| Warning::not_positive(&test.inputs)))
+        .with(subject.scene().and_then(|_| Warning::not_positive(&test.inputs)))
         .with(others.as_ref().and_then(|it| it.warning(&decoders)));
     let mut over_time = None;
     if let Subject::Measured(data) = subject {
@@ -260,16 +260,10 @@ fn of_log(
     }
 }
 
-/// Scene whose models decode readings, if it is one.
-fn decoding(subject: &Subject) -> Option<&Experiment> {
-    subject.scene().filter(|scene| !scene.is_forward())
-}
-
 /// Inputs of the untouched sensor, as far as they are known and not zero. A scene gives them without noise and drift;
 /// measurements give the mean of their frames at rest.
 fn readings_at_rest(subject: &Subject) -> Option<Vec<f64>> {
     match subject {
-        Subject::Scene(scene) if scene.is_forward() => None,
         Subject::Scene(scene) => {
             let at_rest = Synthesis::new(&scene.world).ideal().drift(None).untouched();
             Some(at_rest.readings_of(Stream::Test, 0))
@@ -300,7 +294,7 @@ fn scene_summary(scene: &Experiment, shown: &Distribution) -> SceneSummary {
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,
         sensor: SensorSketch::new(world),
-        ideal_changes: if scene.is_forward() { vec![] } else { ideal_changes(world, shown) },
+        ideal_changes: ideal_changes(world, shown),
     }
 }
 

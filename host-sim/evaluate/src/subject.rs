@@ -10,7 +10,6 @@ use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::path::Path;
 
-use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
 use crate::metrics::{LimitSummary, Measure};
@@ -69,11 +68,6 @@ impl Subject {
         }
     }
 
-    /// Refuses a scene whose models predict readings, for a `command` that is about decoding.
-    pub fn require_inverse(&self, command: &str) -> Result<()> {
-        self.scene().map_or(Ok(()), |scene| scene.require_inverse(command))
-    }
-
     /// Options for training its model.
     pub fn options(&self) -> Options {
         match self {
@@ -101,7 +95,7 @@ impl Subject {
     /// Names of the outputs, in the model's order.
     pub fn output_names(&self) -> Vec<String> {
         match self {
-            Self::Scene(scene) => scene.output_names(),
+            Self::Scene(scene) => scene.world.output_names(),
             Self::Measured(data) => data.training.outputs.names.clone(),
         }
     }

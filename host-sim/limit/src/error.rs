@@ -53,14 +53,6 @@ pub enum Refusal {
         /// Difference of the mean squares, in standard errors.
         standard_errors: f64,
     },
-    /// Readings that are predicted from deformations: nobody can predict their noise.
-    #[error(
-        "readings are predicted, and the least possible error is their own noise: {noise_ohm:.3} Ω RMS"
-    )]
-    OwnNoise {
-        /// Root mean square of the noise in Ω.
-        noise_ohm: f64,
-    },
     /// Measured data, of which neither the sensor nor the prior is known.
     #[error("the sensor and the prior of measured data are not known")]
     Measured,

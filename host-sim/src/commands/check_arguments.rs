@@ -132,7 +132,6 @@ impl CheckArguments {
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
         let scene = SceneArgument::new(&self.source).load_world(common)?;
-        scene.require_inverse("a check of a device")?;
         self.untouched.refuse("a scene makes its own baseline")?;
         scene.world.check_frames("-n", self.frames)?;
         let model = match &self.model {

@@ -171,8 +171,8 @@ pub fn model(
     let blob = ModelBlob::read(path)?;
     let model = blob.parse();
     let metadata = model.metadata();
-    let fits = metadata.input_names.iter().eq(scene.input_names())
-        && metadata.output_names.iter().eq(scene.output_names());
+    let fits = metadata.input_names.iter().eq(scene.world.reading_names())
+        && metadata.output_names.iter().eq(scene.world.output_names());
     if fits {
         if metadata.name != scene.name {
             stderr::remark(format_args!(

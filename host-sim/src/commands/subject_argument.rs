@@ -106,7 +106,6 @@ impl SubjectOptions {
             self.noise.apply(&mut scene)?;
             scene.training.refine = self.refine.over(scene.training.refine);
             scene.training.confidence |= confidence;
-            scene.check_direction()?;
             return Ok(Subject::Scene(Box::new(scene)));
         }
         if self.noise.is_given() {

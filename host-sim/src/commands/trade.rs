@@ -104,7 +104,6 @@ pub struct Arguments {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.subject.refuse_time("trade")?;
     let mut subject = arguments.subject.load(common)?;
-    subject.require_inverse("trade")?;
     if let Some(motion) = arguments.motion {
         motion.apply(&mut subject)?;
     }

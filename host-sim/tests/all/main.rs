@@ -9,7 +9,6 @@ mod accuracy;
 mod contact;
 mod data_files;
 mod device;
-mod directions;
 mod drift;
 mod export;
 mod frozen;

@@ -55,7 +55,7 @@ impl MovingContacts {
         blob: &ModelBlob,
         baselines: &[Box<dyn Decoder>],
     ) -> Result<Option<Self>> {
-        let Some(path) = scene.world.path.filter(|_| !scene.is_forward()) else { return Ok(None) };
+        let Some(path) = scene.world.path else { return Ok(None) };
         let judged =
             Judged::new(scene, Synthesis::new(&scene.world), path, blob, Device::default(), 1)?;
         let scan_ms = judged.touched.ways[0].times.scan_ms;
@@ -116,7 +116,7 @@ impl<'s> Judged<'s> {
         let model = blob.prepare().of_inputs();
         let cost = Cost::of_frame(&Design::new(blob));
         let scan_ms = device.scan_ms(Some(Wires::of(&scene.world)), samples);
-        let names = scene.output_names();
+        let names = scene.world.output_names();
         let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();
         let touches = Touches::new(scene, synthesis, (path, device.passes(samples)), &group);
         let device = (&device, scan_ms);

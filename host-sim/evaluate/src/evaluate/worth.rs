@@ -77,12 +77,7 @@ impl Worth {
         let verdict = Verdict::new(&decoders, &no_limit)
             .of_blob(blob, set.frames.frames())
             .of_frames(subject.measurements().map(|data| &data.outliers), set.frames.frames())
-            .with(
-                subject
-                    .scene()
-                    .filter(|scene| !scene.is_forward())
-                    .and_then(|_| Warning::not_positive(&set.frames.inputs)),
-            );
+            .with(subject.scene().and_then(|_| Warning::not_positive(&set.frames.inputs)));
         let verdict = match subject {
             Subject::Measured(data) => {
                 let at_rest = (!data.training.relative_inputs)

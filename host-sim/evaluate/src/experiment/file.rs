@@ -13,7 +13,7 @@ use taxel_simulate::sensor::{self, Sensor, Vector3};
 use taxel_simulate::world::check_counts;
 
 use super::others::{self, OtherContact};
-use super::{Direction, Experiment, Method, Table1, Training};
+use super::{Experiment, Method, Table1, Training};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -178,15 +178,12 @@ impl SceneFile {
         };
         // Settings that hold are needed to derive others; a scene is checked first.
         world.check()?;
-        let is_forward = self.training.direction == Direction::Forward;
         let others = match self.others {
-            Some(given) => others::check(&given, &world, is_forward).map(|()| given)?,
-            None if is_forward => vec![],
+            Some(given) => others::check(&given, &world).map(|()| given)?,
             None => others::derived(&world),
         };
         let (mut training, table1) = (self.training, self.table1);
-        // What a row's readings follow from is its own deformations.
-        training.each_row |= is_forward || training.method == Method::Paper;
+        training.each_row |= training.method == Method::Paper;
         training.refine &= training.method != Method::Paper;
         Ok(Experiment { name: self.name, digest, world, training, table1, others })
     }

@@ -74,11 +74,7 @@ impl OtherContact {
 }
 
 /// Checks the other contacts that a scene of this `world` gives.
-pub(super) fn check(
-    others: &[OtherContact],
-    world: &World,
-    is_forward: bool,
-) -> Result<(), BadValue> {
+pub(super) fn check(others: &[OtherContact], world: &World) -> Result<(), BadValue> {
     let count = others.len();
     require(count <= MOST, "others", format!("{count} contacts"), || {
         format!("give at most {MOST}")
@@ -86,10 +82,6 @@ pub(super) fn check(
     let has_contact = others.is_empty() || world.motion.as_press().is_some();
     require(has_contact, "others", "[[others]]", || {
         "electrodes that move on their own have no contact that others could differ from; leave it out".into()
-    })?;
-    require(others.is_empty() || !is_forward, "others", "[[others]]", || {
-        "they are for models that decode; leave it out, or set training.direction = \"inverse\""
-            .into()
     })?;
     for (number, other) in (1..).zip(others) {
         let field = |name: &str| format!("others ({number}).{name}");

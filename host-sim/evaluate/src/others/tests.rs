@@ -119,7 +119,7 @@ fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
 }
 
 #[test]
-fn scenes_without_a_contact_and_forward_models_have_no_others() {
+fn scenes_without_a_contact_have_no_others() {
     let subject = |scene: Experiment| Subject::Scene(scene.into());
     assert!(frames(&subject(Experiment::load("paper").unwrap()), None).is_empty());
     let contact = Experiment::load("contact").unwrap();

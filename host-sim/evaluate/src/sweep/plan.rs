@@ -278,7 +278,7 @@ impl Plan {
         };
         let document = self.document_at(&vec![0; self.axes.len()]).ok()?;
         let scene = parse(&document.scene).or_else(|| self.bases.iter().find_map(of_base))?;
-        Some(scene.output_names())
+        Some(scene.world.output_names())
     }
 
     /// Checks objectives and bounds, and chooses objectives where none are given.

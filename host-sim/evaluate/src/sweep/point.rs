@@ -147,7 +147,7 @@ pub fn compute(plan: &Plan, point: &Point, shared: &mut Shared) -> Result<Result
         results.add("area_cm2", Some(x_mm * y_mm / 100.0));
         world.noise = point.device.averaged(world.noise, wires, point.samples);
         let frames = plan.limit_frames.unwrap_or_else(|| Reference::few_frames(world));
-        if frames > 0 && !scene.is_forward() {
+        if frames > 0 {
             match shared.limit(&scene.world, frames) {
                 Ok(found) => limit = Some(found),
                 Err(refusal) => results.notes.push(format!("no limit: {refusal}")),
