@@ -48,7 +48,7 @@ fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
     let (mut slots, mut bench) = on_trial(&old, &new);
     let confirm = [UploadStep::Try { trial_ms: 60_000 }, UploadStep::Confirm, UploadStep::Confirm];
     let state = upload(&mut bench, &mut slots, &mut [], &confirm);
-    assert_eq!(state, confirmed(&new));
+    assert_eq!(state, Ok(confirmed(&new)));
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let found = model(&mut session, &bench.board).unwrap();
     assert_eq!((found.crc_32, found.generation, found.on_trial), (crc_of(&new), 1, false));
@@ -68,7 +68,7 @@ fn a_confirmation_that_cannot_be_written_down_ends_the_trial() {
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
     let _ = session;
     assert_eq!(after_restart(&slots, &mut bench).unwrap().crc_32, crc_of(&old));
-    assert_eq!(install(&mut bench, &mut slots, &mut [], (&new, CHUNK)), confirmed(&new));
+    assert_eq!(install(&mut bench, &mut slots, &mut [], (&new, CHUNK)), Ok(confirmed(&new)));
 }
 
 #[test]
@@ -89,13 +89,13 @@ fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(
         undo(&mut session, &board, crc_of(&new)),
-        (confirmed(&old), Some(SessionEnd::NewModel))
+        (Ok(confirmed(&old)), Some(SessionEnd::NewModel))
     );
     let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(
         undo(&mut session, &board, crc_of(&new)),
-        (confirmed(&old), None),
+        (Ok(confirmed(&old)), None),
         "the answer was lost"
     );
     let _ = session;
@@ -116,7 +116,7 @@ fn on_trial_nothing_overwrites_the_previous_model() {
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
     let _ = session;
     let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
-    assert_eq!(state, confirmed(&new));
+    assert_eq!(state, Ok(confirmed(&new)));
 }
 
 #[test]
@@ -147,7 +147,7 @@ fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
     let late = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
     assert_eq!(late, Err(Refusal::TrialOver));
     let state = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
-    assert_eq!(state, confirmed(&new));
+    assert_eq!(state, Ok(confirmed(&new)));
 }
 
 #[test]

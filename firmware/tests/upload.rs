@@ -35,7 +35,7 @@ fn a_good_model_comes_into_force_and_stays_through_restarts() {
     let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
     for generation in 1..=5_u32 {
         let next = blob(1 + generation as usize, 2 + generation as usize);
-        assert_eq!(device.install(&next), confirmed(&next));
+        assert_eq!(device.install(&next), Ok(confirmed(&next)));
         let model = device.model().unwrap();
         assert_eq!((model.crc_32, model.generation), (crc_of(&next), generation));
         assert_eq!(u32::from(model.slot), generation % 2, "in turn");
@@ -189,7 +189,7 @@ fn a_model_of_more_features_than_there_is_room_for_is_refused() {
     let shape = Err(Refusal::BadModel(ModelFault::Shape));
     assert_eq!(device.install(&many), shape);
     assert_eq!(device.restart(), Some(crc_of(&old)));
-    assert_eq!(device.install(&few), confirmed(&few));
+    assert_eq!(device.install(&few), Ok(confirmed(&few)));
     assert_eq!(device.restart(), Some(crc_of(&few)));
 }
 

@@ -35,7 +35,7 @@ pub fn of_table(names: &[&str], values: impl Iterator<Item = f64>) -> u64 {
 "
             )
             .as_bytes(),
-        )
+        );
     });
     let bits = |value: f64| if value.is_nan() { f64::NAN } else { value + 0.0 }.to_bits();
     let mut bytes = values.flat_map(|value| bits(value).to_le_bytes());

@@ -204,7 +204,7 @@ pub fn run(
         seed: training.origin.seed,
         scene: None,
         data: None,
-        model: model_summary(&training, (options, test.frames()), &network, &blob)?,
+        model: model_summary(&training, (options, test.frames()), &network, &blob),
         device_cost: DeviceCost::new(&blob),
         decoders,
         limit,
@@ -303,11 +303,11 @@ fn model_summary(
     (options, test_frames): (&Options, usize),
     prepared: &PreparedModel<'_>,
     blob: &ModelBlob,
-) -> Result<ModelSummary> {
+) -> ModelSummary {
     let model = prepared.model();
     let shape = model.shape();
     let frame_cost = Cost::of_frame(&Design::new(blob));
-    Ok(ModelSummary {
+    ModelSummary {
         training_frames: training.frames.frames(),
         test_frames,
         networks: model.networks().count(),
@@ -321,7 +321,7 @@ fn model_summary(
         blob_bytes: blob.bytes().len(),
         model_crc: format!("{:08x}", model.crc()),
         frame_cost,
-    })
+    }
 }
 
 fn by_row(

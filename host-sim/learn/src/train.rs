@@ -161,7 +161,7 @@ impl Options {
             _ => self.spread,
         };
         let features = self.features.filter(|_| !each_row);
-        Self { each_row, spread, features, ..self }
+        Self { spread, each_row, features, ..self }
     }
 
     /// Whether the network of `dataset` stands behind a projection of all readings. A single row needs more readings than

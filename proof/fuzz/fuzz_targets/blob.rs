@@ -73,7 +73,7 @@ fn decode(blob: &AlignedBytes, model: Model<'_>) {
         (0..FRAMES).flat_map(|number| readings_of(number, readings, &mut draws)).collect();
     let mut on_device = Vec::new();
     for readings_ohm in frames.chunks_exact(readings) {
-        let frame = Frame { readings_ohm, reciprocals: &reciprocals, ..readings_ohm.into() };
+        let frame = Frame { readings_ohm, reciprocals: &reciprocals };
         let mut estimate = decoder.decode(frame).expect("a frame of the model's shape");
         check(&model, readings_ohm, &estimate.borrowed());
         on_device.extend(estimate.outputs.iter().map(|output| f64::from(*output)));

@@ -37,7 +37,7 @@ fuzz_target!(|bytes: &[u8]| {
     if !file.header[0].to_ascii_lowercase().starts_with("sep=") {
         let again = as_plain(path, &file, &read);
         assert_eq!(again.header, file.header);
-        compare(&read, &again.rows().map(|line| line.to_vec()).collect::<Vec<_>>());
+        compare(&read, &again.rows().map(<[f64]>::to_vec).collect::<Vec<_>>());
     }
 });
 

@@ -42,12 +42,11 @@ pub fn count(mut trace: impl BufRead, marks: Marks) -> Outcome<(Vec<u64>, String
         // `Trace 0: 0x7f… [00800408/00000400/00000110/ff000201] main`: the second number is the block's address.
         let starts = line.starts_with(b"Trace ").then(|| line.split(|byte| *byte == b'/').nth(1));
         let starts = starts.flatten().and_then(hexadecimal);
-        if starts.is_some() || line.starts_with(b"IN:") {
-            if let Some((address, instructions)) = listed.take()
-                && blocks.insert(address, instructions).is_some_and(|it| it != instructions)
-            {
-                return Err(format!("the block at {address:#010x} was listed in two ways"));
-            }
+        if (starts.is_some() || line.starts_with(b"IN:"))
+            && let Some((address, instructions)) = listed.take()
+            && blocks.insert(address, instructions).is_some_and(|it| it != instructions)
+        {
+            return Err(format!("the block at {address:#010x} was listed in two ways"));
         }
         if starts.is_some() {
             let Some(address) = std::mem::replace(&mut announced, starts) else { continue };

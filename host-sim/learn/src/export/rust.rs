@@ -65,9 +65,9 @@ fn held<'a>(model: &Model<'a>) -> Result<Vec<float32::Network<'a>>, Unheld> {
     if let Some((_, part)) = parts.into_iter().find(|(present, _)| *present) {
         return Err(part);
     }
-    let in_f32 = |network| match network {
+    let in_f32 = |network: Network<'a>| match network {
         Network::F32(network) => Ok(network),
-        other => Err(Unheld::Format(other.format())),
+        Network::Fixed16(_) => Err(Unheld::Format(network.format())),
     };
     model.networks().map(in_f32).collect()
 }

@@ -70,7 +70,7 @@ impl Dent {
     }
 
     /// Contact from numbers on [0, 1]: one each for the centre's x and y, the quantities of the form, and the depth.
-    fn from_units(&self, mut units: Vec<Lanes>, shear: &[Lanes; 2], sensor: &Sensor) -> Contact {
+    fn of_units(&self, mut units: Vec<Lanes>, shear: &[Lanes; 2], sensor: &Sensor) -> Contact {
         let [x_mm, y_mm, _] = sensor.size_mm;
         let of_form = &self.quantities[..self.profile.quantities().len()];
         let ranges = [&[[0.0, x_mm], [0.0, y_mm]], of_form, &[self.dent_depth_mm]].concat();
@@ -137,7 +137,7 @@ impl Motion for Dent {
     fn largest_contact(&self, sensor: &Sensor) -> Option<Contact> {
         let mut units = vec![[1.0; LANES]; 3 + self.profile.quantities().len()];
         units[..2].fill([0.5; LANES]);
-        Some(self.from_units(units, &[[self.shear_ratio[1]; LANES]; 2], sensor))
+        Some(self.of_units(units, &[[self.shear_ratio[1]; LANES]; 2], sensor))
     }
 
     /// There is a latent each for the centre's x and y, the quantities of the form and the depth, and two for the shear.
@@ -160,7 +160,7 @@ impl Motion for Dent {
                 shear[1][frame] = factor * y;
             }
         });
-        Some(self.from_units(units, &shear, sensor))
+        Some(self.of_units(units, &shear, sensor))
     }
 
     fn draw_contact(&self, sensor: &Sensor, draws: &mut Draws) -> Option<Contact> {
@@ -180,7 +180,7 @@ impl Motion for Dent {
                 shear[1][frame] = ratios[frame] * sine;
             }
         });
-        Some(self.from_units(units, &shear, sensor))
+        Some(self.of_units(units, &shear, sensor))
     }
 }
 

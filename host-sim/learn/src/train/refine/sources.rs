@@ -244,7 +244,7 @@ impl Projected {
             .chunks_exact(n)
             .flat_map(|centre| centre.iter().zip(&lows).map(|(c, low)| (c - low) / span));
         let (centres, spread) = (scaled.collect(), layer.spread / span);
-        let layer = HiddenLayer { centres, spread, ..layer.clone() };
+        let layer = HiddenLayer { centres, spread };
         Ok(Layers { projection: Some(parameters), seen, hidden: vec![layer] })
     }
 }

@@ -28,7 +28,7 @@ fn at(dent: Dent, centre_mm: [f64; 2]) -> Contact {
     let [x, y] = [0, 1].map(|axis| centre_mm[axis] / sensor.size_mm[axis]);
     let mut units = vec![[0.5; LANES]; 3 + dent.profile.quantities().len()];
     units[..2].copy_from_slice(&[[x; LANES], [y; LANES]]);
-    dent.from_units(units, &[[0.3; LANES], [0.1; LANES]], &sensor)
+    dent.of_units(units, &[[0.3; LANES], [0.1; LANES]], &sensor)
 }
 
 /// Compression in mm of a contact at these places on the face.
