@@ -12,7 +12,6 @@ use crate::process::{Outcome, capture, cargo, root};
 const DEVICE: &[&str] =
     &["taxel-core", "taxel-firmware", "board-common", "qemu-image", "nucleo-f446re"];
 const DESK: &[&str] = &[
-    "taxel-scenes",
     "taxel-data",
     "taxel-recording",
     "taxel-simulate",

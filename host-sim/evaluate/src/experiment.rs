@@ -35,7 +35,7 @@ type Check = std::result::Result<(), BadValue>;
 /// extension and a file, which is a mistyped scene.
 pub fn names_a_scene(name_or_path: &str) -> bool {
     let path = Path::new(name_or_path);
-    taxel_scenes::ALL.iter().any(|(name, _)| *name == name_or_path)
+    crate::scenes::ALL.iter().any(|(name, _)| *name == name_or_path)
         || path.extension().map_or(!path.exists(), |end| end.eq_ignore_ascii_case("toml"))
 }
 
@@ -191,11 +191,11 @@ impl Experiment {
     /// # Errors
     /// As [`load`](Self::load), for a file that cannot be read.
     pub fn text(name_or_path: &str) -> Result<Cow<'static, str>> {
-        if let Some((_, text)) = taxel_scenes::ALL.iter().find(|(name, _)| *name == name_or_path) {
+        if let Some((_, text)) = crate::scenes::ALL.iter().find(|(name, _)| *name == name_or_path) {
             return Ok((*text).into());
         }
         if !names_a_scene(name_or_path) {
-            let known = taxel_scenes::ALL.map(|(name, _)| name).join(", ");
+            let known = crate::scenes::ALL.map(|(name, _)| name).join(", ");
             return Err(Error::Usage(format!(
                 "{name_or_path} is a data file by its name, and a scene is wanted here: {known}, or a scene file (.toml). Measured data \
                  tells neither the sensor nor what may happen to it; `train`, `run` and `trade` take it"
@@ -203,7 +203,7 @@ impl Experiment {
         }
         let text = input::read_text(Path::new(name_or_path)).map_err(|error| match error {
             taxel_data::Error::Read { path, cause } => {
-                let names: Vec<_> = taxel_scenes::ALL.iter().map(|(name, _)| *name).collect();
+                let names: Vec<_> = crate::scenes::ALL.iter().map(|(name, _)| *name).collect();
                 let known = names.join(", ");
                 let hint = format!("{cause}; built-in scenes are: {known}");
                 taxel_data::Error::read(&path, std::io::Error::new(cause.kind(), hint))

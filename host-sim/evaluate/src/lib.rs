@@ -7,6 +7,7 @@
 #![doc = include_str!("../README.md")]
 #![allow(missing_docs, clippy::missing_errors_doc)] // a name that says all needs no more
 
+pub mod scenes;
 pub mod error;
 pub mod metrics;
 pub mod by_depth;

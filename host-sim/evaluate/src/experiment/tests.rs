@@ -6,7 +6,7 @@ use super::*;
 
 #[test]
 fn embedded_scenes_are_sound_and_named_as_they_are_called() {
-    for (name, _) in taxel_scenes::ALL {
+    for (name, _) in crate::scenes::ALL {
         let scene = Experiment::load(name).unwrap();
         assert_eq!(scene.name, name);
         assert_eq!(scene.world.read_rows, (0..8).collect::<Vec<_>>());
@@ -30,20 +30,20 @@ fn listed_positions_replace_the_cells() {
         "resistance_ohm_per_mm = 250.0\nstiffness_n_per_mm = [0.5, 0.6, 3.0]\n\
          upper_electrodes_mm = [{upper}]"
     );
-    let text = taxel_scenes::ALL[1].1.replace("resistance_ohm_per_mm = 100.0", &listed);
+    let text = crate::scenes::ALL[1].1.replace("resistance_ohm_per_mm = 100.0", &listed);
     let scene = Experiment::parse("test", &text).unwrap().world;
     assert_eq!(scene.sensor.upper_electrodes_mm[47], [47.5, 1.0, 6.0]);
     assert_eq!(scene.sensor.stiffness_n_per_mm, [0.5, 0.6, 3.0]);
     let default = Experiment::load("press").unwrap().world;
     assert_eq!(scene.sensor.lower_electrodes_mm, default.sensor.lower_electrodes_mm);
     let digest = |text: &str| Experiment::parse("test", text).unwrap().digest;
-    assert_ne!(digest(&text), digest(taxel_scenes::ALL[1].1));
+    assert_ne!(digest(&text), digest(crate::scenes::ALL[1].1));
 }
 
 #[test]
 fn electrodes_that_would_touch_are_refused() {
     let upper = (0..48).map(|i| format!("[{i}.5, 1.0, 0.5]")).collect::<Vec<_>>().join(", ");
-    let text = taxel_scenes::ALL[0].1.replace(
+    let text = crate::scenes::ALL[0].1.replace(
         "resistance_ohm_per_mm = 100.0",
         &format!("resistance_ohm_per_mm = 100.0\nupper_electrodes_mm = [{upper}]"),
     );
@@ -53,7 +53,7 @@ fn electrodes_that_would_touch_are_refused() {
 
 #[test]
 fn forces_have_their_own_full_scale_and_values() {
-    let text = taxel_scenes::ALL[0]
+    let text = crate::scenes::ALL[0]
         .1
         .replace("quantity = \"deformation\"", "quantity = \"force\"")
         .replace("axes = [\"x\", \"y\", \"z\"]", "axes = [\"x\", \"z\"]");
@@ -87,7 +87,7 @@ fn counts_are_checked_before_memory_is_taken_for_them() {
         ("sensor.electrodes_per_column_wire", column, "1001"),
     ] {
         let name = count.split(" = ").next().unwrap();
-        let text = taxel_scenes::ALL[1].1.replace(count, &format!("{name} = {huge}"));
+        let text = crate::scenes::ALL[1].1.replace(count, &format!("{name} = {huge}"));
         let refused = Experiment::parse("test", &text).unwrap_err().to_string();
         assert!(refused.contains(&format!("{field} = {huge}: it must be from 1 to")), "{refused}");
     }
@@ -99,7 +99,7 @@ fn electrodes_and_frames_whose_computing_takes_hours_are_refused() {
     let wires = |electrodes: u32| {
         format!("\ncolumn_wires = 10000\nelectrodes_per_column_wire = {electrodes}")
     };
-    let huge = taxel_scenes::ALL[1].1.replace(of_columns, &wires(1000));
+    let huge = crate::scenes::ALL[1].1.replace(of_columns, &wires(1000));
     let refused = Experiment::parse("test", &huge).unwrap_err().to_string();
     assert!(refused.contains("48 × 10000000 electrodes"), "{refused}");
     let one = huge.replace("\nrow_wires = 8", "\nrow_wires = 1");
@@ -125,7 +125,7 @@ fn a_damaged_scene_is_refused_or_synthesised_to_positive_readings() {
     let mut random = Random::new(1, Stream::Test, Purpose::Damage, 0, 0);
     let mut taken = 0;
     for case in 0..600 {
-        let (_, text) = taxel_scenes::ALL[case % taxel_scenes::ALL.len()];
+        let (_, text) = crate::scenes::ALL[case % crate::scenes::ALL.len()];
         let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
         let [at, from] = [0; 2].map(|_| random.below(lines.len()));
         match random.below(4) {

@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     fn layouts(change: impl Fn(&str) -> String) -> Result<Vec<String>> {
-        let document: Table = toml::from_str(&change(taxel_scenes::ALL[1].1)).unwrap();
+        let document: Table = toml::from_str(&change(crate::scenes::ALL[1].1)).unwrap();
         let layouts = of_document("mat", &document)?;
         for layout in &layouts {
             check(&layout.document).unwrap();

@@ -131,7 +131,7 @@ impl Plan {
             return Err(of_plan(format!("scene {name} is given twice: give it once")));
         }
         let bases = scenes.iter().map(|name| {
-            let built_in = taxel_scenes::ALL.iter().any(|(known, _)| known == name);
+            let built_in = crate::scenes::ALL.iter().any(|(known, _)| known == name);
             let file = if built_in { name.clone() } else { beside(name) };
             Ok(Base { label: name.clone(), document: document(&file)? })
         });
