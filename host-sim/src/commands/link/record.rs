@@ -25,7 +25,6 @@ use super::scan::{
 };
 
 #[derive(Args)]
-#[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub struct RecordArguments {
     /// Weight blob that is active on the device: its estimates are saved. Without it, readings are.
     model: Option<PathBuf>,
