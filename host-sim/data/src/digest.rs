@@ -28,15 +28,9 @@ pub fn of_debug(value: &impl fmt::Debug) -> u64 {
 /// NaN count alike, and so do 0 and −0.
 pub fn of_table(names: &[&str], values: impl Iterator<Item = f64>) -> u64 {
     let mut digest = crc64fast::Digest::new();
-    names.iter().for_each(|name| {
-        digest.write(
-            format!(
-                "{name}
-"
-            )
-            .as_bytes(),
-        );
-    });
+    for name in names {
+        digest.write(format!("{name}\n").as_bytes());
+    }
     let bits = |value: f64| if value.is_nan() { f64::NAN } else { value + 0.0 }.to_bits();
     let mut bytes = values.flat_map(|value| bits(value).to_le_bytes());
     loop {

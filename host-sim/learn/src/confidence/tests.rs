@@ -1,3 +1,5 @@
+use std::sync::OnceLock;
+
 use taxel_core::Decoder;
 use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_simulate::{World, synthesise};
@@ -15,20 +17,23 @@ fn fitted(world: &World, training: &Dataset, blob: &ModelBlob) -> ModelBlob {
 }
 
 /// A model of row 4 with a confidence, and what it was fitted to.
-fn row_4() -> (World, Dataset, ModelBlob, ModelBlob) {
-    let world = World { read_rows: vec![3], ..World::press() };
-    let training = synthesise(&world, Stream::Training, 4000);
-    let options = Options { centres: 16, ..Options::of_rows() };
-    let trained = train(&training, &options, &Silent).unwrap();
-    let blob = pack(&trained, &training, &Origin::of_data("row 4", 0, 1, &training)).unwrap();
-    let with = fitted(&world, &training, &blob);
-    (world, training, blob, with)
+fn row_4() -> &'static (World, Dataset, ModelBlob, ModelBlob) {
+    static FITTED: OnceLock<(World, Dataset, ModelBlob, ModelBlob)> = OnceLock::new();
+    FITTED.get_or_init(|| {
+        let world = World { read_rows: vec![3], ..World::press() };
+        let training = synthesise(&world, Stream::Training, 4000);
+        let options = Options { centres: 16, ..Options::of_rows() };
+        let trained = train(&training, &options, &Silent).unwrap();
+        let blob = pack(&trained, &training, &Origin::of_data("row 4", 0, 1, &training)).unwrap();
+        let with = fitted(&world, &training, &blob);
+        (world, training, blob, with)
+    })
 }
 
 #[test]
 fn intervals_cover_the_errors_of_frames_that_nothing_was_fitted_to() {
     let (world, _, _, blob) = row_4();
-    let test = synthesise(&world, Stream::Test, 4000);
+    let test = synthesise(world, Stream::Test, 4000);
     let model = blob.prepare();
     let decoded = model.decode_table(&test.inputs).values;
     let (deviations, novelty) = model.assess(&test.inputs.values).unwrap();
@@ -55,7 +60,7 @@ fn intervals_cover_the_errors_of_frames_that_nothing_was_fitted_to() {
 #[test]
 fn frames_that_the_sensor_cannot_give_are_novel() {
     let (world, _, _, blob) = row_4();
-    let mut frames = synthesise(&world, Stream::Test, 500).inputs.values;
+    let mut frames = synthesise(world, Stream::Test, 500).inputs.values;
     for frame in frames.chunks_exact_mut(18) {
         // Two neighbouring column-wires are one.
         let both = 1.0 / (1.0 / frame[7] + 1.0 / frame[8]);
@@ -68,10 +73,10 @@ fn frames_that_the_sensor_cannot_give_are_novel() {
 #[test]
 fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
     let (world, training, without, with) = row_4();
-    let test = synthesise(&world, Stream::Test, 50);
+    let test = synthesise(world, Stream::Test, 50);
     let prepared = with.prepare();
     let decoded = |blob: &ModelBlob| blob.prepare().decode_table(&test.inputs).values;
-    assert_eq!(decoded(&with), decoded(&without));
+    assert_eq!(decoded(with), decoded(without));
     let (deviations, novelty) = prepared.assess(&test.inputs.values).unwrap();
     let decoder = Decoder::<1>::load(with.bytes()).unwrap();
     let mut scratch = vec![0.0; decoder.scratch_floats()];
@@ -83,7 +88,7 @@ fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
         assert_eq!(deviation.map(f64::from), deviations[frame * 18..][..18]);
     }
     // Fitting again gives the same bytes.
-    assert_eq!(fitted(&world, &training, &without).bytes(), with.bytes());
+    assert_eq!(fitted(world, training, without).bytes(), with.bytes());
 }
 
 /// A model of measured data without noise on its one output, with a confidence calibrated on the second half of the
@@ -142,14 +147,14 @@ fn a_quantile_of_few_values_covers_its_share() {
 #[test]
 fn deviations_of_an_output_are_those_of_the_frames_that_have_it() {
     let (world, training, blob, _) = row_4();
-    let density = Density::fit(&training, &Settings { components: 8, ..Settings::default() });
-    let calibration = synthesise(&world, Stream::Calibration, 4000);
+    let density = Density::fit(training, &Settings { components: 8, ..Settings::default() });
+    let calibration = synthesise(world, Stream::Calibration, 4000);
     let mut partly = calibration.clone();
     partly.outputs.values.iter_mut().step_by(36).for_each(|value| *value = f64::NAN);
     let deviations = |calibration: &Dataset| {
         let mut held_out = HeldOut::default();
-        held_out.add(&blob, &density, calibration);
-        let with = add(&blob, &density, &held_out).unwrap();
+        held_out.add(blob, &density, calibration);
+        let with = add(blob, &density, &held_out).unwrap();
         with.prepare().assess(&training.inputs.values).unwrap().0
     };
     let (all, partly) = (deviations(&calibration), deviations(&partly));

@@ -1,3 +1,5 @@
+use std::sync::OnceLock;
+
 use taxel_data::{Silent, Stream};
 use taxel_simulate::{World, synthesise};
 
@@ -6,14 +8,17 @@ use crate::train::train;
 use crate::{Options, Origin, pack};
 
 /// Model of two rows that fills missing readings, and frames that it was not trained on.
-fn model() -> (ModelBlob, Table) {
-    let world = World { read_rows: vec![3, 4], ..World::press() };
-    let frames = synthesise(&world, Stream::Training, 1500);
-    let options = Options { centres: 8, ..Options::of_rows() };
-    let trained = train(&frames, &options, &Silent).unwrap();
-    let blob = pack(&trained, &frames, &Origin::of_data("rows", 0, 1, &frames)).unwrap();
-    let blob = add(&blob, &frames.inputs).unwrap();
-    (blob, synthesise(&world, Stream::Test, 400).inputs)
+fn model() -> &'static (ModelBlob, Table) {
+    static MODEL: OnceLock<(ModelBlob, Table)> = OnceLock::new();
+    MODEL.get_or_init(|| {
+        let world = World { read_rows: vec![3, 4], ..World::press() };
+        let frames = synthesise(&world, Stream::Training, 1500);
+        let options = Options { centres: 8, ..Options::of_rows() };
+        let trained = train(&frames, &options, &Silent).unwrap();
+        let blob = pack(&trained, &frames, &Origin::of_data("rows", 0, 1, &frames)).unwrap();
+        let blob = add(&blob, &frames.inputs).unwrap();
+        (blob, synthesise(&world, Stream::Test, 400).inputs)
+    })
 }
 
 #[test]
@@ -51,10 +56,10 @@ fn models_that_cannot_fill_are_refused() {
     let (blob, fresh) = model();
     assert!(blob.parse().fill().is_some());
     let few = Table { names: vec!["a".into()], values: vec![1.0, 2.0] };
-    assert!(add(&blob, &few).unwrap_err().to_string().contains("fewer than four readings"));
-    let mut bad = fresh;
+    assert!(add(blob, &few).unwrap_err().to_string().contains("fewer than four readings"));
+    let mut bad = fresh.clone();
     bad.values[0] = f64::INFINITY;
-    assert!(add(&blob, &bad).unwrap_err().to_string().contains("are no numbers"));
+    assert!(add(blob, &bad).unwrap_err().to_string().contains("are no numbers"));
 }
 
 #[test]
@@ -62,10 +67,10 @@ fn too_few_frames_are_refused_with_the_number_that_is_enough() {
     let (blob, _) = model();
     let world = World { read_rows: vec![3, 4], ..World::press() };
     let readings = |frames| synthesise(&world, Stream::Test, frames).inputs;
-    let message = add(&blob, &readings(300)).unwrap_err().to_string();
+    let message = add(blob, &readings(300)).unwrap_err().to_string();
     assert!(
         message.contains("300 frames are too few") && message.contains("give 360"),
         "{message}"
     );
-    assert!(add(&blob, &readings(359)).is_err() && add(&blob, &readings(360)).is_ok());
+    assert!(add(blob, &readings(359)).is_err() && add(blob, &readings(360)).is_ok());
 }

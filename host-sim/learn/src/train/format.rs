@@ -124,21 +124,15 @@ pub(super) struct Targets {
 
 impl Targets {
     pub fn new(outputs: &Table) -> Self {
-        let means = Self { deviations: outputs.mean_line(), means: outputs.means() };
-        means.of_others(outputs)
-    }
-
-    pub fn outputs(&self) -> usize {
-        self.means.len()
-    }
-
-    /// Targets of other samples, with their `outputs`: deviations from the same means.
-    pub fn of_others(&self, outputs: &Table) -> Self {
-        let (mut deviations, means) = (outputs.clone(), self.means.clone());
+        let (mut deviations, means) = (outputs.clone(), outputs.means());
         for line in deviations.values.chunks_exact_mut(means.len()) {
             line.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
         }
         Self { deviations, means }
+    }
+
+    pub fn outputs(&self) -> usize {
+        self.means.len()
     }
 }
 
