@@ -117,11 +117,11 @@ struct ColumnSummary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = ModelBlob::read(&arguments.model)?;
-    let summary = summarise(&blob)?;
+    let summary = summarise(&blob);
     print::result(common, &summary, || page_of(&summary))
 }
 
-fn summarise(blob: &ModelBlob) -> Result<Summary> {
+fn summarise(blob: &ModelBlob) -> Summary {
     let (model, design) = (blob.parse(), Design::new(blob));
     let (shape, metadata) = (model.shape(), model.metadata());
     let networks = model.networks().map(|network| NetworkSummary {
@@ -133,7 +133,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
     let column =
         |(name, unit): (&str, &str)| ColumnSummary { name: name.into(), unit: unit.into() };
     let ram = DecoderRam::new(&design);
-    Ok(Summary {
+    Summary {
         subject: metadata.name.into(),
         format_version: taxel_core::blob::FORMAT_VERSION,
         model_crc: format!("{:08x}", model.crc()),
@@ -165,7 +165,7 @@ fn summarise(blob: &ModelBlob) -> Result<Summary> {
         frame_cost: Cost::of_frame(&design),
         inputs: metadata.input_names.iter().zip(metadata.input_units.iter()).map(column).collect(),
         outputs: model_outputs::of(&model),
-    })
+    }
 }
 
 /// Why the images as they are cannot decode a `model`, with a blob of so many bytes, or not as it was trained.

@@ -42,12 +42,12 @@ fn a_model_with_a_confidence_is_judged_by_it_and_writes_it_beside_the_outputs() 
         (header[36], header[72], header[73]),
         ("r4e1_dx_mm_deviation", "novelty_nats", "status")
     );
-    const NOVEL: u8 = 128;
+    let novel = 128_u8;
     for (plain, with) in plain.lines().zip(with.lines()).skip(1) {
         let (outputs, status) = plain.rsplit_once(',').unwrap();
         let (_, with_novelty) = with.rsplit_once(',').unwrap();
         let flags: u8 = with_novelty.parse().unwrap();
-        assert!(with.starts_with(&format!("{outputs},")) && (flags & !NOVEL).to_string() == status);
+        assert!(with.starts_with(&format!("{outputs},")) && (flags & !novel).to_string() == status);
         assert!(with.split(',').skip(36).all(|value| value.parse::<f64>().is_ok()));
     }
 }

@@ -60,8 +60,8 @@ fn keys_of_results_stay_as_they_are() {
         assert_eq!(result["command"], arguments[0]);
         let mut keys = BTreeSet::new();
         add_keys(&result, "", &mut keys);
-        found += &format!("\n{command}\n");
-        keys.iter().for_each(|key| found += &format!("    {key}\n"));
+        found.extend(["\n", command, "\n"]);
+        found.extend(keys.iter().flat_map(|key| ["    ", key, "\n"]));
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata/json-keys.txt");
     if std::env::var_os("TAXEL_ACCEPT").is_some() {
