@@ -1,5 +1,5 @@
 //! Everything that CI runs: two rows of steps side by side, one for the host and one for the device, and what needs all
-//! cores after both.
+//! cores after both. And what takes too long for every change, and is run before a release.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -16,8 +16,31 @@ type Step = (&'static str, Command);
 /// A step that has ended: its name, its time, and the lines for the summary if it failed or ran tests.
 type Ended = (&'static str, Duration, Outcome<String>);
 
-/// Runs every step, even after a failure, and prints a summary.
+/// Scenarios of the emulated board that CI runs: those of the main path, and of faults that restart the board. A release
+/// runs all.
+const SCENARIOS: [&str; 8] = [
+    "session",
+    "sparse",
+    "silent-sensor",
+    "fault-restarts",
+    "panic-restarts",
+    "burst",
+    "restart",
+    "onchip",
+];
+
+/// Runs every step of CI, even after a failure, and prints a summary.
 pub fn run() -> Outcome {
+    run_all(steps)
+}
+
+/// Runs what a release needs beside CI: packages, the module of Python, all scenarios of the emulated board, a record of
+/// it, and exported models in all compilers.
+pub fn run_before_release() -> Outcome {
+    run_all(steps_of_release)
+}
+
+fn run_all(steps: fn(&Path) -> [Vec<Step>; 3]) -> Outcome {
     let logs = target_dir().join("ci");
     let failed = |cause: std::io::Error| format!("{}: {cause}", logs.display());
     fs::create_dir_all(&logs).map_err(failed)?;
@@ -41,14 +64,17 @@ pub fn run() -> Outcome {
     if failed == 0 { Ok(()) } else { Err(format!("{failed} of {} steps failed", ended.len())) }
 }
 
-/// The steps: two rows that build in different folders, and what follows both. QEMU's devices answer in time only if the
-/// machine has a core for QEMU and one for its host.
+/// Step that runs a command of xtask's own, of which `this` is a copy.
+fn own(this: &Path, name: &'static str, arguments: &[&str]) -> Step {
+    let mut command = Command::new(this);
+    command.args(arguments).current_dir(root());
+    (name, command)
+}
+
+/// The steps of CI: two rows that build in different folders, and what follows both. QEMU's devices answer in time only
+/// if the machine has a core for QEMU and one for its host.
 fn steps(this: &Path) -> [Vec<Step>; 3] {
-    let own = |name, arguments: &[&str]| -> Step {
-        let mut command = Command::new(this);
-        command.args(arguments).current_dir(root());
-        (name, command)
-    };
+    let own = |name, arguments: &[&str]| own(this, name, arguments);
     // The fuzz targets are checked as if libFuzzer had been built: that needs no nightly toolchain and no C++.
     let of_all = |arguments: &[&str]| {
         let mut command = cargo(arguments);
@@ -70,8 +96,6 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             ("docs", docs),
             // With the program that the tests have built.
             own("pages", &["docs"]),
-            own("publish", &["publish", "--short"]),
-            own("python", &["python"]),
         ],
         vec![
             own("firmware", &["firmware"]),
@@ -80,9 +104,19 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             own("cycles", &["cycles"]),
             own("c", &["c", "--short"]),
             // The emulated board's time is virtual: it answers alike on a busy machine.
-            own("board", &["board"]),
+            own("board", &[&["board"], &SCENARIOS[..]].concat()),
         ],
-        vec![own("emulate", &["emulate"]), own("accept", &["accept", "--emulated"])],
+        vec![own("emulate", &["emulate"])],
+    ]
+}
+
+/// The steps that only a release waits for.
+fn steps_of_release(this: &Path) -> [Vec<Step>; 3] {
+    let own = |name, arguments: &[&str]| own(this, name, arguments);
+    [
+        vec![own("publish", &["publish"]), own("python", &["python"])],
+        vec![own("c", &["c"]), own("board", &["board"])],
+        vec![own("accept", &["accept", "--emulated"])],
     ]
 }
 

@@ -25,9 +25,9 @@ mod publish;
 
 mod docs;
 
-mod release;
-
 mod ci;
+
+mod release;
 
 use std::process::ExitCode;
 
@@ -89,9 +89,14 @@ enum Command {
     Docs(docs::Options),
     /// Build the docs as a site with search, into target/site; needs mdBook (`cargo install mdbook`).
     Site,
-    /// Build a release into target/release-files: crates, a static program, a wheel of Python and its sources, images, the site,
-    /// licences and an SBOM of what they hold, and checksums.
-    Release,
+    /// Run what takes too long for CI (crates from their packages, the wheel of Python, exported models in all compilers, all of
+    /// the emulated board), then build a release into target/release-files: crates, a static program, a wheel of Python and
+    /// its sources, images, the site, licences and an SBOM of what they hold, and checksums.
+    Release {
+        /// Run the checks alone.
+        #[arg(long)]
+        checks: bool,
+    },
     /// Pack every crate that is published, and build it from its package; those of a device with their oldest Rust, too.
     /// Nothing is published (docs/crates.md).
     Publish(publish::Options),
@@ -116,7 +121,7 @@ fn main() -> ExitCode {
         Command::Python => python::test().map(success),
         Command::Docs(options) => docs::run(&options).map(success),
         Command::Site => docs::site::build(&process::target_dir().join("site")).map(success),
-        Command::Release => release::run().map(success),
+        Command::Release { checks } => release::run(checks).map(success),
     };
     outcome.unwrap_or_else(|cause| {
         eprintln!("error: {cause}");

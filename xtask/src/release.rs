@@ -9,7 +9,7 @@ use object::read::elf::ProgramHeader;
 use crate::process::{Outcome, cargo, root, run as run_command, target_dir};
 use crate::structure::metadata;
 use crate::toolchain::elf;
-use crate::{docs, images, python};
+use crate::{ci, docs, images, python};
 
 /// Target whose programs need no library of the system.
 const STATIC: &str = "x86_64-unknown-linux-musl";
@@ -20,8 +20,13 @@ const WHEEL: [&str; 3] = ["--zig", "--compatibility", "manylinux2014"];
 /// Images for a device.
 const IMAGES: [&str; 3] = [images::NUCLEO_SPI, images::NUCLEO_ONCHIP, images::APPLICATION];
 
-/// Builds everything into target/release-files, and prints sizes.
-pub fn run() -> Outcome {
+/// Runs what CI does not wait for, then, unless `checks` alone are wanted, builds everything into target/release-files and
+/// prints sizes.
+pub fn run(checks: bool) -> Outcome {
+    ci::run_before_release()?;
+    if checks {
+        return Ok(());
+    }
     let folder = target_dir().join("release-files");
     if folder.exists() {
         fs::remove_dir_all(&folder).map_err(|cause| failed(&folder, &cause))?;
