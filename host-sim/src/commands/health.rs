@@ -233,56 +233,7 @@ fn of_lines(count: usize, lines: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use taxel_learn::faults::{Kind, Place, WireFault};
-
     use super::*;
-
-    fn column(column: &str, [missing, shorted, open]: [usize; 3]) -> ColumnHealth {
-        ColumnHealth { column: column.into(), missing, shorted, open }
-    }
-
-    #[test]
-    fn notes_name_wires_and_the_worst_of_the_other_columns() {
-        let faulty = [column("a", [1, 0, 0]), column("r4c5_ohm", [0, 10_000, 0])];
-        let of_columns =
-            ["note: r4c5_ohm: shorted in 100 % of lines", "note: a: missing in 1 line"];
-        assert_eq!(notes(&faulty, &[], 10_000), of_columns);
-        let fault = WireFault { place: Place::Row(4), kind: Kind::Shorted };
-        let found = notes(&faulty, &[Found { fault, frames: 9995 }], 10_000);
-        assert_eq!(found, ["note: row-wire 4 shorted in 99.95 % of lines", of_columns[1]]);
-        let mixed = of_column(&column("b", [0, 9999, 1]), 10_000);
-        assert_eq!(mixed, "note: b: shorted in 99.99 % of lines, open in 1 line");
-        let many: Vec<ColumnHealth> = (0..9).map(|i| column("c", [0, 0, 1 + i])).collect();
-        let found = notes(&many, &[], 20);
-        assert_eq!((found.len(), found[0].as_str()), (6, "note: c: open in 45 % of lines"));
-        assert_eq!(found[5], "note: and 4 more columns with faulty readings");
-        assert!(notes(&[], &[], 5).is_empty());
-        let fault = WireFault { place: Place::Reading(4, 5), kind: Kind::Noisy };
-        let found = notes(&faulty[1..], &[Found { fault, frames: 200 }], 10_000);
-        assert_eq!(found, ["note: r4c5 noisy in 2 % of lines", of_columns[0]]);
-    }
-
-    #[test]
-    fn only_notes_on_columns_that_are_left_out_are_dropped() {
-        let names = ["r1c1_ohm", "r1c2_ohm", "r2c1_ohm", "r2c2_ohm"].map(String::from);
-        let faulty = names.each_ref().map(|name| column(name, [0, 0, 7]));
-        let places = [Place::Reading(1, 2), Place::Row(1), Place::Column(2), Place::All];
-        let faults = places.map(|place| {
-            let fault = WireFault { place, kind: Kind::Open };
-            Found { fault, frames: 7 }
-        });
-        let told = |left_out: &[usize]| {
-            let (columns, faults) = told(&faulty, &faults, &names, left_out);
-            let columns: Vec<String> = columns.into_iter().map(|it| it.column).collect();
-            (columns, faults.into_iter().map(|it| it.fault.place).collect::<Vec<_>>())
-        };
-        assert_eq!(told(&[]), (names.to_vec(), places.to_vec()));
-        assert_eq!(
-            told(&[1]),
-            (vec![0, 2, 3].into_iter().map(|i| names[i].clone()).collect(), places[1..].to_vec())
-        );
-        assert_eq!(told(&[0, 1]).1, [Place::Column(2), Place::All]);
-    }
 
     #[test]
     fn limits_are_two_numbers_or_none() {

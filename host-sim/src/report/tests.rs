@@ -1,7 +1,6 @@
 //! Tests of whole pages, on results made by hand.
 
 use taxel_limit::Refusal;
-use taxel_limit::reference::GroupLimit;
 use taxel_simulate::noise::NoiseKind;
 
 use taxel_data::table::Table as Values;
@@ -9,10 +8,8 @@ use taxel_data::table::Table as Values;
 use super::{Made, View};
 use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::distribution::{Distribution, Reference};
-use taxel_evaluate::evaluate::printed::{CELLS, Nearness};
-use taxel_evaluate::evaluate::table1::{Column, Comparison, Entry, NETWORK, Table1};
+use taxel_evaluate::evaluate::table1::{Column, Entry, NETWORK, Table1};
 use taxel_evaluate::metrics::{DecoderErrors, Errors, LimitSummary};
-use taxel_evaluate::others::{OtherErrors, Others};
 use taxel_evaluate::run::{
     ModelSummary, RowErrors, RowWire, RunResult, SceneSummary, SensorSketch,
 };
@@ -274,72 +271,6 @@ fn every_figure_is_a_picture_and_a_table_of_its_values() {
 }
 
 #[test]
-fn frames_of_all_ranks_are_stepped_through_from_the_median() {
-    let page = html(&result(&["dz_mm"]));
-    // Of 20 frames, the worst is at 99 %, too.
-    assert_eq!(page.matches("<input type=\"radio\" name=\"frames\"").count(), 12);
-    assert_eq!(page.matches(" checked>").count(), 1);
-    assert!(page.contains(" checked><label for=\"frames-5\">50\u{a0}%</label>"), "{page}");
-    assert!(page.contains("<label for=\"frames-11\">100\u{a0}%</label>\n<div class=\"step\">"));
-    assert!(page.contains("The frame with a larger error than 95\u{a0}% of all: number "));
-    assert!(page.contains("ends at ± the largest value"));
-}
-
-#[test]
-fn one_panel_for_every_group_of_outputs() {
-    for (groups, arrows) in
-        [(&["dz_mm"][..], 0), (&["dx_mm", "dy_mm", "dz_mm"], 3), (&["fx_n", "fz_n"], 0)]
-    {
-        let page = html(&result(groups));
-        let titled = |title: &str| page.matches(title).count();
-        for title in ["<title>Decoded against true", "<title>Histogram of", "<title>RMSE of "] {
-            // The sweeps have titles of their own, twice: for wide and for narrow windows.
-            let sweeps = if title == "<title>RMSE of " { 4 } else { 0 };
-            assert_eq!(titled(title), groups.len() + sweeps, "{title}");
-        }
-        assert_eq!(titled("<title>Map of"), 36, "one group, frames of twelve ranks");
-        assert_eq!(titled("<title>Readings of"), 6, "as read and without noise");
-        assert_eq!(titled("<title>Arrows of"), arrows);
-    }
-}
-
-#[test]
-fn maps_and_sweeps_show_z_or_else_the_last_group() {
-    assert!(html(&result(&["dz_mm", "dx_mm"])).contains("Map of Δz, true, median frame"));
-    assert!(html(&result(&["fx_n", "fz_n"])).contains("RMSE of Fz (N)"));
-    assert!(html(&result(&["dx_mm", "dy_mm"])).contains("Map of Δy, true, median frame"));
-}
-
-#[test]
-fn what_is_under_the_pointer_is_told() {
-    let page = html(&result(&["dz_mm"]));
-    assert!(page.contains("<title>row-wire 2, electrode 1: "));
-    assert!(page.contains("<title>row-wire 4, column-wire 2: "));
-    assert!(page.contains("<title>row-wire 5, electrode 2, not read</title>"), "sketch");
-    assert!(!page.contains("<title>row-wire 5, electrode 2: "), "it has no value");
-}
-
-#[test]
-fn errors_on_other_contacts_stand_below_those_of_the_scene() {
-    let groups = ["dz_mm"];
-    let contacts = vec![OtherErrors {
-        name: "flat <punch>".into(),
-        errors: of_groups(&groups, 0.0712),
-        mean: of_groups(&groups, 0.1816),
-        percent_novel: Some(12.9),
-    }];
-    let (frames, own_percent_novel) = (1000, Some(0.4));
-    let others = Some(Others { frames, own_percent_novel, contacts });
-    let page = html(&RunResult { others, ..result(&groups) });
-    let line = page.lines().find(|line| line.contains("flat &lt;punch&gt;")).unwrap();
-    for number in ["0.071", "0.182", "12.9"] {
-        assert!(line.contains(number), "{line}");
-    }
-    assert!(page.contains("As trained") && page.contains(" frames each"));
-    assert!(!html(&result(&groups)).contains("As trained"));
-}
-
-#[test]
 fn a_missing_value_is_drawn_nowhere() {
     let mut result = result(&["dz_mm"]);
     let whole = html(&result);
@@ -353,17 +284,6 @@ fn a_missing_value_is_drawn_nowhere() {
     assert_eq!(count(&whole) - styles, 12 * 3 * ELECTRODES + ELECTRODES + 6 * 6);
     assert_eq!(count(&whole) - count(&page), 2 + 1 + 1, "decoded, difference, reading, RMSE");
     assert_eq!(page.matches(": missing ").count(), 4);
-}
-
-#[test]
-fn a_scene_without_a_sweep_has_a_page_without_it() {
-    let mut result = result(&["dz_mm"]);
-    result.table1 = None;
-    result.scene.as_mut().unwrap().sensor = None;
-    let page = html(&result);
-    assert!(is_drawable(&page));
-    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (5, 1));
-    assert!(page.contains("drawn in a grid") && !page.contains("Noise and spread"));
 }
 
 /// View of outputs and readings of a file, without a scene.
@@ -407,62 +327,6 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
     assert!(page.contains("in its standard deviations") && page.contains(">ch1</text>"));
     assert_eq!(page.matches("<title>Map of").count(), 0);
 }
-
-#[test]
-fn electrodes_beside_the_face_and_at_one_place_are_drawn() {
-    let mut result = result(&["dx_mm", "dy_mm", "dz_mm"]);
-    let rows = &mut result.scene.as_mut().unwrap().sensor.as_mut().unwrap().row_wires;
-    rows[1].electrodes_mm[0] = [-3.0, 20.0];
-    let other = rows[2].electrodes_mm[1];
-    rows[3].electrodes_mm[1] = other;
-    assert!(is_drawable(&html(&result)));
-}
-
-#[test]
-fn the_papers_table_stands_only_beside_a_table_that_it_could_be_of() {
-    let mut result = result(&["dz_mm"]);
-    assert!(!html(&result).contains("Table 1 of the paper"));
-    let mut cells = CELLS.map(|line| line.map(|cell| cell - 1.0));
-    cells[4][1] = 9.9;
-    let formula = "mean|e|/(H − Δz)".into();
-    let nearness = Nearness::new(&cells);
-    let compared = Comparison { formula, cells, mean_percent: [11.0, 9.8, 11.0, 11.0], nearness };
-    result.table1.as_mut().unwrap().comparison = vec![compared];
-    let page = html(&result);
-    let table = page.split("<figure id=\"table-2\"").nth(1).unwrap();
-    // Of the noise of 1 %, the cell above and that of 11.11 − 1 are worse than the mean's 9.8.
-    assert_eq!(table.matches("class=\"number poor\"").count(), 2);
-    let cell = "9.90\u{a0}%<span class=\"dagger\">†</span><small>paper 9.27\u{a0}%</small>";
-    assert!(table.contains(cell) && table.contains("mean|e|/(H − Δz)"));
-    assert!(page.contains(">1234</text>") && page.contains("off the scale"), "standard network");
-    assert!(page.contains("has no place on a logarithmic axis"), "no noise");
-}
-
-#[test]
-fn the_limit_is_a_line_where_it_is_known() {
-    let mut result = result(&["dz_mm"]);
-    assert!(!html(&result).contains("Limit: the least possible"));
-    let limit = GroupLimit {
-        group: "dz_mm".into(),
-        unit: "mm".into(),
-        limit: 0.07,
-        limit_standard_error: 0.001,
-        rmse: 0.08,
-        rmse_standard_error: 0.002,
-        prior_rmse: 0.3,
-        monte_carlo_share: 0.01,
-    };
-    let summary = LimitSummary { frames: 20, groups: vec![limit], refused: None };
-    result.limit = summary.clone();
-    for column in &mut result.table1.as_mut().unwrap().columns {
-        column.limit = summary.clone();
-    }
-    let page = html(&result);
-    assert!(is_drawable(&page) && page.contains("Limit: the least possible"));
-    assert!(page.contains("<td class=\"number\">0.070</td><td class=\"number\">1.10</td>"));
-    assert_eq!(page.matches("truth name\">limit</text>").count(), 2, "wide and narrow");
-}
-
 #[test]
 fn names_are_escaped() {
     let mut result = result(&["dz_mm"]);

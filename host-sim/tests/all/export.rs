@@ -2,9 +2,6 @@
 
 use std::fs;
 
-use taxel_core::AlignedBytes;
-use taxel_core::blob::Model;
-use taxel_core::rbf::Network;
 use taxel_data::Stream;
 use taxel_simulate::{World, synthesise};
 
@@ -33,36 +30,6 @@ fn sources_in_testdata_are_those_that_the_command_writes() {
             "changed on purpose? host-sim export testdata/{name}.bin --rust testdata/{name}.rs"
         );
     }
-}
-
-/// Numbers in the source of a static, in their order.
-fn numbers(source: &str) -> impl Iterator<Item = u32> {
-    let words = source.split(|c: char| c.is_whitespace() || "[],".contains(c));
-    words.filter_map(|word| word.parse::<f32>().ok()).map(f32::to_bits)
-}
-
-#[test]
-fn every_number_of_networks_of_several_sizes_is_written_to_the_bit() {
-    let source = exported(&Folder::new("export_numbers"), "kernels-f32.bin");
-    let blob = AlignedBytes::copy_of(&fs::read(in_testdata("kernels-f32.bin")).unwrap());
-    let model = Model::decode(&blob).unwrap();
-    let statics: Vec<&str> = source.split("pub static ").skip(1).collect();
-    assert_eq!(statics.len(), model.network_count());
-    for (network, source) in model.networks().zip(statics) {
-        let Network::F32(network) = network else { panic!("another format") };
-        let (shape, p) = (network.shape(), network.parameters());
-        let head = format!("Fixed<{}, {}, {}>", shape.inputs, shape.centres, shape.outputs);
-        assert!(source.contains(&head), "{head}");
-        let (body, _) = source.split_once(".checked()").unwrap();
-        let (_, body) = body.split_once('{').unwrap();
-        let no_tail = vec![0.0; shape.inputs * shape.outputs];
-        let tail = if p.affine.is_empty() { &no_tail } else { p.affine };
-        let arrays = [p.input_minimum, p.input_per_span, p.centres, p.decay];
-        let arrays = arrays.into_iter().chain([p.output_weights, p.bias, tail]);
-        assert!(numbers(body).eq(arrays.flatten().map(|value| value.to_bits())), "{head}");
-    }
-    assert!(source.contains("/// Network of rows 1, 3, 5, 7.\n"), "{source}");
-    assert!(source.contains("    [ROW_1.infer(row_1), ROW_2.infer(row_2), ROW_1.infer(row_3), "));
 }
 
 #[test]
@@ -139,24 +106,6 @@ fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
     assert_eq!(fs::read_dir(folder.path("own")).unwrap().count(), 1);
     folder.succeed(&["export", &blob, "--c", "other"]);
     assert!(folder.path("other/src/taxel_model.c").exists());
-}
-
-#[test]
-fn wrong_usage_of_export_is_refused_and_nothing_is_written() {
-    let folder = Folder::new("export_usage");
-    let blob = in_testdata("row4.bin");
-    folder.write("file", "mine");
-    for (options, says) in [
-        (&["--c", "lib", "--name", "2mat"][..], "name starts with a letter"),
-        (&["--c", "lib", "--rust", "row4.rs"], "cannot be used with"),
-        (&["--c", "file"], "file"),
-    ] {
-        let said = folder.fail(&[&["export", &blob], options].concat(), 2);
-        assert!(said.contains(says), "{options:?}: {said}");
-        assert_eq!(folder.names(), ["file"], "{options:?}");
-    }
-    folder.fail(&["export", "none.bin", "--c", "lib"], 2);
-    assert_eq!(folder.names(), ["file"]);
 }
 
 #[test]

@@ -110,33 +110,3 @@ fn wires_are_named_and_columns_can_be_left_out() {
     let refused = folder.fail(&[&eval[..], &["r9c*_ohm"]].concat(), 2);
     assert!(refused.contains("--without r9c*_ohm"), "{refused}");
 }
-
-#[test]
-fn files_that_are_cut_off_stand_still_or_have_other_units_are_noted() {
-    let folder = prepared("health_cut_off");
-    let text = std::fs::read_to_string(folder.path("sound.csv")).unwrap();
-    folder.write("cut.csv", &text[..text.len() - 8]);
-    let decode = |file| folder.notes(&["decode", "fills.bin", file, "-o", "e.csv"]);
-    let said = decode("cut.csv");
-    assert!(said.contains("the last number of line 201 may be wrong"), "{said}");
-    let lines: Vec<&str> = text.lines().collect();
-    let frozen = [lines[0]].into_iter().chain([lines[1]; 100]);
-    folder.write("frozen.csv", frozen.collect::<Vec<_>>().join("\n") + "\n");
-    let said = decode("frozen.csv");
-    assert_eq!(said, "note: all 100 lines are the same: do the readings stand still?\n");
-    changed(&folder, "kilohm.csv", |name, _| name.ends_with("_ohm").then_some("0.06"));
-    let said = decode("kilohm.csv");
-    assert!(said.contains("no reading lies within 5 to 1000 Ω; are they in Ω?"), "{said}");
-}
-
-#[test]
-fn readings_far_beyond_the_training_range_are_flagged() {
-    let folder = prepared("health_clamped");
-    changed(&folder, "far.csv", |name, line| {
-        (name.ends_with("_ohm") && line % 2 == 1).then_some("30")
-    });
-    let said = folder.notes(&["decode", "plain.bin", "far.csv", "-o", "e.csv"]);
-    assert!(said.contains("readings-out-of-range"), "{said}");
-    let status = column(&folder, "e.csv", "status");
-    assert!(status.iter().enumerate().all(|(line, it)| *it == ["0", "64"][line % 2]), "{status:?}");
-}

@@ -229,32 +229,6 @@ fn what_a_dead_host_has_left_is_seen_and_ends_with_the_next_ones_work() {
     assert!(page.contains("scanning          a frame every 5 ms\n"), "{page}");
 }
 
-#[test]
-fn a_model_of_another_sensor_is_noted() {
-    let old = model(3);
-    let rig = Rig::new("another", old.bytes());
-    let lines: Vec<String> =
-        (0..40).map(|i| format!("{},{},{}", i % 7, i % 11, (i % 7) * (i % 11))).collect();
-    rig.folder.write("force.csv", format!("a_v,b_v,f_n\n{}\n", lines.join("\n")));
-    let train = ["train", "force.csv", "--inputs", "a_v,b_v", "--outputs", "f_n"];
-    rig.folder.succeed(&[&train[..], &["--centres", "3", "-o", "force.bin"]].concat());
-    rig.folder.write("press.bin", old.bytes());
-    for (file, notes) in [
-        (
-            "force.bin",
-            &["was \"press\", this one is \"force\"", "names or units", "another scene"][..],
-        ),
-        ("press.bin", &["was \"force\", this one is \"press\""]),
-        ("press.bin", &[]),
-    ] {
-        let output = rig.folder.run(&["link", &rig.port, "upload", file]);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{message}");
-        assert_eq!(message.contains("note:"), !notes.is_empty(), "{message}");
-        assert!(notes.iter().all(|note| message.contains(note)), "{message}");
-    }
-}
-
 /// Device that answers as little as a recording needs, and then sends `frames`: each its number, the time of its
 /// scan, and its number of readings.
 fn liar(frames: &'static [(u32, u64, usize)]) -> String {

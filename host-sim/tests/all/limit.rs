@@ -1,12 +1,5 @@
 //! The limit from the command line, and beside the errors of decoders.
 
-use host_sim::experiment::Experiment;
-use host_sim::metrics;
-use taxel_data::{Silent, Stream};
-use taxel_learn::decoders::BASELINES;
-use taxel_limit::Limit;
-use taxel_simulate::Synthesis;
-
 use crate::common::{Folder, small_scene, untimed};
 
 fn json(text: &str) -> serde_json::Value {
@@ -73,43 +66,4 @@ fn models_are_judged_on_the_frames_of_the_limit() {
     assert!(page.contains(" ×   m.bin") && page.contains(" ×   relative.bin"), "{page}");
     let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
     assert!(page.contains("model m.bin") && page.contains("model relative.bin"));
-}
-
-#[test]
-fn errors_are_given_beside_the_limit_and_its_own_ratio_is_one() {
-    let mut experiment = Experiment::load("press").unwrap();
-    experiment.world.read_rows = vec![3, 4];
-    let world = &experiment.world;
-    let (measure, summary) = experiment.measure_beside_limit(world.noise, 60, &Silent);
-    assert_eq!((summary.frames, summary.refused.as_ref()), (60, None));
-    let test = Synthesis::new(world).frames(Stream::Test, 60);
-    let training = Synthesis::new(world).frames(Stream::Training, 2000);
-    let own = metrics::judge(&Limit::new(world).unwrap(), &test, &measure);
-    for (errors, limit) in own.errors.iter().zip(&summary.groups) {
-        assert_eq!(errors.ratio_to_limit, Some(1.0));
-        let off = (errors.rmse - limit.rmse).abs();
-        assert!(off < 0.02 * limit.rmse, "{errors:?} {limit:?}");
-    }
-    for baseline in BASELINES {
-        let errors = metrics::judge(baseline.fit(&training).as_ref(), &test, &measure).errors;
-        for (errors, limit) in errors.iter().zip(&summary.groups) {
-            let (ratio, error) =
-                (errors.ratio_to_limit.unwrap(), errors.ratio_standard_error.unwrap());
-            assert!(ratio > 1.0 && error < 0.3 * ratio, "{errors:?}");
-            // The plain ratio of the two RMSE has a larger error, but is the same.
-            let plain = errors.rmse / limit.limit;
-            assert!((plain / ratio - 1.0).abs() < 0.35, "{} {plain} {ratio}", errors.group);
-        }
-    }
-}
-
-#[test]
-fn a_drifting_scene_is_run_without_a_limit_and_says_why() {
-    let folder = Folder::new("limit-drift");
-    let scene = small_scene() + "\n[drift]\ngain = 0.02\n";
-    folder.write("scene.toml", scene);
-    let page = folder.succeed(&["run", "scene.toml"]);
-    assert!(page.contains("No ratio to the least possible error: a drift"), "{page}");
-    let metrics = std::fs::read_to_string(folder.path("out/small/metrics.json")).unwrap();
-    assert!(json(&metrics)["decoders"][0]["errors"][0]["ratio_to_limit"].is_null());
 }

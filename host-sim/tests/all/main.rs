@@ -26,7 +26,6 @@ mod moving;
 mod output;
 mod readout;
 mod recordings;
-mod recursion;
 mod refusals;
 mod refused_readings;
 mod settings;
@@ -34,5 +33,4 @@ mod sweep;
 mod trade;
 #[cfg(target_os = "linux")]
 mod view;
-mod wires;
 mod workflow;

@@ -21,15 +21,3 @@ fn quiet_work_says_nothing_and_verbose_work_the_time_of_each_stage() {
     // Errors are said.
     assert!(folder.fail(&["-q", "inspect", "none.bin"], 2).contains("none.bin"));
 }
-
-#[test]
-fn shells_learn_every_command_and_option() {
-    let folder = Folder::new("shells");
-    for shell in ["bash", "zsh", "fish"] {
-        let script = folder.succeed(&["completions", shell]);
-        let known = ["relative-inputs", "inspect", "fixed16"];
-        assert!(known.iter().all(|word| script.contains(word)), "{shell}");
-    }
-    let mistyped = ["train", "log.csv", "--output", "f_n", "-o", "m.bin"];
-    assert!(folder.fail(&mistyped, 2).contains("'--outputs <GLOB>'"));
-}

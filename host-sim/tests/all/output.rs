@@ -177,23 +177,3 @@ fn a_signal_leaves_the_old_file_and_no_temporary_and_a_kill_a_hidden_one() {
 fn is_large(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|found| found.len() > 100_000)
 }
-
-#[test]
-fn an_interrupted_run_leaves_no_folder() {
-    let folder = Folder::new("empty_folder");
-    for (arguments, name) in [(["run", "press"], "-INT"), (["trade", "press"], "-TERM")] {
-        let child = host(&folder, &arguments).stderr(Stdio::piped()).spawn().unwrap();
-        // The check comes before anything is told.
-        std::thread::sleep(Duration::from_millis(300));
-        signal(&child, name);
-        let output = child.wait_with_output().unwrap();
-        assert_ne!(output.status.code(), Some(0));
-        let told = String::from_utf8(output.stderr).unwrap();
-        assert!(
-            told.ends_with(
-                "interrupted: nothing is half-written; files are whole, or as they were\n"
-            )
-        );
-        assert!(folder.names().is_empty(), "{:?}", folder.names());
-    }
-}

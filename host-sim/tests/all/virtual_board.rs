@@ -138,9 +138,9 @@ impl State {
         // The active row is pulled to ground; all else is at V_b.
         let rows: [Tie; ROWS] = std::array::from_fn(|row| {
             let volt = if Some(row) == active { 0.0 } else { drive_v };
-            Tie::Held { volt, through_ohm }
+            Tie { volt, through_ohm }
         });
-        let columns = [Tie::Held { volt: drive_v, through_ohm: lead }; COLUMNS];
+        let columns = [Tie { volt: drive_v, through_ohm: lead }; COLUMNS];
         let potentials = potentials_v(&self.conductance_s, &rows, &columns);
         let outputs = std::array::from_fn(|k| {
             let current_a = |m: usize| {

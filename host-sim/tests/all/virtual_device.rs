@@ -10,8 +10,6 @@ use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use taxel_firmware::store::{FlashError, Journal, PAGE_BYTES, Slot};
 
-pub mod mailbox;
-
 /// Line to the device that spoils bytes, in either direction: one in so many, or none.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {

@@ -1,7 +1,5 @@
 //! Work of users, from end to end, with the binary.
 
-use std::fmt::Write as _;
-
 use crate::common::{Folder, small_scene, small_scene_with_table1, untimed};
 
 fn json(text: &str) -> serde_json::Value {
@@ -56,112 +54,6 @@ fn a_csv_file_trains_decodes_and_evaluates() {
         assert!((0.8..1.25).contains(&ratio), "{group} {fresh}");
     }
     assert!(page.contains("Linear in training"));
-}
-
-#[test]
-fn moving_contacts_are_written_as_a_log_and_still_ones_as_a_model_is_trained_on() {
-    let folder = Folder::new("moving");
-    let motion = "[motion]\nspeed_mm_per_s = [10.0, 100.0]\npress_rate_hz = [1.0, 5.0]\nduration_s = 0.1\n[noise]";
-    let scene = small_scene();
-    folder.write("moving.toml", scene.replace("[noise]", motion));
-    folder.write("still.toml", scene);
-    let synth = |arguments: &str| {
-        let of = ["synth"].into_iter().chain(arguments.split(' ')).chain(["-o", "f.csv"]);
-        folder.succeed(&of.collect::<Vec<_>>());
-        std::fs::read_to_string(folder.path("f.csv")).unwrap()
-    };
-    let fields = |text: &str, line: usize| {
-        text.lines().nth(line).unwrap().split(',').take(3).map(String::from).collect::<Vec<_>>()
-    };
-    let log = synth("moving.toml -n 250 --frame-rate 1000 --scan-ms 0.9");
-    assert_eq!(fields(&log, 0), ["time_s", "trajectory", "r4c1_ohm"]);
-    assert_eq!(fields(&log, 100)[..2], ["0.099", "1"]);
-    assert_eq!(fields(&log, 101)[..2], ["1.1", "2"]);
-    assert_eq!(synth("moving.toml -n 20 --still"), synth("still.toml -n 20"));
-    // The untouched sensor over time: the draws of one trajectory.
-    let rest = synth("still.toml -n 30 --untouched --frame-rate 50 --scan-ms 5");
-    assert_eq!(fields(&rest, 30)[..2], ["0.58", "1"]);
-    assert_ne!(fields(&rest, 30)[2], fields(&rest, 29)[2]);
-}
-
-#[test]
-fn one_network_for_the_whole_array_needs_every_reading_and_has_less_error() {
-    let folder = Folder::new("array");
-    folder.write("scene.toml", small_scene());
-    folder.succeed(&["train", "scene.toml", "-n", "2000", "-o", "rows.bin"]);
-    let scene =
-        small_scene().replace("each_row = true\n", "").replace("spread = 0.8", "spread = 0.4");
-    folder.write("array.toml", scene);
-    folder.succeed(&["train", "array.toml", "-n", "2000", "-o", "array.bin"]);
-    let printed = folder.succeed(&["inspect", "array.bin"]);
-    assert!(printed.contains("36 readings → 18 features for all rows"), "{printed}");
-    assert!(printed.contains("\nnetwork 0 ") && !printed.contains("network 1"), "{printed}");
-    let printed = folder.succeed(&["inspect", "rows.bin"]);
-    assert!(printed.contains("\nnetworks 0–1 ") && !printed.contains("network 0"), "{printed}");
-    folder.succeed(&["synth", "scene.toml", "-n", "1000", "--seed", "9", "-o", "d.csv"]);
-    let rmse = |model: &str| {
-        let result = json(&folder.succeed(&["eval", model, "d.csv", "--json"]));
-        let groups = result["decoders"][0]["errors"].as_array().unwrap().iter();
-        groups.map(|group| group["rmse"].as_f64().unwrap()).sum::<f64>()
-    };
-    let (of_array, of_rows) = (rmse("array.bin"), rmse("rows.bin"));
-    assert!(of_array < of_rows, "{of_array} {of_rows}");
-
-    // The spread of the array's network is half of that of a row's.
-    folder.succeed(&["train", "array.toml", "-n", "2000", "--each-row", "-o", "rows2.bin"]);
-    let networks =
-        |model: &str| json(&folder.succeed(&["inspect", model, "--json"]))["networks"].clone();
-    assert_eq!(networks("rows2.bin"), networks("rows.bin"));
-
-    let data = std::fs::read_to_string(folder.path("d.csv")).unwrap();
-    let mut lines: Vec<Vec<&str>> = data.lines().map(|l| l.split(',').collect()).collect();
-    lines[2][0] = "";
-    folder.write("holed.csv", lines.iter().map(|l| l.join(",") + "\n").collect::<String>());
-    let printed = folder.succeed(&["decode", "array.bin", "holed.csv", "-o", "e.csv"]);
-    assert!(printed.contains("1 of them miss a reading: all outputs are empty"), "{printed}");
-    let estimate = std::fs::read_to_string(folder.path("e.csv")).unwrap();
-    let empty: Vec<usize> = estimate
-        .lines()
-        .map(|line| line.split(',').filter(|cell| cell.is_empty()).count())
-        .collect();
-    assert_eq!(empty[..4], [0, 0, 36, 0]);
-}
-
-#[test]
-fn forward_follows_the_equations() {
-    let folder = Folder::new("forward");
-    let names: Vec<String> = (1..=8)
-        .flat_map(|m| {
-            (1..=6).flat_map(move |i| ["x", "y", "z"].map(|a| format!("r{m}e{i}_d{a}_mm")))
-        })
-        .collect();
-    let moved: Vec<String> =
-        (0..144).map(|i| format!("{}", f64::from(i % 7) * 0.125 - 0.375)).collect();
-    // The last line is of another piece than the 99 lines at rest before it.
-    let at_rest = format!("{}\n", ["0"; 144].join(",")).repeat(99);
-    folder.write("d.csv", format!("{}\n{at_rest}{}\n", names.join(","), moved.join(",")));
-    folder.succeed(&["forward", "paper", "d.csv", "-o", "r.csv"]);
-    let written = std::fs::read_to_string(folder.path("r.csv")).unwrap();
-    let (header, values) = written.split_once('\n').unwrap();
-    let values = values.lines().nth(99).unwrap();
-    assert!(header.starts_with("r1c1_ohm,r1c2_ohm,") && header.ends_with(",r8c18_ohm"));
-    // By hand, node after node, straight from equations 1 to 7.
-    for (place, value) in values.trim().split(',').enumerate() {
-        let (m, k) = (place / 18, place % 18);
-        let mut conductance = 0.0;
-        for i in 0..6 {
-            let delta =
-                |axis: usize| f64::from(((m * 6 + i) * 3 + axis) as u32 % 7) * 0.125 - 0.375;
-            let u = [(i as f64 + 0.5) * 20.0 / 6.0, (m as f64 + 0.5) * 2.25, 5.0];
-            for j in 0..3 {
-                let l = [(k as f64 + 0.5) * 20.0 / 18.0, (f64::from(j) + 0.5) * 6.0, 0.0];
-                let squared: f64 = (0..3).map(|a| (u[a] - delta(a) - l[a]).powi(2)).sum();
-                conductance += 1.0 / (100.0 * squared.sqrt());
-            }
-        }
-        let relative = value.parse::<f64>().unwrap() * conductance - 1.0;
-        assert!(relative.abs() <= 1e-12, "r{}c{}: {relative:e}", m + 1, k + 1);
-    }
 }
 
 #[test]
@@ -303,37 +195,4 @@ fn table1_shows_the_papers_cells_beside_its_own() {
     assert!(cells[3].as_f64().unwrap() < 1.0, "{cells}");
     assert_eq!(result["test_frames"], 60);
     assert_eq!(result["solver"], "qr");
-}
-
-#[test]
-fn inspect_says_what_image_a_model_needs() {
-    let folder = Folder::new("needs");
-    // One row of so many readings, whose sum is the output.
-    let csv = |readings: usize| {
-        let names: Vec<String> = (1..=readings).map(|i| format!("ch{i}")).collect();
-        let mut csv = format!("{},f_n\n", names.join(","));
-        for line in 0..60 {
-            let values: Vec<usize> = (0..readings).map(|i| 50 + (line * (i + 3)) % 101).collect();
-            let sum: usize = values.iter().sum();
-            let values: Vec<String> = values.iter().map(usize::to_string).collect();
-            let _ = writeln!(csv, "{},{sum}", values.join(","));
-        }
-        csv
-    };
-    for (readings, says) in [
-        (18, None),
-        (20, Some("TAXEL_CAPACITY=8x20x18")),
-        (40, Some("TAXEL_CAPACITY=8x8x18")),
-        (37, Some("37 readings without names of wires fill no rows of 32 or fewer")),
-    ] {
-        folder.write("data.csv", csv(readings));
-        let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "--centres", "8"];
-        folder.succeed(&[&train[..], &["--no-refine", "-o", "m.bin"]].concat());
-        let printed = folder.succeed(&["inspect", "m.bin"]);
-        assert!(printed.contains("a frame ") && printed.contains(" cycles ("), "{printed}");
-        match says {
-            Some(says) => assert!(printed.contains(says), "{printed}"),
-            None => assert!(!printed.contains("TAXEL_CAPACITY"), "{printed}"),
-        }
-    }
 }
