@@ -134,6 +134,26 @@ fn a_file_that_is_no_result_is_refused_by_name_and_replaced() {
 }
 
 #[test]
+fn old_results_have_the_fields_of_the_plan_that_takes_them() {
+    let folder = prepared("sweep_new_axis");
+    let of_noise = "[axes]\nnoise.level = [0.005, 0.02]\ntraining.centres = [4, 8]\n";
+    folder.write("plan.toml", PLAN.replace(of_noise, "[axes]\ntraining.centres = [4, 8]\n"));
+    folder.succeed(&["sweep", "plan.toml"]);
+    // The scene's noise is a value of the new axis, so both points are taken.
+    let level = tiny_scene();
+    let level = level.lines().find_map(|line| line.strip_prefix("level = ")).unwrap();
+    folder.write("plan.toml", PLAN.replace("[0.005, 0.02]", &format!("[{level}, 0.03]")));
+    let words = ["sweep", "plan.toml", "--shard", "1/1", "--json"];
+    let shard: Value = serde_json::from_str(&folder.succeed(&words)).unwrap();
+    assert_eq!((&shard["computed"], &shard["there_already"]), (&2.into(), &2.into()));
+    folder.succeed(&["sweep", "plan.toml"]);
+    for line in read(&folder, "out/tiny/results.csv").lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        assert!([level, "0.03"].contains(&cells[1]) && ["4", "8"].contains(&cells[2]), "{line}");
+    }
+}
+
+#[test]
 fn another_plan_does_not_take_old_results() {
     let folder = prepared("sweep_changed");
     folder.succeed(&["sweep", "plan.toml"]);
@@ -215,6 +235,26 @@ fn plans_that_cannot_be_used_are_refused_with_what_is_near() {
         assert!(message.contains(said), "{message}");
     }
     assert_eq!(folder.names(), ["lists.toml", "plan.toml", "scene.toml"]);
+}
+
+#[test]
+fn repeats_are_put_together_and_draws_are_the_same_everywhere() {
+    let folder = prepared("sweep_drawn");
+    let plan = "name = \"drawn\"\nscene = \"scene.toml\"\nlimit_frames = 0\nrepeats = 2\n[set]\ntraining.centres = 4\n\
+                [draw]\npoints = 3\n[draw.axes]\nsensor.pitch_mm = {from = 2.0, to = 4.0}\n";
+    folder.write("plan.toml", plan);
+    let all: Value =
+        serde_json::from_str(&folder.succeed(&["sweep", "plan.toml", "--json"])).unwrap();
+    let settings = all["settings"].as_array().unwrap();
+    assert_eq!((all["points"].as_array().unwrap().len(), settings.len()), (6, 3));
+    for setting in settings {
+        assert_eq!(setting["repeats"], 2);
+        assert!(setting["deviations"]["rmse_dz_mm"].as_f64().unwrap() > 0.0);
+        let [pitch_mm, area_cm2] =
+            [&setting["values"]["sensor.pitch_mm"], &setting["results"]["area_cm2"]];
+        let expected = 8.0 * 18.0 * pitch_mm.as_f64().unwrap().powi(2) / 100.0;
+        assert!((area_cm2.as_f64().unwrap() - expected).abs() < 1e-9);
+    }
 }
 
 #[test]
