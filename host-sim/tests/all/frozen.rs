@@ -113,3 +113,20 @@ fn the_limit_is_the_frozen_one_within_two_standard_errors() {
         );
     }
 }
+
+/// What `cargo xtask cycles` accepts. A frame may take fewer instructions than it did, and none more.
+#[test]
+fn no_accepted_shape_takes_more_instructions_than_the_frozen_ones() {
+    let accepted = concat!(env!("CARGO_MANIFEST_DIR"), "/../firmware/cycles.csv");
+    let accepted = std::fs::read_to_string(accepted).unwrap();
+    let expected = std::fs::read_to_string(frozen("instructions.csv")).unwrap();
+    assert_eq!(expected.lines().count(), 11);
+    for line in expected.lines().skip(1) {
+        let (model, before) = line.rsplit_once(',').unwrap();
+        let frame = format!(",{model},frame,");
+        let (_, rest) =
+            accepted.split_once(&frame).unwrap_or_else(|| panic!("{model} is not counted"));
+        let now: u64 = rest.split(',').next().unwrap().parse().unwrap();
+        assert!(now <= before.parse().unwrap(), "{model}: {now} instructions, and took {before}");
+    }
+}
