@@ -1,6 +1,6 @@
 //! The blob format, compared with its specification in `docs/blob.md` and its examples in `testdata/blob-examples.txt`.
 
-use crate::common::{seal, worked_bytes};
+use crate::common::{close_with_crc, worked_bytes};
 use taxel_core::blob::{
     Columns, DecodeError, EncodeError, Floats, Metadata, Model, ModelParts, NoiseKind, encode,
     encoded_length_bound,
@@ -167,7 +167,7 @@ fn bytes_left_over_behind_the_networks_are_refused() {
     longer[length - 4..].fill(0);
     let at = longer.windows(4).position(|bytes| bytes == (length as u32).to_le_bytes()).unwrap();
     longer[at..at + 4].copy_from_slice(&(length as u32 + 4).to_le_bytes());
-    seal(longer);
+    close_with_crc(longer);
     assert_eq!(Model::decode(longer).unwrap_err(), DecodeError::LeftOver { bytes: 4 });
 }
 
@@ -220,7 +220,7 @@ fn sections_out_of_order_and_bad_metadata_are_refused_under_a_valid_crc() {
     let refused = |offset: usize, bytes: &[u8]| {
         let mut blob = blob.clone();
         blob[offset..offset + bytes.len()].copy_from_slice(bytes);
-        seal(&mut blob);
+        close_with_crc(&mut blob);
         Model::decode(&blob).unwrap_err()
     };
     // Rows, inputs, outputs and networks are one byte each, at 9 to 12; then the map of the rows, and the metadata.

@@ -47,7 +47,7 @@ pub fn bytes_of_table<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<u8> {
 }
 
 /// Writes the CRC that fits the bytes before it.
-pub fn seal(bytes: &mut [u8]) {
+pub fn close_with_crc(bytes: &mut [u8]) {
     let (body, crc) = bytes.split_last_chunk_mut::<4>().unwrap();
     *crc = CRC_32.checksum(body).to_le_bytes();
 }

@@ -1,6 +1,6 @@
 //! Sections of the blob that a model may have besides its networks: their bytes, and what damage of them is called.
 
-use crate::common::{PROJECTION, bytes_of_table, seal, worked_bytes};
+use crate::common::{PROJECTION, bytes_of_table, close_with_crc, worked_bytes};
 use crate::{blob_format, confidence, fill, projection};
 use proptest::prelude::*;
 use taxel_core::blob::{DecodeError, Model};
@@ -41,7 +41,7 @@ impl Sample {
         let mut blob = self.blob.clone();
         blob[place..place + bytes.len()].copy_from_slice(bytes);
         assert!(matches!(Model::decode(&blob), Err(DecodeError::Corrupt { .. })));
-        seal(&mut blob);
+        close_with_crc(&mut blob);
         Model::decode(&blob).map(drop).unwrap_err()
     }
 
@@ -134,7 +134,7 @@ proptest! {
         for (offset, byte) in changes {
             blob[9 + offset % (length - 4 - 9)] = byte;
         }
-        seal(&mut blob);
+        close_with_crc(&mut blob);
         let Ok(decoder) = Decoder::<2>::load(&blob) else { return Ok(()) };
         let model = decoder.model();
         prop_assert_eq!(model.networks().count(), model.network_count());

@@ -102,7 +102,7 @@ pub struct Trade {
     pub chosen: Option<usize>,
     /// What that point is worth.
     pub verdict: Option<Verdict>,
-    /// Index of every point's blob: points that differ only in gate or filter share one.
+    /// Index of every point's blob: points that differ only in the filter share one.
     #[serde(skip)]
     blobs: Vec<usize>,
     #[serde(skip)]
