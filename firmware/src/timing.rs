@@ -298,27 +298,6 @@ mod tests {
     };
 
     #[test]
-    fn extremes_end_at_the_largest_number_or_nothing() {
-        assert_eq!((spi_transfer_ns(3, 0), spi_transfer_ns(u32::MAX, 1)), (u32::MAX, u32::MAX));
-        let most = ScanPlan {
-            rows: u16::MAX,
-            columns: u16::MAX,
-            board_columns: u16::MAX,
-            settling_us: u32::MAX,
-            oversampling: u16::MAX,
-            pass_samples: 0,
-            sample_ns: u32::MAX,
-            reading_ns: u32::MAX,
-            row_ns: u32::MAX,
-            between_passes_ns: u32::MAX,
-        };
-        assert_eq!(most.scan_us(), u32::MAX);
-        let nothing = ScanPlan { rows: 0, columns: 0, board_columns: 0, ..PLAN };
-        // All rows idle all the same.
-        assert_eq!((nothing.scan_us(), nothing.longest_us()), (1, 12));
-    }
-
-    #[test]
     fn the_boards_scan_leaves_a_third_of_the_period() {
         let Configuration { frame_period_us, scan, .. } = Configuration::DEFAULT;
         let plan = ScanPlan::of_nucleo(8, 18, scan.oversampling);

@@ -13,7 +13,6 @@ mod journal;
 mod link_format;
 mod power_cuts;
 mod settings;
-mod store;
 mod trial;
 mod undo;
 mod upload;

@@ -110,7 +110,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         // With other constants it means nothing, and with the former ones it does again.
         for (circuit, contact) in [(ZeroPotential::TYPICAL, 0), (circuit(), 16)] {
             let set = Request::SetConstants(circuit.constants());
-            ask(&mut session, &bench.board, &set, |_| ());
+            tell(&mut session, &bench.board, &set);
             assert_eq!(decode(&mut session, 40.0) & 16, contact);
         }
 
@@ -142,7 +142,7 @@ fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
     let mut bench = Bench::new(quiet());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     for setting in [Setting::Configuration, Setting::Constants] {
-        ask(&mut session, &bench.board, &Request::Keep(setting), |_| ());
+        tell(&mut session, &bench.board, &Request::Keep(setting));
     }
     let _ = session;
     let mut journal = bench.journal();
@@ -183,13 +183,11 @@ fn a_baseline_of_other_wires_is_ignored_until_a_model_of_its_wires_comes() {
 
 #[test]
 fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
-    let mut slots = Flash::slots();
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &[]);
     let good = circuit();
     let mut set = |constants: Constants<'_>| {
         let request = Request::SetConstants(constants);
-        ask(&mut session, &bench.board, &request, |report| match report {
+        ask(&mut session, &board, &request, |report| match report {
             Report::Refused(Refusal::Constants(fault)) => Err(fault),
             Report::Constants(_) => Ok(()),
             other => panic!("{other:?}"),
@@ -211,7 +209,7 @@ fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
     }
     assert_eq!(set(ZeroPotential::<2, 2>::TYPICAL.constants()), Err(ConstantsFault::Length));
     assert_eq!(set(ZeroPotential::<3, 3>::TYPICAL.constants()), Err(ConstantsFault::Length));
-    ask(&mut session, &bench.board, &Request::Constants, |report| match report {
+    ask(&mut session, &board, &Request::Constants, |report| match report {
         Report::Constants(found) => assert_eq!(found, good.constants()),
         other => panic!("{other:?}"),
     });
@@ -228,7 +226,7 @@ fn writes_are_limited_between_restarts() {
         let refused = loop {
             let threshold = 0.001 + kept_times as f32 * 1e-5;
             let configuration = Configuration { contact_threshold: threshold, ..quiet() };
-            ask(&mut session, &bench.board, &Request::Configure(configuration), |_| ());
+            tell(&mut session, &bench.board, &Request::Configure(configuration));
             let keep = Request::Keep(Setting::Configuration);
             let answer = ask(&mut session, &bench.board, &keep, |report| match report {
                 Report::Kept(kept) => Ok(kept.writes_left),

@@ -159,21 +159,3 @@ fn fault(error: &DecodeError) -> ModelFault {
         _ => ModelFault::Invalid,
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_copy_holds_every_byte_or_is_not_made() {
-        let blob: Vec<u8> = (0..=255).collect();
-        for length in [0, 1, 3, 4, 5, 255, 256] {
-            let mut room = [u32::MAX; 64];
-            let copy = copy_to(&mut room, &blob[..length]).unwrap();
-            assert_eq!(copy, &blob[..length]);
-            let mut too_small = vec![0; length.div_ceil(4).saturating_sub(1)];
-            let copy = copy_to(&mut too_small, &blob[..length]);
-            assert_eq!(copy.is_some(), length == 0, "{length}");
-        }
-    }
-}

@@ -158,15 +158,4 @@ mod tests {
             [false, true, true]
         );
     }
-
-    #[test]
-    fn frames_of_another_length_start_anew() {
-        let mut memory = [0.0; 3];
-        let mut baseline = baseline(&mut memory);
-        baseline.add(&[60.0; 3]);
-        baseline.restart(2);
-        assert_eq!((baseline.mean(), baseline.frames()), (&[0.0; 2][..], 0));
-        baseline.restart(9);
-        assert_eq!(baseline.mean().len(), 3); // no memory for more
-    }
 }

@@ -2,7 +2,7 @@
 
 use taxel_firmware::app::Session;
 use taxel_firmware::circuit::ZeroPotential;
-use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request};
+use taxel_firmware::link::message::{Configuration, Report, Request};
 
 use taxel_core::blob::{Columns, Metadata, ModelShape};
 
@@ -50,9 +50,7 @@ fn the_next_frame_is_scanned_while_one_is_decoded_and_none_is_missed() {
         (pins.scans_alone, pins.gap_us) = (alone, 7);
         drop(pins);
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        while board.pins.borrow().now_us < 40_000 {
-            assert_eq!(session.step(), None);
-        }
+        run_until(&mut session, &board, 40_000);
         let frames = readings(&board);
         let s = statistics(&mut session, &board);
         assert_eq!((s.frames_decoded, s.lost_reports), (s.frames_scanned, 0));
@@ -70,32 +68,10 @@ fn the_next_frame_is_scanned_while_one_is_decoded_and_none_is_missed() {
 }
 
 #[test]
-fn the_next_scan_begins_before_a_frame_is_reported() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = bench(100, 250);
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    while board.pins.borrow().to_host.is_empty() {
-        assert_eq!(board.pins.borrow().started.min(2), board.pins.borrow().started);
-        session.step();
-    }
-    assert_eq!(board.pins.borrow().started, 2);
-    // Two periods passed within the first scan: that is told with the second frame, not with the first.
-    while board.pins.borrow().started < 4 {
-        session.step();
-    }
-    let texts = reports(&board.pins.borrow().to_host);
-    let estimates: Vec<_> = texts.iter().filter(|(_, text)| text.starts_with("Estimate")).collect();
-    for (index, flags) in [0, EstimateReport::OVERRUN].into_iter().enumerate() {
-        assert!(estimates[index].1.contains(&format!("flags: {flags},")), "{estimates:?}");
-    }
-}
-
-#[test]
 fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
     let mut slots = Flash::slots_with(&blob(3, 4));
     let mut bench = bench(1000, 500);
-    let (board, shown) = (bench.board.clone(), bench.frame.clone());
+    let (board, shown) = (bench.board.clone(), bench.board.frame.clone());
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let mut constants = ZeroPotential::<ROWS, COLS>::TYPICAL;
     constants.drive_v = 0.21;
@@ -112,8 +88,7 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
         shown.borrow_mut()[0][0] = 70.0 + index as f32;
         board.pins.borrow_mut().to_host.clear();
         let (stopped, changed_us) = (board.pins.borrow().stopped, board.pins.borrow().now_us);
-        board.pins.borrow_mut().to_device.extend(request_bytes(9, change));
-        settle(&mut session, &board);
+        send(&mut session, &board, 9, change);
         assert_eq!(board.pins.borrow().stopped, stopped + 1, "{change:?}");
         while readings(&board).is_empty() {
             session.step();
@@ -131,7 +106,7 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
     // Nothing is given up where nothing changes.
     let (started, stopped) = (board.pins.borrow().started, board.pins.borrow().stopped);
     run_until_started(&mut session, &board, started + 1);
-    ask(&mut session, &board, &Request::Configure(slower), |_| ());
+    tell(&mut session, &board, &Request::Configure(slower));
     assert_eq!(board.pins.borrow().stopped, stopped);
     assert_eq!(statistics(&mut session, &board).frames_missed, 0);
 }
@@ -169,9 +144,7 @@ fn a_scan_that_never_ends_is_a_silent_sensor() {
         assert!(board.pins.borrow().now_us < 2_100_000, "the scan has no end");
     }
     let (fed, now_us) = (board.pins.borrow().feeds, board.pins.borrow().now_us);
-    while board.pins.borrow().now_us < now_us + 6_000_000 {
-        session.step();
-    }
+    run_until(&mut session, &board, now_us + 6_000_000);
     assert_eq!(board.pins.borrow().feeds, fed, "the watchdog is fed");
     assert!(board.pins.borrow().started > 2, "it is not tried again");
     let frames = readings(&board);

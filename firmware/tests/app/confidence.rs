@@ -3,7 +3,6 @@
 use taxel_core::blob::Floats;
 use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Frame};
-use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{
     ConfidenceSent, Configuration, EstimateReport, Report, Request,
 };
@@ -56,12 +55,10 @@ fn decode(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> (S
 /// What the device sends of its next scans, which it then ends.
 fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceSent) -> Vec<Sent> {
     let scanning = Configuration { frame_period_us: 1000, confidence, ..quiet() };
-    ask(session, board, &Request::Configure(scanning), |_| ());
+    tell(session, board, &Request::Configure(scanning));
     board.pins.borrow_mut().to_host.clear();
     let until_us = board.pins.borrow().now_us + 2500;
-    while board.pins.borrow().now_us < until_us {
-        assert_eq!(session.step(), None);
-    }
+    run_until(session, board, until_us);
     let mut found = Vec::new();
     find_report(&std::mem::take(&mut board.pins.borrow_mut().to_host), |_, report| {
         match report {
@@ -71,7 +68,7 @@ fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceS
         }
         None::<()>
     });
-    ask(session, board, &Request::Configure(quiet()), |_| ());
+    tell(session, board, &Request::Configure(quiet()));
     assert!(found.len() >= 2, "{found:?}");
     found
 }
@@ -86,10 +83,7 @@ fn with_last(ohm: f32) -> TestFrame {
 #[test]
 fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
     let blob = blob_with_confidence(false);
-    let mut slots = Flash::slots_with(&blob);
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &blob);
     for (ohm, novel) in [(65.0, false), (64.0, false), (900.0, true)] {
         let (found, flags) = decode(&mut session, &board, &with_last(ohm));
         assert_eq!(found, expected(&blob, &with_last(ohm), f32::NAN), "{ohm}");
@@ -109,12 +103,9 @@ fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
 
 #[test]
 fn without_a_confidence_nothing_is_sent() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &blob(3, 4));
     assert_eq!(decode(&mut session, &board, &with_last(900.0)).0, Sent::NOTHING);
-    *bench.frame.borrow_mut() = with_last(900.0);
+    *board.frame.borrow_mut() = with_last(900.0);
     for sent in scanned(&mut session, &board, ConfidenceSent::Deviations) {
         assert_eq!(sent, Sent::NOTHING);
     }
@@ -125,12 +116,9 @@ fn without_a_confidence_nothing_is_sent() {
 #[test]
 fn of_a_scan_comes_what_the_configuration_says() {
     let blob = blob_with_confidence(false);
-    let mut slots = Flash::slots_with(&blob);
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
+    let (mut session, board) = started(quiet(), &blob);
     let frame = with_last(900.0);
-    *bench.frame.borrow_mut() = frame;
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    *board.frame.borrow_mut() = frame;
     let all = || expected(&blob, &frame, f32::NAN);
     assert!(all().novel);
 
@@ -151,10 +139,7 @@ fn of_a_scan_comes_what_the_configuration_says() {
 #[test]
 fn a_frame_with_a_faulty_reading_has_no_confidence_and_is_not_novel() {
     let blob = blob_with_confidence(false);
-    let mut slots = Flash::slots_with(&blob);
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &blob);
     for bad in [f32::NAN, 0.0, f32::INFINITY, 2000.0, -60.0] {
         let (found, flags) = decode(&mut session, &board, &with_last(bad));
         assert_eq!(flags, EstimateReport::FAULTY_READING, "{bad}");
@@ -167,15 +152,12 @@ fn a_frame_with_a_faulty_reading_has_no_confidence_and_is_not_novel() {
 #[test]
 fn relative_inputs_need_a_baseline_for_a_confidence_too() {
     let blob = blob_with_confidence(true);
-    let mut slots = Flash::slots_with(&blob);
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &blob);
     let (found, flags) = decode(&mut session, &board, &frame_at_rest());
     assert_eq!(flags, EstimateReport::NO_BASELINE);
     assert!(found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan()));
     let request = Request::SetBaseline { readings_ohm: Floats::new(&[62.0; ROWS * COLS]) };
-    ask(&mut session, &board, &request, |_| ());
+    tell(&mut session, &board, &request);
     for (ohm, novel) in [(65.0, false), (900.0, true)] {
         let (found, _) = decode(&mut session, &board, &with_last(ohm));
         assert_eq!(found, expected(&blob, &with_last(ohm), 62.0), "{ohm}");

@@ -3,7 +3,6 @@
 use taxel_core::Decoder;
 use taxel_core::blob::{Floats, Model, ModelParts, encode_to_vec};
 use taxel_core::fill::Fill;
-use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 
 use super::requests::{bits, capture, decode, expected};
@@ -12,14 +11,12 @@ use crate::mock::*;
 #[test]
 fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
     let blob = blob(3, 4);
-    let mut slots = Flash::slots_with(&blob);
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &blob);
     let good = frame_at_rest();
     for bad in [f32::NAN, 0.0, f32::INFINITY, 1.0, 2000.0, -60.0] {
         let mut frame = good;
         frame[0][2] = bad;
-        let (flags, status, found) = decode(&mut session, &bench.board, &frame);
+        let (flags, status, found) = decode(&mut session, &board, &frame);
         assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[1, 0][..]), "{bad}");
         assert!(found[..OUTPUTS].iter().all(|value| f32::from_bits(*value).is_nan()));
         assert_eq!(found[OUTPUTS..], bits(expected(&blob, &good)[1].into_iter()));
@@ -38,12 +35,10 @@ fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
         ..ModelParts::new(&networks, &[0; ROWS], *model.metadata())
     };
     let filling = encode_to_vec(&parts).unwrap();
-    let mut slots = Flash::slots_with(&filling);
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &filling);
     let mut frame = frame_at_rest();
     frame[0][2] = 2000.0;
-    let (flags, status, found) = decode(&mut session, &bench.board, &frame);
+    let (flags, status, found) = decode(&mut session, &board, &frame);
     assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[0, 0][..]));
     let mut filled = frame;
     filled[0][2] = f32::NAN;
@@ -53,29 +48,25 @@ fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
     assert_eq!(found, bits(expected(&plain, &filled).into_iter().flatten()));
     // Two of six are too many.
     frame[1][0] = 2000.0;
-    let (flags, status, _) = decode(&mut session, &bench.board, &frame);
+    let (flags, status, _) = decode(&mut session, &board, &frame);
     assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[1, 1][..]));
 }
 
 #[test]
 fn without_a_model_the_answer_says_so() {
-    let mut slots = Flash::slots();
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let (flags, status, found) = decode(&mut session, &bench.board, &frame_at_rest());
+    let (mut session, board) = started(quiet(), &[]);
+    let (flags, status, found) = decode(&mut session, &board, &frame_at_rest());
     assert_eq!((flags, &status[..]), (EstimateReport::NO_MODEL, &[1, 1][..]));
     assert!(found.is_empty());
 }
 
 #[test]
 fn a_frame_of_another_length_is_refused() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &blob(3, 4));
     for readings in [&[60.0; 5][..], &[60.0; 7], &[]] {
         let request =
             Request::Decode { frame: 0, start_us: 0, readings_ohm: Floats::new(readings) };
-        let (refused, _) = ask(&mut session, &bench.board, &request, |report| {
+        let (refused, _) = ask(&mut session, &board, &request, |report| {
             report == Report::Refused(Refusal::FrameLength { expected: 6 })
         });
         assert!(refused);
@@ -84,10 +75,7 @@ fn a_frame_of_another_length_is_refused() {
 
 #[test]
 fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &blob(3, 4));
     // The training range is 50 to 70 Ω, and an eighth of it more on either side is not clamped.
     for (reading, clamped) in
         [(47.6, false), (72.4, false), (47.4, true), (72.6, true), (900.0, true)]
@@ -106,10 +94,7 @@ fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
 
 #[test]
 fn a_baseline_that_is_being_captured_tells_of_no_contact() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started(quiet(), &blob(3, 4));
     capture(&mut session, &board, 3);
     let rest = frame_at_rest();
     let mut pressed = rest;
@@ -119,7 +104,7 @@ fn a_baseline_that_is_being_captured_tells_of_no_contact() {
     };
     assert_eq!(contact(&mut session, &pressed), EstimateReport::CONTACT);
     let scanning = Configuration { frame_period_us: 1_000_000, ..quiet() };
-    ask(&mut session, &board, &Request::Configure(scanning), |_| ());
+    tell(&mut session, &board, &Request::Configure(scanning));
     let again = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
     board.pins.borrow_mut().to_device.extend(again);
     settle(&mut session, &board);

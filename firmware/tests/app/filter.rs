@@ -120,11 +120,9 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
 #[test]
 fn scans_are_filtered_and_no_request_between_them_changes_that() {
     let mut own = Own::new(3);
-    let mut slots = Flash::slots_with(&own.blob);
-    let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..filtering() });
-    let board = bench.board.clone();
-    let shown = bench.frame.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) =
+        started(Configuration { frame_period_us: 1000, ..filtering() }, &own.blob);
+    let shown = board.frame.clone();
     let raw = bits(expected(&own.blob, &touch(9)).into_iter().flatten());
     for frame in 1..15 {
         *shown.borrow_mut() = touch(frame);
@@ -145,19 +143,15 @@ fn scans_are_filtered_and_no_request_between_them_changes_that() {
 #[test]
 fn one_scan_of_some_is_reported_and_all_are_filtered() {
     let mut own = Own::new(3);
-    let mut slots = Flash::slots_with(&own.blob);
     let scanning = Configuration { frame_period_us: 1000, ..filtering() };
-    let mut bench = Bench::new(Configuration { report_every: 3, send_readings: true, ..scanning });
-    let board = bench.board.clone();
+    let (mut session, board) =
+        started(Configuration { report_every: 3, send_readings: true, ..scanning }, &own.blob);
     let mut faulty = touch(2);
     faulty[0][0] = f32::NAN;
-    let shown = bench.frame.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let shown = board.frame.clone();
     for frame in 1..=10 {
         *shown.borrow_mut() = touch(frame);
-        while board.pins.borrow().now_us < 1000 * frame as u32 + 200 {
-            session.step();
-        }
+        run_until(&mut session, &board, 1000 * frame as u32 + 200);
     }
     let mut wanted = Vec::new();
     find_report(&board.pins.borrow().to_host, |_, report| -> Option<()> {
@@ -172,9 +166,7 @@ fn one_scan_of_some_is_reported_and_all_are_filtered() {
     // Faults are told with the estimate.
     *shown.borrow_mut() = faulty;
     board.pins.borrow_mut().to_host.clear();
-    while board.pins.borrow().now_us < 16_200 {
-        session.step();
-    }
+    run_until(&mut session, &board, 16_200);
     let all = reports(&board.pins.borrow().to_host);
     let health: Vec<_> = all.iter().filter(|(_, text)| text.starts_with("Health")).collect();
     assert!(health.len() == 2 && health[1].1.contains("frame: 15"), "{health:?}");
@@ -184,18 +176,14 @@ fn one_scan_of_some_is_reported_and_all_are_filtered() {
 
 #[test]
 fn the_latency_lasts_until_the_last_byte_is_taken() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(Configuration { frame_period_us: 10_000, ..quiet() });
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) =
+        started(Configuration { frame_period_us: 10_000, ..quiet() }, &blob(3, 4));
     let mut latencies = Vec::new();
     for gap_us in [0, 20] {
         board.pins.borrow_mut().gap_us = gap_us;
         let end_us = board.pins.borrow().now_us + 25_000;
         board.pins.borrow_mut().to_host.clear();
-        while board.pins.borrow().now_us < end_us {
-            session.step();
-        }
+        run_until(&mut session, &board, end_us);
         let bytes = board.pins.borrow().to_host.len() as u32 / 2; // two estimates
         board.pins.borrow_mut().gap_us = 0;
         latencies.push((statistics(&mut session, &board).longest_latency_us, bytes));

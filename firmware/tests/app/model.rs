@@ -22,10 +22,8 @@ fn the_identity_tells_what_the_model_was_trained_on() {
     };
     let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });
     let read = |metadata: Metadata<'static>| {
-        let mut slots = Flash::slots_with(&network(metadata));
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        ask(&mut session, &bench.board, &Request::Identify, |report| match report {
+        let (mut session, board) = started(quiet(), &network(metadata));
+        ask(&mut session, &board, &Request::Identify, |report| match report {
             Report::Identity(identity) => (identity.model_name.to_owned(), identity.model.unwrap()),
             other => panic!("{other:?}"),
         })
@@ -58,9 +56,7 @@ fn reports_on_a_scan(blob: &[u8]) -> Vec<(u16, String)> {
     let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
     let (mut slots, mut bench) = (Flash::slots_with(blob), Bench::new(scanning));
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    while bench.board.pins.borrow().now_us < 1500 {
-        assert_eq!(session.step(), None);
-    }
+    run_until(&mut session, &bench.board, 1500);
     reports(&bench.board.pins.borrow().to_host)
 }
 
@@ -135,8 +131,8 @@ fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let baseline = Request::SetBaseline { readings_ohm: Floats::new(&[60.0, 50.0]) };
-    ask(&mut session, &board, &baseline, |_| ());
-    ask(&mut session, &board, &Request::Keep(Setting::Baseline), |_| ());
+    tell(&mut session, &board, &baseline);
+    tell(&mut session, &board, &Request::Keep(Setting::Baseline));
     let _ = session;
     for (next, contact) in [(&second, 0), (&first, EstimateReport::CONTACT)] {
         install(&mut bench, &mut slots, &mut [], (next, 64)).unwrap();
@@ -153,10 +149,8 @@ fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
 #[test]
 fn a_model_without_room_is_not_put_in_force() {
     for (inputs, outputs) in [(4, 1), (7, 1), (3, 5)] {
-        let mut slots = Flash::slots_with(&blob_of_one_row(inputs, outputs));
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        assert_eq!(model_crc(&mut session, &bench.board), None, "{inputs} {outputs}");
+        let (mut session, board) = started(quiet(), &blob_of_one_row(inputs, outputs));
+        assert_eq!(model_crc(&mut session, &board), None, "{inputs} {outputs}");
     }
 }
 

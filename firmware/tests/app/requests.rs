@@ -40,7 +40,7 @@ pub fn decode(
 /// Captures a baseline of `frames` scans. Then sets a configuration that scans only on request.
 pub fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
     let scanning = Configuration { frame_period_us: 100, ..quiet() };
-    ask(session, board, &Request::Configure(scanning), |_| ());
+    tell(session, board, &Request::Configure(scanning));
     let request = request_bytes(9, &Request::CaptureBaseline { frames });
     board.pins.borrow_mut().to_device.extend(request);
     board.pins.borrow_mut().to_host.clear();
@@ -48,5 +48,5 @@ pub fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
         assert_eq!(session.step(), None);
         assert!(board.pins.borrow().now_us < 1_000_000, "no answer");
     }
-    ask(session, board, &Request::Configure(quiet()), |_| ());
+    tell(session, board, &Request::Configure(quiet()));
 }

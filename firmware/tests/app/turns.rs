@@ -10,14 +10,10 @@ use crate::mock::*;
 #[test]
 fn frames_are_scanned_on_time_numbered_and_reported() {
     let blob = blob(3, 4);
-    let mut slots = Flash::slots_with(&blob);
     let configuration = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
-    let mut bench = Bench::new(configuration);
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    while bench.board.pins.borrow().now_us < 5500 {
-        assert_eq!(session.step(), None);
-    }
-    let reports = reports(&bench.board.pins.borrow().to_host);
+    let (mut session, board) = started(configuration, &blob);
+    run_until(&mut session, &board, 5500);
+    let reports = reports(&board.pins.borrow().to_host);
     assert_eq!(reports.len(), 10, "{reports:?}"); // readings and estimate, five times
     for (i, (number, text)) in reports.iter().enumerate() {
         assert_eq!(*number, 0);
@@ -25,7 +21,7 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
         let start = format!("{kind}frame: {}, start_us: {}", i / 2 + 1, i / 2 + 1);
         assert!(text.starts_with(&start), "{text} instead of {start}");
     }
-    let s = statistics(&mut session, &bench.board);
+    let s = statistics(&mut session, &board);
     assert_eq!((s.frames_scanned, s.frames_decoded, s.frames_missed), (5, 5, 0));
     assert!(s.longest_scan_us >= 10 && s.longest_scan_us < 20);
     assert_eq!((s.shortest_decode_cycles, s.longest_decode_cycles), (1000, 1000));
@@ -33,15 +29,10 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
 
 #[test]
 fn a_scan_longer_than_the_period_is_an_overrun() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
     let configuration = Configuration { frame_period_us: 100, ..quiet() };
-    let mut bench = Bench::new(configuration);
-    bench.board.pins.borrow_mut().scan_us = 250;
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    while board.pins.borrow().now_us < 2000 {
-        session.step();
-    }
+    let (mut session, board) = started(configuration, &blob(3, 4));
+    board.pins.borrow_mut().scan_us = 250;
+    run_until(&mut session, &board, 2000);
     let all = reports(&board.pins.borrow().to_host);
     let flagged =
         |flag: u8| all.iter().filter(|(_, t)| t.contains(&format!("flags: {flag},"))).count();
@@ -53,10 +44,8 @@ fn a_scan_longer_than_the_period_is_an_overrun() {
 
 #[test]
 fn the_watchdog_is_fed_by_good_loops_only() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(Configuration { frame_period_us: 100, ..quiet() });
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let board = bench.board.clone();
+    let (mut session, board) =
+        started(Configuration { frame_period_us: 100, ..quiet() }, &blob(3, 4));
     let feeds = || board.pins.borrow().feeds;
     for _ in 0..50 {
         let before = feeds();
@@ -64,7 +53,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
         assert_eq!(feeds(), before + 1);
     }
     // With a converter that gives nothing, no loop is good from the next scan on, whether it scans or not.
-    *bench.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
+    *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
     let scanned = statistics(&mut session, &board).frames_scanned;
     while statistics(&mut session, &board).frames_scanned == scanned {
         session.step();
@@ -76,7 +65,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
     assert_eq!(feeds(), fed);
     assert!(statistics(&mut session, &board).bad_loops >= bad + 2000);
     // One reading is enough.
-    bench.frame.borrow_mut()[1][1] = 60.0;
+    board.frame.borrow_mut()[1][1] = 60.0;
     let scanned = statistics(&mut session, &board).frames_scanned;
     while statistics(&mut session, &board).frames_scanned == scanned {
         session.step();
@@ -87,11 +76,11 @@ fn the_watchdog_is_fed_by_good_loops_only() {
     }
     assert_eq!(feeds(), fed + 2000);
     // Without scans, a silent sensor must not restart the device.
-    *bench.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
+    *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
     for _ in 0..2000 {
         session.step();
     }
-    ask(&mut session, &board, &Request::Configure(quiet()), |_| ());
+    tell(&mut session, &board, &Request::Configure(quiet()));
     let fed = feeds();
     session.step();
     assert_eq!(feeds(), fed + 1);
@@ -106,7 +95,7 @@ fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
     bench.board.pins.borrow_mut().scan_us = scan_us;
     let board = bench.board.clone();
     // A faulty reading, so that all kinds of reports are sent.
-    bench.frame.borrow_mut()[0][0] = f32::NAN;
+    bench.board.frame.borrow_mut()[0][0] = f32::NAN;
     board.pins.borrow_mut().gap_us = gap_us;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let mut longest_us = 0;
@@ -134,18 +123,13 @@ fn however_slowly_bytes_are_taken_the_watchdog_is_fed() {
 
 #[test]
 fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(Configuration { frame_period_us: 1000, ..quiet() });
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let board = bench.board.clone();
+    let (mut session, board) =
+        started(Configuration { frame_period_us: 1000, ..quiet() }, &blob(3, 4));
     board.pins.borrow_mut().room = Some(10);
-    while board.pins.borrow().now_us < 500_000 {
-        session.step();
-    }
+    run_until(&mut session, &board, 500_000);
     // The report that was cut is a broken frame, which does not damage the next report.
     board.pins.borrow_mut().room = None;
-    board.pins.borrow_mut().to_device.extend(request_bytes(7, &Request::Statistics));
-    settle(&mut session, &board);
+    send(&mut session, &board, 7, &Request::Statistics);
     let bytes = std::mem::take(&mut board.pins.borrow_mut().to_host);
     let mut receiver = Receiver::new([0; 1024]);
     let mut numbers = Vec::new();
@@ -162,10 +146,7 @@ fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
 
 #[test]
 fn a_restart_is_answered_and_ends_the_session() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = Bench::new(quiet());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let (answer, end) =
-        ask(&mut session, &bench.board, &Request::Restart, |r| r == Report::Restarting);
+    let (mut session, board) = started(quiet(), &blob(3, 4));
+    let (answer, end) = ask(&mut session, &board, &Request::Restart, |r| r == Report::Restarting);
     assert_eq!((answer, end), (true, Some(SessionEnd::Restart)));
 }

@@ -1,15 +1,12 @@
 //! An application on its board.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
 use taxel_firmware::app::{App, Buffers, Session};
 use taxel_firmware::link::message::Configuration;
 use taxel_firmware::store::Journal;
 
 use super::board::Board;
 use super::flash::Flash;
-use super::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS, TestFrame, frame_at_rest};
+use super::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS};
 use super::source::Source;
 
 /// Memory of an application.
@@ -34,8 +31,14 @@ pub struct Bench<'m> {
     /// The application. A session borrows it.
     pub app: TestApp<'m>,
     pub board: Board,
-    /// The frame that its sensor shows, in Ω.
-    pub frame: Rc<RefCell<TestFrame>>,
+}
+
+/// A session on a new board with `blob` in its first slot, and the board. Neither is ever freed.
+pub fn started(configuration: Configuration, blob: &[u8]) -> (TestSession<'static>, Board) {
+    let slots = Box::leak(Box::new(Flash::slots_with(blob)));
+    let bench = Box::leak(Box::new(Bench::new(configuration)));
+    let board = bench.board.clone();
+    (Session::start(&mut bench.app, slots, &mut []), board)
 }
 
 impl Bench<'static> {
@@ -56,9 +59,8 @@ impl<'m> Bench<'m> {
     /// when the bench is dropped.
     pub fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
         *memory = Memory::new();
-        let frame = Rc::new(RefCell::new(frame_at_rest()));
-        let source = Source::new(&frame, &board);
-        Self { app: App::new(board.clone(), source, configuration, memory), board, frame }
+        let source = Source::new(&board);
+        Self { app: App::new(board.clone(), source, configuration, memory), board }
     }
 
     /// Its board's journal, for the next start.

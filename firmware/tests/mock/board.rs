@@ -9,6 +9,7 @@ use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::store::Journal;
 
 use super::flash::Flash;
+use super::shape::{TestFrame, frame_at_rest};
 
 /// State of the board, which a test can see while the application owns the board.
 #[derive(Default)]
@@ -48,6 +49,8 @@ pub struct Pins {
 pub struct Board {
     /// Clock, serial line and watchdog.
     pub pins: Rc<RefCell<Pins>>,
+    /// The frame that its sensor shows, in Ω.
+    pub frame: Rc<RefCell<TestFrame>>,
     /// What survives a restart besides the slots; that of a clone is another one.
     pub journal: Journal<Flash>,
 }
@@ -55,7 +58,7 @@ pub struct Board {
 impl Board {
     /// A board with this journal.
     pub fn new(journal: Journal<Flash>) -> Self {
-        Self { pins: Rc::default(), journal }
+        Self { pins: Rc::default(), frame: Rc::new(RefCell::new(frame_at_rest())), journal }
     }
 }
 

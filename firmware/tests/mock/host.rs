@@ -90,6 +90,24 @@ pub fn ask<T>(
     (found, end)
 }
 
+/// Sends `request`, whatever the answer.
+pub fn tell(session: &mut Running<'_, '_>, board: &Board, request: &Request<'_>) {
+    ask(session, board, request, |_| ());
+}
+
+/// Sends `request` with this number, and lets the device read it.
+pub fn send(session: &mut Running<'_, '_>, board: &Board, number: u16, request: &Request<'_>) {
+    board.pins.borrow_mut().to_device.extend(request_bytes(number, request));
+    settle(session, board);
+}
+
+/// Runs turns of the loop until this time.
+pub fn run_until(session: &mut Running<'_, '_>, board: &Board, end_us: u32) {
+    while board.pins.borrow().now_us < end_us {
+        assert_eq!(session.step(), None);
+    }
+}
+
 /// The device's counters.
 pub fn statistics(session: &mut Running<'_, '_>, board: &Board) -> Statistics {
     let read = |report: Report<'_>| match report {

@@ -4,36 +4,15 @@ use taxel_core::AlignedBytes;
 use taxel_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::confidence::{Confidence, Sizes};
 use taxel_core::projection::Projection;
-use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
 
+use super::row_model::with_network;
 use super::shape::{COLS, OUTPUTS, ROWS};
 
 /// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
-    let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
-    let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
-    let (centre, weights) = (list(1, centres * COLS), list(2, centres * OUTPUTS));
-    let (bias, affine, decay) = (list(3, OUTPUTS), list(4, COLS * OUTPUTS), vec![1.5; centres]);
-    let network = float32::Network::try_new(
-        Shape { inputs: COLS, centres, outputs: OUTPUTS },
-        Parameters {
-            input_minimum: &[50.0; COLS],
-            input_per_span: &[0.05; COLS],
-            centres: &centre,
-            decay: &decay,
-            output_weights: &weights,
-            bias: &bias,
-            affine: &affine,
-        },
-    )
-    .unwrap();
-    blob_of(network.into())
-}
-
-/// A blob with `network` for both rows.
-pub fn blob_of(network: Network<'_>) -> AlignedBytes {
-    blob_with(network, None, false)
+    let shape = Shape { inputs: COLS, centres, outputs: OUTPUTS };
+    with_network(shape, seed, |network| blob_with(network, None, false))
 }
 
 /// The blob of [`blob`] with a confidence, for readings relative to the baseline if `relative_inputs`. Its one component
@@ -75,32 +54,18 @@ fn blob_with(
 /// A blob of one network for both rows, behind a projection to so many `features`.
 pub fn blob_of_features(features: usize) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
-    let all = |count: usize, value: f32| vec![value; count];
-    let (minimum, per_span) = (all(features, 50.0), all(features, 0.05));
-    let (centre, weights, bias) = (all(features, 0.5), all(outputs, 0.5), all(outputs, 0.25));
-    let network = float32::Network::try_new(
-        Shape { inputs: features, centres: 1, outputs },
-        Parameters {
-            input_minimum: &minimum,
-            input_per_span: &per_span,
-            centres: &centre,
-            decay: &[1.5],
-            output_weights: &weights,
-            bias: &bias,
-            affine: &[],
-        },
-    )
-    .unwrap();
     // Every feature is the mean reading.
     let mut projection = vec![1.0 / readings as f32; (1 + readings) * features];
     projection[..features].fill(0.0);
-    let networks = [network.into()];
     let metadata = Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS });
-    let parts = ModelParts {
-        projection: Projection::new(readings, features, &projection).ok(),
-        ..ModelParts::new(&networks, &[0; ROWS], metadata)
-    };
-    encode_to_vec(&parts).unwrap()
+    with_network(Shape { inputs: features, centres: 1, outputs }, 0, |network| {
+        let networks = [network];
+        let parts = ModelParts {
+            projection: Projection::new(readings, features, &projection).ok(),
+            ..ModelParts::new(&networks, &[0; ROWS], metadata)
+        };
+        encode_to_vec(&parts).unwrap()
+    })
 }
 
 /// The CRC-32 that closes a blob.

@@ -2,28 +2,30 @@
 
 use taxel_core::AlignedBytes;
 use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
-use taxel_core::rbf::Shape;
 use taxel_core::rbf::float32::{self, Parameters};
+use taxel_core::rbf::{Network, Shape};
 
 /// A blob of one network with this `shape`, which has one row, and this `metadata`.
 pub fn blob_of_a_row(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes {
     let ModelShape { inputs, outputs, .. } = shape;
-    let number = |i: usize| ((i * 37) % 101) as f32 / 50.0 - 1.0;
+    with_network(Shape { inputs, centres: 1, outputs }, 0, |network| {
+        encode_to_vec(&ModelParts::new(&[network], &[0], metadata)).unwrap()
+    })
+}
+
+/// What `make` makes of a network of this shape, with an affine tail and numbers that depend on `seed`.
+pub fn with_network<T>(shape: Shape, seed: usize, make: impl FnOnce(Network<'_>) -> T) -> T {
+    let Shape { inputs, centres, outputs } = shape;
+    let number = |i: usize| ((i * 37 + seed * 11) % 101) as f32 / 50.0 - 1.0;
     let list = |from: usize, count: usize| (from..from + count).map(number).collect::<Vec<_>>();
-    let (centre, weights, bias) = (list(1, inputs), list(2, outputs), list(3, outputs));
-    let (minimum, per_span) = (vec![50.0; inputs], vec![0.05; inputs]);
-    let network = float32::Network::try_new(
-        Shape { inputs, centres: 1, outputs },
-        Parameters {
-            input_minimum: &minimum,
-            input_per_span: &per_span,
-            centres: &centre,
-            decay: &[1.5],
-            output_weights: &weights,
-            bias: &bias,
-            affine: &[],
-        },
-    );
-    let networks = &[network.unwrap().into()];
-    encode_to_vec(&ModelParts::new(networks, &[0], metadata)).unwrap()
+    let parameters = Parameters {
+        input_minimum: &vec![50.0; inputs],
+        input_per_span: &vec![0.05; inputs],
+        centres: &list(1, centres * inputs),
+        decay: &vec![1.5; centres],
+        output_weights: &list(2, centres * outputs),
+        bias: &list(3, outputs),
+        affine: &list(4, inputs * outputs),
+    };
+    make(float32::Network::try_new(shape, parameters).unwrap().into())
 }

@@ -1,13 +1,10 @@
 //! The sensor and its circuit.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 
 use super::board::Board;
-use super::shape::{COLS, ROWS, TestFrame};
+use super::shape::{COLS, ROWS};
 
 /// Least time in µs of a scan.
 const SCAN_US: u32 = 10;
@@ -16,7 +13,6 @@ const SCAN_US: u32 = 10;
 #[derive(Clone)]
 pub struct Source {
     circuit: ZeroPotential<ROWS, COLS>,
-    frame: Rc<RefCell<TestFrame>>,
     board: Board,
     /// What a scan by itself has read, and the time in µs at which it ends.
     under_way: Option<(Vec<f32>, u32)>,
@@ -25,15 +21,15 @@ pub struct Source {
 }
 
 impl Source {
-    /// A sensor with this `frame`.
-    pub fn new(frame: &Rc<RefCell<TestFrame>>, board: &Board) -> Self {
-        let (frame, board) = (frame.clone(), board.clone());
-        Self { circuit: ZeroPotential::TYPICAL, frame, board, under_way: None, ended: None }
+    /// The sensor of `board`.
+    pub fn new(board: &Board) -> Self {
+        let (circuit, board) = (ZeroPotential::TYPICAL, board.clone());
+        Self { circuit, board, under_way: None, ended: None }
     }
 
     fn read(&self, settings: ScanSettings, wires: Selection<'_>) -> Vec<f32> {
         assert!(settings.oversampling > 0, "a scan without samples");
-        let (shown, columns) = (self.frame.borrow(), wires.columns);
+        let (shown, columns) = (self.board.frame.borrow(), wires.columns);
         let readings = wires.rows.iter().flat_map(|row| columns.pick(shown[row.0]));
         readings.collect()
     }
