@@ -36,7 +36,6 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
         let tried = model(&mut session, &bench.board).unwrap();
         assert_eq!((tried.crc_32, tried.slot, tried.generation), (crc_of(&new), 1, 1));
         assert_eq!((tried.on_trial, tried.in_ram), (true, words > 0));
-        let _ = session;
         let left = after_restart(&slots, &mut bench).unwrap();
         assert_eq!((left.crc_32, left.on_trial), (crc_of(&old), false));
     }
@@ -52,7 +51,6 @@ fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     let found = model(&mut session, &bench.board).unwrap();
     assert_eq!((found.crc_32, found.generation, found.on_trial), (crc_of(&new), 1, false));
-    let _ = session;
     assert_eq!(after_restart(&slots, &mut bench), Some(found));
 }
 
@@ -66,7 +64,6 @@ fn a_confirmation_that_cannot_be_written_down_ends_the_trial() {
     bench.app.platform().journal.pages()[0].power_on();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
-    let _ = session;
     assert_eq!(after_restart(&slots, &mut bench).unwrap().crc_32, crc_of(&old));
     assert_eq!(install(&mut bench, &mut slots, &mut [], (&new, CHUNK)), Ok(confirmed(&new)));
 }
@@ -79,7 +76,6 @@ fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     upload(&mut bench, &mut slots, &mut [], &[UploadStep::Abort]).unwrap();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
-    let _ = session;
     assert_eq!([slots[0].words_written, slots[1].words_written], writes);
     let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
     assert_eq!(refused, Err(Refusal::NoUpload), "nothing is on trial any more");
@@ -91,14 +87,12 @@ fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
         undo(&mut session, &board, crc_of(&new)),
         (Ok(confirmed(&old)), Some(SessionEnd::NewModel))
     );
-    let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(
         undo(&mut session, &board, crc_of(&new)),
         (Ok(confirmed(&old)), None),
         "the answer was lost"
     );
-    let _ = session;
     assert_eq!([slots[0].words_written, slots[1].words_written], writes);
     // The model that was tried was never confirmed: there is no way back to it.
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
@@ -114,7 +108,6 @@ fn on_trial_nothing_overwrites_the_previous_model() {
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
-    let _ = session;
     let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
     assert_eq!(state, Ok(confirmed(&new)));
 }
@@ -141,10 +134,8 @@ fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
     let said = reports(&board.pins.borrow().to_host);
     let over = UploadState::TrialOver { crc_32: crc_of(&new) };
     assert_eq!(said, [(UNASKED, format!("{:?}", Report::Upload(over)))]);
-    let _ = session;
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&old)));
-    let _ = session;
     let late = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
     assert_eq!(late, Err(Refusal::TrialOver));
     let state = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));

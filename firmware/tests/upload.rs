@@ -2,7 +2,7 @@
 
 use crate::mock::*;
 use taxel_firmware::app::{Session, SessionEnd};
-use taxel_firmware::link::message::{Configuration, ModelFault, Refusal, UploadState, UploadStep};
+use taxel_firmware::link::message::{ModelFault, Refusal, UploadState, UploadStep};
 use taxel_firmware::store::{ERASES_AT_ONCE, Upload};
 
 const CHUNK: usize = 60;
@@ -40,7 +40,7 @@ fn a_good_model_comes_into_force_and_stays_through_restarts() {
 
 #[test]
 fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor_is_silent() {
-    let (mut session, board) = started(Configuration { frame_period_us: 1000, ..quiet() }, &[]);
+    let (mut session, board) = started(every(1000), &[]);
     *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
     for _ in 0..2000 {
         session.step();

@@ -8,8 +8,7 @@ use crate::mock::*;
 
 #[test]
 fn a_baseline_is_captured_and_contact_is_told_against_it() {
-    let (mut session, board) =
-        started(Configuration { frame_period_us: 100, ..quiet() }, &blob(3, 4));
+    let (mut session, board) = started(every(100), &blob(3, 4));
     board
         .pins
         .borrow_mut()
@@ -60,7 +59,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
         (flags & EstimateReport::NO_BASELINE, status)
     };
     let begin = |session: &mut TestSession<'_>| {
-        let scanning = Configuration { frame_period_us: 100, ..quiet() };
+        let scanning = every(100);
         tell(session, &board, &Request::Configure(scanning));
         send(session, &board, 8, &Request::CaptureBaseline { frames: 1000 });
     };
@@ -92,8 +91,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
 
 #[test]
 fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once() {
-    let (mut session, board) =
-        started(Configuration { frame_period_us: 100, ..quiet() }, &blob(3, 4));
+    let (mut session, board) = started(every(100), &blob(3, 4));
     let say = |session: &mut TestSession<'_>, number: u16, request: &Request<'_>| {
         send(session, &board, number, request);
     };
@@ -114,7 +112,7 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
     say(&mut session, 13, &Request::CaptureBaseline { frames: 1 });
     assert_eq!(answer(13), [refused.as_str()]);
     // The same request again goes on counting, and another under its number starts anew.
-    say(&mut session, 14, &Request::Configure(Configuration { frame_period_us: 100, ..quiet() }));
+    say(&mut session, 14, &Request::Configure(every(100)));
     for frames in [1000, 3, 3] {
         say(&mut session, 15, &Request::CaptureBaseline { frames });
     }

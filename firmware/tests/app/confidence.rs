@@ -45,11 +45,7 @@ fn expected(blob: &[u8], frame: &TestFrame, baseline_ohm: f32) -> Sent {
 fn decode(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> (Sent, u8) {
     let readings_ohm = Floats::new(frame.as_flattened());
     let request = Request::Decode { frame: 5, start_us: 0, readings_ohm };
-    ask(session, board, &request, |report| match report {
-        Report::Estimate(estimate) => (Sent::new(&estimate), estimate.flags),
-        other => panic!("{other:?}"),
-    })
-    .0
+    answer!(session, board, &request, Report::Estimate(it) => (Sent::new(&it), it.flags))
 }
 
 /// What the device sends of its next scans, which it then ends.
@@ -82,58 +78,52 @@ fn with_last(ohm: f32) -> TestFrame {
 
 #[test]
 fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
-    let blob = blob_with_confidence(false);
-    let (mut session, board) = started(quiet(), &blob);
-    for (ohm, novel) in [(65.0, false), (64.0, false), (900.0, true)] {
-        let (found, flags) = decode(&mut session, &board, &with_last(ohm));
-        assert_eq!(found, expected(&blob, &with_last(ohm), f32::NAN), "{ohm}");
-        assert_eq!((found.novel, flags & EstimateReport::NOVEL != 0), (novel, novel), "{ohm}");
-        assert_eq!(found.deviation.len(), ROWS * OUTPUTS);
+    for (is_relative, baseline_ohm) in [(false, f32::NAN), (true, 62.0)] {
+        let blob = blob_with_confidence(is_relative);
+        let (mut session, board) = started(quiet(), &blob);
+        let (found, flags) = decode(&mut session, &board, &frame_at_rest());
+        let is_unknown = found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan());
+        let unknown = if is_relative { EstimateReport::NO_BASELINE } else { 0 };
+        assert_eq!((flags, is_unknown), (unknown, is_relative));
+        let readings_ohm = Floats::new(&[62.0; ROWS * COLS]);
+        tell(&mut session, &board, &Request::SetBaseline { readings_ohm });
+        // However little a frame is novel, it is flagged.
+        let hardly = (65..900).map(|ohm| ohm as f32).find(|ohm| {
+            let novelty = expected(&blob, &with_last(*ohm), baseline_ohm).novelty;
+            novelty.is_some_and(|novelty| (1e-6..1.0).contains(&f32::from_bits(novelty)))
+        });
+        for (ohm, novel) in [(65.0, false), (64.0, false), (hardly.unwrap(), true), (900.0, true)] {
+            let (found, _) = decode(&mut session, &board, &with_last(ohm));
+            assert_eq!(found, expected(&blob, &with_last(ohm), baseline_ohm), "{ohm}");
+            assert_eq!((found.novel, found.deviation.len()), (novel, ROWS * OUTPUTS), "{ohm}");
+        }
+        let s = statistics(&mut session, &board);
+        assert_eq!((s.frames_novel, s.longest_confidence_us > 0), (2, true));
     }
-    let s = statistics(&mut session, &board);
-    assert_eq!((s.frames_decoded, s.frames_novel), (3, 1));
-    assert!(s.longest_confidence_us > 0);
-    // However little a frame is novel, it is flagged.
-    let hardly = (65..900).map(|ohm| with_last(ohm as f32)).find(|frame| {
-        let novelty = expected(&blob, frame, f32::NAN).novelty.map(f32::from_bits);
-        novelty.is_some_and(|novelty| novelty > 0.0 && novelty < 1.0)
-    });
-    assert!(decode(&mut session, &board, &hardly.unwrap()).0.novel);
 }
 
 #[test]
-fn without_a_confidence_nothing_is_sent() {
-    let (mut session, board) = started(quiet(), &blob(3, 4));
-    assert_eq!(decode(&mut session, &board, &with_last(900.0)).0, Sent::NOTHING);
-    *board.frame.borrow_mut() = with_last(900.0);
-    for sent in scanned(&mut session, &board, ConfidenceSent::Deviations) {
-        assert_eq!(sent, Sent::NOTHING);
-    }
-    let s = statistics(&mut session, &board);
-    assert_eq!((s.frames_novel, s.longest_confidence_us), (0, 0));
-}
-
-#[test]
-fn of_a_scan_comes_what_the_configuration_says() {
-    let blob = blob_with_confidence(false);
-    let (mut session, board) = started(quiet(), &blob);
+fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
+    let (with, without) = (blob_with_confidence(false), blob(3, 4));
     let frame = with_last(900.0);
-    *board.frame.borrow_mut() = frame;
-    let all = || expected(&blob, &frame, f32::NAN);
-    assert!(all().novel);
-
-    for sent in scanned(&mut session, &board, ConfidenceSent::Nothing) {
-        assert_eq!(sent, Sent::NOTHING);
+    let all = || expected(&with, &frame, f32::NAN);
+    let novelty = Sent { deviation: Vec::new(), ..all() };
+    for (blob, confidence, expected) in [
+        (&without, ConfidenceSent::Deviations, Sent::NOTHING),
+        (&with, ConfidenceSent::Nothing, Sent::NOTHING),
+        (&with, ConfidenceSent::Novelty, novelty),
+        (&with, ConfidenceSent::Deviations, all()),
+    ] {
+        let (mut session, board) = started(quiet(), blob);
+        *board.frame.borrow_mut() = frame;
+        let frames = scanned(&mut session, &board, confidence);
+        assert!(frames.iter().all(|sent| *sent == expected), "{confidence:?}: {frames:?}");
+        let s = statistics(&mut session, &board);
+        assert_eq!(s.frames_novel, if expected.novel { s.frames_decoded } else { 0 });
+        assert_eq!(s.longest_confidence_us > 0, expected.novel);
     }
-    assert_eq!(statistics(&mut session, &board).longest_confidence_us, 0);
-    for sent in scanned(&mut session, &board, ConfidenceSent::Novelty) {
-        assert_eq!(sent, Sent { deviation: Vec::new(), ..all() });
-    }
-    for sent in scanned(&mut session, &board, ConfidenceSent::Deviations) {
-        assert_eq!(sent, all());
-    }
-    let s = statistics(&mut session, &board);
-    assert!(s.frames_novel >= 4 && s.frames_novel < s.frames_decoded, "{s:?}");
+    let (mut session, board) = started(quiet(), &without);
+    assert_eq!(decode(&mut session, &board, &frame).0, Sent::NOTHING);
 }
 
 #[test]
@@ -146,21 +136,5 @@ fn a_frame_with_a_faulty_reading_has_no_confidence_and_is_not_novel() {
         assert!(found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan()), "{bad}");
         assert_eq!(found.deviation.len(), ROWS * OUTPUTS);
         assert!(found.deviation.iter().all(|value| f32::from_bits(*value).is_nan()), "{bad}");
-    }
-}
-
-#[test]
-fn relative_inputs_need_a_baseline_for_a_confidence_too() {
-    let blob = blob_with_confidence(true);
-    let (mut session, board) = started(quiet(), &blob);
-    let (found, flags) = decode(&mut session, &board, &frame_at_rest());
-    assert_eq!(flags, EstimateReport::NO_BASELINE);
-    assert!(found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan()));
-    let request = Request::SetBaseline { readings_ohm: Floats::new(&[62.0; ROWS * COLS]) };
-    tell(&mut session, &board, &request);
-    for (ohm, novel) in [(65.0, false), (900.0, true)] {
-        let (found, _) = decode(&mut session, &board, &with_last(ohm));
-        assert_eq!(found, expected(&blob, &with_last(ohm), 62.0), "{ohm}");
-        assert_eq!(found.novel, novel, "{ohm}");
     }
 }

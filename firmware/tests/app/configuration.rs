@@ -26,19 +26,15 @@ fn configurations_are_checked_and_a_bad_one_changes_nothing() {
 
 /// The configuration in force.
 fn in_force(session: &mut TestSession<'_>, board: &Board) -> Configuration {
-    ask(session, board, &Request::Configuration, |report| match report {
-        Report::Configuration(configuration) => configuration,
-        other => panic!("{other:?}"),
-    })
-    .0
+    answer!(session, board, &Request::Configuration, Report::Configuration(it) => it)
 }
 
 #[test]
 fn a_configuration_that_is_not_kept_lasts_until_the_host_resumes_what_is() {
-    let default = Configuration { frame_period_us: 10_000, ..quiet() };
+    let default = every(10_000);
     let (mut session, board) = started(default, &blob(3, 4));
     let mut own = default;
-    for kept in [None, Some(Configuration { frame_period_us: 20_000, ..quiet() })] {
+    for kept in [None, Some(every(20_000))] {
         if let Some(kept) = kept {
             tell(&mut session, &board, &Request::Configure(kept));
             tell(&mut session, &board, &Request::Keep(Setting::Configuration));
@@ -62,8 +58,8 @@ fn a_configuration_that_is_not_kept_lasts_until_the_host_resumes_what_is() {
 
 #[test]
 fn another_configuration_gives_up_the_baseline_and_the_same_one_keeps_time() {
-    let slow = Configuration { frame_period_us: 1_000_000, ..quiet() };
-    let fast = Request::Configure(Configuration { frame_period_us: 1000, ..quiet() });
+    let slow = every(1_000_000);
+    let fast = Request::Configure(every(1000));
     let (mut session, board) = started(slow, &blob(3, 4));
     tell(&mut session, &board, &fast);
     send(&mut session, &board, 9, &Request::CaptureBaseline { frames: 1000 });

@@ -3,7 +3,7 @@
 use taxel_core::Decoder;
 use taxel_core::blob::{Floats, Model, ModelParts, encode_to_vec};
 use taxel_core::fill::Fill;
-use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
+use taxel_firmware::link::message::{EstimateReport, Refusal, Report, Request};
 
 use super::requests::{bits, capture, decode, expected};
 use crate::mock::*;
@@ -103,7 +103,7 @@ fn a_baseline_that_is_being_captured_tells_of_no_contact() {
         decode(session, &board, frame).0 & EstimateReport::CONTACT
     };
     assert_eq!(contact(&mut session, &pressed), EstimateReport::CONTACT);
-    let scanning = Configuration { frame_period_us: 1_000_000, ..quiet() };
+    let scanning = every(1_000_000);
     tell(&mut session, &board, &Request::Configure(scanning));
     let again = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
     board.pins.borrow_mut().to_device.extend(again);

@@ -49,14 +49,10 @@ fn decode_at(
 ) -> (Vec<u8>, Vec<u32>) {
     let readings_ohm = Floats::new(frame.as_flattened());
     let request = Request::Decode { frame: 5, start_us, readings_ohm };
-    ask(session, board, &request, |report| match report {
-        Report::Estimate(estimate) => {
-            assert_eq!(estimate.start_us, start_us);
-            (estimate.row_status.to_vec(), bits(estimate.outputs.iter()))
-        }
-        other => panic!("{other:?}"),
+    answer!(session, board, &request, Report::Estimate(estimate) => {
+        assert_eq!(estimate.start_us, start_us);
+        (estimate.row_status.to_vec(), bits(estimate.outputs.iter()))
     })
-    .0
 }
 
 /// Estimates that were sent unasked: number of the frame, its time, and its bits.
@@ -176,8 +172,7 @@ fn one_scan_of_some_is_reported_and_all_are_filtered() {
 
 #[test]
 fn the_latency_lasts_until_the_last_byte_is_taken() {
-    let (mut session, board) =
-        started(Configuration { frame_period_us: 10_000, ..quiet() }, &blob(3, 4));
+    let (mut session, board) = started(every(10_000), &blob(3, 4));
     let mut latencies = Vec::new();
     for gap_us in [0, 20] {
         board.pins.borrow_mut().gap_us = gap_us;

@@ -23,11 +23,9 @@ fn the_identity_tells_what_the_model_was_trained_on() {
     let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });
     let read = |metadata: Metadata<'static>| {
         let (mut session, board) = started(quiet(), &network(metadata));
-        ask(&mut session, &board, &Request::Identify, |report| match report {
-            Report::Identity(identity) => (identity.model_name.to_owned(), identity.model.unwrap()),
-            other => panic!("{other:?}"),
+        answer!(&mut session, &board, &Request::Identify, Report::Identity(identity) => {
+            (identity.model_name.to_owned(), identity.model.unwrap())
         })
-        .0
     };
     let (name, model) = read(Metadata { name: "press", scene_digest: 7, ..plain });
     assert_eq!((&name[..], model.scene_digest), ("press", 7));
@@ -113,7 +111,6 @@ fn a_model_of_wires_that_the_board_lacks_is_refused_and_not_put_in_force() {
         let mut bench = Bench::new(quiet());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         assert_eq!(model_crc(&mut session, &bench.board), None, "{names}");
-        let _ = session;
         let mut slots = Flash::slots_with(&[]);
         let refused = upload(&mut bench, &mut slots, &mut [], &upload_steps(&blob, 64));
         assert_eq!(refused, Err(Refusal::BadModel(ModelFault::Wires)), "{names}");
@@ -133,16 +130,13 @@ fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
     let baseline = Request::SetBaseline { readings_ohm: Floats::new(&[60.0, 50.0]) };
     tell(&mut session, &board, &baseline);
     tell(&mut session, &board, &Request::Keep(Setting::Baseline));
-    let _ = session;
     for (next, contact) in [(&second, 0), (&first, EstimateReport::CONTACT)] {
         install(&mut bench, &mut slots, &mut [], (next, 64)).unwrap();
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         let request =
             Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats::new(&[30.0; 2]) };
-        ask(&mut session, &board, &request, |report| match report {
-            Report::Estimate(it) => assert_eq!(it.flags & EstimateReport::CONTACT, contact),
-            other => panic!("{other:?}"),
-        });
+        let flags = answer!(&mut session, &board, &request, Report::Estimate(it) => it.flags);
+        assert_eq!(flags & EstimateReport::CONTACT, contact);
     }
 }
 
@@ -163,16 +157,10 @@ fn a_model_is_decoded_from_ram_where_it_fits() {
         let mut weights = vec![0; room];
         let mut bench = Bench::new(quiet());
         let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-        let read = |report: Report<'_>| match report {
-            Report::Identity(identity) => identity.model.map(|model| model.in_ram),
-            other => panic!("{other:?}"),
-        };
-        let found = ask(&mut session, &bench.board, &Request::Identify, read).0;
-        assert_eq!(found, Some(in_ram));
+        assert_eq!(model(&mut session, &bench.board).unwrap().in_ram, in_ram);
         let frame = frame_at_rest();
         let (_, _, found) = decode(&mut session, &bench.board, &frame);
         assert_eq!(found, bits(expected(&blob, &frame).into_iter().flatten()));
-        let _ = session;
         assert_eq!(bytemuck::cast_slice::<u32, u8>(&weights).starts_with(&blob), in_ram);
     }
 }
@@ -188,11 +176,7 @@ fn behind_a_damaged_model_the_other_slots_is_decoded_from_there() {
         let mut session = Session::start(&mut bench.app, slots, &mut weights);
         let frame = frame_at_rest();
         let (_, _, found) = decode(&mut session, &bench.board, &frame);
-        let read = |report: Report<'_>| match report {
-            Report::Identity(identity) => identity.model.map(|model| (model.slot, model.in_ram)),
-            other => panic!("{other:?}"),
-        };
-        (ask(&mut session, &bench.board, &Request::Identify, read).0, found)
+        (model(&mut session, &bench.board).map(|model| (model.slot, model.in_ram)), found)
     };
     let outputs = |blob: &[u8]| bits(expected(blob, &frame_at_rest()).into_iter().flatten());
     assert_eq!(in_force(&mut slots), (Some((1, true)), outputs(&second)));

@@ -2,7 +2,7 @@
 
 use taxel_core::blob::Floats;
 use taxel_core::{Aligned, Decoder};
-use taxel_firmware::link::message::{Configuration, Report, Request};
+use taxel_firmware::link::message::{Report, Request};
 
 use crate::mock::*;
 
@@ -21,25 +21,21 @@ pub fn bits(values: impl Iterator<Item = f32>) -> Vec<u32> {
 
 /// Asks for an estimate of `frame`, and returns its flags, row status and bits.
 pub fn decode(
-    session: &mut TestSession<'_>,
+    session: &mut Running<'_, '_>,
     board: &Board,
     frame: &TestFrame,
 ) -> (u8, Vec<u8>, Vec<u32>) {
     let readings_ohm = Floats::new(frame.as_flattened());
     let request = Request::Decode { frame: 5, start_us: 0, readings_ohm };
-    ask(session, board, &request, |report| match report {
-        Report::Estimate(e) => {
-            assert_eq!(e.frame, 5);
-            (e.flags, e.row_status.to_vec(), bits(e.outputs.iter()))
-        }
-        other => panic!("{other:?}"),
+    answer!(session, board, &request, Report::Estimate(e) => {
+        assert_eq!(e.frame, 5);
+        (e.flags, e.row_status.to_vec(), bits(e.outputs.iter()))
     })
-    .0
 }
 
 /// Captures a baseline of `frames` scans. Then sets a configuration that scans only on request.
-pub fn capture(session: &mut TestSession<'_>, board: &Board, frames: u16) {
-    let scanning = Configuration { frame_period_us: 100, ..quiet() };
+pub fn capture(session: &mut Running<'_, '_>, board: &Board, frames: u16) {
+    let scanning = every(100);
     tell(session, board, &Request::Configure(scanning));
     let request = request_bytes(9, &Request::CaptureBaseline { frames });
     board.pins.borrow_mut().to_device.extend(request);

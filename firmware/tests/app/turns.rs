@@ -29,7 +29,7 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
 
 #[test]
 fn a_scan_longer_than_the_period_is_an_overrun() {
-    let configuration = Configuration { frame_period_us: 100, ..quiet() };
+    let configuration = every(100);
     let (mut session, board) = started(configuration, &blob(3, 4));
     board.pins.borrow_mut().scan_us = 250;
     run_until(&mut session, &board, 2000);
@@ -44,8 +44,7 @@ fn a_scan_longer_than_the_period_is_an_overrun() {
 
 #[test]
 fn the_watchdog_is_fed_by_good_loops_only() {
-    let (mut session, board) =
-        started(Configuration { frame_period_us: 100, ..quiet() }, &blob(3, 4));
+    let (mut session, board) = started(every(100), &blob(3, 4));
     let feeds = || board.pins.borrow().feeds;
     for _ in 0..50 {
         let before = feeds();
@@ -123,8 +122,7 @@ fn however_slowly_bytes_are_taken_the_watchdog_is_fed() {
 
 #[test]
 fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
-    let (mut session, board) =
-        started(Configuration { frame_period_us: 1000, ..quiet() }, &blob(3, 4));
+    let (mut session, board) = started(every(1000), &blob(3, 4));
     board.pins.borrow_mut().room = Some(10);
     run_until(&mut session, &board, 500_000);
     // The report that was cut is a broken frame, which does not damage the next report.

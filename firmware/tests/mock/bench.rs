@@ -26,6 +26,11 @@ pub fn quiet() -> Configuration {
     Configuration { frame_period_us: 0, ..Configuration::DEFAULT }
 }
 
+/// A configuration that scans at this period.
+pub fn every(frame_period_us: u32) -> Configuration {
+    Configuration { frame_period_us, ..quiet() }
+}
+
 /// An application, and the host's ends of everything it is connected to.
 pub struct Bench<'m> {
     /// The application. A session borrows it.

@@ -4,13 +4,13 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use taxel_firmware::app::Session;
-use taxel_firmware::link::message::{ModelIdentity, Report, Request, UploadState, UploadStep};
+use taxel_firmware::link::message::{ModelIdentity, UploadState, UploadStep};
 use taxel_firmware::store::{Journal, KeepError, Kind};
 
 use super::bench::{Bench, Memory, Running, quiet};
 use super::board::Board;
 use super::flash::{Cells, Flash, Supply};
-use super::host::{self, Answer, ask, model_crc, undo, upload_steps};
+use super::host::{self, Answer, model, model_crc, undo, upload_steps};
 use super::models::crc_of;
 
 /// Bytes of a chunk of an upload.
@@ -143,13 +143,4 @@ pub fn confirmed_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
     let mut steps = trial_steps(blob);
     steps.push(UploadStep::Confirm);
     steps
-}
-
-/// The model in force.
-pub fn model(session: &mut Running<'_, '_>, board: &Board) -> Option<ModelIdentity> {
-    ask(session, board, &Request::Identify, |report| match report {
-        Report::Identity(identity) => identity.model,
-        other => panic!("{other:?}"),
-    })
-    .0
 }

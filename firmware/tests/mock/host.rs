@@ -3,7 +3,7 @@
 use taxel_core::blob::Model;
 use taxel_firmware::app::{Session, SessionEnd};
 use taxel_firmware::link::message::{
-    Refusal, Report, Request, Statistics, UploadState, UploadStep,
+    ModelIdentity, Refusal, Report, Request, Statistics, UploadState, UploadStep,
 };
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
@@ -90,6 +90,18 @@ pub fn ask<T>(
     (found, end)
 }
 
+/// What the device answers to a request, which is as in the pattern.
+macro_rules! answer {
+    ($session:expr, $board:expr, $request:expr, $report:pat => $value:expr) => {
+        crate::mock::ask($session, $board, $request, |report| match report {
+            $report => $value,
+            other => panic!("{other:?}"),
+        })
+        .0
+    };
+}
+pub(crate) use answer;
+
 /// Sends `request`, whatever the answer.
 pub fn tell(session: &mut Running<'_, '_>, board: &Board, request: &Request<'_>) {
     ask(session, board, request, |_| ());
@@ -110,20 +122,17 @@ pub fn run_until(session: &mut Running<'_, '_>, board: &Board, end_us: u32) {
 
 /// The device's counters.
 pub fn statistics(session: &mut Running<'_, '_>, board: &Board) -> Statistics {
-    let read = |report: Report<'_>| match report {
-        Report::Statistics(statistics) => statistics,
-        other => panic!("{other:?}"),
-    };
-    ask(session, board, &Request::Statistics, read).0
+    answer!(session, board, &Request::Statistics, Report::Statistics(it) => it)
+}
+
+/// The model in force.
+pub fn model(session: &mut Running<'_, '_>, board: &Board) -> Option<ModelIdentity> {
+    answer!(session, board, &Request::Identify, Report::Identity(identity) => identity.model)
 }
 
 /// The CRC-32 of the model in force.
 pub fn model_crc(session: &mut Running<'_, '_>, board: &Board) -> Option<u32> {
-    let read = |report: Report<'_>| match report {
-        Report::Identity(identity) => identity.model.map(|model| model.crc_32),
-        other => panic!("{other:?}"),
-    };
-    ask(session, board, &Request::Identify, read).0
+    model(session, board).map(|model| model.crc_32)
 }
 
 /// The first step of an upload of `blob`.
@@ -171,7 +180,7 @@ pub fn upload_step(
     board: &Board,
     step: UploadStep<'_>,
 ) -> (Answer, Option<SessionEnd>) {
-    ask(session, board, &Request::Upload(step), answer)
+    ask(session, board, &Request::Upload(step), upload_answer)
 }
 
 /// Leaves the model with the CRC-32 `left` for the one before it.
@@ -180,10 +189,10 @@ pub fn undo(
     board: &Board,
     left: u32,
 ) -> (Answer, Option<SessionEnd>) {
-    ask(session, board, &Request::Undo { crc_32: left }, answer)
+    ask(session, board, &Request::Undo { crc_32: left }, upload_answer)
 }
 
-fn answer(report: Report<'_>) -> Answer {
+fn upload_answer(report: Report<'_>) -> Answer {
     match report {
         Report::Upload(state) => Ok(state),
         Report::Refused(refusal) => Err(refusal),
