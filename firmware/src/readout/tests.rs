@@ -152,30 +152,17 @@ fn mcp3208_is_asked_in_the_datasheets_bytes() {
     // Bits before the null bit are undefined: they must not count.
     record.0.borrow_mut().answers = vec![[0xFF, 0b1110_1010, 0xBC]];
     let mut sampler = Mcp3208s { chips: record.chips::<3>() };
-    let expected = [
-        [0x06, 0x00],
-        [0x06, 0x40],
-        [0x06, 0x80],
-        [0x06, 0xC0],
-        [0x07, 0x00],
-        [0x07, 0x40],
-        [0x07, 0x80],
-        [0x07, 0xC0],
-    ];
-    for column in 0..24 {
-        assert_eq!(sampler.sample(ColumnWire(column)), Ok(0xABC));
-        let [first, second] = expected[column % 8];
-        assert_eq!(record.take(), [Event::Transfer(column / 8, vec![first, second, 0])]);
+    for column in 0..24_u8 {
+        assert_eq!(sampler.sample(ColumnWire(column.into())), Ok(0xABC));
+        // A start bit, a bit for single-ended, and the channel in three bits across two bytes.
+        let channel = column % 8;
+        let asked = vec![0x06 | channel >> 2, channel << 6, 0];
+        assert_eq!(record.take(), [Event::Transfer(usize::from(column / 8), asked)]);
     }
     assert_eq!(sampler.sample(ColumnWire(24)), Err(SampleError::NotWired(ColumnWire(24))));
     assert!(record.take().is_empty());
-}
-
-#[test]
-fn mcp3208_that_is_not_there_is_noticed() {
-    let record = Record::default();
+    // A chip that is not there.
     record.0.borrow_mut().answers = vec![[0xFF; 3]];
-    let mut sampler = Mcp3208s { chips: record.chips::<1>() };
     assert_eq!(sampler.sample(ColumnWire(0)), Err(SampleError::NoAnswer));
 }
 
@@ -234,12 +221,32 @@ impl RowDrive for RowPins {
     }
 }
 
-/// A scanner of 2 × 3 wires over one converter chip and row pins.
-fn scanner(record: &Record) -> Scanner<RowPins, Mcp3208s<Spi, 1>, Record, 2, 3> {
-    record.0.borrow_mut().answers = vec![[0, 2000_u16.to_be_bytes()[0], 2000_u16.to_be_bytes()[1]]];
+type TestScanner = Scanner<RowPins, Mcp3208s<Spi, 1>, Record, 2, 3>;
+
+/// A scanner of 2 × 3 wires over one converter chip and row pins, and the record of what it does.
+fn scanner() -> (Record, TestScanner) {
+    let record = Record::default();
+    record.0.borrow_mut().answers = vec![answer(2000)];
     let drive = RowPins(record.pins(["r0", "r1"]));
     let sampler = Mcp3208s { chips: record.chips() };
-    Scanner::new(drive, sampler, record.clone(), ZeroPotential::TYPICAL)
+    let scanner = Scanner::new(drive, sampler, record.clone(), ZeroPotential::TYPICAL);
+    (record, scanner)
+}
+
+/// A frame of both rows, and the number of samples that failed.
+fn scan(scanner: &mut TestScanner) -> ([[f32; 3]; 2], u16) {
+    let mut frame = [[7.0; 3]; 2];
+    let report = scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
+    (frame, report.failed_samples)
+}
+
+fn are_missing(frame: [[f32; 3]; 2]) -> [[bool; 3]; 2] {
+    frame.map(|row| row.map(f32::is_nan))
+}
+
+/// Bytes in which a converter answers with these counts.
+fn answer(counts: u16) -> [u8; 3] {
+    [0, counts.to_be_bytes()[0], counts.to_be_bytes()[1]]
 }
 
 const WIRES: Selection<'static> =
@@ -248,11 +255,8 @@ const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 }
 
 #[test]
 fn a_scan_does_what_it_must_and_no_more() {
-    let record = Record::default();
-    let mut scanner = scanner(&record);
-    let mut frame = [[f32::NAN; 3]; 2];
-    let report = scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
-    assert_eq!(report, ScanReport { failed_samples: 0 });
+    let (record, mut scanner) = scanner();
+    assert_eq!(scan(&mut scanner).1, 0);
     // Each row, and the idle samples, take one wait and one sample a column.
     assert_eq!(record.transfers(), 3 * 3 * 4);
     // A release changes two pins, a drive three.
@@ -269,14 +273,11 @@ fn a_scan_does_what_it_must_and_no_more() {
 
 #[test]
 fn readings_are_those_of_the_mean_counts() {
-    let record = Record::default();
-    let mut scanner = scanner(&record);
-    let answer = |n: u16| [0, n.to_be_bytes()[0], n.to_be_bytes()[1]];
+    let (record, mut scanner) = scanner();
     let idle = [250; 12];
     let counts = idle.iter().chain(&[2600, 2601, 2603, 2604, 2000]);
     record.0.borrow_mut().answers = counts.copied().map(answer).collect();
-    let mut frame = [[f32::NAN; 3]; 2];
-    scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
+    let (frame, _) = scan(&mut scanner);
     let mut expected = [2602.0, 2000.0, 2000.0];
     let row = ScannedRow { row: RowWire(0), columns: WIRES.columns, load: 1.0 };
     ZeroPotential::<2, 3>::TYPICAL.row_ohm(row, &[250.0; 3], 4095, &mut expected);
@@ -284,47 +285,26 @@ fn readings_are_those_of_the_mean_counts() {
 }
 
 #[test]
-fn a_failed_transaction_costs_one_reading() {
-    let record = Record::default();
-    let mut scanner = scanner(&record);
-    // This is the third sample of the second row's second column.
-    record.0.borrow_mut().failing_transfer = Some(2 * 3 * 4 + 4 + 2);
-    let mut frame = [[f32::NAN; 3]; 2];
-    assert_eq!(
-        scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut()),
-        ScanReport { failed_samples: 1 }
-    );
-    let missing = frame.map(|row| row.map(f32::is_nan));
-    assert_eq!(missing, [[false; 3], [false, true, false]]);
-}
-
-#[test]
-fn a_failed_idle_sample_costs_its_column_until_the_next_scan() {
-    let record = Record::default();
-    let mut scanner = scanner(&record);
-    record.0.borrow_mut().failing_transfer = Some(4);
-    let mut frame = [[f32::NAN; 3]; 2];
-    assert_eq!(
-        scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut()),
-        ScanReport { failed_samples: 1 }
-    );
-    let missing = frame.map(|row| row.map(f32::is_nan));
-    assert_eq!(missing, [[false, true, false]; 2]);
-    // The next scan takes another; where rows are not released for it, the one before does not stand in.
-    record.0.borrow_mut().failing_transfer = None;
-    scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
-    assert_eq!(frame.map(|row| row.map(f32::is_nan)), [[false; 3]; 2]);
-    scanner.restart();
-    let next = record.pin_changes();
-    record.0.borrow_mut().failing_pin_change = Some(next);
-    scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
-    assert_eq!(frame.map(|row| row.map(f32::is_nan)), [[true; 3]; 2]);
+fn a_failed_transaction_costs_one_reading_and_an_idle_one_its_column_until_the_next_scan() {
+    // The third sample of the second row's second column, and an idle one of the second column.
+    for (failing, first_row) in [(2 * 3 * 4 + 4 + 2, [false; 3]), (4, [false, true, false])] {
+        let (record, mut scanner) = scanner();
+        record.0.borrow_mut().failing_transfer = Some(failing);
+        let (frame, failed) = scan(&mut scanner);
+        assert_eq!((are_missing(frame), failed), ([first_row, [false, true, false]], 1));
+        // The next scan takes another; where rows are not released for it, the one before does not stand in.
+        record.0.borrow_mut().failing_transfer = None;
+        assert_eq!(are_missing(scan(&mut scanner).0), [[false; 3]; 2]);
+        scanner.restart();
+        let next = record.pin_changes();
+        record.0.borrow_mut().failing_pin_change = Some(next);
+        assert_eq!(are_missing(scan(&mut scanner).0), [[true; 3]; 2]);
+    }
 }
 
 #[test]
 fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
-    let record = Record::default();
-    let mut scanner = scanner(&record);
+    let (record, mut scanner) = scanner();
     let mut frame = [f32::NAN; 6];
     let mut samples = |scanner: &mut dyn FrameSource, settings, wires: Selection<'_>| {
         let before = record.transfers();
@@ -365,11 +345,9 @@ fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
 #[test]
 fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing() {
     for failing in 0..10 {
-        let record = Record::default();
-        let mut scanner = scanner(&record);
+        let (record, mut scanner) = scanner();
         record.0.borrow_mut().failing_pin_change = Some(failing);
-        let mut frame = [[1.0; 3]; 2];
-        let report = scanner.scan(SETTINGS, WIRES, frame.as_flattened_mut());
+        let (frame, failed) = scan(&mut scanner);
         let rows_missing = frame.map(|row| row.iter().all(|r| r.is_nan()));
         // Without a first release there are no idle samples. Changes 2 to 4 drive row 0; if the releasing half fails, the
         // driving half is left out.
@@ -379,25 +357,20 @@ fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing(
             5..=7 => ([false, true], 3),
             _ => ([false, false], 1),
         };
-        assert_eq!((rows_missing, report.failed_samples), expected, "change {failing}");
+        assert_eq!((rows_missing, failed), expected, "change {failing}");
         assert_eq!(record.levels(), HashMap::from([("r0", LOW), ("r1", LOW)]));
     }
 }
 
 #[test]
 fn settings_out_of_range_are_taken_for_the_nearest() {
-    let record = Record::default();
-    let mut scanner = scanner(&record);
+    let (record, mut scanner) = scanner();
     let mut frame = [[f32::NAN; 3]; 2];
     let wild = ScanSettings { settling_us: u32::MAX, oversampling: 0 };
     assert_eq!(scanner.scan(wild, WIRES, frame.as_flattened_mut()).failed_samples, 0);
     assert_eq!(record.transfers(), 3 * 3);
-    let waited_ns: u64 = record
-        .take()
-        .iter()
-        .map(|event| if let Event::WaitNs(ns) = event { u64::from(*ns) } else { 0 })
-        .sum();
-    assert_eq!(waited_ns, 3 * 10_000_000);
+    let waits = record.take();
+    assert_eq!(waits.iter().filter(|it| **it == Event::WaitNs(10_000_000)).count(), 3);
     assert_eq!(ScanSettings::try_new(10_001, 1), None);
     assert_eq!(
         ScanSettings::try_new(10_000, 256),
@@ -408,11 +381,9 @@ fn settings_out_of_range_are_taken_for_the_nearest() {
 
 #[test]
 fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its_own_input() {
-    let record = Record::default();
-    let mut scanner = scanner(&record);
+    let (record, mut scanner) = scanner();
     let once = ScanSettings { oversampling: 1, ..SETTINGS };
     let wires = Selection { rows: &[RowWire(1)], columns: ColumnWires(0b110) };
-    let answer = |n: u16| [0, n.to_be_bytes()[0], n.to_be_bytes()[1]];
     // Idle in all columns, the asked ones first; then the second row's.
     record.0.borrow_mut().answers = [251, 252, 250, 2001, 2002, 2000].map(answer).to_vec();
     let mut frame = [7.0; 3];
@@ -436,8 +407,7 @@ fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its
 
 #[test]
 fn wires_that_a_scanner_does_not_have_are_missing() {
-    let record = Record::default();
-    let mut scanner = scanner(&record);
+    let (_, mut scanner) = scanner();
     let mut frame = [7.0; 4];
     let report = scanner.scan(
         SETTINGS,
@@ -507,6 +477,8 @@ fn passes(polls: u32) -> (Rc<RefCell<Table>>, Passes) {
 }
 
 const BOTH: [RowWire; 2] = [RowWire(1), RowWire(0)];
+const ALL: Selection<'static> = Selection { rows: &BOTH, columns: ColumnWires(0b111) };
+const ONCE: ScanSettings = ScanSettings { settling_us: 20, oversampling: 1 };
 
 #[test]
 fn a_scan_by_passes_is_what_the_circuit_makes_of_the_same_counts() {
@@ -541,20 +513,18 @@ fn a_scan_by_passes_is_what_the_circuit_makes_of_the_same_counts() {
 #[test]
 fn rows_idle_in_the_first_of_sixteen_scans_and_behind_what_changes() {
     let (table, mut scanner) = passes(0);
-    let settings = ScanSettings { settling_us: 20, oversampling: 1 };
-    let wires = Selection { rows: &BOTH, columns: ColumnWires(0b111) };
     let scan = |scanner: &mut Passes, settings| {
         let mut frame = [0.0; 6];
-        let report = scanner.scan(settings, wires, &mut frame);
+        let report = scanner.scan(settings, ALL, &mut frame);
         let idles = table.borrow().passes.last().unwrap().0[0].is_none();
         // Every scan has the samples of its own alone.
         assert!(report.failed_samples > 0 || (74.0..74.1).contains(&frame[1]), "{frame:?}");
         (idles, report.failed_samples, frame[0].is_nan())
     };
-    let idle: Vec<_> = (0..34).map(|_| scan(&mut scanner, settings).0).collect();
+    let idle: Vec<_> = (0..34).map(|_| scan(&mut scanner, ONCE).0).collect();
     let expected: Vec<_> = (0..34).map(|scan| scan % 16 == 0).collect();
     assert_eq!(idle, expected);
-    let slower = ScanSettings { settling_us: 30, ..settings };
+    let slower = ScanSettings { settling_us: 30, ..ONCE };
     assert_eq!(scan(&mut scanner, slower), (true, 0, false));
     assert_eq!(scan(&mut scanner, slower), (false, 0, false));
     let constants = ZeroPotential::<2, 3>::TYPICAL;
@@ -564,7 +534,7 @@ fn rows_idle_in_the_first_of_sixteen_scans_and_behind_what_changes() {
     assert_eq!(scan(&mut scanner, slower), (false, 6, true));
     table.borrow_mut().fails = false;
     assert_eq!(scan(&mut scanner, slower), (true, 0, false));
-    scanner.start(slower, wires);
+    scanner.start(slower, ALL);
     scanner.stop();
     assert_eq!(table.borrow().stops, 1);
     assert!(scan(&mut scanner, slower).0);
@@ -573,20 +543,17 @@ fn rows_idle_in_the_first_of_sixteen_scans_and_behind_what_changes() {
 #[test]
 fn wires_that_are_not_there_have_no_reading() {
     let (_, mut scanner) = passes(0);
-    let settings = ScanSettings { settling_us: 20, oversampling: 1 };
     let wires = Selection { rows: &BOTH, columns: ColumnWires(0b1011) };
     let mut frame = [0.0; 6];
-    assert_eq!(scanner.scan(settings, wires, &mut frame).failed_samples, 2);
+    assert_eq!(scanner.scan(ONCE, wires, &mut frame).failed_samples, 2);
     assert_eq!(frame.map(f32::is_nan), [false, false, true, false, false, true]);
 }
 
 #[test]
 fn a_pass_that_never_ends_is_given_up() {
     let (table, mut scanner) = passes(u32::MAX);
-    let settings = ScanSettings { settling_us: 20, oversampling: 1 };
-    let wires = Selection { rows: &BOTH, columns: ColumnWires(0b111) };
     let mut frame = [0.0; 6];
-    assert_eq!(scanner.scan(settings, wires, &mut frame).failed_samples, 6);
+    assert_eq!(scanner.scan(ONCE, ALL, &mut frame).failed_samples, 6);
     assert!(frame.iter().all(|reading| reading.is_nan()));
     assert_eq!(table.borrow().stops, 1);
 }
