@@ -1,7 +1,7 @@
 //! Uploading a model: sound models come into force, and nothing else ever does.
 
 use crate::mock::*;
-use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::app::SessionEnd;
 use taxel_firmware::link::message::{ModelFault, Refusal, UploadState, UploadStep};
 use taxel_firmware::store::{ERASES_AT_ONCE, Upload};
 
@@ -71,50 +71,35 @@ fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_i
     assert_eq!(device.restart(), None);
 }
 
-fn slot_erases(session: &mut TestSession<'_>, board: &Board) -> u32 {
-    statistics(session, board).slot_erases
-}
-
 #[test]
 fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_more() {
-    let mut slots = Flash::slots_with(&blob(1, 3));
-    {
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        let board = bench.board.clone();
-        let good = blob(2, 4);
-        let mut rows = good.clone();
-        rows[9] = 3;
-        let mut inputs = good.clone();
-        inputs[10] = 4;
-        let mut version = good.clone();
-        version[4] = 9;
-        let fault = |fault| Err(Refusal::BadModel(fault));
-        for (head, refusal) in [
-            (&rows[..], fault(ModelFault::Shape)),
-            (&inputs, fault(ModelFault::Shape)),
-            (&version, fault(ModelFault::NotABlob)),
-            (&good[..11], fault(ModelFault::NotABlob)),
-            (&[], fault(ModelFault::NotABlob)),
-        ] {
-            let head = &head[..head.len().min(16)];
-            let (outcome, _) = upload(&mut session, &board, &[UploadStep::Begin { head }]);
-            assert_eq!(outcome, refusal, "{head:?}");
-        }
-        assert_eq!(slot_erases(&mut session, &board), 0);
-        for _ in 0..1000 {
-            upload(&mut session, &board, &[begin(&good)]).0.unwrap();
-        }
-        assert_eq!(slot_erases(&mut session, &board), 1);
-        // An empty slot takes the model, after an abort as well; one with a chunk must be erased.
-        let steps = upload_steps(&good, CHUNK);
-        upload(&mut session, &board, &[UploadStep::Abort, steps[0], steps[1], steps[0]]).0.unwrap();
-        assert_eq!(slot_erases(&mut session, &board), 2);
-        let (outcome, end) = upload(&mut session, &board, &steps);
-        assert!(outcome.is_ok() && end.is_some(), "{outcome:?}");
-        assert_eq!(slot_erases(&mut session, &board), 2);
+    let (mut session, board) = started(quiet(), &blob(1, 3));
+    let good = blob(2, 4);
+    // Another number of rows, of inputs, another version, and heads that are cut.
+    for (length, place, byte, fault) in [
+        (16, 9, 3, ModelFault::Shape),
+        (16, 10, 4, ModelFault::Shape),
+        (16, 4, 9, ModelFault::NotABlob),
+        (11, 0, b'T', ModelFault::NotABlob),
+        (1, 0, b'T', ModelFault::NotABlob),
+    ] {
+        let mut head = good[..length].to_vec();
+        head[place] = byte;
+        let (outcome, _) = upload(&mut session, &board, &[UploadStep::Begin { head: &head }]);
+        assert_eq!(outcome, Err(Refusal::BadModel(fault)), "{head:?}");
     }
-    assert_eq!((slots[0].erases, slots[1].erases), (0, 2));
+    assert_eq!(statistics(&mut session, &board).slot_erases, 0);
+    for _ in 0..1000 {
+        upload(&mut session, &board, &[begin(&good)]).0.unwrap();
+    }
+    assert_eq!(statistics(&mut session, &board).slot_erases, 1);
+    // An empty slot takes the model, after an abort as well; one with a chunk must be erased.
+    let steps = upload_steps(&good, CHUNK);
+    upload(&mut session, &board, &[UploadStep::Abort, steps[0], steps[1], steps[0]]).0.unwrap();
+    assert_eq!(statistics(&mut session, &board).slot_erases, 2);
+    let (outcome, end) = upload(&mut session, &board, &steps);
+    assert!(outcome.is_ok() && end.is_some(), "{outcome:?}");
+    assert_eq!(statistics(&mut session, &board).slot_erases, 2);
 }
 
 #[test]

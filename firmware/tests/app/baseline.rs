@@ -8,39 +8,36 @@ use crate::mock::*;
 
 #[test]
 fn a_baseline_is_captured_and_contact_is_told_against_it() {
-    let (mut session, board) = started(every(100), &blob(3, 4));
-    board
-        .pins
-        .borrow_mut()
-        .to_device
-        .extend(request_bytes(9, &Request::CaptureBaseline { frames: 4 }));
-    while !reports(&board.pins.borrow().to_host).iter().any(|(number, _)| *number == 9) {
-        session.step();
-        assert!(board.pins.borrow().now_us < 10_000, "no answer");
-    }
-    let all = reports(&board.pins.borrow().to_host);
-    let baseline = &all.iter().find(|(number, _)| *number == 9).unwrap().1;
+    let (mut session, board) = started(quiet(), &blob(3, 4));
+    let captured = capture(&mut session, &board, 4);
     let rest = Floats::new(&[60.0, 61.0, 62.0, 63.0, 64.0, 65.0]);
-    assert_eq!(*baseline, format!("{:?}", Report::Baseline { readings_ohm: rest }));
+    assert_eq!(captured, format!("{:?}", Report::Baseline { readings_ohm: rest }));
 
-    let rest = frame_at_rest();
-    assert_eq!(decode(&mut session, &board, &rest).0 & EstimateReport::CONTACT, 0);
-    let mut pressed = rest;
-    pressed[1][0] *= 0.97;
-    assert_ne!(decode(&mut session, &board, &pressed).0 & EstimateReport::CONTACT, 0);
-    let mut nearly = rest;
-    nearly[1][0] *= 0.985;
-    assert_eq!(decode(&mut session, &board, &nearly).0 & EstimateReport::CONTACT, 0);
-    // A change of the threshold itself, 48 Ω for 64 Ω, is none.
-    tell(
-        &mut session,
-        &board,
-        &Request::Configure(Configuration { contact_threshold: 0.25, ..quiet() }),
-    );
-    for (ohm, contact) in [(48.0, 0), (47.9, EstimateReport::CONTACT)] {
-        let mut frame = rest;
+    // The flag for a frame with this reading instead of 64 Ω.
+    let contact = |session: &mut TestSession<'_>, ohm: f32| {
+        let mut frame = frame_at_rest();
         frame[1][1] = ohm;
-        assert_eq!(decode(&mut session, &board, &frame).0 & EstimateReport::CONTACT, contact);
+        decode(session, &board, &frame).0 & EstimateReport::CONTACT != 0
+    };
+    // The threshold is 2 %. A change of the threshold itself, 48 Ω for 64 Ω, is none.
+    let higher = Configuration { contact_threshold: 0.25, ..quiet() };
+    for (configuration, ohm, is_contact) in [
+        (quiet(), 64.0, false),
+        (quiet(), 0.97 * 64.0, true),
+        (quiet(), 0.985 * 64.0, false),
+        (higher, 48.0, false),
+        (higher, 47.9, true),
+    ] {
+        tell(&mut session, &board, &Request::Configure(configuration));
+        assert_eq!(contact(&mut session, ohm), is_contact, "{ohm}");
+    }
+    // While another is captured there is none: not before its first frame, and not after it.
+    tell(&mut session, &board, &Request::Configure(every(1_000_000)));
+    send(&mut session, &board, 9, &Request::CaptureBaseline { frames: 1000 });
+    for _ in 0..2 {
+        assert!(!contact(&mut session, 40.0) && !contact(&mut session, 64.0));
+        board.pins.borrow_mut().now_us += 1_000_000;
+        session.step();
     }
 }
 
@@ -58,31 +55,22 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
         let (flags, status, _) = decode(session, &board, &rest);
         (flags & EstimateReport::NO_BASELINE, status)
     };
-    let begin = |session: &mut TestSession<'_>| {
-        let scanning = every(100);
-        tell(session, &board, &Request::Configure(scanning));
+    // What is so before a capture, after it has begun and after some frames, and once it is given up. While another is
+    // captured, readings are relative to the one before.
+    let expect = |session: &mut TestSession<'_>, expected: (u8, Vec<u8>)| {
+        assert_eq!(read(session), expected);
+        tell(session, &board, &Request::Configure(every(100)));
         send(session, &board, 8, &Request::CaptureBaseline { frames: 1000 });
-    };
-    let scan_some = |session: &mut TestSession<'_>| {
+        assert_eq!(read(session), expected);
         let until_us = board.pins.borrow().now_us + 1000;
         run_until(session, &board, until_us);
+        assert_eq!(read(session), expected);
+        tell(session, &board, &Request::Configure(quiet()));
+        assert_eq!(read(session), expected);
     };
-    assert_eq!(read(&mut session), without);
-    begin(&mut session);
-    assert_eq!(read(&mut session), without);
-    scan_some(&mut session);
-    assert_eq!(read(&mut session), without);
+    expect(&mut session, without.clone());
     capture(&mut session, &board, 2);
-    let decoded = (0, vec![0, 0]);
-    tell(&mut session, &board, &Request::Configure(quiet()));
-    assert_eq!(read(&mut session), decoded);
-    // While another is captured, and if that is given up, readings are relative to the one before.
-    begin(&mut session);
-    assert_eq!(read(&mut session), decoded);
-    scan_some(&mut session);
-    assert_eq!(read(&mut session), decoded);
-    tell(&mut session, &board, &Request::Configure(quiet()));
-    assert_eq!(read(&mut session), decoded);
+    expect(&mut session, (0, vec![0, 0]));
     // A baseline of no known reading is none.
     let unknown = Request::SetBaseline { readings_ohm: Floats::new(&[f32::NAN; ROWS * COLS]) };
     tell(&mut session, &board, &unknown);
@@ -92,9 +80,6 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
 #[test]
 fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once() {
     let (mut session, board) = started(every(100), &blob(3, 4));
-    let say = |session: &mut TestSession<'_>, number: u16, request: &Request<'_>| {
-        send(session, &board, number, request);
-    };
     let refused = format!("{:?}", Report::Refused(Refusal::Baseline));
     let answer = |number: u16| {
         let all = reports(&board.pins.borrow().to_host);
@@ -104,17 +89,17 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
             .collect::<Vec<_>>()
     };
     // Another capture, and then a configuration without scans, end the previous capture.
-    say(&mut session, 10, &Request::CaptureBaseline { frames: 1000 });
-    say(&mut session, 11, &Request::CaptureBaseline { frames: 1000 });
+    send(&mut session, &board, 10, &Request::CaptureBaseline { frames: 1000 });
+    send(&mut session, &board, 11, &Request::CaptureBaseline { frames: 1000 });
     assert_eq!(answer(10), [refused.as_str()]);
-    say(&mut session, 12, &Request::Configure(quiet()));
+    send(&mut session, &board, 12, &Request::Configure(quiet()));
     assert_eq!(answer(11), [refused.as_str()]);
-    say(&mut session, 13, &Request::CaptureBaseline { frames: 1 });
+    send(&mut session, &board, 13, &Request::CaptureBaseline { frames: 1 });
     assert_eq!(answer(13), [refused.as_str()]);
     // The same request again goes on counting, and another under its number starts anew.
-    say(&mut session, 14, &Request::Configure(every(100)));
+    send(&mut session, &board, 14, &Request::Configure(every(100)));
     for frames in [1000, 3, 3] {
-        say(&mut session, 15, &Request::CaptureBaseline { frames });
+        send(&mut session, &board, 15, &Request::CaptureBaseline { frames });
     }
     while answer(15).len() < 2 {
         assert!(board.pins.borrow().now_us < 100_000, "no answer");

@@ -5,7 +5,7 @@ use taxel_core::blob::{Floats, Model, ModelParts, encode_to_vec};
 use taxel_core::fill::Fill;
 use taxel_firmware::link::message::{EstimateReport, Refusal, Report, Request};
 
-use super::requests::{bits, capture, decode, expected};
+use super::requests::{bits, decode, expected};
 use crate::mock::*;
 
 #[test]
@@ -90,29 +90,4 @@ fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
     let mut frame = frame_at_rest();
     (frame[1][2], frame[1][0]) = (900.0, f32::NAN);
     assert_eq!(decode(&mut session, &board, &frame).0, EstimateReport::FAULTY_READING);
-}
-
-#[test]
-fn a_baseline_that_is_being_captured_tells_of_no_contact() {
-    let (mut session, board) = started(quiet(), &blob(3, 4));
-    capture(&mut session, &board, 3);
-    let rest = frame_at_rest();
-    let mut pressed = rest;
-    pressed[1][0] = 40.0;
-    let contact = |session: &mut TestSession<'_>, frame: &TestFrame| {
-        decode(session, &board, frame).0 & EstimateReport::CONTACT
-    };
-    assert_eq!(contact(&mut session, &pressed), EstimateReport::CONTACT);
-    let scanning = every(1_000_000);
-    tell(&mut session, &board, &Request::Configure(scanning));
-    let again = request_bytes(9, &Request::CaptureBaseline { frames: 1000 });
-    board.pins.borrow_mut().to_device.extend(again);
-    settle(&mut session, &board);
-    // Not before its first frame, and not after it.
-    assert_eq!(contact(&mut session, &pressed), 0);
-    board.pins.borrow_mut().now_us += 1_000_000;
-    session.step();
-    for frame in [rest, pressed] {
-        assert_eq!(contact(&mut session, &frame), 0);
-    }
 }

@@ -4,6 +4,7 @@ use taxel_core::blob::Floats;
 use taxel_core::filter::State;
 use taxel_core::{Estimate, RowStatus};
 use taxel_firmware::app::Session;
+use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
 use super::requests::{bits, expected};
@@ -40,18 +41,18 @@ impl Own {
     }
 }
 
-/// Asks for the estimate of a `frame` that began at this time; returns the status of its rows and its bits.
+/// Asks for the estimate of a `frame` that began at this time; returns its bits.
 fn decode_at(
     session: &mut TestSession<'_>,
     board: &Board,
     start_us: u64,
     frame: &TestFrame,
-) -> (Vec<u8>, Vec<u32>) {
+) -> Vec<u32> {
     let readings_ohm = Floats::new(frame.as_flattened());
     let request = Request::Decode { frame: 5, start_us, readings_ohm };
     answer!(session, board, &request, Report::Estimate(estimate) => {
         assert_eq!(estimate.start_us, start_us);
-        (estimate.row_status.to_vec(), bits(estimate.outputs.iter()))
+        bits(estimate.outputs.iter())
     })
 }
 
@@ -72,10 +73,7 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
     let own = Own::new(3);
     let rest = frame_at_rest();
     let set_baseline = Request::SetBaseline { readings_ohm: Floats::new(rest.as_flattened()) };
-    let circuit = taxel_firmware::circuit::ZeroPotential::<ROWS, COLS> {
-        drive_v: 0.21,
-        ..taxel_firmware::circuit::ZeroPotential::TYPICAL
-    };
+    let circuit = ZeroPotential::<ROWS, COLS> { drive_v: 0.21, ..ZeroPotential::TYPICAL };
     let constants = circuit.constants();
     let other = Configuration { filter_lead_us: 1501, ..filtering() };
     for (request, is_new) in [
@@ -85,16 +83,14 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
         (set_baseline, true),
         (Request::SetConstants(constants), true),
     ] {
-        let mut slots = Flash::slots_with(&own.blob);
-        let mut bench = Bench::new(filtering());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let (mut session, board) = started(filtering(), &own.blob);
         for frame in 0..3 {
-            decode_at(&mut session, &bench.board, 1000 * frame as u64, &touch(frame));
+            decode_at(&mut session, &board, 1000 * frame as u64, &touch(frame));
         }
-        ask(&mut session, &bench.board, &request, |report| {
+        ask(&mut session, &board, &request, |report| {
             assert!(!matches!(report, Report::Refused(_)), "{report:?}");
         });
-        let (_, found) = decode_at(&mut session, &bench.board, 3000, &touch(3));
+        let found = decode_at(&mut session, &board, 3000, &touch(3));
         let raw = bits(expected(&own.blob, &touch(3)).into_iter().flatten());
         assert_eq!(found == raw, is_new, "{request:?}");
     }
@@ -109,50 +105,37 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
     install(&mut bench, &mut slots, &mut [], (&next.blob, 64)).unwrap();
     let board = bench.board.clone();
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let (_, found) = decode_at(&mut session, &board, 1000, &touch(1));
+    let found = decode_at(&mut session, &board, 1000, &touch(1));
     assert_eq!(found, bits(expected(&next.blob, &touch(1)).into_iter().flatten()));
 }
 
 #[test]
-fn scans_are_filtered_and_no_request_between_them_changes_that() {
-    let mut own = Own::new(3);
-    let (mut session, board) =
-        started(Configuration { frame_period_us: 1000, ..filtering() }, &own.blob);
-    let shown = board.frame.clone();
-    let raw = bits(expected(&own.blob, &touch(9)).into_iter().flatten());
-    for frame in 1..15 {
-        *shown.borrow_mut() = touch(frame);
-        board.pins.borrow_mut().to_host.clear();
-        while estimates_of_scans(&board).is_empty() {
-            session.step();
-        }
-        let [(_, start_us, found)] = &estimates_of_scans(&board)[..] else {
-            panic!("one estimate")
-        };
-        assert_eq!(found, &own.bits(*start_us, &touch(frame)), "frame {frame}");
-        // What a host wants decoded in between is not of that series.
-        let (_, answer) = decode_at(&mut session, &board, *start_us + 500, &touch(9));
-        assert_eq!(answer, raw);
-    }
-}
-
-#[test]
-fn one_scan_of_some_is_reported_and_all_are_filtered() {
+fn one_scan_of_some_is_reported_and_all_are_filtered_whatever_is_asked_between_them() {
     let mut own = Own::new(3);
     let scanning = Configuration { frame_period_us: 1000, ..filtering() };
     let (mut session, board) =
         started(Configuration { report_every: 3, send_readings: true, ..scanning }, &own.blob);
     let mut faulty = touch(2);
     faulty[0][0] = f32::NAN;
+    let raw = bits(expected(&own.blob, &touch(9)).into_iter().flatten());
+    let other = touch(9);
+    let between =
+        Request::Decode { frame: 5, start_us: 0, readings_ohm: Floats::new(other.as_flattened()) };
     let shown = board.frame.clone();
     for frame in 1..=10 {
         *shown.borrow_mut() = touch(frame);
         run_until(&mut session, &board, 1000 * frame as u32 + 200);
+        // What a host wants decoded is not of that series.
+        send(&mut session, &board, 9, &between);
     }
     let mut wanted = Vec::new();
-    find_report(&board.pins.borrow().to_host, |_, report| -> Option<()> {
-        if let Report::Readings { frame, start_us, .. } = report {
-            wanted.push((frame, start_us, own.bits(start_us, &touch(frame as usize))));
+    find_report(&board.pins.borrow().to_host, |number, report| -> Option<()> {
+        match (number, report) {
+            (0, Report::Readings { frame, start_us, .. }) => {
+                wanted.push((frame, start_us, own.bits(start_us, &touch(frame as usize))));
+            }
+            (9, Report::Estimate(answer)) => assert_eq!(bits(answer.outputs.iter()), raw),
+            _ => {}
         }
         None
     });
@@ -167,7 +150,7 @@ fn one_scan_of_some_is_reported_and_all_are_filtered() {
     let health: Vec<_> = all.iter().filter(|(_, text)| text.starts_with("Health")).collect();
     assert!(health.len() == 2 && health[1].1.contains("frame: 15"), "{health:?}");
     let s = statistics(&mut session, &board);
-    assert_eq!((s.frames_scanned, s.frames_decoded), (16, 16));
+    assert_eq!((s.frames_scanned, s.frames_decoded), (16, 16 + 10)); // and what was asked
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! The model in force: its identity, its shape, and the memory that it is decoded from.
 
-use taxel_core::blob::{Columns, Floats, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::Decoder;
+use taxel_core::blob::{Columns, Floats, Metadata, ModelShape};
 use taxel_core::checksum::CRC_32;
-use taxel_core::{AlignedBytes, Decoder};
 use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{
     Configuration, EstimateReport, ModelFault, Refusal, Report, Request, Setting,
@@ -13,16 +13,10 @@ use crate::mock::*;
 
 #[test]
 fn the_identity_tells_what_the_model_was_trained_on() {
-    let network = |metadata: Metadata<'static>| {
-        let network = blob_of_one_row(3, 2);
-        let model = Model::decode(&network).unwrap();
-        let networks: Vec<_> = model.networks().collect();
-        let parts = ModelParts::new(&networks, &[0], metadata);
-        encode_to_vec(&parts).unwrap()
-    };
-    let plain = Metadata::unnamed(ModelShape { rows: 1, inputs: 3, outputs: 2 });
+    let shape = ModelShape { rows: 1, inputs: 3, outputs: 2 };
+    let plain = Metadata::unnamed(shape);
     let read = |metadata: Metadata<'static>| {
-        let (mut session, board) = started(quiet(), &network(metadata));
+        let (mut session, board) = started(quiet(), &blob_of_a_row(shape, metadata));
         answer!(&mut session, &board, &Request::Identify, Report::Identity(identity) => {
             (identity.model_name.to_owned(), identity.model.unwrap())
         })
@@ -43,77 +37,54 @@ fn the_identity_tells_what_the_model_was_trained_on() {
     assert_eq!(name.len(), 39);
 }
 
-/// A blob for one row of `inputs` readings and `outputs` outputs.
-fn blob_of_one_row(inputs: usize, outputs: usize) -> AlignedBytes {
-    let shape = ModelShape { rows: 1, inputs, outputs };
-    blob_of_a_row(shape, Metadata::unnamed(shape))
-}
-
 /// Reports on the first scan with the model in `blob`: readings, and then the estimate.
 fn reports_on_a_scan(blob: &[u8]) -> Vec<(u16, String)> {
     let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
-    let (mut slots, mut bench) = (Flash::slots_with(blob), Bench::new(scanning));
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    run_until(&mut session, &bench.board, 1500);
-    reports(&bench.board.pins.borrow().to_host)
+    let (mut session, board) = started(scanning, blob);
+    run_until(&mut session, &board, 1500);
+    reports(&board.pins.borrow().to_host)
 }
 
 #[test]
-fn the_model_says_what_is_scanned_and_decoded() {
-    let rest = frame_at_rest();
-    // A column and an output less; one network for all six readings; one output of one row.
-    for (inputs, outputs, wires) in [(2, 1, 2), (6, 4, 6), (3, 2, 3), (1, 1, 1)] {
-        let blob = blob_of_one_row(inputs, outputs);
-        let readings = &rest.as_flattened()[..wires];
-        let decoder = Decoder::<1>::load(&blob).unwrap();
-        let outputs = decoder.decode(readings).unwrap().outputs;
-        let all = reports_on_a_scan(&blob);
-        let found = |debug: String| all.iter().any(|(_, text)| text.contains(&debug));
-        assert!(found(format!("readings_ohm: {:?}", Floats::new(readings))), "{all:?}");
-        let row = format!("row_status: [0], outputs: {:?}", Floats::new(&outputs));
-        assert!(found(row), "{all:?}");
-    }
-}
-
-#[test]
-fn the_names_of_readings_say_which_cells_are_scanned_and_in_which_order() {
-    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
+fn the_model_says_which_cells_are_scanned_in_which_order_and_what_is_decoded() {
     let [first, second] = frame_at_rest();
-    for (names, readings) in [
-        ("r1c1_ohm\nr1c2_ohm", first[..2].to_vec()),
-        ("r2c1_ohm\nr2c2_ohm", second[..2].to_vec()),
-        ("a\nb", first[..2].to_vec()),
-        // One row of the model with the readings of both row-wires, in the other order.
-        ("r2c1_ohm\nr2c2_ohm\nr2c3_ohm\nr1c1_ohm\nr1c2_ohm\nr1c3_ohm", [second, first].concat()),
-        // Some columns, another order, and cells that are not all between their wires.
-        ("r1c2_ohm\nr1c3_ohm\nr2c2_ohm\nr2c3_ohm", [&first[1..], &second[1..]].concat()),
-        ("r2c3_ohm\nr2c1_ohm", vec![second[2], second[0]]),
-        ("r1c3_ohm\nr2c1_ohm\nr1c2_ohm", vec![first[2], second[0], first[1]]),
-        ("r2c2_ohm", vec![second[1]]),
+    // Without names of wires, the first ones: a column and an output less; one network for all six readings.
+    for (outputs, names, readings) in [
+        (1, "a\nb", first[..2].to_vec()),
+        (4, "x\nx\nx\nx\nx\nx", [first, second].concat()),
+        // Cells that are not all between their wires, and another order.
+        (2, "r2c1_ohm\nr2c2_ohm", second[..2].to_vec()),
+        (1, "r1c3_ohm\nr2c1_ohm\nr1c2_ohm", vec![first[2], second[0], first[1]]),
     ] {
-        let shape = ModelShape { inputs: readings.len(), ..shape };
-        let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
-        let all = reports_on_a_scan(&blob_of_a_row(shape, metadata));
-        let expected = format!("readings_ohm: {:?}", Floats::new(&readings));
-        assert!(all[0].1.contains(&expected), "{names}: {all:?}");
-    }
-}
-
-#[test]
-fn a_model_of_wires_that_the_board_lacks_is_refused_and_not_put_in_force() {
-    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
-    for names in
-        ["r3c1_ohm\nr3c2_ohm", "r1c1_ohm\nr1c4_ohm", "r1c1_ohm\nrest", "r0c1_ohm\nr1c1_ohm"]
-    {
+        let shape = ModelShape { rows: 1, inputs: readings.len(), outputs };
         let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
         let blob = blob_of_a_row(shape, metadata);
-        let mut slots = Flash::slots_with(&blob);
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        assert_eq!(model_crc(&mut session, &bench.board), None, "{names}");
-        let mut slots = Flash::slots_with(&[]);
-        let refused = upload(&mut bench, &mut slots, &mut [], &upload_steps(&blob, 64));
-        assert_eq!(refused, Err(Refusal::BadModel(ModelFault::Wires)), "{names}");
+        let decoder = Decoder::<1>::load(&blob).unwrap();
+        let outputs = decoder.decode(&readings[..]).unwrap().outputs;
+        let all = reports_on_a_scan(&blob);
+        let found = |debug: String| all.iter().any(|(_, text)| text.contains(&debug));
+        assert!(found(format!("readings_ohm: {:?}", Floats::new(&readings))), "{names}: {all:?}");
+        let row = format!("row_status: [0], outputs: {:?}", Floats::new(&outputs));
+        assert!(found(row), "{names}: {all:?}");
+    }
+}
+
+#[test]
+fn a_model_that_does_not_fit_the_board_is_refused_and_not_put_in_force() {
+    for (inputs, outputs, names, fault) in [
+        (2, 1, "r3c1_ohm\nr3c2_ohm", ModelFault::Wires),
+        (2, 1, "r1c1_ohm\nrest", ModelFault::Wires),
+        (7, 1, "", ModelFault::Shape),
+        (3, 5, "", ModelFault::Shape),
+    ] {
+        let shape = ModelShape { rows: 1, inputs, outputs };
+        let unnamed = Metadata::unnamed(shape);
+        let input_names = if names.is_empty() { unnamed.input_names } else { Columns(names) };
+        let blob = blob_of_a_row(shape, Metadata { input_names, ..unnamed });
+        let (mut session, board) = started(quiet(), &blob);
+        assert_eq!(model_crc(&mut session, &board), None, "{shape:?} {names}");
+        let refused = Device::new(Flash::slots()).install(&blob);
+        assert_eq!(refused, Err(Refusal::BadModel(fault)), "{shape:?} {names}");
     }
 }
 
@@ -141,14 +112,6 @@ fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
 }
 
 #[test]
-fn a_model_without_room_is_not_put_in_force() {
-    for (inputs, outputs) in [(4, 1), (7, 1), (3, 5)] {
-        let (mut session, board) = started(quiet(), &blob_of_one_row(inputs, outputs));
-        assert_eq!(model_crc(&mut session, &board), None, "{inputs} {outputs}");
-    }
-}
-
-#[test]
 fn a_model_is_decoded_from_ram_where_it_fits() {
     let blob = blob(3, 4);
     let words = blob.len().div_ceil(4);
@@ -163,23 +126,4 @@ fn a_model_is_decoded_from_ram_where_it_fits() {
         assert_eq!(found, bits(expected(&blob, &frame).into_iter().flatten()));
         assert_eq!(bytemuck::cast_slice::<u32, u8>(&weights).starts_with(&blob), in_ram);
     }
-}
-
-#[test]
-fn behind_a_damaged_model_the_other_slots_is_decoded_from_there() {
-    let (first, second) = (blob(3, 4), blob(5, 4));
-    let mut slots = Flash::slots_with(&first);
-    let mut weights = vec![0; second.len().div_ceil(4)];
-    let mut bench = Bench::new(quiet());
-    install(&mut bench, &mut slots, &mut weights, (&second, 64)).unwrap();
-    let mut in_force = |slots: &mut [Flash; 2]| {
-        let mut session = Session::start(&mut bench.app, slots, &mut weights);
-        let frame = frame_at_rest();
-        let (_, _, found) = decode(&mut session, &bench.board, &frame);
-        (model(&mut session, &bench.board).map(|model| (model.slot, model.in_ram)), found)
-    };
-    let outputs = |blob: &[u8]| bits(expected(blob, &frame_at_rest()).into_iter().flatten());
-    assert_eq!(in_force(&mut slots), (Some((1, true)), outputs(&second)));
-    slots[1].decay(second.len() / 8, 1);
-    assert_eq!(in_force(&mut slots), (Some((0, false)), outputs(&first)));
 }

@@ -33,16 +33,18 @@ pub fn decode(
     })
 }
 
-/// Captures a baseline of `frames` scans. Then sets a configuration that scans only on request.
-pub fn capture(session: &mut Running<'_, '_>, board: &Board, frames: u16) {
-    let scanning = every(100);
-    tell(session, board, &Request::Configure(scanning));
-    let request = request_bytes(9, &Request::CaptureBaseline { frames });
-    board.pins.borrow_mut().to_device.extend(request);
-    board.pins.borrow_mut().to_host.clear();
-    while !reports(&board.pins.borrow().to_host).iter().any(|(number, _)| *number == 9) {
+/// Captures a baseline of `frames` scans, and returns the answer. Then sets a configuration that scans only on request.
+pub fn capture(session: &mut Running<'_, '_>, board: &Board, frames: u16) -> String {
+    tell(session, board, &Request::Configure(every(100)));
+    send(session, board, 9, &Request::CaptureBaseline { frames });
+    let answer = loop {
+        let all = reports(&board.pins.borrow().to_host);
+        if let Some((_, text)) = all.into_iter().find(|(number, _)| *number == 9) {
+            break text;
+        }
         assert_eq!(session.step(), None);
         assert!(board.pins.borrow().now_us < 1_000_000, "no answer");
-    }
+    };
     tell(session, board, &Request::Configure(quiet()));
+    answer
 }

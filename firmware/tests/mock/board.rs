@@ -31,10 +31,6 @@ pub struct Pins {
     pub stopped: u32,
     /// Number of times that the watchdog was fed.
     pub feeds: u32,
-    /// Longest time in µs between two feeds, the first of which is at 0.
-    pub longest_unfed_us: u32,
-    /// When the watchdog was fed last.
-    fed_us: u32,
     /// Number of bytes that the host's side still takes; `None` takes all.
     pub room: Option<usize>,
     /// Least time in µs between two bytes that the host's side takes.
@@ -97,9 +93,6 @@ impl Platform for Board {
     fn feed_watchdog(&mut self) {
         let mut pins = self.pins.borrow_mut();
         pins.feeds = pins.feeds.wrapping_add(1);
-        let unfed_us = pins.now_us.wrapping_sub(pins.fed_us);
-        pins.longest_unfed_us = pins.longest_unfed_us.max(unfed_us);
-        pins.fed_us = pins.now_us;
     }
 
     fn memory(&self) -> Memory {

@@ -21,7 +21,7 @@ pub use flash::{Flash, Supply};
 pub(crate) use host::answer;
 pub use host::{
     Answer, ask, begin, find_report, install, model, model_crc, reports, request_bytes, run_until,
-    send, settle, statistics, tell, undo, upload, upload_step, upload_steps,
+    send, statistics, tell, undo, upload, upload_step, upload_steps,
 };
 pub use models::{blob, blob_of_features, blob_with_confidence, crc_of};
 pub use row_model::blob_of_a_row;
