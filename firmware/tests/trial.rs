@@ -58,10 +58,11 @@ fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
 fn a_confirmation_that_cannot_be_written_down_ends_the_trial() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let (mut slots, mut bench) = on_trial(&old, &new);
-    bench.app.platform().journal.pages()[0].cut_power_after(0);
+    let supply = bench.app.platform().journal.pages()[0].supply();
+    supply.borrow_mut().on(Some(0));
     let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
     assert_eq!(state, Err(Refusal::Flash));
-    bench.app.platform().journal.pages()[0].power_on();
+    supply.borrow_mut().on(None);
     let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
     assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
     assert_eq!(after_restart(&slots, &mut bench).unwrap().crc_32, crc_of(&old));
@@ -115,29 +116,29 @@ fn on_trial_nothing_overwrites_the_previous_model() {
 #[test]
 fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
     let (old, new) = (blob(1, 3), blob(2, 5));
-    let (mut slots, mut bench) = on_trial(&old, &new);
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let pass = |session: &mut Running<'_, '_>, us| {
-        board.pins.borrow_mut().now_us += us;
-        board.pins.borrow_mut().to_host.clear();
-        session.step()
-    };
-    assert_eq!(pass(&mut session, 59_000_000), None);
-    // The host may let it last longer, and asking alone does not.
-    // Half an hour at most.
-    let again = Request::Upload(UploadStep::Try { trial_ms: u32::MAX });
-    tell(&mut session, &board, &again);
-    assert_eq!(pass(&mut session, 1_799_000_000), None);
-    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
-    assert_eq!(pass(&mut session, 1_000_000), Some(SessionEnd::NewModel));
-    let said = reports(&board.pins.borrow().to_host);
-    let over = UploadState::TrialOver { crc_32: crc_of(&new) };
-    assert_eq!(said, [(UNASKED, format!("{:?}", Report::Upload(over)))]);
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&old)));
-    let late = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
-    assert_eq!(late, Err(Refusal::TrialOver));
-    let state = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
-    assert_eq!(state, Ok(confirmed(&new)));
+    // The host may let it last longer, half an hour at most; asking alone does not.
+    for (trial_ms, trial_us) in [(120_000, 120_000_000), (u32::MAX, 1_800_000_000)] {
+        let (mut slots, mut bench) = on_trial(&old, &new);
+        let board = bench.board.clone();
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let pass = |session: &mut Running<'_, '_>, us| {
+            board.pins.borrow_mut().now_us += us;
+            board.pins.borrow_mut().to_host.clear();
+            session.step()
+        };
+        assert_eq!(pass(&mut session, 59_000_000), None);
+        tell(&mut session, &board, &Request::Upload(UploadStep::Try { trial_ms }));
+        assert_eq!(pass(&mut session, trial_us - 1_000_000), None);
+        assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
+        assert_eq!(pass(&mut session, 1_000_000), Some(SessionEnd::NewModel));
+        let said = reports(&board.pins.borrow().to_host);
+        let over = UploadState::TrialOver { crc_32: crc_of(&new) };
+        assert_eq!(said, [(UNASKED, format!("{:?}", Report::Upload(over)))]);
+        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        assert_eq!(model_crc(&mut session, &board), Some(crc_of(&old)));
+        let late = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+        assert_eq!(late, Err(Refusal::TrialOver));
+        let state = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
+        assert_eq!(state, Ok(confirmed(&new)));
+    }
 }

@@ -9,15 +9,14 @@ use taxel_core::blob::{Columns, Metadata, ModelShape};
 use super::requests::decode;
 use crate::mock::*;
 
-/// A board whose sensor scans by itself for `scan_us` and 10 µs.
-fn bench(period_us: u32, scan_us: u32) -> Bench<'static> {
-    let configuration =
-        Configuration { frame_period_us: period_us, send_readings: true, ..quiet() };
-    let bench = Bench::new(configuration);
-    let mut pins = bench.board.pins.borrow_mut();
+/// A session with a model on a board whose sensor scans by itself for `scan_us` and 10 µs.
+fn started_alone(period_us: u32, scan_us: u32) -> (TestSession<'static>, Board) {
+    let configuration = Configuration { send_readings: true, ..every(period_us) };
+    let (session, board) = started(configuration, &blob(3, 4));
+    let mut pins = board.pins.borrow_mut();
     (pins.scans_alone, pins.scan_us) = (true, scan_us);
     drop(pins);
-    bench
+    (session, board)
 }
 
 /// Runs turns of the loop until so many scans were started.
@@ -42,14 +41,11 @@ fn readings(board: &Board) -> Vec<(u32, u64, f32)> {
 #[test]
 fn the_next_frame_is_scanned_while_one_is_decoded_and_none_is_missed() {
     for alone in [true, false] {
-        let mut slots = Flash::slots_with(&blob(3, 4));
-        let mut bench = bench(1000, 790);
-        let board = bench.board.clone();
+        let (mut session, board) = started_alone(1000, 790);
         // Reports take longer than the scan leaves of a period.
         let mut pins = board.pins.borrow_mut();
         (pins.scans_alone, pins.gap_us) = (alone, 7);
         drop(pins);
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         run_until(&mut session, &board, 40_000);
         let frames = readings(&board);
         let s = statistics(&mut session, &board);
@@ -69,10 +65,7 @@ fn the_next_frame_is_scanned_while_one_is_decoded_and_none_is_missed() {
 
 #[test]
 fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = bench(1000, 500);
-    let (board, shown) = (bench.board.clone(), bench.board.frame.clone());
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started_alone(1000, 500);
     let mut constants = ZeroPotential::<ROWS, COLS>::TYPICAL;
     constants.drive_v = 0.21;
     let slower = Configuration { frame_period_us: 2000, send_readings: true, ..quiet() };
@@ -85,7 +78,7 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
         let started = board.pins.borrow().started;
         run_until_started(&mut session, &board, started + 1);
         // What the scan has read so far belongs to no frame any more.
-        shown.borrow_mut()[0][0] = 70.0 + index as f32;
+        board.frame.borrow_mut()[0][0] = 70.0 + index as f32;
         board.pins.borrow_mut().to_host.clear();
         let (stopped, changed_us) = (board.pins.borrow().stopped, board.pins.borrow().now_us);
         send(&mut session, &board, 9, change);
@@ -114,8 +107,10 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
 #[test]
 fn a_scan_of_other_wires_is_given_up_when_a_model_comes_into_force() {
     let mut slots = Flash::slots();
-    let mut bench = bench(1000, 500);
+    let mut bench = Bench::new(every(1000));
     let board = bench.board.clone();
+    board.pins.borrow_mut().scans_alone = true;
+    board.pins.borrow_mut().scan_us = 500;
     {
         let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
         run_until_started(&mut session, &board, 1);
@@ -133,10 +128,7 @@ fn a_scan_of_other_wires_is_given_up_when_a_model_comes_into_force() {
 
 #[test]
 fn a_scan_that_never_ends_is_a_silent_sensor() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = bench(1000, 1_000_000_000);
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started_alone(1000, 1_000_000_000);
     run_until_started(&mut session, &board, 1);
     board.pins.borrow_mut().look_us = 1000;
     while board.pins.borrow().stopped == 0 {
@@ -155,10 +147,7 @@ fn a_scan_that_never_ends_is_a_silent_sensor() {
 
 #[test]
 fn what_a_host_wants_decoded_disturbs_no_scan() {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let mut bench = bench(1000, 500);
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = started_alone(1000, 500);
     run_until_started(&mut session, &board, 1);
     decode(&mut session, &board, &[[33.0; COLS]; ROWS]);
     assert!(readings(&board).is_empty());

@@ -1,6 +1,6 @@
 //! Turns of the loop: scans in time, the watchdog, and a host that takes no bytes.
 
-use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::app::SessionEnd;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request};
 use taxel_firmware::link::packet;
 use taxel_firmware::link::receive::{Received, Receiver};
@@ -9,9 +9,8 @@ use crate::mock::*;
 
 #[test]
 fn frames_are_scanned_on_time_numbered_and_reported() {
-    let blob = blob(3, 4);
-    let configuration = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
-    let (mut session, board) = started(configuration, &blob);
+    let configuration = Configuration { send_readings: true, ..every(1000) };
+    let (mut session, board) = started(configuration, &blob(3, 4));
     run_until(&mut session, &board, 5500);
     let reports = reports(&board.pins.borrow().to_host);
     assert_eq!(reports.len(), 10, "{reports:?}"); // readings and estimate, five times
@@ -46,6 +45,12 @@ fn a_scan_longer_than_the_period_is_an_overrun() {
 fn the_watchdog_is_fed_by_good_loops_only() {
     let (mut session, board) = started(every(100), &blob(3, 4));
     let feeds = || board.pins.borrow().feeds;
+    let await_scan = |session: &mut TestSession<'_>| {
+        let scanned = statistics(session, &board).frames_scanned;
+        while statistics(session, &board).frames_scanned == scanned {
+            session.step();
+        }
+    };
     for _ in 0..50 {
         let before = feeds();
         session.step();
@@ -53,10 +58,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
     }
     // With a converter that gives nothing, no loop is good from the next scan on, whether it scans or not.
     *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
-    let scanned = statistics(&mut session, &board).frames_scanned;
-    while statistics(&mut session, &board).frames_scanned == scanned {
-        session.step();
-    }
+    await_scan(&mut session);
     let (fed, bad) = (feeds(), statistics(&mut session, &board).bad_loops);
     for _ in 0..2000 {
         session.step();
@@ -65,10 +67,7 @@ fn the_watchdog_is_fed_by_good_loops_only() {
     assert!(statistics(&mut session, &board).bad_loops >= bad + 2000);
     // One reading is enough.
     board.frame.borrow_mut()[1][1] = 60.0;
-    let scanned = statistics(&mut session, &board).frames_scanned;
-    while statistics(&mut session, &board).frames_scanned == scanned {
-        session.step();
-    }
+    await_scan(&mut session);
     let fed = feeds();
     for _ in 0..2000 {
         session.step();
@@ -88,15 +87,13 @@ fn the_watchdog_is_fed_by_good_loops_only() {
 /// Longest time in µs in which the watchdog is not fed, when a byte is taken every `gap_us` and each scan takes
 /// `scan_us`.
 fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
-    let mut slots = Flash::slots_with(&blob(3, 4));
-    let scanning = Configuration { frame_period_us: 10_000, send_readings: true, ..quiet() };
-    let mut bench = Bench::new(scanning);
-    bench.board.pins.borrow_mut().scan_us = scan_us;
-    let board = bench.board.clone();
+    let scanning = Configuration { send_readings: true, ..every(10_000) };
+    let (mut session, board) = started(scanning, &blob(3, 4));
+    let mut pins = board.pins.borrow_mut();
+    (pins.scan_us, pins.gap_us) = (scan_us, gap_us);
+    drop(pins);
     // A faulty reading, so that all kinds of reports are sent.
-    bench.board.frame.borrow_mut()[0][0] = f32::NAN;
-    board.pins.borrow_mut().gap_us = gap_us;
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    board.frame.borrow_mut()[0][0] = f32::NAN;
     let mut longest_us = 0;
     for _ in 0..30 {
         let request = request_bytes(5, &Request::Identify);

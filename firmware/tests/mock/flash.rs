@@ -142,16 +142,6 @@ impl Flash {
         self.supply.clone()
     }
 
-    /// Cuts the power after so many `operations`: erases, and words that are programmed.
-    pub fn cut_power_after(&self, operations: u64) {
-        self.supply.borrow_mut().on(Some(operations));
-    }
-
-    /// Switches the power on.
-    pub fn power_on(&self) {
-        self.supply.borrow_mut().on(None);
-    }
-
     /// What it holds, to be put back by [`Flash::restore`].
     pub fn cells(&self) -> Cells {
         self.cells.clone()
