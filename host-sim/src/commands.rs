@@ -7,6 +7,7 @@ pub mod print;
 pub mod progress;
 pub mod arguments;
 mod model_argument;
+mod decoder_arguments;
 mod command_line;
 mod model_outputs;
 pub mod scene_argument;
@@ -92,8 +93,7 @@ fn advice(error: &Error) -> &'static str {
     let of_field = |field: &str| match field {
         "fill" => " (leave --fill or training.fill out)",
         "folds" => " (--folds or --fold-column, --no-refine)",
-        "memory" => " (--centres, --most-memory)",
-        "qemu" => " (--qemu)",
+        "memory" => " (--centres)",
         "image" => " (--image)",
         "port" => " (PORT)",
         _ => "",
@@ -133,7 +133,7 @@ mod tests {
         };
         let of_rig = errors().map(|error| Error::from(taxel_rig::Error::from(error)));
         for error in of_rig.into_iter().chain(errors().map(Error::Data)) {
-            assert_eq!(advice(&error), " (--centres, --most-memory)", "{error}");
+            assert_eq!(advice(&error), " (--centres)", "{error}");
             assert_eq!(exit_status(&error), 2, "{error}");
         }
     }

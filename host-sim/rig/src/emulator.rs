@@ -12,6 +12,8 @@ use crate::device::Wire;
 use crate::error::{Error, Result};
 use crate::mailbox::{FILE_BYTES, Mailbox};
 
+/// QEMU's program, which PATH finds.
+const QEMU: &str = "qemu-system-arm";
 /// Address at which the image expects its first model slot.
 const SLOT_ADDRESS: u32 = 0x0020_0000;
 /// Longest time that QEMU may take to start.
@@ -20,8 +22,6 @@ const START: Duration = Duration::from_secs(20);
 /// Options of the emulator.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// QEMU's program, by name or path.
-    pub qemu: PathBuf,
     /// Path of the image, an ELF file.
     pub image: PathBuf,
     /// Path of a blob that lies in the first slot from the start.
@@ -146,13 +146,12 @@ impl Emulator {
     /// [`Error::Data`] if a file is missing or wrong, if that of the mailbox cannot be made, or if QEMU does not start.
     pub fn start(options: &Options) -> Result<(Self, Link)> {
         options.check()?;
-        let qemu = options.qemu.display();
         let failed = |cause: std::io::Error| {
-            Error::failed(format!("{qemu}: the emulator does not start: {cause} (--qemu)"))
+            Error::failed(format!("{QEMU}: the emulator does not start: {cause}"))
         };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
-        let mut command = Command::new(&options.qemu);
+        let mut command = Command::new(QEMU);
         let mailbox = options.mailbox.as_deref().map(create_mailbox).transpose()?;
         let shared = options.mailbox.clone().map(SharedFile);
         command.args(machine(options.mailbox.as_deref()));
@@ -176,7 +175,7 @@ impl Emulator {
         let child = command.spawn().map_err(|cause| {
             if cause.kind() == ErrorKind::NotFound {
                 let says = "there is no such program; on Debian: apt-get install qemu-system-arm";
-                return Error::unfit_for("qemu", format!("{qemu}: {says}"));
+                return Error::unfit_for("qemu", format!("{QEMU}: {says}"));
             }
             failed(cause)
         })?;

@@ -28,12 +28,6 @@ pub fn folder() -> impl TypedValueParser<Value = PathBuf> {
     })
 }
 
-/// Parser for a number of GB, in bytes.
-pub fn gigabytes(text: &str) -> std::result::Result<u64, &'static str> {
-    let gb = text.parse::<f64>().ok().filter(|gb| (1e-3..1e6).contains(gb));
-    gb.map(|gb| (gb * 1e9) as u64).ok_or("give a number of GB from 0.001 on, such as 16")
-}
-
 /// Refuses the first of these options that was given, with a `message` that takes its name.
 pub fn refuse_given(
     options: impl IntoIterator<Item = (&'static str, bool)>,
@@ -66,15 +60,6 @@ pub fn of_option(bad: BadValue, options: &[(&str, &str)]) -> Error {
 mod tests {
     use super::*;
     use clap::{Arg, Command};
-
-    #[test]
-    fn memory_is_a_number_of_gigabytes_above_none() {
-        assert_eq!(gigabytes("16"), Ok(16_000_000_000));
-        assert_eq!(gigabytes("0.5"), Ok(500_000_000));
-        for bad in ["0", "-1", "1e-9", "nan", "inf", "abc", ""] {
-            assert!(gigabytes(bad).is_err(), "{bad}");
-        }
-    }
 
     #[test]
     fn stdout_is_no_folder() {

@@ -13,9 +13,9 @@ use crate::{Error, Result};
 use clap::Args;
 use toml::Value;
 
+use super::decoder_arguments::{DecoderArguments, ReadoutOption};
 use super::merged::{self, Files};
 use super::progress::Terminal;
-use super::trade::ReadoutOption;
 use super::{Common, arguments, command_line, print};
 
 /// Compare layouts of a sensor: the least possible error, the best decoder, its scan and its cost.
@@ -30,21 +30,8 @@ pub struct Arguments {
     /// Scenes: built-in ones (paper, press, contact, moving), or scene files (.toml).
     #[arg(required = true)]
     scenes: Vec<String>,
-    /// Centres K to try for each layout, instead of the scene's.
-    #[arg(long, value_name = "K,…", value_delimiter = ',')]
-    centres: Vec<usize>,
-    /// Numbers of samples averaged for each reading, to try.
-    #[arg(long, value_name = "N,…", value_delimiter = ',')]
-    average: Vec<usize>,
-    /// Readout of the board (docs/board.md).
-    #[arg(long, value_enum, default_value_t = ReadoutOption::Spi)]
-    readout: ReadoutOption,
-    /// Most time in ms from the start of a scan to its estimate.
-    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
-    max_latency_ms: Option<f64>,
-    /// Outputs that determine the choice, such as dz_mm [default: the last].
-    #[arg(long, value_name = "GROUP")]
-    group: Option<String>,
+    #[command(flatten)]
+    tried: DecoderArguments,
     /// Train nothing: the least possible error and the scan alone.
     #[arg(long, conflicts_with_all = ["centres", "max_latency_ms"])]
     limit_only: bool,
@@ -69,7 +56,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let first = bases.first().map_or(String::new(), |base| base.label.clone());
     let mut plan = Plan::new("compare", (bases, None), wanted(arguments, common)?, "")?;
-    if let Some(group) = &arguments.group {
+    if let Some(group) = &arguments.tried.group {
         let groups = plan.groups();
         require_known("--group", group, &groups.iter().map(String::as_str).collect::<Vec<_>>())?;
         let error = if plan.train { "rmse" } else { "limit" };
@@ -98,12 +85,15 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
     let whole = |value: usize| Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
     let mut wanted = Wanted { train: !arguments.limit_only, ..Wanted::default() };
-    let axes = [("training.centres", &arguments.centres), ("device.samples", &arguments.average)];
+    let axes = [
+        ("training.centres", &arguments.tried.centres),
+        ("device.samples", &arguments.tried.average),
+    ];
     for (field, values) in axes.into_iter().filter(|(_, values)| !values.is_empty()) {
         let values = values.iter().map(|value| whole(*value)).collect();
         wanted.axes.insert(field.into(), Value::Array(values));
     }
-    if let ReadoutOption::Onchip = arguments.readout {
+    if let ReadoutOption::Onchip = arguments.tried.readout {
         wanted.device.insert("readout".into(), "onchip".into());
     }
     if let Some(seed) = common.seed {
@@ -114,7 +104,7 @@ fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
     }
     wanted
         .bounds
-        .extend(arguments.max_latency_ms.map(|most| ("frame_ms".into(), Bound::Most(most))));
+        .extend(arguments.tried.max_latency_ms.map(|most| ("frame_ms".into(), Bound::Most(most))));
     Ok(wanted)
 }
 

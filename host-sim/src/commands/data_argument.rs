@@ -1,6 +1,6 @@
 //! Options of measurements in a data file: its columns, its lines at rest, its folds.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::measurements::far_from_zero;
 use crate::{Error, Result};
@@ -12,8 +12,8 @@ use taxel_data::{DataFile, Dataset, Rest, Table};
 use taxel_learn::select;
 
 use super::arguments::refuse_given;
-use super::data_file::{DATA_FILES, DataFileArguments};
-use super::readings;
+use super::data_file::{DATA_FILES, DataFileArguments, TimeArgument};
+use super::readings::{self, BaselineArgument};
 use super::rest_argument::RestArgument;
 
 mod load;
@@ -48,15 +48,12 @@ pub struct DataArguments {
     /// Train on the lines of a CSV file that hold an outlier, too: a value far from all others in its column.
     #[arg(long)]
     keep_outliers: bool,
-    /// CSV file with frames of the untouched sensor, whose mean is the baseline, instead of lines at rest.
-    #[arg(long, value_name = "FILE")]
-    baseline: Option<PathBuf>,
+    #[command(flatten)]
+    untouched: BaselineArgument,
     #[command(flatten)]
     rest: RestArgument,
-    /// Column of a log with the time of each line [default: one called time, t, timestamp, …; without one lines are
-    /// counted].
-    #[arg(long, value_name = "NAME")]
-    time: Option<String>,
+    #[command(flatten)]
+    clock: TimeArgument,
     #[command(flatten)]
     pub file: DataFileArguments,
 }
@@ -96,13 +93,13 @@ impl DataArguments {
             ("--fold-blocks", "lines", self.fold_blocks.is_some()),
             ("--keep-outliers", "lines", self.keep_outliers),
             ("--rest", "lines", self.rest.is_given()),
-            ("--time", "columns", self.time.is_some()),
+            ("--time", "columns", self.clock.time.is_some()),
         ] {
             refuse_given([(option, given)], |option| {
                 format!("{option} picks {picked} of a CSV file; a scene has its own")
             })?;
         }
-        refuse_given([("--baseline", self.baseline.is_some())], |option| {
+        refuse_given([("--baseline", self.untouched.baseline.is_some())], |option| {
             format!("{option} is for a CSV file; a scene synthesises its own: leave it out")
         })?;
         self.file.refuse_for_scene()
@@ -120,7 +117,7 @@ impl DataArguments {
 
     /// Error if a column of times was named: `command` tells nothing over time.
     pub fn refuse_time(&self, command: &str) -> Result<()> {
-        refuse_given([("--time", self.time.is_some())], |option| {
+        refuse_given([("--time", self.clock.time.is_some())], |option| {
             format!("{option} has no effect in {command}: leave it out")
         })
     }
@@ -142,7 +139,7 @@ impl DataArguments {
 
     /// File with frames of the untouched sensor, if it was given.
     pub fn baseline(&self) -> Option<&Path> {
-        self.baseline.as_deref()
+        self.untouched.baseline.as_deref()
     }
 
     /// Patterns of the input and output columns, as they were given.
@@ -153,7 +150,7 @@ impl DataArguments {
     /// Readings of the untouched sensor in the columns of `inputs`, if a file with them was given.
     pub fn rest_of_file(&self, inputs: &Table) -> Result<Option<Rest>> {
         let read = |path| readings::at_rest(&self.file.fields().read(path)?, inputs);
-        let of_file = self.baseline.as_deref().map(read).transpose()?;
+        let of_file = self.untouched.baseline.as_deref().map(read).transpose()?;
         Ok(of_file.map(|readings| Rest { readings, lines: None }))
     }
 

@@ -32,6 +32,16 @@ pub struct DataFileArguments {
     last_share: Option<f64>,
 }
 
+/// Times of a log's lines.
+#[derive(Args, Default)]
+#[command(next_help_heading = DATA_FILES)]
+pub struct TimeArgument {
+    /// Column of a log with the time of each line [default: one called time, t, timestamp, …; without one lines are
+    /// counted].
+    #[arg(long, value_name = "NAME")]
+    pub time: Option<String>,
+}
+
 /// What the fields of a data file mean.
 #[derive(Args, Default)]
 pub struct FieldArguments {
@@ -49,12 +59,6 @@ pub struct FieldArguments {
     /// Decimal sign of a text file, which is otherwise found.
     #[arg(long, value_name = "SIGN", value_parser = ["point", "comma"])]
     decimal: Option<String>,
-    /// What comment lines of a text file begin with; otherwise #, % and // are found.
-    #[arg(long, value_name = "MARK")]
-    comment: Option<String>,
-    /// Take the line behind the header for units; otherwise such a line is found.
-    #[arg(long)]
-    units_line: bool,
 }
 
 impl DataFileArguments {
@@ -135,20 +139,13 @@ impl FieldArguments {
         let stated = Stated {
             separator: self.separator,
             decimal_comma: self.decimal.as_ref().map(|sign| sign == "comma"),
-            comment: self.comment.clone(),
-            units_line: self.units_line,
         };
         Reading { has_header: self.header, stated, ..Reading::default() }
     }
 
     /// Options that are for text files alone, and whether they were given.
-    fn of_text(&self) -> [(&'static str, bool); 4] {
-        [
-            ("--separator", self.separator.is_some()),
-            ("--decimal", self.decimal.is_some()),
-            ("--comment", self.comment.is_some()),
-            ("--units-line", self.units_line),
-        ]
+    fn of_text(&self) -> [(&'static str, bool); 2] {
+        [("--separator", self.separator.is_some()), ("--decimal", self.decimal.is_some())]
     }
 
     /// Reads the file at `path`, and says on stderr what it made of it.

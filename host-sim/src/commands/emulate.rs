@@ -49,9 +49,6 @@ pub struct Arguments {
         default_value = "target/thumb/thumbv7em-none-eabihf/firmware/qemu-app"
     )]
     image: PathBuf,
-    /// QEMU's program.
-    #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
-    qemu: PathBuf,
     /// File for the image's log, as defmt encodes it: `cargo xtask log FILE` prints it.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -65,7 +62,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scratch =
         scratch.map_err(|cause| taxel_data::Error::write(&std::env::temp_dir(), cause))?;
     let options = emulator::Options {
-        qemu: arguments.qemu.clone(),
         image: arguments.image.clone(),
         model: None,
         log: arguments.log.is_some().then(|| scratch.path().join("log.defmt")),

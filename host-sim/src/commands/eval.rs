@@ -23,7 +23,7 @@ use taxel_learn::decoders::mean;
 use taxel_limit::Refusal;
 
 use super::coverage_page;
-use super::data_file::{DATA_FILES, DataFileArguments};
+use super::data_file::{DataFileArguments, TimeArgument};
 use super::health::{Health, HealthArguments};
 use super::readings::{model_inputs, related, table_of};
 use super::rest_argument::UntouchedArguments;
@@ -48,12 +48,11 @@ pub struct Arguments {
     untouched: UntouchedArguments,
     #[command(flatten)]
     health: HealthArguments,
-    /// Column with the time of each line [default: one called time, t, timestamp, …; without one lines are counted].
-    #[arg(long, value_name = "NAME", help_heading = DATA_FILES)]
-    time: Option<String>,
     /// Write a page with the same figures as run's.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    #[command(flatten)]
+    clock: TimeArgument,
     #[command(flatten)]
     file: DataFileArguments,
 }
@@ -105,7 +104,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let metadata = parsed.metadata();
     let mut readings = model_inputs(&model, &file)?;
     let mut truth = table_of(&file, metadata.output_names.iter())?;
-    let clock = Clock::of(&file, arguments.time.as_deref())?;
+    let clock = Clock::of(&file, arguments.clock.time.as_deref())?;
     let log = Log { clock, lines: (0..file.lines()).collect() };
     let rest = if over_time::is_log(&log, &truth) {
         arguments.untouched.rest(&file, metadata, limits)?

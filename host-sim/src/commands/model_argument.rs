@@ -6,9 +6,51 @@ use taxel_core::rbf::Format;
 use taxel_learn::Options;
 use taxel_learn::train::Solver;
 
-use super::arguments::{format, gigabytes, solver};
+use super::arguments::{format, solver};
 use super::stderr;
 use crate::subject::Subject;
+use crate::{Error, Result};
+
+/// Numbers that a network is trained with, or candidates for them.
+#[derive(Args, Default)]
+pub struct NetworkArguments {
+    /// Centres K; with `train --select`, candidates [default: the scene's, or 64].
+    #[arg(long, value_name = "K", value_delimiter = ',')]
+    pub centres: Vec<usize>,
+    /// Width σ on scaled inputs, where refinement starts; with `train --select`, candidates [default: the scene's, or 0.4;
+    /// 0.8 for the readings of a row].
+    #[arg(long, value_name = "S", value_delimiter = ',')]
+    pub spread: Vec<f64>,
+    /// Ridge penalty on squared weights, for each frame: 1 is as strong as an input that is always 1. More of it
+    /// generalises better from few or noisy frames, or to another day. With `train --select`, candidates [default: 1e-6 for all
+    /// frames together, or 1e-7 a frame if refined].
+    #[arg(long, value_name = "P", value_delimiter = ',', allow_negative_numbers = true)]
+    pub penalty: Vec<f64>,
+}
+
+impl NetworkArguments {
+    /// Sets `options` to the numbers that were given.
+    ///
+    /// # Errors
+    /// Error for several values of an option, which only `train --select` takes.
+    pub fn apply(&self, options: &mut Options) -> Result<()> {
+        options.centres = one("--centres", &self.centres)?.unwrap_or(options.centres);
+        options.spread = one("--spread", &self.spread)?.unwrap_or(options.spread);
+        options.penalty = one("--penalty", &self.penalty)?.or(options.penalty);
+        Ok(())
+    }
+}
+
+/// The one value of an option, if it was given.
+fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T]) -> Result<Option<T>> {
+    match given {
+        [] => Ok(None),
+        [value] => Ok(Some(*value)),
+        _ => Err(Error::Usage(format!(
+            "{option} {given:?}: give one value, or `train` with --select"
+        ))),
+    }
+}
 
 /// What a model computes, and how its numbers are held.
 #[derive(Args, Default)]
@@ -31,9 +73,6 @@ pub struct ModelArguments {
     /// How output weights are computed. Both ways give the same estimates [default: the scene's, or qr].
     #[arg(long, value_name = "SOLVER", value_parser = solver())]
     solver: Option<Solver>,
-    /// Memory in GB that training may take; where it would take more, it is refused at once [default: 8].
-    #[arg(long, value_name = "GB", value_parser = gigabytes)]
-    most_memory: Option<u64>,
 }
 
 impl ModelArguments {
@@ -50,7 +89,6 @@ impl ModelArguments {
             options = options.for_each_row(false);
         }
         options.features = self.features.or(options.features);
-        options.most_memory_bytes = self.most_memory.unwrap_or(options.most_memory_bytes);
         options.solver = self.solver.unwrap_or(options.solver);
         if let Some(format) = self.format {
             (options.format, options.or_f32) = (format, false);

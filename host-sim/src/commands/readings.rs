@@ -17,10 +17,10 @@ use super::stderr;
 use super::data_file::FieldArguments;
 
 /// Baseline of the sensor that readings are from.
-#[derive(Args)]
+#[derive(Args, Default)]
 pub struct BaselineArgument {
-    /// CSV file with frames of the untouched sensor, in columns of the same names as the readings. A model with
-    /// relative inputs takes the mean of its lines for the baseline.
+    /// CSV file with frames of the untouched sensor, in columns of the same names as the readings. The mean of its lines is the
+    /// baseline of relative inputs, instead of lines at rest.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
 }

@@ -13,7 +13,7 @@ use clap::Args;
 use taxel_data::output::FileSet;
 use taxel_learn::{ModelBlob, Options};
 
-use super::model_argument::{ModelArguments, note_format};
+use super::model_argument::{ModelArguments, NetworkArguments, note_format};
 use super::subject_argument::SubjectArgument;
 use super::{Common, arguments, command_line, print, refused_readings, stderr};
 
@@ -47,16 +47,8 @@ const FILES: FileSet = FileSet {
   host-sim run press --noise 0.01 -o out/noise-1
   host-sim run measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column fold")]
 pub struct Arguments {
-    /// Centres K of each network [default: the scene's, or 64].
-    #[arg(long, value_name = "K")]
-    centres: Option<usize>,
-    /// Width σ on scaled inputs, where refinement starts [default: the scene's, or 0.4; 0.8 for the
-    /// readings of a row].
-    #[arg(long, value_name = "S")]
-    spread: Option<f64>,
-    /// Ridge penalty on squared weights, for each frame, as `train` takes it.
-    #[arg(long, value_name = "P", allow_negative_numbers = true)]
-    penalty: Option<f64>,
+    #[command(flatten)]
+    network: NetworkArguments,
     #[command(flatten)]
     model: ModelArguments,
     /// Folder that receives a folder named after the scene.
@@ -70,9 +62,7 @@ impl Default for Arguments {
     fn default() -> Self {
         Self {
             subject: SubjectArgument::default(),
-            centres: None,
-            spread: None,
-            penalty: None,
+            network: NetworkArguments::default(),
             model: ModelArguments::default(),
             output: DEFAULT_OUTPUT.into(),
         }
@@ -80,11 +70,10 @@ impl Default for Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let mut subject = arguments.subject.load_with(common, arguments.centres)?;
+    let centres = arguments.network.centres.iter().min().copied();
+    let mut subject = arguments.subject.load_with(common, centres)?;
     let mut options = arguments.model.over(&mut subject);
-    options.centres = arguments.centres.unwrap_or(options.centres);
-    options.spread = arguments.spread.unwrap_or(options.spread);
-    options.penalty = arguments.penalty.or(options.penalty);
+    arguments.network.apply(&mut options)?;
     options.check(subject.training_frames())?;
     let folder = arguments.output.join(subject.name());
     FILES.check(&folder, &arguments.subject.paths())?;

@@ -128,19 +128,16 @@ impl NoiseArgument {
 /// Whether training is refined, whatever the scene says.
 #[derive(Args, Default)]
 pub struct RefineArgument {
-    /// Refine centres, widths and the projection by their gradient: more accurate at the same cost on the device,
-    /// and slower to train (docs/training.md). It is the default.
-    #[arg(long, overrides_with = "no_refine")]
-    refine: bool,
-    /// Leave centres where K-means puts them, as the paper does.
-    #[arg(long, overrides_with = "refine")]
+    /// Leave centres where K-means puts them, as the paper does. Otherwise centres, widths and the projection are refined
+    /// by their gradient: more accurate at the same cost on the device, and slower to train (docs/training.md).
+    #[arg(long)]
     no_refine: bool,
 }
 
 impl RefineArgument {
     /// Whether to refine, where `default` is what holds without an option.
     pub fn over(&self, default: bool) -> bool {
-        self.refine || (default && !self.no_refine)
+        default && !self.no_refine
     }
 }
 

@@ -5,16 +5,17 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use crate::error::{Bounded, NoPoint};
-use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Plan, Readout, Wires};
+use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Plan, Wires};
 use crate::metrics;
 use crate::subject::Subject;
 use crate::verdict::Warning;
 use crate::{Error, Result};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use taxel_data::{BadValue, columns};
 use taxel_simulate::path::Path;
 
 use super::arguments::{self, of_option};
+use super::decoder_arguments::DecoderArguments;
 use super::progress::Terminal;
 use super::subject_argument::SubjectArgument;
 use super::{Common, print, stderr};
@@ -47,24 +48,16 @@ pub struct Arguments {
     /// Folder that receives a folder named after the scene or the CSV file.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = "out")]
     output: PathBuf,
-    /// Centres K to try [default: 16,32,64,128,256, of a CSV file those that are fewer than its training frames].
-    #[arg(long, value_name = "K", value_delimiter = ',')]
-    centres: Vec<usize>,
+    #[command(flatten)]
+    tried: DecoderArguments,
     /// Columns of a scene to read, to try: every, every 2nd and so on. Fewer make the scan shorter [default: 1,2,3,6
     /// with --frame-rate or --max-latency-ms, else 1].
     #[arg(long, value_name = "STEP", value_delimiter = ',')]
     column_step: Vec<usize>,
-    /// Numbers of samples averaged for each reading, to try: more lower the noise, and make the scan longer.
-    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1")]
-    average: Vec<usize>,
     /// Judge on contacts that slide at this speed, and are pressed and lifted so often a second, instead of the scene's
     /// motion: by the newest finished estimate against the truth at that moment. `none` for still contacts.
     #[arg(long, value_name = "MM/S,HZ")]
     motion: Option<MotionOption>,
-    /// Outputs that determine the front and the choice, such as dz_mm; or all, by the mean of RMSE/standard deviation
-    /// [default: the last of a scene, all of a data file].
-    #[arg(long, value_name = "GROUP")]
-    group: Option<String>,
     /// Choose the cheapest point with an RMSE of at most this, in the group's unit.
     #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
     max_error: Option<f64>,
@@ -78,16 +71,9 @@ pub struct Arguments {
     /// Choose among points that scan and decode at least so many frames a second.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     frame_rate: Option<f64>,
-    /// Choose among points that take at most so many ms, from the start of a scan to its estimate.
-    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
-    max_latency_ms: Option<f64>,
     /// Clock of the device.
     #[arg(long, value_name = "MHZ", default_value_t = BOARD_CLOCK_MHZ, allow_negative_numbers = true)]
     clock_mhz: f64,
-    /// Readout of the board: converters on a bus, or the chip's own, which scan while the frame before is decoded
-    /// (docs/board.md).
-    #[arg(long, value_enum, default_value_t = ReadoutOption::Spi)]
-    readout: ReadoutOption,
     /// Time of a scan in ms with one sample a reading, instead of that of the board's readout.
     #[arg(long, value_name = "MS", allow_negative_numbers = true)]
     scan_ms: Option<f64>,
@@ -109,7 +95,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
-    let group = match &arguments.group {
+    let group = match &arguments.tried.group {
         Some(group) if group == metrics::ALL || groups.contains(&group.as_str()) => group.as_str(),
         Some(group) => {
             let message = format!("--group {group}: the outputs are {}; or all", groups.join(", "));
@@ -120,14 +106,17 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let device = Device {
         clock_mhz: arguments.clock_mhz,
-        readout: arguments.readout.into(),
+        readout: arguments.tried.readout.into(),
         scan_ms: arguments.scan_ms,
     };
     device.check().map_err(|bad| of_option(bad, &OPTIONS))?;
     let plan = Plan {
-        centres: centres(&arguments.centres, &subject)?,
+        centres: centres(&arguments.tried.centres, &subject)?,
         column_steps: column_steps(arguments, &subject)?,
-        samples_averaged: distinct("--average", &arguments.average)?,
+        samples_averaged: match arguments.tried.average.as_slice() {
+            [] => vec![1],
+            given => distinct("--average", given)?,
+        },
         device,
         worst_case: arguments.worst_case,
     };
@@ -141,10 +130,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         cycles: arguments.max_cycles,
         blob_bytes: arguments.max_flash,
         frame_rate_hz: arguments.frame_rate,
-        latency_ms: arguments.max_latency_ms,
+        latency_ms: arguments.tried.max_latency_ms,
     };
     bounds.check().map_err(|bad| of_option(bad, &OPTIONS))?;
-    let is_timed = arguments.frame_rate.is_some() || arguments.max_latency_ms.is_some();
+    let is_timed = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
     if is_timed && plan.device.scan_ms(wires(&subject, 1), 1).is_none() {
         let message = "--frame-rate and --max-latency-ms count the scan, whose time is not known: the readings name no \
                        wires; give --scan-ms MS, or --grid ROWSxCOLUMNS for the board's own scan";
@@ -215,22 +204,6 @@ const fn option(bounded: Bounded) -> &'static str {
         Bounded::Flash => "--max-flash",
         Bounded::FrameRate => "--frame-rate",
         Bounded::Latency => "--max-latency-ms",
-    }
-}
-
-/// Value of `--readout`.
-#[derive(Clone, Copy, ValueEnum)]
-pub enum ReadoutOption {
-    Spi,
-    Onchip,
-}
-
-impl From<ReadoutOption> for Readout {
-    fn from(option: ReadoutOption) -> Self {
-        match option {
-            ReadoutOption::Spi => Self::Spi,
-            ReadoutOption::Onchip => Self::OnChip,
-        }
     }
 }
 
@@ -311,7 +284,7 @@ fn centres(given: &[usize], subject: &Subject) -> Result<Vec<usize>> {
 
 /// Steps of columns to try: those that are given, or that shorten the scan where its time matters.
 fn column_steps(arguments: &Arguments, subject: &Subject) -> Result<Vec<usize>> {
-    let time_matters = arguments.frame_rate.is_some() || arguments.max_latency_ms.is_some();
+    let time_matters = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
     match subject {
         _ if !arguments.column_step.is_empty() => distinct("--column-step", &arguments.column_step),
         Subject::Scene(scene) if time_matters && arguments.scan_ms.is_none() => {

@@ -19,7 +19,7 @@ use taxel_learn::select::Selection;
 use taxel_learn::train::Solver;
 
 use super::data_argument::JudgedBy;
-use super::model_argument::{ModelArguments, note_format};
+use super::model_argument::{ModelArguments, NetworkArguments, note_format};
 use super::model_outputs::{self, ModelOutput};
 use super::scene_argument::Sizes;
 use super::subject_argument::SubjectOptions;
@@ -46,18 +46,8 @@ pub struct Arguments {
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Centres K; with --select, candidates [default: the scene's, or 64].
-    #[arg(long, value_name = "K", value_delimiter = ',')]
-    centres: Vec<usize>,
-    /// Width σ on scaled inputs, where refinement starts; with --select, candidates [default: the scene's, or 0.4;
-    /// 0.8 for the readings of a row].
-    #[arg(long, value_name = "S", value_delimiter = ',')]
-    spread: Vec<f64>,
-    /// Ridge penalty on squared weights, for each frame: 1 is as strong as an input that is always 1. More of it
-    /// generalises better from few or noisy frames, or to another day. With --select, candidates [default: 1e-6 for all
-    /// frames together, or 1e-7 a frame if refined].
-    #[arg(long, value_name = "P", value_delimiter = ',', allow_negative_numbers = true)]
-    penalty: Vec<f64>,
+    #[command(flatten)]
+    network: NetworkArguments,
     #[command(flatten)]
     model: ModelArguments,
     /// Choose K, spread and penalty among the candidates by cross-validation, and print every score. Best values at
@@ -184,7 +174,7 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
         let message = "--baseline is what --relative-inputs divides by: give both, or neither";
         return Err(Error::Usage(message.into()));
     }
-    let centres = arguments.centres.iter().min().copied();
+    let centres = arguments.network.centres.iter().min().copied();
     let sizes = Sizes { frames: arguments.frames, centres };
     let (judged, confidence) = (JudgedBy::None, arguments.confidence);
     let subject = options.load(&arguments.source, common, judged, confidence, sizes)?;

@@ -17,7 +17,6 @@ fn the_image_keeps_settings_over_restarts() {
     let image = std::env::var_os("TAXEL_IMAGE").expect("TAXEL_IMAGE is the path of qemu-app");
     let folder = Folder::new("kept_in_qemu");
     let options = emulator::Options {
-        qemu: "qemu-system-arm".into(),
         image: image.into(),
         model: None,
         log: None,

@@ -17,8 +17,6 @@ fuzz_target!(|bytes: &[u8]| {
         stated: Stated {
             separator: bit(2).then_some(Separator::Char(if bit(3) { ';' } else { '\t' })),
             decimal_comma: bit(4).then_some(bit(3)),
-            comment: bit(5).then(|| "!".into()),
-            units_line: bit(6),
         },
     };
     let path = Path::new("f.csv");

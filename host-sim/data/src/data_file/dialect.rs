@@ -31,14 +31,10 @@ const SEPARATORS: [Separator; 5] = [
 ];
 
 /// What a user states of a text file, in place of what is found.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Stated {
     pub separator: Option<Separator>,
     pub decimal_comma: Option<bool>,
-    /// What comment lines begin with.
-    pub comment: Option<String>,
-    /// Whether the line behind the header holds units.
-    pub units_line: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,8 +89,7 @@ impl Dialect {
         stated: &Stated,
         has_header: bool,
     ) -> Result<Self, Problem> {
-        let known = stated.comment.as_deref().map_or_else(|| COMMENTS.to_vec(), |mark| vec![mark]);
-        let mark_of = |line: &str| known.iter().copied().find(|mark| is_comment(line, mark));
+        let mark_of = |line: &str| COMMENTS.into_iter().find(|mark| is_comment(line, mark));
         let lines = lines(sample).map(|(line, _)| line).enumerate();
         let (mut comments, mut body, mut left_out) = (vec![], vec![], vec![]);
         let mut separator = None;
@@ -155,7 +150,7 @@ impl Dialect {
                     && below.contains(&Some(true))
                     && pairs.all(|(unit, below)| unit.is_some() || below.is_some())
             });
-            if stated.units_line || are_units {
+            if are_units {
                 let names = names.iter().enumerate();
                 let with_unit = |(column, name): (usize, &Cow<'_, str>)| {
                     with_unit(name, units.get(column).map_or("", |unit| unit))
@@ -166,7 +161,6 @@ impl Dialect {
             }
         }
         let mut marks: Vec<String> = comments.iter().map(|it| it.1.to_owned()).collect();
-        marks.extend(stated.comment.clone()); // there may be some later
         marks.sort_unstable();
         marks.dedup();
         let words = [

@@ -130,7 +130,7 @@ impl DataArguments {
         let lines = outliers.kept.iter().map(|frame| lines[*frame]).collect();
         let frames = frames.subset(&outliers.kept);
         refused_readings::note(&frames.inputs, &file.path.display().to_string());
-        let log = Log { clock: Clock::of(file, self.time.as_deref())?, lines };
+        let log = Log { clock: Clock::of(file, self.clock.time.as_deref())?, lines };
         if let Some(why) = log.clock.why_counted(file) {
             stderr::remark(format_args!("note: {why}; lines are counted instead (--time)"));
         }

@@ -50,6 +50,7 @@ struct Summary {
 }
 
 pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> Result<()> {
+    arguments.scan.check()?;
     if let Some(path) = &arguments.output {
         let read = [&arguments.model, &arguments.presses].map(PathBuf::as_path);
         let baseline = arguments.baseline.baseline.as_deref();

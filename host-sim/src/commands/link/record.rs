@@ -88,6 +88,7 @@ const MISSED: f64 = 0.98;
 
 /// Checks before long work that the options go together, and that the file can be written.
 fn check_usage(action: &RecordArguments) -> Result<()> {
+    action.scan.check()?;
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     if is_recording(&action.output) {
         if action.time {
@@ -181,7 +182,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let saved = Saved {
         frames,
         frames_per_s,
-        asked_period_us: action.scan.period_us,
+        asked_period_us: action.scan.period_us(),
         frames_lost,
         values_missing,
         frames_novel,
@@ -246,6 +247,7 @@ fn confidence_names(
 }
 
 pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common) -> Result<()> {
+    action.scan.check()?;
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
     print::check_output(&action.output, &inputs)?;
     let identity = device.identify()?;
@@ -277,7 +279,7 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
     let saved = Saved {
         frames: frames.into(),
         frames_per_s: None,
-        asked_period_us: action.scan.period_us,
+        asked_period_us: action.scan.period_us(),
         frames_lost: 0,
         values_missing,
         frames_novel: 0,

@@ -16,15 +16,49 @@ pub struct ScanArguments {
     /// Frames to scan.
     #[arg(short = 'n', long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u16).range(1..), allow_negative_numbers = true)]
     pub frames: u16,
+    #[command(flatten)]
+    timing: TimingArguments,
+}
+
+/// Times of a scan, where they are not the ones that hold already.
+#[derive(Args)]
+pub struct TimingArguments {
     /// Time from one scan to the next.
-    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.frame_period_us, value_parser = value_parser!(u32).range(100..=1_000_000_000), allow_negative_numbers = true)]
-    pub period_us: u32,
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=1_000_000_000), allow_negative_numbers = true)]
+    period_us: Option<u32>,
     /// Wait after a row is driven.
-    #[arg(long, value_name = "US", default_value_t = Configuration::DEFAULT.scan.settling_us, value_parser = value_parser!(u32).range(..=10_000), allow_negative_numbers = true)]
-    pub settling_us: u32,
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=10_000), allow_negative_numbers = true)]
+    settling_us: Option<u32>,
     /// Samples averaged for a reading.
-    #[arg(long, value_name = "N", default_value_t = Configuration::DEFAULT.scan.oversampling, value_parser = value_parser!(u16).range(1..=256), allow_negative_numbers = true)]
-    pub oversampling: u16,
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=256), allow_negative_numbers = true)]
+    oversampling: Option<u16>,
+}
+
+impl TimingArguments {
+    /// This configuration with the times that are given.
+    pub fn over(&self, mut c: Configuration) -> Configuration {
+        c.frame_period_us = self.period_us.unwrap_or(c.frame_period_us);
+        c.scan.settling_us = self.settling_us.unwrap_or(c.scan.settling_us);
+        c.scan.oversampling = self.oversampling.unwrap_or(c.scan.oversampling);
+        c
+    }
+}
+
+impl ScanArguments {
+    /// Error for a period with which no frames come.
+    pub fn check(&self) -> Result<()> {
+        match self.timing.period_us {
+            Some(period_us @ ..100) => {
+                Err(Error::Usage(format!("--period-us {period_us}: give at least 100")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Time from one scan to the next that is asked for.
+    pub fn period_us(&self) -> u32 {
+        self.timing.over(Configuration::DEFAULT).frame_period_us
+    }
 }
 
 /// Content that a device is to send of each scan.
@@ -75,15 +109,11 @@ pub fn configure(
     wanted: Wanted,
     decoding: Configuration,
 ) -> taxel_rig::Result<()> {
-    let mut configuration = Configuration {
-        frame_period_us: scan.period_us,
+    device.configure(Configuration {
         send_readings: wanted.sent().readings,
         send_estimates: wanted.sent().estimates,
-        ..decoding
-    };
-    configuration.scan.settling_us = scan.settling_us;
-    configuration.scan.oversampling = scan.oversampling;
-    device.configure(configuration)
+        ..scan.timing.over(decoding)
+    })
 }
 
 /// Longest time of a sample, with any converter that the readout is written for.
@@ -102,19 +132,20 @@ pub fn patience_for_next(scan: &ScanArguments, identity: &DeviceIdentity, every:
 
 /// Longest time from scan to scan.
 fn longest_period(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
+    let configuration = scan.timing.over(Configuration::DEFAULT);
     let plan = ScanPlan {
         rows: identity.rows as u16,
         columns: identity.columns as u16,
         board_columns: identity.columns as u16,
-        settling_us: scan.settling_us,
-        oversampling: scan.oversampling,
+        settling_us: configuration.scan.settling_us,
+        oversampling: configuration.scan.oversampling,
         pass_samples: u16::MAX,
         sample_ns: SLOWEST_SAMPLE_NS,
         reading_ns: SLOWEST_SAMPLE_NS,
         row_ns: SLOWEST_SAMPLE_NS,
         between_passes_ns: 0,
     };
-    Duration::from_micros(scan.period_us.max(plan.longest_us()).into())
+    Duration::from_micros(configuration.frame_period_us.max(plan.longest_us()).into())
 }
 
 /// Names of the readings in a frame: those of the `model` that is active on the device, or else of its wires.

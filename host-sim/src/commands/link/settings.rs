@@ -8,20 +8,13 @@ use taxel_rig::device::{CircuitConstants, Device};
 
 use super::super::filter_arguments::milliseconds;
 use super::super::{Common, print};
-use super::scan::Confidence;
+use super::scan::{Confidence, TimingArguments};
 
 #[derive(Args)]
 #[group(required = true, multiple = true)]
 pub struct ConfigureArguments {
-    /// Time from one scan to the next; 0 never scans.
-    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=1_000_000_000))]
-    period_us: Option<u32>,
-    /// Wait after a row is driven.
-    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=10_000))]
-    settling_us: Option<u32>,
-    /// Samples averaged for a reading.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=256))]
-    oversampling: Option<u16>,
+    #[command(flatten)]
+    timing: TimingArguments,
     /// Reports that are sent of each scan.
     #[arg(long, value_enum, value_name = "WHAT")]
     send: Option<Send>,
@@ -59,10 +52,8 @@ enum Send {
 
 impl ConfigureArguments {
     /// This configuration with the fields that are given.
-    fn changed(&self, mut c: Configuration) -> Configuration {
-        c.frame_period_us = self.period_us.unwrap_or(c.frame_period_us);
-        c.scan.settling_us = self.settling_us.unwrap_or(c.scan.settling_us);
-        c.scan.oversampling = self.oversampling.unwrap_or(c.scan.oversampling);
+    fn changed(&self, c: Configuration) -> Configuration {
+        let mut c = self.timing.over(c);
         if let Some(send) = self.send {
             c.send_readings = matches!(send, Send::Readings | Send::Both);
             c.send_estimates = matches!(send, Send::Estimates | Send::Both);

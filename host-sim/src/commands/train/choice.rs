@@ -1,15 +1,16 @@
 //! Centres, spread and penalty: as given, or chosen among candidates by cross-validation.
 
+use crate::Result;
 use crate::commands::stderr;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
-use crate::{Error, Result};
 use taxel_data::Table;
 use taxel_learn::Options;
 use taxel_learn::select::{self, Candidates, Edge, Scored, Selection};
 use taxel_learn::train::Refinement;
 
 use super::Arguments;
+use crate::commands::model_argument::NetworkArguments;
 use crate::commands::progress::Terminal;
 
 /// Spreads that are tried for centres of K-means. Refinement moves the width itself.
@@ -27,7 +28,8 @@ pub fn choose(
     options: &mut Options,
 ) -> Result<Option<Selection>> {
     let usual = Options::default().centres;
-    if arguments.centres.is_empty() && subject.scene().is_none() && options.centres < usual {
+    if arguments.network.centres.is_empty() && subject.scene().is_none() && options.centres < usual
+    {
         let (frames, centres) = (set.frames.fewest_values(), options.centres);
         stderr::remark(format_args!(
             "note: {frames} lines are few for {usual} centres, so the default is {centres}; \
@@ -35,9 +37,7 @@ pub fn choose(
         ));
     }
     if !arguments.select {
-        options.centres = one("--centres", &arguments.centres)?.unwrap_or(options.centres);
-        options.spread = one("--spread", &arguments.spread)?.unwrap_or(options.spread);
-        options.penalty = one("--penalty", &arguments.penalty)?.or(options.penalty);
+        arguments.network.apply(options)?;
         return Ok(None);
     }
     let fold_of = match subject {
@@ -47,7 +47,7 @@ pub fn choose(
     let selection = select::cross_validate(
         &set.frames,
         &fold_of,
-        &candidates(arguments, (&fold_of, &set.frames.outputs), set.refine, options),
+        &candidates(&arguments.network, (&fold_of, &set.frames.outputs), set.refine, options),
         options,
         set.refine.then(Refinement::default).as_ref(),
         &Terminal::new(),
@@ -59,23 +59,14 @@ pub fn choose(
     Ok(Some(selection))
 }
 
-/// The one value of an option, if it was given.
-fn one<T: Copy + std::fmt::Debug>(option: &str, given: &[T]) -> Result<Option<T>> {
-    match given {
-        [] => Ok(None),
-        [value] => Ok(Some(*value)),
-        _ => Err(Error::Usage(format!("{option} {given:?}: give one value, or add --select"))),
-    }
-}
-
 /// Candidates as given, and usual ones for the rest. Only grids of usual ones grow.
 fn candidates(
-    arguments: &Arguments,
+    given: &NetworkArguments,
     (fold_of, outputs): (&[usize], &Table),
     refine: bool,
     options: &Options,
 ) -> Candidates {
-    let centres = if arguments.centres.is_empty() {
+    let centres = if given.centres.is_empty() {
         // K around the usual one, as far as the smallest training part allows.
         let largest = select::smallest_training_part(fold_of, outputs).saturating_sub(1).max(1);
         let usual = [options.centres / 2, options.centres, options.centres * 2];
@@ -83,17 +74,17 @@ fn candidates(
         candidates.dedup();
         candidates
     } else {
-        arguments.centres.clone()
+        given.centres.clone()
     };
-    let usual_spreads = arguments.spread.is_empty();
+    let usual_spreads = given.spread.is_empty();
     let spreads = match (usual_spreads, refine) {
-        (false, _) => arguments.spread.clone(),
+        (false, _) => given.spread.clone(),
         (true, true) => vec![options.spread],
         (true, false) => SPREADS.to_vec(),
     };
-    let usual_penalties = arguments.penalty.is_empty();
+    let usual_penalties = given.penalty.is_empty();
     let penalties = match (usual_penalties, refine) {
-        (false, _) => arguments.penalty.iter().copied().map(Some).collect(),
+        (false, _) => given.penalty.iter().copied().map(Some).collect(),
         (true, true) => vec![options.penalty],
         (true, false) => {
             [options.penalty].into_iter().chain(PENALTIES.map(Some)).collect::<Vec<_>>()

@@ -80,8 +80,6 @@ fn a_line_of_units_is_not_a_line_of_text() {
     assert_eq!(file.header, ["t (s)", "f (N)", "n"]);
     let file = found("t_ms,f,g\n[ms],[counts],[kPa]\n1,2,3\n2,3,4\n");
     assert_eq!(file.header, ["t_ms", "f", "g (kPa)"]);
-    let stated = Stated { units_line: true, ..Stated::default() };
-    assert_eq!(read(b"id,f\nN,kg\ns,2\n", stated).unwrap().header, ["id (N)", "f (kg)"]);
 }
 
 #[test]

@@ -1,0 +1,43 @@
+//! Decoders and scans that `trade` and `compare` try, and what they choose by.
+
+use crate::evaluate::trade::Readout;
+use clap::{Args, ValueEnum};
+
+/// Decoders and scans to try, and the choice among them.
+#[derive(Args)]
+pub struct DecoderArguments {
+    /// Centres K to try [default: of trade 16,32,64,128,256, of a CSV file those that are fewer than its training frames;
+    /// of compare the scene's].
+    #[arg(long, value_name = "K,…", value_delimiter = ',')]
+    pub centres: Vec<usize>,
+    /// Numbers of samples averaged for each reading, to try: more lower the noise, and make the scan longer [default: 1].
+    #[arg(long, value_name = "N,…", value_delimiter = ',')]
+    pub average: Vec<usize>,
+    /// Readout of the board: converters on a bus, or the chip's own, which scan while the frame before is decoded
+    /// (docs/board.md).
+    #[arg(long, value_enum, default_value_t = ReadoutOption::Spi)]
+    pub readout: ReadoutOption,
+    /// Choose among decoders that take at most so many ms, from the start of a scan to its estimate.
+    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    pub max_latency_ms: Option<f64>,
+    /// Outputs that determine the choice, such as dz_mm; in trade also all, by the mean of RMSE/standard deviation
+    /// [default: the last of a scene, all of a data file].
+    #[arg(long, value_name = "GROUP")]
+    pub group: Option<String>,
+}
+
+/// Value of `--readout`.
+#[derive(Clone, Copy, ValueEnum)]
+pub enum ReadoutOption {
+    Spi,
+    Onchip,
+}
+
+impl From<ReadoutOption> for Readout {
+    fn from(option: ReadoutOption) -> Self {
+        match option {
+            ReadoutOption::Spi => Self::Spi,
+            ReadoutOption::Onchip => Self::OnChip,
+        }
+    }
+}
