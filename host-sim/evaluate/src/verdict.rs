@@ -1,7 +1,7 @@
 //! Verdict on a model in plain words: what it is worth, and what to beware of.
 
 use serde::Serialize;
-use taxel_core::rbf::{Format, Shape, fixed16};
+use taxel_core::rbf::Shape;
 use taxel_data::columns::READINGS;
 use taxel_learn::ModelBlob;
 use taxel_learn::cost::Design;
@@ -119,20 +119,17 @@ impl Verdict {
         self
     }
 
-    /// Adds what a blob, trained on so many `frames`, gives reason to beware of: too few frames, centres that the format
-    /// pads where there are frames for more, a size beyond a slot.
+    /// Adds what a blob, trained on so many `frames`, gives reason to beware of: too few frames, a size
+    /// beyond a slot.
     #[must_use]
     pub fn of_blob(self, blob: &ModelBlob, frames: usize) -> Self {
         let model = blob.parse();
         let of_networks = |size: fn(Shape) -> usize| {
             model.networks().map(|network| size(network.shape())).max().unwrap_or(0)
         };
-        let (used, inputs) = (of_networks(|it| it.centres), of_networks(|it| it.inputs));
-        let stored = model.networks().map(|network| stored_centres(network.format(), used)).max();
-        let stored = stored.filter(|k| Warning::few_frames(frames, *k, inputs).is_none());
+        let (centres, inputs) = (of_networks(|it| it.centres), of_networks(|it| it.inputs));
         self.with(Warning::other_image(&model))
-            .with(Warning::few_frames(frames, used, inputs))
-            .with(Warning::padded_centres(used, stored.unwrap_or(used)))
+            .with(Warning::few_frames(frames, centres, inputs))
             .with(Warning::few_frames_for_confidence(frames, model.confidence().is_some()))
             .with(Warning::larger_than_slot(blob.bytes().len(), &Design::new(blob)))
     }
@@ -142,14 +139,6 @@ impl Verdict {
     pub fn with(mut self, warning: Option<Warning>) -> Self {
         self.warnings.extend(warning);
         self
-    }
-}
-
-/// Number of centres that a network of so many takes room and time for.
-fn stored_centres(format: Format, centres: usize) -> usize {
-    match format {
-        Format::F32 => centres,
-        Format::Fixed16 => centres.next_multiple_of(fixed16::CENTRES_AT_ONCE),
     }
 }
 

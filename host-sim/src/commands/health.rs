@@ -188,7 +188,7 @@ fn told(
 }
 
 /// Notes on wires with a fault, and on the worst of the other faulty `columns`, in so many `lines`.
-fn notes(columns: &[ColumnHealth], faults: &[Found], lines: usize) -> Vec<String> {
+pub fn notes(columns: &[ColumnHealth], faults: &[Found], lines: usize) -> Vec<String> {
     let mut worst: Vec<&Found> = faults.iter().collect();
     worst.sort_by_key(|found| std::cmp::Reverse(found.frames)); // stable
     let note =

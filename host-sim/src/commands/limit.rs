@@ -1,6 +1,5 @@
 //! Command `limit`: the least possible error of any decoder, and what the sensor shows at all.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::evaluate::limit::{self, Candidate, Figures, Level, LimitResult, Plan};
@@ -8,7 +7,6 @@ use crate::experiment::Experiment;
 use crate::metrics::DecoderErrors;
 use crate::{Error, Result, report};
 use clap::Args;
-use serde::Serialize;
 use taxel_data::output::FileSet;
 use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;
@@ -34,14 +32,10 @@ const PRINTED_VALUES: usize = 6;
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim limit press --row 4 --noise 0.005,0.01 -o out/limit
-  host-sim limit thin.toml thick.toml wide.toml
   host-sim limit press --model m.bin -n 2000")]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
-    /// More scenes, one after the other; `compare` puts them side by side, with their best decoders.
-    #[arg(value_name = "MORE", conflicts_with = "model")]
-    more: Vec<String>,
     /// Levels of the white noise, instead of the scene's: fractions (0.01 is 1 %), or in ohm for absolute noise.
     #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
     noise: Vec<f64>,
@@ -54,57 +48,22 @@ pub struct Arguments {
     /// Models of the scene to judge on the same frames: their errors, and the ratios of these to the limit.
     #[arg(long, value_name = "FILE,…", value_delimiter = ',')]
     model: Vec<PathBuf>,
-    /// Folder that receives limit.json, a page limit.html, and its figures/ by themselves; of several scenes a folder each,
-    /// by its name.
+    /// Folder that receives limit.json, a page limit.html, and its figures/ by themselves.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
     output: Option<PathBuf>,
 }
 
-/// Results of several scenes.
-#[derive(Serialize)]
-struct Several {
-    scenes: Vec<LimitResult>,
-}
-
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let first = &arguments.scene;
-    let more = arguments.more.iter().map(|name| SceneArgument::new(name));
-    let all: Vec<SceneArgument> = more.collect();
-    let all: Vec<&SceneArgument> = [first].into_iter().chain(&all).collect();
-    let scenes = all.iter().map(|scene| prepared(scene, arguments, common));
-    let scenes: Vec<Prepared> = scenes.collect::<Result<_>>()?;
-    let is_one = scenes.len() == 1;
-    let names: BTreeSet<&str> = scenes.iter().map(|it| it.scene.name.as_str()).collect();
-    if arguments.output.is_some() && names.len() < scenes.len() {
-        let message = "two scenes have the same name, and each is to have a folder of its name; give them others";
-        return Err(Error::Usage(message.into()));
+    if let Some(folder) = &arguments.output {
+        FILES.check(folder, &[arguments.scene.path()])?;
     }
-    let inputs: Vec<&Path> = all.iter().map(|scene| scene.path()).collect();
-    let folder_of = |scene: &Experiment| {
-        let folder = arguments.output.as_ref()?;
-        Some(if is_one { folder.clone() } else { folder.join(&scene.name) })
-    };
-    for folder in scenes.iter().filter_map(|it| folder_of(&it.scene)) {
-        FILES.check(&folder, &inputs)?;
-    }
-    let mut results = Vec::new();
-    let mut pages = Vec::new();
-    for Prepared { scene, noise_levels, frames, models } in &scenes {
-        let plan = Plan { noise_levels, frames: *frames, models };
-        let result = limit::compute(scene, &plan, &Terminal::new())?;
-        let folder = folder_of(scene);
-        folder.as_ref().map_or(Ok(()), |folder| write_files(folder, &result))?;
-        pages.push(page_of(&result, folder.as_deref()));
-        results.push(result);
-    }
-    if is_one {
-        let (result, page) = (&results[0], pages.remove(0));
-        print::result(common, result, || page)?;
-        return refusal(result);
-    }
-    let several = Several { scenes: results };
-    print::result(common, &several, || print::Page::of_all(pages))?;
-    several.scenes.iter().try_for_each(refusal)
+    let Prepared { scene, noise_levels, frames, models } = prepared(arguments, common)?;
+    let plan = Plan { noise_levels: &noise_levels, frames, models: &models };
+    let result = limit::compute(&scene, &plan, &Terminal::new())?;
+    let folder = arguments.output.as_deref();
+    folder.map_or(Ok(()), |folder| write_files(folder, &result))?;
+    print::result(common, &result, || page_of(&result, folder))?;
+    refusal(&result)
 }
 
 /// Scene with what is to be computed of it.
@@ -115,8 +74,8 @@ struct Prepared {
     models: Vec<Candidate>,
 }
 
-fn prepared(scene: &SceneArgument, arguments: &Arguments, common: &Common) -> Result<Prepared> {
-    let mut scene = scene.load(common)?;
+fn prepared(arguments: &Arguments, common: &Common) -> Result<Prepared> {
+    let mut scene = arguments.scene.load(common)?;
     arguments.row.map_or(Ok(()), |row| read_one_row(&mut scene, row))?;
     let world = &mut scene.world;
     let own = vec![world.noise.level];

@@ -37,12 +37,6 @@ impl Page {
         page
     }
 
-    /// Pages below each other.
-    pub fn of_all(pages: Vec<Self>) -> Self {
-        let texts: Vec<String> = pages.into_iter().map(|page| page.0).collect();
-        Self(texts.join("\n"))
-    }
-
     /// Prints the page.
     pub fn print(self) -> Result<()> {
         show(&printable(&self.0))

@@ -2,7 +2,6 @@
 
 use std::cmp::Ordering;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use crate::error::{Bounded, NoPoint};
 use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Plan, Wires};
@@ -11,8 +10,7 @@ use crate::subject::Subject;
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::{BadValue, columns};
-use taxel_simulate::path::Path;
+use taxel_data::columns;
 
 use super::arguments::{self, of_option};
 use super::decoder_arguments::DecoderArguments;
@@ -41,7 +39,6 @@ mod page;
   host-sim trade press --max-error 0.045
   host-sim trade press --max-cycles 40000 --max-flash 40000
   host-sim trade press --average 1,4,16 --max-latency-ms 25
-  host-sim trade press --average 1,4 --motion 50mm/s,3Hz
   host-sim trade moving --readout onchip --average 1,4,12 --max-latency-ms 2
   host-sim trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
@@ -54,10 +51,6 @@ pub struct Arguments {
     /// with --frame-rate or --max-latency-ms, else 1].
     #[arg(long, value_name = "STEP", value_delimiter = ',')]
     column_step: Vec<usize>,
-    /// Judge on contacts that slide at this speed, and are pressed and lifted so often a second, instead of the scene's
-    /// motion: by the newest finished estimate against the truth at that moment. `none` for still contacts.
-    #[arg(long, value_name = "MM/S,HZ")]
-    motion: Option<MotionOption>,
     /// Choose the cheapest point with an RMSE of at most this, in the group's unit.
     #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
     max_error: Option<f64>,
@@ -89,10 +82,7 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.subject.refuse_time("trade")?;
-    let mut subject = arguments.subject.load(common)?;
-    if let Some(motion) = arguments.motion {
-        motion.apply(&mut subject)?;
-    }
+    let subject = arguments.subject.load(common)?;
     let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let group = match &arguments.tried.group {
@@ -204,55 +194,6 @@ const fn option(bounded: Bounded) -> &'static str {
         Bounded::Flash => "--max-flash",
         Bounded::FrameRate => "--frame-rate",
         Bounded::Latency => "--max-latency-ms",
-    }
-}
-
-/// Value of `--motion`.
-#[derive(Clone, Copy)]
-enum MotionOption {
-    None,
-    At { speed_mm_per_s: f64, press_rate_hz: f64 },
-}
-
-impl FromStr for MotionOption {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        if text == "none" {
-            return Ok(Self::None);
-        }
-        let number =
-            |text: &str, unit: &str| text.trim().trim_end_matches(unit).trim().parse().ok();
-        let parsed = text.split_once(',').and_then(|(speed, rate)| {
-            let (speed_mm_per_s, press_rate_hz) = (number(speed, "mm/s")?, number(rate, "Hz")?);
-            Some(Self::At { speed_mm_per_s, press_rate_hz })
-        });
-        parsed
-            .ok_or_else(|| "give a speed and a rate of presses, such as 50mm/s,3Hz, or none".into())
-    }
-}
-
-impl MotionOption {
-    /// Lets the contacts of a scene move.
-    fn apply(self, subject: &mut Subject) -> Result<()> {
-        let Subject::Scene(scene) = subject else {
-            let message =
-                "--motion: measured contacts are as they were; only a scene can move them";
-            return Err(Error::Usage(message.into()));
-        };
-        scene.world.path = match self {
-            Self::None => None,
-            Self::At { speed_mm_per_s, press_rate_hz } => Some(Path {
-                speed_mm_per_s: [speed_mm_per_s; 2],
-                press_rate_hz: [press_rate_hz; 2],
-                ..scene.world.path.unwrap_or_else(|| Path::at(speed_mm_per_s, press_rate_hz))
-            }),
-        };
-        let path = scene.world.path;
-        path.map_or(Ok(()), |path| scene.world.check_path(&path)).map_err(|bad| {
-            let bad = BadValue { field: bad.field.replace("motion.", "--motion: "), ..bad };
-            Error::Usage(bad.to_string())
-        })
     }
 }
 

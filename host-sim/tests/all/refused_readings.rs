@@ -34,6 +34,6 @@ fn training_tells_of_readings_that_a_device_would_refuse() {
     let broken: String = text.lines().enumerate().map(line).collect();
     folder.write("broken.csv", broken);
     let noted = folder.notes(&train("broken.csv", &[]));
-    assert!(noted.contains(NOTE) && noted.contains("r4c5_ohm open in 30 % of frames"), "{noted}");
+    assert!(noted.contains(NOTE) && noted.contains("r4c5_ohm: open in 30 % of lines"), "{noted}");
     assert!(noted.contains("--open-above-ohm") && noted.contains("--limits"), "{noted}");
 }

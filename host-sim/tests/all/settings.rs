@@ -109,7 +109,7 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
 
     folder.write("other.toml", "feedback_ohm = [1.0, 2.0]\n");
     for (arguments, text) in [
-        (&["configure"][..], "required arguments"),
+        (&["configure"][..], "Usage"),
         (&["constants"], "required arguments"),
         (&["constants", "other.toml"], "feedback_ohm has 2 numbers"),
     ] {

@@ -243,13 +243,6 @@ impl Warning {
         let needed = image::needed(model, Capacity::PAPER);
         needed.and_then(|needed| Self::when(true, "other-image", || needed))
     }
-
-    /// Number of `centres` that was asked for, and the larger one that the number format `stored`.
-    pub fn padded_centres(centres: usize, stored: usize) -> Option<Self> {
-        Self::when(stored > centres, "padded-centres", || {
-            format!("K = {centres} is stored as {stored}: K = {stored} costs a device no more")
-        })
-    }
 }
 
 /// Most columns, and most outputs, that are named in a warning of drift.

@@ -11,7 +11,7 @@ use super::super::{Common, print};
 use super::scan::{Confidence, TimingArguments};
 
 #[derive(Args)]
-#[group(required = true, multiple = true)]
+#[command(arg_required_else_help = true)]
 pub struct ConfigureArguments {
     #[command(flatten)]
     timing: TimingArguments,
