@@ -3,6 +3,7 @@ use taxel_limit::reference::GroupLimit;
 use taxel_simulate::noise::{Noise, NoiseKind};
 
 use taxel_core::blob::ModelShape;
+use taxel_core::rbf::Format;
 
 use super::*;
 
