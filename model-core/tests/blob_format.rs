@@ -131,17 +131,6 @@ fn weights_are_borrowed_where_the_blob_lies() {
 }
 
 #[test]
-fn a_decoder_marks_rows_with_missing_readings_and_leaves_the_others() {
-    let mut buffer = Aligned([0; 512]);
-    let decoder = Decoder::<2>::load(small_model(&mut buffer.0)).unwrap();
-    let frame = [54.0, f32::NAN, 54.0, 64.0];
-    let estimate = decoder.decode(&frame[..]).unwrap();
-    assert_eq!(estimate.status, [RowStatus::MissingReading, RowStatus::Decoded]);
-    assert!(estimate.outputs[0].is_nan());
-    assert_eq!(estimate.outputs[1], 1.0); // at the centre: 1.5·1 − 0.5
-}
-
-#[test]
 fn readings_that_overflow_are_told_from_missing_ones() {
     let mut buffer = Aligned([0; 512]);
     let parameters = Parameters {
@@ -209,6 +198,8 @@ fn every_truncation_and_any_trailing_byte_is_refused() {
             let refused = Model::decode(&blob[..found]).unwrap_err();
             assert_eq!(refused, DecodeError::Truncated { expected, found });
         }
+        let shifted = AlignedBytes::copy_of(&[&[0], &blob[..]].concat());
+        assert!(matches!(Model::decode(&shifted[1..]), Err(DecodeError::Misaligned)));
         let longer = AlignedBytes::copy_of(&[&blob[..], &[0]].concat());
         assert!(matches!(Model::decode(&longer), Err(DecodeError::TrailingBytes { .. })));
     }

@@ -96,22 +96,6 @@ pub fn of_one_row(buffer: &mut [u8]) -> &[u8] {
 }
 
 #[test]
-fn a_projection_may_have_another_number_of_features_than_a_row_has_readings() {
-    let mut buffer = Aligned([0; 1024]);
-    let decoder = Decoder::<1>::load(of_one_row(&mut buffer.0)).unwrap();
-    assert_eq!(decoder.shape(), ModelShape { rows: 1, inputs: 4, outputs: 3 });
-    assert_eq!(decoder.scratch_floats(), 4);
-    let estimate = decoder.decode(&NEAR_CENTRE[..]).unwrap();
-    assert_eq!(estimate.status, [RowStatus::Decoded]);
-    // As the array of two rows, and one output more.
-    let activation = (-2.0_f32 * 0.0625).exp();
-    let expected = [1.5 * activation - 0.5, 3.0 * activation - 1.0, 4.5 * activation];
-    for (output, expected) in estimate.outputs.iter().zip(expected) {
-        assert!((output - expected).abs() < 1e-6, "{output} {expected}");
-    }
-}
-
-#[test]
 fn what_cannot_stand_behind_a_projection_is_refused() {
     let mut buffer = Aligned([0; 1024]);
     let twice =

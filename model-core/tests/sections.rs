@@ -12,7 +12,6 @@ struct Sample {
     blob: AlignedBytes,
     start: usize,
     floats: usize,
-    count: usize,
 }
 
 /// A blob whose section has this `header`, padding, and the numbers of `block`.
@@ -21,15 +20,14 @@ fn sample(blob: &[u8], header: &[u8], block: &[f32]) -> Sample {
     let floats = blob.windows(bytes.len()).position(|window| window == bytes).unwrap();
     assert!(floats.is_multiple_of(4));
     let start = blob[..floats].windows(header.len()).rposition(|it| it == header).unwrap();
-    Sample { blob: AlignedBytes::copy_of(blob), start, floats, count: block.len() }
+    Sample { blob: AlignedBytes::copy_of(blob), start, floats }
 }
 
 /// A projection, a confidence and a fill.
 fn samples() -> [Sample; 3] {
     let mut buffer = Aligned([0; 1024]);
     let of_projection = sample(projection::of_one_row(&mut buffer.0), &[4, 2], &PROJECTION);
-    let (blob, length) = confidence::small(false);
-    let of_confidence = sample(&blob.0[..length], &[5, 1, 1], &confidence::BLOCK);
+    let of_confidence = sample(&confidence::small(false), &[5, 1, 1], &confidence::BLOCK);
     let blob = fill::blob(Some(fill::fill()), false).unwrap();
     let of_fill = sample(&blob, &[7, 1], fill::BLOCK.as_flattened());
     [of_projection, of_confidence, of_fill]
@@ -95,24 +93,18 @@ fn every_damage_of_a_section_has_its_own_error() {
 }
 
 #[test]
-fn every_number_that_cannot_be_is_refused_by_its_section() {
+fn a_number_that_cannot_be_is_refused_by_its_section() {
     let [projection, confidence, fill] = samples();
     let not_finite = |what| NetworkError::NotFinite { what };
     let not_positive = |what| NetworkError::NotPositive { what };
-    for (sample, error) in [
-        (&projection, DecodeError::Projection { cause: not_finite("projection") }),
-        (&confidence, DecodeError::Confidence { cause: not_finite("confidence") }),
-        (&fill, DecodeError::Fill { cause: not_finite("fill") }),
+    for (sample, number, value, error) in [
+        (&projection, 0, f32::NAN, DecodeError::Projection { cause: not_finite("projection") }),
+        (&confidence, 13, 2e38, DecodeError::Confidence { cause: not_finite("confidence") }),
+        (&confidence, 12, 0.0, DecodeError::Confidence { cause: not_positive("confidence") }),
+        (&fill, 8, 1.5, DecodeError::Fill { cause: not_positive("fill") }),
     ] {
-        for (number, value) in (0..sample.count).zip([f32::NAN, f32::NEG_INFINITY].iter().cycle()) {
-            assert_eq!(sample.with(number, *value), error, "number {number}");
-        }
+        assert_eq!(sample.with(number, value), error, "number {number}");
     }
-    let cause = not_finite("confidence");
-    assert_eq!(confidence.with(13, 2e38), DecodeError::Confidence { cause });
-    let cause = not_positive("confidence");
-    assert_eq!(confidence.with(12, 0.0), DecodeError::Confidence { cause });
-    assert_eq!(fill.with(8, 1.5), DecodeError::Fill { cause: not_positive("fill") });
 }
 
 proptest! {

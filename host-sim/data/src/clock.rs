@@ -199,21 +199,6 @@ mod tests {
             assert_eq!((clock.column.as_deref(), &clock.at[..]), (None, &[2.0, 3.0][..]), "{text}");
             assert_eq!(clock.span(2.0, 3.0), "from line 2 to line 3");
         }
-        let file = |text: &str| {
-            DataFile::parse(Path::new("log.csv"), text.as_bytes(), &Reading::default()).unwrap()
-        };
-        for (text, why) in [
-            ("time,a\n2,1\n1,2\n", Some("line 3 is before the one above")),
-            ("Zeit,a\n1,1\n25.11.2026,2\n", Some("line 3 holds no time")),
-            ("t,a\n1,1\n1,2\n", Some("it never changes")),
-            ("t,a\n1,1\n2,2\n", None),
-            ("b,a\n1,1\n1,2\n", None),
-        ] {
-            let file = file(text);
-            let said = Clock::of(&file, None).unwrap().why_counted(&file);
-            assert_eq!(said.is_some(), why.is_some(), "{text}");
-            assert!(said.unwrap_or_default().contains(why.unwrap_or_default()), "{text}");
-        }
         let monotonic = clock("t,a\n12000000000000,1\n12300000000000,2\n", None).unwrap();
         assert_eq!(monotonic.unit, "", "nanoseconds since a start");
         let unknown = clock("time,a\n5,1\n7,2\n", None).unwrap();

@@ -51,6 +51,26 @@ pub struct Errors {
     pub ratio_standard_error: Option<f64>,
 }
 
+#[cfg(test)]
+impl Errors {
+    /// Errors of ten pairs in mm, of which tests know no more.
+    pub(crate) fn of(group: &str, rmse: f64, r_squared: f64) -> Self {
+        Self {
+            group: group.into(),
+            unit: "mm".into(),
+            count: 10,
+            rmse,
+            relative_l2_percent: None,
+            full_scale_percent: None,
+            positional_percent: None,
+            r_squared: Some(r_squared),
+            mean_relative_percent: None,
+            ratio_to_limit: None,
+            ratio_standard_error: None,
+        }
+    }
+}
+
 /// Name under which all groups are judged together.
 pub const ALL: &str = "all";
 
@@ -351,21 +371,8 @@ mod tests {
 
     #[test]
     fn all_groups_together_are_judged_by_their_shares_of_the_deviation() {
-        let of = |group: &str, rmse: f64, r_squared: f64| Errors {
-            group: group.into(),
-            unit: String::new(),
-            count: 10,
-            rmse,
-            relative_l2_percent: None,
-            full_scale_percent: None,
-            positional_percent: None,
-            r_squared: Some(r_squared),
-            mean_relative_percent: None,
-            ratio_to_limit: None,
-            ratio_standard_error: None,
-        };
         // Deviations of 10 mm and 2 N.
-        let errors = [of("x_mm", 5.0, 0.75), of("force_n", 0.4, 0.96)];
+        let errors = [Errors::of("x_mm", 5.0, 0.75), Errors::of("force_n", 0.4, 0.96)];
         assert!((rmse_of(&errors, ALL).unwrap() - 0.35).abs() < 1e-12);
         assert_eq!(rmse_of(&errors, "x_mm"), Some(5.0));
         assert_eq!((rmse_of(&errors, "y_mm"), rmse_of(&[], ALL)), (None, None));

@@ -153,13 +153,4 @@ mod tests {
         assert!((0.000_7..0.002).contains(&soon), "{soon} mm");
         assert!((late / soon - 7.7).abs() < 0.25 && slow > 1.1 * late, "{soon} {late} {slow}");
     }
-
-    #[test]
-    fn a_trajectory_of_few_frames_is_refused() {
-        let scene = Experiment::load("moving").unwrap();
-        let path = Path { duration_s: 0.05, ..scene.world.path.unwrap() };
-        let refused = Moving::new(&scene, &Synthesis::new(&scene.world), path, ([23.0, 24.0], 1));
-        let refused = refused.unwrap_err().to_string();
-        assert!(refused.contains("motion.duration_s") && refused.contains("0.096"), "{refused}");
-    }
 }

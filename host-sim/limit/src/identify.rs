@@ -225,17 +225,4 @@ mod tests {
             assert!((0.9..1.1).contains(&ratio), "{limit:?} {predicted:?}");
         }
     }
-
-    #[test]
-    fn less_noise_shows_more_and_what_does_not_move_is_known() {
-        let mut world = World { read_rows: vec![0], ..World::paper() };
-        let coarse = of_rows(&world, &[0]);
-        world.noise.level = 0.0005;
-        let fine = of_rows(&world, &[0]);
-        assert!(fine.observable > coarse.observable);
-        assert!(fine.axes.iter().zip(&coarse.axes).all(|(f, c)| f.rmse_mm < c.rmse_mm));
-        for (fine, coarse) in fine.signal_to_noise.iter().zip(&coarse.signal_to_noise).take(8) {
-            assert!((fine / coarse - 10.0).abs() < 1e-6);
-        }
-    }
 }

@@ -53,14 +53,4 @@ mod tests {
         assert!((effective(&normalised(&[0.0, -800.0, -900.0])) - 1.0).abs() < 1e-12);
         assert_eq!(effective(&normalised(&[f64::NEG_INFINITY; 3])), 0.0);
     }
-
-    #[test]
-    fn the_power_leaves_as_many_samples_as_wanted() {
-        let likelihood: Vec<f64> = (0..1000).map(|i| -f64::from(i)).collect();
-        let prior = vec![0.0; 1000];
-        let power = largest_power(&prior, &likelihood, 100.0);
-        let left = effective(&normalised(&tempered(&prior, &likelihood, power)));
-        assert!((100.0..101.0).contains(&left), "{left}");
-        assert_eq!(largest_power(&prior, &vec![0.0; 1000], 100.0), 1.0);
-    }
 }

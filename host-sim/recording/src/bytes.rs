@@ -128,29 +128,3 @@ impl Message {
         self.0.push(0);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_of_a_message_are_aligned_to_their_size() {
-        let mut message = Message::new();
-        message.u8(7);
-        message.f64(0.5);
-        message.text("ab");
-        message.u32(9);
-        let bytes = message.into_bytes();
-        assert_eq!(bytes.len(), 4 + 8 + 8 + 4 + 3 + 1 + 4);
-        let mut read = Bytes::message(&bytes).unwrap();
-        assert_eq!((read.u8(), read.f64(), read.text()), (Some(7), Some(0.5), Some("ab")));
-        assert_eq!((read.u32(), read.u8()), (Some(9), None));
-    }
-
-    #[test]
-    fn a_length_beyond_the_end_reads_as_nothing() {
-        assert_eq!(Bytes::record(&[0xff; 12]).sequence(), None);
-        assert_eq!(Bytes::record(&[0xff; 12]).take(usize::MAX), None);
-        assert!(Bytes::message(&[0, 0, 0, 0, 1]).is_none());
-    }
-}

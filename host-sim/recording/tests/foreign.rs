@@ -4,25 +4,14 @@ mod common;
 
 use std::io::Cursor;
 
-use common::{Folder, assert_same, electrodes, extras, frames, start};
-use taxel_recording::{Error, Frame, Layout, Reader, Replace, Writer};
+use common::{assert_same, electrodes, frames, recording};
+use taxel_recording::{Error, Frame, Reader, Writer};
 
 const _: fn() = || {
     fn may_be_sent<T: Send>() {}
     may_be_sent::<Writer>();
     may_be_sent::<Reader>();
 };
-
-/// A recording of the layout's frames.
-fn recording(name: &str, layout: &Layout, written: &[Frame]) -> Vec<u8> {
-    let folder = Folder::new(name);
-    let path = folder.path(name);
-    let mut writer =
-        Writer::create(&path, layout, &extras(), start(), Replace::Recordings).unwrap();
-    written.iter().for_each(|frame| writer.write(frame).unwrap());
-    writer.finish().unwrap();
-    std::fs::read(path).unwrap()
-}
 
 /// Places, kinds and bodies of records up to the end.
 fn records(bytes: &[u8], mut at: usize) -> Vec<(usize, u8, &[u8])> {

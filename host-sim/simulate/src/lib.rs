@@ -21,8 +21,6 @@ pub mod outputs;
 pub mod world;
 pub mod synth;
 pub mod forward;
-#[cfg(test)]
-mod extremes;
 
 pub use synth::{Synthesis, synthesise};
 pub use taxel_data::error::{Error, Result};

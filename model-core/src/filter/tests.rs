@@ -1,6 +1,3 @@
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::*;
 
 /// Filter of one output, whose frames come each millisecond.
@@ -26,11 +23,6 @@ impl One {
     fn at(&mut self, start_us: u64, output: f32) -> f32 {
         self.row(start_us, RowStatus::Decoded, output)
     }
-}
-
-/// θ of a frame each millisecond.
-fn theta(time_constant_us: u32) -> f64 {
-    (-1000.0 / f64::from(time_constant_us)).exp()
 }
 
 #[test]
@@ -62,37 +54,6 @@ fn a_step_is_answered_as_by_two_equal_poles() {
             let found = f64::from(one.at(period_us * (n as u64 + 1), 1.0));
             assert!((found - expected).abs() < 1e-5, "{found} instead of {expected}, {n}");
         }
-    }
-}
-
-#[test]
-fn white_noise_is_reduced_by_the_ratio_of_brookner() {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
-    // A sum of twelve uniform numbers: its variance is 1.
-    let mut normal =
-        || (0..12).map(|_| random.next_u32() as f32 / 4_294_967_296.0).sum::<f32>() - 6.0;
-    for time_constant_us in [1000, 3000, 8000] {
-        let (mut one, theta) = (One::new(time_constant_us, 0), theta(time_constant_us));
-        let frames = 300_000;
-        let squares = (0..frames).map(|frame| f64::from(one.at(1000 * frame, normal())).powi(2));
-        let found = squares.sum::<f64>() / frames as f64;
-        let sum = 1.0 + 4.0 * theta + 5.0 * theta * theta;
-        let expected = (1.0 - theta) * sum / (1.0 + theta).powi(3);
-        assert!((found / expected - 1.0).abs() < 0.03, "{found} instead of {expected}");
-    }
-}
-
-#[test]
-fn constant_acceleration_has_the_lag_of_brookner() {
-    for time_constant_us in [1000, 5000, 20_000] {
-        let (mut one, theta) = (One::new(time_constant_us, 0), theta(time_constant_us));
-        let acceleration = 50.0;
-        let mm = |frame: u64| 0.5 * acceleration * (frame as f64 * 1e-3).powi(2);
-        let last = 300;
-        let filtered = (0..=last).map(|frame| one.at(1000 * frame, mm(frame) as f32)).last();
-        let found = mm(last) - f64::from(filtered.unwrap());
-        let expected = acceleration * 1e-6 * (theta / (1.0 - theta)).powi(2);
-        assert!((found / expected - 1.0).abs() < 0.02, "{found} instead of {expected}");
     }
 }
 

@@ -49,29 +49,6 @@ fn steps_of(failing: usize, work: impl FnOnce() -> Result<()>) -> (Vec<String>, 
 }
 
 #[test]
-fn files_are_safe_before_the_first_one_is_renamed() {
-    let folder = tempfile::tempdir().unwrap();
-    let (steps, outcome) = steps_of(0, || write_bytes(&folder.path().join("x"), b"new"));
-    outcome.unwrap();
-    let expected =
-        ["create beside x", "write temporary", "sync temporary", "rename temporary to x"];
-    assert_eq!(steps[..4], expected);
-    assert_eq!(steps[4..], ["sync folder"]);
-
-    let files: [(&str, &[u8]); 2] = [("model", b"new"), ("table", b"new")];
-    let (steps, outcome) = steps_of(0, || SET.write(folder.path(), &files));
-    outcome.unwrap();
-    let renames = steps.iter().position(|step| step.starts_with("rename")).unwrap();
-    let synced = steps[..renames].iter().filter(|step| *step == "sync temporary").count();
-    assert_eq!((synced, &*steps[renames - 1]), (2, "sync temporary"));
-    assert_eq!(
-        steps[renames..renames + 3],
-        ["rename temporary to model", "rename temporary to table", "remove metrics"]
-    );
-    assert_eq!(steps.last().unwrap(), "sync folder");
-}
-
-#[test]
 fn whichever_step_fails_files_are_whole_and_no_temporary_stays() {
     for failing in 1.. {
         let folder = tempfile::tempdir().unwrap();
@@ -128,17 +105,6 @@ fn whenever_the_program_is_killed_or_the_power_goes_files_are_whole() {
     watched(watcher, || SET.write(folder.path(), &all(b"new")[..2])).unwrap();
     assert_eq!(contents(&folder).len(), 2);
     assert!(steps.get() > 6, "{} steps", steps.get());
-}
-
-#[test]
-fn what_stands_beside_a_folder_to_be_made_is_no_hindrance() {
-    let folder = tempfile::tempdir().unwrap();
-    for name in ["new", "b"] {
-        fs::create_dir(folder.path().join(name)).unwrap();
-    }
-    SET.check(&folder.path().join("a/b"), &[]).unwrap();
-    fs::write(folder.path().join("a"), "a file").unwrap();
-    SET.check(&folder.path().join("a/b"), &[]).unwrap_err();
 }
 
 #[test]

@@ -5,20 +5,7 @@ use super::*;
 use crate::experiment::Experiment;
 
 fn errors(rmse: f64, r_squared: f64) -> Vec<Errors> {
-    let group = "dz_mm".to_owned();
-    vec![Errors {
-        group,
-        unit: "mm".into(),
-        count: 10,
-        rmse,
-        relative_l2_percent: None,
-        full_scale_percent: None,
-        positional_percent: None,
-        r_squared: Some(r_squared),
-        mean_relative_percent: None,
-        ratio_to_limit: None,
-        ratio_standard_error: None,
-    }]
+    vec![Errors::of("dz_mm", rmse, r_squared)]
 }
 
 fn others(contacts: &[(&str, f64, f64, Option<f64>)]) -> Others {

@@ -132,11 +132,4 @@ mod tests {
             "{labels:?}"
         );
     }
-
-    #[test]
-    fn a_scene_that_is_wrong_otherwise_is_refused_for_that() {
-        let typo = |text: &str| text.replace("row_wires = 8", "row_wire = 8\npitch_mm = [1, 2]");
-        let message = layouts(typo).unwrap_err().to_string();
-        assert!(message.contains("row_wire"), "{message}");
-    }
 }

@@ -1,5 +1,4 @@
 use taxel_learn::outliers::Outliers;
-use taxel_limit::reference::GroupLimit;
 use taxel_simulate::noise::{Noise, NoiseKind};
 
 use taxel_core::blob::ModelShape;
@@ -7,36 +6,12 @@ use taxel_core::rbf::Format;
 
 use super::*;
 
-fn group(name: &str, rmse: f64, ratio_to_limit: Option<f64>) -> Errors {
-    Errors {
-        group: name.into(),
-        unit: "mm".into(),
-        count: 1,
-        rmse,
-        relative_l2_percent: None,
-        full_scale_percent: None,
-        positional_percent: None,
-        r_squared: Some(0.0),
-        mean_relative_percent: None,
-        ratio_to_limit,
-        ratio_standard_error: None,
-    }
-}
-
 fn decoders(of: &[(&str, &[(&str, f64)])]) -> Vec<DecoderErrors> {
     let decoder = |(name, groups): &(&str, &[(&str, f64)])| DecoderErrors {
         decoder: (*name).into(),
-        errors: groups.iter().map(|(name, rmse)| group(name, *rmse, None)).collect(),
+        errors: groups.iter().map(|(name, rmse)| Errors::of(name, *rmse, 0.0)).collect(),
     };
     of.iter().map(decoder).collect()
-}
-
-#[test]
-fn an_output_that_only_rounding_changes_has_nothing_to_decode() {
-    let mut decoders = decoders(&[("network", &[("y", 1e-17)]), ("mean", &[("y", 1e-17)])]);
-    decoders[1].errors[0].r_squared = None;
-    let sentence = Verdict::new(&decoders, &no_limit()).sentence;
-    assert!(sentence.starts_with("y does not change"), "{sentence}");
 }
 
 fn outliers(lines: usize) -> Outliers {
@@ -49,55 +24,6 @@ fn no_limit() -> LimitSummary {
 
 fn names(verdict: &Verdict) -> Vec<&str> {
     verdict.warnings.iter().map(|warning| warning.name).collect()
-}
-
-#[test]
-fn a_good_model_is_told_beside_mean_and_linear() {
-    let all = decoders(&[
-        ("network", &[("dz_mm", 0.047)]),
-        ("mean", &[("dz_mm", 0.152)]),
-        ("linear", &[("dz_mm", 0.060)]),
-    ]);
-    let verdict = Verdict::new(&all, &no_limit());
-    assert_eq!(
-        verdict.sentence,
-        "The model decodes dz_mm to 0.0470 mm: 69 % below always predicting the mean, and 22 % below the best linear \
-         decoder."
-    );
-    assert_eq!(verdict.warnings, []);
-}
-
-#[test]
-fn the_limit_is_named_where_it_is_known() {
-    let mut all = decoders(&[("network", &[("dz_mm", 0.047)]), ("mean", &[("dz_mm", 0.152)])]);
-    all[0].errors[0].ratio_to_limit = Some(1.5);
-    let groups = vec![GroupLimit {
-        group: "dz_mm".into(),
-        unit: "mm".into(),
-        limit: 0.031,
-        limit_standard_error: 0.001,
-        rmse: 0.031,
-        rmse_standard_error: 0.001,
-        prior_rmse: 0.152,
-        monte_carlo_share: 0.01,
-    }];
-    let limit = LimitSummary { frames: 10, groups, refused: None };
-    let sentence = Verdict::new(&all, &limit).sentence;
-    assert!(sentence.ends_with("That is 1.50 times the least possible error."), "{sentence}");
-}
-
-#[test]
-fn outputs_that_are_hardly_decoded_are_told_apart() {
-    let all = decoders(&[
-        ("network", &[("dx_mm", 0.030), ("dz_mm", 0.047)]),
-        ("mean", &[("dx_mm", 0.035), ("dz_mm", 0.152)]),
-    ]);
-    let verdict = Verdict::new(&all, &no_limit());
-    assert!(verdict.sentence.starts_with("The model decodes dz_mm to 0.0470 mm"), "{verdict:?}");
-    let hardly =
-        "It tells little of dx_mm: at best 14 % below the error of always predicting the mean.";
-    assert!(verdict.sentence.ends_with(hardly), "{verdict:?}");
-    assert_eq!(verdict.warnings, []);
 }
 
 #[test]
@@ -146,52 +72,27 @@ fn every_warning_is_raised_and_left_out() {
 }
 
 #[test]
-fn a_model_that_is_as_good_as_linear_is_warned_of() {
-    let all = decoders(&[
-        ("network", &[("f_n", 0.25), ("g_n", 0.10)]),
-        ("mean", &[("f_n", 1.0), ("g_n", 1.0)]),
-        ("linear", &[("f_n", 0.25), ("g_n", 0.30)]),
-    ]);
-    let verdict = Verdict::new(&all, &no_limit());
-    assert_eq!(names(&verdict), ["no-gain-over-linear"]);
-    assert!(verdict.warnings[0].text.starts_with("f_n:"), "{verdict:?}");
-    let gains =
-        "75 to 90 % below always predicting the mean, and 0 to 67 % below the best linear decoder";
-    assert!(verdict.sentence.contains(gains), "{verdict:?}");
-}
-
-#[test]
-fn a_model_that_is_worse_than_linear_is_told_by_how_much() {
-    let gains = |errors: [f64; 2]| {
-        let all = decoders(&[
-            ("network", &[("f_n", errors[0]), ("g_n", errors[1])]),
-            ("mean", &[("f_n", 1.0), ("g_n", 1.0)]),
-            ("linear", &[("f_n", 0.5), ("g_n", 0.5)]),
-        ]);
+fn a_verdict_tells_gains_and_losses_over_mean_and_linear() {
+    let says = |network: [f64; 2], mean: [f64; 2], linear: [f64; 2]| {
+        let groups = |errors: [f64; 2]| [("f_n", errors[0]), ("g_n", errors[1])];
+        let [network, mean, linear] = [network, mean, linear].map(groups);
+        let all = decoders(&[("network", &network), ("mean", &mean), ("linear", &linear)]);
         let verdict = Verdict::new(&all, &no_limit());
-        assert_eq!(names(&verdict), ["no-gain-over-linear"]);
-        verdict.sentence
+        (names(&verdict).concat(), verdict.sentence)
     };
-    for (errors, said) in [
-        ([0.63, 0.30], "26 % above to 40 % below the best linear decoder"),
-        ([0.63, 0.60], "20 to 26 % above the best linear decoder"),
-        ([0.60, 0.60], "20 % above the best linear decoder"),
+    let (missing, gain) = (f64::NAN, "no-gain-over-linear");
+    for (network, mean, linear, warning, part) in [
+        ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], gain, "75 to 90 % below always predicting the mean"),
+        ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], gain, "0 to 67 % below the best linear decoder"),
+        ([0.63, 0.3], [1.0, 1.0], [0.5, 0.5], gain, "26 % above to 40 % below the best linear"),
+        ([0.63, 0.6], [1.0, 1.0], [0.5, 0.5], gain, "20 to 26 % above the best linear decoder"),
+        ([0.0, 0.1], [0.0, 1.0], [0.0, 0.3], "", "f_n does not change in these frames"),
+        ([missing, 0.1], [missing, 1.0], [missing, 0.3], "", "f_n has no frame to judge by"),
+        ([0.86, 0.1], [1.0, 1.0], [1.0, 0.3], "", "It tells little of f_n: at best 14 % below"),
     ] {
-        assert!(gains(errors).contains(said), "{}", gains(errors));
+        let (found, sentence) = says(network, mean, linear);
+        assert!(found == warning && sentence.contains(part), "{found}: {sentence}");
     }
-}
-
-#[test]
-fn outputs_that_do_not_change_or_have_no_frames_are_named() {
-    let all = decoders(&[
-        ("network", &[("f_n", 0.0), ("g_n", f64::NAN), ("h_n", 0.1)]),
-        ("mean", &[("f_n", 0.0), ("g_n", f64::NAN), ("h_n", 1.0)]),
-    ]);
-    assert_eq!(
-        Verdict::new(&all, &no_limit()).sentence,
-        "The model decodes h_n to 0.100 mm: 90 % below always predicting the mean. f_n does not change in these \
-         frames: there is nothing to decode. g_n has no frame to judge by."
-    );
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use taxel_learn::Decoder;
 use taxel_simulate::motion::{Dent, Kind, Mix, Part};
-use taxel_simulate::noise::{Noise, NoiseKind};
+use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::path::Path;
 use taxel_simulate::profile::Profile;
 use taxel_simulate::rubber::StandardLinearSolid;
@@ -53,25 +53,6 @@ fn a_frame_is_decoded_alike_wherever_it_stands() {
     let outputs = all.values.len() / 6;
     assert_eq!(later.values, all.values[4 * outputs..]);
     assert_eq!(later.deviation.unwrap(), all.deviation.unwrap()[4 * outputs..]);
-}
-
-#[test]
-fn noise_of_each_kind_is_modelled() {
-    // Three scenes with nearly the same noise: relative to the reading, to the span, and in Ω.
-    let mut world = World { read_rows: vec![3], ..World::press() };
-    let limit = |world: &World| Reference::new(world, 100, &Silent).unwrap().limits()[2].clone();
-    let relative = limit(&world);
-    let frames = Synthesis::new(&world).ideal().frames(Stream::Test, 2000).inputs;
-    let spans: f64 = frames.ranges().iter().map(|[low, high]| high - low).sum();
-    let means: f64 = frames.means().iter().sum();
-    for (kind, level) in
-        [(NoiseKind::Span, 0.005 * means / spans), (NoiseKind::Absolute, 0.005 * means / 18.0)]
-    {
-        world.noise = Noise::white(kind, level);
-        let found = limit(&world);
-        let ratio = found.limit / relative.limit;
-        assert!((0.85..1.15).contains(&ratio), "{relative:?} {found:?}");
-    }
 }
 
 #[test]

@@ -4,7 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use taxel_recording::{Column, Contact, Electrode, Extras, Frame, Health, Layout, Status};
+use taxel_recording::{
+    Column, Contact, Electrode, Extras, Frame, Health, Layout, Replace, Status, Writer,
+};
 
 /// Folder that goes with its test.
 pub struct Folder(PathBuf);
@@ -130,34 +132,32 @@ pub fn frames(layout: &Layout, count: usize) -> Vec<Frame> {
     (0..count).map(frame).collect()
 }
 
-/// Values and bits, with every NaN for the same.
+/// Values and bits, with every NaN for the same: what Debug prints of a float is read to its bits.
 pub fn assert_same(read: &[Frame], written: &[Frame]) {
     assert_eq!(read.len(), written.len());
-    let bits = |values: &[f32]| -> Vec<u32> {
-        values
-            .iter()
-            .map(|value| if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() })
-            .collect()
-    };
     for (read, written) in read.iter().zip(written) {
-        let number = written.number;
-        assert_eq!((read.number, read.time_us), (number, written.time_us));
-        assert_eq!(bits(&read.readings), bits(&written.readings), "readings of {number}");
-        for (read, written, what) in [
-            (&read.outputs, &written.outputs, "outputs"),
-            (&read.deviations, &written.deviations, "deviations"),
-            (&read.truth, &written.truth, "truth"),
-        ] {
-            assert_eq!(
-                read.as_deref().map(bits),
-                written.as_deref().map(bits),
-                "{what} of {number}"
-            );
-        }
-        let contact = |contact: &Option<Contact>| {
-            contact.map(|it| (bits(&it.place_mm), it.force_n.map(|it| bits(&it))))
-        };
-        assert_eq!(contact(&read.contact), contact(&written.contact), "contact of {number}");
-        assert_eq!(read.status, written.status, "status of {number}");
+        assert_eq!(format!("{read:?}"), format!("{written:?}"));
     }
+}
+
+/// Writes a recording in chunks of so many frames. Returns the file's size before the first and after each.
+pub fn write(path: &Path, layout: &Layout, frames: &[Frame], chunk: usize) -> Vec<usize> {
+    let mut writer = Writer::create(path, layout, &extras(), start(), Replace::Recordings).unwrap();
+    let mut sizes = vec![writer.bytes() as usize];
+    for (number, frame) in frames.iter().enumerate() {
+        writer.write(frame).unwrap();
+        if number % chunk == chunk - 1 {
+            writer.flush().unwrap();
+            sizes.push(writer.bytes() as usize);
+        }
+    }
+    writer.finish().unwrap();
+    sizes
+}
+
+/// Bytes of a recording in chunks of four frames, whose file has that name.
+pub fn recording(name: &str, layout: &Layout, frames: &[Frame]) -> Vec<u8> {
+    let folder = Folder::new(name);
+    write(&folder.path(name), layout, frames, 4);
+    std::fs::read(folder.path(name)).unwrap()
 }

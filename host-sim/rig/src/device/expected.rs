@@ -187,17 +187,22 @@ mod tests {
         }
     }
 
-    #[test]
-    fn one_bit_of_one_output_makes_a_frame_another() {
-        let expected = Expected {
+    /// Two frames with these novelties and deviations.
+    fn expected(confidence: Vec<(f32, Vec<f32>)>) -> Expected {
+        Expected {
             readings_ohm: vec![60.0; 4],
             outputs: vec![0.5, -0.25, 0.0, 1.0],
             per_frame: [2, 2],
-            confidence: Vec::new(),
+            confidence,
             baseline_ohm: None,
             start_us: vec![0; 2],
             filter: Settings::default(),
-        };
+        }
+    }
+
+    #[test]
+    fn one_bit_of_one_output_makes_a_frame_another() {
+        let expected = expected(Vec::new());
         assert!(expected.is_same(1, &estimate(&[0.0, 1.0], &[])));
         assert!(!expected.is_same(1, &estimate(&[0.0, 1.0], &[0.5, 0.5])));
         let next = f32::from_bits(1.0_f32.to_bits() + 1);
@@ -209,15 +214,7 @@ mod tests {
 
     #[test]
     fn one_bit_of_its_confidence_makes_a_frame_another() {
-        let expected = Expected {
-            readings_ohm: vec![60.0; 4],
-            outputs: vec![0.5, -0.25, 0.0, 1.0],
-            per_frame: [2, 2],
-            confidence: vec![(0.5, vec![1.0, 1.0]), (-2.5, vec![0.125, 0.25])],
-            baseline_ohm: None,
-            start_us: vec![0; 2],
-            filter: Settings::default(),
-        };
+        let expected = expected(vec![(0.5, vec![1.0, 1.0]), (-2.5, vec![0.125, 0.25])]);
         let good = estimate(&[0.0, 1.0], &[0.125, 0.25]);
         assert!(expected.is_same(1, &good));
         assert!(!expected.is_same(1, &EstimateReport { novelty: Some(-2.25), ..good }));

@@ -197,38 +197,6 @@ fn still() -> (Mailbox<Memory>, image::Mailbox<Memory>) {
 }
 
 #[test]
-fn a_ring_holds_its_capacity_and_not_a_byte_more() {
-    let (mut host, mut image) = still();
-    let capacity = usize::from(CAPACITY);
-    let bytes: Vec<u8> = (0..2 * capacity).map(byte).collect();
-    // At every start within the ring, so that its end lies anywhere.
-    for start in [0, 1, 255, 256, capacity - 1, capacity, 3 * capacity + 7] {
-        for position in [&mut host.written, &mut host.read] {
-            *position = start as u16;
-        }
-        for ring in [TO_IMAGE, TO_HOST] {
-            host.set_position(ring.written, start as u16).unwrap();
-            host.set_position(ring.read, start as u16).unwrap();
-        }
-        assert_eq!(host.try_write(&bytes).unwrap(), capacity);
-        assert_eq!(host.try_write(&bytes).unwrap(), 0);
-        assert_eq!(image.try_read(), Some(byte(0)));
-        assert_eq!(host.try_write(&bytes[capacity..]).unwrap(), 1);
-        let rest: Vec<u8> = std::iter::from_fn(|| image.try_read()).collect();
-        assert_eq!(rest, bytes[1..=capacity]);
-
-        let taken = bytes.iter().take_while(|byte| image.try_write(**byte)).count();
-        assert_eq!(taken, capacity);
-        let mut found = vec![0; 2 * capacity];
-        assert_eq!(host.try_read(&mut found[..1]).unwrap(), 1);
-        assert!(image.try_write(bytes[capacity]) && !image.try_write(0));
-        assert_eq!(host.try_read(&mut found[1..]).unwrap(), capacity);
-        assert_eq!(found[..=capacity], bytes[..=capacity]);
-        assert_eq!(host.try_read(&mut found).unwrap(), 0);
-    }
-}
-
-#[test]
 fn a_restart_of_the_image_loses_no_byte() {
     let (mut host, mut image) = still();
     assert_eq!(host.try_write(b"before").unwrap(), 6);
@@ -239,11 +207,6 @@ fn a_restart_of_the_image_loses_no_byte() {
     let mut bytes = [0; 9];
     assert_eq!((rest.as_slice(), host.try_read(&mut bytes).unwrap()), (&b"efore"[..], 2));
     assert_eq!(&bytes[..2], b"xy");
-}
-
-#[test]
-fn memory_without_a_mailbox_is_recognised() {
-    assert!(image::Mailbox::find(Memory::empty()).is_none());
 }
 
 #[test]

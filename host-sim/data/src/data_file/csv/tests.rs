@@ -132,17 +132,6 @@ fn a_first_line_of_numbers_is_data() {
 }
 
 #[test]
-fn lines_of_a_file_without_a_header_are_counted_from_its_first() {
-    for (text, says) in [
-        ("1,2\n3,4\n5\n", "line 3 has 1 fields; the first line has 2"),
-        ("1\n\n2\n", "line 2 is blank"),
-    ] {
-        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err().to_string();
-        assert!(message.contains(says), "{message}");
-    }
-}
-
-#[test]
 fn a_column_that_is_no_number_is_told_once_it_is_asked_for() {
     let path = Path::new("test.csv");
     let file = parse(path, b"t,label,f\n1,pen,2\n2, cup,x\n3,pen,4\n", false).unwrap();

@@ -83,14 +83,6 @@ fn a_line_of_units_is_not_a_line_of_text() {
 }
 
 #[test]
-fn a_long_header_is_read_whole() {
-    let names: Vec<String> = (0..30_000).map(|column| format!("r1c{column}")).collect();
-    let line = (0..30_000).map(|column| format!("{column},5")).collect::<Vec<_>>().join(";");
-    let file = found(&format!("{}\n{line}\n{line}\n", names.join(";")));
-    assert_eq!((file.header.len(), file.lines(), file.value(1, 7)), (30_000, 2, 7.5));
-}
-
-#[test]
 fn what_is_no_text_is_refused() {
     for bytes in [&b"a,b\n1,\0\n"[..], b"\x93NUMPY\x01\0v\0{'descr': '<f8'}", b"PK\x03\x04\0\0"] {
         let refused = read(bytes, Stated::default()).unwrap_err().to_string();

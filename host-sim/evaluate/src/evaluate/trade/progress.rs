@@ -38,33 +38,3 @@ impl Progress for Part<'_> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[derive(Default)]
-    struct Count(AtomicUsize);
-
-    impl Progress for Count {
-        fn stage(&self, _: &str, _: usize) {
-            panic!("a part begins no stage");
-        }
-
-        fn step(&self) {
-            self.0.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-
-    #[test]
-    fn a_part_takes_just_its_share_of_the_whole() {
-        let whole = Count::default();
-        let part = Part::new(&whole, 3, 5);
-        part.stage("inside", 1000);
-        part.step();
-        assert_eq!(whole.0.load(Ordering::Relaxed), 5);
-        part.finish();
-        part.step();
-        assert_eq!(whole.0.load(Ordering::Relaxed), 15);
-    }
-}

@@ -4,9 +4,9 @@
 use taxel_data::LANES;
 use taxel_data::random::{Purpose, Random, Stream};
 
-use crate::World;
-use crate::motion::Independent;
-use crate::sensor::{LaneModel, Precision, Scratch};
+use taxel_simulate::World;
+use taxel_simulate::motion::Independent;
+use taxel_simulate::sensor::{LaneModel, Precision, Scratch};
 
 #[path = "../../../proof/extremes.rs"]
 mod table;
