@@ -192,28 +192,27 @@ mod tests {
     #[test]
     fn every_shape_within_the_capacity_has_room_and_without_names_the_first_wires() {
         let capacity = Capacity { rows: 3, columns: 4, outputs: 2 };
-        for rows in 1..6 {
-            for inputs in 1..20 {
-                for outputs in 1..8 {
-                    let shape = ModelShape { rows, inputs, outputs };
-                    let fits = rows <= 3 && rows * inputs <= 12 && rows * outputs <= 6;
-                    assert_eq!(capacity.has_room_for(shape), fits, "{shape:?}");
-                    if !fits {
-                        continue;
-                    }
-                    let names = ["x"].repeat(rows * inputs).join("\n");
-                    let cells: Result<Vec<_>, _> = capacity.cells(Columns(&names), shape).collect();
-                    let line = inputs.min(4);
-                    if inputs <= 4 || rows == 1 && inputs % 4 == 0 {
-                        let expected = (0..rows * inputs).map(|i| (i / line, i % line));
-                        let expected = expected.map(|(row, k)| (RowWire(row), ColumnWire(k)));
-                        assert_eq!(cells, Ok(expected.collect()), "{shape:?}");
-                    } else {
-                        let first = if rows == 1 { inputs / 4 * 4 } else { 4 };
-                        assert_eq!(cells, Err(first), "{shape:?}");
-                    }
-                }
-            }
+        // Rows, inputs, outputs, and the first input that has no wires.
+        for (rows, inputs, outputs, without) in [
+            (3, 4, 2, None),
+            (2, 3, 1, None),
+            (1, 12, 6, None), // one network for all
+            (1, 8, 1, None),
+            (2, 5, 1, Some(4)),  // wider than the lines
+            (1, 10, 1, Some(8)), // no whole lines
+        ] {
+            let shape = ModelShape { rows, inputs, outputs };
+            assert!(capacity.has_room_for(shape), "{shape:?}");
+            let names = ["x"].repeat(rows * inputs).join("\n");
+            let cells: Result<Vec<_>, _> = capacity.cells(Columns(&names), shape).collect();
+            let line = inputs.min(4);
+            let first_wires =
+                (0..rows * inputs).map(|i| (RowWire(i / line), ColumnWire(i % line))).collect();
+            assert_eq!(cells, without.map_or(Ok(first_wires), Err), "{shape:?}");
+        }
+        for (rows, inputs, outputs) in [(4, 1, 1), (3, 5, 1), (1, 13, 1), (3, 1, 3), (1, 1, 7)] {
+            let shape = ModelShape { rows, inputs, outputs };
+            assert!(!capacity.has_room_for(shape), "{shape:?}");
         }
     }
 

@@ -45,34 +45,29 @@ fn requests() -> Vec<Example> {
     let readings_ohm = Floats::new(&OHM);
     // A blob of 1000 bytes for the paper's sensor, with one network for all rows.
     let head = *b"TAXL\x02\xe8\x03\0\0\x08\x12\x12\x01\x08\0\0";
+    let default = Configuration::DEFAULT;
+    let filtering = Configuration {
+        filter_time_constant_us: 5000,
+        filter_lead_us: 2000,
+        report_every: 10,
+        ..default
+    };
+    let decode = Request::Decode { frame: 300, start_us: START_US, readings_ohm };
+    let capture = Request::CaptureBaseline { frames: 20 };
     let configure = |configuration| request_bytes(300, &Request::Configure(configuration));
     let upload = |step| request_bytes(6, &Request::Upload(step));
     vec![
         ("identify", request_bytes(1, &Request::Identify)),
         ("statistics?", request_bytes(2, &Request::Statistics)),
         ("configuration?", request_bytes(3, &Request::Configuration)),
-        ("configure", configure(Configuration::DEFAULT)),
+        ("configure", configure(default)),
         (
             "configure: contact threshold 0.0175",
-            configure(Configuration { contact_threshold: 0.0175, ..Configuration::DEFAULT }),
+            configure(Configuration { contact_threshold: 0.0175, ..default }),
         ),
-        (
-            "configure: filter of 5 ms, lead 2 ms, a report every 10 scans",
-            configure(Configuration {
-                filter_time_constant_us: 5000,
-                filter_lead_us: 2000,
-                report_every: 10,
-                ..Configuration::DEFAULT
-            }),
-        ),
-        (
-            "capture baseline of 20 frames",
-            request_bytes(4, &Request::CaptureBaseline { frames: 20 }),
-        ),
-        (
-            "decode frame 300: 60 Ω, missing",
-            request_bytes(5, &Request::Decode { frame: 300, start_us: START_US, readings_ohm }),
-        ),
+        ("configure: filter of 5 ms, lead 2 ms, a report every 10 scans", configure(filtering)),
+        ("capture baseline of 20 frames", request_bytes(4, &capture)),
+        ("decode frame 300: 60 Ω, missing", request_bytes(5, &decode)),
         ("begin: 8 × 18 → 18, 1000 bytes", upload(UploadStep::Begin { head: &head })),
         ("chunk at 512", upload(UploadStep::Chunk { offset: 512, bytes: &[0, 1, 0, 2] })),
         ("try", upload(UploadStep::Try { trial_ms: 60_000 })),
@@ -172,40 +167,27 @@ fn reports() -> Vec<Example> {
         ..Statistics::default()
     };
     let configuration = Report::Configuration(Configuration::DEFAULT);
+    let readings = Report::Readings { frame: 300, start_us: START_US, readings_ohm };
+    let (crc_32, threshold) = (0x1234_5678, ConfigurationField::ContactThreshold);
     let refused = |refusal| report_bytes(6, &Report::Refused(refusal));
     vec![
         ("identity", report_bytes(1, &identity())),
         ("statistics", report_bytes(2, &Report::Statistics(statistics))),
         ("configuration", report_bytes(3, &configuration)),
         ("baseline", report_bytes(4, &Report::Baseline { readings_ohm })),
-        (
-            "readings",
-            report_bytes(0, &Report::Readings { frame: 300, start_us: START_US, readings_ohm }),
-        ),
+        ("readings", report_bytes(0, &readings)),
         ("estimate", report_bytes(5, &Report::Estimate(estimate))),
         ("estimate with confidence", report_bytes(5, &Report::Estimate(novel))),
         ("health", report_bytes(0, &Report::Health(health))),
         ("idle", report_bytes(6, &Report::Upload(UploadState::Idle))),
         ("receiving", report_bytes(6, &Report::Upload(UploadState::Receiving { received: 512 }))),
-        (
-            "on trial",
-            report_bytes(6, &Report::Upload(UploadState::OnTrial { crc_32: 0x1234_5678 })),
-        ),
-        (
-            "confirmed",
-            report_bytes(6, &Report::Upload(UploadState::Confirmed { crc_32: 0x1234_5678 })),
-        ),
-        (
-            "trial over",
-            report_bytes(0, &Report::Upload(UploadState::TrialOver { crc_32: 0x1234_5678 })),
-        ),
+        ("on trial", report_bytes(6, &Report::Upload(UploadState::OnTrial { crc_32 }))),
+        ("confirmed", report_bytes(6, &Report::Upload(UploadState::Confirmed { crc_32 }))),
+        ("trial over", report_bytes(0, &Report::Upload(UploadState::TrialOver { crc_32 }))),
         ("refused: nothing to undo", refused(Refusal::NothingToUndo)),
         ("restarting", report_bytes(7, &Report::Restarting)),
         ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
-        (
-            "refused: contact threshold",
-            refused(Refusal::Configuration(ConfigurationField::ContactThreshold)),
-        ),
+        ("refused: contact threshold", refused(Refusal::Configuration(threshold))),
         ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
         ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
         ("refused: flash", refused(Refusal::Flash)),
