@@ -1,42 +1,44 @@
 //! A new model is on trial until it is confirmed: until then every restart brings the previous one back.
 
 use crate::mock::*;
-use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::app::SessionEnd;
 use taxel_firmware::link::message::{
     ModelIdentity, Refusal, Report, Request, UploadState, UploadStep,
 };
 use taxel_firmware::link::packet::UNASKED;
 
-const CHUNK: usize = 60;
-
 /// The model that is in force after a restart.
-fn after_restart(slots: &[Flash; 2], bench: &mut Bench<'_>) -> Option<ModelIdentity> {
-    let mut device = Device::new(slots.clone());
+fn after_restart(bench: &mut Bench<'_>) -> Option<ModelIdentity> {
+    let mut device = Device::new(bench.slots.clone());
     device.journal = bench.journal();
-    device.weights.clear();
+    device.ram_words = 0;
     device.model()
 }
 
-/// Slots with the model `old`, and what is in force while `new` is on trial.
-fn on_trial(old: &[u8], new: &[u8]) -> ([Flash; 2], Bench<'static>) {
-    let mut slots = Flash::slots_with(old);
-    let mut bench = Bench::new(quiet());
-    let state = upload(&mut bench, &mut slots, &mut [], &upload_steps(new, CHUNK));
+/// A device with the model `old`, and with `new` on trial.
+fn on_trial(old: &[u8], new: &[u8]) -> Bench<'static> {
+    let mut bench = Bench::new(quiet(), old);
+    let state = bench.upload(&trial_steps(new));
     assert_eq!(state, Ok(UploadState::OnTrial { crc_32: crc_of(new) }));
-    (slots, bench)
+    bench
+}
+
+/// Number of words that were written to each slot.
+fn words_written(bench: &Bench<'_>) -> [usize; 2] {
+    bench.slots.each_ref().map(|slot| slot.words_written)
 }
 
 #[test]
 fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     for words in [0, 512] {
-        let (mut slots, mut bench) = on_trial(&old, &new);
-        let mut weights = vec![0; words];
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-        let tried = model(&mut session, &bench.board).unwrap();
+        let mut bench = on_trial(&old, &new);
+        bench.weights = vec![0; words];
+        let (mut session, board) = bench.session();
+        let tried = model(&mut session, &board).unwrap();
         assert_eq!((tried.crc_32, tried.slot, tried.generation), (crc_of(&new), 1, 1));
         assert_eq!((tried.on_trial, tried.in_ram), (true, words > 0));
-        let left = after_restart(&slots, &mut bench).unwrap();
+        let left = after_restart(&mut bench).unwrap();
         assert_eq!((left.crc_32, left.on_trial), (crc_of(&old), false));
     }
 }
@@ -44,72 +46,70 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
 #[test]
 fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
     let (old, new) = (blob(1, 3), blob(2, 5));
-    let (mut slots, mut bench) = on_trial(&old, &new);
+    let mut bench = on_trial(&old, &new);
     let confirm = [UploadStep::Try { trial_ms: 60_000 }, UploadStep::Confirm, UploadStep::Confirm];
-    let state = upload(&mut bench, &mut slots, &mut [], &confirm);
+    let state = bench.upload(&confirm);
     assert_eq!(state, Ok(confirmed(&new)));
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    let found = model(&mut session, &bench.board).unwrap();
+    let (mut session, board) = bench.session();
+    let found = model(&mut session, &board).unwrap();
     assert_eq!((found.crc_32, found.generation, found.on_trial), (crc_of(&new), 1, false));
-    assert_eq!(after_restart(&slots, &mut bench), Some(found));
+    assert_eq!(after_restart(&mut bench), Some(found));
 }
 
 #[test]
 fn a_confirmation_that_cannot_be_written_down_ends_the_trial() {
     let (old, new) = (blob(1, 3), blob(2, 5));
-    let (mut slots, mut bench) = on_trial(&old, &new);
+    let mut bench = on_trial(&old, &new);
     let supply = bench.app.platform().journal.pages()[0].supply();
     supply.borrow_mut().on(Some(0));
-    let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+    let state = bench.upload(&[UploadStep::Confirm]);
     assert_eq!(state, Err(Refusal::Flash));
     supply.borrow_mut().on(None);
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
-    assert_eq!(after_restart(&slots, &mut bench).unwrap().crc_32, crc_of(&old));
-    assert_eq!(install(&mut bench, &mut slots, &mut [], (&new, CHUNK)), Ok(confirmed(&new)));
+    let (mut session, board) = bench.session();
+    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&old)));
+    assert_eq!(after_restart(&mut bench).unwrap().crc_32, crc_of(&old));
+    assert_eq!(bench.install(&new), Ok(confirmed(&new)));
 }
 
 #[test]
 fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     let (old, new) = (blob(1, 3), blob(2, 5));
-    let (mut slots, mut bench) = on_trial(&old, &new);
-    let writes = [slots[0].words_written, slots[1].words_written];
-    upload(&mut bench, &mut slots, &mut [], &[UploadStep::Abort]).unwrap();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-    assert_eq!(model_crc(&mut session, &bench.board), Some(crc_of(&old)));
-    assert_eq!([slots[0].words_written, slots[1].words_written], writes);
-    let refused = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+    let mut bench = on_trial(&old, &new);
+    let writes = words_written(&bench);
+    bench.upload(&[UploadStep::Abort]).unwrap();
+    let (mut session, board) = bench.session();
+    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&old)));
+    assert_eq!(words_written(&bench), writes);
+    let refused = bench.upload(&[UploadStep::Confirm]);
     assert_eq!(refused, Err(Refusal::NoUpload), "nothing is on trial any more");
 
-    let (mut slots, mut bench) = on_trial(&old, &new);
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let mut bench = on_trial(&old, &new);
+    let (mut session, board) = bench.session();
     assert_eq!(
         undo(&mut session, &board, crc_of(&new)),
         (Ok(confirmed(&old)), Some(SessionEnd::NewModel))
     );
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = bench.session();
     assert_eq!(
         undo(&mut session, &board, crc_of(&new)),
         (Ok(confirmed(&old)), None),
         "the answer was lost"
     );
-    assert_eq!([slots[0].words_written, slots[1].words_written], writes);
+    assert_eq!(words_written(&bench), writes);
     // The model that was tried was never confirmed: there is no way back to it.
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = bench.session();
     assert_eq!(undo(&mut session, &board, crc_of(&old)).0, Err(Refusal::NothingToUndo));
 }
 
 #[test]
 fn on_trial_nothing_overwrites_the_previous_model() {
     let (old, new) = (blob(1, 3), blob(2, 5));
-    let (mut slots, mut bench) = on_trial(&old, &new);
-    let refused = upload(&mut bench, &mut slots, &mut [], &upload_steps(&old, CHUNK));
+    let mut bench = on_trial(&old, &new);
+    let refused = bench.upload(&trial_steps(&old));
     assert_eq!(refused, Err(Refusal::OnTrial));
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let (mut session, board) = bench.session();
     assert_eq!(model_crc(&mut session, &board), Some(crc_of(&new)));
-    let state = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+    let state = bench.upload(&[UploadStep::Confirm]);
     assert_eq!(state, Ok(confirmed(&new)));
 }
 
@@ -118,9 +118,8 @@ fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     // The host may let it last longer, half an hour at most; asking alone does not.
     for (trial_ms, trial_us) in [(120_000, 120_000_000), (u32::MAX, 1_800_000_000)] {
-        let (mut slots, mut bench) = on_trial(&old, &new);
-        let board = bench.board.clone();
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let mut bench = on_trial(&old, &new);
+        let (mut session, board) = bench.session();
         let pass = |session: &mut Running<'_, '_>, us| {
             board.pins.borrow_mut().now_us += us;
             board.pins.borrow_mut().to_host.clear();
@@ -134,11 +133,11 @@ fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
         let said = reports(&board.pins.borrow().to_host);
         let over = UploadState::TrialOver { crc_32: crc_of(&new) };
         assert_eq!(said, [(UNASKED, format!("{:?}", Report::Upload(over)))]);
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let (mut session, board) = bench.session();
         assert_eq!(model_crc(&mut session, &board), Some(crc_of(&old)));
-        let late = upload(&mut bench, &mut slots, &mut [], &[UploadStep::Confirm]);
+        let late = bench.upload(&[UploadStep::Confirm]);
         assert_eq!(late, Err(Refusal::TrialOver));
-        let state = install(&mut bench, &mut slots, &mut [], (&new, CHUNK));
+        let state = bench.install(&new);
         assert_eq!(state, Ok(confirmed(&new)));
     }
 }

@@ -1,7 +1,6 @@
 //! Undo over the link: the previous model comes into force again, whole and for good.
 
 use crate::mock::*;
-use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{KeepFault, Refusal, UploadState};
 
 /// A device with the model `first`, flashed, and the others uploaded.
@@ -56,13 +55,11 @@ fn an_upload_that_could_not_begin_leaves_the_way_back() {
 #[test]
 fn undos_wear_flash_and_are_limited_between_restarts() {
     let (old, new) = (blob(1, 3), blob(4, 3));
-    let mut slots = Flash::slots_with(&old);
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    install(&mut bench, &mut slots, &mut [], (&new, 60)).unwrap();
+    let mut bench = Bench::new(quiet(), &old);
+    bench.install(&new).unwrap();
     let mut in_force = [crc_of(&new), crc_of(&old)];
     for undos in 0..=100 {
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        let (mut session, board) = bench.session();
         let expected = match undos {
             100 => Err(Refusal::Keep(KeepFault::TooOften)),
             _ => Ok(UploadState::Confirmed { crc_32: in_force[1] }),

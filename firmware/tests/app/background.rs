@@ -1,6 +1,5 @@
 //! Scans that go on by themselves while the frame before is decoded.
 
-use taxel_firmware::app::Session;
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
@@ -106,20 +105,16 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
 
 #[test]
 fn a_scan_of_other_wires_is_given_up_when_a_model_comes_into_force() {
-    let mut slots = Flash::slots();
-    let mut bench = Bench::new(every(1000));
-    let board = bench.board.clone();
+    let mut bench = Bench::new(every(1000), &[]);
+    let (mut session, board) = bench.session();
     board.pins.borrow_mut().scans_alone = true;
     board.pins.borrow_mut().scan_us = 500;
-    {
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        run_until_started(&mut session, &board, 1);
-    }
+    run_until_started(&mut session, &board, 1);
     let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
     let metadata =
         Metadata { input_names: Columns("r2c1_ohm\nr2c3_ohm"), ..Metadata::unnamed(shape) };
-    slots = Flash::slots_with(&blob_of_a_row(shape, metadata));
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    bench.slots = Flash::slots_with(&blob_of_a_row(shape, metadata));
+    let (mut session, board) = bench.session();
     assert_eq!(board.pins.borrow().stopped, 1);
     run_until_started(&mut session, &board, 3);
     // It has as many readings as the model: the mock panics for another number.

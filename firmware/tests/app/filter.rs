@@ -3,7 +3,6 @@
 use taxel_core::blob::Floats;
 use taxel_core::filter::State;
 use taxel_core::{Estimate, RowStatus};
-use taxel_firmware::app::Session;
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
@@ -96,15 +95,11 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
     }
     // Another model, too.
     let next = Own::new(5);
-    let mut slots = Flash::slots_with(&own.blob);
-    let mut bench = Bench::new(filtering());
-    {
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
-        decode_at(&mut session, &bench.board, 0, &touch(0));
-    }
-    install(&mut bench, &mut slots, &mut [], (&next.blob, 64)).unwrap();
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let mut bench = Bench::new(filtering(), &own.blob);
+    let (mut session, board) = bench.session();
+    decode_at(&mut session, &board, 0, &touch(0));
+    bench.install(&next.blob).unwrap();
+    let (mut session, board) = bench.session();
     let found = decode_at(&mut session, &board, 1000, &touch(1));
     assert_eq!(found, bits(expected(&next.blob, &touch(1)).into_iter().flatten()));
 }

@@ -3,7 +3,6 @@
 use taxel_core::Decoder;
 use taxel_core::blob::{Columns, Floats, Metadata, ModelShape};
 use taxel_core::checksum::CRC_32;
-use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{
     Configuration, EstimateReport, ModelFault, Refusal, Report, Request, Setting,
 };
@@ -94,16 +93,14 @@ fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
     let [first, second] = ["r1c1_ohm\nr1c2_ohm", "r1c2_ohm\nr1c1_ohm"].map(|names| {
         blob_of_a_row(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
     });
-    let mut slots = Flash::slots_with(&first);
-    let mut bench = Bench::new(quiet());
-    let board = bench.board.clone();
-    let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+    let mut bench = Bench::new(quiet(), &first);
+    let (mut session, board) = bench.session();
     let baseline = Request::SetBaseline { readings_ohm: Floats::new(&[60.0, 50.0]) };
     tell(&mut session, &board, &baseline);
     tell(&mut session, &board, &Request::Keep(Setting::Baseline));
     for (next, contact) in [(&second, 0), (&first, EstimateReport::CONTACT)] {
-        install(&mut bench, &mut slots, &mut [], (next, 64)).unwrap();
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut []);
+        bench.install(next).unwrap();
+        let (mut session, board) = bench.session();
         let request =
             Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats::new(&[30.0; 2]) };
         let flags = answer!(&mut session, &board, &request, Report::Estimate(it) => it.flags);
@@ -116,14 +113,13 @@ fn a_model_is_decoded_from_ram_where_it_fits() {
     let blob = blob(3, 4);
     let words = blob.len().div_ceil(4);
     for (room, in_ram) in [(words, true), (words - 1, false)] {
-        let mut slots = Flash::slots_with(&blob);
-        let mut weights = vec![0; room];
-        let mut bench = Bench::new(quiet());
-        let mut session = Session::start(&mut bench.app, &mut slots, &mut weights);
-        assert_eq!(model(&mut session, &bench.board).unwrap().in_ram, in_ram);
+        let mut bench = Bench::new(quiet(), &blob);
+        bench.weights = vec![0; room];
+        let (mut session, board) = bench.session();
+        assert_eq!(model(&mut session, &board).unwrap().in_ram, in_ram);
         let frame = frame_at_rest();
-        let (_, _, found) = decode(&mut session, &bench.board, &frame);
+        let (_, _, found) = decode(&mut session, &board, &frame);
         assert_eq!(found, bits(expected(&blob, &frame).into_iter().flatten()));
-        assert_eq!(bytemuck::cast_slice::<u32, u8>(&weights).starts_with(&blob), in_ram);
+        assert_eq!(bytemuck::cast_slice::<u32, u8>(&bench.weights).starts_with(&blob), in_ram);
     }
 }

@@ -1,11 +1,12 @@
 //! An application on its board.
 
 use taxel_firmware::app::{App, Buffers, Session};
-use taxel_firmware::link::message::Configuration;
+use taxel_firmware::link::message::{Configuration, UploadState, UploadStep};
 use taxel_firmware::store::Journal;
 
 use super::board::Board;
 use super::flash::Flash;
+use super::host::{Answer, Running, TestSession, confirmed_steps, upload_step};
 use super::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS};
 use super::source::Source;
 
@@ -14,12 +15,6 @@ pub type Memory = Buffers<ROWS, COLS, OUTPUTS, MESSAGE_BYTES>;
 
 /// An application on the mock board.
 pub type TestApp<'m> = App<'m, Board, Source, ROWS>;
-
-/// A session of an application in memory of any lifetime.
-pub type Running<'a, 'm> = Session<'a, 'm, Board, Source, Flash, ROWS>;
-
-/// A session of an application whose memory is never freed.
-pub type TestSession<'a> = Running<'a, 'static>;
 
 /// A configuration that scans only on request.
 pub fn quiet() -> Configuration {
@@ -31,41 +26,68 @@ pub fn every(frame_period_us: u32) -> Configuration {
     Configuration { frame_period_us, ..quiet() }
 }
 
-/// An application, and the host's ends of everything it is connected to.
+/// An application, its flash, and the host's ends of everything it is connected to.
 pub struct Bench<'m> {
-    /// The application. A session borrows it.
     pub app: TestApp<'m>,
     pub board: Board,
+    pub slots: [Flash; 2],
+    /// Memory for a copy of the model.
+    pub weights: Vec<u32>,
 }
 
 /// A session on a new board with `blob` in its first slot, and the board. Neither is ever freed.
 pub fn started(configuration: Configuration, blob: &[u8]) -> (TestSession<'static>, Board) {
-    let slots = Box::leak(Box::new(Flash::slots_with(blob)));
-    let bench = Box::leak(Box::new(Bench::new(configuration)));
-    let board = bench.board.clone();
-    (Session::start(&mut bench.app, slots, &mut []), board)
+    Box::leak(Box::new(Bench::new(configuration, blob))).session()
 }
 
 impl Bench<'static> {
-    /// An application on a new board. Its memory, half a kilobyte, is never freed: whoever makes many uses
-    /// [`Bench::on`].
-    pub fn new(configuration: Configuration) -> Self {
-        Self::with_journal(configuration, Flash::journal())
-    }
-
-    /// As [`Bench::new`], on a board with this journal.
-    pub fn with_journal(configuration: Configuration, journal: Journal<Flash>) -> Self {
-        Self::on(Board::new(journal), Box::leak(Box::new(Memory::new())), configuration)
+    /// An application on a new board with `blob` in its first slot, without memory for a copy. Its memory, half a kilobyte, is
+    /// never freed: whoever makes many uses [`Bench::on`].
+    pub fn new(configuration: Configuration, blob: &[u8]) -> Self {
+        let (board, memory) = (Board::new(Flash::journal()), Box::leak(Box::new(Memory::new())));
+        Self::on(board, Flash::slots_with(blob), memory, configuration)
     }
 }
 
 impl<'m> Bench<'m> {
-    /// An application on this board in this `memory`, which is cleared: what a restart leaves. The memory can be used again
-    /// when the bench is dropped.
-    pub fn on(board: Board, memory: &'m mut Memory, configuration: Configuration) -> Self {
+    /// An application on this board and these slots in this `memory`, which is cleared: what a restart leaves. The memory can
+    /// be used again when the bench is dropped.
+    pub fn on(
+        board: Board,
+        slots: [Flash; 2],
+        memory: &'m mut Memory,
+        configuration: Configuration,
+    ) -> Self {
         *memory = Memory::new();
         let source = Source::new(&board);
-        Self { app: App::new(board.clone(), source, configuration, memory), board }
+        let app = App::new(board.clone(), source, configuration, memory);
+        Self { app, board, slots, weights: Vec::new() }
+    }
+
+    /// The next session, and the board.
+    pub fn session(&mut self) -> (Running<'_, 'm>, Board) {
+        let session = Session::start(&mut self.app, &mut self.slots, &mut self.weights);
+        (session, self.board.clone())
+    }
+
+    /// Carries out steps of an upload in one session after the other, until the device refuses one; returns the last
+    /// answer.
+    pub fn upload(&mut self, steps: &[UploadStep<'_>]) -> Answer {
+        let mut steps = steps.iter();
+        let mut last = Ok(UploadState::Idle);
+        loop {
+            let (mut session, board) = self.session();
+            let mut end = None;
+            while end.is_none() {
+                let Some(step) = steps.next().filter(|_| last.is_ok()) else { return last };
+                (last, end) = upload_step(&mut session, &board, *step);
+            }
+        }
+    }
+
+    /// Uploads `blob`, and confirms it.
+    pub fn install(&mut self, blob: &[u8]) -> Answer {
+        self.upload(&confirmed_steps(blob))
     }
 
     /// Its board's journal, for the next start.

@@ -3,18 +3,14 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use taxel_firmware::app::Session;
 use taxel_firmware::link::message::{ModelIdentity, UploadState, UploadStep};
 use taxel_firmware::store::{Journal, KeepError, Kind};
 
-use super::bench::{Bench, Memory, Running, quiet};
+use super::bench::{Bench, Memory, quiet};
 use super::board::Board;
 use super::flash::{Cells, Flash, Supply};
-use super::host::{self, Answer, model, model_crc, undo, upload_steps};
+use super::host::{Answer, Running, model, model_crc, undo};
 use super::models::crc_of;
-
-/// Bytes of a chunk of an upload.
-const CHUNK: usize = 100;
 
 /// The answer to a confirmation of `blob`.
 pub fn confirmed(blob: &[u8]) -> UploadState {
@@ -25,8 +21,8 @@ pub fn confirmed(blob: &[u8]) -> UploadState {
 pub struct Device {
     pub slots: [Flash; 2],
     pub journal: Journal<Flash>,
-    /// Memory for a copy of the model.
-    pub weights: Vec<u32>,
+    /// Words of memory for a copy of the model.
+    pub ram_words: usize,
     /// Operation of the flash behind which the power is cut at the next start.
     pub cut_after: Option<u64>,
     /// Power that is cut: that of the slots.
@@ -44,7 +40,7 @@ impl Device {
             supply: slots[0].supply(),
             slots,
             journal: Flash::journal(),
-            weights: vec![0; 1024],
+            ram_words: 1024,
             cut_after: None,
             memory: Box::new(Memory::new()),
         }
@@ -76,23 +72,22 @@ impl Device {
     }
 
     /// Starts it, and does `work` with it.
-    fn start<T>(
-        &mut self,
-        work: impl FnOnce(&mut Bench<'_>, &mut [Flash; 2], &mut [u32]) -> T,
-    ) -> T {
+    fn start<T>(&mut self, work: impl FnOnce(&mut Bench<'_>) -> T) -> T {
         self.power_on();
         let board = Board::new(self.journal.clone());
-        let mut bench = Bench::on(board, &mut self.memory, quiet());
-        let done = work(&mut bench, &mut self.slots, &mut self.weights);
+        let mut bench = Bench::on(board, self.slots.clone(), &mut self.memory, quiet());
+        bench.weights = vec![0; self.ram_words];
+        let done = work(&mut bench);
         self.journal = bench.journal();
+        self.slots = bench.slots;
         done
     }
 
     /// Starts it, and does `work` in its session.
     pub fn session<T>(&mut self, work: impl FnOnce(&mut Running<'_, '_>, &Board) -> T) -> T {
-        self.start(|bench, slots, weights| {
-            let board = bench.board.clone();
-            work(&mut Session::start(&mut bench.app, slots, weights), &board)
+        self.start(|bench| {
+            let (mut session, board) = bench.session();
+            work(&mut session, &board)
         })
     }
 
@@ -113,12 +108,12 @@ impl Device {
 
     /// Carries out these steps of an upload, until one is refused; returns the last answer.
     pub fn upload(&mut self, steps: &[UploadStep<'_>]) -> Answer {
-        self.start(|bench, slots, weights| host::upload(bench, slots, weights, steps))
+        self.start(|bench| bench.upload(steps))
     }
 
     /// Uploads `blob`, and confirms it.
     pub fn install(&mut self, blob: &[u8]) -> Answer {
-        self.upload(&confirmed_steps(blob))
+        self.start(|bench| bench.install(blob))
     }
 
     /// Leaves the model with the CRC-32 `left` for the one before it.
@@ -131,16 +126,4 @@ impl Device {
         self.power_on();
         self.journal.keep(kind, &[bytes])
     }
-}
-
-/// Steps of an upload in chunks of 100 bytes, until it is on trial.
-pub fn trial_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
-    upload_steps(blob, CHUNK)
-}
-
-/// The same, and its confirmation.
-pub fn confirmed_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
-    let mut steps = trial_steps(blob);
-    steps.push(UploadStep::Confirm);
-    steps
 }

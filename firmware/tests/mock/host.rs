@@ -8,9 +8,16 @@ use taxel_firmware::link::message::{
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
 
-use super::bench::{Bench, Running};
 use super::board::Board;
 use super::flash::Flash;
+use super::shape::ROWS;
+use super::source::Source;
+
+/// A session of an application in memory of any lifetime.
+pub type Running<'a, 'm> = Session<'a, 'm, Board, Source, Flash, ROWS>;
+
+/// A session of an application whose memory is never freed.
+pub type TestSession<'a> = Running<'a, 'static>;
 
 /// Number of the requests of [`ask`].
 const ASKED: u16 = 77;
@@ -140,8 +147,7 @@ pub fn begin(blob: &[u8]) -> UploadStep<'_> {
     UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
 }
 
-/// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial. [`install`] goes on
-/// to the confirmation.
+/// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial.
 pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
     let mut steps = vec![begin(blob)];
     steps.extend(
@@ -153,25 +159,16 @@ pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
     steps
 }
 
-/// Carries out steps of an upload in one session after the other, until the device refuses one; returns the last
-/// answer.
-pub fn upload(
-    bench: &mut Bench<'_>,
-    slots: &mut [Flash; 2],
-    weights: &mut [u32],
-    steps: &[UploadStep<'_>],
-) -> Answer {
-    let board = bench.board.clone();
-    let mut steps = steps.iter();
-    let mut last = Ok(UploadState::Idle);
-    loop {
-        let mut session = Session::start(&mut bench.app, slots, weights);
-        let mut end = None;
-        while end.is_none() {
-            let Some(step) = steps.next().filter(|_| last.is_ok()) else { return last };
-            (last, end) = upload_step(&mut session, &board, *step);
-        }
-    }
+/// The same in chunks of 100 bytes.
+pub fn trial_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
+    upload_steps(blob, 100)
+}
+
+/// The same, and its confirmation.
+pub fn confirmed_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
+    let mut steps = trial_steps(blob);
+    steps.push(UploadStep::Confirm);
+    steps
 }
 
 /// Carries out one step of an upload.
@@ -198,16 +195,4 @@ fn upload_answer(report: Report<'_>) -> Answer {
         Report::Refused(refusal) => Err(refusal),
         other => panic!("{other:?}"),
     }
-}
-
-/// Uploads `blob` in chunks of `chunk` bytes and confirms it.
-pub fn install(
-    bench: &mut Bench<'_>,
-    slots: &mut [Flash; 2],
-    weights: &mut [u32],
-    (blob, chunk): (&[u8], usize),
-) -> Answer {
-    let mut steps = upload_steps(blob, chunk);
-    steps.push(UploadStep::Confirm);
-    upload(bench, slots, weights, &steps)
 }

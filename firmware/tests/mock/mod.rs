@@ -10,18 +10,18 @@ mod board;
 mod source;
 mod row_model;
 mod models;
-pub mod bench;
 mod host;
+mod bench;
 mod device;
 
-pub use bench::{Bench, Running, TestSession, every, quiet, started};
+pub use bench::{Bench, every, quiet, started};
 pub use board::Board;
-pub use device::{Device, confirmed, trial_steps};
+pub use device::{Device, confirmed};
 pub use flash::{Flash, Supply};
 pub(crate) use host::answer;
 pub use host::{
-    Answer, ask, begin, find_report, install, model, model_crc, reports, request_bytes, run_until,
-    send, statistics, tell, undo, upload, upload_step, upload_steps,
+    Answer, Running, TestSession, ask, begin, find_report, model, model_crc, reports,
+    request_bytes, run_until, send, statistics, tell, trial_steps, undo, upload_step, upload_steps,
 };
 pub use models::{blob, blob_of_features, blob_with_confidence, crc_of};
 pub use row_model::blob_of_a_row;
