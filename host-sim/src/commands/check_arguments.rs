@@ -48,8 +48,6 @@ pub struct CheckArguments {
         allow_negative_numbers = true
     )]
     frames: usize,
-    #[command(flatten)]
-    pub limits: Limits,
 }
 
 /// What a device is checked with.
@@ -58,33 +56,6 @@ pub struct Checked {
     pub frames: Frames,
     /// Model of the device.
     pub model: ModelBlob,
-}
-
-/// Bounds on the memory of the firmware, without its models.
-#[derive(Args)]
-pub struct Limits {
-    /// Most flash in bytes that the firmware may take.
-    #[arg(long, value_name = "BYTES", default_value_t = u32::MAX, hide_default_value = true)]
-    flash_limit: u32,
-    /// Most RAM in bytes that variables and the stack at its deepest may take.
-    #[arg(long, value_name = "BYTES", default_value_t = u32::MAX, hide_default_value = true)]
-    ram_limit: u32,
-}
-
-impl Limits {
-    fn check(&self, memory: &Memory) -> Result<()> {
-        for (option, limit, taken) in [
-            ("--flash-limit", self.flash_limit, memory.flash_bytes()),
-            ("--ram-limit", self.ram_limit, memory.ram_bytes()),
-        ] {
-            if taken > limit {
-                let message =
-                    format!("the firmware takes {taken} bytes, more than {option} {limit}");
-                return Err(Error::failed(message));
-            }
-        }
-        Ok(())
-    }
 }
 
 impl CheckArguments {
@@ -175,11 +146,11 @@ impl CheckArguments {
     }
 }
 
-/// Prints the findings. Wrong answers, and more memory than allowed, are a failure.
-pub fn conclude(findings: &Findings, limits: &Limits, common: &Common) -> Result<()> {
+/// Prints the findings. Wrong answers are a failure.
+pub fn conclude(findings: &Findings, common: &Common) -> Result<()> {
     print::result(common, findings, || page_of(findings))?;
     if findings.all_good() {
-        limits.check(&findings.device.memory)
+        Ok(())
     } else {
         Err(Error::failed(if findings.repeated > 0 || findings.damaged > 0 {
             format!(

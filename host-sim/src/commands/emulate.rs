@@ -88,5 +88,5 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             output::write_bytes(wanted, &logged)?;
         }
     }
-    conclude(&outcome?, &arguments.check.limits, common)
+    conclude(&outcome?, common)
 }

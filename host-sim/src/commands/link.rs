@@ -166,7 +166,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let mut device = open()?;
             let plan = action.plan(1);
             let findings = check(&mut device, &frames, &model, &plan, &Terminal::new())?;
-            conclude(&findings, &action.limits, common)
+            conclude(&findings, common)
         }
     }
 }

@@ -16,7 +16,7 @@ use super::arguments::{self, of_option};
 use super::decoder_arguments::DecoderArguments;
 use super::progress::Terminal;
 use super::subject_argument::SubjectArgument;
-use super::{Common, print, stderr};
+use super::{Common, command_line, print, stderr};
 
 mod files;
 mod others;
@@ -147,7 +147,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         other => other,
     })?;
     let choice = trade.choose(&bounds);
-    files::write(&folder, &trade, &command())?;
+    files::write(&folder, &trade, &command_line::of_this_process("trade", &[], None))?;
     if common.json {
         print::json(&trade)?;
     } else {
@@ -155,20 +155,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     // Measurements are kept and shown even if no point is within the bounds.
     choice.map_err(|cause| refused(&cause))
-}
-
-/// The command that is running, as it can be typed again.
-fn command() -> String {
-    let quoted = |argument: String| {
-        let plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=+:@%".contains(c);
-        if !argument.is_empty() && argument.chars().all(plain) {
-            argument
-        } else {
-            format!("'{}'", argument.replace('\'', r"'\''"))
-        }
-    };
-    let arguments = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned()));
-    std::iter::once("host-sim".into()).chain(arguments).collect::<Vec<String>>().join(" ")
 }
 
 /// Options by the settings that they set.
