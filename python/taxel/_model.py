@@ -56,7 +56,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
     centres : int
         Largest number of Gaussians K; fewer distinct lines take fewer, with a warning.
     spread : float or None
-        Width σ on scaled inputs, where refinement starts; None for 0.8.
+        Width σ on scaled inputs, where refinement starts; None for 0.4, or 0.8 with `each_row`.
     penalty : float or None
         Ridge penalty on squared weights for each line; None for the usual one.
     refine : bool

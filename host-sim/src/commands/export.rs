@@ -26,7 +26,7 @@ use super::{Common, print};
   host-sim train press -o press.bin
   host-sim export press.bin --c lib/press --name press
 
-  host-sim train press --format f32 -o press.bin
+  host-sim train press --each-row --format f32 -o press.bin
   host-sim export press.bin --rust src/press.rs")]
 pub struct Arguments {
     /// Weight blob.
