@@ -5,13 +5,12 @@
 //! that has power answers, and has a model in force. What is decoded of a packet is the same when it is sent again.
 #![no_main]
 
-use std::cell::RefCell;
-use std::rc::Rc;
+use std::ops::ControlFlow;
 
 use libfuzzer_sys::fuzz_target;
 use taxel_core::AlignedBytes;
 use taxel_core::checksum::CRC_32;
-use taxel_firmware::app::{Session, SessionEnd};
+use taxel_firmware::app::SessionEnd;
 use taxel_firmware::link::message::{Report, Request};
 use taxel_firmware::link::packet::PROTOCOL_VERSION;
 use taxel_firmware::link::{cobs, packet};
@@ -20,10 +19,7 @@ use taxel_firmware::link::{cobs, packet};
 #[expect(dead_code, unused_imports, reason = "the firmware's tests use all of it")]
 mod mock;
 
-use mock::bench::Memory;
-use mock::{
-    Bench, Board, Flash, Running, TestFrame, blob, model_crc, quiet, request_bytes, upload_steps,
-};
+use mock::{Board, Device, Flash, Running, blob, model_crc, request_bytes, upload_steps};
 
 /// Most starts of the device in one run.
 const MOST_STARTS: usize = 12;
@@ -36,46 +32,16 @@ const NUMBER: u16 = 9;
 
 fuzz_target!(|bytes: &[u8]| {
     let models = [blob(3, 4), blob(4, 3), blob(5, 6)];
-    let mut slots = Flash::slots_with(&models[0]);
-    let mut journal = Flash::journal();
-    let mut memory = Memory::new();
+    let mut device = Device::new(Flash::slots_with(&models[0]));
+    device.ram_words = 0;
     let mut steps = Steps(bytes);
-    let mut cut_after = None;
     for _ in 0..MOST_STARTS {
-        if let Some(operations) = cut_after.take() {
-            slots[0].cut_power_after(operations);
-            journal.pages()[0].cut_power_after(operations);
-        }
-        let mut bench = Bench::on(Board::new(journal), &mut memory, quiet());
-        let mut device = Device {
-            board: bench.board.clone(),
-            frame: bench.frame.clone(),
-            session: Session::start(&mut bench.app, &mut slots, &mut []),
-        };
-        device.answers();
-        loop {
-            let Some((operation, bytes)) = steps.next() else { return };
-            match operation % 12 {
-                10 => break,
-                11 => {
-                    cut_after = Some(u64::from(number_of(bytes) % 1024));
-                    break;
-                }
-                operation => {
-                    let end = device.step(operation, bytes, &models);
-                    // A first request may end a frame that the bytes have begun. The next is answered.
-                    let identify = || request_bytes(NUMBER, &Request::Identify);
-                    if end.or_else(|| device.send(identify())).is_some() {
-                        break;
-                    }
-                    device.answers();
-                }
-            }
-        }
-        drop(device);
-        journal = bench.journal();
-        slots[0].power_on();
-        journal.pages()[0].power_on();
+        // The journal has a power of its own, which is cut alike.
+        let supply = device.journal.pages()[0].supply();
+        supply.borrow_mut().on(device.cut_after);
+        let end = device.session(|session, board| Life { session, board }.run(&mut steps, &models));
+        let ControlFlow::Continue(cut_after) = end else { return };
+        device.cut_after = cut_after;
     }
 });
 
@@ -109,14 +75,40 @@ macro_rules! same_again {
     };
 }
 
-/// A device that runs.
-struct Device<'d, 'm> {
-    session: Running<'d, 'm>,
-    board: Board,
-    frame: Rc<RefCell<TestFrame>>,
+/// A device from a start to the next.
+struct Life<'d, 'b, 'm> {
+    session: &'d mut Running<'b, 'm>,
+    board: &'d Board,
 }
 
-impl Device<'_, '_> {
+impl Life<'_, '_, '_> {
+    /// Takes steps up to a restart; breaks if none are left, else returns the operation at which the power is cut next.
+    fn run(
+        mut self,
+        steps: &mut Steps<'_>,
+        models: &[AlignedBytes; 3],
+    ) -> ControlFlow<(), Option<u64>> {
+        self.answers();
+        while let Some((operation, bytes)) = steps.next() {
+            match operation % 12 {
+                10 => return ControlFlow::Continue(None),
+                11 => {
+                    return ControlFlow::Continue(Some(u64::from(number_of(bytes) % 1024)));
+                }
+                operation => {
+                    let end = self.step(operation, bytes, models);
+                    // A first request may end a frame that the bytes have begun. The next is answered.
+                    let identify = || request_bytes(NUMBER, &Request::Identify);
+                    if end.or_else(|| self.send(identify())).is_some() {
+                        return ControlFlow::Continue(None);
+                    }
+                    self.answers();
+                }
+            }
+        }
+        ControlFlow::Break(())
+    }
+
     /// Takes a step; returns why the session ended, if it did.
     fn step(
         &mut self,
@@ -160,7 +152,7 @@ impl Device<'_, '_> {
                 end
             }
             _ => {
-                let mut frame = self.frame.borrow_mut();
+                let mut frame = self.board.frame.borrow_mut();
                 let readings = frame.as_flattened_mut().iter_mut();
                 readings
                     .zip(bytes.as_chunks().0)
@@ -188,7 +180,7 @@ impl Device<'_, '_> {
 
     /// Checks that the device answers, and has a model in force.
     fn answers(&mut self) {
-        assert!(model_crc(&mut self.session, &self.board).is_some(), "no model in force");
+        assert!(model_crc(self.session, self.board).is_some(), "no model in force");
     }
 }
 
