@@ -118,20 +118,6 @@ fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
 }
 
 #[test]
-fn a_baseline_of_other_wires_is_ignored_until_a_model_of_its_wires_comes() {
-    let readings: Vec<u8> = [60.0_f32; 4].iter().flat_map(|ohm| ohm.to_le_bytes()).collect();
-    let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
-    let head = [2, 2, 2, 7, 0, 0, 0, 0, 0];
-    device.keep(Kind::Baseline, &[&head[..], &readings].concat()).unwrap();
-    device.session(|session, board| {
-        // None is in force.
-        assert_eq!(refusal(session, board, &Request::Keep(Setting::Baseline)), NOTHING);
-        let found = ask_kept(session, board, &Request::Kept).baseline;
-        assert_eq!(found, Some(KeptBaseline { rows: 2, columns: 2, frames: 7 }));
-    });
-}
-
-#[test]
 fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
     let (mut session, board) = started(quiet(), &[]);
     let good = circuit();

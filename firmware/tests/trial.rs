@@ -44,19 +44,6 @@ fn a_model_on_trial_is_decoded_with_and_gone_after_a_restart() {
 }
 
 #[test]
-fn a_confirmed_model_stays_and_a_repeated_confirmation_does_no_harm() {
-    let (old, new) = (blob(1, 3), blob(2, 5));
-    let mut bench = on_trial(&old, &new);
-    let confirm = [UploadStep::Try { trial_ms: 60_000 }, UploadStep::Confirm, UploadStep::Confirm];
-    let state = bench.upload(&confirm);
-    assert_eq!(state, Ok(confirmed(&new)));
-    let (mut session, board) = bench.session();
-    let found = model(&mut session, &board).unwrap();
-    assert_eq!((found.crc_32, found.generation, found.on_trial), (crc_of(&new), 1, false));
-    assert_eq!(after_restart(&mut bench), Some(found));
-}
-
-#[test]
 fn a_confirmation_that_cannot_be_written_down_ends_the_trial() {
     let (old, new) = (blob(1, 3), blob(2, 5));
     let mut bench = on_trial(&old, &new);

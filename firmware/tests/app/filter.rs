@@ -6,7 +6,7 @@ use taxel_core::{Estimate, RowStatus};
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
-use super::requests::{bits, expected};
+use super::requests::{bits, decode_at, expected};
 use crate::mock::*;
 
 /// A configuration that filters, and scans only on request.
@@ -38,21 +38,6 @@ impl Own {
         self.state.filter(filtering().filter(), start_us, &mut estimate);
         bits(outputs.iter().copied())
     }
-}
-
-/// Asks for the estimate of a `frame` that began at this time; returns its bits.
-fn decode_at(
-    session: &mut TestSession<'_>,
-    board: &Board,
-    start_us: u64,
-    frame: &TestFrame,
-) -> Vec<u32> {
-    let readings_ohm = Floats::new(frame.as_flattened());
-    let request = Request::Decode { frame: 5, start_us, readings_ohm };
-    answer!(session, board, &request, Report::Estimate(estimate) => {
-        assert_eq!(estimate.start_us, start_us);
-        bits(estimate.outputs.iter())
-    })
 }
 
 /// Estimates that were sent unasked: number of the frame, its time, and its bits.
@@ -89,7 +74,7 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
         ask(&mut session, &board, &request, |report| {
             assert!(!matches!(report, Report::Refused(_)), "{report:?}");
         });
-        let found = decode_at(&mut session, &board, 3000, &touch(3));
+        let (.., found) = decode_at(&mut session, &board, 3000, &touch(3));
         let raw = bits(expected(&own.blob, &touch(3)).into_iter().flatten());
         assert_eq!(found == raw, is_new, "{request:?}");
     }
@@ -100,7 +85,7 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
     decode_at(&mut session, &board, 0, &touch(0));
     bench.install(&next.blob).unwrap();
     let (mut session, board) = bench.session();
-    let found = decode_at(&mut session, &board, 1000, &touch(1));
+    let (.., found) = decode_at(&mut session, &board, 1000, &touch(1));
     assert_eq!(found, bits(expected(&next.blob, &touch(1)).into_iter().flatten()));
 }
 

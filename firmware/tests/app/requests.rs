@@ -25,10 +25,20 @@ pub fn decode(
     board: &Board,
     frame: &TestFrame,
 ) -> (u8, Vec<u8>, Vec<u32>) {
+    decode_at(session, board, 0, frame)
+}
+
+/// The same for a frame that began at this time.
+pub fn decode_at(
+    session: &mut Running<'_, '_>,
+    board: &Board,
+    start_us: u64,
+    frame: &TestFrame,
+) -> (u8, Vec<u8>, Vec<u32>) {
     let readings_ohm = Floats::new(frame.as_flattened());
-    let request = Request::Decode { frame: 5, start_us: 0, readings_ohm };
+    let request = Request::Decode { frame: 5, start_us, readings_ohm };
     answer!(session, board, &request, Report::Estimate(e) => {
-        assert_eq!(e.frame, 5);
+        assert_eq!((e.frame, e.start_us), (5, start_us));
         (e.flags, e.row_status.to_vec(), bits(e.outputs.iter()))
     })
 }
