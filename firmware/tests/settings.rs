@@ -48,9 +48,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         expect(session, board, &circuit());
         send(session, board, 1, &Request::Configure(scanning));
         send(session, board, 2, &Request::CaptureBaseline { frames: 3 });
-        for _ in 0..10_000 {
-            session.step();
-        }
+        turn(session, 10_000);
         for setting in Setting::ALL {
             ask_kept(session, board, &Request::Keep(setting));
         }

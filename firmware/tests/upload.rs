@@ -45,9 +45,7 @@ fn a_good_model_comes_into_force_and_stays_and_a_repeated_confirmation_does_no_h
 fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor_is_silent() {
     let (mut session, board) = started(every(1000), &[]);
     *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
-    for _ in 0..2000 {
-        session.step();
-    }
+    turn(&mut session, 2000);
     let feeds = || board.pins.borrow().feeds;
     let fed = feeds();
     let good = blob(4, 3);

@@ -162,17 +162,5 @@ mod tests {
             theirs.push(END);
             prop_assert_eq!(message_of(&theirs), Some(message));
         }
-
-        #[test]
-        fn a_frame_that_is_cut_short_within_a_run_is_broken(message in messages(), cut in 1..1000_usize) {
-            let frame = frame_of(&message);
-            prop_assume!(cut < frame.len() - 1);
-            let mut shorter = frame[..frame.len() - 1 - cut].to_vec();
-            shorter.push(END);
-            // A cut between two runs looks whole here; the CRC finds it.
-            if let Some(found) = message_of(&shorter) {
-                prop_assert!(found.len() < message.len());
-            }
-        }
     }
 }

@@ -105,9 +105,7 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
         assert!(board.pins.borrow().now_us < 100_000, "no answer");
         session.step();
     }
-    for _ in 0..2000 {
-        session.step();
-    }
+    turn(&mut session, 2000);
     let answers = answer(15);
     assert!(answers[0] == refused && answers[1].starts_with("Baseline"), "{answers:?}");
     assert_eq!(answers.len(), 2);

@@ -2,8 +2,6 @@
 
 use taxel_firmware::app::SessionEnd;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request};
-use taxel_firmware::link::packet;
-use taxel_firmware::link::receive::{Received, Receiver};
 
 use crate::mock::*;
 
@@ -60,24 +58,18 @@ fn the_watchdog_is_fed_by_good_loops_only() {
     *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
     await_scan(&mut session);
     let (fed, bad) = (feeds(), statistics(&mut session, &board).bad_loops);
-    for _ in 0..2000 {
-        session.step();
-    }
+    turn(&mut session, 2000);
     assert_eq!(feeds(), fed);
     assert!(statistics(&mut session, &board).bad_loops >= bad + 2000);
     // One reading is enough.
     board.frame.borrow_mut()[1][1] = 60.0;
     await_scan(&mut session);
     let fed = feeds();
-    for _ in 0..2000 {
-        session.step();
-    }
+    turn(&mut session, 2000);
     assert_eq!(feeds(), fed + 2000);
     // Without scans, a silent sensor must not restart the device.
     *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
-    for _ in 0..2000 {
-        session.step();
-    }
+    turn(&mut session, 2000);
     tell(&mut session, &board, &Request::Configure(quiet()));
     let fed = feeds();
     session.step();
@@ -126,15 +118,7 @@ fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
     board.pins.borrow_mut().room = None;
     send(&mut session, &board, 7, &Request::Statistics);
     let bytes = std::mem::take(&mut board.pins.borrow_mut().to_host);
-    let mut receiver = Receiver::new([0; 1024]);
-    let mut numbers = Vec::new();
-    for byte in bytes {
-        numbers.extend(receiver.push(byte).map(|received| match received {
-            Received::Frame(bytes) => packet::decode::<Report<'_>>(bytes).map(|p| p.number).ok(),
-            _ => None,
-        }));
-    }
-    assert_eq!(numbers[..2], [None, Some(7)], "{numbers:?}");
+    assert_eq!(find_report(&bytes, |number, _| Some(number)), Some(7));
     let s = statistics(&mut session, &board);
     assert!(s.lost_reports >= 5 && s.frames_missed > 0, "{s:?}");
 }

@@ -120,6 +120,13 @@ pub fn send(session: &mut Running<'_, '_>, board: &Board, number: u16, request: 
     settle(session, board);
 }
 
+/// Runs so many turns of the loop.
+pub fn turn(session: &mut Running<'_, '_>, times: u32) {
+    for _ in 0..times {
+        session.step();
+    }
+}
+
 /// Runs turns of the loop until this time.
 pub fn run_until(session: &mut Running<'_, '_>, board: &Board, end_us: u32) {
     while board.pins.borrow().now_us < end_us {

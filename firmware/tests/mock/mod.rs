@@ -21,7 +21,8 @@ pub use flash::{Flash, Supply};
 pub(crate) use host::answer;
 pub use host::{
     Answer, Running, TestSession, ask, begin, find_report, model, model_crc, reports,
-    request_bytes, run_until, send, statistics, tell, trial_steps, undo, upload_step, upload_steps,
+    request_bytes, run_until, send, statistics, tell, trial_steps, turn, undo, upload_step,
+    upload_steps,
 };
 pub use models::{blob, blob_of_features, blob_with_confidence, crc_of};
 pub use row_model::blob_of_a_row;
