@@ -93,8 +93,9 @@ fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
             novelty.is_some_and(|novelty| (1e-6..1.0).contains(&f32::from_bits(novelty)))
         });
         for (ohm, novel) in [(65.0, false), (64.0, false), (hardly.unwrap(), true), (900.0, true)] {
-            let (found, _) = decode(&mut session, &board, &with_last(ohm));
+            let (found, flags) = decode(&mut session, &board, &with_last(ohm));
             assert_eq!(found, expected(&blob, &with_last(ohm), baseline_ohm), "{ohm}");
+            assert_ne!(flags & EstimateReport::CONTACT, 0, "{ohm}: a flag of its own is lost");
             assert_eq!((found.novel, found.deviation.len()), (novel, ROWS * OUTPUTS), "{ohm}");
         }
         let s = statistics(&mut session, &board);
