@@ -235,24 +235,16 @@ mod tests {
     }
 
     #[test]
-    fn the_last_fifth_is_held_out() {
-        let split = Split::new(&numbered(11), None, Judged::HeldOut);
-        assert_eq!(split.training, (0..9).collect::<Vec<_>>());
-        assert_eq!(
-            (split.test.frames.inputs.values, split.choice.as_str()),
-            (vec![9.0, 10.0], "the last fifth")
-        );
-        assert_eq!(split.test.log.times(), [9.0, 10.0]);
-    }
-
-    #[test]
-    fn the_last_fold_is_held_out_where_folds_are_given() {
-        let split = Split::new(&numbered(5), Some(&[2, 0, 1, 2, 0]), Judged::HeldOut);
-        assert_eq!(split.training, [1, 2, 4]);
-        assert_eq!(
-            (split.test.frames.inputs.values, split.choice.as_str()),
-            (vec![0.0, 3.0], "the last fold")
-        );
+    fn the_last_fifth_is_held_out_or_the_last_fold_where_folds_are_given() {
+        for (count, folds, training, test, choice) in [
+            (11, None, (0..9).collect(), [9.0, 10.0], "the last fifth"),
+            (5, Some(&[2, 0, 1, 2, 0][..]), vec![1, 2, 4], [0.0, 3.0], "the last fold"),
+        ] {
+            let split = Split::new(&numbered(count), folds, Judged::HeldOut);
+            assert_eq!((split.training, split.choice.as_str()), (training, choice));
+            assert_eq!(split.test.frames.inputs.values, test);
+            assert_eq!(split.test.log.times(), test);
+        }
     }
 
     #[test]

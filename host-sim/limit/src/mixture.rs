@@ -220,34 +220,3 @@ fn factor(covariance: &DMatrix<f64>) -> DMatrix<f64> {
         added *= 10.0;
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use taxel_data::random::{Purpose, Stream};
-
-    #[test]
-    fn the_density_is_that_of_the_draws() {
-        // For draws from q, the mean of prior/q is the prior's integral: 1.
-        for n in [1, 2, 5] {
-            let mut random = Random::new(3, Stream::Test, Purpose::Posterior, n as u64, 0);
-            let mut samples = Samples::new(n);
-            let places = (0..300 * n).map(|_| 0.7 + 0.4 * random.normal());
-            samples.places = places.collect();
-            let mixture = Mixture::fit(&samples, &[1.0 / 300.0; 300], &mut random);
-            let mut latents = vec![[0.0; LANES]; n];
-            let (mut sum, mut squares, rounds) = (0.0, 0.0, 1000);
-            for round in 0..rounds {
-                mixture.draw(round * LANES, &mut random, &mut latents);
-                for log in mixture.log_prior_over_density(&latents) {
-                    sum += log.exp();
-                    squares += log.exp().powi(2);
-                }
-            }
-            let count = (rounds * LANES) as f64;
-            let mean = sum / count;
-            let error = ((squares / count - mean * mean) / count).sqrt();
-            assert!((mean - 1.0).abs() < 4.0 * error && error < 0.02, "{n}: {mean} ± {error}");
-        }
-    }
-}

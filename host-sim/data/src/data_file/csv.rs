@@ -13,7 +13,7 @@ mod body;
 /// Parses the bytes of a text file of any dialect; `path` names it in messages.
 pub(super) fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<DataFile> {
     let error = |problem| Error::file(path, problem);
-    let found = Dialect::find(bytes, &reading.stated, reading.has_header);
+    let found = Dialect::find(bytes, reading.stated, reading.has_header);
     let (dialect, text) = found.map_err(error)?;
     let plain = dialect.to_plain(&text).map_err(error)?;
     let mut file = parse_plain(path, &plain, reading.has_header || dialect.has_names())?;

@@ -69,11 +69,11 @@ type Line<'t> = (usize, Vec<Cow<'t, str>>);
 impl Dialect {
     /// Finds the dialect of a file of these `bytes`, and decodes them to UTF-8 without a byte order mark. The first line
     /// holds names, if it `has_header`.
-    pub(super) fn find<'b>(
-        bytes: &'b [u8],
-        stated: &Stated,
+    pub(super) fn find(
+        bytes: &[u8],
+        stated: Stated,
         has_header: bool,
-    ) -> Result<(Self, Cow<'b, [u8]>), Problem> {
+    ) -> Result<(Self, Cow<'_, [u8]>), Problem> {
         let encoding = Encoding::of(bytes);
         let text = encoding.decode(bytes);
         let sample = String::from_utf8_lossy(sample(&text)).into_owned();
@@ -86,7 +86,7 @@ impl Dialect {
     fn of_sample(
         encoding: Encoding,
         sample: &str,
-        stated: &Stated,
+        stated: Stated,
         has_header: bool,
     ) -> Result<Self, Problem> {
         let mark_of = |line: &str| COMMENTS.into_iter().find(|mark| is_comment(line, mark));

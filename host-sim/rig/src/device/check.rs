@@ -86,26 +86,15 @@ pub fn check(
 
 #[cfg(test)]
 mod tests {
-    use taxel_firmware::link::message::Memory;
+    use taxel_firmware::link::message::Report;
 
     use super::*;
+    use crate::device::upload::tests::identity;
 
     #[test]
     fn every_frame_must_have_the_hosts_bits_over_a_sound_line() {
-        let device = DeviceIdentity {
-            board: "b".into(),
-            firmware: "0".into(),
-            rows: 1,
-            columns: 1,
-            outputs: 1,
-            model: None,
-            model_name: String::new(),
-            slot_bytes: 0,
-            chunk_bytes: 0,
-            memory: Memory::default(),
-            unique_id: [0; 12],
-            wires_crc_32: 0,
-        };
+        let Report::Identity(identity) = identity(false) else { unreachable!() };
+        let device = DeviceIdentity::from(&identity);
         let frames = FrameFindings { frames: 5, bit_identical: 5, frames_per_s: 1.0 };
         let statistics = Statistics::default();
         let good = Findings { device, statistics, frames, repeated: 0, damaged: 0 };

@@ -223,4 +223,4 @@ fn unexpected(request: &str, answer: UploadState) -> Error {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -87,7 +87,7 @@ fn a_restart_waits_for_a_device_that_takes_longer_to_answer_than_a_board_to_star
 }
 
 /// Device of one reading whose model has the CRC-32 7.
-fn identity(on_trial: bool) -> Report<'static> {
+pub fn identity(on_trial: bool) -> Report<'static> {
     let model = ModelIdentity {
         crc_32: 7,
         slot: 0,
