@@ -103,7 +103,6 @@ impl<M: AsMut<[Track]>> State<M> {
     /// Filters the estimate of a frame that began at `start_us`, by a clock of any start. Outputs for which there is no
     /// room in the state stay as they are.
     ///
-    /// - A row that is at rest keeps the outputs at rest; at the touch the filter starts from there, with rate 0.
     /// - A row that could not be decoded keeps NaN, and its filter starts anew at the next frame that can be.
     /// - A frame of the same time as the last one changes nothing, and gets the same outputs: it is a repeated request.
     /// - After a gap of more than [ten](Settings::MOST_TIME_CONSTANTS) time constants, and if the time goes back, the

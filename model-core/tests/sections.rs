@@ -1,6 +1,6 @@
 //! Sections of the blob that a model may have besides its networks: their bytes, and what damage of them is called.
 
-use crate::common::{PROJECTION, bytes_of_table, close_with_crc, worked_bytes};
+use crate::common::{PROJECTION, close_with_crc, worked_bytes};
 use crate::{blob_format, confidence, fill, projection};
 use proptest::prelude::*;
 use taxel_core::blob::{DecodeError, Model};
@@ -54,13 +54,6 @@ fn a_confidence_has_the_specifications_worked_bytes() {
     let [_, confidence, _] = samples();
     let bytes = worked_bytes("worked confidence");
     assert_eq!(confidence.blob[confidence.start..][..bytes.len()], bytes);
-}
-
-#[test]
-fn the_example_of_the_page_is_the_specifications() {
-    let page = include_str!("../../docs/blob.md");
-    let table = page.split("<!-- worked confidence -->").nth(1).expect("the marked table");
-    assert_eq!(bytes_of_table(table.lines()), worked_bytes("worked confidence"));
 }
 
 #[test]

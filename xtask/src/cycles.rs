@@ -1,6 +1,6 @@
 //! Cost of decoding on a Cortex-M4: instructions counted exactly in QEMU, beside those that `host-sim` predicts.
 //!
-//! `docs/cycles.md` explains all this, and has the accepted figures.
+//! `docs/cycles.md` explains all this.
 
 mod models;
 pub mod trace;
@@ -22,10 +22,8 @@ pub use models::{Model, train_all};
 /// Name of the image that is measured.
 const IMAGE: &str = "qemu-bench";
 
-/// Files of the accepted figures, and of the table that is made from them behind a heading.
+/// File of the accepted figures.
 const DATA: &str = "firmware/cycles.csv";
-const DOCUMENT: &str = "docs/cycles.md";
-const HEADING: &str = "## Figures\n";
 
 /// First line of the accepted figures.
 const HEAD: &str = "compiler,model,scope,instructions,predicted";
@@ -42,7 +40,7 @@ const OTHER_COMPILER_PERCENT: u64 = 5;
 /// What to do besides comparing with accepted figures.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Write firmware/cycles.csv and the table of docs/cycles.md instead of comparing.
+    /// Write firmware/cycles.csv instead of comparing.
     #[arg(long)]
     accept: bool,
 }
@@ -71,10 +69,8 @@ pub fn run(options: &Options) -> Outcome {
     print!("{}", markdown(&measured));
     let mut faults: Vec<String> = measured.iter().filter_map(off).collect();
     if options.accept {
-        let document = in_document(&read(DOCUMENT)?, &compiler, &measured)?;
-        for (file, text) in [(DATA, data(&compiler, &measured)), (DOCUMENT, document)] {
-            fs::write(root().join(file), text).map_err(|cause| format!("{file}: {cause}"))?;
-        }
+        let written = fs::write(root().join(DATA), data(&compiler, &measured));
+        written.map_err(|cause| format!("{DATA}: {cause}"))?;
     } else {
         let (accepted_by, accepted) = parse(&read(DATA)?)?;
         faults.extend(differences(&accepted, &measured, accepted_by == compiler));
@@ -172,26 +168,15 @@ fn markdown(figures: &[Figure]) -> String {
     head.to_owned() + &frames.map(line).collect::<String>()
 }
 
-/// The `document` with the table of accepted figures at its end.
-fn in_document(document: &str, compiler: &str, figures: &[Figure]) -> Outcome<String> {
-    let start = document.find(HEADING).ok_or(format!("{DOCUMENT} lacks {}", HEADING.trim()))?;
-    let head = &document[..start + HEADING.len()];
-    Ok(format!("{head}\nBy {compiler}:\n\n{}", markdown(figures)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_table_of_the_document_is_that_of_the_data() {
-        let [text, document] = [DATA, DOCUMENT].map(|file| read(file).unwrap());
+    fn the_accepted_figures_are_written_as_they_were_read() {
+        let text = read(DATA).unwrap();
         let (compiler, figures) = parse(&text).unwrap();
         assert_eq!(data(&compiler, &figures), text);
-        assert!(
-            in_document(&document, &compiler, &figures).unwrap() == document,
-            "{DOCUMENT} has other figures than {DATA}: cargo xtask cycles --accept"
-        );
     }
 
     #[test]

@@ -2,8 +2,7 @@
 //!
 //! QEMU's UART moves only one byte in each turn of its main loop; here a message takes no longer than its copy.
 //! The memory holds two rings of bytes, one for each direction. Every ring has one writer, one reader and two
-//! positions: the bytes written so far, and the bytes read so far, both modulo 2¹⁶. `docs/emulator.md` has
-//! the layout.
+//! positions: the bytes written so far, and the bytes read so far, both modulo 2¹⁶, little-endian.
 //!
 //! The positions are kept in the shared memory alone, so that a restart of the image loses no byte.
 //!

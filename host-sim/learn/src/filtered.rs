@@ -22,6 +22,27 @@ use crate::decoder::{Estimates, FrameDecoder, Frames};
 /// Decoder whose outputs are filtered in time, as a device does. Deviations and novelty stay those of each frame.
 ///
 /// Outputs are rounded to f32. A frame whose time is not known starts the filter anew, so that it is not filtered.
+///
+/// ```
+/// use taxel_core::filter::Settings;
+/// use taxel_data::random::Stream;
+/// use taxel_learn::{Decoder, Filtered, Frames, Options, Origin, Timing, pack, train::train};
+/// use taxel_simulate::{World, synthesise};
+///
+/// let world = World { read_rows: vec![3], ..World::press() }; // one row-wire
+/// let frames = synthesise(&world, Stream::Training, 500);
+/// let trained = train(&frames, &Options { centres: 8, ..Options::default() }, &taxel_data::progress::Silent)?;
+/// let blob = pack(&trained, &frames, &Origin::of_data("row 4", 0, 1, &frames))?;
+/// let settings = Settings { time_constant_us: 5000, lead_us: 2000 };
+/// let filtered = Filtered::new(blob.prepare(), settings);
+///
+/// let start_us: Vec<u64> = (0..500).map(|frame| 1000 * frame).collect();
+/// let timing = Timing { start_us: &start_us, reading_offset_us: &[] }; // when each reading is taken: not needed here
+/// let frames = Frames { readings: &frames.inputs.values, timing: Some(timing) };
+/// let estimates = filtered.decode_frames(frames, 500); // one trajectory
+/// assert_eq!(estimates.values.len(), 500 * 18);
+/// # Ok::<(), taxel_learn::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filtered<D> {
     decoder: D,

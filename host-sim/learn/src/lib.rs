@@ -35,8 +35,3 @@ pub use packing::{ModelBlob, Origin, pack};
 pub use prepared::PreparedModel;
 pub use taxel_data::error::{Error, Result};
 pub use train::{Options, Trained};
-
-/// The page's example is a test.
-#[cfg(doctest)]
-#[doc = include_str!("../../../docs/filter.md")]
-struct FilterPage;

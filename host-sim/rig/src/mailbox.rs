@@ -1,8 +1,8 @@
 //! Mailbox: a serial line through memory that this program shares with the image in the emulator.
 //!
 //! QEMU keeps the machine's PSRAM in a file. This end of the line reads and writes that file; the image's
-//! end (`firmware/qemu/src/mailbox.rs`) reads and writes the memory. `docs/emulator.md` has the layout: two
-//! rings of bytes, each with the position of its writer and that of its reader.
+//! end (`firmware/qemu/src/mailbox.rs`, which has the layout) reads and writes the memory: two rings of bytes, each
+//! with the position of its writer and that of its reader.
 //!
 //! The system may copy the two bytes of a position one after the other. Both ends stay correct all the same:
 //!
