@@ -34,7 +34,7 @@ pub fn worked_bytes(name: &str) -> Vec<u8> {
 }
 
 /// Bytes of lines that begin with an offset, ` | ` and bytes in hexadecimal. Other lines are skipped.
-pub fn bytes_of_table<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<u8> {
+fn bytes_of_table<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for line in lines {
         let mut cells = line.trim_start_matches('|').split('|').map(str::trim);
