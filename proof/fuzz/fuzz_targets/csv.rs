@@ -47,11 +47,7 @@ fn as_plain(path: &Path, file: &DataFile, lines: &[&[f64]]) -> DataFile {
         let field = |value: &f64| if value.is_nan() { "NaN".into() } else { value.to_string() };
         plain += &(line.iter().map(field).collect::<Vec<_>>().join(",") + "\n");
     }
-    let stated = Stated {
-        separator: Some(Separator::Char(',')),
-        decimal_comma: Some(false),
-        ..Stated::default()
-    };
+    let stated = Stated { separator: Some(Separator::Char(',')), decimal_comma: Some(false) };
     let reading = Reading { has_header: true, stated, ..Reading::default() };
     DataFile::parse(path, plain.as_bytes(), &reading).expect("plain text of numbers")
 }

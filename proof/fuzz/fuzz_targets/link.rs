@@ -89,7 +89,7 @@ impl Life<'_, '_, '_> {
         models: &[AlignedBytes; 3],
     ) -> ControlFlow<(), Option<u64>> {
         self.answers();
-        while let Some((operation, bytes)) = steps.next() {
+        for (operation, bytes) in steps.by_ref() {
             match operation % 12 {
                 10 => return ControlFlow::Continue(None),
                 11 => {
