@@ -16,7 +16,7 @@ use taxel_data::error::Problem;
 use taxel_data::{Clock, DataFile, Dataset};
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::refine::LEAST_FOLDS;
-use taxel_learn::train::resolution;
+use taxel_learn::train::{projection, resolution};
 use taxel_learn::{Options, relative, select};
 
 impl DataArguments {
@@ -77,10 +77,18 @@ impl DataArguments {
             [&training, &test].map(|it| (it.log.clone(), it.rest.clone()));
         let training = given(training);
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
-        let inputs = training.inputs.names.len() / training.rows;
-        let centres = Warning::enough_frames_for(training.fewest_values(), inputs);
         let usual = Options::usual_for(&training);
-        let centres = usual.centres.min(centres);
+        let readings = training.inputs.names.len();
+        let inputs = if usual.each_row {
+            readings / training.rows
+        } else {
+            projection::features_at_most(
+                &training,
+                projection::usual_features(training.rows, readings),
+            )
+        };
+        let centres =
+            usual.centres.min(Warning::enough_frames_for(training.fewest_values(), inputs));
         let measurements = Measurements {
             name: name.into_owned(),
             digest,
