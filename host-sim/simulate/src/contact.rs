@@ -110,7 +110,7 @@ impl Contact {
     /// Normal force in N on the face of `sensor`: the integral of k·Δz over the face. What of the dent lies beyond the
     /// face does not count.
     ///
-    /// The integral is Gauss's rule of four nodes, on [`PANELS`] × [`PANELS`] equal panels of the part of the face that
+    /// The integral is Gauss's rule of four nodes, on 10 × 10 equal panels of the part of the face that
     /// the dent reaches. It is within 1e-5 of the volume for Gaussian dents, and within 5e-3 for punches, which have a
     /// kink at their rim.
     pub fn force_n(&self, sensor: &Sensor) -> Lanes {

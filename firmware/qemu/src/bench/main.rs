@@ -21,14 +21,12 @@ use region::{calibrate, region};
 /// Most rows of a model.
 const MOST_ROWS: usize = 32;
 
-/// Takes so many `floats` of RAM, filled with 0.
-fn take(ram: &mut &'static mut [f32], floats: usize) -> &'static mut [f32] {
-    let all = core::mem::take(ram);
+/// Splits so many `floats`, filled with 0, off the `ram`.
+fn split(ram: &'static mut [f32], floats: usize) -> [&'static mut [f32]; 2] {
     let (taken, rest) =
-        unwrap!(all.split_at_mut_checked(floats), "the model is too large for the RAM");
-    *ram = rest;
+        unwrap!(ram.split_at_mut_checked(floats), "the model is too large for the RAM");
     taken.fill(0.0);
-    taken
+    [taken, rest]
 }
 
 #[entry]
@@ -36,21 +34,21 @@ fn main() -> ! {
     calibrate();
     // SAFETY: the slots, and the RAM for weights, are taken here only.
     let (([slot, frame], ..), ram) = unsafe { (Slot::take(), take_weights()) };
-    let mut ram: &'static mut [f32] = bytemuck::cast_slice_mut(ram);
+    let ram: &'static mut [f32] = bytemuck::cast_slice_mut(ram);
     let length = unwrap!(Model::declared_length(slot.bytes()), "slot A holds no model");
     let blob = unwrap!(slot.bytes().get(..length), "the model in slot A is cut off");
     let model = unwrap!(Model::decode(blob).ok(), "the model in slot A is unsound");
     let shape = model.shape();
-    let readings = take(&mut ram, shape.rows * shape.inputs);
+    let [readings, ram] = split(ram, shape.rows * shape.inputs);
     let bytes = frame.bytes().as_chunks().0;
     readings
         .iter_mut()
         .zip(bytes)
         .for_each(|(reading, bytes)| *reading = f32::from_le_bytes(*bytes));
     let decoder: Decoder<'_, MOST_ROWS> = unwrap!(Decoder::new(model).ok(), "too many rows");
-    let scratch = take(&mut ram, decoder.scratch_floats());
+    let [scratch, ram] = split(ram, decoder.scratch_floats());
     let mut status = [RowStatus::MissingReading; MOST_ROWS];
-    let outputs = take(&mut ram, shape.rows * shape.outputs);
+    let [outputs, ram] = split(ram, shape.rows * shape.outputs);
     let mut estimate = Estimate { outputs, status: unwrap!(status.get_mut(..shape.rows)) };
 
     region("frame", || {
@@ -60,7 +58,8 @@ fn main() -> ! {
     assert!(estimate.status.iter().all(|row| *row == RowStatus::Decoded), "a row is not decoded");
 
     let settings = Settings { time_constant_us: 5000, lead_us: 1000 };
-    let tracks = take(&mut ram, 2 * shape.rows * shape.outputs).as_chunks_mut().0;
+    let [tracks, _] = split(ram, 2 * shape.rows * shape.outputs);
+    let tracks = tracks.as_chunks_mut().0;
     let mut state = State::new(tracks);
     state.filter(settings, 0, &mut estimate);
     region("filter", || {
