@@ -40,8 +40,7 @@ def test_the_blob_is_that_of_the_command_line(tmp_path, parameters):
     model = taxel.Model(12, refine=False, **parameters).fit(x, y)
     names = [*(f"x{i}" for i in (1, 2, 3)), "y1", "y2"]
     pandas.DataFrame(np.column_stack([x, y]), columns=names).to_csv(tmp_path / "data.csv", index=False)
-    options = ["--no-affine"] if "affine_tail" in parameters else []
-    options += ["--format", "fixed16", "--confidence"] if "format" in parameters else []
+    options = ["--format", "fixed16", "--confidence"] if "format" in parameters else []
     host_sim(
         *("train", tmp_path / "data.csv", "--inputs", "x1..x3", "--outputs", "y1,y2", "--no-refine"),
         *("--centres", 12, *options, "-o", tmp_path / "model.bin"),

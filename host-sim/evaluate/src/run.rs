@@ -1,7 +1,6 @@
 //! Main job: synthesise or read frames, train, write the blob, read it back, decode, evaluate.
 
 use serde::Serialize;
-use taxel_data::columns::READINGS;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{Dataset, Progress, Stream, Table};
 use taxel_learn::cost::{Cost, Design};
@@ -136,14 +135,6 @@ pub struct RowErrors {
     /// Row-wire, from 1.
     pub row_wire: usize,
     pub errors: Vec<Errors>,
-}
-
-impl RunResult {
-    /// Whether the model predicts readings from deformations.
-    pub fn predicts_readings(&self) -> bool {
-        let mut errors = self.decoders.iter().flat_map(|decoder| &decoder.errors);
-        !self.decoders.is_empty() && errors.all(|errors| errors.group == READINGS)
-    }
 }
 
 /// Trains on `subject` with `options`, judges the model and returns its results and the blob.

@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 use taxel_core::rbf::Shape;
-use taxel_data::columns::READINGS;
 use taxel_learn::ModelBlob;
 use taxel_learn::cost::Design;
 use taxel_learn::decoders::{linear, mean};
@@ -53,10 +52,8 @@ impl Verdict {
             .partition(|group| others.of_mean(group).is_none_or(|share| share <= HARDLY));
         let mut sentences = Vec::new();
         if !decoded.is_empty() {
-            let predicts = decoded.iter().all(|group| group.group == READINGS);
             sentences.push(format!(
-                "The model {} {}{}.",
-                if predicts { "predicts" } else { "decodes" },
+                "The model decodes {}{}.",
                 listed(&decoded.iter().map(|group| with_error(group)).collect::<Vec<_>>()),
                 others.gains(&decoded)
             ));

@@ -170,11 +170,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         model.networks,
         if model.networks == 1 { "" } else { "s" },
         {
-            let readings = match () {
-                () if result.predicts_readings() => "deformations",
-                () if model.relative_inputs => "relative readings",
-                () => "readings",
-            };
+            let readings = if model.relative_inputs { "relative readings" } else { "readings" };
             match model.projected_readings {
                 0 => format!("{} {readings}", model.inputs_per_network),
                 count => format!("{count} {readings} -> {} features", model.inputs_per_network),

@@ -337,3 +337,15 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
     let unknown = folder.fail(&["compare", "scene.toml", "--group", "dy"], 2);
     assert!(unknown.contains("--group = dy") && unknown.contains("`dz_mm`"), "{unknown}");
 }
+
+/// The project's own plans are read as they stand.
+#[test]
+fn the_plans_of_the_project_name_fields_that_exist() {
+    let folder = Folder::new("sweep_own_plans");
+    let plans = ["plans/layouts.toml", "plans/small.toml", "test/plan64.toml"];
+    for plan in plans {
+        let plan = format!("{}/../cluster/{plan}", env!("CARGO_MANIFEST_DIR"));
+        let listed = folder.succeed(&["sweep", &plan, "--list"]);
+        assert!(listed.lines().count() > 10, "{listed}");
+    }
+}

@@ -1,7 +1,7 @@
 //! What a model is worth on contacts that move, read by a board at its own pace.
 
 use serde::Serialize;
-use taxel_data::{BadValue, columns};
+use taxel_data::columns;
 use taxel_learn::cost::{Cost, Design};
 use taxel_learn::{Decoder, ModelBlob};
 use taxel_simulate::Synthesis;
@@ -76,25 +76,6 @@ impl MovingContacts {
 pub fn scanned(scene: &Experiment, device: Device, samples: usize) -> Synthesis<'_> {
     let world = &scene.world;
     Synthesis::new(world).noise(device.averaged(world.noise, Some(Wires::of(world)), samples))
-}
-
-/// Errors of the model in `blob` on the moving contacts of `scene`, without a filter and behind one, on a `device` that
-/// averages so many `samples` a reading.
-///
-/// # Errors
-/// [`Error`](crate::Error) for a scene whose contacts do not move.
-pub fn on_device(
-    scene: &Experiment,
-    blob: &ModelBlob,
-    device: Device,
-    samples: usize,
-) -> Result<Vec<MovingWay>> {
-    let Some(path) = scene.world.path else {
-        let rule = "a scene whose contacts do not move has no such errors; add [motion]";
-        return Err(BadValue::new("motion", "none", rule).into());
-    };
-    let synthesis = scanned(scene, device, samples);
-    Ok(Judged::new(scene, synthesis, path, blob, device, samples)?.ways())
 }
 
 /// Model that was judged on one device.

@@ -132,4 +132,13 @@ mod tests {
             "{labels:?}"
         );
     }
+
+    #[test]
+    fn the_layouts_of_the_project_are_scenes() {
+        let layouts =
+            of_scene(concat!(env!("CARGO_MANIFEST_DIR"), "/../../cluster/plans/pitches.toml"));
+        let layouts = layouts.unwrap();
+        assert_eq!(layouts.len(), 10);
+        layouts.iter().for_each(|layout| check(&layout.document).unwrap());
+    }
 }
