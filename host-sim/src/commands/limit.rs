@@ -1,20 +1,22 @@
 //! Command `limit`: the least possible error of any decoder, and what the sensor shows at all.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::evaluate::limit::{self, Candidate, Figures, Level, LimitResult, Plan};
 use crate::experiment::Experiment;
-use crate::metrics::DecoderErrors;
+use crate::metrics::{DecoderErrors, Errors};
 use crate::{Error, Result, report};
 use clap::Args;
+use serde::Serialize;
 use taxel_data::output::FileSet;
 use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;
 use taxel_simulate::noise::NoiseKind;
 
 use super::progress::Terminal;
-use super::scene_argument::{SceneArgument, read_one_row};
-use super::{Common, arguments, command_line, print};
+use super::scene_argument::{DEFAULT_SCENE, SceneArgument, read_one_row};
+use super::{Common, arguments, command_line, merged, print};
 
 /// All files that `-o` writes.
 const FILES: FileSet = FileSet {
@@ -32,10 +34,12 @@ const PRINTED_VALUES: usize = 6;
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim limit press --row 4 --noise 0.005,0.01 -o out/limit
+  host-sim limit thin.toml thick.toml
   host-sim limit press --model m.bin -n 2000")]
 pub struct Arguments {
-    #[command(flatten)]
-    scene: SceneArgument,
+    /// Built-in scenes (paper, press, contact, moving) or paths of scene files. One table compares several.
+    #[arg(value_name = "SCENE", default_value = DEFAULT_SCENE)]
+    scenes: Vec<String>,
     /// Levels of the white noise, instead of the scene's: fractions (0.01 is 1 %), or in ohm for absolute noise.
     #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
     noise: Vec<f64>,
@@ -45,25 +49,51 @@ pub struct Arguments {
     /// Test frames [default: 400, or 400 posteriors of rows where rows move independently].
     #[arg(short = 'n', long, value_name = "N", allow_negative_numbers = true)]
     frames: Option<usize>,
-    /// Models of the scene to judge on the same frames: their errors, and the ratios of these to the limit.
+    /// Models of the scenes to judge on the same frames: their errors, and the ratios of these to the limit.
     #[arg(long, value_name = "FILE,…", value_delimiter = ',')]
     model: Vec<PathBuf>,
-    /// Folder that receives limit.json, a page limit.html, and its figures/ by themselves.
+    /// Folder that receives limit.json, a page limit.html, and its figures/ by themselves; of several scenes, a folder
+    /// there for each, by its name.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
     output: Option<PathBuf>,
 }
 
+/// Results of several scenes.
+#[derive(Serialize)]
+struct Scenes {
+    scenes: Vec<LimitResult>,
+}
+
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    if let Some(folder) = &arguments.output {
-        FILES.check(folder, &[arguments.scene.path()])?;
+    let scenes = arguments.scenes.iter().map(|scene| prepared(scene, arguments, common));
+    let scenes: Vec<Prepared> = scenes.collect::<Result<_>>()?;
+    let names: BTreeSet<&str> = scenes.iter().map(|it| it.scene.name.as_str()).collect();
+    if names.len() < scenes.len() {
+        return Err(Error::Usage("two scenes have the same name; give each its own".into()));
     }
-    let Prepared { scene, noise_levels, frames, models } = prepared(arguments, common)?;
-    let plan = Plan { noise_levels: &noise_levels, frames, models: &models };
-    let result = limit::compute(&scene, &plan, &Terminal::new())?;
+    let folder_of = |scene: &Experiment| {
+        let folder = arguments.output.as_ref()?;
+        Some(if scenes.len() == 1 { folder.clone() } else { folder.join(&scene.name) })
+    };
+    let inputs: Vec<&Path> = arguments.scenes.iter().map(Path::new).collect();
+    for folder in scenes.iter().filter_map(|it| folder_of(&it.scene)) {
+        FILES.check(&folder, &inputs)?;
+    }
+    let mut results = Vec::new();
+    for Prepared { scene, noise_levels, frames, models } in &scenes {
+        let plan = Plan { noise_levels, frames: *frames, models };
+        let result = limit::compute(scene, &plan, &Terminal::new())?;
+        folder_of(scene).map_or(Ok(()), |folder| write_files(&folder, &result))?;
+        results.push(result);
+    }
     let folder = arguments.output.as_deref();
-    folder.map_or(Ok(()), |folder| write_files(folder, &result))?;
-    print::result(common, &result, || page_of(&result, folder))?;
-    refusal(&result)
+    if let [result] = &results[..] {
+        print::result(common, result, || page_of(result, folder))?;
+        return refusal(result);
+    }
+    let several = Scenes { scenes: results };
+    print::result(common, &several, || page_of_several(&several.scenes, folder))?;
+    several.scenes.iter().try_for_each(refusal)
 }
 
 /// Scene with what is to be computed of it.
@@ -74,8 +104,8 @@ struct Prepared {
     models: Vec<Candidate>,
 }
 
-fn prepared(arguments: &Arguments, common: &Common) -> Result<Prepared> {
-    let mut scene = arguments.scene.load(common)?;
+fn prepared(scene: &str, arguments: &Arguments, common: &Common) -> Result<Prepared> {
+    let mut scene = SceneArgument::new(scene).load(common)?;
     arguments.row.map_or(Ok(()), |row| read_one_row(&mut scene, row))?;
     let world = &mut scene.world;
     let own = vec![world.noise.level];
@@ -145,13 +175,57 @@ fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {
     for level in &result.levels {
         directions(&mut page, level, result.noise_kind);
     }
+    written(&mut page, folder, "");
+    page
+}
+
+/// Says which files were written to the `folder`.
+fn written(page: &mut print::Page, folder: Option<&Path>, place: &str) {
     if let Some(folder) = folder {
         page.line(format_args!(
-            "\nwritten to {}: {}",
+            "\nwritten to {}{place}: {}",
             folder.display(),
             [FILES.files, &["figures/"]].concat().join(", ")
         ));
     }
+}
+
+/// Table of several scenes: what all readings of each one show.
+fn page_of_several(results: &[LimitResult], folder: Option<&Path>) -> print::Page {
+    let mut page = print::Page::default();
+    let heads = ["scene", "noise", "outputs", "limit", "prior", "observable"].map(String::from);
+    let models = results[0].levels.first().into_iter().flat_map(|level| &level.decoders);
+    let models = models.map(|model| model.decoder.clone());
+    let mut lines: Vec<Vec<String>> = vec![heads.into_iter().chain(models).collect()];
+    for (result, level) in results.iter().flat_map(|it| it.levels.iter().map(move |l| (it, l))) {
+        let noise = result.noise_kind.in_words(level.noise_level);
+        let seen = &level.observability;
+        for (place, group) in level.limits[0].groups.iter().enumerate() {
+            let models = level.decoders.iter().map(|model| rmse_and_ratio(&model.errors[place]));
+            let own = [
+                result.subject.clone(),
+                noise.clone(),
+                group.group.clone(),
+                format!("{:.4} ± {:.4}", group.limit, group.limit_standard_error),
+                format!("{:.4}", group.prior_rmse),
+                format!("{} of {}", seen.observable, seen.unknowns),
+            ];
+            lines.push(own.into_iter().chain(models).collect());
+        }
+    }
+    merged::table(&mut page, &lines);
+    for (result, level) in results.iter().flat_map(|it| it.levels.iter().map(move |l| (it, l))) {
+        if let Some(refused) = &level.limits[0].refused {
+            let noise = result.noise_kind.in_words(level.noise_level);
+            page.line(format_args!("{}, {noise}: not given: {refused}", result.subject));
+        }
+    }
+    page.line(
+        "limit: least possible RMSE from all readings, ± its standard error over the frames. prior: always predicting\n\
+         the mean. observable: directions of the deformation that move the readings by more than the noise. Of a model:\n\
+         its RMSE, and the ratio to the limit ± its standard error.",
+    );
+    written(&mut page, folder, "/SCENE");
     page
 }
 
@@ -192,15 +266,17 @@ fn limits(page: &mut print::Page, result: &LimitResult) {
 }
 
 fn model_line(noise: &str, model: &DecoderErrors) -> String {
-    let cells = model.errors.iter().map(|errors| {
-        let ratio = match (errors.ratio_to_limit, errors.ratio_standard_error) {
-            (Some(ratio), Some(error)) => format!("{ratio:.3} ± {error:.3} ×"),
-            _ => "–".into(),
-        };
-        format!(" {:>8.4} {ratio:>17}", errors.rmse)
-    });
+    let cells = model.errors.iter().map(|errors| format!(" {}", rmse_and_ratio(errors)));
     let cells: String = cells.collect();
     format!("{noise:>7} {:<8}{cells}   {}", "model", model.decoder)
+}
+
+fn rmse_and_ratio(errors: &Errors) -> String {
+    let ratio = match (errors.ratio_to_limit, errors.ratio_standard_error) {
+        (Some(ratio), Some(error)) => format!("{ratio:.3} ± {error:.3} ×"),
+        _ => "–".into(),
+    };
+    format!("{:>8.4} {ratio:>17}", errors.rmse)
 }
 
 fn limit_line(level: &Level, figures: &Figures, result: &LimitResult) -> String {

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::common::{Folder, small_scene_with_table1};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --confidence --fill -o m.bin",
@@ -22,6 +22,7 @@ const COMMANDS: [&str; 18] = [
     "run scene.toml",
     "table1 scene.toml",
     "limit scene.toml -n 4 --model m.bin",
+    "limit scene.toml tiny.toml -n 4",
     "trade scene.toml --centres 6 --max-error 1",
     "compare tiny.toml --centres 4,6 -o both",
     "sweep plan.toml --list",
@@ -49,7 +50,8 @@ fn keys_of_results_stay_as_they_are() {
     let folder = Folder::new("json_keys");
     let scene = small_scene_with_table1();
     folder.write("scene.toml", scene.replace("frames = 3000", "frames = 600"));
-    folder.write("tiny.toml", crate::sweep::tiny_scene());
+    let tiny = crate::sweep::tiny_scene().replace("name = \"small\"", "name = \"tiny\"");
+    folder.write("tiny.toml", tiny);
     folder.write("plan.toml", crate::sweep::PLAN.replace("scene.toml", "tiny.toml"));
     let mut found = String::from(
         "# Keys of each command's JSON. TAXEL_ACCEPT=1 cargo test -p host-sim --test all json_keys writes them anew.\n",

@@ -67,3 +67,25 @@ fn models_are_judged_on_the_frames_of_the_limit() {
     let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
     assert!(page.contains("model m.bin") && page.contains("model relative.bin"));
 }
+
+#[test]
+fn several_scenes_stand_in_one_table_with_the_figures_of_each_alone() {
+    let folder = Folder::new("limit-scenes");
+    folder.write("one.toml", small_scene().replace("name = \"small\"", "name = \"one\""));
+    folder.write("two.toml", crate::sweep::tiny_scene());
+    let both = ["limit", "one.toml", "two.toml", "-n", "8"];
+    let results = json(&folder.succeed(&[&both[..], &["--json", "-o", "out"]].concat()));
+    let table = folder.succeed(&both);
+    for (scene, result) in ["one", "two"].iter().zip(results["scenes"].as_array().unwrap()) {
+        let file = format!("{scene}.toml");
+        let alone = json(&folder.succeed(&["limit", &file, "-n", "8", "--json"]));
+        assert_eq!(result["levels"], alone["levels"]);
+        let name = result["subject"].as_str().unwrap();
+        assert!(folder.path(&format!("out/{name}/limit.html")).exists());
+        let z = result["levels"][0]["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
+        let line = table.lines().find(|line| line.starts_with(name) && line.contains("dz_mm"));
+        assert!(line.unwrap().contains(&format!("{z:.4} ± ")), "{table}");
+    }
+    let twice = folder.fail(&["limit", "one.toml", "one.toml"], 2);
+    assert!(twice.contains("two scenes have the same name"), "{twice}");
+}
