@@ -63,7 +63,7 @@ impl Files {
     }
 }
 
-/// Front, shares of the variance, and gains for a unit of cost.
+/// Front, and shares of the variance.
 pub fn page(merged: &Merged) -> print::Page {
     let mut page = print::Page::default();
     let within = merged.settings.iter().filter(|setting| setting.is_within).count();
@@ -94,43 +94,22 @@ pub fn page(merged: &Merged) -> print::Page {
     front(&mut page, merged);
     if !merged.effects.is_empty() {
         page.line("\nShare of the variance that each axis explains");
-        let shares = |field: &str, place: usize| {
-            let effect = merged.effect(field, &merged.objectives[place])?;
-            Some(format!("{:.0} %", 100.0 * effect.share))
-        };
-        by_field(&mut page, merged, &merged.objectives, shares);
-    }
-    for (error, costs) in merged.errors_and_costs() {
-        page.line(format_args!(
-            "\nChange of {error} where an axis is changed until a cost has risen by"
-        ));
-        let heads: Vec<String> =
-            costs.iter().map(|[cost, unit]| format!("{unit} of {cost}")).collect();
-        by_field(&mut page, merged, &heads, |field, place| {
-            Some(match merged.worth_of(field, error, costs[place][0])?.change_percent {
-                Some([change, error]) => format!("{change:+.2} ± {error:.2} %"),
-                None => "free".into(),
-            })
-        });
+        shares(&mut page, merged);
     }
     page
 }
 
-/// Table with a line for each field; `cell` takes a field, and the place of a head.
-fn by_field(
-    page: &mut print::Page,
-    merged: &Merged,
-    heads: &[String],
-    cell: impl Fn(&str, usize) -> Option<String>,
-) {
-    let mut lines =
-        vec![[String::new()].into_iter().chain(heads.iter().cloned()).collect::<Vec<_>>()];
-    for field in &merged.fields {
-        let cells: Vec<Option<String>> = (0..heads.len()).map(|place| cell(field, place)).collect();
-        if cells.iter().any(Option::is_some) {
-            let cells = cells.into_iter().map(|cell| cell.unwrap_or("-".into()));
-            lines.push([field.clone()].into_iter().chain(cells).collect());
-        }
+/// Adds the share of each objective's variance that each axis explains.
+fn shares(page: &mut print::Page, merged: &Merged) {
+    let heads = [String::new()].into_iter().chain(merged.objectives.iter().cloned());
+    let mut lines = vec![heads.collect::<Vec<_>>()];
+    for field in merged.fields_with_effects() {
+        let share = |objective: &String| {
+            let effect = merged.effect(field, objective);
+            effect.map_or("-".into(), |effect| format!("{:.0} %", 100.0 * effect.share))
+        };
+        let cells = merged.objectives.iter().map(share);
+        lines.push([field.clone()].into_iter().chain(cells).collect());
     }
     table(page, &lines);
 }

@@ -6,14 +6,14 @@ use super::axes::Axis;
 use super::chart::{Chart, Mark, Series};
 use super::data::{Data, number};
 use super::figures::{Figure, Figures, Page, link};
-use super::format::{counted, fixed, significant, symbol};
+use super::format::{counted, significant, symbol};
 use super::html::document;
 use super::svg::{Anchor, Shape, Svg, TEXT_PX, escape, text_width};
 use super::tables::numbers;
 use super::ticks;
 use taxel_evaluate::metrics::unit_of_rmse;
 use taxel_evaluate::sweep::Merged;
-use taxel_evaluate::sweep::effects::{Effect, Law};
+use taxel_evaluate::sweep::effects::Effect;
 use taxel_evaluate::sweep::merge::Setting;
 use taxel_evaluate::sweep::plan::SEED;
 
@@ -41,7 +41,6 @@ fn name(result: &str) -> String {
         }
     }
     let known = [
-        ("cost_eur", "cost of the parts (€)"),
         ("scan_ms", "time of a scan (ms)"),
         ("decode_ms", "time of decoding (ms)"),
         ("frame_ms", "time of a frame, scan and decoding (ms)"),
@@ -174,8 +173,7 @@ fn front(merged: &Merged) -> Option<Chart> {
 /// Bars of what each axis explains of each objective.
 fn bars(merged: &Merged, width: f64) -> String {
     const LINE: f64 = 22.0;
-    let fields: Vec<&String> =
-        merged.fields.iter().filter(|field| has_effect(merged, field)).collect();
+    let fields: Vec<&String> = merged.fields_with_effects().collect();
     let label = fields.iter().map(|field| text_width(field)).fold(60.0, f64::max) + 12.0;
     let value = text_width("100 %") + 8.0;
     let groups: Vec<&String> = merged
@@ -208,10 +206,6 @@ fn bars(merged: &Merged, width: f64) -> String {
         y += 20.0;
     }
     svg.finish()
-}
-
-fn has_effect(merged: &Merged, field: &str) -> bool {
-    merged.effects.iter().any(|effect| effect.field == field)
 }
 
 /// What the axes explain, as a table.
@@ -278,8 +272,6 @@ pub fn html(merged: &Merged, stem: &str, command: &str) -> Page {
         ));
         body += &levels(merged);
     }
-    body += &laws(merged);
-    body += &worth(merged);
     let _ = writeln!(
         body,
         "<p class=\"note\">Made by <code>{}</code>, {}</p>",
@@ -377,68 +369,4 @@ fn levels(merged: &Merged) -> String {
         &lines,
     );
     format!("<details>\n<summary>Means by level</summary>\n{table}</details>\n")
-}
-
-fn laws(merged: &Merged) -> String {
-    if merged.laws.is_empty() {
-        return String::new();
-    }
-    let mut lines = String::new();
-    for field in &merged.fields {
-        let of = |law: &Law| law.exponents.iter().find(|it| it.field == *field).cloned();
-        if merged.laws.iter().all(|law| of(law).is_none()) {
-            continue;
-        }
-        let cells = merged.laws.iter().map(|law| {
-            of(law).map_or("-".into(), |it| {
-                format!("{} ± {}", fixed(it.exponent, 3), fixed(it.standard_error, 3))
-            })
-        });
-        let _ = writeln!(lines, "<tr><td>{}</td>{}</tr>", escape(field), numbers("td", cells));
-    }
-    let fits = merged.laws.iter().map(|law| format!("{:.3}", law.r_squared));
-    let _ = writeln!(lines, "<tr><td>R² of the law</td>{}</tr>", numbers("td", fits));
-    let heads = merged.laws.iter().map(|law| escape(&name(&law.result)));
-    let caption = "Exponents of power laws, fitted by least squares: one per cent more of the axis changes the result by so many \
-                   per cent, all else equal.";
-    table(caption, "axis", heads, &lines)
-}
-
-fn worth(merged: &Merged) -> String {
-    let mut html = String::new();
-    for (error, costs) in merged.errors_and_costs() {
-        let mut lines = String::new();
-        for field in &merged.fields {
-            let cells = costs.iter().map(|[cost, _]| {
-                let worth = merged.worth_of(field, error, cost)?;
-                Some(match worth.change_percent {
-                    None => "free".into(),
-                    Some([change, error]) => {
-                        format!("{} ± {} %", signed(change), fixed(error, 2))
-                    }
-                })
-            });
-            let cells: Vec<Option<String>> = cells.collect();
-            if cells.iter().any(Option::is_some) {
-                let cells = cells.into_iter().map(|cell| cell.unwrap_or("-".into()));
-                let _ =
-                    writeln!(lines, "<tr><td>{}</td>{}</tr>", escape(field), numbers("td", cells));
-            }
-        }
-        let heads = costs.iter().map(|[cost, unit]| format!("{unit}, {}", escape(&name(cost))));
-        html += &table(&format!("Change of the {}.", escape(&name(error))), "axis", heads, &lines);
-    }
-    if html.is_empty() {
-        return html;
-    }
-    format!(
-        "<h2>What a unit of cost buys</h2>\n<p class=\"note\">Change of an error where an axis is changed, and nothing else, until a \
-         cost has risen by one unit, at the costs’ geometric mean. Negative is better; “free” is an axis that does not change this \
-         cost.</p>\n{html}"
-    )
-}
-
-fn signed(value: f64) -> String {
-    let text = fixed(value, 2);
-    if value > 0.0 { format!("+{text}") } else { text }
 }

@@ -7,10 +7,10 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::axis::rounded;
-use super::effects::{self, Effect, Law, Settings, Worth};
-use super::file::{Bound, PartPrices};
+use super::effects::{Effect, Settings};
+use super::file::Bound;
 use super::plan::{Plan, Point, SEED};
-use super::point::{is_error, place_of};
+use super::point::place_of;
 use super::store::{Found, Record, Store};
 use crate::error::{Error, Result};
 
@@ -33,8 +33,6 @@ pub struct Merged {
     /// Settings: points that differ at most in their seed, put together.
     pub settings: Vec<Setting>,
     pub effects: Vec<Effect>,
-    pub laws: Vec<Law>,
-    pub worth: Vec<Worth>,
 }
 
 /// Result of a point, with the fields that this plan's points differ in.
@@ -50,13 +48,10 @@ pub struct PointResult {
 }
 
 impl PointResult {
-    fn new(point: &Point, record: Record, prices: Option<&PartPrices>) -> Self {
+    fn new(point: &Point, record: Record) -> Self {
         let value = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
         let values = point.values.iter().map(|(field, it)| (field.clone(), value(it))).collect();
-        let Record { id, mut results, notes, failed, .. } = record;
-        if let Some(prices) = prices {
-            add_cost(&mut results, prices);
-        }
+        let Record { id, results, notes, failed, .. } = record;
         Self { id, values, results, notes, failed }
     }
 }
@@ -129,7 +124,7 @@ impl Merged {
             match record {
                 None => missing.push(point.id.clone()),
                 Some(record) => {
-                    results.push(PointResult::new(point, record, plan.prices.as_ref()));
+                    results.push(PointResult::new(point, record));
                     scenes.push(point.scene.as_str());
                 }
             }
@@ -156,14 +151,6 @@ impl Merged {
         };
         let effects =
             plan.objectives.iter().flat_map(|name| all.effects(name, &result(name))).collect();
-        let laws: Vec<Law> =
-            plan.objectives.iter().filter_map(|name| all.law(name, &result(name))).collect();
-        let (errors, costs): (Vec<&Law>, Vec<&Law>) =
-            laws.iter().partition(|law| is_error(&law.result));
-        let worth = errors
-            .iter()
-            .flat_map(|error| costs.iter().flat_map(|cost| effects::worth(error, cost)));
-        let worth = worth.collect();
         Self {
             plan: plan.name.clone(),
             build: plan.build.clone(),
@@ -175,8 +162,6 @@ impl Merged {
             missing,
             settings,
             effects,
-            laws,
-            worth,
         }
     }
 
@@ -244,29 +229,16 @@ impl Merged {
         Some(format!("no setting is within the bounds; the nearest is {words}"))
     }
 
+    /// Fields whose axes have an effect that is known, in the plan's order.
+    pub fn fields_with_effects(&self) -> impl Iterator<Item = &String> {
+        let has_effect =
+            |field: &&String| self.effects.iter().any(|effect| effect.field == **field);
+        self.fields.iter().filter(has_effect)
+    }
+
     /// Effect of the axis of this field on a result.
     pub fn effect(&self, field: &str, result: &str) -> Option<&Effect> {
         self.effects.iter().find(|effect| effect.field == field && effect.result == result)
-    }
-
-    /// Errors that [`worth`](Self::worth) is told of, and the costs of each with their units.
-    pub fn errors_and_costs(&self) -> Vec<(&str, Vec<[&str; 2]>)> {
-        let mut errors: Vec<(&str, Vec<[&str; 2]>)> = Vec::new();
-        for worth in &self.worth {
-            let cost = [worth.cost.as_str(), worth.unit.as_str()];
-            match errors.iter_mut().find(|(error, _)| *error == worth.error) {
-                None => errors.push((&worth.error, vec![cost])),
-                Some((_, costs)) if !costs.contains(&cost) => costs.push(cost),
-                Some(_) => {}
-            }
-        }
-        errors
-    }
-
-    /// What the axis of this field is worth to an error, for a cost.
-    pub fn worth_of(&self, field: &str, error: &str, cost: &str) -> Option<&Worth> {
-        let is_it = |it: &&Worth| it.field == field && it.error == error && it.cost == cost;
-        self.worth.iter().find(is_it)
     }
 
     /// Remarks on points, without their reasons, such as `no limit`, and the number of points that have each.
@@ -282,20 +254,6 @@ impl Merged {
     pub fn failed(&self) -> impl Iterator<Item = &PointResult> {
         self.points.iter().filter(|point| point.failed.is_some())
     }
-}
-
-/// Adds what the sensor's parts cost.
-fn add_cost(results: &mut BTreeMap<String, f64>, prices: &PartPrices) {
-    let of = |name: &str| results.get(name).copied();
-    let [Some(rows), Some(columns), Some(area_cm2)] = ["rows", "columns", "area_cm2"].map(of)
-    else {
-        return;
-    };
-    let cost_eur = prices.fixed_eur
-        + rows * prices.row_eur
-        + columns * prices.column_eur
-        + area_cm2 * prices.cm2_eur;
-    results.insert("cost_eur".into(), cost_eur);
 }
 
 fn without_seed(values: &BTreeMap<String, Value>) -> BTreeMap<String, Value> {

@@ -34,11 +34,10 @@ impl Results {
 }
 
 /// Results that do not belong to a group of outputs, in the order of tables.
-const GENERAL: [&str; 12] = [
+const GENERAL: [&str; 11] = [
     "rows",
     "columns",
     "area_cm2",
-    "cost_eur",
     "scan_ms",
     "decode_ms",
     "frame_ms",
@@ -49,7 +48,7 @@ const GENERAL: [&str; 12] = [
     "ram_bytes",
 ];
 /// First of these that only a model has.
-const MODEL_FROM: usize = 5;
+const MODEL_FROM: usize = 4;
 /// Results of each group of outputs, in the order of tables.
 const OF_GROUP: [&str; 4] = ["limit", "limit_standard_error", "rmse", "ratio_to_limit"];
 
@@ -63,7 +62,7 @@ pub fn columns_of(plan: &Plan, groups: &[&str]) -> Vec<String> {
 /// Reason why a plan does not compute the result called `name`, and what to give for it; `None` if it does, and for a
 /// name that no result has.
 pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
-    let is_of_scene = ["area_cm2", "cost_eur"].contains(&name) || name.starts_with("limit_");
+    let is_of_scene = name == "area_cm2" || name.starts_with("limit_");
     let is_of_model = ["rmse_", "ratio_to_limit_"].iter().any(|start| name.starts_with(start))
         || GENERAL[MODEL_FROM..].contains(&name);
     if plan.data.is_some() && (is_of_scene || name.starts_with("ratio_")) {
@@ -71,7 +70,6 @@ pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
     }
     let is_of_limit = name.starts_with("limit_") || name.starts_with("ratio_");
     match name {
-        "cost_eur" if plan.prices.is_none() => Some("the plan has no [prices]; give them"),
         _ if is_of_limit && plan.limit_frames == Some(0) => {
             Some("the plan computes no limit; leave limit_frames = 0 out")
         }
@@ -94,11 +92,6 @@ pub fn place_of(name: &str) -> (usize, &str, usize) {
         .filter_map(|(place, prefix)| Some((place, name.strip_prefix(prefix)?.strip_prefix('_')?)));
     let found = prefixes.min_by_key(|(_, group)| group.len());
     found.map_or((usize::MAX, name, 0), |(place, group)| (GENERAL.len(), group, place))
-}
-
-/// Whether a result is an error of an estimate.
-pub fn is_error(name: &str) -> bool {
-    ["limit_", "rmse_", "ratio_to_limit_"].iter().any(|start| name.starts_with(start))
 }
 
 /// Limit of a world, which points share that differ only in their training.
