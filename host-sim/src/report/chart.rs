@@ -20,6 +20,8 @@ pub enum Mark {
     Dotted,
     /// Bars from zero, this wide on the x axis.
     Bars(f64),
+    /// Names of the points, below them; the first ones where there is no room for all.
+    Names(Vec<String>),
 }
 
 /// Colours and marks of series that stand beside each other, such as groups of outputs.
@@ -78,7 +80,7 @@ struct Frame<'c> {
 }
 
 /// Distance of lines of text in px.
-pub const LINE_PX: f64 = TEXT_PX + 7.0;
+const LINE_PX: f64 = TEXT_PX + 7.0;
 const SWATCH_PX: f64 = 24.0;
 /// Room between the end of a line and its name, in px.
 const LEADER_PX: f64 = 26.0;
@@ -140,7 +142,7 @@ fn opacity(series: &Series) -> String {
 
 /// Draws names and marks: beside the label of the y axis where there is room, otherwise below it.
 /// Returns the y coordinate at which the legend ends.
-pub fn legend(svg: &mut Svg, series: &[Series], width: f64, label_width: f64) -> f64 {
+fn legend(svg: &mut Svg, series: &[Series], width: f64, label_width: f64) -> f64 {
     let named: Vec<_> = series.iter().filter(|series| series.is_listed).collect();
     let entry = |series: &Series| SWATCH_PX + text_width(&series.name) + 14.0;
     let total: f64 = named.iter().map(|series| entry(series)).sum();
@@ -183,6 +185,7 @@ fn swatch(svg: &mut Svg, series: &Series, [x, y]: [f64; 2]) {
             let class = format!("{} mark", series.class);
             svg.rect([x + 3.0, y - 5.0], [11.0, 10.0], &class, "");
         }
+        Mark::Names(_) => {}
     }
 }
 
@@ -207,6 +210,7 @@ impl Frame<'_> {
                     svg.rect(corner, [px, (a - b).abs()], &class("mark"), "");
                 }
             }
+            Mark::Names(names) => self.draw_names(svg, series, names),
         }
     }
 
@@ -239,6 +243,28 @@ impl Frame<'_> {
                 svg.path(&Shape::Triangle.path([x, self.panel.top + 5.0], 1.0), class);
                 let label = significant(*y, 2);
                 svg.text(x + 8.0, self.panel.top + 11.0, Anchor::Start, "tick", &label);
+            }
+        }
+    }
+
+    /// Writes names below points, to their left where there is room; those that would cover one before are left out.
+    fn draw_names(&self, svg: &mut Svg, series: &Series, names: &[String]) {
+        let mut taken: Vec<[f64; 3]> = Vec::new();
+        for ([x, y], name) in series.points.iter().zip(names) {
+            let (x, baseline) = (self.panel.x(*x), self.panel.y(*y) + TEXT_PX + 2.0);
+            let width = text_width(name);
+            let (left, end) = if x - 5.0 - width > self.panel.left {
+                (x - 5.0 - width, Anchor::End)
+            } else {
+                (x + 5.0, Anchor::Start)
+            };
+            let covers = |[from, to, at]: &[f64; 3]| {
+                left < *to && left + width > *from && (baseline - at).abs() < TEXT_PX
+            };
+            if baseline < self.panel.bottom && !taken.iter().any(covers) {
+                taken.push([left, left + width, baseline]);
+                let at = if end == Anchor::End { left + width } else { left };
+                svg.text(at, baseline, end, series.class, name);
             }
         }
     }
@@ -332,6 +358,19 @@ mod tests {
         assert_eq!(bars.matches("<rect").count(), 3);
         let points = chart(Mark::LineAnd(Shape::Square), &values[..4]).draw([400.0, 200.0]);
         assert_eq!(points.matches("c1 mark").count(), 3);
+    }
+
+    #[test]
+    fn names_leave_each_other_alone_and_stay_within_the_panel() {
+        let written = |y: f64| {
+            let mut chart = chart(Mark::Names((0..40).map(|i| format!("K {i}")).collect()), &[]);
+            chart.series[0].points = (0..40).map(|i| [0.1 * f64::from(i), y]).collect();
+            let picture = chart.draw([400.0, 200.0]);
+            (picture.matches(">K ").count(), picture.contains(">K 0<"))
+        };
+        let (crowded, has_first) = written(0.5);
+        assert!((3..15).contains(&crowded) && has_first, "{crowded}");
+        assert_eq!(written(-1.0).0, 0, "no room below the points");
     }
 
     #[test]

@@ -8,8 +8,6 @@ use super::html::document;
 use super::svg::escape;
 use taxel_evaluate::evaluate::trade::Trade;
 
-mod scales;
-mod labels;
 mod words;
 mod plot;
 mod table;
@@ -40,8 +38,7 @@ pub fn html(trade: &Trade, command: &str) -> Page {
         trade.device.clock_mhz,
     );
     body += &answer(trade);
-    let (wide, outside) = plot::draw(trade, [920.0, 540.0]);
-    let (narrow, _) = plot::draw(trade, [480.0, 600.0]);
+    let (chart, outside) = plot::chart(trade);
     let outside = match outside {
         0 => String::new(),
         1 => " One dominated point lies outside.".into(),
@@ -54,12 +51,13 @@ pub fn html(trade: &Trade, command: &str) -> Page {
     };
     let caption = format!(
         "RMSE of {} against the time of a frame, both logarithmic. The line joins the Pareto front: no other point is as good \
-         in both and better in one. Hover over its points for all their settings.{networks}{outside}{}",
+         in both and better in one. Its points have their number of centres K. Lines outside are in the legend alone.{networks}{outside}{}",
         symbol(&trade.group),
         hidden_bounds(trade)
     );
     let mut figures = Figures::in_files("");
-    let figure = Figure::of_drawings("error-by-time", caption, [wide, narrow], plot::data(trade));
+    let figure =
+        Figure::of_chart("error-by-time", caption, &chart, [[920.0, 540.0], [480.0, 600.0]]);
     body += &figures.html(&figure);
     let _ = write!(
         body,

@@ -167,12 +167,10 @@ fn the_files_and_the_table_tell_every_point() {
     assert_eq!(lines.count(), every.len());
     let json: serde_json::Value = serde_json::from_str(&read("out/few/trade.json")).unwrap();
     let html = read("out/few/trade.html");
-    // Each point of the front tells its settings, in the wide picture and in the narrow one.
+    // The picture has each point of the front.
     let front = json["points"].as_array().unwrap().iter().filter(|p| p["on_front"] == true).count();
-    assert_eq!(
-        html.matches("<title>fixed16").count() + html.matches("<title>f32").count(),
-        2 * front
-    );
+    let picture = read("out/few/figures/error-by-time.csv");
+    assert_eq!(picture.lines().filter(|line| line.starts_with("Pareto front,")).count(), front);
     assert!(html.matches("<tr class=\"chosen-row\">").count() == 1 && html.contains(">chosen: K"));
     assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
     assert!(html.contains("at most 9\u{202f}000\u{a0}cycles at zero wait"), "the bound");

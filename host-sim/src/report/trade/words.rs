@@ -1,7 +1,7 @@
 //! Points in words.
 
-use crate::report::format::{fixed, grouped, significant, symbol};
-use taxel_evaluate::evaluate::trade::{Bounds, Point, Times, Trade};
+use crate::report::format::{fixed, grouped, significant};
+use taxel_evaluate::evaluate::trade::{Bounds, Point, Trade};
 
 /// Text of a rate.
 pub fn rate(frames_per_s: f64) -> String {
@@ -15,34 +15,6 @@ pub fn rate(frames_per_s: f64) -> String {
 /// Text of an error with its unit.
 pub fn error(trade: &Trade, rmse: f64) -> String {
     format!("{} {}", significant(rmse, 3), trade.unit).trim_end().into()
-}
-
-/// Times of a frame, and its rate.
-pub fn times(times: &Times) -> String {
-    let decoding = format!("{} ms to decode", fixed(times.decode_ms, 3));
-    match times.scan_ms {
-        Some(scan_ms) => format!(
-            "{} ms from scan to estimate ({} ms to scan, {decoding}), {} frames/s",
-            fixed(times.frame_ms, 3),
-            fixed(scan_ms, 3),
-            rate(times.frames_per_s)
-        ),
-        None => format!("{decoding}, besides its scan"),
-    }
-}
-
-/// All settings, the error and the cost of a point.
-pub fn in_full(trade: &Trade, point: &Point) -> String {
-    format!(
-        "{}: RMSE of {} {}; {}; {} cycles; blob {} B, RAM {} B",
-        point.name(),
-        symbol(&trade.group),
-        error(trade, point.rmse(&trade.group)),
-        times(&point.times),
-        grouped(point.frame.cycles as usize),
-        grouped(point.blob_bytes),
-        grouped(point.ram_bytes)
-    )
 }
 
 /// Number of centres, and what is read if points differ in it.
