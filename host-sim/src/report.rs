@@ -5,7 +5,6 @@
 
 use taxel_data::output::Inner;
 use taxel_evaluate::evaluate::limit::LimitResult;
-use taxel_evaluate::evaluate::printed::Cells;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
 use taxel_evaluate::sweep::Merged;
@@ -31,7 +30,6 @@ mod sweep;
 mod over_time;
 mod moving;
 mod html;
-mod printed;
 mod trade;
 mod limit;
 mod points;
@@ -70,11 +68,6 @@ pub fn limit_html(limit: &LimitResult, command: &str) -> Page {
 /// Page for the results of a sweep or a comparison, whose files begin with `stem`, with the `command` that made them.
 pub fn sweep_html(merged: &Merged, stem: &str, command: &str) -> Page {
     points::html(merged, stem, command)
-}
-
-/// Picture of a computed table beside the paper's printed Table 1; a file of its own, light or dark like the viewer.
-pub fn printed_svg(computed: &Cells) -> String {
-    printed::svg(computed)
 }
 
 #[cfg(test)]

@@ -3,20 +3,18 @@
 use std::path::PathBuf;
 
 use super::progress::Terminal;
-use crate::evaluate::printed::{CELLS, Nearness};
+use crate::Result;
+use crate::evaluate::printed::{CELLS, NOISE_LEVELS, Nearness, SPREADS};
 use crate::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
 use crate::metrics::{Definition, Errors};
-use crate::report;
-use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
 use taxel_data::output;
 use taxel_learn::decoders::{mean, standard};
+use taxel_simulate::noise::NoiseKind;
 
 use super::scene_argument::{RelativeInputsArgument, SceneArgument, group_of_scene};
 use super::{Common, print};
-
-pub mod comparison;
 
 /// Compute the paper's Table 1: errors by spread and noise.
 ///
@@ -24,7 +22,7 @@ pub mod comparison;
 /// linear decoder, the paper's standard network (K = N), and the 40 cells that the paper prints.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim table1 paper -o table1.csv --svg table1.svg
+  host-sim table1 paper -o table1.csv
   host-sim table1 paper-as-printed")]
 pub struct Arguments {
     /// A built-in scene (paper, paper-as-printed) or the path of a scene file with [table1].
@@ -35,9 +33,6 @@ pub struct Arguments {
     /// CSV file to write, with all axes, decoders and definitions.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Picture to write: the table beside the printed one.
-    #[arg(long, value_name = "FILE")]
-    svg: Option<PathBuf>,
     /// Outputs to print, such as dz_mm or dx_mm.
     #[arg(long, value_name = "GROUP", default_value = "dz_mm")]
     group: String,
@@ -61,25 +56,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(path) = &arguments.output {
         print::check_output(path, &[argument.path()])?;
     }
-    if let Some(path) = &arguments.svg {
-        let other = arguments.output.as_deref().unwrap_or(argument.path());
-        if other == path {
-            return Err(Error::Usage("--svg and -o: give each a file of its own".into()));
-        }
-        print::check_output(path, &[argument.path()])?;
-        if scene.table1.as_ref().is_some_and(|table| !table1::is_comparable(&scene, table)) {
-            let message = "--svg: the table is of another sensor or motion than the paper's, has other spreads or noise \
-                           levels, or no z; leave it out";
-            return Err(Error::Usage(message.into()));
-        }
-    }
     let table = table1::compute(&scene, &Terminal::new())?;
     if let Some(path) = &arguments.output {
         output::write_bytes(path, table.to_csv().as_bytes())?;
-    }
-    if let (Some(path), Some(nearest)) = (&arguments.svg, table.nearest_formula()) {
-        let picture = report::printed_svg(&nearest.cells);
-        output::write_bytes(path, picture.as_bytes())?;
     }
     if common.json {
         return print::json(&Summary { subject: scene.name, seed: scene.world.seed, table });
@@ -155,16 +134,25 @@ fn compare(page: &mut print::Page, by_formula: &[Comparison], nearest: &Comparis
         "\nAs the paper prints it, for z. It does not state its formula; nearest is {}, computed / printed, %:",
         nearest.formula
     ));
-    comparison::cells(page, &nearest.cells);
+    let levels = NOISE_LEVELS.map(|level| format!("{:>18}", NoiseKind::Relative.in_words(level)));
+    page.line(format_args!("{:<10}{}", "noise", levels.concat()));
+    for ((spread, line), printed) in SPREADS.iter().zip(&nearest.cells).zip(&CELLS) {
+        let pairs =
+            line.iter().zip(printed).map(|(a, b)| format!("{:>18}", format!("{a:.2} / {b:.2}")));
+        page.line(format_args!("spread {spread:?}{}", pairs.collect::<String>()));
+    }
     let mean = nearest.mean_percent.map(|it| format!("{it:>18.2}"));
     page.line(format_args!("{:<10}{}", "mean", mean.concat()));
-    page.line(format_args!("\n{}", comparison::header("formula (points)")));
-    page.line(comparison::line("printed", &Nearness::new(&CELLS)));
-    page.line(comparison::line("a constant", &Nearness::of_a_constant()));
+    page.line(format_args!("\n{:<26} {:>11} {:>12}", "formula", "gap, points", "correlation"));
+    let mut line = |name: &str, nearness: &Nearness| {
+        let correlation = nearness.correlation.map_or("-".into(), |it| format!("{it:.2}"));
+        page.line(format_args!("{name:<26} {:>11.2} {correlation:>12}", nearness.gap));
+    };
+    line("a constant", &Nearness::of_a_constant());
     for it in by_formula {
-        page.line(comparison::line(&it.formula, &it.nearness));
+        line(&it.formula, &it.nearness);
     }
-    page.line("with noise, with spread: rise from the least to the largest. docs/paper.md says what is open.\n");
+    page.line("gap: root of the mean square over all cells. docs/paper.md says what is open.\n");
 }
 
 fn number(definition: Definition, value: Option<f64>) -> String {

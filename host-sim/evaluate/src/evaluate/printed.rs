@@ -54,30 +54,16 @@ pub fn cells() -> impl Iterator<Item = Printed> {
 pub struct Nearness {
     /// Root mean square of the gaps, in points (per cent of error).
     pub gap: f64,
-    /// Gap over the cells that set-ups are fitted to.
-    pub gap_fitted: f64,
-    /// Gap over the cells that are held out.
-    pub gap_held_out: f64,
     /// Pearson correlation with the printed cells; none for a table of equal cells.
     pub correlation: Option<f64>,
-    /// Rise from the lowest to the highest noise level in points, mean over the spreads.
-    pub rise_with_noise: f64,
-    /// Rise from the least to the largest spread in points, mean over the noise levels.
-    pub rise_with_spread: f64,
 }
 
 impl Nearness {
     /// Nearness of `cells` to the printed ones.
     pub fn new(cells: &Cells) -> Self {
-        let [noise, spread] = rises(cells);
-        Self {
-            gap: gap(cells, &CELLS),
-            gap_fitted: gap_of_half(cells, 0),
-            gap_held_out: gap_of_half(cells, 1),
-            correlation: correlation(cells),
-            rise_with_noise: noise,
-            rise_with_spread: spread,
-        }
+        let pairs = cells.as_flattened().iter().zip(CELLS.as_flattened());
+        let gap = f64::sqrt(pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / 40.0);
+        Self { gap, correlation: correlation(cells) }
     }
 
     /// Nearness of a table whose cells are all the mean of the printed ones.
@@ -86,28 +72,8 @@ impl Nearness {
     }
 }
 
-/// Root mean square gap between two tables, in points.
-pub fn gap(cells: &Cells, others: &Cells) -> f64 {
-    let pairs = cells.as_flattened().iter().zip(others.as_flattened());
-    f64::sqrt(pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / 40.0)
-}
-
-/// Root mean square gap to half of the printed cells, in points. The halves are like the squares of a chessboard: 0 is
-/// the one with the first cell, which set-ups are fitted to; 1 is held out.
-fn gap_of_half(cells: &Cells, half: usize) -> f64 {
-    let mut squares = 0.0;
-    for (i, (line, printed)) in cells.iter().zip(&CELLS).enumerate() {
-        for (j, (cell, printed)) in line.iter().zip(printed).enumerate() {
-            if (i + j) % 2 == half {
-                squares += (cell - printed) * (cell - printed);
-            }
-        }
-    }
-    f64::sqrt(squares / 20.0)
-}
-
 /// Mean of all cells, in per cent.
-pub fn mean(cells: &Cells) -> f64 {
+fn mean(cells: &Cells) -> f64 {
     cells.as_flattened().iter().sum::<f64>() / 40.0
 }
 
@@ -121,13 +87,6 @@ fn correlation(cells: &Cells) -> Option<f64> {
     (square > 1e-12).then(|| common / (square * sum(|_, b| b * b)).sqrt())
 }
 
-/// Mean rise with noise over the spreads, and with spread over the noise levels, in points.
-pub fn rises(cells: &Cells) -> [f64; 2] {
-    let noise = cells.iter().map(|line| line[3] - line[0]).sum::<f64>() / 10.0;
-    let spread = cells[9].iter().zip(cells[0]).map(|(last, first)| last - first).sum::<f64>() / 4.0;
-    [noise, spread]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,22 +95,10 @@ mod tests {
     fn a_constant_is_105_hundredths_of_a_point_off_and_the_paper_itself_nothing() {
         let constant = Nearness::of_a_constant();
         assert!((constant.gap - 1.05).abs() < 0.005, "{constant:?}");
-        assert_eq!((constant.correlation, constant.rise_with_noise), (None, 0.0));
+        assert_eq!(constant.correlation, None);
         let own = Nearness::new(&CELLS);
         assert_eq!(own.gap, 0.0);
         assert!((own.correlation.unwrap() - 1.0).abs() < 1e-12);
-        assert!((own.rise_with_noise - 2.118).abs() < 1e-9, "{own:?}");
-        assert!((own.rise_with_spread - 2.3625).abs() < 1e-9, "{own:?}");
-    }
-
-    #[test]
-    fn halves_are_equal_and_a_wrong_cell_counts_in_its_own() {
-        let mut cells = CELLS;
-        cells[0][1] += 2.0;
-        let nearness = Nearness::new(&cells);
-        assert_eq!(nearness.gap_fitted, 0.0);
-        assert!((nearness.gap_held_out - (4.0_f64 / 20.0).sqrt()).abs() < 1e-12);
-        assert!((nearness.gap - (4.0_f64 / 40.0).sqrt()).abs() < 1e-12);
     }
 
     #[test]

@@ -158,7 +158,7 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
 
 /// Whether a scene's `table` is one that the paper's could be: of its sensor, with electrodes that move on their own along
 /// z at least, and its spreads and noise levels in per cent.
-pub fn is_comparable(experiment: &Experiment, table: &Settings) -> bool {
+fn is_comparable(experiment: &Experiment, table: &Settings) -> bool {
     let world = &experiment.world;
     let is_moved = matches!(world.motion, Kind::Independent(_));
     let is_of_paper = world.sensor == Sensor::paper() && is_moved;
@@ -379,9 +379,9 @@ impl Table1 {
         csv
     }
 
-    /// Formula by which the table is nearest to the printed one, on the cells that set-ups are fitted to.
+    /// Formula by which the table is nearest to the printed one.
     pub fn nearest_formula(&self) -> Option<&Comparison> {
-        let gap = |it: &Comparison| it.nearness.gap_fitted;
+        let gap = |it: &Comparison| it.nearness.gap;
         self.comparison.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)))
     }
 
