@@ -147,12 +147,24 @@ pub fn refine<'d>(
         Examples::Fresh(fresh) => {
             progress.stage("refine", settings.steps);
             let count = settings.fresh_frames(options.centres);
-            for step in 0..settings.steps {
+            let samples = |step| -> Vec<Vec<Piece>> {
                 let frames = fresh.frames(step, count);
-                let networks = descents.par_iter_mut().enumerate();
-                networks.try_for_each(|(network, descent)| {
-                    descent.step(&sources.pieces(&frames, network).iter().collect::<Vec<_>>())
-                })?;
+                let networks = (0..layers.hidden.len()).into_par_iter();
+                networks.map(|network| sources.pieces(&frames, network)).collect()
+            };
+            let mut now = samples(0);
+            for step in 0..settings.steps {
+                let descend = || {
+                    let networks = descents.par_iter_mut().zip(&now);
+                    networks.try_for_each(|(descent, pieces)| {
+                        descent.step(&pieces.iter().collect::<Vec<_>>())
+                    })
+                };
+                // One thread lays out the next samples, while others descend.
+                let more = step + 1 < settings.steps;
+                let (done, next) = rayon::join(descend, || more.then(|| samples(step + 1)));
+                done?;
+                now = next.unwrap_or_default();
                 progress.step();
             }
         }

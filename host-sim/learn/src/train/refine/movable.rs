@@ -6,6 +6,9 @@ use taxel_data::widest;
 use super::products::{Line, SIDE, add_combinations, add_products};
 use crate::train::least_squares::{exponentiate_non_positive, squared_distances};
 
+/// Lines that samples are laid into at once.
+const AT_ONCE: usize = 8;
+
 /// Sizes of a network that is refined.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
@@ -228,8 +231,11 @@ impl Piece {
 
 fn side_by_side(values: &[f64], width: usize) -> Vec<Line> {
     let mut lines = vec![[0.0; SIDE]; width];
-    for (s, sample) in values.chunks_exact(width).enumerate() {
-        lines.iter_mut().zip(sample).for_each(|(line, value)| line[s] = *value);
+    // A few lines at once: what is read and written then stays in the cache.
+    for (first, lines) in (0..width).step_by(AT_ONCE).zip(lines.chunks_mut(AT_ONCE)) {
+        for (s, sample) in values.chunks_exact(width).enumerate() {
+            lines.iter_mut().zip(&sample[first..]).for_each(|(line, value)| line[s] = *value);
+        }
     }
     lines
 }

@@ -5,13 +5,16 @@
 
 use std::borrow::Cow;
 
+use taxel_core::projection::Projection;
 use taxel_core::rbf::Format;
 use taxel_data::Dataset;
 
 use super::movable::Piece;
+use super::products::SIDE;
 use super::targets::Targets;
 use super::{turn, width};
 use crate::error::Result;
+use crate::parallel;
 use crate::train::layers::Layers;
 use crate::train::{HiddenLayer, InputScale, projection};
 
@@ -131,26 +134,29 @@ impl Sources {
     /// have then serves all of their tasks.
     pub(super) fn pieces(&self, frames: &Dataset, network: usize) -> Vec<Piece> {
         let targets = self.targets.of_network(&frames.outputs, network);
-        let (inputs, width) = match &self.inputs {
-            Inputs::Rows(scales) => {
-                let width = frames.inputs.names.len() / self.tasks.len();
-                let readings = frames.inputs.columns(network * width, width);
-                (scales[network].apply(&readings.values), width)
-            }
-            Inputs::Projected(projected) => {
-                (projected.sources(frames), projected.features + projected.readings.len())
-            }
-        };
-        let outputs: Vec<usize> = (0..targets.names.len()).collect();
         let missing = |line: &usize| -> Vec<bool> {
             targets.line(*line).iter().map(|target| target.is_nan()).collect()
         };
         let mut lines: Vec<usize> =
             (0..targets.len()).filter(|line| missing(line).contains(&false)).collect();
         lines.sort_by_cached_key(missing);
-        let inputs: Vec<f64> =
-            lines.iter().flat_map(|line| &inputs[line * width..][..width]).copied().collect();
-        Piece::all(&inputs, width, &targets.part(&lines, &outputs).values, outputs.len())
+        let outputs: Vec<usize> = (0..targets.names.len()).collect();
+        let width = frames.inputs.names.len() / self.tasks.len();
+        let readings: Vec<usize> = (network * width..(network + 1) * width).collect();
+        let of_lines = |index| {
+            let lines = parallel::piece(&lines, SIDE, index);
+            let readings = frames.inputs.part(lines, &readings).values;
+            let inputs = match &self.inputs {
+                Inputs::Rows(scales) => scales[network].apply(&readings),
+                Inputs::Projected(projected) => {
+                    projected.sources(projection::view(&projected.parameters, frames), &readings)
+                }
+            };
+            let targets = targets.part(lines, &outputs).values;
+            Piece::all(&inputs, inputs.len() / lines.len(), &targets, outputs.len())
+        };
+        let pieces = parallel::map(lines.len().div_ceil(SIDE), &of_lines);
+        pieces.into_iter().flatten().collect()
     }
 }
 
@@ -195,18 +201,18 @@ impl Projected {
         HiddenLayer { centres: turn::turned(&centres, &self.turn, self.features), ..layer.clone() }
     }
 
-    /// Sources of all frames, line after line.
-    fn sources(&self, frames: &Dataset) -> Vec<f64> {
+    /// Sources of the frames with these `readings`, line after line.
+    fn sources(&self, view: Projection<'_>, readings: &[f64]) -> Vec<f64> {
         let count = self.readings.len();
-        let view = projection::view(&self.parameters, frames);
-        let features = projection::features(view, self.features, count, &frames.inputs.values);
-        let lines = features.chunks_exact(self.features).zip(frames.inputs.lines());
-        let of_line = |(features, readings): (&[f64], &[f64])| -> Vec<f64> {
+        let features = projection::features(view, self.features, count, readings);
+        let mut sources = Vec::with_capacity(features.len() + readings.len());
+        let lines = features.chunks_exact(self.features).zip(readings.chunks_exact(count));
+        for (features, readings) in lines {
+            sources.extend(features.iter().map(|f| f / self.span));
             let readings = readings.iter().zip(&self.readings);
-            let readings = readings.map(|(r, (mean, scale))| (r - mean) * scale);
-            features.iter().map(|f| f / self.span).chain(readings).collect()
-        };
-        lines.flat_map(of_line).collect()
+            sources.extend(readings.map(|(r, (mean, scale))| (r - mean) * scale));
+        }
+        sources
     }
 
     /// Projection and hidden layer that a descent has come to, with its `mix` and with a `layer` among the
