@@ -1,9 +1,8 @@
 //! The link's bytes, compared with those in `testdata/link-examples.txt` and in `docs/link.md`.
 
-use crate::mock::request_bytes;
+use crate::mock::{framed, request_bytes};
 use taxel_core::blob::Floats;
 use taxel_firmware::circuit::{ConstantsFault, ZeroPotential};
-use taxel_firmware::link::cobs;
 use taxel_firmware::link::message::{
     Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
     KeptBaseline, Memory, ModelFault, ModelIdentity, Refusal, Report, Request, Setting, Statistics,
@@ -27,13 +26,11 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 fn report_bytes(number: u16, report: &Report<'_>) -> Vec<u8> {
-    let mut buffer = [0; 256];
-    let mut bytes = Vec::new();
-    assert!(cobs::encode(packet::encode(number, report, &mut buffer).unwrap(), |byte| {
-        bytes.push(byte);
-        true
-    }));
-    bytes
+    framed(packet::encode(number, report, &mut [0; 256]).unwrap())
+}
+
+fn refused(number: u16, refusal: Refusal) -> Vec<u8> {
+    report_bytes(number, &Report::Refused(refusal))
 }
 
 type Example = (&'static str, Vec<u8>);
@@ -119,7 +116,6 @@ fn about_settings() -> [(&'static str, Vec<u8>); 9] {
         baseline: Some(KeptBaseline { rows: 8, columns: 18, frames: 20 }),
         writes_left: 99,
     };
-    let refused = |refusal| report_bytes(9, &Report::Refused(refusal));
     [
         ("constants?", request_bytes(8, &Request::Constants)),
         ("set constants", request_bytes(8, &Request::SetConstants(constants))),
@@ -128,8 +124,8 @@ fn about_settings() -> [(&'static str, Vec<u8>); 9] {
         ("forget the constants", request_bytes(9, &Request::Forget(Setting::Constants))),
         ("constants", report_bytes(8, &Report::Constants(constants))),
         ("kept", report_bytes(9, &Report::Kept(kept))),
-        ("refused: feedback", refused(Refusal::Constants(ConstantsFault::Feedback))),
-        ("refused: nothing to keep", refused(Refusal::Keep(KeepFault::Nothing))),
+        ("refused: feedback", refused(9, Refusal::Constants(ConstantsFault::Feedback))),
+        ("refused: nothing to keep", refused(9, Refusal::Keep(KeepFault::Nothing))),
     ]
 }
 
@@ -141,8 +137,7 @@ fn reports() -> Vec<Example> {
         flags: 2,
         row_status: &[0, 1],
         outputs: readings_ohm,
-        novelty: None,
-        deviation: Floats(&[]),
+        ..Default::default()
     };
     let novel = EstimateReport {
         flags: 128,
@@ -169,7 +164,6 @@ fn reports() -> Vec<Example> {
     let configuration = Report::Configuration(Configuration::DEFAULT);
     let readings = Report::Readings { frame: 300, start_us: START_US, readings_ohm };
     let (crc_32, threshold) = (0x1234_5678, ConfigurationField::ContactThreshold);
-    let refused = |refusal| report_bytes(6, &Report::Refused(refusal));
     vec![
         ("identity", report_bytes(1, &identity())),
         ("statistics", report_bytes(2, &Report::Statistics(statistics))),
@@ -184,14 +178,14 @@ fn reports() -> Vec<Example> {
         ("on trial", report_bytes(6, &Report::Upload(UploadState::OnTrial { crc_32 }))),
         ("confirmed", report_bytes(6, &Report::Upload(UploadState::Confirmed { crc_32 }))),
         ("trial over", report_bytes(0, &Report::Upload(UploadState::TrialOver { crc_32 }))),
-        ("refused: nothing to undo", refused(Refusal::NothingToUndo)),
+        ("refused: nothing to undo", refused(6, Refusal::NothingToUndo)),
         ("restarting", report_bytes(7, &Report::Restarting)),
-        ("refused: version", refused(Refusal::Version(PROTOCOL_VERSION))),
-        ("refused: contact threshold", refused(Refusal::Configuration(threshold))),
-        ("refused: too large", refused(Refusal::TooLarge { slot_bytes: 131_056 })),
-        ("refused: another shape", refused(Refusal::BadModel(ModelFault::Shape))),
-        ("refused: flash", refused(Refusal::Flash)),
-        ("refused: erased too often", refused(Refusal::TooSoon { wait_us: 600_000_000 })),
+        ("refused: version", refused(6, Refusal::Version(PROTOCOL_VERSION))),
+        ("refused: contact threshold", refused(6, Refusal::Configuration(threshold))),
+        ("refused: too large", refused(6, Refusal::TooLarge { slot_bytes: 131_056 })),
+        ("refused: another shape", refused(6, Refusal::BadModel(ModelFault::Shape))),
+        ("refused: flash", refused(6, Refusal::Flash)),
+        ("refused: erased too often", refused(6, Refusal::TooSoon { wait_us: 600_000_000 })),
     ]
 }
 

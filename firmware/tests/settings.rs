@@ -119,14 +119,11 @@ fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
 fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
     let (mut session, board) = started(quiet(), &[]);
     let good = circuit();
-    let mut set = |constants: Constants<'_>| {
-        let request = Request::SetConstants(constants);
-        ask(&mut session, &board, &request, |report| match report {
-            Report::Refused(Refusal::Constants(fault)) => Err(fault),
-            Report::Constants(_) => Ok(()),
-            other => panic!("{other:?}"),
-        })
-        .0
+    tell(&mut session, &board, &Request::SetConstants(good.constants()));
+    let mut check = |constants: Constants<'_>, fault: ConstantsFault| {
+        let found = refusal(&mut session, &board, &Request::SetConstants(constants));
+        assert_eq!(found, Refusal::Constants(fault));
+        expect(&mut session, &board, &good);
     };
     let series_ohm = [0.0, 0.0, -0.1];
     let bad: [(ZeroPotential<ROWS, COLS>, ConstantsFault); 6] = [
@@ -137,13 +134,9 @@ fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
         (ZeroPotential { feedback_ohm: [f32::INFINITY; 3], ..good }, ConstantsFault::Feedback),
         (ZeroPotential { series_ohm, ..good }, ConstantsFault::Series),
     ];
-    assert_eq!(set(good.constants()), Ok(()));
-    for (circuit, fault) in &bad {
-        assert_eq!(set(circuit.constants()), Err(*fault));
-    }
-    assert_eq!(set(ZeroPotential::<2, 2>::TYPICAL.constants()), Err(ConstantsFault::Length));
-    assert_eq!(set(ZeroPotential::<3, 3>::TYPICAL.constants()), Err(ConstantsFault::Length));
-    expect(&mut session, &board, &good);
+    bad.iter().for_each(|(circuit, fault)| check(circuit.constants(), *fault));
+    check(ZeroPotential::<2, 2>::TYPICAL.constants(), ConstantsFault::Length);
+    check(ZeroPotential::<3, 3>::TYPICAL.constants(), ConstantsFault::Length);
 }
 
 #[test]

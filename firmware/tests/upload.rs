@@ -147,19 +147,6 @@ fn a_blob_may_fill_the_slot() {
     assert_eq!(begin(slot_bytes), Ok(()));
 }
 
-/// Working space has room for 12 numbers: two for each feature.
-#[test]
-fn a_model_of_more_features_than_there_is_room_for_is_refused() {
-    let old = blob(1, 3);
-    let mut device = Device::new(Flash::slots_with(&old));
-    let (many, few) = (blob_of_features(7), blob_of_features(6));
-    let shape = Err(Refusal::BadModel(ModelFault::Shape));
-    assert_eq!(device.install(&many), shape);
-    assert_eq!(device.restart(), Some(crc_of(&old)));
-    assert_eq!(device.install(&few), Ok(confirmed(&few)));
-    assert_eq!(device.restart(), Some(crc_of(&few)));
-}
-
 #[test]
 fn each_fault_of_a_model_is_named() {
     let old = blob(1, 3);

@@ -22,42 +22,26 @@ pub fn small(relative_inputs: bool) -> AlignedBytes {
 }
 
 #[test]
-fn a_decoder_assesses_frames_and_decodes_them_as_without() {
-    let blob = small(false);
-    let decoder = Decoder::<1>::load(&blob).unwrap();
-    let confidence = decoder.model().confidence().unwrap();
+fn a_decoder_assesses_readings_or_ratios_and_has_its_lengths_checked() {
+    let [plain, relative] = [small(false), small(true)];
+    let [plain, relative] = [&plain, &relative].map(|blob| Decoder::<1>::load(blob).unwrap());
+    let confidence = plain.model().confidence().unwrap();
     assert_eq!((confidence.sizes(), confidence.block()), (SIZES, &BLOCK[..]));
-    assert_eq!(decoder.scratch_floats(), 5);
+    assert_eq!(plain.scratch_floats(), 5);
     let (mut scratch, mut deviation) = ([0.0; 5], [0.0]);
-    let frame = Frame::from(&[58.0, 61.0][..]);
-    let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).unwrap().unwrap();
-    // z = (2, ½), f = (2, ½): 2 − 0.5 and 0.25·2 + 2·0.5 − 1.
-    let density: f32 = -1.0 - 0.5 * (1.5 * 1.5 + 0.5 * 0.5);
-    assert!((novelty - (-density - 3.0)).abs() < 1e-6, "{novelty}");
-    assert_eq!(deviation, [0.25]);
-
-    let estimate = decoder.decode(&[58.0, 61.0][..]).unwrap();
-    let mut output = [0.0];
-    network(&[1.5]).infer(&[58.0, 61.0], &mut [0.0; 2], &mut output).unwrap();
-    assert_eq!(estimate.outputs, output);
-    let wrong = decoder.assess_into(Frame::from(&[58.0][..]), &mut scratch, &mut deviation);
-    assert_eq!(wrong, Err(NetworkError::Length { what: "frame", expected: 2, found: 1 }));
-}
-
-#[test]
-fn readings_are_relative_where_the_models_are() {
-    let blob = small(true);
-    let decoder = Decoder::<1>::load(&blob).unwrap();
-    let (mut scratch, mut deviation) = ([0.0; 5], [0.0]);
-    let mut assess = |readings_ohm: &[f32], reciprocals: &[f32]| {
-        let frame = Frame { readings_ohm, reciprocals };
-        decoder.assess_into(frame, &mut scratch, &mut deviation)
+    let mut assess = |decoder: &Decoder<'_, 1>, readings_ohm: &[f32], reciprocals: &[f32]| {
+        decoder.assess_into(Frame { readings_ohm, reciprocals }, &mut scratch, &mut deviation)
     };
-    // 116/2 and 244/4.
-    let relative = assess(&[116.0, 244.0], &[2.0, 4.0].map(reciprocal)).unwrap().unwrap();
-    assert!((relative - (1.0 + 1.25 - 3.0)).abs() < 1e-6, "{relative}");
-    let unknown = assess(&[116.0, 244.0], &[0.5, f32::NAN]).unwrap().unwrap();
-    assert!(unknown.is_nan());
-    let length = NetworkError::Length { what: "reciprocals", expected: 2, found: 0 };
-    assert_eq!(assess(&[116.0, 244.0], &[]), Err(length));
+    let baseline = [2.0, 4.0].map(reciprocal);
+    let found = [
+        assess(&plain, &[58.0, 61.0], &[]).unwrap().unwrap(),
+        assess(&relative, &[116.0, 244.0], &baseline).unwrap().unwrap(),
+    ];
+    // z = (2, ½), f = (2, ½): 2 − 0.5 and 0.25·2 + 2·0.5 − 1.
+    let novelty = 1.0 + 0.5 * (1.5 * 1.5 + 0.5 * 0.5) - 3.0;
+    assert!(found.iter().all(|found: &f32| (found - novelty).abs() < 1e-6), "{found:?}");
+    assert!(assess(&relative, &[116.0, 244.0], &[0.5, f32::NAN]).unwrap().unwrap().is_nan());
+    let length = |what, found| Err(NetworkError::Length { what, expected: 2, found });
+    assert_eq!(assess(&plain, &[58.0], &[]), length("frame", 1));
+    assert_eq!(assess(&relative, &[116.0, 244.0], &[]), length("reciprocals", 0));
 }

@@ -18,50 +18,30 @@ fn spread_out(seed: usize, count: usize) -> Vec<f32> {
     (0..count).map(|i| (((i * 37 + seed * 11) % 101) as f32 - 50.0) / 50.0).collect()
 }
 
-/// The parameters of one network of the paper's shape.
-struct Numbers {
-    minimum: Vec<f32>,
-    per_span: Vec<f32>,
-    centres: Vec<f32>,
-    weights: Vec<f32>,
-    bias: Vec<f32>,
-    affine: Vec<f32>,
-}
-
-impl Numbers {
-    fn new(seed: usize) -> Self {
-        Self {
-            minimum: spread_out(seed, COLS).iter().map(|v| 55.0 + v).collect(),
-            per_span: vec![0.1; COLS],
-            centres: spread_out(seed + 1, CENTRES * COLS).iter().map(|v| 0.5 + v / 2.0).collect(),
-            weights: spread_out(seed + 2, CENTRES * OUTPUTS),
-            bias: spread_out(seed + 3, OUTPUTS),
-            affine: spread_out(seed + 4, COLS * OUTPUTS),
-        }
-    }
-
-    fn network(&self) -> Network<'_> {
-        let parameters = Parameters {
-            input_minimum: &self.minimum,
-            input_per_span: &self.per_span,
-            centres: &self.centres,
-            decay: &[0.75; CENTRES],
-            output_weights: &self.weights,
-            bias: &self.bias,
-            affine: &self.affine,
-        };
-        let shape = Shape { inputs: COLS, centres: CENTRES, outputs: OUTPUTS };
-        float32::Network::try_new(shape, parameters).unwrap().into()
-    }
+/// A network of the paper's shape, whose numbers depend on `seed`. They are never freed.
+fn network(seed: usize) -> Network<'static> {
+    let list = |from: usize, count: usize, start: f32, by: f32| -> &'static [f32] {
+        spread_out(seed + from, count).iter().map(|v| start + by * v).collect::<Vec<_>>().leak()
+    };
+    let parameters = Parameters {
+        input_minimum: list(0, COLS, 55.0, 1.0),
+        input_per_span: &[0.1; COLS],
+        centres: list(1, CENTRES * COLS, 0.5, 0.5),
+        decay: &[0.75; CENTRES],
+        output_weights: list(2, CENTRES * OUTPUTS, 0.0, 1.0),
+        bias: list(3, OUTPUTS, 0.0, 1.0),
+        affine: list(4, COLS * OUTPUTS, 0.0, 1.0),
+    };
+    let shape = Shape { inputs: COLS, centres: CENTRES, outputs: OUTPUTS };
+    float32::Network::try_new(shape, parameters).unwrap().into()
 }
 
 /// A blob of two networks that the rows use in turn.
 fn blob(seed: usize, rows: usize) -> AlignedBytes {
-    let (even, odd) = (Numbers::new(seed), Numbers::new(seed + 50));
     let shape = ModelShape { rows, inputs: COLS, outputs: OUTPUTS };
     let metadata = Metadata { name: "hand-made", ..Metadata::unnamed(shape) };
     let row_network: Vec<u8> = (0..rows).map(|row| (row % 2) as u8).collect();
-    let networks = &[even.network(), odd.network()];
+    let networks = &[network(seed), network(seed + 50)];
     encode_to_vec(&ModelParts::new(networks, &row_network, metadata)).unwrap()
 }
 
@@ -75,12 +55,11 @@ fn bits(outputs: &[f32]) -> Vec<u32> {
 
 /// Outputs of the networks themselves.
 fn inferred(seed: usize, frame: &[f32]) -> Vec<f32> {
-    let numbers = [Numbers::new(seed), Numbers::new(seed + 50)];
+    let networks = [network(seed), network(seed + 50)];
     let mut outputs = vec![0.0; ROWS * OUTPUTS];
     let rows = frame.chunks(COLS).zip(outputs.chunks_mut(OUTPUTS)).enumerate();
     for (row, (reading, output)) in rows {
-        let network = numbers[row % 2].network();
-        network.infer(reading, &mut [0.0; COLS], output).unwrap();
+        networks[row % 2].infer(reading, &mut [0.0; COLS], output).unwrap();
     }
     outputs
 }
@@ -131,11 +110,10 @@ fn a_slice_of_another_length_is_refused_by_name_and_nothing_is_written() {
 
 #[test]
 fn each_row_is_divided_by_its_own_baseline() {
-    let network = Numbers::new(3);
     let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
     let blob = |relative_inputs: bool| {
         let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
-        let networks = &[network.network()];
+        let networks = &[network(3)];
         encode_to_vec(&ModelParts::new(networks, &[0; ROWS], metadata)).unwrap()
     };
     let [plain, relative] = [false, true].map(blob);

@@ -53,24 +53,17 @@ fn a_blob_keeps_its_fill_and_a_model_without_has_none() {
 }
 
 #[test]
-fn a_decoder_fills_what_is_missing_and_then_decodes_it() {
-    let bytes = blob(Some(fill()), false).unwrap();
-    let decoder = Decoder::<2>::load(&bytes).unwrap();
-    let whole = [61.0, 62.0, 63.0, 64.0];
-    let mut frame = [61.0, f32::NAN, 63.0, 64.0];
-    let status = decoder.decode(&frame[..]).unwrap().status;
-    assert_eq!(status, [RowStatus::MissingReading, RowStatus::Decoded]);
-    let mut scratch = vec![0.0; decoder.scratch_floats()];
-    assert_eq!(decoder.fill(&mut frame, &mut scratch), 1);
-    assert!((frame[1] - whole[1]).abs() < 0.1, "{frame:?}");
-    let (found, expected) =
-        (decoder.decode(&frame[..]).unwrap(), decoder.decode(&whole[..]).unwrap());
-    assert_eq!(found.status, [RowStatus::Decoded; 2]);
-    assert!((found.outputs[0] - expected.outputs[0]).abs() < 0.01);
-    assert_eq!(found.outputs[1].to_bits(), expected.outputs[1].to_bits());
-    let plain = blob(None, false).unwrap();
-    let mut frame = [61.0, f32::NAN, 63.0, 64.0];
-    assert_eq!(Decoder::<2>::load(&plain).unwrap().fill(&mut frame, &mut scratch), 0);
+fn a_decoder_fills_what_is_missing_if_it_has_a_fill() {
+    for (fill, count, status) in
+        [(Some(fill()), 1, RowStatus::Decoded), (None, 0, RowStatus::MissingReading)]
+    {
+        let bytes = blob(fill, false).unwrap();
+        let decoder = Decoder::<2>::load(&bytes).unwrap();
+        let (mut frame, mut scratch) = ([61.0, f32::NAN, 63.0, 64.0], [0.0; 8]);
+        assert_eq!(decoder.fill(&mut frame, &mut scratch), count);
+        assert_eq!(decoder.decode(&frame[..]).unwrap().status, [status, RowStatus::Decoded]);
+        assert!(count == 0 || (frame[1] - 62.0).abs() < 0.1, "{frame:?}");
+    }
 }
 
 #[test]

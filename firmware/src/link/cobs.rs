@@ -90,11 +90,11 @@ impl Decoder {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn frame_of(message: &[u8]) -> Vec<u8> {
+    pub fn frame_of(message: &[u8]) -> Vec<u8> {
         let mut frame = Vec::new();
         assert!(encode(message, |byte| {
             frame.push(byte);

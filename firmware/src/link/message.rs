@@ -161,7 +161,7 @@ pub enum Report<'a> {
 }
 
 /// Identity of the device, and of the model in force.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Identity<'a> {
     /// Name of the board.
     pub board: &'a str,
@@ -190,7 +190,7 @@ pub struct Identity<'a> {
 }
 
 /// Identity of the model in force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ModelIdentity {
     /// CRC-32 at the end of the model's blob.
     pub crc_32: u32,
@@ -317,7 +317,7 @@ pub struct KeptBaseline {
 }
 
 /// The estimate of one frame: outputs, status of rows, and flags.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct EstimateReport<'a> {
     /// Number of the frame.
     pub frame: u32,

@@ -68,16 +68,7 @@ impl<B: AsMut<[u8]>> Receiver<B> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::cobs;
-
-    fn frame(message: &[u8]) -> Vec<u8> {
-        let mut frame = Vec::new();
-        cobs::encode(message, |byte| {
-            frame.push(byte);
-            true
-        });
-        frame
-    }
+    use crate::link::cobs::tests::frame_of as frame;
 
     /// Outcomes of a receiver of four bytes for `stream`.
     fn received(stream: &[u8]) -> Vec<Result<Vec<u8>, &'static str>> {

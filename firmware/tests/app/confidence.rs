@@ -10,24 +10,14 @@ use taxel_firmware::link::message::{
 use super::requests::bits;
 use crate::mock::*;
 
-/// What an estimate has of a confidence, as bits, and whether it is flagged as novel.
-#[derive(Debug, PartialEq)]
-struct Sent {
-    novel: bool,
-    novelty: Option<u32>,
-    deviation: Vec<u32>,
-}
+/// What an estimate has of a confidence: whether it is flagged as novel, and bits of novelty and deviations.
+type Sent = (bool, Option<u32>, Vec<u32>);
 
-impl Sent {
-    fn new(estimate: &EstimateReport<'_>) -> Self {
-        Self {
-            novel: estimate.flags & EstimateReport::NOVEL != 0,
-            novelty: estimate.novelty.map(f32::to_bits),
-            deviation: bits(estimate.deviation.iter()),
-        }
-    }
+const NOTHING: Sent = (false, None, Vec::new());
 
-    const NOTHING: Self = Self { novel: false, novelty: None, deviation: Vec::new() };
+fn sent(estimate: &EstimateReport<'_>) -> Sent {
+    let is_novel = estimate.flags & EstimateReport::NOVEL != 0;
+    (is_novel, estimate.novelty.map(f32::to_bits), bits(estimate.deviation.iter()))
 }
 
 /// What taxel-core itself makes of a frame.
@@ -37,15 +27,14 @@ fn expected(blob: &[u8], frame: &TestFrame, baseline_ohm: f32) -> Sent {
     let frame = Frame { readings_ohm: frame.as_flattened(), reciprocals: &reciprocals };
     let (mut scratch, mut deviation) = (vec![0.0; decoder.scratch_floats()], [0.0; ROWS * OUTPUTS]);
     let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).unwrap().unwrap();
-    let deviation = bits(deviation.into_iter());
-    Sent { novel: novelty > 0.0, novelty: Some(novelty.to_bits()), deviation }
+    (novelty > 0.0, Some(novelty.to_bits()), bits(deviation.into_iter()))
 }
 
 /// Lets the device decode `frame`.
 fn decode(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> (Sent, u8) {
     let readings_ohm = Floats::new(frame.as_flattened());
     let request = Request::Decode { frame: 5, start_us: 0, readings_ohm };
-    answer!(session, board, &request, Report::Estimate(it) => (Sent::new(&it), it.flags))
+    answer!(session, board, &request, Report::Estimate(it) => (sent(&it), it.flags))
 }
 
 /// What the device sends of its next scans, which it then ends.
@@ -58,7 +47,7 @@ fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceS
     let mut found = Vec::new();
     find_report(&std::mem::take(&mut board.pins.borrow_mut().to_host), |_, report| {
         match report {
-            Report::Estimate(estimate) => found.push(Sent::new(&estimate)),
+            Report::Estimate(estimate) => found.push(sent(&estimate)),
             Report::Health(_) => {}
             other => panic!("{other:?}"),
         }
@@ -82,21 +71,21 @@ fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
         let blob = blob_with_confidence(is_relative);
         let (mut session, board) = started(quiet(), &blob);
         let (found, flags) = decode(&mut session, &board, &frame_at_rest());
-        let is_unknown = found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan());
+        let is_unknown = found.1.is_some_and(|novelty| f32::from_bits(novelty).is_nan());
         let unknown = if is_relative { EstimateReport::NO_BASELINE } else { 0 };
         assert_eq!((flags, is_unknown), (unknown, is_relative));
         let readings_ohm = Floats::new(&[62.0; ROWS * COLS]);
         tell(&mut session, &board, &Request::SetBaseline { readings_ohm });
         // However little a frame is novel, it is flagged.
         let hardly = (65..900).map(|ohm| ohm as f32).find(|ohm| {
-            let novelty = expected(&blob, &with_last(*ohm), baseline_ohm).novelty;
+            let (_, novelty, _) = expected(&blob, &with_last(*ohm), baseline_ohm);
             novelty.is_some_and(|novelty| (1e-6..1.0).contains(&f32::from_bits(novelty)))
         });
         for (ohm, novel) in [(65.0, false), (64.0, false), (hardly.unwrap(), true), (900.0, true)] {
             let (found, flags) = decode(&mut session, &board, &with_last(ohm));
             assert_eq!(found, expected(&blob, &with_last(ohm), baseline_ohm), "{ohm}");
             assert_ne!(flags & EstimateReport::CONTACT, 0, "{ohm}: a flag of its own is lost");
-            assert_eq!((found.novel, found.deviation.len()), (novel, ROWS * OUTPUTS), "{ohm}");
+            assert_eq!((found.0, found.2.len()), (novel, ROWS * OUTPUTS), "{ohm}");
         }
         let s = statistics(&mut session, &board);
         assert_eq!((s.frames_novel, s.longest_confidence_us > 0), (2, true));
@@ -108,10 +97,10 @@ fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
     let (with, without) = (blob_with_confidence(false), blob(3, 4));
     let frame = with_last(900.0);
     let all = || expected(&with, &frame, f32::NAN);
-    let novelty = Sent { deviation: Vec::new(), ..all() };
+    let novelty = (true, all().1, Vec::new());
     for (blob, confidence, expected) in [
-        (&without, ConfidenceSent::Deviations, Sent::NOTHING),
-        (&with, ConfidenceSent::Nothing, Sent::NOTHING),
+        (&without, ConfidenceSent::Deviations, NOTHING),
+        (&with, ConfidenceSent::Nothing, NOTHING),
         (&with, ConfidenceSent::Novelty, novelty),
         (&with, ConfidenceSent::Deviations, all()),
     ] {
@@ -120,11 +109,11 @@ fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
         let frames = scanned(&mut session, &board, confidence);
         assert!(frames.iter().all(|sent| *sent == expected), "{confidence:?}: {frames:?}");
         let s = statistics(&mut session, &board);
-        assert_eq!(s.frames_novel, if expected.novel { s.frames_decoded } else { 0 });
-        assert_eq!(s.longest_confidence_us > 0, expected.novel);
+        assert_eq!(s.frames_novel, if expected.0 { s.frames_decoded } else { 0 });
+        assert_eq!(s.longest_confidence_us > 0, expected.0);
     }
     let (mut session, board) = started(quiet(), &without);
-    assert_eq!(decode(&mut session, &board, &frame).0, Sent::NOTHING);
+    assert_eq!(decode(&mut session, &board, &frame).0, NOTHING);
 }
 
 #[test]
@@ -134,8 +123,9 @@ fn a_frame_with_a_faulty_reading_has_no_confidence_and_is_not_novel() {
     for bad in [f32::NAN, 0.0, f32::INFINITY, 2000.0, -60.0] {
         let (found, flags) = decode(&mut session, &board, &with_last(bad));
         assert_eq!(flags, EstimateReport::FAULTY_READING, "{bad}");
-        assert!(found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan()), "{bad}");
-        assert_eq!(found.deviation.len(), ROWS * OUTPUTS);
-        assert!(found.deviation.iter().all(|value| f32::from_bits(*value).is_nan()), "{bad}");
+        let (_, novelty, deviation) = found;
+        assert_eq!((novelty.is_some(), deviation.len()), (true, ROWS * OUTPUTS), "{bad}");
+        let mut all = novelty.into_iter().chain(deviation);
+        assert!(all.all(|value| f32::from_bits(value).is_nan()), "{bad}");
     }
 }

@@ -9,18 +9,12 @@ use crate::mock::*;
 #[test]
 fn configurations_are_checked_and_a_bad_one_changes_nothing() {
     let (mut session, board) = started(quiet(), &blob(3, 4));
-    let mut outcome = |configuration| {
-        ask(&mut session, &board, &Request::Configure(configuration), |report| match report {
-            Report::Configuration(configuration) => Ok(configuration),
-            Report::Refused(refusal) => Err(refusal),
-            other => panic!("{other:?}"),
-        })
-        .0
-    };
     let good = Configuration { frame_period_us: 20_000, send_readings: true, ..quiet() };
-    assert_eq!(outcome(good), Ok(good));
-    let bad = Configuration { report_every: 0, ..good };
-    assert_eq!(outcome(bad), Err(Refusal::Configuration(Field::ReportEvery)));
+    tell(&mut session, &board, &Request::Configure(good));
+    assert_eq!(in_force(&mut session, &board), good);
+    let bad = Request::Configure(Configuration { report_every: 0, ..good });
+    let refused = answer!(&mut session, &board, &bad, Report::Refused(it) => it);
+    assert_eq!(refused, Refusal::Configuration(Field::ReportEvery));
     assert_eq!(in_force(&mut session, &board), good);
 }
 

@@ -70,6 +70,14 @@ fn the_model_says_which_cells_are_scanned_in_which_order_and_what_is_decoded() {
 
 #[test]
 fn a_model_that_does_not_fit_the_board_is_refused_and_not_put_in_force() {
+    let old = blob(1, 3);
+    let check = |blob: &[u8], fault: ModelFault| {
+        let (mut session, board) = started(quiet(), blob);
+        assert_eq!(model_crc(&mut session, &board), None, "{fault:?}");
+        let mut device = Device::new(Flash::slots_with(&old));
+        assert_eq!(device.install(blob), Err(Refusal::BadModel(fault)));
+        assert_eq!(device.restart(), Some(crc_of(&old)));
+    };
     for (inputs, outputs, names, fault) in [
         (2, 1, "r3c1_ohm\nr3c2_ohm", ModelFault::Wires),
         (2, 1, "r1c1_ohm\nrest", ModelFault::Wires),
@@ -79,12 +87,12 @@ fn a_model_that_does_not_fit_the_board_is_refused_and_not_put_in_force() {
         let shape = ModelShape { rows: 1, inputs, outputs };
         let unnamed = Metadata::unnamed(shape);
         let input_names = if names.is_empty() { unnamed.input_names } else { Columns(names) };
-        let blob = blob_of_a_row(shape, Metadata { input_names, ..unnamed });
-        let (mut session, board) = started(quiet(), &blob);
-        assert_eq!(model_crc(&mut session, &board), None, "{shape:?} {names}");
-        let refused = Device::new(Flash::slots()).install(&blob);
-        assert_eq!(refused, Err(Refusal::BadModel(fault)), "{shape:?} {names}");
+        check(&blob_of_a_row(shape, Metadata { input_names, ..unnamed }), fault);
     }
+    // Working space has room for 12 numbers: two for each feature.
+    check(&blob_of_features(7), ModelFault::Shape);
+    let few = blob_of_features(6);
+    assert_eq!(Device::new(Flash::slots()).install(&few), Ok(confirmed(&few)));
 }
 
 #[test]

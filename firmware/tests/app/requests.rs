@@ -1,16 +1,14 @@
 //! Requests that many tests make, and what their answers must be.
 
+use taxel_core::Decoder;
 use taxel_core::blob::Floats;
-use taxel_core::{Aligned, Decoder};
 use taxel_firmware::link::message::{Report, Request};
 
 use crate::mock::*;
 
 /// Outputs of taxel-core itself.
 pub fn expected(blob: &[u8], frame: &TestFrame) -> [[f32; OUTPUTS]; ROWS] {
-    let mut aligned = Aligned([0; 2048]);
-    aligned.0[..blob.len()].copy_from_slice(blob);
-    let decoder = Decoder::<ROWS>::load(&aligned.0[..blob.len()]).unwrap();
+    let decoder = Decoder::<ROWS>::load(blob).unwrap();
     let outputs = decoder.decode(frame.as_flattened()).unwrap().outputs;
     std::array::from_fn(|row| outputs.as_chunks().0[row])
 }

@@ -27,8 +27,11 @@ pub type Answer = Result<UploadState, Refusal>;
 
 /// The bytes of one request.
 pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
-    let mut buffer = [0; 1024];
-    let packet = packet::encode(number, request, &mut buffer).unwrap();
+    framed(packet::encode(number, request, &mut [0; 1024]).unwrap())
+}
+
+/// A packet as bytes on the line.
+pub fn framed(packet: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     assert!(cobs::encode(packet, |byte| {
         bytes.push(byte);

@@ -20,7 +20,7 @@ pub use device::{Device, confirmed};
 pub use flash::{Flash, Supply};
 pub(crate) use host::answer;
 pub use host::{
-    Answer, Running, TestSession, ask, begin, find_report, model, model_crc, reports,
+    Answer, Running, TestSession, ask, begin, find_report, framed, model, model_crc, reports,
     request_bytes, run_until, send, statistics, tell, trial_steps, turn, undo, upload_step,
     upload_steps,
 };

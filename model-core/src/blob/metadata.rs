@@ -39,7 +39,7 @@ impl<'a> Columns<'a> {
 }
 
 /// A list of little-endian `f32` numbers, borrowed from any address.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Floats<'a>(#[serde(borrow)] pub &'a [u8]);
 
 impl<'a> Floats<'a> {

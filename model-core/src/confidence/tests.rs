@@ -96,16 +96,6 @@ fn the_most_probable_components_count() {
 }
 
 #[test]
-fn a_row_is_multiplied_with_as_many_features() {
-    let features: Vec<f32> = (1..=11).map(|f| f as f32).collect();
-    for length in 1..=11 {
-        let row: Vec<f32> = (0..length).map(|w| (w + 2) as f32).collect();
-        let expected: usize = (1..=length).map(|f| f * (f + 1)).sum();
-        assert_eq!(product(&row, &features), expected as f32, "{length}");
-    }
-}
-
-#[test]
 fn what_cannot_be_a_confidence_is_refused() {
     let what = "confidence";
     let good = block();
