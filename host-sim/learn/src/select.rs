@@ -305,6 +305,26 @@ mod tests {
         }
     }
 
+    /// What is selected of one number of centres, where no spread is tried beyond those given.
+    fn select(
+        dataset: &Dataset,
+        folds: &[usize],
+        centres: usize,
+        spreads: &[f64],
+        (penalties, most_penalties): (&[Option<f64>], usize),
+    ) -> Selection {
+        let (spreads, penalties) = (spreads.to_vec(), penalties.to_vec());
+        let candidates = Candidates {
+            centres: vec![centres],
+            spreads,
+            penalties,
+            most_spreads: 0,
+            most_penalties,
+        };
+        let options = Options { centres: 1, spread: 1.0, ..Options::of_rows() };
+        cross_validate(dataset, folds, &candidates, &options, None, &Silent).unwrap()
+    }
+
     /// Noisy outputs of few frames: a penalty keeps many centres from fitting the noise.
     #[test]
     fn a_penalty_is_chosen_where_data_are_noisy_and_the_grid_grows_to_it() {
@@ -312,13 +332,9 @@ mod tests {
         let mut random = Random::new(8, Stream::Training, Purpose::Noise, 0, 0);
         dataset.outputs.values.iter_mut().for_each(|y| *y += 0.3 * random.normal());
         let folds = block_folds(dataset.frames(), 4);
-        let options = Options { centres: 1, spread: 1.0, ..Options::of_rows() };
-        let select = |penalties: &[f64], most_penalties: usize| {
-            let penalties = penalties.iter().copied().map(Some).collect();
-            let (centres, spreads) = (vec![60], vec![0.2]);
-            let candidates =
-                Candidates { centres, spreads, penalties, most_spreads: 0, most_penalties };
-            cross_validate(&dataset, &folds, &candidates, &options, None, &Silent).unwrap()
+        let select = |penalties: &[f64], most: usize| {
+            let penalties: Vec<Option<f64>> = penalties.iter().copied().map(Some).collect();
+            select(&dataset, &folds, 60, &[0.2], (&penalties, most))
         };
         let wide = select(&[1e-9, 1e-7, 1e-5, 1e-3, 1e-1], 0);
         assert!((0.3..0.4).contains(&wide.best().rmse[0]), "little more than the noise: {wide:?}");
@@ -337,16 +353,7 @@ mod tests {
     fn best_spread(outputs: &[&str]) -> f64 {
         let dataset = dataset(outputs);
         let folds = random_folds(dataset.frames(), 4, 1);
-        let options = Options { centres: 1, spread: 1.0, ..Options::of_rows() };
-        let candidates = Candidates {
-            centres: vec![20],
-            spreads: vec![0.05, 0.2, 3.0],
-            penalties: vec![None],
-            most_spreads: 0,
-            most_penalties: 0,
-        };
-        let selection =
-            cross_validate(&dataset, &folds, &candidates, &options, None, &Silent).unwrap();
+        let selection = select(&dataset, &folds, 20, &[0.05, 0.2, 3.0], (&[None], 0));
         assert_eq!(selection.scored.len(), 3);
         selection.best().spread
     }
@@ -365,13 +372,7 @@ mod tests {
             line[1] = if number % 3 == 0 { f64::NAN } else { line[0] };
         }
         let folds = block_folds(both.frames(), 4);
-        let options = Options { centres: 1, spread: 1.0, ..Options::of_rows() };
-        let (centres, spreads, penalties) = (vec![20], vec![0.5], vec![None]);
-        let candidates =
-            Candidates { centres, spreads, penalties, most_spreads: 0, most_penalties: 0 };
-        let select = |data: &Dataset| {
-            cross_validate(data, &folds, &candidates, &options, None, &Silent).unwrap()
-        };
+        let select = |data: &Dataset| select(data, &folds, 20, &[0.5], (&[None], 0));
         let alone = Dataset { outputs: both.outputs.columns(0, 1), ..both.clone() };
         let (of_both, of_one) = (select(&both), select(&alone));
         assert_eq!(of_both.scored[0].rmse[0].to_bits(), of_one.scored[0].rmse[0].to_bits());

@@ -72,37 +72,3 @@ impl RandomLanes {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random::Random;
-
-    #[test]
-    fn a_block_draws_what_its_frames_draw_one_by_one() {
-        for first in [0, 12_345, usize::MAX / 2] {
-            let mut block = RandomLanes::new(first);
-            for (part, purpose) in [(3, Purpose::Noise), (0, Purpose::Contact)] {
-                block.start(9, Stream::Test, purpose, part);
-                let mut lanes = [[0.0; LANES]; 3];
-                block.between([[-1.0, 2.0], [0.0, 1.0], [5.0, 5.5]], &mut lanes);
-                let mut single: Vec<_> = (first..first + LANES)
-                    .map(|frame| Random::new(9, Stream::Test, purpose, frame as u64, part))
-                    .collect();
-                for (lane, random) in single.iter_mut().enumerate() {
-                    let expected = [[-1.0, 2.0], [0.0, 1.0], [5.0, 5.5]];
-                    let expected = expected.map(|range| random.between(range));
-                    assert_eq!(lanes.map(|lanes| lanes[lane]), expected);
-                }
-                for _ in 0..20 {
-                    let [a, b, _] = &mut lanes;
-                    block.normal_pair(a, b);
-                    for (lane, random) in single.iter_mut().enumerate() {
-                        let expected = [random.normal(), random.normal()].map(f64::to_bits);
-                        assert_eq!([lanes[0][lane], lanes[1][lane]].map(f64::to_bits), expected);
-                    }
-                }
-            }
-        }
-    }
-}

@@ -82,23 +82,3 @@ impl RowDecoder for StandardNetwork {
         predicted
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use taxel_data::table::Table;
-
-    use super::*;
-
-    #[test]
-    fn a_solution_that_misses_the_samples_is_none() {
-        let table = |name: &str, value: &dyn Fn(usize) -> f64| Table {
-            names: vec![name.into()],
-            values: (0..40).map(value).collect(),
-        };
-        let inputs = table("a", &|i| i as f64);
-        let outputs = table("b", &|i| if i.is_multiple_of(2) { 1.0 } else { -1.0 });
-        let table = RowTable { inputs, outputs, common_span: false };
-        assert!(StandardNetwork::fit(&table, 0.02).is_some());
-        assert_eq!(StandardNetwork::fit(&table, 30.0), None);
-    }
-}

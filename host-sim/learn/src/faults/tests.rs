@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use taxel_data::{Purpose, Random, Stream};
 use taxel_simulate::{World, synthesise};
 
@@ -30,17 +32,26 @@ fn with(readings: &Table, change: impl Fn(usize, &mut [f64])) -> Table {
     changed
 }
 
+/// The same with this value of some `readings` in some lines.
+fn struck(table: &Table, when: fn(usize) -> bool, readings: Range<usize>, ohm: f64) -> Table {
+    with(table, |line, frame| {
+        if when(line) {
+            frame[readings.clone()].fill(ohm);
+        }
+    })
+}
+
 #[test]
 fn every_kind_of_fault_is_named_and_sound_frames_have_none() {
     let (sound, block) = sensor();
     assert_eq!(named(&sound, &block), [""; 0]);
-    let row = |ohm: f64| with(&sound, |_, frame| frame[3 * 18..][..18].fill(ohm));
+    let row = |ohm: f64| struck(&sound, |_| true, 54..72, ohm);
     assert_eq!(named(&row(f64::INFINITY), &block), ["row-wire 4 open"]);
     assert_eq!(named(&row(f64::NAN), &block), ["row-wire 4 missing"]);
     let column =
         with(&sound, |_, frame| frame.iter_mut().skip(4).step_by(18).for_each(|r| *r = 0.0));
     assert_eq!(named(&column, &block), ["column-wire 5 shorted"]);
-    let single = with(&sound, |_, frame| frame[3 * 18 + 4] = 0.02);
+    let single = struck(&sound, |_| true, 58..59, 0.02);
     assert_eq!(named(&single, &block), ["r4c5 shorted"]);
     let ground = with(&sound, |_, frame| {
         frame.iter_mut().enumerate().for_each(|(at, r)| *r = if at / 18 == 6 { 1e9 } else { 0.0 });
@@ -94,28 +105,14 @@ fn what_comes_and_goes_is_named_and_counted_in_the_frames_that_it_strikes() {
         assert_eq!(found, expected);
     };
     for fill in [block, none] {
-        let single = |ohm| {
-            with(&sound, move |line, frame| {
-                if line % 8 == 0 {
-                    frame[3 * 18 + 4] = ohm;
-                }
-            })
-        };
+        let single = |ohm| struck(&sound, |line| line % 8 == 0, 58..59, ohm);
         told(&single(1e6), fill, &[("r4c5 intermittently open", 25)]);
         told(&single(0.02), fill, &[("r4c5 intermittently shorted", 25)]);
         told(&single(f64::NAN), fill, &[("r4c5 intermittently missing", 25)]);
-        let row = with(&sound, |line, frame| {
-            if line % 5 == 0 {
-                frame[3 * 18..][..18].fill(f64::INFINITY);
-            }
-        });
+        let row = struck(&sound, |line| line % 5 == 0, 54..72, f64::INFINITY);
         told(&row, fill, &[("row-wire 4 intermittently open", 40)]);
         // It breaks for good, and lasts in most of the frames.
-        let breaks = with(&sound, |line, frame| {
-            if line >= 8 {
-                frame[3 * 18 + 4] = 1e6;
-            }
-        });
+        let breaks = struck(&sound, |line| line >= 8, 58..59, 1e6);
         told(&breaks, fill, &[("r4c5 open", 192)]);
     }
     // All readings of a column are open in an eighth of the frames, but never together.
@@ -124,11 +121,7 @@ fn what_comes_and_goes_is_named_and_counted_in_the_frames_that_it_strikes() {
     let each: Vec<(&str, usize)> = each.iter().map(|name| (name.as_str(), 25)).collect();
     told(&apart, block, &each);
     let twice = Table { values: [&sound.values[..], &sound.values].concat(), ..sound.clone() };
-    let breaks = with(&twice, |line, frame| {
-        if line >= 150 {
-            frame[3 * 18 + 4] = 1e6;
-        }
-    });
+    let breaks = struck(&twice, |line| line >= 150, 58..59, 1e6);
     told(&breaks, block, &[("r4c5 open", 250)]);
     let mut draw = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
     let draws: Vec<f64> = (0..200).map(|_| draw.normal()).collect();

@@ -108,16 +108,6 @@ fn the_rule_finds_the_least_error_of_a_simulation() {
 }
 
 #[test]
-fn an_output_that_is_used_at_once_has_the_fifth_root_of_the_rule() {
-    for (noise, acceleration, period_us) in [(0.03_f64, 50.0_f64, 200.0_f64), (1.0, 30.0, 1000.0)] {
-        let movement = Movement { rate_per_s: 1.0, acceleration_per_s2: acceleration };
-        let found = settings_for(noise, movement, period_us, 0.0).time_constant_us;
-        let tau_s = (0.3125 * (noise / acceleration).powi(2) * period_us * 1e-6).powf(0.2);
-        assert!((f64::from(found) / (tau_s * 1e6) - 1.0).abs() < 0.01, "{found} and {tau_s}");
-    }
-}
-
-#[test]
 fn a_fast_output_is_extrapolated_by_its_age_and_a_slow_noisy_one_is_not() {
     let of = |noise: f64, rate_per_s: f64| {
         let movement = Movement { rate_per_s, acceleration_per_s2: 80.0 };

@@ -1,5 +1,5 @@
 use taxel_core::blob::{Floats, Metadata, ModelParts, encode_to_vec};
-use taxel_core::rbf::{Format, Shape};
+use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Purpose, Random, Silent, Stream};
 use taxel_simulate::{Synthesis, World, synthesise};
 
@@ -78,53 +78,6 @@ fn small(options: Options) -> (ModelBlob, Dataset) {
     let trained = train(&seen, &options, &Silent).unwrap();
     let blob = pack(&trained, &seen, &Origin::of_data("rows", 0, 1, &seen)).unwrap();
     (blob, synthesise(&world, Stream::Test, 400))
-}
-
-#[test]
-fn a_smooth_network_has_the_outputs_of_decoding_and_the_slopes_of_its_outputs() {
-    for (format, affine_tail, tolerance) in [
-        (Format::F32, true, 1e-4),
-        (Format::F32, false, 1e-4),
-        (Format::Fixed16, true, 4e-3), // inputs, activations and weights have 16 bits
-        (Format::Fixed16, false, 4e-3),
-    ] {
-        let (blob, frames) = small(Options { affine_tail, format, ..Options::of_rows() });
-        let model = blob.prepare();
-        let decoded = model.decode_table(&frames.inputs);
-        let size = decoded.values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-        for (row, network) in model.networks().iter().enumerate() {
-            let smooth = Smooth::new(network);
-            let Shape { inputs, outputs, .. } = smooth.shape;
-            for frame in 0..20 {
-                let readings = &frames.inputs.line(frame)[row * inputs..][..inputs];
-                let scale = smooth.zeros.iter().zip(&smooth.per_unit);
-                let mut x: Vec<f64> =
-                    readings.iter().zip(scale).map(|(r, (z, p))| (r - z) * p).collect();
-                let expected = &decoded.line(frame)[row * outputs..][..outputs];
-                for (value, decoded) in smooth.infer(&x, &mut []).iter().zip(expected) {
-                    assert!(
-                        (value - decoded).abs() <= tolerance * size,
-                        "{format:?}: {value} for {decoded}"
-                    );
-                }
-                // Slopes are differences of values, far outside as well.
-                x[frame % inputs] += if frame % 2 == 0 { 2.0 } else { 0.0 };
-                let (i, step) = (frame * 5 % inputs, 1e-4);
-                let mut slopes = vec![0.0; inputs * outputs];
-                smooth.infer(&x, &mut slopes);
-                let [below, above] = [-step, step].map(|step| {
-                    let mut x = x.clone();
-                    x[i] += step;
-                    smooth.infer(&x, &mut [])
-                });
-                for (o, (below, above)) in below.iter().zip(above).enumerate() {
-                    let (found, expected) =
-                        (slopes[o * inputs + i], (above - below) / (2.0 * step));
-                    assert!((found - expected).abs() <= 1e-6 * size, "{found} for {expected}");
-                }
-            }
-        }
-    }
 }
 
 #[test]
@@ -209,27 +162,14 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
 
     let shared = model.model().networks().next().unwrap();
     let parts = |networks: &[Network<'_>], row_network: &[u8], rmse: f32| {
-        let parsed = model.model();
-        let rmse = [rmse; 36].iter().flat_map(|rmse| rmse.to_le_bytes()).collect::<Vec<u8>>();
-        let parts = ModelParts {
-            linear_rmse: Floats(&[]),
-            projection: None,
-            confidence: None,
-            fill: None,
-            networks,
-            row_network,
-            metadata: Metadata {
-                training_rmse: Floats(&rmse),
-                full_scale: Floats(&vec![0; rmse.len()]),
-                ..*parsed.metadata()
-            },
-        };
+        let bytes = [rmse, 0.0].map(|value| value.to_le_bytes().repeat(36));
+        let [training_rmse, full_scale] = bytes.each_ref().map(|bytes| Floats(bytes));
+        let metadata = Metadata { training_rmse, full_scale, ..*model.model().metadata() };
+        let parts = ModelParts::new(networks, row_network, metadata);
         ModelBlob::of_bytes(&encode_to_vec(&parts).unwrap()).unwrap()
     };
-    let density = confidence::Density::fit(
-        &frames,
-        &confidence::Settings { components: 2, ..Default::default() },
-    );
+    let settings = confidence::Settings { components: 2, ..Default::default() };
+    let density = confidence::Density::fit(&frames, &settings);
     let mut held_out = confidence::HeldOut::default();
     held_out.add(&blob, &density, &frames);
     for (blob, says) in [

@@ -1,39 +1,6 @@
 use super::*;
 
 #[test]
-fn an_unusable_sample_is_refused_and_changes_nothing() {
-    let mut rls = Rls::<f32>::new([2, 1], 1e3, 0.99).unwrap();
-    rls.update(&mut [1.0, 2.0], &mut [3.0]).unwrap();
-    let before = rls.clone();
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e20, -1e20, f32::MAX] {
-        for (h, y) in [([bad, 0.0], 0.0), ([0.0, bad], 0.0), ([1.0, 1.0], bad)] {
-            assert_eq!(rls.update(&mut h.clone(), &mut [y]), Err(UnusableSample));
-        }
-    }
-    assert_eq!(rls, before);
-    // The largest usable numbers still give finite weights.
-    for _ in 0..1000 {
-        rls.update(&mut [1e15, -1e15], &mut [1e15]).unwrap();
-    }
-    assert!(rls.weights().iter().all(|w| w.is_finite()), "{:?}", rls.weights());
-}
-
-#[test]
-fn unexcited_directions_fade_towards_weight_zero() {
-    let mut rls = Rls::<f32>::new([2, 1], 1e3, 0.9).unwrap();
-    for _ in 0..100 {
-        rls.update(&mut [0.0, 1.0], &mut [5.0]).unwrap();
-        rls.update(&mut [1.0, 0.0], &mut [2.0]).unwrap();
-    }
-    assert!((rls.weights()[1] - 5.0).abs() < 0.01, "{:?}", rls.weights());
-    for _ in 0..100_000 {
-        rls.update(&mut [1.0, 0.0], &mut [2.0]).unwrap();
-    }
-    let weights = rls.weights();
-    assert!((weights[0] - 2.0).abs() < 1e-3 && weights[1].abs() < 1e-6, "{weights:?}");
-}
-
-#[test]
 fn with_forgetting_the_recursion_follows_what_changes() {
     let slope = |forgetting_factor: f64| {
         let mut rls = Rls::new([2, 1], 1e6, forgetting_factor).unwrap();

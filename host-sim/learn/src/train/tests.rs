@@ -24,76 +24,18 @@ fn table(frames: usize, noise: f64) -> RowTable {
     }
 }
 
-fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
-    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
-    norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
-}
-
-#[test]
-fn a_trained_network_learns_a_smooth_function() {
-    let table = table(4000, 0.0);
-    let samples = Samples::new(&table);
-    let options = Options { centres: 40, spread: 0.3, ..Options::of_rows() };
-    let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
-    let predicted = infer(&fitted.network(), &table.inputs.values);
-    let relative = relative_difference(&predicted, &table.outputs.values);
-    assert!(relative < 2e-3, "{relative}");
-}
-
-#[test]
-fn an_input_that_never_changes_is_no_obstacle() {
-    let mut table = table(500, 0.0);
-    table.inputs.values.iter_mut().skip(1).step_by(2).for_each(|v| *v = 77.0);
-    let samples = Samples::new(&table);
-    let options = Options { centres: 10, spread: 0.3, ..Options::of_rows() };
-    let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
-    let [lowest, highest] = fitted.network().training_range(1);
-    assert_eq!(lowest, highest);
-    let predicted = infer(&fitted.network(), &table.inputs.values);
-    assert!(predicted.iter().all(|y| y.is_finite()));
-}
-
-#[test]
-fn duplicate_samples_give_fewer_centres() {
-    let mut table = table(6, 0.0);
-    table.inputs.values = [[50.0, 99.0], [51.0, 99.0], [50.0, 98.0]].as_flattened().repeat(2);
-    let samples = Samples::new(&table);
-    let options = Options { centres: 6, spread: 0.3, affine_tail: false, ..Options::of_rows() };
-    assert_eq!(samples.centres(&options, 0).len(), 3 * 2);
-}
-
 #[test]
 fn the_standard_network_interpolates_its_samples_exactly() {
     let table = table(60, 0.2);
     let standard = StandardNetwork::fit(&table, 0.05).unwrap();
-    let relative =
-        relative_difference(&standard.predict(&table.inputs.values), &table.outputs.values);
-    assert!(relative < 1e-9, "{relative}");
+    let predicted = standard.predict(&table.inputs.values);
+    let differ = predicted.iter().zip(&table.outputs.values).map(|(p, y)| (p - y).abs());
+    assert!(differ.fold(0.0, f64::max) < 1e-9);
+    assert_eq!(StandardNetwork::fit(&table, 30.0), None, "its solution misses the samples");
     let mut twice = table.clone();
     twice.inputs.values.extend(table.inputs.values);
     twice.outputs.values.extend(table.outputs.values);
     assert!(StandardNetwork::fit(&twice, 0.05).is_none(), "duplicates cannot be interpolated");
-}
-
-/// A large offset, as of an absolute pressure, must not cost the network its digits.
-#[test]
-fn an_offset_of_the_outputs_costs_no_more_than_f32_itself() {
-    let rmse_at = |offset: f64| {
-        let mut table = table(500, 0.0);
-        table.outputs.values.iter_mut().for_each(|value| *value += offset);
-        let samples = Samples::new(&table);
-        let options = Options { centres: 30, spread: 0.5, ..Options::of_rows() };
-        let fitted = samples.fit(&samples.centres(&options, 0), &options).unwrap();
-        let predicted = infer(&fitted.network(), &table.inputs.values);
-        let squares = predicted.iter().zip(&table.outputs.values).map(|(p, t)| (p - t).powi(2));
-        (squares.sum::<f64>() / predicted.len() as f64).sqrt()
-    };
-    let without = rmse_at(0.0);
-    for offset in [1e3, 1e5, 1e6] {
-        let rmse = rmse_at(offset);
-        let half_an_ulp = offset * f64::from(f32::EPSILON) / 2.0;
-        assert!(rmse <= 1.01 * without + half_an_ulp, "offset {offset}: {rmse} and {without}");
-    }
 }
 
 #[test]

@@ -6,7 +6,6 @@ use taxel_simulate::{Synthesis, World};
 
 use super::loss::{Loss, held_out_errors, on_held_out, on_same};
 use super::movable::{Movable, Piece, Sizes};
-use super::products::{Line, SIDE, add_combinations, add_products, normal_equations};
 use super::*;
 use crate::infer::infer;
 use crate::train::{train, train_refined};
@@ -14,46 +13,6 @@ use crate::train::{train, train_refined};
 fn draws(purpose: u64) -> impl FnMut() -> f64 {
     let mut random = Random::new(11, Stream::Test, Purpose::Damage, purpose, 0);
     move || random.between([-1.0, 1.0])
-}
-
-#[test]
-fn products_are_those_of_plain_loops() {
-    let mut draw = draws(0);
-    let mut lines = |count: usize| -> Vec<Line> {
-        (0..count).map(|_| std::array::from_fn(|_| draw())).collect()
-    };
-    for (m, n) in [(1, 1), (7, 17), (19, 16), (40, 33)] {
-        let (a, b) = (lines(m), lines(n));
-        let dot = |a: &Line, b: &Line| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        let close = |found: f64, exact: f64| assert!((found - exact).abs() < 1e-12, "{m} {n}");
-        let mut products = vec![1.0; m * n];
-        add_products(&a, &b, &mut products);
-        for (i, a) in a.iter().enumerate() {
-            for (j, b) in b.iter().enumerate() {
-                close(products[i * n + j], 1.0 + dot(a, b));
-            }
-        }
-        // All samples, and those but the first.
-        let mut masks = [[0.0; SIDE]; 2];
-        masks[1][0] = f64::NAN;
-        let (squares, again) = normal_equations(&a, &b, &masks.each_ref());
-        again.iter().zip(&products).for_each(|(again, product)| close(1.0 + again, *product));
-        for i in 0..m {
-            for j in i..m {
-                let square = dot(&a[i], &a[j]);
-                close(squares[0][i * m + j], square);
-                close(squares[1][i * m + j], square - a[i][0] * a[j][0]);
-            }
-        }
-        let mut combined = vec![[2.0; SIDE]; n];
-        add_combinations(&products, &a, &mut combined);
-        for (j, line) in combined.iter().enumerate() {
-            for (s, sum) in line.iter().enumerate() {
-                let exact: f64 = (0..m).map(|i| products[i * n + j] * a[i][s]).sum();
-                close(*sum, 2.0 + exact);
-            }
-        }
-    }
 }
 
 /// Random samples: their inputs, and their outputs.
@@ -93,15 +52,16 @@ fn gradient_is_the_slope(sizes: Sizes, loss: &dyn Fn(&Movable) -> Loss) {
 #[test]
 fn gradients_are_slopes_of_the_loss() {
     for (sources, affine_tail) in [(0, true), (5, true), (5, false)] {
+        // Outputs and regressors fill strips and blocks of products, and others in part.
         let sizes = Sizes { inputs: 3, centres: 6, sources, affine_tail };
         let given = if sources > 0 { sources } else { 3 };
         // The second piece of the rest is not full.
         let [rest, held] = [(300, 1), (100, 2)].map(|(count, purpose)| {
-            let (x, y) = samples(given, 2, count, purpose);
-            Piece::all(&x, given, &y, 2)
+            let (x, y) = samples(given, 18, count, purpose);
+            Piece::all(&x, given, &y, 18)
         });
         let [rest, held] = [&rest, &held].map(|pieces| pieces.iter().collect::<Vec<_>>());
-        let tasks = [vec![0, 1]];
+        let tasks = [(0..18).collect()];
         gradient_is_the_slope(sizes, &|movable| {
             on_same(movable, &tasks, &rest, 1e-9).unwrap().unwrap()
         });
@@ -243,30 +203,6 @@ fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
     }
 }
 
-/// Source of frames that remembers the largest number asked for.
-struct Counted<'w>(Fresh<'w>, AtomicUsize);
-
-impl FreshFrames for Counted<'_> {
-    fn frames(&self, step: usize, count: usize) -> Dataset {
-        self.1.fetch_max(count, Ordering::Relaxed);
-        self.0.frames(step, count)
-    }
-}
-
-#[test]
-fn steps_look_at_more_frames_the_more_centres_there_are() {
-    let world = World { read_rows: vec![3], ..World::press() };
-    let training = Synthesis::new(&world).frames(Stream::Training, 200);
-    for (centres, frames) in [(8, 300), (40, 640)] {
-        let fresh = Counted(Fresh(Synthesis::new(&world)), AtomicUsize::new(0));
-        let options = Options { centres, ..Options::of_rows() };
-        let settings = Refinement { steps: 2, frames: 300, ..Refinement::default() };
-        let examples = Examples::Fresh(&fresh);
-        train_refined(&training, &options, &settings, examples, &Silent).unwrap();
-        assert_eq!(fresh.1.into_inner(), frames, "{centres} centres");
-    }
-}
-
 /// Counts steps.
 struct Taken(AtomicUsize);
 
@@ -321,30 +257,6 @@ fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
         crate::train::fit(&layers, &options, &Silent).is_ok()
     };
     assert!(held(least) && !held(0.999 * least), "{least}");
-}
-
-#[test]
-fn evened_features_are_rotated_and_span_less() {
-    let mut draw = draws(7);
-    // The first feature spans far more than the others.
-    let values: Vec<f64> =
-        (0..2000 * 4).map(|i| draw() * if i % 4 == 0 { 4.0 } else { 0.5 }).collect();
-    let rotation = turn::evening(&values, 4);
-    for i in 0..4 {
-        for j in 0..4 {
-            let dot: f64 = (0..4).map(|k| rotation[k * 4 + i] * rotation[k * 4 + j]).sum();
-            assert!((dot - if i == j { 1.0 } else { 0.0 }).abs() < 1e-12);
-        }
-    }
-    let widest = |values: &[f64]| -> f64 {
-        let span = |j: usize| {
-            let column = || values.iter().skip(j).step_by(4);
-            column().fold(f64::MIN, |m, x| m.max(*x)) - column().fold(f64::MAX, |m, x| m.min(*x))
-        };
-        (0..4).map(span).fold(0.0, f64::max)
-    };
-    let turned = turn::turned(&values, &rotation, 4);
-    assert!(widest(&turned) < 0.7 * widest(&values), "{}", widest(&turned));
 }
 
 #[test]
