@@ -93,7 +93,7 @@ fn replaced(mut bytes: Vec<u8>, from: &[u8], to: &[u8]) -> Vec<u8> {
 fn a_recording_that_a_tool_copied_is_read() {
     let layout = electrodes();
     let written = frames(&layout, 20);
-    let bytes = recording("copied", &layout, &written);
+    let bytes = recording(&layout, &written);
     for has_summary in [true, false] {
         let copy = copied(&bytes, Some(2000), has_summary);
         let mut reader = Reader::new(Cursor::new(copy)).unwrap();
@@ -108,7 +108,7 @@ fn a_recording_that_a_tool_copied_is_read() {
 #[test]
 fn what_is_no_recording_is_refused_with_what_it_lacks() {
     let layout = electrodes();
-    let bytes = recording("refused", &layout, &frames(&layout, 3));
+    let bytes = recording(&layout, &frames(&layout, 3));
     let lacks = |bytes: Vec<u8>| match Reader::new(Cursor::new(bytes))
         .and_then(|mut it| it.next().unwrap())
     {
@@ -137,7 +137,7 @@ fn what_is_no_recording_is_refused_with_what_it_lacks() {
 #[test]
 fn a_compressed_recording_is_refused_by_the_name_of_its_compression() {
     let layout = electrodes();
-    let bytes = recording("compressed", &layout, &frames(&layout, 3));
+    let bytes = recording(&layout, &frames(&layout, 3));
     let mut copy = bytes[..8].to_vec();
     for (_, kind, body) in records(&bytes, 8) {
         match kind {

@@ -65,7 +65,7 @@ fn read_and_mend(bytes: &[u8]) -> Result<Vec<Frame>, Error> {
 fn hostile_bytes_do_no_harm() {
     let layout = electrodes();
     let written = frames(&layout, 12);
-    let whole = recording("hostile", &layout, &written);
+    let whole = recording(&layout, &written);
     assert_same(&read_all(&whole).unwrap(), &written);
     let mut state = 7_u64;
     let mut below = |bound: usize| {

@@ -12,7 +12,7 @@ use taxel_recording::{
 
 #[test]
 fn frames_and_all_that_goes_with_them_come_back_to_the_bit() {
-    let folder = Folder::new("round-trip");
+    let folder = Folder::new();
     for (name, layout) in [("electrodes", electrodes()), ("forces", forces())] {
         let path = folder.path(name);
         let written = frames(&layout, 40);
@@ -31,7 +31,7 @@ fn frames_and_all_that_goes_with_them_come_back_to_the_bit() {
 
 #[test]
 fn a_recording_without_frames_is_whole() {
-    let folder = Folder::new("empty");
+    let folder = Folder::new();
     let path = folder.path("empty");
     write(&path, &forces(), &[], 1);
     let mut reader = Reader::open(&path).unwrap();
@@ -42,7 +42,7 @@ fn a_recording_without_frames_is_whole() {
 
 #[test]
 fn reading_goes_on_from_any_time() {
-    let folder = Folder::new("seek");
+    let folder = Folder::new();
     let path = folder.path("seek");
     let layout = electrodes();
     let written = frames(&layout, 40);
@@ -63,7 +63,7 @@ fn reading_goes_on_from_any_time() {
 
 #[test]
 fn a_device_that_starts_anew_does_not_turn_the_clock_back() {
-    let folder = Folder::new("restart");
+    let folder = Folder::new();
     let path = folder.path("restart");
     let layout = forces();
     let mut written = frames(&layout, 4);
@@ -82,7 +82,7 @@ fn a_device_that_starts_anew_does_not_turn_the_clock_back() {
 
 #[test]
 fn a_file_that_is_cut_anywhere_keeps_all_its_whole_chunks() {
-    let folder = Folder::new("cut");
+    let folder = Folder::new();
     let (path, cut) = (folder.path("whole"), folder.path("cut"));
     let layout = electrodes();
     let written = frames(&layout, 12);
@@ -123,7 +123,7 @@ fn a_file_that_is_cut_anywhere_keeps_all_its_whole_chunks() {
 
 #[test]
 fn chunks_that_are_not_whole_are_left_out_and_their_bytes_counted() {
-    let folder = Folder::new("left-out");
+    let folder = Folder::new();
     let path = folder.path("damaged");
     let written = frames(&electrodes(), 3);
     let sizes = write(&path, &electrodes(), &written, 1);
@@ -147,7 +147,7 @@ fn chunks_that_are_not_whole_are_left_out_and_their_bytes_counted() {
 
 #[test]
 fn a_frame_that_does_not_fit_is_refused_and_harms_nothing() {
-    let folder = Folder::new("unfit");
+    let folder = Folder::new();
     let path = folder.path("unfit");
     let layout = forces();
     let written = frames(&layout, 2);
@@ -178,7 +178,7 @@ fn a_frame_that_does_not_fit_is_refused_and_harms_nothing() {
 
 #[test]
 fn frames_of_the_largest_layout_come_back() {
-    let folder = Folder::new("largest");
+    let folder = Folder::new();
     let path = folder.path("largest");
     let half = 16_384;
     let mut layout = forces();
@@ -206,7 +206,7 @@ fn frames_of_the_largest_layout_come_back() {
 
 #[test]
 fn only_recordings_are_replaced_and_none_that_is_being_written() {
-    let folder = Folder::new("replace");
+    let folder = Folder::new();
     let path = folder.path("file");
     let create = |replace| Writer::create(&path, &forces(), &extras(), start(), replace);
     fs::write(&path, "a thesis").unwrap();
@@ -221,7 +221,7 @@ fn only_recordings_are_replaced_and_none_that_is_being_written() {
 
 #[test]
 fn a_layout_that_cannot_be_recorded_is_refused_before_any_file_is_touched() {
-    let folder = Folder::new("layout");
+    let folder = Folder::new();
     let path = folder.path("layout");
     let changes: [fn(&mut Layout, &mut Extras); 9] = [
         |layout, _| layout.rows += 1,

@@ -304,10 +304,8 @@ mod tests {
         }
     }
 
-    /// A report as bytes on the line.
-    fn framed() -> Vec<u8> {
-        let mut buffer = [0; 64];
-        let packet = packet::encode(0, &Report::Restarting, &mut buffer).expect("room");
+    /// A packet as bytes on the line.
+    fn framed(packet: &[u8]) -> Vec<u8> {
         let mut line = Vec::new();
         cobs::encode(packet, |byte| {
             line.push(byte);
@@ -316,9 +314,13 @@ mod tests {
         line
     }
 
+    fn report() -> Vec<u8> {
+        framed(packet::encode(0, &Report::Restarting, &mut [0; 64]).expect("room"))
+    }
+
     #[test]
     fn a_report_that_began_before_anybody_listened_is_not_damaged() {
-        let whole = framed();
+        let whole = report();
         let mut cut = whole.clone();
         cut.remove(2);
         for (first, second, damaged) in
@@ -360,15 +362,8 @@ mod tests {
 
     #[test]
     fn a_device_that_does_not_answer_is_told_by_what_comes_instead() {
-        let packet = |start: &[u8]| {
-            let packet = [start, &CRC_32.checksum(start).to_le_bytes()].concat();
-            let mut line = Vec::new();
-            cobs::encode(&packet, |byte| {
-                line.push(byte);
-                true
-            });
-            line
-        };
+        let packet =
+            |start: &[u8]| framed(&[start, &CRC_32.checksum(start).to_le_bytes()].concat());
         let version = packet::PROTOCOL_VERSION;
         let other_version = format!(
             "it speaks version {} of the link, and this program version {version}",
@@ -378,7 +373,7 @@ mod tests {
             (vec![], "nothing comes from it"),
             (vec![0x55; 40], "bytes come from it that are no packets: check the speed"),
             (packet(&[version + 1, 0, 3]), &other_version),
-            (framed(), "it sends reports, but no answer in time"),
+            (report(), "it sends reports, but no answer in time"),
             (packet(&[version, 0, 120]), "messages that this program does not know"),
         ] {
             let mut device = Device::new(Deaf(bytes)).unwrap();

@@ -5,32 +5,32 @@ use taxel_simulate::sensor::Sensor;
 use super::*;
 
 #[test]
-fn embedded_scenes_are_sound_and_named_as_they_are_called() {
+fn embedded_scenes_are_sound_named_as_they_are_called_and_the_worlds_in_code() {
     for (name, _) in crate::scenes::ALL {
         let scene = Experiment::load(name).unwrap();
         assert_eq!(scene.name, name);
         assert_eq!(scene.world.read_rows, (0..8).collect::<Vec<_>>());
         assert_eq!(scene.world.sensor, Sensor::paper());
     }
-}
-
-#[test]
-fn worlds_in_code_are_those_of_the_embedded_scenes() {
-    let worlds =
-        [("paper", World::paper()), ("press", World::press()), ("contact", World::contact())];
-    for (name, world) in worlds {
+    let worlds = [World::paper(), World::press(), World::contact()];
+    for (name, world) in ["paper", "press", "contact"].into_iter().zip(worlds) {
         assert_eq!(Experiment::load(name).unwrap().world, world);
     }
 }
 
 #[test]
-fn listed_positions_replace_the_cells() {
-    let upper = (0..48).map(|i| format!("[{i}.5, 1.0, 6.0]")).collect::<Vec<_>>().join(", ");
-    let listed = format!(
-        "resistance_ohm_per_mm = 250.0\nstiffness_n_per_mm = [0.5, 0.6, 3.0]\n\
-         upper_electrodes_mm = [{upper}]"
-    );
-    let text = crate::scenes::ALL[1].1.replace("resistance_ohm_per_mm = 100.0", &listed);
+fn listed_positions_replace_the_cells_and_must_not_touch() {
+    let with_upper = |z: &str| {
+        let upper = (0..48).map(|i| format!("[{i}.5, 1.0, {z}]")).collect::<Vec<_>>().join(", ");
+        let listed = format!(
+            "resistance_ohm_per_mm = 250.0\nstiffness_n_per_mm = [0.5, 0.6, 3.0]\n\
+             upper_electrodes_mm = [{upper}]"
+        );
+        crate::scenes::ALL[1].1.replace("resistance_ohm_per_mm = 100.0", &listed)
+    };
+    let refused = Experiment::parse("test", &with_upper("0.5")).unwrap_err().to_string();
+    assert!(refused.contains("they would touch"), "{refused}");
+    let text = with_upper("6.0");
     let scene = Experiment::parse("test", &text).unwrap().world;
     assert_eq!(scene.sensor.upper_electrodes_mm[47], [47.5, 1.0, 6.0]);
     assert_eq!(scene.sensor.stiffness_n_per_mm, [0.5, 0.6, 3.0]);
@@ -38,17 +38,6 @@ fn listed_positions_replace_the_cells() {
     assert_eq!(scene.sensor.lower_electrodes_mm, default.sensor.lower_electrodes_mm);
     let digest = |text: &str| Experiment::parse("test", text).unwrap().digest;
     assert_ne!(digest(&text), digest(crate::scenes::ALL[1].1));
-}
-
-#[test]
-fn electrodes_that_would_touch_are_refused() {
-    let upper = (0..48).map(|i| format!("[{i}.5, 1.0, 0.5]")).collect::<Vec<_>>().join(", ");
-    let text = crate::scenes::ALL[0].1.replace(
-        "resistance_ohm_per_mm = 100.0",
-        &format!("resistance_ohm_per_mm = 100.0\nupper_electrodes_mm = [{upper}]"),
-    );
-    let refused = Experiment::parse("test", &text).unwrap_err().to_string();
-    assert!(refused.contains("they would touch"), "{refused}");
 }
 
 #[test]

@@ -7,26 +7,18 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use taxel_recording::{
     Column, Contact, Electrode, Extras, Frame, Health, Layout, Replace, Status, Writer,
 };
+use tempfile::TempDir;
 
 /// Folder that goes with its test.
-pub struct Folder(PathBuf);
+pub struct Folder(TempDir);
 
 impl Folder {
-    pub fn new(name: &str) -> Self {
-        let folder =
-            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        Self(folder)
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
-        self.0.join(format!("{name}.mcap"))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
+        self.0.path().join(format!("{name}.mcap"))
     }
 }
 
@@ -155,9 +147,10 @@ pub fn write(path: &Path, layout: &Layout, frames: &[Frame], chunk: usize) -> Ve
     sizes
 }
 
-/// Bytes of a recording in chunks of four frames, whose file has that name.
-pub fn recording(name: &str, layout: &Layout, frames: &[Frame]) -> Vec<u8> {
-    let folder = Folder::new(name);
-    write(&folder.path(name), layout, frames, 4);
-    std::fs::read(folder.path(name)).unwrap()
+/// Bytes of a recording in chunks of four frames.
+pub fn recording(layout: &Layout, frames: &[Frame]) -> Vec<u8> {
+    let folder = Folder::new();
+    let path = folder.path("recording");
+    write(&path, layout, frames, 4);
+    std::fs::read(path).unwrap()
 }

@@ -177,13 +177,10 @@ mod tests {
     fn estimate<'a>(outputs: &'a [f32], deviation: &'a [f32]) -> EstimateReport<'a> {
         let novelty = deviation.first().map(|_| -2.5);
         EstimateReport {
-            frame: 1,
-            start_us: 0,
-            flags: 0,
-            row_status: &[0],
             outputs: Floats::new(outputs),
             novelty,
             deviation: Floats::new(deviation),
+            ..Default::default()
         }
     }
 
@@ -201,26 +198,23 @@ mod tests {
     }
 
     #[test]
-    fn one_bit_of_one_output_makes_a_frame_another() {
-        let expected = expected(Vec::new());
-        assert!(expected.is_same(1, &estimate(&[0.0, 1.0], &[])));
-        assert!(!expected.is_same(1, &estimate(&[0.0, 1.0], &[0.5, 0.5])));
+    fn one_bit_of_an_output_or_of_its_confidence_makes_a_frame_another() {
+        let plain = expected(Vec::new());
+        assert!(plain.is_same(1, &estimate(&[0.0, 1.0], &[])));
+        assert!(!plain.is_same(1, &estimate(&[0.0, 1.0], &[0.5, 0.5])));
         let next = f32::from_bits(1.0_f32.to_bits() + 1);
         for wrong in [&[0.0, next][..], &[-0.0, 1.0], &[0.0], &[0.0, 1.0, 2.0], &[0.5, -0.25]] {
-            assert!(!expected.is_same(1, &estimate(wrong, &[])), "{wrong:?}");
+            assert!(!plain.is_same(1, &estimate(wrong, &[])), "{wrong:?}");
         }
-        assert!(!expected.is_same(2, &estimate(&[], &[])));
-    }
-
-    #[test]
-    fn one_bit_of_its_confidence_makes_a_frame_another() {
-        let expected = expected(vec![(0.5, vec![1.0, 1.0]), (-2.5, vec![0.125, 0.25])]);
+        assert!(!plain.is_same(2, &estimate(&[], &[])));
+        let sure = expected(vec![(0.5, vec![1.0, 1.0]), (-2.5, vec![0.125, 0.25])]);
         let good = estimate(&[0.0, 1.0], &[0.125, 0.25]);
-        assert!(expected.is_same(1, &good));
-        assert!(!expected.is_same(1, &EstimateReport { novelty: Some(-2.25), ..good }));
-        assert!(!expected.is_same(1, &EstimateReport { novelty: None, ..good }));
+        assert!(sure.is_same(1, &good));
+        for novelty in [Some(-2.25), None] {
+            assert!(!sure.is_same(1, &EstimateReport { novelty, ..good }));
+        }
         for wrong in [&[0.125, 0.5][..], &[0.125], &[]] {
-            assert!(!expected.is_same(1, &estimate(&[0.0, 1.0], wrong)), "{wrong:?}");
+            assert!(!sure.is_same(1, &estimate(&[0.0, 1.0], wrong)), "{wrong:?}");
         }
     }
 }

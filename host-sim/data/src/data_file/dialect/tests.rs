@@ -167,22 +167,19 @@ fn one_log_is_the_same_table_in_any_dialect() {
 #[test]
 fn an_encoding_is_found_by_its_mark_or_its_bytes() {
     let text = "t_s;Kraft µ\n1,5;2\n2,5;3\n";
-    let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
-    let utf_16 =
-        |bytes: fn(u16) -> [u8; 2]| -> Vec<u8> { text.encode_utf16().flat_map(bytes).collect() };
-    let of = |bytes: &[u8]| {
-        let file = read(bytes, Stated::default()).unwrap();
-        assert_eq!((&*file.header[1], file.values.len()), ("Kraft µ", 4));
-        file.found
-    };
-    assert_eq!(of(text.as_bytes()), "semicolons, decimal commas");
-    assert_eq!(of(&latin), "latin-1, semicolons, decimal commas");
-    for (mark, bytes) in [
-        (&[0xff, 0xfe][..], utf_16(u16::to_le_bytes)),
-        (&[0xfe, 0xff], utf_16(u16::to_be_bytes)),
-        (&[], utf_16(u16::to_le_bytes)),
-        (&[], utf_16(u16::to_be_bytes)),
+    let [little, big] =
+        [u16::to_le_bytes, u16::to_be_bytes].map(|bytes| text.encode_utf16().flat_map(bytes));
+    let [little, big]: [Vec<u8>; 2] = [little.collect(), big.collect()];
+    for (bytes, encoding) in [
+        (text.into(), ""),
+        (text.chars().map(|c| c as u8).collect(), "latin-1, "),
+        ([&[0xff, 0xfe], &little[..]].concat(), "UTF-16, "),
+        ([&[0xfe, 0xff], &big[..]].concat(), "UTF-16, "),
+        (little, "UTF-16, "),
+        (big, "UTF-16, "),
     ] {
-        assert_eq!(of(&[mark, &bytes].concat()), "UTF-16, semicolons, decimal commas");
+        let file = read(&bytes, Stated::default()).unwrap();
+        assert_eq!((&*file.header[1], file.values.len()), ("Kraft µ", 4));
+        assert_eq!(file.found, format!("{encoding}semicolons, decimal commas"));
     }
 }

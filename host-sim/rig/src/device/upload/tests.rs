@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::rc::Rc;
 
 use taxel_data::Silent;
-use taxel_firmware::link::message::{Configuration, Identity, Memory, ModelIdentity, Statistics};
+use taxel_firmware::link::message::{Configuration, Identity, ModelIdentity, Statistics};
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
 
@@ -88,33 +88,9 @@ fn a_restart_waits_for_a_device_that_takes_longer_to_answer_than_a_board_to_star
 
 /// Device of one reading whose model has the CRC-32 7.
 pub fn identity(on_trial: bool) -> Report<'static> {
-    let model = ModelIdentity {
-        crc_32: 7,
-        slot: 0,
-        generation: 1,
-        rows: 1,
-        inputs: 1,
-        outputs: 1,
-        in_ram: true,
-        scene_digest: 0,
-        inputs_crc_32: 0,
-        outputs_crc_32: 0,
-        on_trial,
-    };
-    Report::Identity(Identity {
-        board: "scripted",
-        firmware: "0",
-        rows: 1,
-        columns: 1,
-        outputs: 1,
-        model: Some(model),
-        model_name: "",
-        slot_bytes: 4096,
-        chunk_bytes: 4,
-        memory: Memory::default(),
-        unique_id: [0; 12],
-        wires_crc_32: 0,
-    })
+    let model =
+        ModelIdentity { crc_32: 7, rows: 1, inputs: 1, outputs: 1, on_trial, ..Default::default() };
+    Report::Identity(Identity { board: "scripted", model: Some(model), ..Default::default() })
 }
 
 #[test]
@@ -122,15 +98,7 @@ fn a_model_that_decodes_no_frame_is_given_up() {
     for (flags, is_seen) in [(0, true), (EstimateReport::NO_MODEL, false)] {
         let mut device = device(move |request| match request {
             Request::Identify => identity(true),
-            _ => Report::Estimate(EstimateReport {
-                frame: 0,
-                start_us: 0,
-                flags,
-                row_status: &[],
-                outputs: Floats::new(&[]),
-                novelty: None,
-                deviation: Floats::new(&[]),
-            }),
+            _ => Report::Estimate(EstimateReport { flags, ..Default::default() }),
         });
         assert_eq!(see_estimate(&mut device, 7).is_ok(), is_seen);
     }
