@@ -1,19 +1,17 @@
-//! Tests of whole pages, on results made by hand.
+//! Tests of whole pages, on the results of a small run.
 
-use taxel_limit::Refusal;
-use taxel_simulate::noise::NoiseKind;
+use std::sync::OnceLock;
 
+use taxel_data::Silent;
 use taxel_data::table::Table as Values;
-
-use super::{Made, View};
-use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::distribution::{Distribution, Reference};
 use taxel_evaluate::evaluate::table1::{Column, Entry, NETWORK, Table1};
-use taxel_evaluate::metrics::{DecoderErrors, Errors, LimitSummary};
-use taxel_evaluate::run::{
-    ModelSummary, RowErrors, RowWire, RunResult, SceneSummary, SensorSketch,
-};
+use taxel_evaluate::experiment::Experiment;
+use taxel_evaluate::run::{RunResult, run};
+use taxel_evaluate::subject::Subject;
 use taxel_evaluate::verdict::{Verdict, Warning};
+
+use super::{Made, View};
 
 fn made() -> Made {
     let files = ["model.bin", "metrics.json"].map(String::from).to_vec();
@@ -24,83 +22,29 @@ fn html(result: &RunResult) -> String {
     super::html(result, &made()).html
 }
 
-const ROW_WIRES: usize = 3;
-const PER_ROW: usize = 2;
-const ELECTRODES: usize = ROW_WIRES * PER_ROW;
+/// Electrodes of the three row-wires that are read.
+const ELECTRODES: usize = 18;
 
-fn errors(group: &str, rmse: f64) -> Errors {
-    Errors {
-        group: group.into(),
-        unit: taxel_data::columns::unit_of(group).into(),
-        count: 10,
-        rmse,
-        relative_l2_percent: Some(30.0 * rmse),
-        full_scale_percent: Some(20.0 * rmse),
-        positional_percent: (group == "dz_mm").then_some(10.0 * rmse),
-        r_squared: Some(1.0 - rmse),
-        mean_relative_percent: None,
-        ratio_to_limit: Some(1.0 + rmse),
-        ratio_standard_error: Some(0.02),
-    }
-}
-
-fn of_groups(groups: &[&str], rmse: f64) -> Vec<Errors> {
-    groups.iter().map(|group| errors(group, rmse)).collect()
-}
-
-/// Outputs of so many `frames`, and readings of two column-wires: row-wires 2 to 4, of five.
-fn tables(groups: &[&str], frames: usize) -> [Values; 3] {
-    let rows = 2..2 + ROW_WIRES;
-    let electrodes = rows.clone().flat_map(|row| (1..=PER_ROW).map(move |e| (row, e)));
-    let names = electrodes.flat_map(|(row, electrode)| {
-        groups.iter().map(move |group| format!("r{row}e{electrode}_{group}"))
+/// Result of a small run, with a hand-made table 1 and texts that need escaping.
+fn result() -> RunResult {
+    static RUN: OnceLock<RunResult> = OnceLock::new();
+    let run = RUN.get_or_init(|| {
+        let mut scene = Experiment::load("press").unwrap();
+        scene.world.read_rows = vec![1, 2, 3];
+        let training = &mut scene.training;
+        (training.frames, training.test_frames, training.centres) = (600, 20, 9);
+        training.refine = false;
+        let options = scene.options();
+        run(&Subject::Scene(scene.into()), &options, &Silent).unwrap().0
     });
-    let names: Vec<String> = names.collect();
-    let truth: Vec<f64> =
-        (0..frames * names.len()).map(|i| 0.1 * (i % 7) as f64 + 0.001 * (i % 3) as f64).collect();
-    // Frame n is off by n·0.01 everywhere.
-    let off = |(i, truth): (usize, &f64)| truth + 0.01 * (i / names.len()) as f64;
-    let estimate = truth.iter().enumerate().map(off).collect();
-    let readings: Vec<String> =
-        rows.flat_map(|row| (1..=2).map(move |k| format!("r{row}c{k}_ohm"))).collect();
-    let ohm = (0..frames * readings.len()).map(|i| 50.0 - 0.1 * (i % 11) as f64).collect();
-    [
-        Values { names: names.clone(), values: truth },
-        Values { names, values: estimate },
-        Values { names: readings, values: ohm },
-    ]
-}
-
-fn distribution(groups: &[&str]) -> Distribution {
-    let [truth, estimate, readings] = tables(groups, 20);
-    Distribution::new(&truth, &estimate, &readings, Reference::Rest(&[50.0; 2 * ROW_WIRES]))
-}
-
-fn sensor() -> SensorSketch {
-    let row = |row: usize| RowWire {
-        read: (1..=ROW_WIRES).contains(&row),
-        electrodes_mm: (0..PER_ROW)
-            .map(|i| [5.0 + 10.0 * i as f64, 2.0 + 3.5 * row as f64])
-            .collect(),
-    };
-    SensorSketch {
-        face_mm: [20.0, 18.0],
-        row_wires: (0..5).map(row).collect(),
-        column_numbers: vec![1, 2],
-        column_wires_mm: vec![vec![[5.0, 4.0], [5.0, 14.0]], vec![[15.0, 4.0], [15.0, 14.0]]],
-    }
-}
-
-fn result(groups: &[&str]) -> RunResult {
-    let distribution = distribution(groups);
-    let entry = |decoder: &str, spread: Option<f64>, rmse: f64| Entry {
-        decoder: decoder.into(),
-        spread,
-        errors: of_groups(groups, rmse),
-        largest_positional_percent: None,
+    let mut result = run.clone();
+    let entry = |decoder: &str, spread: Option<f64>, rmse: f64| {
+        let mut errors = result.decoders[0].errors.clone();
+        errors.iter_mut().for_each(|errors| errors.rmse = rmse);
+        Entry { decoder: decoder.into(), spread, errors, largest_positional_percent: None }
     };
     let column = |noise_level| Column {
-        limit: LimitSummary::new(&Err(Refusal::Drift)),
+        limit: result.limit.clone(),
         noise_level,
         decoders: vec![
             entry("mean", None, 0.3),
@@ -110,74 +54,27 @@ fn result(groups: &[&str]) -> RunResult {
             entry("standard", Some(1.0), 1234.0),
         ],
     };
-    RunResult {
-        moving: None,
-        subject: "by <hand>".into(),
-        scene_digest: "0123".into(),
-        seed: 7,
-        data: None,
-        scene: Some(SceneSummary {
-            noise_kind: NoiseKind::Relative,
-            noise_level: 0.005,
-            gain_drift: 0.0,
-            size_mm: [20.0, 18.0, 5.0],
-            row_wires: 5,
-            sensor: Some(sensor()),
-            ideal_changes: distribution.frames.iter().map(|frame| frame.change.clone()).collect(),
-        }),
-        device_cost: DeviceCost {
-            cycles: 34_000,
-            us: 200.0,
-            ram_bytes: 2000,
-            weights_in_ram: true,
-            blob_bytes: 12_345,
-            slot_bytes: 131_072,
-            fits_slot: true,
-        },
-        verdict: Verdict {
-            sentence: "It is a <good> model of dz_mm.".into(),
-            warnings: vec![Warning { name: "few-frames", text: "Few frames for dz_mm.".into() }],
-        },
-        model: ModelSummary {
-            projected_readings: 0,
-            training_frames: 1000,
-            test_frames: 100,
-            networks: ROW_WIRES,
-            inputs_per_network: 4,
-            relative_inputs: false,
-            centres: 9,
-            outputs_per_network: groups.len() * PER_ROW,
-            spread: 0.8,
-            refined: true,
-            blob_bytes: 12_345,
-            model_crc: "deadbeef".into(),
-            frame_cost: taxel_learn::cost::Cost { instructions: 20_000, cycles: 34_000 },
-        },
-        decoders: [("network", 0.1), ("linear", 0.2), ("mean", 0.3)]
-            .map(|(name, rmse)| DecoderErrors {
-                decoder: name.into(),
-                errors: of_groups(groups, rmse),
-            })
-            .to_vec(),
-        limit: LimitSummary::new(&Err(Refusal::Drift)),
-        by_depth: vec![],
-        others: None,
-        by_row: (0..ROW_WIRES)
-            .map(|row| RowErrors { row_wire: row + 2, errors: of_groups(groups, 0.1) })
-            .collect(),
-        distribution,
-        table1: Some(Table1 {
-            centres: 48,
-            noise_kind: NoiseKind::Relative,
-            training_frames: 600,
-            test_frames: 300,
-            standard_frames: 50,
-            solver: "rls",
-            columns: vec![column(0.0), column(0.01), column(0.1)],
-            printed: vec![],
-            comparison: vec![],
-        }),
-    }
+    let columns = [0.0, 0.01, 0.1].map(column).to_vec();
+    result.table1 = Some(Table1 {
+        centres: 48,
+        noise_kind: result.scene.as_ref().unwrap().noise_kind,
+        training_frames: 600,
+        test_frames: 300,
+        standard_frames: 50,
+        solver: "rls",
+        columns,
+        printed: vec![],
+        comparison: vec![],
+    });
+    result.subject = "by <hand>".into();
+    (result.seed, result.model.model_crc, result.model.blob_bytes) = (7, "deadbeef".into(), 12_345);
+    let cost = &mut result.device_cost;
+    (cost.us, cost.ram_bytes, cost.blob_bytes, cost.weights_in_ram) = (200.0, 2000, 12_345, true);
+    result.verdict = Verdict {
+        sentence: "It is a <good> model of dz_mm.".into(),
+        warnings: vec![Warning { name: "few-frames", text: "Few frames for dz_mm.".into() }],
+    };
+    result
 }
 
 /// Whether every number that places an element in a drawing is finite.
@@ -191,18 +88,18 @@ fn figures(page: &str) -> usize {
 
 #[test]
 fn the_page_is_whole_self_contained_and_always_the_same() {
-    let result = result(&["dx_mm", "dy_mm", "dz_mm"]);
+    let result = result();
     let page = html(&result);
     assert_eq!(page, html(&result));
     assert!(is_drawable(&page));
     // Density, histogram, by electrode; readings, frames, arrows; sensor; noise and spread.
-    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (9, 1));
+    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (9, 2));
     for text in [
         "seed 7",
         "K = 9",
         "12\u{202f}345 bytes",
         "deadbeef",
-        "number 9 (from 0)",
+        &format!("number {} (from 0)", result.distribution.frames[0].frame),
         "It is a &lt;good&gt; model of Δz.",
         "<li>Few frames for Δz.</li>",
         "200\u{a0}<span>µs</span>",
@@ -228,7 +125,7 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
 
 #[test]
 fn every_figure_is_a_picture_and_a_table_of_its_values() {
-    let result = result(&["dx_mm", "dy_mm", "dz_mm"]);
+    let result = result();
     let page = super::html(&result, &made());
     let links =
         page.html.split("href=\"figures/").skip(1).map(|rest| rest.split('"').next().unwrap());
@@ -259,7 +156,7 @@ fn every_figure_is_a_picture_and_a_table_of_its_values() {
     assert_eq!(lines.next(), Some("panel,row-wire,electrode,x (mm),y (mm),value,unit"));
     assert_eq!(lines.count(), 3 * ELECTRODES);
     let rmse = &result.distribution.outputs[2].rmse;
-    assert!(csv.contains(&format!("RMSE of Δz,2,1,5,5.5,{rmse},mm\n")), "{csv}");
+    assert!(csv.contains(&format!("RMSE of Δz,2,1,1.6666666666666667,3.375,{rmse},mm\n")), "{csv}");
     let csv = text("frames.csv");
     assert_eq!(csv.lines().count(), 1 + 12 * 3 * ELECTRODES);
     let csv = text("error-by-noise.csv");
@@ -272,16 +169,17 @@ fn every_figure_is_a_picture_and_a_table_of_its_values() {
 
 #[test]
 fn a_missing_value_is_drawn_nowhere() {
-    let mut result = result(&["dz_mm"]);
+    let mut result = result();
     let whole = html(&result);
-    result.distribution.steps[5].estimate[1] = f64::NAN;
+    result.distribution.steps[5].estimate[2] = f64::NAN;
     result.distribution.frames[0].change[2] = f64::NAN;
     result.distribution.outputs[0].rmse = f64::NAN;
     let page = html(&result);
     assert!(is_drawable(&page));
     let count = |page: &str| page.matches("cell-of-map").count();
     let styles = 1;
-    assert_eq!(count(&whole) - styles, 12 * 3 * ELECTRODES + ELECTRODES + 6 * 6);
+    let readings = 3 * 18;
+    assert_eq!(count(&whole) - styles, 12 * 3 * ELECTRODES + 3 * ELECTRODES + 6 * readings);
     assert_eq!(count(&whole) - count(&page), 2 + 1 + 1, "decoded, difference, reading, RMSE");
     assert_eq!(page.matches(": missing ").count(), 4);
 }
@@ -300,8 +198,9 @@ fn view<'a>(distribution: &'a Distribution, result: &'a RunResult, made: &'a Mad
 
 #[test]
 fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
-    let [_, _, readings] = tables(&["dz_mm"], 4);
-    let result = result(&["dz_mm"]);
+    let names = ["r2c1_ohm", "r2c2_ohm", "r3c1_ohm", "r3c2_ohm"].map(String::from).to_vec();
+    let readings = Values { names, values: (0..16).map(|i| 50.0 - 0.1 * f64::from(i)).collect() };
+    let result = result();
     let of = |names: &[&str], readings: &Values| {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
         let truth: Vec<f64> = (0..4 * names.len()).map(|i| (i * i % 17) as f64).collect();
@@ -329,7 +228,7 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
 }
 #[test]
 fn names_are_escaped() {
-    let mut result = result(&["dz_mm"]);
+    let mut result = result();
     result.distribution.groups[0].group = "<b>\"&".into();
     result.distribution.readings.names[0] = "<b>\"&".into();
     result.decoders[0].decoder = "<i>".into();

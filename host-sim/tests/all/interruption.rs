@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::{Folder, program, shell_status};
 use crate::device::serial_port::terminal;
-use crate::device::{frames, model};
+use crate::device::{SOUND, frames, model};
 use crate::virtual_device;
 use taxel_core::blob::Floats;
 use taxel_core::checksum::CRC_32;
@@ -72,7 +72,8 @@ impl Rig {
         let (port, _, far) = terminal();
         let trap = Arc::new(Mutex::new(Trap::default()));
         let counter = trap.clone();
-        virtual_device::run_scanning(far, model, frames(), OWN, move || {
+        let sensor = virtual_device::Source { frames: frames(), next: 0 };
+        virtual_device::run_scanning(far, SOUND, model, (sensor, OWN), move || {
             counter.lock().unwrap().count();
         });
         Self { port, trap, folder: Folder::new(name) }

@@ -72,11 +72,12 @@ impl FrameSource for AtRest {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_board_is_set_up_from_the_command_line_and_stays_so() {
-    use crate::virtual_device::{Line, run_with};
+    use crate::virtual_device::{Line, QUIET, run_scanning};
 
     let folder = Folder::new("settings");
     let (port, near, far) = crate::device::serial_port::terminal();
-    run_with(far, Line { one_in: None }, &[], AtRest(ZeroPotential::TYPICAL));
+    let sensor = AtRest(ZeroPotential::TYPICAL);
+    run_scanning(far, Line { one_in: None }, &[], (sensor, QUIET), || ());
     drop(near); // the program opens it itself
     let link = |arguments: &[&str]| folder.succeed(&[&["link", &port][..], arguments].concat());
 

@@ -8,7 +8,7 @@ use taxel_firmware::capacity::Capacity;
 use taxel_firmware::link::message::{Configuration, Memory};
 use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
-use taxel_firmware::store::{FlashError, Journal, PAGE_BYTES, Slot};
+use taxel_firmware::store::Journal;
 
 /// Line to the device that spoils bytes, in either direction: one in so many, or none.
 #[derive(Debug, Clone, Copy)]
@@ -16,36 +16,12 @@ pub struct Line {
     pub one_in: Option<usize>,
 }
 
-/// Flash without faults: a model slot, or a page of the journal.
-struct Flash(Vec<u32>);
+/// The mock flash of the firmware's tests, whose power is not cut here.
+#[path = "../../../firmware/tests/mock/flash.rs"]
+#[expect(dead_code, reason = "power cuts are for the firmware's tests")]
+mod flash;
 
-impl Flash {
-    /// Erased flash of so many bytes.
-    fn erased(bytes: usize) -> Self {
-        Self(vec![u32::MAX; bytes / 4])
-    }
-}
-
-impl Slot for Flash {
-    fn erase_interval_s(&self) -> u32 {
-        0
-    }
-
-    fn bytes(&self) -> &[u8] {
-        bytemuck::cast_slice(&self.0)
-    }
-
-    fn erase(&mut self) -> Result<(), FlashError> {
-        self.0.fill(u32::MAX);
-        Ok(())
-    }
-
-    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
-        let place: &mut [u8] = bytemuck::cast_slice_mut(&mut self.0);
-        place[offset..offset + bytes.len()].copy_from_slice(bytes);
-        Ok(())
-    }
-}
+use flash::{Flash, Supply};
 
 /// Board whose serial line is `W`, whose reads must not block.
 struct Board<'s, W, N> {
@@ -154,9 +130,9 @@ fn is_timeout(cause: &std::io::Error) -> bool {
 
 /// Sensor that goes through given frames again and again.
 #[derive(Clone)]
-struct Source {
-    frames: Vec<[[f32; 18]; 8]>,
-    next: usize,
+pub struct Source {
+    pub frames: Vec<[[f32; 18]; 8]>,
+    pub next: usize,
 }
 
 impl FrameSource for Source {
@@ -169,59 +145,38 @@ impl FrameSource for Source {
     }
 }
 
-/// Runs a device on `wire` that goes through `frames`: see [`run_with`].
+/// Runs a device on `wire` that goes through `frames` when the host asks for a scan: see [`run_scanning`].
 pub fn run(
     wire: impl Read + Write + Send + 'static,
     line: Line,
     model: &[u8],
     frames: Vec<[[f32; 18]; 8]>,
 ) {
-    run_with(wire, line, model, Source { frames, next: 0 });
+    run_scanning(wire, line, model, (Source { frames, next: 0 }, QUIET), || ());
 }
 
-/// Runs a device on `wire` that scans `source` when the host asks for it: see [`run_on_its_own`].
-pub fn run_with(
-    wire: impl Read + Write + Send + 'static,
-    line: Line,
-    model: &[u8],
-    source: impl FrameSource + Clone + Send + 'static,
-) {
-    let quiet = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
-    run_on_its_own(wire, line, model, source, quiet, || ());
-}
+/// Configuration that scans only on request.
+pub const QUIET: Configuration = Configuration { frame_period_us: 0, ..Configuration::DEFAULT };
 
-/// Runs a device on `wire` that goes through `frames` by its `own` configuration, and calls `notice` with each
-/// request's last byte, before it is carried out.
-pub fn run_scanning(
-    wire: impl Read + Write + Send + 'static,
-    model: &[u8],
-    frames: Vec<[[f32; 18]; 8]>,
-    own: Configuration,
-    notice: impl FnMut() + Send + 'static,
-) {
-    run_on_its_own(wire, Line { one_in: None }, model, Source { frames, next: 0 }, own, notice);
-}
-
-/// Runs a device on `wire` that scans `source`, until the host goes. The device is restarted whenever it asks for
-/// that.
+/// Runs a device on `wire` that scans `source` by its `own` configuration, until the host goes. Calls `notice` with each
+/// request's last byte, before it is carried out. The device is restarted whenever it asks for that.
 ///
 /// `wire` must read without blocking.
-fn run_on_its_own(
+pub fn run_scanning(
     mut wire: impl Read + Write + Send + 'static,
     line: Line,
     model: &[u8],
-    source: impl FrameSource + Clone + Send + 'static,
-    own: Configuration,
+    (source, own): (impl FrameSource + Clone + Send + 'static, Configuration),
     mut notice: impl FnMut() + Send + 'static,
 ) {
     let model = model.to_vec();
     // Half of a large model fits: both ways are taken.
     let mut weights = vec![0; 8 * 1024];
     std::thread::spawn(move || {
-        let mut slots = [0, 1].map(|_| Flash::erased(128 * 1024));
-        let flashed: &mut [u8] = bytemuck::cast_slice_mut(&mut slots[0].0);
-        flashed[..model.len()].copy_from_slice(&model);
-        let mut journal = Journal::new([0, 1].map(|_| Flash::erased(PAGE_BYTES)));
+        let supply = Supply::new(0);
+        let mut slots = [0, 1].map(|_| Flash::erased(128 * 1024, &supply));
+        slots[0].flash(0, &model);
+        let mut journal = Flash::journal();
         for life in 0.. {
             let board = Board {
                 wire: &mut wire,
