@@ -1,5 +1,5 @@
 use taxel_core::blob::{Floats, Metadata, ModelParts, encode_to_vec};
-use taxel_core::rbf::Format;
+use taxel_core::rbf::{Format, Shape};
 use taxel_data::{Dataset, Purpose, Random, Silent, Stream};
 use taxel_simulate::{Synthesis, World, synthesise};
 
@@ -78,6 +78,30 @@ fn small(options: Options) -> (ModelBlob, Dataset) {
     let trained = train(&seen, &options, &Silent).unwrap();
     let blob = pack(&trained, &seen, &Origin::of_data("rows", 0, 1, &seen)).unwrap();
     (blob, synthesise(&world, Stream::Test, 400))
+}
+
+#[test]
+fn slopes_of_a_smooth_network_are_differences_of_its_outputs() {
+    let (blob, frames) = small(Options::of_rows());
+    let smooth = Smooth::new(&blob.prepare().networks()[0]);
+    let Shape { inputs, outputs, .. } = smooth.shape;
+    for frame in 0..20 {
+        let scale = smooth.zeros.iter().zip(&smooth.per_unit);
+        let readings = frames.inputs.line(frame).iter().zip(scale);
+        let x: Vec<f64> = readings.map(|(r, (zero, per_unit))| (r - zero) * per_unit).collect();
+        let i = frame * 5 % inputs;
+        let at = |step: f64| {
+            let mut x = x.clone();
+            x[i] += step;
+            smooth.infer(&x, &mut [])
+        };
+        let mut slopes = vec![0.0; inputs * outputs];
+        smooth.infer(&x, &mut slopes);
+        for (o, (below, above)) in at(-1e-4).iter().zip(at(1e-4)).enumerate() {
+            let (found, expected) = (slopes[o * inputs + i], (above - below) / 2e-4);
+            assert!((found - expected).abs() <= 1e-6, "{found} for {expected}");
+        }
+    }
 }
 
 #[test]
