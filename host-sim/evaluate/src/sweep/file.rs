@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use taxel_data::{BadValue, require};
 use toml::Table;
 
 use super::fields::require_known;
@@ -47,6 +48,8 @@ pub struct Wanted {
     pub bounds: BTreeMap<String, Bound>,
     /// Device that scans and decodes, and `samples` averaged.
     pub device: Table,
+    /// Prices of the parts of a sensor.
+    pub prices: Option<PartPrices>,
     /// Fields that are changed in every point.
     pub set: Table,
     /// Axes that are crossed.
@@ -64,6 +67,7 @@ impl Default for Wanted {
             objectives: vec![],
             bounds: BTreeMap::new(),
             device: Table::new(),
+            prices: None,
             set: Table::new(),
             axes: Table::new(),
             draw: None,
@@ -164,9 +168,47 @@ impl Bound {
     }
 }
 
+/// Prices of the parts of a sensor, in €.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PartPrices {
+    pub fixed_eur: f64,
+    /// Price of a row-wire with what drives it.
+    pub row_eur: f64,
+    /// Price of a column-wire with what samples it.
+    pub column_eur: f64,
+    /// Price of a cm² of the mat.
+    pub cm2_eur: f64,
+}
+
+impl PartPrices {
+    pub(super) fn check(&self) -> std::result::Result<(), BadValue> {
+        let all = [
+            ("prices.fixed_eur", self.fixed_eur),
+            ("prices.row_eur", self.row_eur),
+            ("prices.column_eur", self.column_eur),
+            ("prices.cm2_eur", self.cm2_eur),
+        ];
+        all.into_iter().try_for_each(|(field, price)| {
+            let rule = || "give a price in €, 0 or more".into();
+            require(price.is_finite() && price >= 0.0, field, price, rule)
+        })
+    }
+
+    /// Adds `cost_eur` to `results` that tell of a sensor's parts.
+    pub(super) fn add_cost(&self, results: &mut BTreeMap<String, f64>) {
+        let of = |name| results.get(name).copied();
+        if let [Some(rows), Some(columns), Some(area_cm2)] = ["rows", "columns", "area_cm2"].map(of)
+        {
+            let of_wires = rows * self.row_eur + columns * self.column_eur;
+            results.insert("cost_eur".into(), self.fixed_eur + of_wires + area_cm2 * self.cm2_eur);
+        }
+    }
+}
+
 /// Checks the names at the top of a plan: serde does not, where fields are flattened.
 fn check_top(text: &str) -> std::result::Result<(), String> {
-    const KNOWN: [&str; 12] = [
+    const KNOWN: [&str; 13] = [
         "name",
         "scene",
         "data",
@@ -176,6 +218,7 @@ fn check_top(text: &str) -> std::result::Result<(), String> {
         "objectives",
         "bounds",
         "device",
+        "prices",
         "set",
         "axes",
         "draw",

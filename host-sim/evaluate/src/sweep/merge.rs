@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::axis::rounded;
 use super::effects::{Effect, Settings};
-use super::file::Bound;
+use super::file::{Bound, PartPrices};
 use super::plan::{Plan, Point, SEED};
 use super::point::place_of;
 use super::store::{Found, Record, Store};
@@ -48,10 +48,13 @@ pub struct PointResult {
 }
 
 impl PointResult {
-    fn new(point: &Point, record: Record) -> Self {
+    fn new(point: &Point, record: Record, prices: Option<&PartPrices>) -> Self {
         let value = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
         let values = point.values.iter().map(|(field, it)| (field.clone(), value(it))).collect();
-        let Record { id, results, notes, failed, .. } = record;
+        let Record { id, mut results, notes, failed, .. } = record;
+        if let Some(prices) = prices {
+            prices.add_cost(&mut results);
+        }
         Self { id, values, results, notes, failed }
     }
 }
@@ -124,7 +127,7 @@ impl Merged {
             match record {
                 None => missing.push(point.id.clone()),
                 Some(record) => {
-                    results.push(PointResult::new(point, record));
+                    results.push(PointResult::new(point, record, plan.prices.as_ref()));
                     scenes.push(point.scene.as_str());
                 }
             }

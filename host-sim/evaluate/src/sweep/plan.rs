@@ -12,7 +12,7 @@ use toml::{Table, Value};
 
 use super::axis::{Axis, latin_hypercube};
 use super::fields::{self, require_known};
-use super::file::{Bound, OneOrMore, PlanFile, Wanted};
+use super::file::{Bound, OneOrMore, PartPrices, PlanFile, Wanted};
 use super::point::{columns_of, not_computed};
 use crate::error::{Error, Result};
 use crate::evaluate::trade::Device;
@@ -49,6 +49,7 @@ pub struct Plan {
     pub fields: Vec<String>,
     pub objectives: Vec<String>,
     pub bounds: BTreeMap<String, Bound>,
+    pub prices: Option<PartPrices>,
     /// Measurements that all points are trained on, if it is no plan of scenes.
     pub data: Option<Arc<Measurements>>,
     /// Digest of these, of the frames that they are judged by, and of all options.
@@ -167,6 +168,7 @@ impl Plan {
         check_name(name)?;
         let allowed = (1..=MOST_POINTS).contains(&wanted.repeats);
         require(allowed, "repeats", wanted.repeats, || format!("give 1 to {MOST_POINTS}"))?;
+        wanted.prices.iter().try_for_each(PartPrices::check)?;
         require(wanted.limit_frames != Some(1), "limit_frames", 1, || {
             "give at least 2, or 0 for no limit".into()
         })?;
@@ -176,6 +178,7 @@ impl Plan {
             fields: axes.iter().flat_map(|(fields, _)| fields.clone()).collect(),
             objectives: wanted.objectives,
             bounds: wanted.bounds,
+            prices: wanted.prices,
             data_digest: data.as_deref().map_or(0, digest_of),
             data,
             limit_frames: wanted.limit_frames,

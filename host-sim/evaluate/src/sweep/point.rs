@@ -34,10 +34,11 @@ impl Results {
 }
 
 /// Results that do not belong to a group of outputs, in the order of tables.
-const GENERAL: [&str; 11] = [
+const GENERAL: [&str; 12] = [
     "rows",
     "columns",
     "area_cm2",
+    "cost_eur",
     "scan_ms",
     "decode_ms",
     "frame_ms",
@@ -48,7 +49,7 @@ const GENERAL: [&str; 11] = [
     "ram_bytes",
 ];
 /// First of these that only a model has.
-const MODEL_FROM: usize = 4;
+const MODEL_FROM: usize = 5;
 /// Results of each group of outputs, in the order of tables.
 const OF_GROUP: [&str; 4] = ["limit", "limit_standard_error", "rmse", "ratio_to_limit"];
 
@@ -62,7 +63,7 @@ pub fn columns_of(plan: &Plan, groups: &[&str]) -> Vec<String> {
 /// Reason why a plan does not compute the result called `name`, and what to give for it; `None` if it does, and for a
 /// name that no result has.
 pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
-    let is_of_scene = name == "area_cm2" || name.starts_with("limit_");
+    let is_of_scene = ["area_cm2", "cost_eur"].contains(&name) || name.starts_with("limit_");
     let is_of_model = ["rmse_", "ratio_to_limit_"].iter().any(|start| name.starts_with(start))
         || GENERAL[MODEL_FROM..].contains(&name);
     if plan.data.is_some() && (is_of_scene || name.starts_with("ratio_")) {
@@ -70,6 +71,7 @@ pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
     }
     let is_of_limit = name.starts_with("limit_") || name.starts_with("ratio_");
     match name {
+        "cost_eur" if plan.prices.is_none() => Some("the plan has no [prices]; give them"),
         _ if is_of_limit && plan.limit_frames == Some(0) => {
             Some("the plan computes no limit; leave limit_frames = 0 out")
         }
