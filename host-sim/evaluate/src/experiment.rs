@@ -11,7 +11,6 @@ use taxel_core::blob::NoiseKind as BlobNoiseKind;
 use taxel_core::rbf::Format;
 use taxel_data::digest::digest;
 use taxel_data::{BadValue, Dataset, Progress, Stream, input, require};
-use taxel_learn::decoders::textbook::{Scaling, SpreadMeaning};
 use taxel_learn::train::{FreshFrames, Solver, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
@@ -133,31 +132,9 @@ pub struct Table1 {
     /// How output weights are computed; the paper's way is recursive least squares.
     #[serde(default = "by_recursion")]
     pub solver: Solver,
-    /// What the paper leaves open, where it is chosen otherwise than for a device.
-    pub open: Option<OpenChoices>,
-}
-
-/// Choices for Table 1 that the paper leaves open. Networks are then computed in f64, as no device has them, by QR: with
-/// the same penalty it gives the weights of the recursion.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct OpenChoices {
-    pub inputs_scaled: Scaling,
-    pub spread_is: SpreadMeaning,
-    pub bias: bool,
-    /// Initial covariance δ of the recursive least squares: the penalty on squared weights is 1/δ.
-    pub initial_covariance: f64,
-    /// Samples that cells are judged on.
-    pub judged_on: JudgedOn,
-}
-
-/// Samples that the cells of Table 1 are judged on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum JudgedOn {
-    /// Frames that training did not see.
-    Fresh,
-    Training,
+    /// Initial covariance δ for networks in f64 on readings over their maximum, as no device has them. They are computed
+    /// by QR: with the penalty 1/δ it gives the weights of the recursion.
+    pub textbook_covariance: Option<f64>,
 }
 
 fn by_recursion() -> Solver {
@@ -417,9 +394,8 @@ fn check_table1(t: &Table1, noise_kind: NoiseKind) -> Check {
     for level in &t.noise_levels {
         check_noise_level("table1.noise_levels", noise_kind, *level)?;
     }
-    if let Some(open) = &t.open {
-        let delta = open.initial_covariance;
-        let field = "table1.open.initial_covariance";
+    if let Some(delta) = t.textbook_covariance {
+        let field = "table1.textbook_covariance";
         require((1e-12..=1e12).contains(&delta), field, format!("{delta:?}"), || {
             "give a number from 1e-12 to 1e12; the penalty on squared weights is one over it".into()
         })?;

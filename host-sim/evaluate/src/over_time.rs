@@ -7,11 +7,9 @@ use taxel_data::{Table, columns};
 use crate::measurements::Log;
 use crate::metrics::pooled;
 
-mod relative_trial;
 mod at_rest;
 
 pub use at_rest::{ColumnDrift, PercentOf, RestOverTime, RestStretch};
-pub use relative_trial::RelativeTrial;
 
 /// Most stretches of time that a part of a log is cut into.
 const MOST_STRETCHES: usize = 20;

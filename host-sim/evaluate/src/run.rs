@@ -179,7 +179,7 @@ pub fn run(
         .with(others.as_ref().and_then(|it| it.warning(&decoders)));
     let mut over_time = None;
     if let Subject::Measured(data) = subject {
-        let at_rest = RestOverTime::of_data(data, options);
+        let at_rest = RestOverTime::of_data(data);
         verdict = verdict.of_data(data, at_rest.as_ref());
         over_time = of_log(data, &network, &estimate, at_rest);
         let last_lines = data.log.lines.last() < data.test_log.lines.first();

@@ -154,7 +154,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         fill: model.fill().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: model_outputs::of(&model),
-        worth: Worth::new(&subject, &set, &blob, selection.as_ref(), &options),
+        worth: Worth::new(&subject, &set, &blob, selection.as_ref()),
         selection,
         outliers: subject.measurements().map(|data| data.outliers.clone()),
         lines_left_out: subject.measurements().map(|data| data.left_out.clone()),

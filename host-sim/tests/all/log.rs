@@ -59,13 +59,11 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
     );
     let most = rest["drifts"][0]["percent"].as_f64().unwrap();
     assert!((16.0..18.0).contains(&most), "{most}");
-    let ratio = rest["relative_trial"]["ratio"].as_f64().unwrap();
+    let warning = plain["verdict"]["warnings"][0]["text"].as_str().unwrap();
+    assert!(warning.contains("try --relative-inputs"), "{warning}");
     let relative = folder.json(&[&run[..], &["--relative-inputs"]].concat());
     let gained = force_rmse(&relative) / force_rmse(&plain);
-    // The trial judges by lines that it was not trained on, as `run` does.
-    let tried = rest["relative_trial"]["rmse"][1].as_f64().unwrap() / force_rmse(&plain);
-    assert!((0.65..1.5).contains(&tried), "{tried}");
-    assert!(ratio < 0.7 && gained < 0.7, "{ratio} {gained}");
+    assert!(gained < 0.7, "{gained}");
     assert_eq!(warnings(&relative), [""; 0]);
     let words = relative["verdict"]["sentence"].as_str().unwrap();
     assert!(words.contains("errors at the end of the log"), "{words}");

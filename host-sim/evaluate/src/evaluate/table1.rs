@@ -16,7 +16,7 @@ use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::sensor::Sensor;
 
 use crate::error::{Error, Result};
-use crate::experiment::{Experiment, JudgedOn, OpenChoices, Table1 as Settings};
+use crate::experiment::{Experiment, Table1 as Settings};
 use crate::metrics::{self, Definition, Errors, LimitSummary, Measure};
 
 use super::printed::{self, Cells, Nearness, Printed, SPREADS};
@@ -114,23 +114,13 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
             "it has no [table1]: add one, or use a scene that has (paper, paper-as-printed)";
         Error::of_scene(&experiment.name, cause)
     })?;
-    let on_training = settings.open.is_some_and(|open| open.judged_on == JudgedOn::Training);
     let columns = settings.noise_levels.iter().map(|&level| {
         let frames = Synthesis::new(&experiment.world).noise_level(level);
         let training = experiment.dataset(&frames, Stream::Training, settings.frames);
-        let (test, (measure, limit)) = if on_training {
-            (training.clone(), (experiment.measure(), no_limit_on_training()))
-        } else {
-            let test = experiment.dataset(&frames, Stream::Test, settings.test_frames);
-            (
-                test,
-                experiment.measure_beside_limit(
-                    experiment.world.noise.with_level(level),
-                    settings.test_frames,
-                    progress,
-                ),
-            )
-        };
+        let test = experiment.dataset(&frames, Stream::Test, settings.test_frames);
+        let noise = experiment.world.noise.with_level(level);
+        let (measure, limit) =
+            experiment.measure_beside_limit(noise, settings.test_frames, progress);
         progress.stage(&format!("table 1, noise {level}"), experiment.world.read_rows.len());
         let decoders = decoders(settings, experiment.world.seed, &training, progress)?;
         let judged = |(spread, decoder): &Spread| entry(decoder.as_ref(), *spread, &test, &measure);
@@ -147,9 +137,10 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
         centres: settings.centres,
         noise_kind: experiment.world.noise.kind,
         training_frames: settings.frames,
-        test_frames: if on_training { settings.frames } else { settings.test_frames },
+        test_frames: settings.test_frames,
         standard_frames: settings.standard_frames,
-        solver: if settings.open.is_some() { Solver::Qr.name() } else { settings.solver.name() },
+        solver: if settings.textbook_covariance.is_some() { Solver::Qr } else { settings.solver }
+            .name(),
         columns,
         printed: if comparison.is_empty() { Vec::new() } else { printed::cells().collect() },
         comparison,
@@ -168,11 +159,6 @@ fn is_comparable(experiment: &Experiment, table: &Settings) -> bool {
         && has_z
         && world.noise.kind != NoiseKind::Absolute
         && printed::is_layout(&table.spreads, &table.noise_levels)
-}
-
-fn no_limit_on_training() -> LimitSummary {
-    let refused = "cells are judged on the samples that were trained on, and these are no test";
-    LimitSummary { frames: 0, groups: Vec::new(), refused: Some(refused.into()) }
 }
 
 /// The table along z by every formula that could be the paper's, beside the printed cells.
@@ -249,12 +235,12 @@ fn decoders(
     training: &Dataset,
     progress: &dyn Progress,
 ) -> Result<Vec<Spread>> {
-    match &settings.open {
+    match settings.textbook_covariance {
         None => fit_rows(settings, training, progress, |row| {
             row_networks(settings, seed, row, training)
         }),
-        Some(open) => fit_rows(settings, training, progress, |row| {
-            Ok(textbook_networks(settings, open, seed, row, training))
+        Some(covariance) => fit_rows(settings, training, progress, |row| {
+            Ok(textbook_networks(settings, covariance, seed, row, training))
         }),
     }
 }
@@ -322,10 +308,10 @@ fn row_networks(
 /// Initial covariance of standard networks in f64: the penalty is too small to be felt.
 const INTERPOLATING: f64 = 1e12;
 
-/// Networks of one row-wire with the choices that the paper leaves `open`.
+/// Networks of one row-wire in f64, with this initial `covariance`.
 fn textbook_networks(
     settings: &Settings,
-    open: &OpenChoices,
+    covariance: f64,
     seed: u64,
     row: usize,
     training: &Dataset,
@@ -334,16 +320,13 @@ fn textbook_networks(
     let few = table.first(settings.standard_frames);
     let hidden = |table: &RowTable, centres| {
         let mut random = Random::new(seed, Stream::Training, Purpose::Centres, 0, row as u64);
-        Arc::new(Textbook::new(table, open.inputs_scaled, centres, &mut random))
+        Arc::new(Textbook::new(table, centres, &mut random))
     };
     let (network, standard) =
         (hidden(&table, settings.centres), hidden(&few, settings.standard_frames));
     let each = settings.spreads.par_iter().map(|&spread| {
-        let fit = |hidden: &Arc<Textbook>, table, initial_covariance| {
-            let decay = open.spread_is.decay(spread);
-            hidden.fit(table, decay, open.bias, initial_covariance)
-        };
-        (fit(&network, &table, open.initial_covariance), Some(fit(&standard, &few, INTERPOLATING)))
+        let network = network.fit(&table, spread, covariance);
+        (network, Some(standard.fit(&few, spread, INTERPOLATING)))
     });
     let (networks, standard) = each.collect::<Vec<_>>().into_iter().unzip();
     RowNetworks { networks, standard }

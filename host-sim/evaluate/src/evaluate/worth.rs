@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 use taxel_data::{Dataset, Stream, columns};
+use taxel_learn::ModelBlob;
 use taxel_learn::decoders::{BASELINES, mean};
 use taxel_learn::select::Selection;
-use taxel_learn::{ModelBlob, Options};
 use taxel_limit::Refusal;
 use taxel_simulate::Synthesis;
 
@@ -53,14 +53,13 @@ pub struct Worth {
 }
 
 impl Worth {
-    /// Worth of the model in `blob`, trained with `options` on `set` of `subject`. A `selection` of
-    /// these has errors on held-out folds.
+    /// Worth of the model in `blob`, trained on `set` of `subject`. A `selection` of its options has errors on held-out
+    /// folds.
     pub fn new(
         subject: &Subject,
         set: &TrainingSet<'_>,
         blob: &ModelBlob,
         selection: Option<&Selection>,
-        options: &Options,
     ) -> Self {
         let (judged_on, decoders) = match (selection, subject) {
             (Some(selection), _) => (JudgedOn::HeldOutFolds, on_folds(selection, set)),
@@ -80,9 +79,8 @@ impl Worth {
             .with(subject.scene().and_then(|_| Warning::not_positive(&set.frames.inputs)));
         let verdict = match subject {
             Subject::Measured(data) => {
-                let at_rest = (!data.training.relative_inputs)
-                    .then(|| RestOverTime::of_data(data, options))
-                    .flatten();
+                let at_rest =
+                    (!data.training.relative_inputs).then(|| RestOverTime::of_data(data)).flatten();
                 verdict.of_data(data, at_rest.as_ref())
             }
             Subject::Scene(_) => verdict,

@@ -2,9 +2,7 @@
 
 use serde::Serialize;
 use taxel_data::{Clock, Rest};
-use taxel_learn::Options;
 
-use super::relative_trial::RelativeTrial;
 use super::{MOST_STRETCHES, cut, is_log};
 use crate::measurements::{Measurements, Spread, far_from_zero};
 
@@ -41,8 +39,6 @@ pub struct RestOverTime {
     pub readings: usize,
     /// Time between the first stretch and the last, in words: `in 9.6 minutes`.
     pub span: String,
-    /// What relative inputs would change; `None` if it was not tried.
-    pub relative_trial: Option<RelativeTrial>,
 }
 
 /// Changes of readings at rest in a stretch of time.
@@ -68,15 +64,10 @@ pub struct ColumnDrift {
 }
 
 impl RestOverTime {
-    /// Readings at rest of the log in `data`, by time. If they drift, and a model with `options` is given readings as they
-    /// are, relative inputs are tried. `None` if lines are in no order of time, or none is at rest.
-    pub fn of_data(data: &Measurements, options: &Options) -> Option<Self> {
+    /// Readings at rest of the log in `data`, by time. `None` if lines are in no order of time, or none is at rest.
+    pub fn of_data(data: &Measurements) -> Option<Self> {
         let rest = data.rest.as_ref().filter(|_| is_log(&data.log, &data.training.outputs))?;
-        let mut found = Self::new(rest, &data.log.clock, &data.spread)?;
-        if !found.drifts.is_empty() && found.percent_of == PercentOf::Rest {
-            found.relative_trial = RelativeTrial::new(data, options);
-        }
-        Some(found)
+        Self::new(rest, &data.log.clock, &data.spread)
     }
 
     /// Readings at `rest` by time; `None` if they are of another file, or too few. `spread` is that of the log's
@@ -150,7 +141,6 @@ impl RestOverTime {
             drifts: noticeable,
             readings: all.len(),
             span: clock.span(time(0)[0], time(ranges.len() - 1)[1]),
-            relative_trial: None,
         })
     }
 }

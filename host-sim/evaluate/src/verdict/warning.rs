@@ -180,12 +180,18 @@ impl Warning {
         })
     }
 
-    /// Readings at rest that drift, and whether relative inputs help, if they were tried.
+    /// Readings at rest that drift, and what may help.
     pub fn drift(rest: &RestOverTime) -> Option<Self> {
         Self::when(!rest.drifts.is_empty(), "drift-at-rest", || {
-            let of = match rest.percent_of {
-                PercentOf::Rest => "",
-                PercentOf::Range => " of its range",
+            let (of, help) = match rest.percent_of {
+                PercentOf::Rest => (
+                    "",
+                    "try --relative-inputs, which takes readings over the baseline of the pause before",
+                ),
+                PercentOf::Range => (
+                    " of its range",
+                    "subtract the mean of each pause before training (docs/drift.md)",
+                ),
             };
             let named = rest.drifts.iter().take(MOST_NAMED);
             let named: Vec<String> = named
@@ -195,8 +201,7 @@ impl Warning {
                 1 => "an input drifts".to_owned(),
                 count => format!("{count} of {} inputs drift", rest.readings),
             };
-            let tried = tried(rest);
-            format!("at rest, {count} {}: {}{tried}", rest.span, named.join(", "))
+            format!("at rest, {count} {}: {}; {help}", rest.span, named.join(", "))
         })
     }
 
@@ -247,38 +252,6 @@ impl Warning {
 
 /// Most columns, and most outputs, that are named in a warning of drift.
 const MOST_NAMED: usize = 3;
-
-/// What the trial of relative inputs says to do.
-fn tried(rest: &RestOverTime) -> String {
-    /// Share of the error below which relative inputs are proposed.
-    const WORTH: f64 = 0.95;
-    let trial = rest.relative_trial.as_ref();
-    let Some(trial) = trial else {
-        return match rest.percent_of {
-            PercentOf::Rest => {
-                "; --relative-inputs takes readings over the baseline of the pause before".into()
-            }
-            PercentOf::Range => {
-                "; subtract the mean of each pause before training (docs/drift.md)".into()
-            }
-        };
-    };
-    let errors = |rmse: &[f64]| {
-        let errors = rmse.iter().take(MOST_NAMED).map(|rmse| significant(*rmse));
-        errors.collect::<Vec<_>>().join(", ")
-    };
-    if trial.ratio >= WORTH {
-        return "; --relative-inputs was tried, and does not help".into();
-    }
-    let gain = 100.0 * (1.0 - trial.ratio);
-    format!(
-        "; try --relative-inputs: without refinement, on the last fifth of the training lines, it lowered errors by {gain:.0} % \
-         (RMSE of {}: {} instead of {})",
-        trial.groups[..trial.groups.len().min(MOST_NAMED)].join(", "),
-        errors(&trial.relative_rmse),
-        errors(&trial.rmse)
-    )
-}
 
 /// Options with which a blob of so many `bytes`, of a model of this `design`, fits into a slot.
 fn smaller(bytes: usize, design: &Design) -> Vec<String> {
