@@ -26,8 +26,7 @@ use crate::store::Kind;
 /// Version of what is kept for `setting`. Whoever changes the setting's fields must raise it.
 const fn version(setting: Setting) -> u8 {
     match setting {
-        // Before version 2 it did not tell what is sent of a model's confidence, before version 3 nothing of a filter,
-        // and before version 4 it told of a gate.
+        // Earlier versions had other fields.
         Setting::Configuration => 4,
         // Before version 2 a baseline did not tell its wires.
         Setting::Baseline => 2,

@@ -38,8 +38,6 @@ pub enum Purpose {
     Posterior = 11,
     /// Start of a mixture of Gaussians.
     Mixture = 12,
-    /// What is wrong with a frame that a model should find novel.
-    Anomaly = 13,
     /// Set-ups of a search.
     Setup = 14,
     /// The path of a contact.
@@ -63,8 +61,6 @@ pub enum Stream {
     Refinement = 4,
     /// Frames that a model's confidence is calibrated on.
     Calibration = 5,
-    /// Frames that a model should find novel.
-    Anomaly = 6,
 }
 
 /// Seeded source of random draws.

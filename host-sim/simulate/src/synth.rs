@@ -123,13 +123,6 @@ impl<'w> Synthesis<'w> {
         self
     }
 
-    /// Synthesises readings and outputs of all row-wires, whichever the world reads.
-    #[must_use]
-    pub fn all_rows(mut self) -> Self {
-        self.read_rows = Cow::Owned((0..self.world.sensor.row_wires).collect());
-        self
-    }
-
     /// Replaces the outputs.
     #[must_use]
     pub fn outputs(mut self, outputs: Outputs) -> Self {
