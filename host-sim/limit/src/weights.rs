@@ -1,6 +1,6 @@
 //! Importance weights: their effective number, and tempering.
 
-use taxel_data::exp;
+use taxel_data::{exp, widest};
 
 /// Weights proportional to the exponentials of `logarithms`, with a sum of 1; all 0 if no logarithm is finite.
 pub fn normalised(logarithms: &[f64]) -> Vec<f64> {
@@ -8,8 +8,8 @@ pub fn normalised(logarithms: &[f64]) -> Vec<f64> {
     if !most.is_finite() {
         return vec![0.0; logarithms.len()];
     }
-    let mut weights: Vec<f64> =
-        logarithms.iter().map(|logarithm| exp((logarithm - most).min(0.0))).collect();
+    let mut weights = logarithms.to_vec();
+    widest!(weights.iter_mut().for_each(|weight| *weight = exp((*weight - most).min(0.0))));
     let sum: f64 = weights.iter().sum();
     weights.iter_mut().for_each(|weight| *weight /= sum);
     weights
