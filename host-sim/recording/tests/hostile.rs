@@ -1,5 +1,6 @@
 //! Any bytes are read in bounded memory or refused, without a panic.
 
+#[path = "all/common.rs"]
 mod common;
 
 use std::alloc::{GlobalAlloc, Layout as Size, System};

@@ -1,11 +1,9 @@
 //! What is written comes back to the bit, whole or cut.
 
-mod common;
-
 use std::fs;
 use std::time::{Duration, UNIX_EPOCH};
 
-use common::{Folder, assert_same, electrodes, extras, forces, frames, start, write};
+use crate::common::{Folder, assert_same, electrodes, extras, forces, frames, start, write};
 use taxel_recording::{
     Column, Electrode, Error, Extras, Frame, Layout, Reader, Replace, Writer, recover,
 };

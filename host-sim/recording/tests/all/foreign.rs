@@ -1,10 +1,8 @@
 //! Files of others: recordings that tools wrote anew are read, and whatever is no recording is refused with what it lacks.
 
-mod common;
-
 use std::io::Cursor;
 
-use common::{assert_same, electrodes, frames, recording};
+use crate::common::{assert_same, electrodes, frames, recording};
 use taxel_recording::{Error, Frame, Reader, Writer};
 
 const _: fn() = || {
