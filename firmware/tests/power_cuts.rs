@@ -9,7 +9,7 @@ use taxel_firmware::store::{ConfirmedModels, Kind, PAGE_BYTES};
 use crate::mock::*;
 
 /// Cases of each job, unless `TAXEL_CASES` says otherwise.
-const CASES: u64 = 12;
+const CASES: u64 = 5;
 
 /// First cuts of each device.
 const FIRST_CUTS: usize = 4;

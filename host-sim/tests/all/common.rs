@@ -143,7 +143,7 @@ pub fn small_scene() -> String {
         ("spread = 0.4", "spread = 0.8"),
         ("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]"),
         ("frames = 20000", "frames = 3000"),
-        ("test_frames = 8000", "test_frames = 500"),
+        ("test_frames = 8000", "test_frames = 80"),
         ("centres = 64", "centres = 12"),
     ] {
         assert!(scene.contains(from), "{from}");
@@ -152,10 +152,17 @@ pub fn small_scene() -> String {
     scene
 }
 
+/// [`small_scene`] with as few frames as its least possible error needs.
+pub fn tiny_scene() -> String {
+    small_scene()
+        .replace("frames = 3000", "frames = 200")
+        .replace("test_frames = 80", "test_frames = 50")
+}
+
 /// [`small_scene`] with a Table 1, which takes most of its time.
 pub fn small_scene_with_table1() -> String {
     small_scene()
         + "\n[table1]\nspreads = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]\n\
-           noise_levels = [0.01]\nframes = 1500\ntest_frames = 300\ncentres = 10\n\
+           noise_levels = [0.01]\nframes = 1500\ntest_frames = 60\ncentres = 10\n\
            standard_frames = 40\n"
 }

@@ -8,7 +8,7 @@ use crate::common::Folder;
 fn small_contact() -> String {
     include_str!("../../../scenes/contact.toml")
         .replace("frames = 20000", "frames = 3000")
-        .replace("test_frames = 8000", "test_frames = 500")
+        .replace("test_frames = 8000", "test_frames = 80")
         .replace("centres = 64", "centres = 24\nrefine = false")
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::common::{Folder, small_scene_with_table1};
+use crate::common::{Folder, small_scene_with_table1, tiny_scene};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
 const COMMANDS: [&str; 19] = [
@@ -50,7 +50,7 @@ fn keys_of_results_stay_as_they_are() {
     let folder = Folder::new("json_keys");
     let scene = small_scene_with_table1();
     folder.write("scene.toml", scene.replace("frames = 3000", "frames = 600"));
-    let tiny = crate::sweep::tiny_scene().replace("name = \"small\"", "name = \"tiny\"");
+    let tiny = tiny_scene().replace("name = \"small\"", "name = \"tiny\"");
     folder.write("tiny.toml", tiny);
     folder.write("plan.toml", crate::sweep::PLAN.replace("scene.toml", "tiny.toml"));
     let mut found = String::from(

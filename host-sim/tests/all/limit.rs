@@ -1,6 +1,6 @@
 //! The limit from the command line, and beside the errors of decoders.
 
-use crate::common::{Folder, small_scene, untimed};
+use crate::common::{Folder, small_scene, tiny_scene, untimed};
 
 fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap()
@@ -47,8 +47,8 @@ fn models_are_judged_on_the_frames_of_the_limit() {
     folder.write("scene.toml", small_scene());
     folder.succeed(&["train", "scene.toml", "-o", "m.bin"]);
     folder.succeed(&["train", "scene.toml", "--relative-inputs", "-o", "relative.bin"]);
-    let models = ["limit", "scene.toml", "-n", "60", "--model", "m.bin,relative.bin"];
-    let result = json(&folder.succeed(&[&models[..], &["--json"]].concat()));
+    let models = ["limit", "scene.toml", "--model", "m.bin,relative.bin", "-n"];
+    let result = json(&folder.succeed(&[&models[..], &["60", "--json"]].concat()));
     let level = &result["levels"][0];
     let limit = level["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
     for (model, file) in level["decoders"].as_array().unwrap().iter().zip(["m.bin", "relative.bin"])
@@ -62,7 +62,7 @@ fn models_are_judged_on_the_frames_of_the_limit() {
         let plain = number("rmse") / limit;
         assert!((plain / ratio - 1.0).abs() < 0.2, "{file}: {plain} and {ratio}");
     }
-    let page = folder.succeed(&[&models[..], &["-o", "out"]].concat());
+    let page = folder.succeed(&[&models[..], &["4", "-o", "out"]].concat());
     assert!(page.contains(" ×   m.bin") && page.contains(" ×   relative.bin"), "{page}");
     let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
     assert!(page.contains("model m.bin") && page.contains("model relative.bin"));
@@ -72,7 +72,7 @@ fn models_are_judged_on_the_frames_of_the_limit() {
 fn several_scenes_stand_in_one_table_with_the_figures_of_each_alone() {
     let folder = Folder::new("limit-scenes");
     folder.write("one.toml", small_scene().replace("name = \"small\"", "name = \"one\""));
-    folder.write("two.toml", crate::sweep::tiny_scene());
+    folder.write("two.toml", tiny_scene());
     let both = ["limit", "one.toml", "two.toml", "-n", "8"];
     let results = json(&folder.succeed(&[&both[..], &["--json", "-o", "out"]].concat()));
     let table = folder.succeed(&both);

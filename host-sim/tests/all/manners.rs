@@ -1,11 +1,11 @@
 //! What the program says of its work, and what it tells a shell of itself.
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, tiny_scene};
 
 #[test]
 fn quiet_work_says_nothing_and_verbose_work_the_time_of_each_stage() {
     let folder = Folder::new("manners");
-    folder.write("scene.toml", small_scene());
+    folder.write("scene.toml", tiny_scene());
     let run = ["run", "scene.toml", "--no-refine"];
     let usual = folder.notes(&run);
     assert!(usual.contains("fit weights …") && !usual.contains("took"), "{usual}");

@@ -1,13 +1,13 @@
 //! Contacts that move: what commands say of them.
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, tiny_scene};
 
 #[test]
 fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     let folder = Folder::new("moving-commands");
     let motion = "[motion]\nspeed_mm_per_s = [50.0, 50.0]\npress_rate_hz = [3.0, 3.0]\ntrajectories = 4\n[noise]";
-    folder.write("small.toml", small_scene().replace("[noise]", motion));
-    folder.write("still.toml", small_scene());
+    folder.write("small.toml", tiny_scene().replace("[noise]", motion));
+    folder.write("still.toml", tiny_scene());
     let run = folder.json(&["run", "small.toml"]);
     let moving = &run["moving"];
     let rmse = |of: &serde_json::Value| of["errors"][2]["rmse"].as_f64().unwrap();

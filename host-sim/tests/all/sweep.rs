@@ -5,17 +5,11 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, tiny_scene};
 
 /// Plan of four points of `scene.toml`, two of which share their limit.
 pub const PLAN: &str = "name = \"tiny\"\nscene = \"scene.toml\"\nlimit_frames = 4\nobjectives = [\"rmse_dz_mm\", \"frame_ms\"]\n\
                         [axes]\nnoise.level = [0.005, 0.02]\ntraining.centres = [4, 8]\n";
-
-pub fn tiny_scene() -> String {
-    small_scene()
-        .replace("frames = 3000", "frames = 200")
-        .replace("test_frames = 500", "test_frames = 50")
-}
 
 fn prepared(name: &str) -> Folder {
     let folder = Folder::new(name);
@@ -320,7 +314,7 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
     }
     let table = read(&folder, "out/compare.csv");
     assert_eq!(table.lines().count(), 7, "{table}");
-    let limit = folder.succeed(&["compare", "scene.toml", "press", "--limit-only", "--json"]);
+    let limit = folder.succeed(&["compare", "lists.toml", "--limit-only", "--json"]);
     let limit: Value = serde_json::from_str(&limit).unwrap();
     assert_eq!(limit["objectives"][0], "limit_dz_mm");
     assert!(folder.fail(&["compare", "scene.toml", "scene.toml"], 2).contains("twice"));

@@ -13,7 +13,7 @@ use taxel_simulate::Synthesis;
 
 fn press() -> Experiment {
     let mut scene = unrefined("press");
-    (scene.training.frames, scene.training.test_frames) = (1500, 80);
+    (scene.training.frames, scene.training.test_frames) = (1500, 40);
     scene
 }
 

@@ -390,3 +390,65 @@ impl Table1 {
         ratios.max_by(f64::total_cmp)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use taxel_data::Silent;
+    use taxel_simulate::World;
+
+    use super::*;
+
+    #[test]
+    fn only_a_table_that_the_papers_could_be_stands_beside_the_printed_cells() {
+        let paper = Experiment::load("paper").unwrap();
+        let is_beside = |change: fn(&mut Experiment)| {
+            let mut changed = paper.clone();
+            change(&mut changed);
+            is_comparable(&changed, changed.table1.as_ref().unwrap())
+        };
+        assert!(is_beside(|_| ()));
+        assert!(!is_beside(|it| it.table1.as_mut().unwrap().noise_levels[2] = 0.06));
+        assert!(!is_beside(|it| it.table1.as_mut().unwrap().spreads[2] = 0.35));
+        assert!(!is_beside(|it| it.world.sensor.size_mm[0] = 21.0));
+        assert!(!is_beside(|it| it.world.noise.kind = NoiseKind::Absolute));
+        assert!(!is_beside(|it| it.world.motion = World::press().motion));
+    }
+
+    #[test]
+    fn no_cell_of_the_papers_table_is_worse_than_the_mean_by_more_than_two_per_cent() {
+        let mut paper = Experiment::load("paper").unwrap();
+        // Two rows of eight that are alike, and the least and the greatest of the table's widths and noise levels.
+        paper.world.read_rows = vec![3, 4];
+        let settings = paper.table1.as_mut().unwrap();
+        settings.spreads = vec![0.1, 1.0];
+        let (settings, measure) = (paper.table1.as_ref().unwrap(), paper.measure());
+        let (mut worst, mut cells) = (0.0_f64, 0);
+        for noise_level in [0.005, 0.1] {
+            let frames = Synthesis::new(&paper.world).noise_level(noise_level);
+            let training = paper.dataset(&frames, Stream::Training, settings.frames);
+            let test = paper.dataset(&frames, Stream::Test, settings.test_frames);
+            let decoders = decoders(settings, paper.world.seed, &training, &Silent).unwrap();
+            let errors_of = |name, spread| {
+                let is_wanted = |it: &&Spread| it.0 == spread && it.1.name() == name;
+                let (_, decoder) = decoders.iter().find(is_wanted).unwrap();
+                entry(decoder.as_ref(), spread, &test, &measure).errors
+            };
+            for spread in [0.1, 1.0] {
+                let pairs = errors_of(NETWORK, Some(spread)).into_iter();
+                for (network, mean) in pairs.zip(errors_of(mean::NAME, None)) {
+                    // R² is the RMSE again, on a scale where the mean is 0.
+                    for definition in Definition::ALL.iter().filter(|d| **d != Definition::RSquared)
+                    {
+                        let pair = (definition.of(&network), definition.of(&mean));
+                        let (Some(network), Some(mean)) = pair else { continue };
+                        worst = worst.max(network / mean);
+                        cells += 1;
+                    }
+                }
+            }
+        }
+        println!("{cells} cells; the worst is {worst:.4} × the mean's error");
+        assert_eq!(cells, 2 * 2 * (4 + 4 + 5));
+        assert!(worst <= 1.02, "{worst}");
+    }
+}

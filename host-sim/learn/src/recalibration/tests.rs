@@ -19,7 +19,7 @@ fn drifted(readings: &Table, gains: &[f64]) -> Table {
 fn two_hundred_presses_bring_every_format_within_3_percent_of_fresh_training() {
     let world = World { read_rows: vec![2, 3], ..World::press() };
     let [training, presses, test] =
-        [(Stream::Training, 4000), (Stream::Calibration, 200), (Stream::Test, 1000)]
+        [(Stream::Training, 2000), (Stream::Calibration, 200), (Stream::Test, 1000)]
             .map(|(stream, frames)| synthesise(&world, stream, frames));
     // Baseline of before any drift: nobody could leave the sensor untouched since.
     let rest = Synthesis::new(&world).untouched().frames(Stream::Calibration, 100).inputs;

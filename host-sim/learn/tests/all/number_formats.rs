@@ -1,5 +1,5 @@
 //! Loss of accuracy by number formats: the same centres fitted and evaluated in f64, in f32 and in 16-bit
-//! fixed point, on both reference scenes, by axis. Figures: `cargo test -p taxel-learn --test all number_formats -- --nocapture`.
+//! fixed point, on both reference scenes, by axis. Figures: `TAXEL_CASES=3 cargo test -p taxel-learn --test all number_formats -- --nocapture`.
 
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
@@ -11,13 +11,18 @@ use taxel_learn::{Options, Origin, pack};
 use taxel_simulate::{World, synthesise};
 
 const NOISE_LEVELS: [f64; 2] = [0.0, 0.005];
-/// Row-wires at the rim, beside the middle, and in between.
+/// Row-wires at the rim, beside the middle, and in between: the first, or as many as `TAXEL_CASES` says.
 const ROWS: [usize; 3] = [1, 4, 7];
+
+fn rows() -> &'static [usize] {
+    let count = std::env::var("TAXEL_CASES").map_or(1, |count| count.parse().unwrap());
+    &ROWS[..ROWS.len().min(count)]
+}
 
 fn world(name: &str, noise: f64) -> World {
     let mut world = if name == "paper" { World::paper() } else { World::press() };
     world.set_noise_level(noise).unwrap();
-    world.read_rows = ROWS.map(|row| row - 1).to_vec();
+    world.read_rows = rows().iter().map(|row| row - 1).collect();
     world
 }
 
@@ -61,7 +66,7 @@ fn errors(name: &str, noise: f64) -> [Vec<f64>; 3] {
     let training = synthesise(&world, Stream::Training, 8000);
     let test = synthesise(&world, Stream::Test, 4000);
     let options = Options::of_rows();
-    let of_rows: Vec<[Vec<f64>; 3]> = (0..ROWS.len())
+    let of_rows: Vec<[Vec<f64>; 3]> = (0..rows().len())
         .into_par_iter()
         .map(|row| {
             let (training, test) = (training.row_table(row), test.row_table(row));
@@ -76,7 +81,7 @@ fn errors(name: &str, noise: f64) -> [Vec<f64>; 3] {
             [exact, float, fixed]
         })
         .collect();
-    let values = (ROWS.len() * 6 * test.frames()) as f64;
+    let values = (rows().len() * 6 * test.frames()) as f64;
     std::array::from_fn(|format| {
         let axis = |axis: usize| of_rows.iter().map(|row| row[format][axis]).sum::<f64>();
         (0..3).map(|a| (axis(a) / values).sqrt()).collect()

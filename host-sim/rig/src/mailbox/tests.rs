@@ -124,7 +124,7 @@ impl SharedBytes for Torn {
 
 #[test]
 fn every_byte_arrives_once_and_in_order_however_accesses_are_torn() {
-    for seed in 0..4_u64 {
+    for seed in 0..2_u64 {
         let draws = |index: u64| Random::new(1, Stream::Test, Purpose::Damage, 3 * seed + index, 0);
         let memory = Memory::empty();
         memory.clone().write_at(&MAGIC, 0).unwrap();
@@ -132,9 +132,9 @@ fn every_byte_arrives_once_and_in_order_however_accesses_are_torn() {
         let image = Image { mailbox, random: draws(0), sent: 0, received: 0 };
         let mut host = Mailbox::new(Torn { memory, image, random: draws(1) }).unwrap();
         let (mut random, mut sent, mut received) = (draws(2), 0, 0);
-        // Positions go round three times, in either direction.
+        // Positions go round twice, in either direction.
         let mut turns = 0;
-        while sent < 200_000 || received < 200_000 {
+        while sent < 140_000 || received < 140_000 {
             turns += 1;
             assert!(turns < 10_000, "{sent} bytes sent, {received} received");
             let bytes: Vec<u8> = (sent..sent + random.below(1500)).map(byte).collect();

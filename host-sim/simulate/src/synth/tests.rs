@@ -342,15 +342,21 @@ fn noise_with_a_memory_has_the_size_and_the_time_constant_that_it_is_asked_for()
     {
         let world = remembering(level, correlated_level, time_constant_ms);
         let period_s = 0.1 * f64::max(time_constant_ms, 20.0) / 1000.0;
-        let times = Timetable::every(period_s, 0.0, 1500.0 * period_s).unwrap();
+        // Trajectories of 50 scans, which are synthesised side by side.
+        let (scans, frames) = (50, 1500);
+        let times = Timetable::every(period_s, 0.0, scans as f64 * period_s).unwrap();
         let log = Synthesis::new(&world).untouched().timed(times);
-        let readings = log.frames(Stream::Training, 1500).inputs;
-        let ideal = log.clone().ideal().frames(Stream::Training, 1500).inputs;
+        let readings = log.frames(Stream::Training, frames).inputs;
+        let ideal = log.clone().ideal().frames(Stream::Training, frames).inputs;
         let noise: Vec<f64> = ratios(&readings, &ideal).flatten().map(|it| it - 1.0).collect();
         // Mean product of a reading's noise with its own so many frames later.
         let covariance = |frames: usize| {
-            let products = noise.iter().zip(&noise[frames * readings.names.len()..]);
-            products.clone().map(|(a, b)| a * b).sum::<f64>() / products.len() as f64
+            let of_trajectories = noise.chunks(scans * readings.names.len());
+            let products: Vec<f64> = of_trajectories
+                .flat_map(|noise| noise.iter().zip(&noise[frames * readings.names.len()..]))
+                .map(|(a, b)| a * b)
+                .collect();
+            products.iter().sum::<f64>() / products.len() as f64
         };
         let total = world.noise.total_level().powi(2);
         assert!((covariance(0) / total - 1.0).abs() < 0.05, "{}", covariance(0));
