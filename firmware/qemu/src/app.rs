@@ -1,5 +1,4 @@
-//! The application in the emulator, without a sensor. The link goes through a mailbox or the first serial line;
-//! `host-sim emulate` is at the other end.
+//! The application in the emulator, without a sensor. `host-sim emulate` is at the other end of its link, a mailbox.
 #![no_std]
 #![no_main]
 
@@ -7,12 +6,11 @@ use board_common::region::take_weights;
 use board_common::{BoardApp, CAPACITY, buffers};
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::entry;
-use defmt::info;
+use defmt::{error, info};
 use qemu_image::clock::Clock;
 use qemu_image::mailbox::Mailbox;
 use qemu_image::psram::Psram;
 use qemu_image::slot::Slot;
-use qemu_image::uart::Uart;
 use qemu_image::watchdog::Watchdog;
 use qemu_image::{exit, memory};
 use taxel_core::{Decoder, decoder_ram_bytes};
@@ -46,30 +44,8 @@ impl FrameSource for NoSensor {
     }
 }
 
-/// Carrier of the link's bytes: the mailbox or a UART.
-enum Carrier {
-    Uart(Uart),
-    Mailbox(Mailbox<Psram>),
-}
-
-impl Carrier {
-    /// The mailbox if the host has laid one out, else the first UART.
-    fn find() -> Self {
-        // SAFETY: the memory is taken here only.
-        let psram = unsafe { Psram::take() };
-        Mailbox::find(psram).map_or_else(|| Self::Uart(Uart::first()), Self::Mailbox)
-    }
-
-    fn name(&self) -> &'static str {
-        match self {
-            Self::Uart(_) => "UART",
-            Self::Mailbox(_) => "mailbox",
-        }
-    }
-}
-
 struct Board {
-    carrier: Carrier,
+    mailbox: Mailbox<Psram>,
     clock: Clock,
     watchdog: Watchdog,
     fed_us: u32,
@@ -82,17 +58,11 @@ impl Port for Board {
     }
 
     fn receive(&mut self) -> Option<u8> {
-        match &mut self.carrier {
-            Carrier::Uart(uart) => uart.try_read(),
-            Carrier::Mailbox(mailbox) => mailbox.try_read(),
-        }
+        self.mailbox.try_read()
     }
 
     fn send(&mut self, byte: u8) -> bool {
-        match &mut self.carrier {
-            Carrier::Uart(uart) => uart.try_write(byte),
-            Carrier::Mailbox(mailbox) => mailbox.try_write(byte),
-        }
+        self.mailbox.try_write(byte)
     }
 }
 
@@ -123,14 +93,17 @@ impl Platform for Board {
 fn main() -> ! {
     info!("taxel {=str} on an emulated Cortex-M4F", env!("CARGO_PKG_VERSION"));
     let clock = Clock::start();
-    let carrier = Carrier::find();
-    info!("link: {=str}", carrier.name());
     #[cfg(feature = "must-fail")]
-    info!("{=u8}", [0_u8; 4][carrier.name().len()]);
+    info!("{=u8}", [0_u8; 4][memory::taken().text as usize]);
+    // SAFETY: the memory is taken here only.
+    let Some(mailbox) = Mailbox::find(unsafe { Psram::take() }) else {
+        error!("the host has laid out no mailbox");
+        exit::failure()
+    };
     // SAFETY: the slots are taken here only.
     let (mut slots, pages) = unsafe { Slot::take() };
     let board = Board {
-        carrier,
+        mailbox,
         clock,
         watchdog: Watchdog::start(WATCHDOG_MS),
         fed_us: 0,

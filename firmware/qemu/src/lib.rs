@@ -12,7 +12,6 @@ mod registers;
 pub mod mailbox;
 pub mod psram;
 pub mod clock;
-pub mod uart;
 pub mod watchdog;
 pub mod exit;
 mod fault;

@@ -3,10 +3,9 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::device::Wire;
 use crate::error::{Error, Result};
@@ -16,8 +15,6 @@ use crate::mailbox::{FILE_BYTES, Mailbox};
 const QEMU: &str = "qemu-system-arm";
 /// Address at which the image expects its first model slot.
 const SLOT_ADDRESS: u32 = 0x0020_0000;
-/// Longest time that QEMU may take to start.
-const START: Duration = Duration::from_secs(20);
 
 /// Options of the emulator.
 #[derive(Debug, Clone)]
@@ -28,8 +25,8 @@ pub struct Options {
     pub model: Option<PathBuf>,
     /// Path for the image's log, in defmt's encoding; no log if not given.
     pub log: Option<PathBuf>,
-    /// Path for the file of a mailbox while the emulator runs; without it the link is on the first UART.
-    pub mailbox: Option<PathBuf>,
+    /// Path for a new file, which holds the mailbox that carries the link.
+    pub mailbox: PathBuf,
 }
 
 impl Options {
@@ -57,107 +54,30 @@ impl Options {
     }
 }
 
-/// Line that carries the link.
-#[derive(Debug)]
-pub enum Link {
-    /// Mailbox in shared memory.
-    Mailbox {
-        /// Mailbox that carries the bytes.
-        mailbox: Mailbox,
-        /// First UART, which is silent, and closed when the emulator ends.
-        uart: TcpStream,
-    },
-    /// First UART.
-    Uart(TcpStream),
-}
-
-impl Read for Link {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        match self {
-            Self::Mailbox { mailbox, uart } => match mailbox.read(bytes) {
-                Err(cause) if cause.kind() == ErrorKind::TimedOut && is_closed(uart) => Ok(0),
-                outcome => outcome,
-            },
-            Self::Uart(uart) => uart.read(bytes),
-        }
-    }
-}
-
-impl Write for Link {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Mailbox { mailbox, uart } => match mailbox.write(bytes) {
-                Err(cause) if cause.kind() == ErrorKind::TimedOut && is_closed(uart) => {
-                    Err(ErrorKind::BrokenPipe.into())
-                }
-                outcome => outcome,
-            },
-            Self::Uart(uart) => uart.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Mailbox { mailbox, .. } => mailbox.flush(),
-            Self::Uart(uart) => uart.flush(),
-        }
-    }
-}
-
-impl Wire for Link {
-    fn set_read_timeout(&mut self, timeout: Duration) -> io::Result<()> {
-        match self {
-            Self::Mailbox { mailbox, .. } => mailbox.set_read_timeout(timeout),
-            Self::Uart(uart) => Wire::set_read_timeout(uart, timeout),
-        }
-    }
-}
-
-/// Whether the other end of a non-blocking socket is closed.
-fn is_closed(stream: &TcpStream) -> bool {
-    match stream.peek(&mut [0]) {
-        Ok(count) => count == 0,
-        Err(cause) => cause.kind() != ErrorKind::WouldBlock,
-    }
-}
-
-/// Running emulator; it ends when this value is dropped.
+/// Running emulator, and its link; it ends when this value is dropped.
 #[derive(Debug)]
 pub struct Emulator {
     child: Child,
-    _shared: Option<SharedFile>,
-}
-
-/// File of a mailbox, removed when this value is dropped.
-#[derive(Debug)]
-struct SharedFile(PathBuf);
-
-impl Drop for SharedFile {
-    fn drop(&mut self) {
-        // The file may have been removed already.
-        let _ = std::fs::remove_file(&self.0);
-    }
+    mailbox: Mailbox,
 }
 
 impl Emulator {
-    /// Starts QEMU and connects to the image's link.
+    /// Starts QEMU with a mailbox for the image's link.
     ///
     /// # Errors
     /// [`Error::Data`] if a file is missing or wrong, if that of the mailbox cannot be made, or if QEMU does not start.
-    pub fn start(options: &Options) -> Result<(Self, Link)> {
+    pub fn start(options: &Options) -> Result<Self> {
         options.check()?;
-        let failed = |cause: std::io::Error| {
-            Error::failed(format!("{QEMU}: the emulator does not start: {cause}"))
-        };
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(failed)?;
-        let port = listener.local_addr().map_err(failed)?.port();
+        let mailbox = Mailbox::create(&options.mailbox).map_err(|cause| {
+            let path = options.mailbox.display();
+            Error::failed(format!("cannot make the mailbox {path}: {cause}"))
+        })?;
         let mut command = Command::new(QEMU);
-        let mailbox = options.mailbox.as_deref().map(create_mailbox).transpose()?;
-        let shared = options.mailbox.clone().map(SharedFile);
-        command.args(machine(options.mailbox.as_deref()));
-        command.args(["-cpu", "cortex-m4", "-display", "none"]);
+        command.args(["-M", "mps2-an386,memory-backend=psram", "-object"]);
+        let file = format!("mem-path={},share=on", escaped(&options.mailbox));
+        command.arg(format!("memory-backend-file,id=psram,size={FILE_BYTES},{file}"));
+        command.args(["-cpu", "cortex-m4", "-display", "none", "-serial", "none"]);
         command.args(["-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
-        command.args(["-serial", &format!("tcp:127.0.0.1:{port},nodelay=on")]);
         if let Some(model) = &options.model {
             let path = escaped(model);
             let place = format!("loader,file={path},addr={SLOT_ADDRESS:#x},force-raw=on");
@@ -177,18 +97,43 @@ impl Emulator {
                 let says = "there is no such program; on Debian: apt-get install qemu-system-arm";
                 return Error::unfit_for("qemu", format!("{QEMU}: {says}"));
             }
-            failed(cause)
+            Error::failed(format!("{QEMU}: the emulator does not start: {cause}"))
         })?;
-        let mut emulator = Self { child, _shared: shared };
-        let uart = accept(&listener, &mut emulator.child).map_err(failed)?;
-        let link = match mailbox {
-            Some(mailbox) => {
-                uart.set_nonblocking(true).map_err(failed)?;
-                Link::Mailbox { mailbox, uart }
-            }
-            None => Link::Uart(uart),
-        };
-        Ok((emulator, link))
+        Ok(Self { child, mailbox })
+    }
+
+    /// Outcome of a transfer; one that timed out because QEMU has ended says so.
+    fn unless_ended(&mut self, outcome: io::Result<usize>) -> io::Result<usize> {
+        if outcome.as_ref().is_err_and(|cause| cause.kind() == ErrorKind::TimedOut)
+            && let Some(status) = self.child.try_wait()?
+        {
+            return Err(io::Error::other(format!("{QEMU}: the emulator ended with {status}")));
+        }
+        outcome
+    }
+}
+
+impl Read for Emulator {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let outcome = self.mailbox.read(bytes);
+        self.unless_ended(outcome)
+    }
+}
+
+impl Write for Emulator {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let outcome = self.mailbox.write(bytes);
+        self.unless_ended(outcome)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.mailbox.flush()
+    }
+}
+
+impl Wire for Emulator {
+    fn set_read_timeout(&mut self, timeout: Duration) -> io::Result<()> {
+        self.mailbox.set_read_timeout(timeout)
     }
 }
 
@@ -200,44 +145,7 @@ impl Drop for Emulator {
     }
 }
 
-fn create_mailbox(path: &Path) -> Result<Mailbox> {
-    Mailbox::create(path).map_err(|cause| {
-        Error::failed(format!("cannot make the mailbox {}: {cause}", path.display()))
-    })
-}
-
-/// Arguments that choose the machine, with its PSRAM in the file at `mailbox` if that is given.
-fn machine(mailbox: Option<&Path>) -> Vec<String> {
-    let Some(path) = mailbox else { return ["-M", "mps2-an386"].map(String::from).to_vec() };
-    let file = format!("mem-path={},share=on", escaped(path));
-    let memory = format!("memory-backend-file,id=psram,size={FILE_BYTES},{file}");
-    ["-M", "mps2-an386,memory-backend=psram", "-object", &memory].map(String::from).to_vec()
-}
-
 /// Path as QEMU's options need it: a comma would end an option unless it is doubled.
 fn escaped(path: &Path) -> String {
     path.display().to_string().replace(',', ",,")
-}
-
-fn accept(listener: &TcpListener, child: &mut Child) -> std::io::Result<TcpStream> {
-    listener.set_nonblocking(true)?;
-    let deadline = Instant::now() + START;
-    loop {
-        match listener.accept() {
-            Ok((stream, _)) => {
-                stream.set_nonblocking(false)?;
-                stream.set_nodelay(true)?;
-                return Ok(stream);
-            }
-            Err(cause) if cause.kind() == ErrorKind::WouldBlock => {}
-            Err(cause) => return Err(cause),
-        }
-        if let Some(status) = child.try_wait()? {
-            return Err(std::io::Error::other(format!("it ended with {status}")));
-        }
-        if Instant::now() > deadline {
-            return Err(std::io::Error::other("QEMU does not connect"));
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::Result;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use taxel_data::output;
 use taxel_rig::device::Device;
 use taxel_rig::device::check::check;
@@ -14,20 +14,10 @@ use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::progress::Terminal;
 use super::{Common, print};
 
-/// Frames on their way at a time: either line holds bytes back while the device is busy.
+/// Frames on their way at a time: the mailbox holds bytes back while the device is busy.
 const WINDOW: usize = 4;
 /// Longest time for an answer: the emulator loses nothing, but a busy computer makes it slow.
 const PATIENCE: Duration = Duration::from_mins(1);
-
-/// Line that carries the bytes between the host and the image's link.
-#[derive(Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-enum Line {
-    /// Memory that both share: about as fast as the image decodes.
-    #[default]
-    Mailbox,
-    /// The image's first UART, which QEMU serves byte by byte: some thirty frames a second.
-    Uart,
-}
 
 /// Run the firmware in QEMU and compare its estimates with the host's.
 ///
@@ -39,9 +29,6 @@ enum Line {
 pub struct Arguments {
     #[command(flatten)]
     check: CheckArguments,
-    /// Line that carries the link.
-    #[arg(long, value_enum, value_name = "LINE", default_value_t)]
-    line: Line,
     /// Image of the firmware for mps2-an386.
     #[arg(
         long,
@@ -65,7 +52,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         image: arguments.image.clone(),
         model: None,
         log: arguments.log.is_some().then(|| scratch.path().join("log.defmt")),
-        mailbox: (arguments.line == Line::Mailbox).then(|| scratch.path().join("mailbox.ram")),
+        mailbox: scratch.path().join("mailbox.ram"),
     };
     options.check()?;
     let Checked { frames, model } = arguments.check.load(common)?;
@@ -76,8 +63,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     written.map_err(|cause| taxel_data::Error::write(&blob, cause))?;
     let log = options.log.clone();
     let started = Emulator::start(&emulator::Options { model: Some(blob.clone()), ..options });
-    let outcome = started.and_then(|(_emulator, link)| {
-        let mut device = Device::new(link)?;
+    let outcome = started.and_then(|emulator| {
+        let mut device = Device::new(emulator)?;
         device.patience = PATIENCE;
         let plan = arguments.check.plan(WINDOW);
         check(&mut device, &frames, &model, &plan, &Terminal::new())

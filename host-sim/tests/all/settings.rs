@@ -20,10 +20,9 @@ fn the_image_keeps_settings_over_restarts() {
         image: image.into(),
         model: None,
         log: None,
-        mailbox: Some(folder.path("mailbox.ram")),
+        mailbox: folder.path("mailbox.ram"),
     };
-    let (_emulator, link) = Emulator::start(&options).unwrap();
-    let mut device = Device::new(link).unwrap();
+    let mut device = Device::new(Emulator::start(&options).unwrap()).unwrap();
     device.patience = Duration::from_mins(1);
     assert_eq!(device.kept().unwrap().configuration, None);
     let quiet = device.configuration().unwrap();

@@ -17,10 +17,6 @@ const LIMITS: [(&str, u32); 2] = [("flash", 98_304), ("RAM", 14_336)];
 /// Options of the check with a network a row.
 const OF_ROWS: &[&str] = &["-n10000"];
 
-/// Options of the check on the UART, where every byte takes a turn of QEMU's main loop. They are enough to show
-/// that the driver loses nothing.
-const ON_UART: &[&str] = &["--line=uart", "-n200"];
-
 /// Options of the check with one network for the whole array. Only decoding differs; it takes more stack.
 const OF_ARRAY: &[&str] = &["-n1000"];
 
@@ -62,7 +58,7 @@ pub fn log() -> PathBuf {
 }
 
 /// Trains the models for the checks, and returns the checks.
-pub fn checks() -> Outcome<[Check; 5]> {
+pub fn checks() -> Outcome<[Check; 4]> {
     let [rows, array] =
         ["qemu-rows.bin", "qemu-array.bin"].map(|name| target_dir().join(name).into_os_string());
     let log = log().into_os_string();
@@ -72,8 +68,6 @@ pub fn checks() -> Outcome<[Check; 5]> {
     train(&[], &array)?;
     Ok([
         Check::new("application", OF_ROWS, &["--model".as_ref(), &rows, "--log".as_ref(), &log]),
-        // This is the smaller model, because it is uploaded on that line as well.
-        Check::new("application on the UART", ON_UART, &["--model".as_ref(), &array]),
         Check::new("application with one network", OF_ARRAY, &["--model".as_ref(), &array]),
         Check::new("application with a filter", FILTERED, &["--model".as_ref(), &array]),
         Check {
