@@ -34,7 +34,6 @@ const FILES: FileSet = FileSet {
         "places",
         "sensor",
         "error-by-noise",
-        "error-by-spread",
     ]),
 };
 
@@ -212,14 +211,6 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         };
         let rows: String = result.by_row.iter().map(of_row).collect();
         page.line(format_args!("  {:<7}{rows} {}", group.group, group.unit));
-    }
-    if let Some(table) = &result.table1 {
-        for group in table.groups() {
-            let ratio = table.worst_ratio_to_mean(group).unwrap_or(f64::NAN);
-            page.line(format_args!(
-                "table 1, {group}: worst cell {ratio:.3} × the RMSE of the mean"
-            ));
-        }
     }
     page.line(format_args!("\nwritten to {}: {}", folder.display(), files.join(", ")));
     print::verdict(&mut page, None, &result.verdict);

@@ -118,13 +118,6 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
     if let Some(nearest) = table.nearest_formula() {
         compare(&mut page, &table.comparison, nearest);
     }
-    for group in table.groups() {
-        if let Some(ratio) = table.worst_ratio_to_mean(group) {
-            page.line(format_args!(
-                "{group}: the worst cell's RMSE is {ratio:.3} × that of the mean"
-            ));
-        }
-    }
     page
 }
 

@@ -76,9 +76,8 @@ pub fn page(view: &View<'_>, figures: Figures) -> Page {
         body.figure(&sketch::figure(sensor));
     }
     if let (Some(table), Some(group)) = (view.table1, view.distribution.main_group()) {
-        body.heading("noise", "Noise and spread");
+        body.heading("noise", "Noise");
         body.figure(&sweep::error_by_noise(table, &group.group, &group.unit));
-        body.figure(&sweep::error_by_spread(table, &group.group, &group.unit));
         if let Some(nearest) = table.nearest_formula() {
             body.add("<details>\n<summary>Beside Table 1 of the paper</summary>\n");
             let caption = tables::table1_caption(table, nearest);

@@ -1,10 +1,10 @@
-//! Figures of Table 1: error against noise and against spread.
+//! Figure of Table 1: error against noise.
 
 use taxel_learn::decoders::{linear, mean, standard};
 use taxel_limit::limit;
 
 use super::axes::Axis;
-use super::chart::{Chart, Mark, STYLES, Series};
+use super::chart::{Chart, Mark, Series};
 use super::figures::Figure;
 use super::format::{noise, symbol, with_unit};
 use super::svg::Shape;
@@ -125,42 +125,6 @@ pub fn error_by_noise(table: &Table1, group: &str, unit: &str) -> Figure {
             table.centres,
             super::format::grouped(table.training_frames),
             table.standard_frames
-        ),
-        &chart,
-        [WIDE, NARROW],
-    )
-}
-
-/// Figure of error against spread, one line a noise level.
-pub fn error_by_spread(table: &Table1, group: &str, unit: &str) -> Figure {
-    let name = symbol(group);
-    let x = ticks::linear(table.columns.iter().flat_map(Column::spreads), 6);
-    let mean = table.columns.first().map_or(f64::NAN, |column| best(column, mean::NAME, group));
-    let mut series =
-        vec![Series::new("mean", "muted", Mark::Dashed, vec![[x.low, mean], [x.high, mean]])];
-    let last = table.columns.len().saturating_sub(1).max(1) as f64;
-    for (i, column) in table.columns.iter().enumerate() {
-        let at = |spread| [spread, rmse(column.errors(NETWORK, Some(spread)), group)];
-        let points = column.spreads().map(at).collect();
-        let mark = Mark::LineAnd(STYLES[i % STYLES.len()].1);
-        let line = Series::new(&noise(table.noise_kind, column.noise_level), "c1", mark, points);
-        series.push(Series { opacity: 0.6 + 0.4 * i as f64 / last, ..line });
-    }
-    let heights = series.iter().flat_map(|s| s.points.iter().map(|[_, y]| *y));
-    let chart = Chart {
-        title: format!("RMSE of {name} against spread, by noise level"),
-        y: Axis::linear(with_unit(&format!("RMSE of {name}"), unit), ticks::linear(heights, 5)),
-        x: Axis::linear("spread σ on scaled inputs", x),
-        series,
-        end_labels: true,
-    };
-    Figure::of_chart(
-        "error-by-spread",
-        format!(
-            "RMSE of {name} in {unit} of the network (K = {}) against its spread, one line for \
-             each noise level. Dashed: always the training mean, which noise does not change. \
-             The scale need not start at zero.",
-            table.centres
         ),
         &chart,
         [WIDE, NARROW],

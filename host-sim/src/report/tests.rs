@@ -63,7 +63,6 @@ fn result() -> RunResult {
         standard_frames: 50,
         solver: "rls",
         columns,
-        printed: vec![],
         comparison: vec![],
     });
     result.subject = "by <hand>".into();
@@ -92,8 +91,8 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
     let page = html(&result);
     assert_eq!(page, html(&result));
     assert!(is_drawable(&page));
-    // Density, histogram, by electrode; readings, frames, arrows; sensor; noise and spread.
-    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (9, 2));
+    // Density, histogram, by electrode; readings, frames, arrows; sensor; noise.
+    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (8, 2));
     for text in [
         "seed 7",
         "K = 9",

@@ -58,7 +58,7 @@ pub struct View<'a> {
     pub ideal_changes: &'a [Vec<f64>],
     /// Noise on the readings in words, if it is known.
     pub noise: Option<String>,
-    /// Errors by noise and spread.
+    /// Table 1: errors by noise and spread.
     pub table1: Option<&'a Table1>,
     pub made: &'a Made,
 }

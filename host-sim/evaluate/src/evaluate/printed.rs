@@ -30,25 +30,6 @@ pub const CELLS: Cells = [
     [9.31, 11.11, 10.67, 11.39],
 ];
 
-/// Cell as the paper prints it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Printed {
-    pub spread: f64,
-    /// Noise level of its column, as a fraction.
-    pub noise_level: f64,
-    /// Error in per cent.
-    pub percent: f64,
-}
-
-/// All printed cells, line by line.
-pub fn cells() -> impl Iterator<Item = Printed> {
-    let lines = SPREADS.into_iter().zip(CELLS);
-    lines.flat_map(|(spread, line)| {
-        let cells = NOISE_LEVELS.into_iter().zip(line);
-        cells.map(move |(noise_level, percent)| Printed { spread, noise_level, percent })
-    })
-}
-
 /// How near a table comes to the printed one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Nearness {
@@ -99,11 +80,5 @@ mod tests {
         let own = Nearness::new(&CELLS);
         assert_eq!(own.gap, 0.0);
         assert!((own.correlation.unwrap() - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn all_forty_cells_are_there() {
-        assert_eq!(cells().count(), 40);
-        assert!(cells().any(|c| c == Printed { spread: 0.3, noise_level: 0.01, percent: 10.23 }));
     }
 }

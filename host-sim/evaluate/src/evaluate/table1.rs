@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::experiment::{Experiment, Table1 as Settings};
 use crate::metrics::{self, Definition, Errors, LimitSummary, Measure};
 
-use super::printed::{self, Cells, Nearness, Printed, SPREADS};
+use super::printed::{self, CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
 pub use crate::metrics::NETWORK;
 
 /// Table 1 of a scene: errors of every decoder at every noise level.
@@ -37,10 +37,8 @@ pub struct Table1 {
     pub solver: &'static str,
     /// Columns of the table, one a noise level.
     pub columns: Vec<Column>,
-    /// Cells as the paper prints them; empty for another sensor or motion than the paper's, for other spreads or noise
-    /// levels, and without Δz.
-    pub printed: Vec<Printed>,
-    /// The table by every formula that could be the paper's, beside the printed cells; empty where these are.
+    /// The table by every formula that could be the paper's, beside the printed cells; empty for another sensor or motion
+    /// than the paper's, for other spreads or noise levels, and without Δz.
     pub comparison: Vec<Comparison>,
 }
 
@@ -142,7 +140,6 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
         solver: if settings.textbook_covariance.is_some() { Solver::Qr } else { settings.solver }
             .name(),
         columns,
-        printed: if comparison.is_empty() { Vec::new() } else { printed::cells().collect() },
         comparison,
     })
 }
@@ -356,8 +353,11 @@ impl Table1 {
                 }
             }
         }
-        for Printed { spread, noise_level, percent } in &self.printed {
-            let _ = writeln!(csv, "{noise_level},paper,{spread},dz_mm,as_printed,{percent}");
+        let printed = SPREADS.iter().zip(&CELLS).filter(|_| !self.comparison.is_empty());
+        for (spread, line) in printed {
+            for (noise_level, percent) in NOISE_LEVELS.iter().zip(line) {
+                let _ = writeln!(csv, "{noise_level},paper,{spread},dz_mm,as_printed,{percent}");
+            }
         }
         csv
     }
@@ -366,28 +366,6 @@ impl Table1 {
     pub fn nearest_formula(&self) -> Option<&Comparison> {
         let gap = |it: &Comparison| it.nearness.gap;
         self.comparison.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)))
-    }
-
-    /// Groups of outputs that the table covers.
-    pub fn groups(&self) -> Vec<&str> {
-        let first = self.columns.first().and_then(|column| column.decoders.first());
-        first
-            .map_or(&[][..], |entry| &entry.errors)
-            .iter()
-            .map(|errors| errors.group.as_str())
-            .collect()
-    }
-
-    /// Largest ratio of the network's RMSE to the RMSE of always predicting the mean, over all cells of
-    /// `group`.
-    pub fn worst_ratio_to_mean(&self, group: &str) -> Option<f64> {
-        let rmse = |errors: &[Errors]| errors.iter().find(|e| e.group == group).map(|e| e.rmse);
-        let ratios = self.columns.iter().flat_map(|column| {
-            let mean = rmse(column.errors(mean::NAME, None));
-            let networks = column.decoders.iter().filter(|entry| entry.decoder == NETWORK);
-            networks.filter_map(move |entry| Some(rmse(&entry.errors)? / mean?))
-        });
-        ratios.max_by(f64::total_cmp)
     }
 }
 
