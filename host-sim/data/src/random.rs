@@ -38,7 +38,7 @@ pub enum Purpose {
     Posterior = 11,
     /// Start of a mixture of Gaussians.
     Mixture = 12,
-    /// Set-ups of a search.
+    /// Points of a plan that are drawn.
     Setup = 14,
     /// The path of a contact.
     Path = 15,

@@ -64,7 +64,7 @@ pub struct Extras {
     pub blob: Option<Vec<u8>>,
     /// Text of the scene.
     pub scene: Option<String>,
-    /// Further settings by name. Keys of devices have no place here.
+    /// Further settings by name.
     pub settings: BTreeMap<String, String>,
     /// Frame of ROS that the sensor's frame, `taxel`, stands in.
     pub parent_frame: String,
