@@ -57,12 +57,11 @@ pub fn frames(subject: &Subject, noise: Option<Noise>) -> OtherFrames {
     scene.others.iter().map(of).collect()
 }
 
-/// Share of the frames in per cent that a `model` with a confidence finds novel.
-pub fn percent_novel(model: &PreparedModel<'_>, inputs: &[f64]) -> Option<f64> {
-    let (_, novelty) = model.assess(inputs)?;
+/// Share of the frames with this `novelty` that are novel, in per cent of those of which it can be told.
+pub fn percent_novel(novelty: &[f64]) -> f64 {
     let told = novelty.iter().filter(|novelty| !novelty.is_nan()).count();
     let novel = novelty.iter().filter(|novelty| **novelty > 0.0).count();
-    Some(100.0 * novel as f64 / told.max(1) as f64)
+    100.0 * novel as f64 / told.max(1) as f64
 }
 
 impl Others {
@@ -75,13 +74,14 @@ impl Others {
         measure: &Measure,
     ) -> Option<Self> {
         let measure = Measure { limit: None, ..measure.clone() };
+        let novel = |inputs: &[f64]| Some(percent_novel(&model.assess(inputs)?.1));
         let contacts = frames.iter().map(|(name, frames)| OtherErrors {
             name: name.clone(),
             errors: metrics::judge(model, frames, &measure).errors,
             mean: metrics::judge(mean, frames, &measure).errors,
-            percent_novel: percent_novel(model, &frames.inputs.values),
+            percent_novel: novel(&frames.inputs.values),
         });
-        let own_percent_novel = percent_novel(model, &own.inputs.values);
+        let own_percent_novel = novel(&own.inputs.values);
         (!frames.is_empty()).then(|| Self {
             frames: FRAMES,
             own_percent_novel,

@@ -8,8 +8,8 @@ use taxel_learn::decoders::BASELINES;
 use taxel_learn::decoders::mean::Mean;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Decoder, ModelBlob, Options, PreparedModel};
+use taxel_simulate::Synthesis;
 use taxel_simulate::noise::NoiseKind;
-use taxel_simulate::{Synthesis, World};
 
 use crate::by_depth::{DepthErrors, by_depth};
 use crate::error::Result;
@@ -97,9 +97,6 @@ pub struct SceneSummary {
     pub row_wires: usize,
     /// Wires and electrodes of the sensor; `None` for too many to draw.
     pub sensor: Option<SensorSketch>,
-    /// Changes of the readings without noise in the shown frames, ΔR/R₀ in per cent: those of
-    /// [`ShownFrame`](crate::evaluate::distribution::ShownFrame) have it.
-    pub ideal_changes: Vec<Vec<f64>>,
 }
 
 /// Summary of the model that was trained.
@@ -209,7 +206,7 @@ pub fn run(
     match subject {
         Subject::Scene(scene) => {
             result.moving = MovingContacts::new(scene, &blob, &baselines)?;
-            result.scene = Some(scene_summary(scene, &result.distribution));
+            result.scene = Some(scene_summary(scene));
             if scene.table1.is_some() {
                 result.table1 = Some(table1::compute(scene, progress)?);
             }
@@ -263,20 +260,7 @@ fn readings_at_rest(subject: &Subject) -> Option<Vec<f64>> {
     }
 }
 
-/// Changes of the readings of the shown frames without noise, ΔR/R₀ in per cent.
-fn ideal_changes(world: &World, shown: &Distribution) -> Vec<Vec<f64>> {
-    let ideal = Synthesis::new(world).ideal();
-    let untouched = Synthesis::new(world).ideal().untouched();
-    let of_frame = |frame: usize| {
-        let readings = ideal.readings_of(Stream::Test, frame);
-        // The gain of the frame's session is in both, and cancels.
-        let at_rest = untouched.readings_of(Stream::Test, frame);
-        readings.iter().zip(at_rest).map(|(r, at_rest)| 100.0 * (r / at_rest - 1.0)).collect()
-    };
-    shown.frames.iter().map(|frame| of_frame(frame.frame)).collect()
-}
-
-fn scene_summary(scene: &Experiment, shown: &Distribution) -> SceneSummary {
+fn scene_summary(scene: &Experiment) -> SceneSummary {
     let world = &scene.world;
     SceneSummary {
         noise_kind: world.noise.kind,
@@ -285,7 +269,6 @@ fn scene_summary(scene: &Experiment, shown: &Distribution) -> SceneSummary {
         size_mm: world.sensor.size_mm,
         row_wires: world.sensor.row_wires,
         sensor: SensorSketch::new(world),
-        ideal_changes: ideal_changes(world, shown),
     }
 }
 

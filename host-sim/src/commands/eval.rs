@@ -8,6 +8,7 @@ use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
 use crate::measurements::{Log, Spread};
 use crate::metrics::{self, DecoderErrors, Errors, GroupRmse, LimitSummary, Measure, NETWORK};
+use crate::others::percent_novel;
 use crate::over_time::{self, Decoded, OverTime, RestOverTime};
 use crate::report::format::{grouped, significant};
 use crate::report::{self, Made, View};
@@ -141,9 +142,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             message: nothing_counts(metadata.relative_inputs).into(),
         });
     }
-    let (deviations, novelty) = model.assess(&readings.values).unzip();
+    let assessed = model.assess(&readings.values);
     let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
-    let percent_novel = novelty.map(|novelty| percent_novel(&novelty));
+    let percent_novel = assessed.as_ref().map(|(_, novelty)| percent_novel(novelty));
     // A frame counts if any of its values does; what could not be decoded is missing in both.
     let frames_evaluated =
         truth.lines().filter(|line| line.iter().any(|value| !value.is_nan())).count();
@@ -167,7 +168,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         verdict,
         decoders,
         linear_at_training: metrics::linear_at_training(&parsed),
-        coverage: deviations.map_or(vec![], |deviations: Vec<f64>| {
+        coverage: assessed.map_or(vec![], |(deviations, _)| {
             coverage(&truth, &estimate.values, &deviations, ratios_95)
         }),
         percent_novel,
@@ -212,12 +213,6 @@ fn knows(metadata: &Metadata<'_>, file: &DataFile) -> Result<bool> {
     };
     let others = file.lines_left_out().filter(usable).count();
     Ok(metadata.training_frames as usize > others + others / ONE_IN)
-}
-
-/// Share of the frames that are novel, in per cent of those of which it can be told.
-fn percent_novel(novelty: &[f64]) -> f64 {
-    let told = novelty.iter().filter(|novelty| !novelty.is_nan()).count();
-    100.0 * novelty.iter().filter(|novelty| **novelty > 0.0).count() as f64 / told.max(1) as f64
 }
 
 /// Result for people.
@@ -324,8 +319,6 @@ fn page_of(
         distribution,
         frames: summary.frames_evaluated,
         sensor: None,
-        ideal_changes: &[],
-        noise: None,
         table1: None,
         made: &Made { command: command_line::of_this_process("eval", &[], None), files: vec![] },
     };

@@ -222,7 +222,7 @@ fn column_steps(arguments: &Arguments, subject: &Subject) -> Result<Vec<usize>> 
     }
 }
 
-/// What stands in the way of bounds on time that no point meets, and what each remedy gives.
+/// What stands in the way of bounds on time that no point meets, and what helps.
 fn in_the_way(cause: &NoPoint, subject: &Subject, plan: &Plan) -> Option<String> {
     let NoPoint::Each { unmet, .. } = cause else { return None };
     let most_ms = unmet.iter().filter_map(|unmet| match unmet.bounded {
@@ -231,43 +231,18 @@ fn in_the_way(cause: &NoPoint, subject: &Subject, plan: &Plan) -> Option<String>
         _ => None,
     });
     let most_ms = most_ms.reduce(f64::min)?;
-    let (tried, samples) = (*plan.column_steps.last()?, *plan.samples_averaged.first()?);
-    let wires = wires(subject, tried);
-    let scan_ms = |wires| plan.device.scan_ms(wires, samples);
-    let now_ms = scan_ms(wires)?;
-    let mut said =
-        vec![format!("a frame may take {most_ms:.3} ms, of which the scan takes {now_ms:.3} ms")];
-    if now_ms < most_ms {
-        said.push("fewer --centres decode faster".into());
-    }
-    let is_faster = |wires| scan_ms(Some(wires)).is_some_and(|ms| ms < most_ms.min(now_ms));
-    let took = |wires| format!("{:.3} ms", scan_ms(Some(wires)).unwrap_or(now_ms));
-    match subject {
-        _ if plan.device.scan_ms.is_some() => {}
-        Subject::Scene(scene) => {
-            let all = scene.world.sensor.column_wires;
-            let wider = (tried + 1..=all).filter(|step| all.is_multiple_of(*step));
-            let mut wider = wider.filter_map(|step| Some((step, self::wires(subject, step)?)));
-            said.extend(wider.find(|(_, wires)| is_faster(*wires)).map(|(step, wires)| {
-                let (columns, took) = (wires.columns, took(wires));
-                format!(
-                    "fewer columns are faster: try --column-step {step} ({columns} columns, {took})"
-                )
-            }));
-        }
-        Subject::Measured(_) => {
-            let Wires { rows, columns } = wires?;
-            let mut fewer = (1..columns).rev().map(|columns| Wires { rows, columns });
-            said.extend(fewer.find(|wires| is_faster(*wires)).map(|wires| {
-                let took = took(wires);
-                format!("the readings of {} columns (--inputs) take {took}", wires.columns)
-            }));
-        }
-    }
-    said.push(format!(
-        "for a converter with a scan below {most_ms:.3} ms give its time with --scan-ms"
-    ));
-    Some(said.join("; "))
+    let (step, samples) = (*plan.column_steps.last()?, *plan.samples_averaged.first()?);
+    let scan_ms = plan.device.scan_ms(wires(subject, step), samples)?;
+    let helps = match subject {
+        _ if scan_ms < most_ms => "give fewer --centres, which decode faster, or ",
+        _ if plan.device.scan_ms.is_some() => "",
+        Subject::Scene(_) => "read fewer columns (a larger --column-step), or ",
+        Subject::Measured(_) => "read fewer columns (--inputs), or ",
+    };
+    Some(format!(
+        "a frame may take {most_ms:.3} ms, of which the scan takes {scan_ms:.3} ms: {helps}give the time of a faster \
+         converter with --scan-ms"
+    ))
 }
 
 /// Wires that are read if only every `step`th column of a scene is; `None` where names of readings tell none.

@@ -45,7 +45,7 @@ fn described(view: &View<'_>, frame: &ShownFrame) -> String {
 pub const ORDER: &str = "Frames are ordered by the root mean square of their errors over all outputs; outputs of \
                          different quantities are divided by their standard deviations first.";
 
-/// Figure of the readings of all shown frames, as they were read and without noise.
+/// Figure of the readings of all shown frames.
 pub fn readings(view: &View<'_>) -> Option<Figure> {
     let shown = &view.distribution.readings;
     let (label, words) = match shown.relative_to {
@@ -65,24 +65,15 @@ pub fn readings(view: &View<'_>) -> Option<Figure> {
     let unit = if shown.relative_to == RelativeTo::MedianInDeviations { "" } else { "%" };
     let Some(face) = Face::of_readings(shown) else { return channels(view, label, words) };
     let changes = || view.distribution.frames.iter().map(|frame| &frame.change);
-    let scale = ColourScale::diverging(changes().chain(view.ideal_changes).flatten().copied());
-    let map = |frame: &ShownFrame, what: &str, values: &[f64]| {
-        let heading = format!("{}, {what}", name(frame));
-        let title = format!("Readings of the {heading}");
-        let values = Values { of_cells: values, scale: &scale, label, unit, shown: 6 };
-        Map::new(&face, &title, &heading, BAR_PX).values(&values)
-    };
+    let scale = ColourScale::diverging(changes().flatten().copied());
     let frames = &view.distribution.frames;
-    let read = frames.iter().map(|frame| map(frame, "as read", &frame.change));
-    let ideal = frames.iter().zip(view.ideal_changes);
-    let ideal = ideal.map(|(frame, ideal)| map(frame, "without noise", ideal));
-    let panels: Vec<Panel> = read.chain(ideal).collect();
-    let below = match &view.noise {
-        Some(noise) if !view.ideal_changes.is_empty() => {
-            format!(" Above as the model received them, with {noise}; below without it.")
-        }
-        _ => String::new(),
+    let map = |frame: &ShownFrame| {
+        let title = format!("Readings of the {}", name(frame));
+        let shown = frames.len();
+        let values = Values { of_cells: &frame.change, scale: &scale, label, unit, shown };
+        Map::new(&face, &title, &name(frame), BAR_PX).values(&values)
     };
+    let panels: Vec<Panel> = frames.iter().map(map).collect();
     let missing = if changes().flatten().any(|change| change.is_nan())
         || face.cells.len() > shown.names.len()
     {
@@ -90,7 +81,7 @@ pub fn readings(view: &View<'_>) -> Option<Figure> {
     } else {
         ""
     };
-    let caption = format!("{words}. All maps share one scale.{missing}{below} {ORDER}");
+    let caption = format!("{words}. All maps share one scale.{missing} {ORDER}");
     Some(Figure::of_panels("readings", caption, &panels))
 }
 

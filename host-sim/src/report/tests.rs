@@ -178,21 +178,14 @@ fn a_missing_value_is_drawn_nowhere() {
     let count = |page: &str| page.matches("cell-of-map").count();
     let styles = 1;
     let readings = 3 * 18;
-    assert_eq!(count(&whole) - styles, 12 * 3 * ELECTRODES + 3 * ELECTRODES + 6 * readings);
+    assert_eq!(count(&whole) - styles, 12 * 3 * ELECTRODES + 3 * ELECTRODES + 3 * readings);
     assert_eq!(count(&whole) - count(&page), 2 + 1 + 1, "decoded, difference, reading, RMSE");
     assert_eq!(page.matches(": missing ").count(), 4);
 }
 
 /// View of outputs and readings of a file, without a scene.
 fn view<'a>(distribution: &'a Distribution, result: &'a RunResult, made: &'a Made) -> View<'a> {
-    View {
-        distribution,
-        sensor: None,
-        ideal_changes: &[],
-        noise: None,
-        table1: None,
-        ..View::of_run(result, made)
-    }
+    View { distribution, sensor: None, table1: None, ..View::of_run(result, made) }
 }
 
 #[test]

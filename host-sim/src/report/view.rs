@@ -54,10 +54,6 @@ pub struct View<'a> {
     pub frames: usize,
     /// Wires and electrodes of the sensor.
     pub sensor: Option<&'a SensorSketch>,
-    /// Changes of the readings of the shown frames without noise; empty where they are not known.
-    pub ideal_changes: &'a [Vec<f64>],
-    /// Noise on the readings in words, if it is known.
-    pub noise: Option<String>,
     /// Table 1: errors by noise and spread.
     pub table1: Option<&'a Table1>,
     pub made: &'a Made,
@@ -86,8 +82,6 @@ impl<'a> View<'a> {
             distribution: &result.distribution,
             frames: result.model.test_frames,
             sensor: scene.and_then(|scene| scene.sensor.as_ref()),
-            ideal_changes: scene.map_or(&[], |scene| &scene.ideal_changes),
-            noise,
             table1: result.table1.as_ref(),
             made,
         }

@@ -56,69 +56,39 @@ impl MovingContacts {
         baselines: &[Box<dyn Decoder>],
     ) -> Result<Option<Self>> {
         let Some(path) = scene.world.path else { return Ok(None) };
-        let judged =
-            Judged::new(scene, Synthesis::new(&scene.world), path, blob, Device::default(), 1)?;
-        let scan_ms = judged.touched.ways[0].times.scan_ms;
-        let scanned = judged.touches.while_scanned(scan_ms)?;
+        let device = Device::default();
+        let scan_ms = device.scan_ms(Some(Wires::of(&scene.world)), 1);
+        let names = scene.world.output_names();
+        let group = columns::groups(&names).last().map_or("", |(group, _)| *group);
+        let synthesis = Synthesis::new(&scene.world);
+        let touches = Touches::new(scene, synthesis, (path, device.passes(1)), group);
+        let model = blob.prepare().of_inputs();
+        let cost = Cost::of_frame(&Design::new(blob));
+        let touched = touches.judge((blob, &model), cost, (&device, scan_ms), &scene.measure())?;
+        let scanned = touches.while_scanned(scan_ms)?;
         let decoders = baselines.iter().map(|baseline| {
             let estimates = baseline.decode_all(&scanned.moving.frames.inputs.values, 1);
             let errors = scanned.errors_at_once(&estimates.values, &scene.measure());
             DecoderErrors::new(baseline.name(), errors)
         });
-        let decoders = decoders.collect();
-        let shown = ShownTrajectory::new(&judged);
-        let ways = judged.ways();
-        Ok(Some(Self { path, group: judged.group, ways, decoders, shown }))
-    }
-}
-
-/// Synthesis of frames of `scene` that a `device` scans, with what averaging so many `samples` a reading leaves of the noise.
-pub fn scanned(scene: &Experiment, device: Device, samples: usize) -> Synthesis<'_> {
-    let world = &scene.world;
-    Synthesis::new(world).noise(device.averaged(world.noise, Some(Wires::of(world)), samples))
-}
-
-/// Model that was judged on one device.
-struct Judged<'s> {
-    touches: Touches<'s>,
-    touched: Touched,
-    group: String,
-}
-
-impl<'s> Judged<'s> {
-    fn new(
-        scene: &'s Experiment,
-        synthesis: Synthesis<'s>,
-        path: Path,
-        blob: &ModelBlob,
-        device: Device,
-        samples: usize,
-    ) -> Result<Self> {
-        let model = blob.prepare().of_inputs();
-        let cost = Cost::of_frame(&Design::new(blob));
-        let scan_ms = device.scan_ms(Some(Wires::of(&scene.world)), samples);
-        let names = scene.world.output_names();
-        let group = columns::groups(&names).last().map_or("", |(group, _)| *group).to_owned();
-        let touches = Touches::new(scene, synthesis, (path, device.passes(samples)), &group);
-        let device = (&device, scan_ms);
-        let touched = touches.judge((blob, &model), cost, device, &scene.measure())?;
-        Ok(Self { touches, touched, group })
-    }
-
-    fn ways(&self) -> Vec<MovingWay> {
         let way = |way: &Way| MovingWay {
             filter: way.filter.is_on().then(|| way.filter.into()),
             times: way.times,
             errors: way.errors.clone(),
         };
-        self.touched.ways.iter().map(way).collect()
+        Ok(Some(Self {
+            path,
+            group: group.into(),
+            ways: touched.ways.iter().map(way).collect(),
+            decoders: decoders.collect(),
+            shown: ShownTrajectory::new(&touched, group),
+        }))
     }
 }
 
 impl ShownTrajectory {
     /// First trajectory, and the output of `group` that changes most in it.
-    fn new(judged: &Judged<'_>) -> Self {
-        let Judged { touched, group, .. } = judged;
+    fn new(touched: &Touched, group: &str) -> Self {
         let moving = &touched.of_period.moving;
         let [plain, behind] = &touched.ways;
         let names = &moving.truth.names;
@@ -131,8 +101,7 @@ impl ShownTrajectory {
             let of = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
             of(f64::max).zip(of(f64::min)).map_or(0.0, |(most, least)| most - least)
         };
-        let outputs =
-            (0..names.len()).filter(|output| columns::group_of(&names[*output]) == *group);
+        let outputs = (0..names.len()).filter(|output| columns::group_of(&names[*output]) == group);
         let ranges = outputs.map(|output| (output, range(output)));
         let (output, _) = ranges.max_by(|(_, a), (_, b)| a.total_cmp(b)).unwrap_or_default();
         let held = |estimates: &[f64], way: &Way| {

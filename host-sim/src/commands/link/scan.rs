@@ -62,13 +62,12 @@ impl ScanArguments {
 }
 
 /// Content that a device is to send of each scan.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Wanted {
-    Nothing,
     Readings,
     Estimates,
-    /// Readings and estimates.
     Both,
+    Nothing,
 }
 
 impl Wanted {

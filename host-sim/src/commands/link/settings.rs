@@ -8,7 +8,7 @@ use taxel_rig::device::{CircuitConstants, Device};
 
 use super::super::filter_arguments::milliseconds;
 use super::super::{Common, print};
-use super::scan::{Confidence, TimingArguments};
+use super::scan::{Confidence, TimingArguments, Wanted};
 
 #[derive(Args)]
 #[command(arg_required_else_help = true)]
@@ -17,7 +17,7 @@ pub struct ConfigureArguments {
     timing: TimingArguments,
     /// Reports that are sent of each scan.
     #[arg(long, value_enum, value_name = "WHAT")]
-    send: Option<Send>,
+    send: Option<Wanted>,
     /// What is computed and sent of the model's confidence with each estimate (docs/confidence.md).
     #[arg(long, value_enum, value_name = "WHAT")]
     confidence: Option<Confidence>,
@@ -41,22 +41,12 @@ pub struct ConfigureArguments {
     report_every: Option<u16>,
 }
 
-/// Reports of each scan.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Send {
-    Readings,
-    Estimates,
-    Both,
-    Nothing,
-}
-
 impl ConfigureArguments {
     /// This configuration with the fields that are given.
     fn changed(&self, c: Configuration) -> Configuration {
         let mut c = self.timing.over(c);
         if let Some(send) = self.send {
-            c.send_readings = matches!(send, Send::Readings | Send::Both);
-            c.send_estimates = matches!(send, Send::Estimates | Send::Both);
+            (c.send_readings, c.send_estimates) = (send.sent().readings, send.sent().estimates);
         }
         c.confidence = self.confidence.map_or(c.confidence, ConfidenceSent::from);
         c.shorted_below_ohm = self.shorted_below_ohm.unwrap_or(c.shorted_below_ohm);
