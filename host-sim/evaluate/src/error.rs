@@ -23,14 +23,14 @@ pub enum Bounded {
 }
 
 impl Bounded {
-    /// Name of the quantity in messages.
-    pub fn name(self) -> &'static str {
+    /// Option of `trade` that bounds it.
+    pub fn option(self) -> &'static str {
         match self {
-            Self::Error => "max-error",
-            Self::Cycles => "max-cycles",
-            Self::Flash => "max-flash",
-            Self::FrameRate => "frame-rate",
-            Self::Latency => "max-latency-ms",
+            Self::Error => "--max-error",
+            Self::Cycles => "--max-cycles",
+            Self::Flash => "--max-flash",
+            Self::FrameRate => "--frame-rate",
+            Self::Latency => "--max-latency-ms",
         }
     }
 
@@ -87,11 +87,11 @@ pub enum NoPoint {
 
 impl Unmet {
     /// Bound in words.
-    fn bound(&self, name: impl Fn(Bounded) -> &'static str) -> String {
+    fn bound(&self) -> String {
         if self.is_slot {
             format!("a slot's {} bytes", self.bound)
         } else {
-            format!("{} {}", name(self.bounded), self.bound)
+            format!("{} {}", self.bounded.option(), self.bound)
         }
     }
 
@@ -122,13 +122,6 @@ impl std::error::Error for NoPoint {}
 
 impl fmt::Display for NoPoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text(Bounded::name))
-    }
-}
-
-impl NoPoint {
-    /// Message, with bounds called by `name`.
-    pub fn text(&self, name: impl Fn(Bounded) -> &'static str + Copy) -> String {
         let untrained = |predicted: bool| if predicted { "; nothing was trained" } else { "" };
         match self {
             Self::Each { unmet, unit, predicted } => {
@@ -143,23 +136,22 @@ impl NoPoint {
                 let plural = if unmet.len() == 1 { "" } else { "s" };
                 let unmet: Vec<String> = unmet
                     .iter()
-                    .map(|u| format!("{} ({})", u.bound(name), u.nearest(unit, *predicted)))
+                    .map(|u| format!("{} ({})", u.bound(), u.nearest(unit, *predicted)))
                     .collect();
                 let (unmet, untrained) = (unmet.join(", nor within "), untrained(*predicted));
-                format!("no point is within {unmet}: {verb} the bound{plural}{untrained}")
+                write!(f, "no point is within {unmet}: {verb} the bound{plural}{untrained}")
             }
             Self::Together { bounds, unit, predicted } => {
-                let names: Vec<String> = bounds.iter().map(|(b, _)| b.bound(name)).collect();
+                let names: Vec<String> = bounds.iter().map(|(b, _)| b.bound()).collect();
                 let nearest: Vec<String> = bounds
                     .iter()
                     .filter(|(_, any)| *any)
-                    .map(|(b, _)| {
-                        format!("without {}, {}", b.bound(name), b.nearest(unit, *predicted))
-                    })
+                    .map(|(b, _)| format!("without {}, {}", b.bound(), b.nearest(unit, *predicted)))
                     .collect();
                 let (names, nearest) = (names.join(", "), nearest.join("; "));
                 let untrained = untrained(*predicted);
-                format!(
+                write!(
+                    f,
                     "no point is within {names} at once: {nearest}; relax one of these bounds{untrained}"
                 )
             }

@@ -48,12 +48,12 @@ fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// Error that names the option which sets `bad`'s field, if one of `options` (field, option) does.
-pub fn of_option(bad: BadValue, options: &[(&str, &str)]) -> Error {
-    match options.iter().find(|(field, _)| *field == bad.field) {
-        Some((_, option)) => Error::Usage(format!("{option} {}: {}", bad.value, bad.rule)),
-        None => bad.into(),
+/// Error for a `bad` value, written as on the command line if its field is an option.
+pub fn of_option(bad: BadValue) -> Error {
+    if bad.field.starts_with('-') {
+        return Error::Usage(format!("{} {}: {}", bad.field, bad.value, bad.rule));
     }
+    bad.into()
 }
 
 #[cfg(test)]

@@ -98,8 +98,8 @@ impl Sizes {
         for (field, option) in &options {
             bad.rule = bad.rule.replace(field, option);
         }
-        if options.iter().any(|(field, _)| *field == bad.field) {
-            return Err(arguments::of_option(bad, &options));
+        if let Some((_, option)) = options.iter().find(|(field, _)| *field == bad.field) {
+            return Err(arguments::of_option(bad.named(*option)));
         }
         Err(Error::of_scene(source, bad))
     }

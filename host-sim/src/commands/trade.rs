@@ -99,7 +99,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         readout: arguments.tried.readout.into(),
         scan_ms: arguments.scan_ms,
     };
-    device.check().map_err(|bad| of_option(bad, &OPTIONS))?;
+    device.check().map_err(of_option)?;
     let plan = Plan {
         centres: centres(&arguments.tried.centres, &subject)?,
         column_steps: column_steps(arguments, &subject)?,
@@ -122,7 +122,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         frame_rate_hz: arguments.frame_rate,
         latency_ms: arguments.tried.max_latency_ms,
     };
-    bounds.check().map_err(|bad| of_option(bad, &OPTIONS))?;
+    bounds.check().map_err(of_option)?;
     let is_timed = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
     if is_timed && plan.device.scan_ms(wires(&subject, 1), 1).is_none() {
         let message = "--frame-rate and --max-latency-ms count the scan, whose time is not known: the readings name no \
@@ -132,7 +132,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let refused = |cause: &NoPoint| {
         let way =
             in_the_way(cause, &subject, &plan).map_or(String::new(), |way| format!("; {way}"));
-        Error::Usage(format!("{}{way}", cause.text(option)))
+        Error::Usage(format!("{cause}{way}"))
     };
     let folder = arguments.output.join(subject.name());
     files::FILES.check(&folder, &arguments.subject.paths())?;
@@ -142,7 +142,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let fix = "give fewer --centres or --inputs";
             Error::Usage(format!("training takes {}, more than 8 GB: {fix}", bad.value))
         }
-        Error::Data(taxel_data::Error::Setting(bad)) => of_option(bad, &OPTIONS),
+        Error::Data(taxel_data::Error::Setting(bad)) if bad.field == "centres" => {
+            of_option(bad.named("--centres"))
+        }
+        Error::Data(taxel_data::Error::Setting(bad)) => of_option(bad),
         Error::NoPoint(cause) => refused(&cause),
         other => other,
     })?;
@@ -155,32 +158,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     // Measurements are kept and shown even if no point is within the bounds.
     choice.map_err(|cause| refused(&cause))
-}
-
-/// Options by the settings that they set.
-const OPTIONS: [(&str, &str); 11] = [
-    ("worst-case", "--worst-case"),
-    ("clock-mhz", "--clock-mhz"),
-    ("scan-ms", "--scan-ms"),
-    ("centres", "--centres"),
-    ("average", "--average"),
-    ("column-step", "--column-step"),
-    ("max-error", option(Bounded::Error)),
-    ("max-cycles", option(Bounded::Cycles)),
-    ("max-flash", option(Bounded::Flash)),
-    ("frame-rate", option(Bounded::FrameRate)),
-    ("max-latency-ms", option(Bounded::Latency)),
-];
-
-/// Option that sets a bound.
-const fn option(bounded: Bounded) -> &'static str {
-    match bounded {
-        Bounded::Error => "--max-error",
-        Bounded::Cycles => "--max-cycles",
-        Bounded::Flash => "--max-flash",
-        Bounded::FrameRate => "--frame-rate",
-        Bounded::Latency => "--max-latency-ms",
-    }
 }
 
 /// Centres to try unless a user says otherwise.

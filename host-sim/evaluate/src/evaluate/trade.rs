@@ -331,7 +331,7 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
     if let Some(samples) =
         plan.samples_averaged.iter().find(|samples| !(1..=256).contains(*samples))
     {
-        return Err(BadValue::new("average", samples, "the firmware averages 1 to 256 samples"));
+        return Err(BadValue::new("--average", samples, "the firmware averages 1 to 256 samples"));
     }
     let (columns, rule) = match subject {
         Subject::Scene(scene) => {
@@ -343,20 +343,20 @@ fn check(subject: &Subject, plan: &Plan) -> std::result::Result<(), BadValue> {
         }
     };
     if let Some(step) = plan.column_steps.iter().find(|step| !(1..=columns).contains(*step)) {
-        return Err(BadValue::new("column-step", step, rule));
+        return Err(BadValue::new("--column-step", step, rule));
     }
     plan.device.check()?;
     let has_others = subject.scene().is_some_and(|scene| !scene.others.is_empty());
     if plan.worst_case && !has_others {
         let rule =
             "there are no other contacts to judge by; leave it out, or give a scene of contacts";
-        return Err(BadValue::new("worst-case", true, rule));
+        return Err(BadValue::new("--worst-case", true, rule));
     }
     if let Subject::Measured(_) = subject
         && let Some(samples) = plan.samples_averaged.iter().find(|samples| **samples != 1)
     {
         let rule = "measured readings are averaged already: give 1, or a scene";
-        return Err(BadValue::new("average", samples, rule));
+        return Err(BadValue::new("--average", samples, rule));
     }
     Ok(())
 }

@@ -39,7 +39,7 @@ impl Bounds {
     pub fn check(&self) -> Result<(), BadValue> {
         for Unmet { bounded, bound, .. } in self.each() {
             if !(bound.is_finite() && bound > 0.0) {
-                return Err(BadValue::new(bounded.name(), bound, "give a positive number"));
+                return Err(BadValue::new(bounded.option(), bound, "give a positive number"));
             }
         }
         Ok(())
@@ -210,7 +210,7 @@ mod tests {
             (Bounds { latency_ms: Some(1.0), ..none }, "the shortest time is 6.200 ms"),
             (
                 Bounds { error: Some(0.035), frame_rate_hz: Some(100.0), ..none },
-                "without frame-rate 100, the highest rate is 43.1 frames",
+                "without --frame-rate 100, the highest rate is 43.1 frames",
             ),
         ] {
             let refused = bounds.choose(&offers(), "mm").unwrap_err().to_string();

@@ -102,7 +102,7 @@ impl Times {
 impl Device {
     /// Checks that the numbers are positive.
     pub fn check(&self) -> Result<(), BadValue> {
-        let numbers = [("clock-mhz", Some(self.clock_mhz)), ("scan-ms", self.scan_ms)];
+        let numbers = [("--clock-mhz", Some(self.clock_mhz)), ("--scan-ms", self.scan_ms)];
         for (name, number) in numbers {
             if let Some(number) = number.filter(|number| !(number.is_finite() && *number > 0.0)) {
                 return Err(BadValue::new(name, number, "give a positive number"));
