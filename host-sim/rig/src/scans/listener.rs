@@ -184,11 +184,3 @@ fn listen(
     }
     Ok(())
 }
-
-#[cfg(test)]
-impl Listener {
-    /// Number of the newest scan that was heard, which is not taken.
-    pub(super) fn shared_newest(&self) -> Option<u32> {
-        self.shared.heard().newest.as_ref().map(|scan| scan.number)
-    }
-}
