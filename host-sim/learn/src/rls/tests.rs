@@ -1,6 +1,31 @@
 use super::*;
 
 #[test]
+fn the_largest_usable_numbers_give_finite_weights() {
+    let mut rls = Rls::<f32>::new([2, 1], 1e3, 0.99).unwrap();
+    for _ in 0..1000 {
+        rls.update(&mut [1e15, -1e15], &mut [1e15]).unwrap();
+    }
+    assert!(rls.weights().iter().all(|w| w.is_finite()), "{:?}", rls.weights());
+}
+
+#[test]
+fn unexcited_directions_fade_towards_weight_zero() {
+    let mut rls = Rls::<f32>::new([2, 1], 1e3, 0.9).unwrap();
+    for _ in 0..100 {
+        rls.update(&mut [0.0, 1.0], &mut [5.0]).unwrap();
+        rls.update(&mut [1.0, 0.0], &mut [2.0]).unwrap();
+    }
+    assert!((rls.weights()[1] - 5.0).abs() < 0.01, "{:?}", rls.weights());
+    // Without leakage, weights stay until their information is no normal number: thousands of updates.
+    for _ in 0..300 {
+        rls.update(&mut [1.0, 0.0], &mut [2.0]).unwrap();
+    }
+    let weights = rls.weights();
+    assert!((weights[0] - 2.0).abs() < 1e-3 && weights[1].abs() < 1e-6, "{weights:?}");
+}
+
+#[test]
 fn with_forgetting_the_recursion_follows_what_changes() {
     let slope = |forgetting_factor: f64| {
         let mut rls = Rls::new([2, 1], 1e6, forgetting_factor).unwrap();

@@ -194,6 +194,15 @@ fn reading_and_writing_end_with_the_time_for_them() {
 }
 
 #[test]
+fn positions_that_do_not_fit_together_are_an_error() {
+    let (mut host, _image) = still();
+    host.set_position(TO_HOST.written, CAPACITY + 1).unwrap();
+    host.set_position(TO_IMAGE.read, 1).unwrap();
+    assert_eq!(host.read(&mut [0]).unwrap_err().kind(), ErrorKind::InvalidData);
+    assert_eq!(host.write(&[0]).unwrap_err().kind(), ErrorKind::InvalidData);
+}
+
+#[test]
 fn the_file_holds_what_the_machine_maps() {
     let name = format!("taxel-mailbox-test-{}", std::process::id());
     let path = std::env::temp_dir().join(name);
