@@ -142,19 +142,49 @@ impl FileSet {
 
     /// Writes files, by name and content, to `folder`, which is made if it is not there. Other files of the set
     /// are removed: they are from an earlier run.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if a file cannot be written.
     pub fn write(&self, folder: &Path, contents: &[(&str, &[u8])]) -> Result<()> {
+        Written::put_in_place(vec![self.written(folder, contents)?])
+    }
+
+    /// Writes files like [`write`](Self::write), beside their places as yet.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if a file cannot be written.
+    pub fn written(&self, folder: &Path, contents: &[(&str, &[u8])]) -> Result<Written> {
         let is_of_set = |name: &str| {
             let inner =
                 name.strip_prefix(self.inner.folder).and_then(|name| name.strip_prefix('/'));
             inner.map_or(self.files.contains(&name), |name| self.inner.has(Path::new(name)))
         };
         debug_assert!(contents.iter().all(|(name, _)| is_of_set(name)), "unknown file");
-        let written = written_in(folder, contents)?;
+        let files = written_in(folder, contents)?;
         let mut earlier: Vec<PathBuf> = self.files.iter().map(|name| folder.join(name)).collect();
         let inner = fs::read_dir(folder.join(self.inner.folder)).into_iter().flatten().flatten();
         earlier.extend(inner.map(|entry| entry.path()).filter(|path| self.inner.has(path)));
         earlier.retain(|path| contents.iter().all(|(new, _)| folder.join(new) != *path));
-        temporary::put_in_place(written, &earlier)
+        Ok(Written { files, earlier })
+    }
+}
+
+/// Files of a folder, written beside their places. Dropped, they leave the old ones.
+pub struct Written {
+    files: Vec<Temporary>,
+    /// Files of an earlier run, which go.
+    earlier: Vec<PathBuf>,
+}
+
+impl Written {
+    /// Renames the files of all folders to their places. A signal waits until all are renamed.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if a file cannot be renamed, or one of an earlier run cannot be removed.
+    pub fn put_in_place(folders: Vec<Self>) -> Result<()> {
+        let folders = folders.into_iter().map(|it| (it.files, it.earlier));
+        let (files, earlier): (Vec<_>, Vec<_>) = folders.unzip();
+        temporary::put_in_place(files.into_iter().flatten().collect(), &earlier.concat())
     }
 }
 

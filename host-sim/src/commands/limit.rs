@@ -9,7 +9,7 @@ use crate::metrics::{DecoderErrors, Errors};
 use crate::{Error, Result, report};
 use clap::Args;
 use serde::Serialize;
-use taxel_data::output::FileSet;
+use taxel_data::output::{FileSet, Written};
 use taxel_learn::ModelBlob;
 use taxel_limit::identify::Observability;
 use taxel_simulate::noise::NoiseKind;
@@ -82,10 +82,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut results = Vec::new();
     for Prepared { scene, noise_levels, frames, models } in &scenes {
         let plan = Plan { noise_levels, frames: *frames, models };
-        let result = limit::compute(scene, &plan, &Terminal::new())?;
-        folder_of(scene).map_or(Ok(()), |folder| write_files(&folder, &result))?;
-        results.push(result);
+        results.push(limit::compute(scene, &plan, &Terminal::new())?);
     }
+    let written = scenes.iter().zip(&results).filter_map(|(it, result)| {
+        folder_of(&it.scene).map(|folder| written_files(&folder, result))
+    });
+    Written::put_in_place(written.collect::<Result<_>>()?)?;
     let folder = arguments.output.as_deref();
     if let [result] = &results[..] {
         print::result(common, result, || page_of(result, folder))?;
@@ -148,13 +150,13 @@ fn refusal(result: &LimitResult) -> Result<()> {
     }
 }
 
-fn write_files(folder: &Path, result: &LimitResult) -> Result<()> {
+fn written_files(folder: &Path, result: &LimitResult) -> Result<Written> {
     let json = print::json_text(result)?;
     let command = command_line::of_this_process("limit", &["-o", "--output"], Some(result.seed));
     let page = report::limit_html(result, &command);
     let mut files = vec![("limit.json", json.as_bytes()), ("limit.html", page.html.as_bytes())];
     files.extend(page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes())));
-    Ok(FILES.write(folder, &files)?)
+    Ok(FILES.written(folder, &files)?)
 }
 
 fn page_of(result: &LimitResult, folder: Option<&Path>) -> print::Page {

@@ -75,6 +75,20 @@ fn whichever_step_fails_files_are_whole_and_no_temporary_stays() {
 }
 
 #[test]
+fn files_of_several_folders_are_all_written_before_the_first_is_renamed() {
+    let around = tempfile::tempdir().unwrap();
+    let folders = ["one", "two"].map(|name| around.path().join(name));
+    let (steps, outcome) = steps_of(0, || {
+        let written = folders.iter().map(|folder| SET.written(folder, &[("model", b"new")]));
+        Written::put_in_place(written.collect::<Result<_>>()?)
+    });
+    outcome.unwrap();
+    let renamed = steps.iter().position(|step| step.starts_with("rename")).unwrap();
+    assert!(steps[renamed..].iter().all(|step| !step.starts_with("write")), "{steps:?}");
+    assert!(folders.iter().all(|folder| folder.join("model").exists()));
+}
+
+#[test]
 fn whenever_the_program_is_killed_or_the_power_goes_files_are_whole() {
     let folder = tempfile::tempdir().unwrap();
     let all = |text: &'static [u8]| [("model", text), ("metrics", text), ("table", text)];
