@@ -311,7 +311,8 @@ mod tests {
         folds: &[usize],
         centres: usize,
         spreads: &[f64],
-        (penalties, most_penalties): (&[Option<f64>], usize),
+        penalties: &[Option<f64>],
+        most_penalties: usize,
     ) -> Selection {
         let (spreads, penalties) = (spreads.to_vec(), penalties.to_vec());
         let candidates = Candidates {
@@ -334,7 +335,7 @@ mod tests {
         let folds = block_folds(dataset.frames(), 4);
         let select = |penalties: &[f64], most: usize| {
             let penalties: Vec<Option<f64>> = penalties.iter().copied().map(Some).collect();
-            select(&dataset, &folds, 60, &[0.2], (&penalties, most))
+            select(&dataset, &folds, 60, &[0.2], &penalties, most)
         };
         let wide = select(&[1e-9, 1e-7, 1e-5, 1e-3, 1e-1], 0);
         assert!((0.3..0.4).contains(&wide.best().rmse[0]), "little more than the noise: {wide:?}");
@@ -353,7 +354,7 @@ mod tests {
     fn best_spread(outputs: &[&str]) -> f64 {
         let dataset = dataset(outputs);
         let folds = random_folds(dataset.frames(), 4, 1);
-        let selection = select(&dataset, &folds, 20, &[0.05, 0.2, 3.0], (&[None], 0));
+        let selection = select(&dataset, &folds, 20, &[0.05, 0.2, 3.0], &[None], 0);
         assert_eq!(selection.scored.len(), 3);
         selection.best().spread
     }
@@ -372,7 +373,7 @@ mod tests {
             line[1] = if number % 3 == 0 { f64::NAN } else { line[0] };
         }
         let folds = block_folds(both.frames(), 4);
-        let select = |data: &Dataset| select(data, &folds, 20, &[0.5], (&[None], 0));
+        let select = |data: &Dataset| select(data, &folds, 20, &[0.5], &[None], 0);
         let alone = Dataset { outputs: both.outputs.columns(0, 1), ..both.clone() };
         let (of_both, of_one) = (select(&both), select(&alone));
         assert_eq!(of_both.scored[0].rmse[0].to_bits(), of_one.scored[0].rmse[0].to_bits());

@@ -30,7 +30,7 @@ const DOUBLED: u64 = 14;
 #[test]
 fn columns_of_any_scale_and_offset_cost_no_accuracy_or_are_refused_by_name() {
     let formats = Format::ALL;
-    let base = formats.map(|format| r_squared([Change::NONE; 2], format).unwrap());
+    let base = formats.map(|format| errors([Change::NONE; 2], format).unwrap().r_squared());
     hold("scale", MOST_LOST, 200, |seed| {
         let mut random = Random::new(seed, Stream::Test, Purpose::Noise, 0, 0);
         let mut which = random.below(formats.len());
@@ -50,15 +50,40 @@ fn columns_of_any_scale_and_offset_cost_no_accuracy_or_are_refused_by_name() {
         }
         let mut changes = [Change::NONE; 2];
         changes[place] = change;
-        let found = r_squared(changes, formats[which]);
+        let found = errors(changes, formats[which]).map(Errors::r_squared);
         assert!(found.is_some() || !change.is_moderate(), "{changes:?}: moderate, and refused");
         found.map(|found| base[which] - found)
     });
 }
 
-/// R² on its own frames of a model whose first input and whose output are changed. `None` if a column is refused, or does
-/// not change any more in f64.
-fn r_squared(changes: [Change; 2], format: Format) -> Option<f64> {
+/// A large offset, as of an absolute pressure, must not cost the network its digits.
+#[test]
+fn an_offset_of_the_outputs_costs_no_more_than_f32_itself() {
+    let rmse = |offset: f64| {
+        let change = Change { factor: 10.0, offset };
+        errors([Change::NONE, change], Format::F32).unwrap().of_model.sqrt()
+    };
+    for offset in [1e3, 1e5, 1e6] {
+        let half_an_ulp = offset * f64::from(f32::EPSILON) / 2.0;
+        assert!(rmse(offset) <= 1.01 * rmse(0.0) + half_an_ulp, "{offset}: {}", rmse(offset));
+    }
+}
+
+/// Mean squared errors on a model's own frames.
+struct Errors {
+    of_model: f64,
+    of_mean: f64,
+}
+
+impl Errors {
+    fn r_squared(self) -> f64 {
+        1.0 - self.of_model / self.of_mean
+    }
+}
+
+/// Errors of a model whose first input and whose output are changed. `None` if a column is refused, or does not change any
+/// more in f64.
+fn errors(changes: [Change; 2], format: Format) -> Option<Errors> {
     let mut data = Dataset::empty(vec!["a".into(), "b".into()], vec!["y".into()], 1, 150);
     let mut random = Random::new(1, Stream::Training, Purpose::Noise, 0, 0);
     let [of_input, of_output] =
@@ -85,6 +110,7 @@ fn r_squared(changes: [Change; 2], format: Format) -> Option<f64> {
         return None;
     }
     let mean = vec![data.outputs.means()[0]; decoded.len()];
-    let [left, all] = [&decoded, &mean].map(|it| data.outputs.squared_errors(it)[0]);
-    Some(1.0 - left / all)
+    let [of_model, of_mean] =
+        [&decoded, &mean].map(|it| data.outputs.squared_errors(it)[0] / decoded.len() as f64);
+    Some(Errors { of_model, of_mean })
 }
