@@ -368,8 +368,9 @@ mod tests {
         assert!(ScanPlan { oversampling: most, ..PLAN }.longest_us() <= 10_000);
         assert!(ScanPlan { oversampling: most + 1, ..PLAN }.longest_us() > 10_000);
     }
+
     #[test]
-    fn a_scan_too_long_to_tell_takes_the_longest_time() {
+    fn a_scan_beyond_u32_takes_the_longest_time() {
         let (rows, settling_us, oversampling) = (u16::MAX, u32::MAX, u16::MAX);
         let endless = ScanPlan { rows, settling_us, oversampling, pass_samples: 1, ..PLAN };
         assert_eq!((endless.scan_us(), endless.longest_us()), (u32::MAX, u32::MAX));

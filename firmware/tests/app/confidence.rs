@@ -10,14 +10,22 @@ use taxel_firmware::link::message::{
 use super::requests::bits;
 use crate::mock::*;
 
-/// What an estimate has of a confidence: whether it is flagged as novel, and bits of novelty and deviations.
-type Sent = (bool, Option<u32>, Vec<u32>);
+/// What an estimate has of a confidence: a flag, and the bits of its numbers.
+#[derive(Debug, Clone, PartialEq)]
+struct Sent {
+    is_novel: bool,
+    novelty: Option<u32>,
+    deviations: Vec<u32>,
+}
 
-const NOTHING: Sent = (false, None, Vec::new());
+const NOTHING: Sent = Sent { is_novel: false, novelty: None, deviations: Vec::new() };
 
 fn sent(estimate: &EstimateReport<'_>) -> Sent {
-    let is_novel = estimate.flags & EstimateReport::NOVEL != 0;
-    (is_novel, estimate.novelty.map(f32::to_bits), bits(estimate.deviation.iter()))
+    Sent {
+        is_novel: estimate.flags & EstimateReport::NOVEL != 0,
+        novelty: estimate.novelty.map(f32::to_bits),
+        deviations: bits(estimate.deviation.iter()),
+    }
 }
 
 /// What taxel-core itself makes of a frame.
@@ -27,7 +35,11 @@ fn expected(blob: &[u8], frame: &TestFrame, baseline_ohm: f32) -> Sent {
     let frame = Frame { readings_ohm: frame.as_flattened(), reciprocals: &reciprocals };
     let (mut scratch, mut deviation) = (vec![0.0; decoder.scratch_floats()], [0.0; ROWS * OUTPUTS]);
     let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).unwrap().unwrap();
-    (novelty > 0.0, Some(novelty.to_bits()), bits(deviation.into_iter()))
+    Sent {
+        is_novel: novelty > 0.0,
+        novelty: Some(novelty.to_bits()),
+        deviations: bits(deviation.into_iter()),
+    }
 }
 
 /// Lets the device decode `frame`.
@@ -71,21 +83,21 @@ fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
         let blob = blob_with_confidence(is_relative);
         let (mut session, board) = started(quiet(), &blob);
         let (found, flags) = decode(&mut session, &board, &frame_at_rest());
-        let is_unknown = found.1.is_some_and(|novelty| f32::from_bits(novelty).is_nan());
+        let is_unknown = found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan());
         let unknown = if is_relative { EstimateReport::NO_BASELINE } else { 0 };
         assert_eq!((flags, is_unknown), (unknown, is_relative));
         let readings_ohm = Floats::new(&[62.0; ROWS * COLS]);
         tell(&mut session, &board, &Request::SetBaseline { readings_ohm });
         // However little a frame is novel, it is flagged.
         let hardly = (65..900).map(|ohm| ohm as f32).find(|ohm| {
-            let (_, novelty, _) = expected(&blob, &with_last(*ohm), baseline_ohm);
-            novelty.is_some_and(|novelty| (1e-6..1.0).contains(&f32::from_bits(novelty)))
+            let sent = expected(&blob, &with_last(*ohm), baseline_ohm);
+            sent.novelty.is_some_and(|novelty| (1e-6..1.0).contains(&f32::from_bits(novelty)))
         });
         for (ohm, novel) in [(65.0, false), (64.0, false), (hardly.unwrap(), true), (900.0, true)] {
             let (found, flags) = decode(&mut session, &board, &with_last(ohm));
             assert_eq!(found, expected(&blob, &with_last(ohm), baseline_ohm), "{ohm}");
             assert_ne!(flags & EstimateReport::CONTACT, 0, "{ohm}: a flag of its own is lost");
-            assert_eq!((found.0, found.2.len()), (novel, ROWS * OUTPUTS), "{ohm}");
+            assert_eq!((found.is_novel, found.deviations.len()), (novel, ROWS * OUTPUTS), "{ohm}");
         }
         let s = statistics(&mut session, &board);
         assert_eq!((s.frames_novel, s.longest_confidence_us > 0), (2, true));
@@ -97,7 +109,7 @@ fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
     let (with, without) = (blob_with_confidence(false), blob(3, 4));
     let frame = with_last(900.0);
     let all = || expected(&with, &frame, f32::NAN);
-    let novelty = (true, all().1, Vec::new());
+    let novelty = Sent { deviations: Vec::new(), ..all() };
     for (blob, confidence, expected) in [
         (&without, ConfidenceSent::Deviations, NOTHING),
         (&with, ConfidenceSent::Nothing, NOTHING),
@@ -109,8 +121,8 @@ fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
         let frames = scanned(&mut session, &board, confidence);
         assert!(frames.iter().all(|sent| *sent == expected), "{confidence:?}: {frames:?}");
         let s = statistics(&mut session, &board);
-        assert_eq!(s.frames_novel, if expected.0 { s.frames_decoded } else { 0 });
-        assert_eq!(s.longest_confidence_us > 0, expected.0);
+        assert_eq!(s.frames_novel, if expected.is_novel { s.frames_decoded } else { 0 });
+        assert_eq!(s.longest_confidence_us > 0, expected.is_novel);
     }
     let (mut session, board) = started(quiet(), &without);
     assert_eq!(decode(&mut session, &board, &frame).0, NOTHING);
@@ -123,9 +135,9 @@ fn a_frame_with_a_faulty_reading_has_no_confidence_and_is_not_novel() {
     for bad in [f32::NAN, 0.0, f32::INFINITY, 2000.0, -60.0] {
         let (found, flags) = decode(&mut session, &board, &with_last(bad));
         assert_eq!(flags, EstimateReport::FAULTY_READING, "{bad}");
-        let (_, novelty, deviation) = found;
-        assert_eq!((novelty.is_some(), deviation.len()), (true, ROWS * OUTPUTS), "{bad}");
-        let mut all = novelty.into_iter().chain(deviation);
+        let Sent { novelty, deviations, .. } = found;
+        assert_eq!((novelty.is_some(), deviations.len()), (true, ROWS * OUTPUTS), "{bad}");
+        let mut all = novelty.into_iter().chain(deviations);
         assert!(all.all(|value| f32::from_bits(value).is_nan()), "{bad}");
     }
 }
