@@ -124,7 +124,7 @@ impl Chart {
     /// All points, by series.
     pub fn data(&self) -> Data {
         let mut data = Data::new(&["series", &self.x.label, &self.y.label]);
-        for series in &self.series {
+        for series in self.series.iter().filter(|it| !matches!(it.mark, Mark::Names(_))) {
             let line = |[x, y]: &[f64; 2]| vec![series.name.clone(), number(*x), number(*y)];
             data.lines.extend(series.points.iter().map(line));
         }
@@ -361,10 +361,11 @@ mod tests {
     }
 
     #[test]
-    fn names_leave_each_other_alone_and_stay_within_the_panel() {
+    fn names_do_not_overlap_and_stay_within_the_panel() {
         let written = |y: f64| {
             let mut chart = chart(Mark::Names((0..40).map(|i| format!("K {i}")).collect()), &[]);
             chart.series[0].points = (0..40).map(|i| [0.1 * f64::from(i), y]).collect();
+            assert!(chart.data().lines.is_empty(), "places of names are those of other series");
             let picture = chart.draw([400.0, 200.0]);
             (picture.matches(">K ").count(), picture.contains(">K 0<"))
         };

@@ -123,7 +123,7 @@ fn levels(trade: &Trade) -> Vec<(String, f64, &'static str, Mark)> {
         of => format!(" with {of}"),
     };
     let styles = [("muted", Mark::Dashed), ("c3", Mark::Dashed), ("truth", Mark::Dotted)];
-    let references = readings.references(&trade.group).zip(styles).enumerate();
+    let references = readings.references(&trade.group).zip(styles.into_iter().cycle()).enumerate();
     let references = references.map(|(place, ((name, rmse), (class, mark)))| {
         // What is read matters to all but the mean.
         let with = if place == 0 { "" } else { &with };
