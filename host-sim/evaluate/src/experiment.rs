@@ -129,16 +129,19 @@ pub struct Table1 {
     pub centres: usize,
     /// Number of frames, and of centres, of the standard network (K = N).
     pub standard_frames: usize,
-    /// How output weights are computed; the paper's way is recursive least squares.
-    #[serde(default = "by_recursion")]
-    pub solver: Solver,
+    /// How output weights are computed, if a scene says so.
+    solver: Option<Solver>,
     /// Initial covariance δ for networks in f64 on readings over their maximum, as no device has them. They are computed
     /// by QR: with the penalty 1/δ it gives the weights of the recursion.
     pub textbook_covariance: Option<f64>,
 }
 
-fn by_recursion() -> Solver {
-    Solver::Rls
+impl Table1 {
+    /// How output weights are computed; the paper's way is recursive least squares.
+    pub fn solver(&self) -> Solver {
+        let of_textbook = self.textbook_covariance.map(|_| Solver::Qr);
+        self.solver.or(of_textbook).unwrap_or(Solver::Rls)
+    }
 }
 
 fn yes() -> bool {
@@ -395,6 +398,10 @@ fn check_table1(t: &Table1, noise_kind: NoiseKind) -> Check {
         check_noise_level("table1.noise_levels", noise_kind, *level)?;
     }
     if let Some(delta) = t.textbook_covariance {
+        let solver = t.solver.map_or("", Solver::name);
+        require(t.solver.is_none(), "table1.solver", solver, || {
+            "textbook networks are solved by QR decomposition; leave table1.solver out".into()
+        })?;
         let field = "table1.textbook_covariance";
         require((1e-12..=1e12).contains(&delta), field, format!("{delta:?}"), || {
             "give a number from 1e-12 to 1e12; the penalty on squared weights is one over it".into()

@@ -8,7 +8,7 @@ use taxel_data::{Dataset, Progress, Purpose, Random, RowTable, Stream, columns};
 use taxel_learn::decoders::standard::{self, StandardNetwork};
 use taxel_learn::decoders::textbook::{Textbook, TextbookNetwork};
 use taxel_learn::decoders::{BASELINES, RowDecoder, Rows, mean};
-use taxel_learn::train::{FittedNetwork, Samples, Solver};
+use taxel_learn::train::{FittedNetwork, Samples};
 use taxel_learn::{Decoder, Options};
 use taxel_simulate::Synthesis;
 use taxel_simulate::motion::Kind;
@@ -137,8 +137,7 @@ pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table
         training_frames: settings.frames,
         test_frames: settings.test_frames,
         standard_frames: settings.standard_frames,
-        solver: if settings.textbook_covariance.is_some() { Solver::Qr } else { settings.solver }
-            .name(),
+        solver: settings.solver().name(),
         columns,
         comparison,
     })
@@ -284,7 +283,7 @@ fn row_networks(
     let table = training.row_table(row);
     let samples = Samples::new(&table);
     let options = |spread| {
-        let (centres, solver) = (settings.centres, settings.solver);
+        let (centres, solver) = (settings.centres, settings.solver());
         let paper = Options::of_rows().as_in_paper();
         let mut options = Options { centres, spread, solver, seed, ..paper };
         options.search.most_points = 4096;
