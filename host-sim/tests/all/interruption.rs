@@ -73,7 +73,7 @@ impl Rig {
         let trap = Arc::new(Mutex::new(Trap::default()));
         let counter = trap.clone();
         let sensor = virtual_device::Source { frames: frames(), next: 0 };
-        virtual_device::run_scanning(far, SOUND, model, (sensor, OWN), move || {
+        virtual_device::run_scanning(far, SOUND, model, sensor, OWN, move || {
             counter.lock().unwrap().count();
         });
         Self { port, trap, folder: Folder::new(name) }

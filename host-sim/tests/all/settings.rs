@@ -76,7 +76,7 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
     let folder = Folder::new("settings");
     let (port, near, far) = crate::device::serial_port::terminal();
     let sensor = AtRest(ZeroPotential::TYPICAL);
-    run_scanning(far, Line { one_in: None }, &[], (sensor, QUIET), || ());
+    run_scanning(far, Line { one_in: None }, &[], sensor, QUIET, || ());
     drop(near); // the program opens it itself
     let link = |arguments: &[&str]| folder.succeed(&[&["link", &port][..], arguments].concat());
 

@@ -152,7 +152,7 @@ pub fn run(
     model: &[u8],
     frames: Vec<[[f32; 18]; 8]>,
 ) {
-    run_scanning(wire, line, model, (Source { frames, next: 0 }, QUIET), || ());
+    run_scanning(wire, line, model, Source { frames, next: 0 }, QUIET, || ());
 }
 
 /// Configuration that scans only on request.
@@ -166,7 +166,8 @@ pub fn run_scanning(
     mut wire: impl Read + Write + Send + 'static,
     line: Line,
     model: &[u8],
-    (source, own): (impl FrameSource + Clone + Send + 'static, Configuration),
+    source: impl FrameSource + Clone + Send + 'static,
+    own: Configuration,
     mut notice: impl FnMut() + Send + 'static,
 ) {
     let model = model.to_vec();
