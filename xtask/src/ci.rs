@@ -34,8 +34,8 @@ pub fn run() -> Outcome {
     run_all(steps)
 }
 
-/// Runs what a release needs beside CI: packages, the module of Python, all scenarios of the emulated board, a record of
-/// it, and exported models in all compilers.
+/// Runs what a release needs beside CI: packages, the module of Python, tests with more cases, all scenarios of the emulated
+/// board, a record of it, and exported models in all compilers.
 pub fn run_before_release() -> Outcome {
     run_all(steps_of_release)
 }
@@ -113,8 +113,12 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
 /// The steps that only a release waits for.
 fn steps_of_release(this: &Path) -> [Vec<Step>; 3] {
     let own = |name, arguments: &[&str]| own(this, name, arguments);
+    // The tests that draw their cases.
+    let drawn = ["extremes", "limits_agree", "number_formats", "power_cuts"];
+    let mut cases = cargo(&[&["test", "--tests", "--"], &drawn[..]].concat());
+    cases.env("TAXEL_CASES", "3000");
     [
-        vec![own("publish", &["publish"]), own("python", &["python"])],
+        vec![own("publish", &["publish"]), own("python", &["python"]), ("cases", cases)],
         vec![own("c", &["c"]), own("board", &["board"])],
         vec![own("accept", &["accept", "--emulated"])],
     ]
