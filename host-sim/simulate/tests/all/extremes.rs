@@ -8,8 +8,7 @@ use taxel_simulate::World;
 use taxel_simulate::motion::Independent;
 use taxel_simulate::sensor::{LaneModel, Precision, Scratch};
 
-#[path = "../../../proof/extremes.rs"]
-mod table;
+use crate::table;
 
 /// Steps of compression at which readings are compared.
 const STEPS: u32 = 20;

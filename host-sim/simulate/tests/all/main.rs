@@ -1,0 +1,6 @@
+//! Every integration test in one program: it is linked once.
+
+#[path = "../../../../proof/extremes.rs"]
+mod table;
+
+mod extremes;
