@@ -113,12 +113,16 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
 /// The steps that only a release waits for.
 fn steps_of_release(this: &Path) -> [Vec<Step>; 3] {
     let own = |name, arguments: &[&str]| own(this, name, arguments);
-    // The tests that draw their cases.
-    let drawn = ["extremes", "limits_agree", "number_formats", "power_cuts"];
-    let mut cases = cargo(&[&["test", "--tests", "--"], &drawn[..]].concat());
-    cases.env("TAXEL_CASES", "3000");
+    // The tests that draw their cases. A power cut takes a hundred times as long as another case.
+    let drawn = |name, count: &str, tests: &[&str]| {
+        let mut command = cargo(&[&["test", "--tests", "--"], tests].concat());
+        command.env("TAXEL_CASES", count);
+        (name, command)
+    };
+    let cases = drawn("cases", "3000", &["extremes", "limits_agree", "number_formats"]);
+    let power_cuts = drawn("power-cuts", "30", &["power_cuts"]);
     [
-        vec![own("publish", &["publish"]), own("python", &["python"]), ("cases", cases)],
+        vec![own("publish", &["publish"]), own("python", &["python"]), cases, power_cuts],
         vec![own("c", &["c"]), own("board", &["board"])],
         vec![own("accept", &["accept", "--emulated"])],
     ]
