@@ -48,7 +48,7 @@ impl Options {
             Ok(()) if magic == *b"\x7FELF" => Ok(()),
             Ok(()) => not_elf(),
             Err(cause) => unfit(format!(
-                "{cause}; `cargo xtask firmware` builds it, below CARGO_TARGET_DIR if that is set"
+                "{cause}; `cargo xtask firmware qemu-app` builds it, below CARGO_TARGET_DIR if that is set"
             )),
         }
     }
