@@ -100,8 +100,13 @@ fn a_number_that_cannot_be_is_refused_by_its_section() {
     }
 }
 
+/// Number of cases: some, or as many as `TAXEL_CASES` says.
+fn cases() -> u32 {
+    std::env::var("TAXEL_CASES").map_or(10_000, |cases| cases.parse().unwrap())
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60_000))]
+    #![proptest_config(ProptestConfig::with_cases(cases()))]
     /// Parsing, decoding and assessing end for any bytes under a valid CRC. What an accepted model decodes is finite, or
     /// marked; where readings are numbers, so is the novelty.
     #[test]

@@ -120,9 +120,10 @@ fn steps_of_release(this: &Path) -> [Vec<Step>; 3] {
         (name, command)
     };
     let cases = drawn("cases", "3000", &["extremes", "limits_agree", "number_formats"]);
+    let hostile = drawn("hostile", "60000", &["hostile"]);
     let power_cuts = drawn("power-cuts", "30", &["power_cuts"]);
     [
-        vec![own("publish", &["publish"]), own("python", &["python"]), cases, power_cuts],
+        vec![own("publish", &["publish"]), own("python", &["python"]), cases, hostile, power_cuts],
         vec![own("c", &["c"]), own("board", &["board"])],
         vec![own("accept", &["accept", "--emulated"])],
     ]

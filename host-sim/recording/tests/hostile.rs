@@ -75,10 +75,14 @@ fn hostile_bytes_do_no_harm() {
         (state >> 33) as usize % bound
     };
 
+    // Places that are tried: one of so many, or each where `TAXEL_CASES` is set.
+    let [of_bits, of_lengths] =
+        if std::env::var_os("TAXEL_CASES").is_some() { [1, 1] } else { [7, 17] };
+
     // A bit is flipped: its chunk is left out, or what it tells is refused. Frames that come are those that were written,
     // if the bit was in a chunk.
     let chunks = whole.windows(15).position(|it| it == b"/taxel/readings").unwrap();
-    for at in (0..whole.len()).step_by(3) {
+    for at in (0..whole.len()).step_by(of_bits) {
         let mut bytes = whole.clone();
         bytes[at] ^= 1 << below(8);
         if let Ok(read) = read_all(&bytes)
@@ -89,7 +93,7 @@ fn hostile_bytes_do_no_harm() {
     }
 
     // A length is huge, wherever there may be one.
-    for at in (8..whole.len() - 8).step_by(5) {
+    for at in (8..whole.len() - 8).step_by(of_lengths) {
         for length in [u64::MAX, u64::MAX / 2, 1 << 40, 1 << 31, 1 << 25, 0] {
             let mut bytes = whole.clone();
             bytes[at..at + 8].copy_from_slice(&length.to_le_bytes());
@@ -98,7 +102,7 @@ fn hostile_bytes_do_no_harm() {
     }
 
     // Bytes are missing, or stand twice.
-    for _ in 0..2000 {
+    for _ in 0..600 {
         let mut bytes = whole.clone();
         let from = below(bytes.len());
         let to = from + below(bytes.len() - from);
