@@ -96,8 +96,7 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
     assert!(host(&folder, &[&synth[..], &["-"]].concat()).status().unwrap().success());
     // A log that cannot be written is no reason to stop.
     let full = File::create("/dev/full").unwrap();
-    let status =
-        host(&folder, &["run", "scene.toml"]).stderr(full).status().unwrap();
+    let status = host(&folder, &["run", "scene.toml"]).stderr(full).status().unwrap();
     assert_eq!(status.code(), Some(0));
 
     let output = waiting.unwrap().wait_with_output().unwrap();
