@@ -45,8 +45,8 @@ pub struct OtherErrors {
 /// Frames of other contacts, by name.
 pub type OtherFrames = Vec<(String, Dataset)>;
 
-/// Frames of all other contacts of a subject, with this noise or that of the scene. Measurements have
-/// none.
+/// Frames of all other contacts of a subject, with this noise or that of the scene. Measurements
+/// have none.
 pub fn frames(subject: &Subject, noise: Option<Noise>) -> OtherFrames {
     let Some(scene) = subject.scene() else { return vec![] };
     let synthesis = Subject::synthesis(scene, noise);

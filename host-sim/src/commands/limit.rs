@@ -199,7 +199,8 @@ fn page_of_several(results: &[LimitResult], folder: Option<&Path>) -> print::Pag
     let models = results[0].levels.first().into_iter().flat_map(|level| &level.decoders);
     let models = models.map(|model| model.decoder.clone());
     let mut lines: Vec<Vec<String>> = vec![heads.into_iter().chain(models).collect()];
-    for (result, level) in results.iter().flat_map(|it| it.levels.iter().map(move |l| (it, l))) {
+    let levels = || results.iter().flat_map(|it| it.levels.iter().map(move |level| (it, level)));
+    for (result, level) in levels() {
         let noise = result.noise_kind.in_words(level.noise_level);
         let seen = &level.observability;
         for (place, group) in level.limits[0].groups.iter().enumerate() {
@@ -216,7 +217,7 @@ fn page_of_several(results: &[LimitResult], folder: Option<&Path>) -> print::Pag
         }
     }
     merged::table(&mut page, &lines);
-    for (result, level) in results.iter().flat_map(|it| it.levels.iter().map(move |l| (it, l))) {
+    for (result, level) in levels() {
         if let Some(refused) = &level.limits[0].refused {
             let noise = result.noise_kind.in_words(level.noise_level);
             page.line(format_args!("{}, {noise}: not given: {refused}", result.subject));

@@ -32,7 +32,7 @@ fn with(readings: &Table, change: impl Fn(usize, &mut [f64])) -> Table {
     changed
 }
 
-/// The same with this value of some `readings` in some lines.
+/// Frames of `table`, with this value of some `readings` in some lines.
 fn struck(table: &Table, when: fn(usize) -> bool, readings: Range<usize>, ohm: f64) -> Table {
     with(table, |line, frame| {
         if when(line) {

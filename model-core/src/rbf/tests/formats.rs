@@ -7,9 +7,9 @@ use proptest::prelude::*;
 const SHAPE: Shape = Shape { inputs: 3, centres: 2, outputs: 2 };
 /// Decay of σ = 0.8.
 const DECAY: u32 = 472_742_311;
-/// Of each centre −2g·c, for the inputs.
+/// Factors −2g·c of the inputs, for each centre.
 const A: [[i16; 3]; 2] = [[-865, 400, 10], [300, 0, -1000]];
-/// Of each output: weights of the centres, bias and affine tail.
+/// Weights of the centres, bias and affine tail of each output.
 const WEIGHTS: [[i16; 2]; 2] = [[30_000, -12_000], [-7, 20_000]];
 const BIAS: [i32; 2] = [10_000_000, -90_000_000];
 const TAIL: [[i16; 3]; 2] = [[900, -4000, 1200], [0, 3, -2000]];
