@@ -35,6 +35,26 @@ pub struct Dataset {
     pub common_span: bool,
     /// Whether inputs are readings relative to the baseline (R/R₀), without a unit, and not readings as they are.
     pub relative_inputs: bool,
+    /// What the inputs are while nothing touches the sensor, if it is known.
+    pub at_rest: Option<AtRest>,
+    /// Factor on the error of each frame in least squares; `None` where all frames count alike.
+    pub weights: Option<Vec<f64>>,
+}
+
+/// Inputs while nothing touches the sensor, in their units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AtRest {
+    /// Mean of each input.
+    pub level: Vec<f64>,
+    /// Standard deviation of each input.
+    pub deviation: Vec<f64>,
+}
+
+impl AtRest {
+    /// Level and deviation of `inputs` (`frames × inputs`) at rest.
+    pub fn of(inputs: &Table) -> Self {
+        Self { level: inputs.means(), deviation: inputs.deviations() }
+    }
 }
 
 impl Dataset {
@@ -47,7 +67,8 @@ impl Dataset {
     ) -> Self {
         let table = |names: Vec<String>| Table { values: vec![0.0; names.len() * frames], names };
         let (inputs, outputs) = (table(input_names), table(output_names));
-        Self { inputs, outputs, rows, common_span: false, relative_inputs: false }
+        let (at_rest, weights) = (None, None);
+        Self { inputs, outputs, rows, common_span: false, relative_inputs: false, at_rest, weights }
     }
 
     /// Number of frames in the set.
@@ -75,7 +96,7 @@ impl Dataset {
             table.columns(row * count, count)
         };
         let (inputs, outputs) = (cut(&self.inputs), cut(&self.outputs));
-        RowTable { inputs, outputs, common_span: self.common_span }
+        RowTable { inputs, outputs, common_span: self.common_span, weights: self.weights.clone() }
     }
 
     /// Selects the columns that match the patterns `inputs` and `outputs` (see [`columns::select`]), by
@@ -129,9 +150,12 @@ impl Dataset {
             names: columns.iter().map(|c| file.header[*c].clone()).collect(),
             values: kept.iter().flat_map(|l| columns.iter().map(|c| file.value(*l, *c))).collect(),
         };
-        let (inputs, outputs) = (take(&input_columns), take(&output_columns));
-        let dataset = Self { inputs, outputs, rows, common_span: false, relative_inputs: false };
-        Ok((dataset, Kept { lines: kept, of: file.lines(), left_out }))
+        let tables = Self {
+            inputs: take(&input_columns),
+            outputs: take(&output_columns),
+            ..Self::empty(vec![], vec![], rows, 0)
+        };
+        Ok((tables, Kept { lines: kept, of: file.lines(), left_out }))
     }
 
     /// Frames at `indices` (from 0), in that order.
@@ -145,7 +169,9 @@ impl Dataset {
             let line = |i: &usize| table.values[i * n..(i + 1) * n].to_vec();
             Table { names: table.names.clone(), values: indices.iter().flat_map(line).collect() }
         };
-        Self { inputs: pick(&self.inputs), outputs: pick(&self.outputs), ..*self }
+        let weights = self.weights.as_ref().map(|it| indices.iter().map(|i| it[*i]).collect());
+        let (inputs, outputs) = (pick(&self.inputs), pick(&self.outputs));
+        Self { inputs, outputs, weights, at_rest: self.at_rest.clone(), ..*self }
     }
 }
 
@@ -248,6 +274,8 @@ pub struct RowTable {
     /// Whether every input is scaled by the largest span of any, about its own middle. Features of a
     /// projection share one unit: the wider one's range, the more it tells about the outputs.
     pub common_span: bool,
+    /// Factor on the error of each line in least squares; `None` where all lines count alike.
+    pub weights: Option<Vec<f64>>,
 }
 
 impl RowTable {
@@ -274,7 +302,8 @@ impl RowTable {
             names: table.names.clone(),
             values: table.values[..frames * table.names.len()].to_vec(),
         };
-        Self { inputs: cut(&self.inputs), outputs: cut(&self.outputs), ..*self }
+        let weights = self.weights.as_ref().map(|weights| weights[..frames].to_vec());
+        Self { inputs: cut(&self.inputs), outputs: cut(&self.outputs), weights, ..*self }
     }
 }
 

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use taxel_core::blob::NoiseKind as BlobNoiseKind;
 use taxel_core::rbf::Format;
 use taxel_data::digest::digest;
-use taxel_data::{BadValue, Dataset, Progress, Stream, input, require};
+use taxel_data::{AtRest, BadValue, Dataset, Progress, Stream, input, require};
 use taxel_learn::train::{FreshFrames, Solver, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
@@ -27,6 +27,9 @@ mod others;
 mod file;
 
 pub use others::OtherContact;
+
+/// Number of frames of the untouched sensor that tell what its inputs are at rest.
+const FRAMES_AT_REST: usize = 400;
 
 type Check = std::result::Result<(), BadValue>;
 
@@ -307,11 +310,14 @@ impl Experiment {
     /// Its inputs are readings, which may be relative to the baseline of each session: the mean of [`BASELINE_FRAMES`]
     /// frames of the untouched sensor. `synthesis` is one of the experiment's world.
     pub fn dataset(&self, synthesis: &Synthesis<'_>, stream: Stream, frames: usize) -> Dataset {
-        self.dataset_from(synthesis, stream, 0, frames)
+        let at_rest = synthesis.clone().untouched();
+        let at_rest = self.inputs(&at_rest, Stream::Calibration, 0, FRAMES_AT_REST).inputs;
+        let at_rest = Some(AtRest::of(&at_rest));
+        Dataset { at_rest, ..self.inputs(synthesis, stream, 0, frames) }
     }
 
-    /// Data set from trajectory number `first` of `stream` on.
-    fn dataset_from(
+    /// Frames from trajectory number `first` of `stream` on, without what inputs are at rest.
+    fn inputs(
         &self,
         synthesis: &Synthesis<'_>,
         stream: Stream,
@@ -368,7 +374,7 @@ impl FreshFrames for MoreFrames<'_> {
     fn frames(&self, step: usize, count: usize) -> Dataset {
         let trajectories = count.div_ceil(self.synthesis.steps());
         let first = step * trajectories;
-        self.experiment.dataset_from(&self.synthesis, Stream::Refinement, first, count)
+        self.experiment.inputs(&self.synthesis, Stream::Refinement, first, count)
     }
 }
 

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use taxel_data::dataset::{LeftOut, UnusedInputs};
-use taxel_data::{Clock, Dataset, Rest, Table};
+use taxel_data::{AtRest, Clock, Dataset, Rest, Table};
 use taxel_learn::outliers::Outliers;
-use taxel_learn::{Options, Origin};
+use taxel_learn::{Options, Origin, relative};
 
 use crate::metrics::Measure;
 
@@ -98,9 +98,17 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Baseline of these frames, on one line or one for each, if the sensor at rest is known.
-    pub fn baselines(&self) -> Option<Table> {
-        self.rest.as_ref().map(|rest| rest.baselines(&self.log.lines))
+    /// The frames, with inputs relative to their baselines if `relative_inputs` says so, and what inputs are at rest if
+    /// that is known.
+    pub fn given(self, relative_inputs: bool) -> Dataset {
+        let Some(rest) = &self.rest else { return self.frames };
+        let at_rest = |inputs: &Table| Some(AtRest::of(inputs));
+        if !relative_inputs {
+            return Dataset { at_rest: at_rest(&rest.readings), ..self.frames };
+        }
+        let baselines = rest.baselines(rest.lines.as_deref().unwrap_or_default());
+        let at_rest = at_rest(&relative::inputs(&rest.readings, &baselines));
+        Dataset { at_rest, ..relative::dataset(self.frames, &rest.baselines(&self.log.lines)) }
     }
 
     /// Frames at `indices` (from 0), in that order.

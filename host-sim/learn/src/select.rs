@@ -297,11 +297,9 @@ mod tests {
         }
         let names = |list: &[&str]| list.iter().map(|n| (*n).to_owned()).collect();
         Dataset {
-            common_span: false,
-            relative_inputs: false,
             inputs: Table { names: names(&["a", "b"]), values: inputs },
             outputs: Table { names: names(outputs), values },
-            rows: 1,
+            ..Dataset::empty(vec![], vec![], 1, 0)
         }
     }
 

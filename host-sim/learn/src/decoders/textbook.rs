@@ -123,6 +123,7 @@ mod tests {
             inputs: named(["a", "b"], values(|t| [50.0 + 10.0 * t, 80.0 - 20.0 * t * t])),
             outputs: named(["y", "z"], values(|t| [t.sin(), 1.0 - t])),
             common_span: false,
+            weights: None,
         }
     }
 

@@ -138,9 +138,9 @@ pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
     Dataset {
         inputs: Table { names, values },
         outputs: dataset.outputs.clone(),
-        rows: 1,
         common_span: true,
-        relative_inputs: false,
+        weights: dataset.weights.clone(),
+        ..Dataset::empty(vec![], vec![], 1, 0)
     }
 }
 

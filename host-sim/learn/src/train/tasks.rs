@@ -32,7 +32,10 @@ impl<'t> Task<'t> {
             let inputs = table.inputs.part(&lines, &all_inputs);
             let outputs = table.outputs.part(&lines, &columns);
             let targets = Cow::Owned(targets.part(&lines, &columns).values);
-            let table = Cow::Owned(RowTable { inputs, outputs, ..*table });
+            let weights = table.weights.as_ref();
+            let weights = weights.map(|it| lines.iter().map(|line| it[*line]).collect());
+            let common_span = table.common_span;
+            let table = Cow::Owned(RowTable { inputs, outputs, common_span, weights });
             Self { columns, table, targets }
         };
         targets.missing_together().into_iter().map(of_columns).collect()

@@ -17,7 +17,7 @@ use taxel_data::{Clock, DataFile, Dataset};
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::refine::LEAST_FOLDS;
 use taxel_learn::train::{projection, resolution};
-use taxel_learn::{Options, relative, select};
+use taxel_learn::{Options, select};
 
 impl DataArguments {
     /// Measurements in the CSV file at `path`.
@@ -68,14 +68,10 @@ impl DataArguments {
         // Readings themselves, even if the model is given their ratios to the baseline.
         resolution::check(&training.frames)
             .map_err(|refusal| Error::Unfit { path: path.into(), message: refusal.to_string() })?;
-        let given = |frames: Frames| match how.relative_inputs.then(|| frames.baselines()) {
-            Some(Some(baselines)) => relative::dataset(frames.frames, &baselines),
-            _ => frames.frames,
-        };
         let spread = Spread::of(&all.frames.inputs);
         let [(log, rest), (test_log, test_rest)] =
             [&training, &test].map(|it| (it.log.clone(), it.rest.clone()));
-        let training = given(training);
+        let training = training.given(how.relative_inputs);
         let name = path.file_stem().map_or("data".into(), |stem| stem.to_string_lossy());
         let usual = Options::usual_for(&training);
         let readings = training.inputs.names.len();
@@ -96,7 +92,7 @@ impl DataArguments {
             folds_flatter: self.folds.is_some() && neighbours_alike(&training.outputs),
             training,
             fold_of,
-            test: given(test),
+            test: test.given(how.relative_inputs),
             test_log,
             test_rest,
             is_one_log: matches!(judged, JudgedBy::HeldOut),
