@@ -83,6 +83,15 @@ pub enum NoPoint {
         /// Whether nothing was trained.
         predicted: bool,
     },
+    /// Points within the bounds, all of which have larger errors than a baseline.
+    Beaten {
+        /// Name of the baseline.
+        decoder: String,
+        /// Its error.
+        least: f64,
+        /// Unit and group of the error, such as `mm (dz_mm)`.
+        unit: String,
+    },
 }
 
 impl Unmet {
@@ -155,6 +164,11 @@ impl fmt::Display for NoPoint {
                     "no point is within {names} at once: {nearest}; relax one of these bounds{untrained}"
                 )
             }
+            Self::Beaten { decoder, least, unit } => write!(
+                f,
+                "no model within the bounds is worth its cost: the baseline {decoder} has an error of {least:.4} {unit}, \
+                 which is smaller"
+            ),
         }
     }
 }

@@ -150,7 +150,7 @@ pub fn run(
     let (measure, limit) = subject.measure(None, progress);
     progress.stage("decode and evaluate", 1);
     let baselines: Vec<Box<dyn Decoder>> =
-        BASELINES.iter().map(|b| b.fit(&training.frames)).collect();
+        BASELINES.iter().filter_map(|b| b.fit(&training.frames)).collect();
     let decoders = std::iter::once(&network as &dyn Decoder)
         .chain(baselines.iter().map(AsRef::as_ref))
         .map(|decoder| metrics::judge(decoder, &test, &measure));

@@ -111,7 +111,7 @@ impl<'s> TrainingSet<'s> {
         if fold_of.iter().all(|fold| *fold == 0) {
             return vec![];
         }
-        let rmse = select::baseline_rmse(&LINEAR, &self.frames, &fold_of);
+        let rmse = select::baseline_rmse(&LINEAR, &self.frames, &fold_of).unwrap_or_default();
         if rmse.iter().all(|error| error.is_finite()) { rmse } else { vec![] }
     }
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 use taxel_core::rbf::Shape;
 use taxel_learn::ModelBlob;
 use taxel_learn::cost::Design;
-use taxel_learn::decoders::{linear, mean};
+use taxel_learn::decoders::{centroid, linear, mean};
 use taxel_learn::outliers::Outliers;
 
 use crate::measurements::Measurements;
@@ -34,8 +34,8 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Verdict on the first of `decoders`, beside those of the others that are the mean and the best linear decoder,
-    /// and the `limit`. It warns of outputs without a gain over these.
+    /// Verdict on the first of `decoders`, beside those of the others that are baselines, and the `limit`. It warns of
+    /// outputs without a gain over these.
     ///
     /// Without the mean among `decoders` there is nothing to compare with, and the sentence tells errors alone.
     pub fn new(decoders: &[DecoderErrors], limit: &LimitSummary) -> Self {
@@ -84,11 +84,26 @@ impl Verdict {
             let names: Vec<&str> = groups.iter().map(|group| group.group.as_str()).collect();
             sentences.extend(names.iter().map(|name| format!("{name} {why}.")));
         }
-        // What is no better than the mean need not be compared with the linear decoder.
+        let lost = others.lost(model);
+        let of_decoder = |(name, groups): &(&str, Vec<&Errors>)| {
+            let groups: Vec<String> = groups.iter().map(|group| with_error(group)).collect();
+            format!("{name} decodes {}", listed(&groups))
+        };
+        if !lost.is_empty() {
+            let better: Vec<String> = lost.iter().map(of_decoder).collect();
+            sentences.push(format!("Ten lines do better: {}.", better.join("; ")));
+        }
+        // What is no better than the mean, or lost, need not be compared with the linear decoder.
         let useless = others.without_gain(model, |it| it.mean);
         let mut plain = others.without_gain(model, |it| it.linear);
-        plain.retain(|group| !useless.contains(group));
-        let warnings = [Warning::no_gain_over_mean(&useless), Warning::no_gain_over_linear(&plain)];
+        let is_lost =
+            |name: &str| lost.iter().flat_map(|(_, groups)| groups).any(|it| it.group == name);
+        plain.retain(|group| !useless.contains(group) && !is_lost(group));
+        let warnings = [
+            Warning::no_gain_over_mean(&useless),
+            Warning::worse_than_baseline(&lost),
+            Warning::no_gain_over_linear(&plain),
+        ];
         Self { sentence: sentences.join(" "), warnings: warnings.into_iter().flatten().collect() }
     }
 
@@ -144,6 +159,7 @@ impl Verdict {
 struct Others<'e> {
     mean: Option<&'e [Errors]>,
     linear: Option<&'e [Errors]>,
+    centroid: Option<&'e [Errors]>,
 }
 
 impl<'e> Others<'e> {
@@ -152,7 +168,8 @@ impl<'e> Others<'e> {
             let found = decoders.iter().skip(1).find(|decoder| decoder.decoder == name);
             found.map(|decoder| decoder.errors.as_slice())
         };
-        Self { mean: called(mean::NAME), linear: called(linear::NAME) }
+        let [mean, linear, centroid] = [mean::NAME, linear::NAME, centroid::NAME].map(called);
+        Self { mean, linear, centroid }
     }
 
     /// RMSE of a group as a share of the mean's.
@@ -196,6 +213,30 @@ impl<'e> Others<'e> {
         ];
         let gains: Vec<String> = gains.into_iter().flatten().collect();
         if gains.is_empty() { String::new() } else { format!(": {}", gains.join(", and ")) }
+    }
+
+    /// Baselines with a smaller error than `model`, each with its errors of the groups where it has the least; none that is no
+    /// better than always predicting the mean.
+    fn lost(&self, model: &DecoderErrors) -> Vec<(&'static str, Vec<&'e Errors>)> {
+        let all = [("the centroid", self.centroid), ("the best linear decoder", self.linear)];
+        let least = |group: &str| {
+            let of = |errors: &'e [Errors]| errors.iter().find(|it| it.group == group);
+            let found = all.iter().filter_map(|(name, errors)| Some((*name, of((*errors)?)?)));
+            found.min_by(|(_, a), (_, b)| a.rmse.total_cmp(&b.rmse))
+        };
+        let lost = model.errors.iter().filter_map(|group| {
+            let (name, errors) = least(&group.group).filter(|(_, it)| it.rmse < group.rmse)?;
+            self.of_mean(errors).is_none_or(|share| share <= NO_GAIN).then_some((name, errors))
+        });
+        let lost: Vec<(&str, &Errors)> = lost.collect();
+        let of_baseline = |(name, _)| {
+            let groups = lost.iter().filter(|(by, _)| *by == name).map(|(_, errors)| *errors);
+            (name, groups.collect())
+        };
+        all.into_iter()
+            .map(of_baseline)
+            .filter(|(_, groups): &(_, Vec<_>)| !groups.is_empty())
+            .collect()
     }
 
     /// Groups of `model` without a gain over the decoder that `other` picks.

@@ -7,6 +7,7 @@ use crate::infer::infer;
 use crate::parallel;
 use crate::train::FittedNetwork;
 
+pub mod centroid;
 pub mod linear;
 pub mod mean;
 pub mod standard;
@@ -17,23 +18,32 @@ pub mod textbook;
 pub struct Baseline {
     /// Name of the decoder in tables and results.
     pub name: &'static str,
-    fit: fn(&Dataset) -> Box<dyn Decoder>,
+    fit: fn(&Dataset) -> Option<Box<dyn Decoder>>,
 }
 
 impl Baseline {
-    /// Fits the decoder to `training`.
-    pub fn fit(&self, training: &Dataset) -> Box<dyn Decoder> {
+    /// Fits the decoder to `training`; `None` if it cannot decode such readings to any of the outputs.
+    pub fn fit(&self, training: &Dataset) -> Option<Box<dyn Decoder>> {
         (self.fit)(training)
     }
 }
 
 /// The best linear decoder of each row-wire.
 pub const LINEAR: Baseline =
-    Baseline { name: linear::NAME, fit: |training| Box::new(linear::fit(training)) };
+    Baseline { name: linear::NAME, fit: |training| Some(Box::new(linear::fit(training))) };
+
+/// The centroid of the touch.
+pub const CENTROID: Baseline = Baseline {
+    name: centroid::NAME,
+    fit: |training| Some(Box::new(centroid::Centroid::fit(training)?)),
+};
 
 /// Every baseline: `run`, `table1`, `trade`, selection and the report go through this list.
-pub const BASELINES: &[Baseline] =
-    &[LINEAR, Baseline { name: mean::NAME, fit: |training| Box::new(mean::Mean::fit(training)) }];
+pub const BASELINES: &[Baseline] = &[
+    LINEAR,
+    CENTROID,
+    Baseline { name: mean::NAME, fit: |training| Some(Box::new(mean::Mean::fit(training))) },
+];
 
 /// Decoder of one row-wire's readings.
 pub trait RowDecoder: Sync {

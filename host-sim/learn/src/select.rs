@@ -54,12 +54,20 @@ pub struct BaselineScore {
     pub decoder: &'static str,
     /// RMSE of each output over all held-out samples, in the output's unit.
     pub rmse: Vec<f64>,
+    /// Mean over the outputs of RMSE/standard deviation, as of candidates.
+    pub score: f64,
 }
 
 impl Selection {
     /// Candidate with the lowest score.
     pub fn best(&self) -> &Scored {
         &self.scored[self.chosen]
+    }
+
+    /// Baseline with the lowest score, if it is lower than that of every candidate.
+    pub fn better_baseline(&self) -> Option<&BaselineScore> {
+        let lowest = self.baselines.iter().min_by(|a, b| a.score.total_cmp(&b.score));
+        lowest.filter(|baseline| baseline.score < self.best().score)
     }
 }
 
@@ -213,23 +221,29 @@ impl<'d> Judge<'d> {
 
     /// Baselines on the same folds.
     fn baselines(&self) -> Vec<BaselineScore> {
-        let score = |it: &Baseline| BaselineScore {
-            decoder: it.name,
-            rmse: baseline_rmse(it, self.dataset, self.fold_of),
+        let deviations = self.dataset.outputs.deviations();
+        let score = |it: &Baseline| {
+            let rmse = baseline_rmse(it, self.dataset, self.fold_of)?;
+            Some(BaselineScore { decoder: it.name, score: score(&rmse, &deviations), rmse })
         };
-        BASELINES.iter().map(score).collect()
+        BASELINES.iter().filter_map(score).collect()
     }
 }
 
 /// RMSE of a baseline on folds that it was not fitted to, for each output, in its unit. `fold_of` gives each frame's fold,
-/// numbered from 0. It is NaN for an output without a value.
-pub fn baseline_rmse(baseline: &Baseline, dataset: &Dataset, fold_of: &[usize]) -> Vec<f64> {
+/// numbered from 0. It is NaN for an output without a value. `None` for a baseline that cannot be fitted.
+pub fn baseline_rmse(
+    baseline: &Baseline,
+    dataset: &Dataset,
+    fold_of: &[usize],
+) -> Option<Vec<f64>> {
     let folds = fold_of.iter().max().map_or(0, |last| last + 1);
     let squares = parallel::map(folds, &|fold| baseline_squares(baseline, dataset, fold_of, fold));
+    let squares: Vec<Vec<f64>> = squares.into_iter().collect::<Option<_>>()?;
     let rmse = |(output, count): (usize, usize)| {
         root_mean(squares.iter().map(|fold| fold[output]).sum(), count)
     };
-    dataset.outputs.counts().into_iter().enumerate().map(rmse).collect()
+    Some(dataset.outputs.counts().into_iter().enumerate().map(rmse).collect())
 }
 
 fn root_mean(squares: f64, count: usize) -> f64 {
@@ -250,10 +264,10 @@ fn baseline_squares(
     dataset: &Dataset,
     fold_of: &[usize],
     fold: usize,
-) -> Vec<f64> {
+) -> Option<Vec<f64>> {
     let (training, test) = split(dataset, fold_of, fold);
-    let predicted = baseline.fit(&training).decode_all(&test.inputs.values, 1);
-    test.outputs.squared_errors(&predicted.values)
+    let predicted = baseline.fit(&training)?.decode_all(&test.inputs.values, 1);
+    Some(test.outputs.squared_errors(&predicted.values))
 }
 
 /// Training part and held-out part of a data set, for one fold.

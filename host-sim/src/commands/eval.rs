@@ -18,9 +18,9 @@ use clap::Args;
 use serde::Serialize;
 use taxel_core::blob::Metadata;
 use taxel_data::dataset::UnusedInputs;
-use taxel_data::{Clock, DataFile, output};
+use taxel_data::{AtRest, Clock, DataFile, Dataset, Table, output};
 use taxel_learn::ModelBlob;
-use taxel_learn::decoders::mean;
+use taxel_learn::decoders::{CENTROID, mean};
 use taxel_limit::Refusal;
 
 use super::coverage_page;
@@ -74,7 +74,8 @@ struct Summary {
     values_evaluated: usize,
     /// Faulty readings, and how many of them were filled.
     health: Health,
-    /// Errors of the model, and of always predicting the mean of these outputs.
+    /// Errors of the model, and of always predicting the mean of these outputs; between them those of the centroid, fitted to
+    /// these lines, where it is known what they are at rest.
     decoders: Vec<DecoderErrors>,
     /// RMSE of the best linear decoder on frames of the model's training that it was not fitted to; empty if the model does
     /// not tell it.
@@ -116,6 +117,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baselines =
         arguments.untouched.baselines(metadata, &arguments.model, of_lines, fields, limits)?;
     let mut health = arguments.health.apply(&model, &mut readings)?;
+    let lines_at_rest = rest.as_ref().and_then(|rest| rest.lines.clone());
     let at_rest =
         rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &Spread::of(&readings)));
     let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
@@ -154,8 +156,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let values_evaluated = errors.iter().map(|group| group.count).sum();
     let mean_errors = metrics::by_group(&truth, &means, &measure);
     let at_rest = over_time.as_ref().and_then(|log| log.rest.as_ref());
-    let decoders =
-        vec![DecoderErrors::new(NETWORK, errors), DecoderErrors::new(mean::NAME, mean_errors)];
+    let mut decoders = vec![DecoderErrors::new(NETWORK, errors)];
+    decoders.extend(centroid(&readings, &truth, lines_at_rest.as_deref(), &measure));
+    decoders.push(DecoderErrors::new(mean::NAME, mean_errors));
     let verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
@@ -188,6 +191,23 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         output::write_bytes(html, page.as_bytes())?;
     }
     print::result(common, &summary, || text_of(&summary))
+}
+
+/// Errors of the centroid, whose scale is fitted to these lines, as the mean is: a model keeps none.
+fn centroid(
+    readings: &Table,
+    truth: &Table,
+    lines_at_rest: Option<&[usize]>,
+    measure: &Measure,
+) -> Option<DecoderErrors> {
+    let columns: Vec<usize> = (0..readings.names.len()).collect();
+    let frames = Dataset {
+        inputs: readings.clone(),
+        outputs: truth.clone(),
+        at_rest: Some(AtRest::of(&readings.part(lines_at_rest?, &columns))),
+        ..Dataset::empty(vec![], vec![], 1, 0)
+    };
+    Some(metrics::judge(CENTROID.fit(&frames)?.as_ref(), &frames, measure))
 }
 
 /// Reason why no line can be judged, and what helps.

@@ -212,13 +212,21 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         let settings = selection.scored.iter().map(choice::settings).collect::<Vec<_>>();
         let width = settings.iter().map(String::len).max().unwrap_or(0);
         for (i, (scored, settings)) in selection.scored.iter().zip(&settings).enumerate() {
-            let mark = if i == selection.chosen { "  <- chosen" } else { "" };
+            let is_chosen = i == selection.chosen && selection.better_baseline().is_none();
+            let mark = if is_chosen { "  <- chosen" } else { "" };
             let (score, errors) = (scored.score, pooled(&scored.rmse));
             page.line(format_args!("  {settings:<width$} score {score:.4}: {errors}{mark}"));
         }
         for baseline in &selection.baselines {
             let label = format!("{}:", baseline.decoder);
-            page.line(format_args!("  {label:<0$} {1}", width + 14, pooled(&baseline.rmse)));
+            let (score, errors) = (baseline.score, pooled(&baseline.rmse));
+            page.line(format_args!("  {label:<width$} score {score:.4}: {errors}"));
+        }
+        if let Some(better) = selection.better_baseline() {
+            page.line(format_args!(
+                "  The baseline {} has a lower score than every candidate: none of them is worth its cost.",
+                better.decoder
+            ));
         }
     }
     page.line(format_args!(

@@ -8,6 +8,7 @@ use super::format::{grouped, significant, symbol, unbroken};
 use super::svg::escape;
 use super::view::View;
 use super::{errors, frames, moving, over_time, sketch, sweep, tables};
+use taxel_learn::decoders::centroid;
 
 /// Body of a page, which numbers its figures and tables, and lists its headings.
 #[derive(Default)]
@@ -189,7 +190,13 @@ fn header(view: &View<'_>) -> String {
     } else {
         " Least possible: the limit that no decoder of these readings can pass; × limit: the network’s ratio to it."
     };
-    let linear = if view.decoders.iter().any(|decoder| decoder.decoder == "linear") {
+    let judged = |name: &str| view.decoders.iter().any(|decoder| decoder.decoder == name);
+    let centroid = if judged(centroid::NAME) {
+        " Centroid: that of what exceeds the readings at rest; a force from their sum."
+    } else {
+        ""
+    };
+    let linear = if judged("linear") {
         " Linear: the best linear decoder, which shows how much needs no network."
     } else if view.linear_at_training.is_empty() {
         ""
@@ -199,7 +206,7 @@ fn header(view: &View<'_>) -> String {
     let _ = writeln!(
         html,
         "<p class=\"note\">Root mean square errors on {} frames. Mean: always predicting the mean, which ignores the \
-         readings: a decoder that is no better has learnt nothing.{linear}{limit}</p>\n</header>",
+         readings: a decoder that is no better has learnt nothing.{linear}{centroid}{limit}</p>\n</header>",
         grouped(view.frames)
     );
     html

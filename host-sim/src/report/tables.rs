@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use taxel_learn::decoders::{linear, mean};
+use taxel_learn::decoders::{centroid, linear, mean};
 
 use super::format::{UNDEFINED, decimals, fixed, grouped, percent, significant, symbol, with_unit};
 use super::svg::escape;
@@ -29,6 +29,7 @@ pub fn short_name(decoder: &DecoderErrors) -> &str {
     match decoder.decoder.as_str() {
         NETWORK => "Network",
         linear::NAME => "Linear",
+        centroid::NAME => "Centroid",
         mean::NAME => "Mean",
         other => other,
     }

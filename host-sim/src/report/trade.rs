@@ -78,11 +78,8 @@ pub fn html(trade: &Trade, command: &str) -> Page {
 /// What was chosen, what it is worth and what it costs.
 fn answer(trade: &Trade) -> String {
     let Some(chosen) = trade.chosen else {
-        let why = if trade.bounds.any() {
-            format!("No point is within {}.", words::bounds(&trade.bounds))
-        } else {
-            "Nothing is chosen: no bound was given.".into()
-        };
+        let why = trade.refused.as_ref().map_or("no bound was given".into(), ToString::to_string);
+        let why = format!("Nothing is chosen: {why}.");
         return format!(
             "<section class=\"summary\">\n<p>{}</p>\n</section>\n",
             escape(&unbroken(&why))

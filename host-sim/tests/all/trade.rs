@@ -125,6 +125,26 @@ fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
     assert!((rmse - point.rmse("dz_mm")).abs() < 1e-12, "{rmse}");
 }
 
+#[test]
+fn a_point_that_loses_to_a_baseline_is_never_chosen() {
+    let mut trade = traded().clone();
+    let bounds = Bounds { error: Some(0.055), ..Bounds::default() };
+    trade.choose(&bounds).unwrap();
+    let first = trade.chosen.unwrap();
+    // A baseline that beats this point, then one that beats all.
+    for least in [0.999 * trade.points[first].rmse("dz_mm"), 0.001] {
+        for errors in trade.readings.iter_mut().flat_map(|it| &mut it.decoders[0].errors) {
+            errors.rmse = least;
+        }
+        let refused = trade.choose(&bounds).map_err(|cause| cause.to_string());
+        let chosen = trade.chosen.map(|point| trade.points[point].rmse("dz_mm"));
+        assert!(chosen.is_none_or(|rmse| rmse < least), "{chosen:?}");
+        let beaten = "the baseline linear has an error of 0.0010 mm (dz_mm)";
+        assert_eq!(refused.is_err_and(|cause| cause.contains(beaten)), least == 0.001);
+        assert_eq!(trade.chosen.is_none(), least == 0.001);
+    }
+}
+
 /// The scene `press` with two rows and few frames.
 fn few_frames_of_two_rows() -> String {
     include_str!("../../../scenes/press.toml")

@@ -260,8 +260,8 @@ where
             networks
         })
         .collect::<Result<_>>()?;
-    let baselines = BASELINES.iter().rev().map(|baseline| (None, baseline.fit(training)));
-    let mut decoders: Vec<Spread> = baselines.collect();
+    let baselines = BASELINES.iter().rev().filter_map(|baseline| baseline.fit(training));
+    let mut decoders: Vec<Spread> = baselines.map(|baseline| (None, baseline)).collect();
     for (place, &spread) in settings.spreads.iter().enumerate() {
         let networks = rows.iter().map(|row| row.networks[place].clone()).collect();
         decoders.push((Some(spread), Box::new(Rows::new(NETWORK, training, networks))));

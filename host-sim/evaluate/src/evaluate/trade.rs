@@ -102,6 +102,9 @@ pub struct Trade {
     pub chosen: Option<usize>,
     /// What that point is worth.
     pub verdict: Option<Verdict>,
+    /// Reason why no point was picked within bounds.
+    #[serde(skip)]
+    pub refused: Option<NoPoint>,
     /// Index of every point's blob: points that differ only in the filter share one.
     #[serde(skip)]
     blobs: Vec<usize>,
@@ -110,14 +113,40 @@ pub struct Trade {
 }
 
 impl Trade {
-    /// Picks the point within `bounds`, if any are given.
+    /// Picks the point within `bounds`, if any are given, among those that beat the baselines.
     pub fn choose(&mut self, bounds: &Bounds) -> std::result::Result<(), NoPoint> {
-        let offers: Vec<Offer> =
-            self.points.iter().map(|p| p.offer(&self.group, self.worst_case)).collect();
         self.bounds = *bounds;
-        self.chosen = bounds.choose(&offers, &named(&self.unit, &self.group))?;
+        let chosen = self.choice(bounds);
+        self.refused = chosen.as_ref().err().cloned();
+        self.chosen = chosen.clone().unwrap_or_default();
         self.verdict = self.chosen.map(|point| self.verdict_on(point));
-        Ok(())
+        chosen.map(|_| ())
+    }
+
+    fn choice(&self, bounds: &Bounds) -> std::result::Result<Option<usize>, NoPoint> {
+        let unit = named(&self.unit, &self.group);
+        let choose = |among: &[usize]| {
+            let offer = |i: &usize| self.points[*i].offer(&self.group, self.worst_case);
+            let offers: Vec<Offer> = among.iter().map(offer).collect();
+            Ok(bounds.choose(&offers, &unit)?.map(|place| among[place]))
+        };
+        let all: Vec<usize> = (0..self.points.len()).collect();
+        let Some(best) = choose(&all)? else { return Ok(None) };
+        let Some((decoder, least)) = self.better_baseline(best) else { return Ok(Some(best)) };
+        let kept: Vec<usize> =
+            all.into_iter().filter(|i| self.better_baseline(*i).is_none()).collect();
+        let decoder = decoder.into();
+        choose(&kept).map_err(|_| NoPoint::Beaten { decoder, least, unit: unit.clone() })
+    }
+
+    /// Baseline with the least error of the group, and that error, if it is smaller than that of a point which decodes the
+    /// same readings.
+    ///
+    /// # Panics
+    /// If there is no such point.
+    pub fn better_baseline(&self, point: usize) -> Option<(&str, f64)> {
+        let point = &self.points[point];
+        self.readings[point.readings].better_baseline(&self.group, point.rmse(&self.group))
     }
 
     /// Points of the front from fast to slow.
@@ -308,6 +337,7 @@ pub fn compute(
         bounds: Bounds::default(),
         chosen: None,
         verdict: None,
+        refused: None,
         blobs,
         distinct_blobs: distinct,
     })

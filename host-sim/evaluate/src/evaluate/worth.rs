@@ -97,9 +97,8 @@ fn on_frames(
 ) -> Vec<DecoderErrors> {
     let model = blob.prepare().of_inputs();
     let network = metrics::judge(&model, frames, measure);
-    let baselines = BASELINES.iter();
-    let baselines =
-        baselines.map(|it| metrics::judge(it.fit(&set.frames).as_ref(), frames, measure));
+    let baselines = BASELINES.iter().filter_map(|it| it.fit(&set.frames));
+    let baselines = baselines.map(|it| metrics::judge(it.as_ref(), frames, measure));
     std::iter::once(network).chain(baselines).collect()
 }
 

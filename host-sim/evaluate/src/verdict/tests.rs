@@ -80,12 +80,12 @@ fn a_verdict_tells_gains_and_losses_over_mean_and_linear() {
         let verdict = Verdict::new(&all, &no_limit());
         (names(&verdict).concat(), verdict.sentence)
     };
-    let (missing, gain) = (f64::NAN, "no-gain-over-linear");
+    let (missing, gain, worse) = (f64::NAN, "no-gain-over-linear", "worse-than-baseline");
     for (network, mean, linear, warning, part) in [
         ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], gain, "75 to 90 % below always predicting the mean"),
         ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], gain, "0 to 67 % below the best linear decoder"),
-        ([0.63, 0.3], [1.0, 1.0], [0.5, 0.5], gain, "26 % above to 40 % below the best linear"),
-        ([0.63, 0.6], [1.0, 1.0], [0.5, 0.5], gain, "20 to 26 % above the best linear decoder"),
+        ([0.63, 0.3], [1.0, 1.0], [0.5, 0.5], worse, "26 % above to 40 % below the best linear"),
+        ([0.63, 0.6], [1.0, 1.0], [0.5, 0.5], worse, "20 to 26 % above the best linear decoder"),
         ([0.0, 0.1], [0.0, 1.0], [0.0, 0.3], "", "f_n does not change in these frames"),
         ([missing, 0.1], [missing, 1.0], [missing, 0.3], "", "f_n has no frame to judge by"),
         ([0.86, 0.1], [1.0, 1.0], [1.0, 0.3], "", "It tells little of f_n: at best 14 % below"),
@@ -93,6 +93,29 @@ fn a_verdict_tells_gains_and_losses_over_mean_and_linear() {
         let (found, sentence) = says(network, mean, linear);
         assert!(found == warning && sentence.contains(part), "{found}: {sentence}");
     }
+}
+
+#[test]
+fn a_model_that_loses_to_a_baseline_is_told_so_by_output() {
+    let groups = ["x_mm", "y_mm", "z_mm", "depth_mm"];
+    let rows = [
+        ("network", [1.5, 9.9, 0.3, 5.0]),
+        ("linear", [2.0, 8.0, 0.2, 6.0]),
+        ("centroid", [0.3, 0.4, 0.4, 8.0]),
+        ("mean", [10.0; 4]),
+    ];
+    let rows = rows.map(|(name, rmse)| (name, [0, 1, 2, 3].map(|at| (groups[at], rmse[at]))));
+    let all = decoders(&rows.each_ref().map(|(name, errors)| (*name, &errors[..])));
+    let verdict = Verdict::new(&all, &no_limit());
+    let better = "Ten lines do better: the centroid decodes x_mm to 0.300 mm and y_mm to 0.400 mm; the best linear decoder \
+                  decodes z_mm to 0.200 mm.";
+    assert!(verdict.sentence.ends_with(better), "{}", verdict.sentence);
+    assert_eq!(names(&verdict), ["no-gain-over-mean", "worse-than-baseline"]);
+    assert!(
+        verdict.warnings[1]
+            .text
+            .starts_with("x_mm, y_mm: worse than the centroid; z_mm: worse than the best")
+    );
 }
 
 #[test]

@@ -13,6 +13,7 @@ use taxel_rig::image;
 use taxel_simulate::noise::Noise;
 
 use super::significant;
+use crate::metrics::Errors;
 use crate::over_time::{PercentOf, RestOverTime};
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB.
@@ -66,13 +67,28 @@ impl Warning {
         })
     }
 
-    /// Groups of outputs that a linear decoder decodes as well, or better.
+    /// Baselines with smaller errors than the model, and the groups of outputs where they have them.
+    pub fn worse_than_baseline(lost: &[(&str, Vec<&Errors>)]) -> Option<Self> {
+        Self::when(!lost.is_empty(), "worse-than-baseline", || {
+            let of = |(name, groups): &(&str, Vec<&Errors>)| {
+                let groups: Vec<&str> = groups.iter().map(|group| group.group.as_str()).collect();
+                format!("{}: worse than {name}", groups.join(", "))
+            };
+            let lost: Vec<String> = lost.iter().map(of).collect();
+            format!(
+                "{}, so the model is not worth its cost there (docs/trouble.md says what may help)",
+                lost.join("; ")
+            )
+        })
+    }
+
+    /// Groups of outputs that a linear decoder decodes as well, or nearly.
     pub fn no_gain_over_linear(groups: &[&str]) -> Option<Self> {
         Self::when(!groups.is_empty(), "no-gain-over-linear", || {
             let groups = groups.join(", ");
             format!(
-                "{groups}: at most 2 % better than a linear decoder, or worse, so a network gains nothing there; a larger \
-                 --penalty may help"
+                "{groups}: at most 2 % better than a linear decoder, so a network gains nothing there; a larger --penalty may \
+                 help"
             )
         })
     }

@@ -221,6 +221,16 @@ fn no_choice(page: &mut Page, trade: &Trade) {
     let front = trade.front();
     let (Some(fastest), Some(best)) = (front.first(), trade.most_accurate()) else { return };
     for (end, i) in [("The fastest", *fastest), ("The most accurate", best)] {
+        if let Some((decoder, least)) = trade.better_baseline(i) {
+            let least = error(least);
+            wrapped(
+                page,
+                &format!(
+                    "{end} point is not worth its cost: the baseline {decoder} has an RMSE of {least}, which is smaller."
+                ),
+            );
+            continue;
+        }
         let point = &trade.points[i];
         let Verdict { sentence, warnings } = trade.verdict_on(i);
         wrapped(page, &format!("{end}: {}. {sentence} {}", point.name(), cost(point)));

@@ -2,6 +2,7 @@
 
 use taxel_core::rbf::Format;
 use taxel_evaluate::evaluate::trade::{Point, Times, Trade};
+use taxel_learn::decoders::centroid;
 
 use super::words;
 use crate::report::axes::Axis;
@@ -122,11 +123,15 @@ fn levels(trade: &Trade) -> Vec<(String, f64, &'static str, Mark)> {
         of if of.is_empty() => of,
         of => format!(" with {of}"),
     };
-    let styles = [("muted", Mark::Dashed), ("c3", Mark::Dashed), ("truth", Mark::Dotted)];
-    let references = readings.references(&trade.group).zip(styles.into_iter().cycle()).enumerate();
-    let references = references.map(|(place, ((name, rmse), (class, mark)))| {
+    let references = readings.references(&trade.group).enumerate();
+    let references = references.map(|(place, (name, rmse))| {
         // What is read matters to all but the mean.
-        let with = if place == 0 { "" } else { &with };
+        let (with, class) = if place == 0 { ("", "muted") } else { (with.as_str(), "c3") };
+        let (class, mark) = match name {
+            "least possible" => ("truth", Mark::Dotted),
+            centroid::NAME => ("c2", Mark::Dashed),
+            _ => (class, Mark::Dashed),
+        };
         (format!("{name}{with} {}", significant(rmse, 3)), rmse, class, mark)
     });
     let bound = trade.bounds.error.map(|y| (format!("at most {y}"), y, "bound", Mark::Line));

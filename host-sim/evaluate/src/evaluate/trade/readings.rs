@@ -1,7 +1,7 @@
 //! Readings that points decode, and what other decoders make of the same ones.
 
 use serde::Serialize;
-use taxel_learn::decoders::{BASELINES, linear, mean};
+use taxel_learn::decoders::{BASELINES, centroid, linear, mean};
 
 use super::device::Wires;
 use super::frames::Frames;
@@ -34,8 +34,8 @@ impl Readings {
     ) -> Result<Self> {
         let decoders: Vec<DecoderErrors> = BASELINES
             .iter()
-            .map(|baseline| {
-                let decoder = baseline.fit(frames.training());
+            .filter_map(|baseline| baseline.fit(frames.training()))
+            .map(|decoder| {
                 let Some(touches) = &frames.touches else {
                     return Ok(metrics::judge(decoder.as_ref(), &frames.test, measure));
                 };
@@ -60,13 +60,19 @@ impl Readings {
         })
     }
 
+    /// Baseline with the least error of a group, and that error, if it is smaller than a model's `rmse`.
+    pub fn better_baseline(&self, group: &str, rmse: f64) -> Option<(&str, f64)> {
+        let of = |it: &'_ DecoderErrors| metrics::rmse_of(&it.errors, group);
+        let errors = self.decoders.iter().filter_map(|it| Some((it.decoder.as_str(), of(it)?)));
+        errors.min_by(|(_, a), (_, b)| a.total_cmp(b)).filter(|(_, least)| *least < rmse)
+    }
+
     /// Number of column-wires; `None` if the readings are not those of wires.
     pub fn columns(&self) -> Option<usize> {
         self.wires.map(|wires| wires.columns)
     }
 
-    /// Errors of a group to compare points with, by name, where they are known: always predicting the mean, the best
-    /// linear decoder, and the least possible.
+    /// Errors of a group to compare points with, by name, where they are known: of the baselines, and the least possible.
     pub fn references(&self, group: &str) -> impl Iterator<Item = (&'static str, f64)> {
         let of = |name| {
             let decoder = self.decoders.iter().find(|baseline| baseline.decoder == name)?;
@@ -76,6 +82,7 @@ impl Readings {
         let references = [
             ("always predicting the mean", of(mean::NAME)),
             ("best linear decoder", of(linear::NAME)),
+            ("centroid", of(centroid::NAME)),
             ("least possible", least.map(|limit| limit.limit)),
         ];
         references.into_iter().filter_map(|(name, rmse)| Some((name, rmse?)))

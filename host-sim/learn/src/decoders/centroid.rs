@@ -1,0 +1,232 @@
+//! Baseline: the centroid of what exceeds the readings at rest, which a network must beat on a mat.
+
+use nalgebra::{Cholesky, Matrix3, Vector3};
+use taxel_data::dataset::AtRest;
+use taxel_data::{Dataset, columns, rest};
+
+use crate::decoder::{Estimates, FrameDecoder, Frames};
+
+/// Name of the decoder in tables and results.
+pub const NAME: &str = "centroid";
+
+/// Standard deviations at rest by which a reading must change to count as touched.
+const THRESHOLD: f64 = 3.0;
+
+/// Penalty on squared weights as a share of their regressors' mean square: it matters only where cells lie in one line.
+const PENALTY: f64 = 1e-9;
+
+/// Decoder of places from the centroid of a touch, and of loads from its strength.
+///
+/// A cell's weight w is what its reading changes beyond [`THRESHOLD`], S is the sum of all. A place is affine in the
+/// centroid Σ w·(row, column)/S, a load is affine in S and √S.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Centroid {
+    /// Row-wire and column-wire of each reading, from 1.
+    cells: Vec<[f64; 2]>,
+    at_rest: AtRest,
+    /// Direction in which most readings change when touched: 1 or −1.
+    sign: f64,
+    /// Mean strength S of a training frame, in which strengths are counted.
+    unit: f64,
+    outputs: Vec<Output>,
+}
+
+/// Output's quantity, and what it is fitted by.
+#[derive(Debug, Clone, PartialEq)]
+struct Output {
+    quantity: Quantity,
+    mean: f64,
+    weights: Vector3<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Quantity {
+    /// Coordinate of the touch along the sensor.
+    Place,
+    /// Force, weight, pressure or depth of the whole touch.
+    Load,
+    Other,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Touch {
+    /// Σ w.
+    strength: f64,
+    /// Centroid, as row and column; NaN without strength.
+    place: [f64; 2],
+}
+
+impl Centroid {
+    /// Fits the decoder to `training`. `None` if readings are not named after the wires of cells, if they are not known
+    /// at rest, or if no output is a place or a load.
+    pub fn fit(training: &Dataset) -> Option<Self> {
+        let at_rest = training.at_rest.clone()?;
+        let names = &training.inputs.names;
+        let cell = |name: &String| Some(columns::cell_of(name)?.0.map(|wire| wire as f64));
+        let cells = names.iter().map(cell).collect::<Option<_>>()?;
+        let quantities = training.outputs.names.iter().map(|name| Quantity::of(name));
+        let quantities: Vec<Quantity> = quantities.collect();
+        if quantities.iter().all(|it| *it == Quantity::Other) {
+            return None;
+        }
+        let changes = training.inputs.means().into_iter().zip(&at_rest.level);
+        let sign =
+            if changes.map(|(mean, level)| mean - level).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+        let mut this = Self { cells, at_rest, sign, unit: 1.0, outputs: vec![] };
+        let mut touches = this.touches(&training.inputs.values);
+        let unit = touches.iter().map(|touch| touch.strength).sum::<f64>() / touches.len() as f64;
+        if unit > 0.0 {
+            this.unit = unit;
+            touches.iter_mut().for_each(|touch| touch.strength /= unit);
+        }
+        let means = training.outputs.means();
+        let output = |(column, (quantity, mean)): (usize, (Quantity, f64))| {
+            let truth = training.outputs.lines().map(|line| line[column]);
+            Output::fit(quantity, mean, touches.iter().zip(truth))
+        };
+        this.outputs = quantities.into_iter().zip(means).enumerate().map(output).collect();
+        Some(this)
+    }
+
+    /// Touch of each frame of `readings`. A missing reading has no weight.
+    fn touches(&self, readings: &[f64]) -> Vec<Touch> {
+        let AtRest { level, deviation } = &self.at_rest;
+        let of_frame = |frame: &[f64]| {
+            let (mut strength, mut moment) = (0.0, [0.0; 2]);
+            let rest = level.iter().zip(deviation);
+            for ((reading, (level, deviation)), cell) in frame.iter().zip(rest).zip(&self.cells) {
+                let weight = (self.sign * (reading - level) - THRESHOLD * deviation).max(0.0);
+                strength += weight;
+                moment = [0, 1].map(|axis| moment[axis] + weight * cell[axis]);
+            }
+            Touch { strength: strength / self.unit, place: moment.map(|it| it / strength) }
+        };
+        readings.chunks_exact(self.cells.len().max(1)).map(of_frame).collect()
+    }
+}
+
+impl Quantity {
+    /// Quantity of the output called `name`.
+    fn of(name: &str) -> Self {
+        let bare = columns::without_unit(name).to_lowercase();
+        let is_axis = ["x", "y"].contains(&bare.rsplit('_').next().unwrap_or_default());
+        let is_length = ["", "m", "cm", "mm", "µm"].contains(&columns::unit_of(name));
+        let of_electrode = columns::row_of(name).is_some();
+        if !of_electrode && rest::is_zero_at_rest(name) {
+            Self::Load
+        } else if !of_electrode && is_axis && is_length && !bare.contains("shear") {
+            Self::Place
+        } else {
+            Self::Other
+        }
+    }
+
+    /// Regressors of a `touch`, if it tells the quantity.
+    fn regressors(self, touch: &Touch) -> Option<Vector3<f64>> {
+        let Touch { strength, place: [row, column] } = *touch;
+        match self {
+            Self::Place => (strength > 0.0).then(|| Vector3::new(row, column, 1.0)),
+            Self::Load => Some(Vector3::new(strength, strength.sqrt(), 1.0)),
+            Self::Other => None,
+        }
+    }
+}
+
+impl Output {
+    /// Fits weights by least squares, places' errors weighed by the touch's strength.
+    fn fit<'t>(
+        quantity: Quantity,
+        mean: f64,
+        frames: impl Iterator<Item = (&'t Touch, f64)>,
+    ) -> Self {
+        let (mut squares, mut products) = (Matrix3::zeros(), Vector3::zeros());
+        for (touch, truth) in frames.filter(|(_, truth)| !truth.is_nan()) {
+            let Some(x) = quantity.regressors(touch) else { continue };
+            let weight = if quantity == Quantity::Place { touch.strength } else { 1.0 };
+            squares += weight * x * x.transpose();
+            products += weight * truth * x;
+        }
+        let penalty = PENALTY * squares.diagonal();
+        let solved = Cholesky::new(squares + Matrix3::from_diagonal(&penalty));
+        let weights = solved.map_or_else(|| Vector3::new(0.0, 0.0, mean), |it| it.solve(&products));
+        Self { quantity, mean, weights }
+    }
+
+    fn predict(&self, touch: &Touch) -> f64 {
+        self.quantity.regressors(touch).map_or(self.mean, |x| x.dot(&self.weights))
+    }
+}
+
+impl FrameDecoder for Centroid {
+    type State = ();
+
+    fn name(&self) -> &str {
+        NAME
+    }
+
+    fn inputs(&self) -> usize {
+        self.cells.len()
+    }
+
+    fn decode(&self, (): &mut (), frames: Frames<'_>) -> Estimates {
+        let touches = self.touches(frames.readings);
+        let of_touch = |touch| self.outputs.iter().map(move |output| output.predict(touch));
+        Estimates::of_values(touches.iter().flat_map(of_touch).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Touches of a mat of 8 × 8 cells 4 mm apart, whose resistances fall by what is pressed on them; a cell is dead.
+    fn touched(frames: u32) -> Dataset {
+        let names = (0..64).map(|cell| format!("r{}c{}_ohm", cell / 8 + 1, cell % 8 + 1));
+        let outputs = ["x_mm", "y_mm", "force_n", "age_s"].map(String::from).to_vec();
+        let mut mat = Dataset::empty(names.collect(), outputs, 1, 0);
+        let noise = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 16) / 32_768.0 - 1.0;
+        for frame in 0..frames {
+            let [x, y] = [13, 17].map(|step| 6.0 + f64::from(frame * step % 97) / 6.0);
+            let force = f64::from(frame % 5);
+            for cell in 0..64 {
+                let [row, column] = [cell / 8, cell % 8].map(|it| 4.0 * f64::from(it));
+                let distance = (column - x).powi(2) + (row - y).powi(2);
+                let dent = if cell == 9 { 0.0 } else { 50.0 * force * (-distance / 32.0).exp() };
+                mat.inputs.values.push(1000.0 + noise(64 * frame + cell) - dent);
+            }
+            let place = [x, y].map(|at| if force > 0.0 { at } else { f64::NAN });
+            mat.outputs.values.extend(place.into_iter().chain([force, f64::from(frame)]));
+        }
+        let untouched = mat.subset(&(0..mat.frames()).step_by(5).collect::<Vec<_>>());
+        mat.at_rest = Some(AtRest::of(&untouched.inputs));
+        mat
+    }
+
+    #[test]
+    fn a_touch_is_found_within_a_tenth_of_a_cell() {
+        let (training, test) = (touched(400), touched(97));
+        let centroid = Centroid::fit(&training).unwrap();
+        let decoded = centroid.decode(&mut (), Frames::untimed(&test.inputs.values));
+        let squares = test.outputs.squared_errors(&decoded.values);
+        let rmse = squares.iter().zip(test.outputs.counts());
+        let rmse: Vec<f64> = rmse.map(|(squares, count)| (squares / count as f64).sqrt()).collect();
+        assert!(rmse[..2].iter().all(|place_mm| *place_mm < 0.4), "{rmse:?}");
+        assert!(rmse[2] < 0.1 && rmse[3] > 100.0, "{rmse:?}");
+        // What is not touched has the mean place.
+        let untouched = centroid.decode(&mut (), Frames::untimed(&centroid.at_rest.level));
+        assert_eq!(untouched.values[..2], training.outputs.means()[..2]);
+    }
+
+    #[test]
+    fn without_cells_rest_or_a_place_there_is_no_centroid() {
+        let mat = touched(40);
+        assert!(Centroid::fit(&Dataset { at_rest: None, ..mat.clone() }).is_none());
+        let mut channels = mat.clone();
+        channels.inputs.names[3] = "ch3".into();
+        assert!(Centroid::fit(&channels).is_none());
+        let mut others = mat;
+        others.outputs.names =
+            ["r1e1_dx_mm", "shear_x_mm", "yaw_deg", "age_s"].map(String::from).to_vec();
+        assert!(Centroid::fit(&others).is_none());
+    }
+}
