@@ -144,6 +144,14 @@ pub fn quantity_of(name: &str) -> &str {
     }
 }
 
+/// Whether the output called `name` is a coordinate of the touch: `x_mm`, `contact_y_mm`, `pos_x`.
+pub fn is_place(name: &str) -> bool {
+    let bare = without_unit(name).to_lowercase();
+    let is_axis = ["x", "y"].contains(&bare.rsplit('_').next().unwrap_or_default());
+    let is_length = ["", "m", "cm", "mm", "µm"].contains(&unit_of(name));
+    is_axis && is_length && row_of(name).is_none() && !bare.contains("shear")
+}
+
 /// Whether `group` is compression in mm, the only one with a positional error.
 pub fn is_compression(group: &str) -> bool {
     group == "dz_mm"

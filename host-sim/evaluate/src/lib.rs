@@ -10,7 +10,7 @@
 pub mod scenes;
 pub mod error;
 pub mod metrics;
-pub mod by_depth;
+pub mod by_load;
 pub mod measurements;
 pub mod over_time;
 pub mod verdict;

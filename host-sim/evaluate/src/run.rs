@@ -4,14 +4,14 @@ use serde::Serialize;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{Dataset, Progress, Stream, Table};
 use taxel_learn::cost::{Cost, Design};
-use taxel_learn::decoders::BASELINES;
 use taxel_learn::decoders::mean::Mean;
+use taxel_learn::decoders::{BASELINES, centroid};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Decoder, ModelBlob, Options, PreparedModel};
 use taxel_simulate::Synthesis;
 use taxel_simulate::noise::NoiseKind;
 
-use crate::by_depth::{DepthErrors, by_depth};
+use crate::by_load::{LoadErrors, by_load};
 use crate::error::Result;
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
@@ -52,8 +52,8 @@ pub struct RunResult {
     pub decoders: Vec<DecoderErrors>,
     /// Least possible errors, of a decoder that sees all readings of a frame.
     pub limit: LimitSummary,
-    /// Errors of the network by the depth of the contact, if that is an output.
-    pub by_depth: Vec<DepthErrors>,
+    /// Errors by the depth of the contact, or of places by the force; empty for other outputs.
+    pub by_load: Vec<LoadErrors>,
     /// Errors on contacts that the model was not trained on; `None` for a scene without a contact, and for measurements.
     pub others: Option<Others>,
     /// Errors of the network by row-wire; nothing for outputs that belong to no row-wire.
@@ -157,6 +157,8 @@ pub fn run(
     let decoders: Vec<DecoderErrors> = decoders.collect();
     let estimate = network.decode_table(&test.inputs);
     let of_mean = Mean::fit(&training.frames);
+    let of_centroid = baselines.iter().find(|it| it.name() == centroid::NAME);
+    let of_centroid = of_centroid.map(|it| it.decode_all(&test.inputs.values, 1).values);
     let others = others::frames(subject, None);
     let others = Others::new(&others, (&network, &of_mean), &test, &measure);
     progress.step();
@@ -196,7 +198,7 @@ pub fn run(
         device_cost: DeviceCost::new(&blob),
         decoders,
         limit,
-        by_depth: by_depth(&test.outputs, &estimate.values, &measure),
+        by_load: by_load(&test.outputs, &estimate.values, of_centroid.as_deref(), &measure),
         others,
         by_row: by_row(subject, &test, &estimate, &measure),
         moving: None,

@@ -85,20 +85,16 @@ impl Verdict {
             sentences.extend(names.iter().map(|name| format!("{name} {why}.")));
         }
         let lost = others.lost(model);
-        let of_decoder = |(name, groups): &(&str, Vec<&Errors>)| {
-            let groups: Vec<String> = groups.iter().map(|group| with_error(group)).collect();
-            format!("{name} decodes {}", listed(&groups))
-        };
         if !lost.is_empty() {
-            let better: Vec<String> = lost.iter().map(of_decoder).collect();
-            sentences.push(format!("Ten lines do better: {}.", better.join("; ")));
+            let with_name = |(name, it): &(&str, &Errors)| format!("{} ({name})", with_error(it));
+            let better: Vec<String> = lost.iter().map(with_name).collect();
+            sentences.push(format!("Ten lines do better: {}.", listed(&better)));
         }
         // What is no better than the mean, or lost, need not be compared with the linear decoder.
         let useless = others.without_gain(model, |it| it.mean);
         let mut plain = others.without_gain(model, |it| it.linear);
-        let is_lost =
-            |name: &str| lost.iter().flat_map(|(_, groups)| groups).any(|it| it.group == name);
-        plain.retain(|group| !useless.contains(group) && !is_lost(group));
+        let lost: Vec<&str> = lost.iter().map(|(_, errors)| errors.group.as_str()).collect();
+        plain.retain(|group| !useless.contains(group) && !lost.contains(group));
         let warnings = [
             Warning::no_gain_over_mean(&useless),
             Warning::worse_than_baseline(&lost),
@@ -215,28 +211,20 @@ impl<'e> Others<'e> {
         if gains.is_empty() { String::new() } else { format!(": {}", gains.join(", and ")) }
     }
 
-    /// Baselines with a smaller error than `model`, each with its errors of the groups where it has the least; none that is no
-    /// better than always predicting the mean.
-    fn lost(&self, model: &DecoderErrors) -> Vec<(&'static str, Vec<&'e Errors>)> {
-        let all = [("the centroid", self.centroid), ("the best linear decoder", self.linear)];
-        let least = |group: &str| {
-            let of = |errors: &'e [Errors]| errors.iter().find(|it| it.group == group);
-            let found = all.iter().filter_map(|(name, errors)| Some((*name, of((*errors)?)?)));
-            found.min_by(|(_, a), (_, b)| a.rmse.total_cmp(&b.rmse))
+    /// Errors smaller than those of `model`, each with the name of the best baseline; none that are no better than always
+    /// predicting the mean.
+    fn lost(&self, model: &DecoderErrors) -> Vec<(&'static str, &'e Errors)> {
+        let better = |group: &Errors| {
+            let of = |name, errors: Option<&'e [Errors]>| {
+                Some((name, errors?.iter().find(|it| it.group == group.group)?))
+            };
+            let all = [of(centroid::NAME, self.centroid), of(linear::NAME, self.linear)];
+            let least =
+                all.into_iter().flatten().min_by(|(_, a), (_, b)| a.rmse.total_cmp(&b.rmse));
+            let is_useful = |it: &Errors| self.of_mean(it).is_none_or(|share| share <= NO_GAIN);
+            least.filter(|(_, it)| it.rmse < group.rmse && is_useful(it))
         };
-        let lost = model.errors.iter().filter_map(|group| {
-            let (name, errors) = least(&group.group).filter(|(_, it)| it.rmse < group.rmse)?;
-            self.of_mean(errors).is_none_or(|share| share <= NO_GAIN).then_some((name, errors))
-        });
-        let lost: Vec<(&str, &Errors)> = lost.collect();
-        let of_baseline = |(name, _)| {
-            let groups = lost.iter().filter(|(by, _)| *by == name).map(|(_, errors)| *errors);
-            (name, groups.collect())
-        };
-        all.into_iter()
-            .map(of_baseline)
-            .filter(|(_, groups): &(_, Vec<_>)| !groups.is_empty())
-            .collect()
+        model.errors.iter().filter_map(better).collect()
     }
 
     /// Groups of `model` without a gain over the decoder that `other` picks.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::by_depth::{DepthErrors, by_depth};
+use crate::by_load::{LoadErrors, by_load};
 use crate::evaluate::confidence::{Coverage, coverage};
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
@@ -20,7 +20,7 @@ use taxel_core::blob::Metadata;
 use taxel_data::dataset::UnusedInputs;
 use taxel_data::{AtRest, Clock, DataFile, Dataset, Table, output};
 use taxel_learn::ModelBlob;
-use taxel_learn::decoders::{CENTROID, mean};
+use taxel_learn::decoders::{CENTROID, centroid, mean};
 use taxel_limit::Refusal;
 
 use super::coverage_page;
@@ -80,8 +80,8 @@ struct Summary {
     /// RMSE of the best linear decoder on frames of the model's training that it was not fitted to; empty if the model does
     /// not tell it.
     linear_at_training: Vec<GroupRmse>,
-    /// Errors of the model by the depth of the contact, if that is an output.
-    by_depth: Vec<DepthErrors>,
+    /// Errors by the depth of the contact, or of places by the force; empty for other outputs.
+    by_load: Vec<LoadErrors>,
     /// Errors and readings at rest by time; `None` if lines are in no order of time.
     over_time: Option<OverTime>,
     /// What the intervals of a model with a confidence cover; empty without one.
@@ -134,7 +134,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let is_empty = |line: &&[f64]| line.iter().all(|value| value.is_nan());
     let without_reading = estimate.lines().filter(is_empty).count();
-    let means = truth.means().repeat(truth.len());
     let judged = Decoded { log: &log, outputs: &truth, estimates: &estimate.values };
     let over_time = OverTime::new(None, &judged, at_rest);
     let errors = metrics::by_group(&truth, &estimate.values, &measure);
@@ -154,11 +153,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         metadata.input_names.iter().chain(metadata.output_names.iter()).collect();
     let same_file = metadata.scene_digest == file.digest(&names)? && knows(metadata, &file)?;
     let values_evaluated = errors.iter().map(|group| group.count).sum();
-    let mean_errors = metrics::by_group(&truth, &means, &measure);
     let at_rest = over_time.as_ref().and_then(|log| log.rest.as_ref());
+    let of = |name: &str, estimate: &[f64]| {
+        DecoderErrors::new(name, metrics::by_group(&truth, estimate, &measure))
+    };
+    let of_centroid = centroid_of(&readings, &truth, lines_at_rest.as_deref());
     let mut decoders = vec![DecoderErrors::new(NETWORK, errors)];
-    decoders.extend(centroid(&readings, &truth, lines_at_rest.as_deref(), &measure));
-    decoders.push(DecoderErrors::new(mean::NAME, mean_errors));
+    decoders.extend(of_centroid.as_ref().map(|estimate| of(centroid::NAME, estimate)));
+    decoders.push(of(mean::NAME, &truth.means().repeat(truth.len())));
     let verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
@@ -180,7 +182,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         values: truth.values.len(),
         values_evaluated,
         health,
-        by_depth: by_depth(&truth, &estimate.values, &measure),
+        by_load: by_load(&truth, &estimate.values, of_centroid.as_deref(), &measure),
         over_time,
     };
     if let Some(html) = &arguments.html {
@@ -193,13 +195,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     print::result(common, &summary, || text_of(&summary))
 }
 
-/// Errors of the centroid, whose scale is fitted to these lines, as the mean is: a model keeps none.
-fn centroid(
+/// Estimates of the centroid, whose scale is fitted to these lines, as the mean is: a model keeps none.
+fn centroid_of(
     readings: &Table,
     truth: &Table,
     lines_at_rest: Option<&[usize]>,
-    measure: &Measure,
-) -> Option<DecoderErrors> {
+) -> Option<Vec<f64>> {
     let columns: Vec<usize> = (0..readings.names.len()).collect();
     let frames = Dataset {
         inputs: readings.clone(),
@@ -207,7 +208,7 @@ fn centroid(
         at_rest: Some(AtRest::of(&readings.part(lines_at_rest?, &columns))),
         ..Dataset::empty(vec![], vec![], 1, 0)
     };
-    Some(metrics::judge(CENTROID.fit(&frames)?.as_ref(), &frames, measure))
+    Some(CENTROID.fit(&frames)?.decode_all(&readings.values, 1).values)
 }
 
 /// Reason why no line can be judged, and what helps.
@@ -260,7 +261,7 @@ fn text_of(summary: &Summary) -> print::Page {
         ));
     }
     page.line(LimitSummary::new(&Err(Refusal::Measured)).note());
-    print::by_depth(&mut page, &summary.by_depth);
+    print::by_load(&mut page, &summary.by_load);
     if let Some(percent) = summary.percent_novel {
         page.line("");
         page.line("Errors that the model's intervals of 68.3 % and 95 % cover:");
@@ -332,7 +333,7 @@ fn page_of(
         decoders: &summary.decoders,
         linear_at_training: &summary.linear_at_training,
         limit: &limit,
-        by_depth: &summary.by_depth,
+        by_load: &summary.by_load,
         others: None,
         over_time: summary.over_time.as_ref(),
         moving: None,

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use crate::by_depth::DepthErrors;
+use crate::by_load::LoadErrors;
 use crate::metrics::{self, DecoderErrors, Definition, Errors, NETWORK};
 use crate::others::Others;
 use crate::verdict::Verdict;
@@ -181,24 +181,25 @@ pub fn wrapped(page: &mut Page, text: &str) {
     page.line(&line);
 }
 
-/// Adds a table of RMSE by the depth of the contact, if there is one.
-pub fn by_depth(page: &mut Page, ranges: &[DepthErrors]) {
+/// Adds a table of RMSE by the depth or force of the contact, if there is one; of the centroid below the model's.
+pub fn by_load(page: &mut Page, ranges: &[LoadErrors]) {
     let Some(first) = ranges.first() else { return };
     let groups =
         first.errors.iter().map(|e| format!(" {:>19}", format!("{}, {}", e.group, e.unit)));
     let groups: String = groups.collect();
     page.line(format_args!(
-        "\nRMSE by depth of the contact\n{:<16} {:>7}{groups}",
-        "depth", "frames"
+        "\nRMSE by true {}\n{:<16} {:>7}{groups}",
+        first.load, "range", "frames"
     ));
     for range in ranges {
-        let errors = range.errors.iter().map(|e| format!(" {:>19}", number(e.rmse)));
-        page.line(format_args!(
-            "{:<16} {:>7}{}",
-            range.range(),
-            range.frames,
-            errors.collect::<String>()
-        ));
+        let mut line = |head: &str, frames: &str, errors: &[Errors]| {
+            let errors = errors.iter().map(|e| format!(" {:>19}", number(e.rmse)));
+            page.line(format_args!("{head:<16} {frames:>7}{}", errors.collect::<String>()));
+        };
+        line(&range.range(), &range.frames.to_string(), &range.errors);
+        if !range.centroid.is_empty() {
+            line("  centroid", "", &range.centroid);
+        }
     }
 }
 

@@ -195,7 +195,7 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
     if let Some(moving) = &result.moving {
         moving_page(&mut page, moving);
     }
-    print::by_depth(&mut page, &result.by_depth);
+    print::by_load(&mut page, &result.by_load);
     if let Some(others) = &result.others {
         print::others(&mut page, others, &result.decoders);
     }

@@ -212,8 +212,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         let settings = selection.scored.iter().map(choice::settings).collect::<Vec<_>>();
         let width = settings.iter().map(String::len).max().unwrap_or(0);
         for (i, (scored, settings)) in selection.scored.iter().zip(&settings).enumerate() {
-            let is_chosen = i == selection.chosen && selection.better_baseline().is_none();
-            let mark = if is_chosen { "  <- chosen" } else { "" };
+            let mark = if i == selection.chosen { "  <- chosen" } else { "" };
             let (score, errors) = (scored.score, pooled(&scored.rmse));
             page.line(format_args!("  {settings:<width$} score {score:.4}: {errors}{mark}"));
         }
@@ -223,10 +222,8 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
             page.line(format_args!("  {label:<width$} score {score:.4}: {errors}"));
         }
         if let Some(better) = selection.better_baseline() {
-            page.line(format_args!(
-                "  The baseline {} has a lower score than every candidate: none of them is worth its cost.",
-                better.decoder
-            ));
+            let name = better.decoder;
+            page.line(format_args!("  not worth its cost: the baseline {name} has a lower score"));
         }
     }
     page.line(format_args!(

@@ -8,6 +8,7 @@ use super::format::{grouped, significant, symbol, unbroken};
 use super::svg::escape;
 use super::view::View;
 use super::{errors, frames, moving, over_time, sketch, sweep, tables};
+use taxel_evaluate::by_load::LoadErrors;
 use taxel_learn::decoders::centroid;
 
 /// Body of a page, which numbers its figures and tables, and lists its headings.
@@ -113,10 +114,9 @@ fn error_section(body: &mut Body, view: &View<'_>, face: Option<&Face>) {
     if let Some(face) = face {
         body.figure(&errors::by_electrode(view, face));
     }
-    if !view.by_depth.is_empty() {
-        let caption = "RMSE of the model by the true depth of the contact. The last line holds all frames that are \
-                       not shallow.";
-        body.table(caption, &tables::by_depth(view.by_depth), "");
+    if let Some(LoadErrors { load, .. }) = view.by_load.first() {
+        let caption = format!("RMSE of the model by the true {}.", symbol(load));
+        body.table(&caption, &tables::by_load(view.by_load), "");
     }
     if let Some(others) = view.others {
         let caption = format!(
@@ -191,11 +191,7 @@ fn header(view: &View<'_>) -> String {
         " Least possible: the limit that no decoder of these readings can pass; × limit: the network’s ratio to it."
     };
     let judged = |name: &str| view.decoders.iter().any(|decoder| decoder.decoder == name);
-    let centroid = if judged(centroid::NAME) {
-        " Centroid: that of what exceeds the readings at rest; a force from their sum."
-    } else {
-        ""
-    };
+    let centroid = if judged(centroid::NAME) { " Centroid: that of the touch." } else { "" };
     let linear = if judged("linear") {
         " Linear: the best linear decoder, which shows how much needs no network."
     } else if view.linear_at_training.is_empty() {

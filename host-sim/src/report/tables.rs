@@ -8,7 +8,7 @@ use super::format::{UNDEFINED, decimals, fixed, grouped, percent, significant, s
 use super::svg::escape;
 use super::ticks;
 use super::view::View;
-use taxel_evaluate::by_depth::DepthErrors;
+use taxel_evaluate::by_load::LoadErrors;
 use taxel_evaluate::evaluate::printed::{CELLS, NOISE_LEVELS, SPREADS};
 use taxel_evaluate::evaluate::table1::{Comparison, NETWORK, Table1};
 use taxel_evaluate::metrics::{self, DecoderErrors, Definition, Errors};
@@ -190,16 +190,23 @@ pub fn frames(view: &View<'_>) -> String {
     }
 }
 
-/// Table of the network's RMSE by depth of the contact (lines) and output (columns).
-pub fn by_depth(ranges: &[DepthErrors]) -> String {
+/// Table of RMSE by depth or force of the contact (lines) and output (columns), of the centroid below the model's.
+pub fn by_load(ranges: &[LoadErrors]) -> String {
     let groups = ranges.first().map_or(&[][..], |range| &range.errors);
     let heads = std::iter::once("Frames".into()).chain(groups.iter().map(name));
+    let of = |head: &str, frames: String, errors: &[Errors]| {
+        let errors = errors.iter().map(|errors| significant(errors.rmse, 3));
+        line(&escape(head), std::iter::once(frames).chain(errors))
+    };
     let lines = ranges.iter().map(|range| {
-        let errors = range.errors.iter().map(|errors| significant(errors.rmse, 3));
-        line(&escape(&range.range()), std::iter::once(grouped(range.frames)).chain(errors))
+        let own = of(&range.range(), grouped(range.frames), &range.errors);
+        if range.centroid.is_empty() {
+            return own;
+        }
+        own + &of("centroid", String::new(), &range.centroid)
     });
     format!(
-        "<table>\n<thead><tr><th>Depth</th>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table>\n",
+        "<table>\n<thead><tr><th>Range</th>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table>\n",
         numbers("th", heads),
         lines.collect::<String>()
     )

@@ -2,7 +2,7 @@
 
 use taxel_data::columns;
 use taxel_data::dataset::UnusedInputs;
-use taxel_evaluate::by_depth::DepthErrors;
+use taxel_evaluate::by_load::LoadErrors;
 use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::distribution::Distribution;
 use taxel_evaluate::evaluate::moving_contacts::MovingContacts;
@@ -40,8 +40,8 @@ pub struct View<'a> {
     pub linear_at_training: &'a [GroupRmse],
     /// Least possible errors.
     pub limit: &'a LimitSummary,
-    /// Errors by the depth of the contact; empty for other outputs.
-    pub by_depth: &'a [DepthErrors],
+    /// Errors by the depth of the contact, or of places by the force; empty for other outputs.
+    pub by_load: &'a [LoadErrors],
     /// Errors on contacts that the model was not trained on.
     pub others: Option<&'a Others>,
     /// Errors and readings at rest by time, of a log.
@@ -75,7 +75,7 @@ impl<'a> View<'a> {
             decoders: &result.decoders,
             linear_at_training: &[],
             limit: &result.limit,
-            by_depth: &result.by_depth,
+            by_load: &result.by_load,
             others: result.others.as_ref(),
             over_time: result.data.as_ref().and_then(|data| data.over_time.as_ref()),
             moving: result.moving.as_ref(),

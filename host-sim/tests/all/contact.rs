@@ -46,7 +46,7 @@ fn the_contact_is_trained_evaluated_inspected_and_run() {
             "{group}: {found}"
         );
     }
-    let ranges = evaluated["by_depth"].as_array().unwrap();
+    let ranges = evaluated["by_load"].as_array().unwrap();
     let x = |range: &Value| rmse(&range["errors"], "contact_x_mm");
     let (shallow, deep) = (&ranges[0], &ranges[ranges.len() - 2]);
     assert!(x(shallow) > 2.0 * x(deep), "where a shallow contact is can hardly be known");
@@ -58,8 +58,8 @@ fn the_contact_is_trained_evaluated_inspected_and_run() {
     assert_eq!(model["needs"].as_array().unwrap().len(), 0, "the images take it");
 
     let printed = folder.succeed(&["run", "scene.toml"]);
-    assert!(printed.contains("RMSE by depth of the contact") && !printed.contains("row-wire"));
+    assert!(printed.contains("RMSE by true contact_depth_mm") && !printed.contains("row-wire"));
     assert!(printed.contains("144 readings -> 10 features -> K = 24 -> 4 outputs"), "{printed}");
     let page = std::fs::read_to_string(folder.path("out/contact/report.html")).unwrap();
-    assert!(page.contains("by the true depth of the contact") && !page.contains("NaN"));
+    assert!(page.contains("by the true contact depth") && !page.contains("NaN"));
 }

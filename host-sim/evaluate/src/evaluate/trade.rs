@@ -146,7 +146,12 @@ impl Trade {
     /// If there is no such point.
     pub fn better_baseline(&self, point: usize) -> Option<(&str, f64)> {
         let point = &self.points[point];
-        self.readings[point.readings].better_baseline(&self.group, point.rmse(&self.group))
+        let of = |it: &DecoderErrors| metrics::rmse_of(&it.errors, &self.group);
+        let decoders = self.readings[point.readings].decoders.iter();
+        let least = decoders
+            .filter_map(|it| Some((it.decoder.as_str(), of(it)?)))
+            .min_by(|(_, a), (_, b)| a.total_cmp(b));
+        least.filter(|(_, least)| *least < point.rmse(&self.group))
     }
 
     /// Points of the front from fast to slow.

@@ -13,7 +13,6 @@ use taxel_rig::image;
 use taxel_simulate::noise::Noise;
 
 use super::significant;
-use crate::metrics::Errors;
 use crate::over_time::{PercentOf, RestOverTime};
 
 /// Largest blob in bytes that a slot of the firmware's images holds: 128 KiB.
@@ -67,17 +66,12 @@ impl Warning {
         })
     }
 
-    /// Baselines with smaller errors than the model, and the groups of outputs where they have them.
-    pub fn worse_than_baseline(lost: &[(&str, Vec<&Errors>)]) -> Option<Self> {
-        Self::when(!lost.is_empty(), "worse-than-baseline", || {
-            let of = |(name, groups): &(&str, Vec<&Errors>)| {
-                let groups: Vec<&str> = groups.iter().map(|group| group.group.as_str()).collect();
-                format!("{}: worse than {name}", groups.join(", "))
-            };
-            let lost: Vec<String> = lost.iter().map(of).collect();
+    /// Groups of outputs that the centroid or a linear decoder decodes better.
+    pub fn worse_than_baseline(groups: &[&str]) -> Option<Self> {
+        Self::when(!groups.is_empty(), "worse-than-baseline", || {
+            let groups = groups.join(", ");
             format!(
-                "{}, so the model is not worth its cost there (docs/trouble.md says what may help)",
-                lost.join("; ")
+                "{groups}: a simpler decoder is better, so the model is not worth its cost there (docs/trouble.md)"
             )
         })
     }

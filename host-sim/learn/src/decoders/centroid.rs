@@ -26,8 +26,6 @@ pub struct Centroid {
     at_rest: AtRest,
     /// Direction in which most readings change when touched: 1 or −1.
     sign: f64,
-    /// Mean strength S of a training frame, in which strengths are counted.
-    unit: f64,
     outputs: Vec<Output>,
 }
 
@@ -48,43 +46,31 @@ enum Quantity {
     Other,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Touch {
-    /// Σ w.
-    strength: f64,
-    /// Centroid, as row and column; NaN without strength.
-    place: [f64; 2],
-}
+/// Strength S of a touch, and row and column of its centroid, which are NaN without strength.
+type Touch = [f64; 3];
 
 impl Centroid {
     /// Fits the decoder to `training`. `None` if readings are not named after the wires of cells, if they are not known
     /// at rest, or if no output is a place or a load.
     pub fn fit(training: &Dataset) -> Option<Self> {
         let at_rest = training.at_rest.clone()?;
-        let names = &training.inputs.names;
+        let (inputs, outputs) = (&training.inputs, &training.outputs);
         let cell = |name: &String| Some(columns::cell_of(name)?.0.map(|wire| wire as f64));
-        let cells = names.iter().map(cell).collect::<Option<_>>()?;
-        let quantities = training.outputs.names.iter().map(|name| Quantity::of(name));
-        let quantities: Vec<Quantity> = quantities.collect();
+        let cells = inputs.names.iter().map(cell).collect::<Option<_>>()?;
+        let quantities: Vec<Quantity> = outputs.names.iter().map(|it| Quantity::of(it)).collect();
         if quantities.iter().all(|it| *it == Quantity::Other) {
             return None;
         }
-        let changes = training.inputs.means().into_iter().zip(&at_rest.level);
-        let sign =
-            if changes.map(|(mean, level)| mean - level).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
-        let mut this = Self { cells, at_rest, sign, unit: 1.0, outputs: vec![] };
-        let mut touches = this.touches(&training.inputs.values);
-        let unit = touches.iter().map(|touch| touch.strength).sum::<f64>() / touches.len() as f64;
-        if unit > 0.0 {
-            this.unit = unit;
-            touches.iter_mut().for_each(|touch| touch.strength /= unit);
-        }
-        let means = training.outputs.means();
+        let changes = inputs.means().into_iter().zip(&at_rest.level);
+        let sign = changes.map(|(mean, level)| mean - level).sum::<f64>().signum();
+        let mut this = Self { cells, at_rest, sign, outputs: vec![] };
+        let touches = this.touches(&inputs.values);
         let output = |(column, (quantity, mean)): (usize, (Quantity, f64))| {
-            let truth = training.outputs.lines().map(|line| line[column]);
+            let truth = outputs.lines().map(|line| line[column]);
             Output::fit(quantity, mean, touches.iter().zip(truth))
         };
-        this.outputs = quantities.into_iter().zip(means).enumerate().map(output).collect();
+        this.outputs =
+            quantities.into_iter().zip(outputs.means()).enumerate().map(output).collect();
         Some(this)
     }
 
@@ -92,14 +78,14 @@ impl Centroid {
     fn touches(&self, readings: &[f64]) -> Vec<Touch> {
         let AtRest { level, deviation } = &self.at_rest;
         let of_frame = |frame: &[f64]| {
-            let (mut strength, mut moment) = (0.0, [0.0; 2]);
             let rest = level.iter().zip(deviation);
-            for ((reading, (level, deviation)), cell) in frame.iter().zip(rest).zip(&self.cells) {
-                let weight = (self.sign * (reading - level) - THRESHOLD * deviation).max(0.0);
-                strength += weight;
-                moment = [0, 1].map(|axis| moment[axis] + weight * cell[axis]);
-            }
-            Touch { strength: strength / self.unit, place: moment.map(|it| it / strength) }
+            let cells = frame.iter().zip(rest).zip(&self.cells);
+            let [strength, rows, columns] =
+                cells.fold([0.0; 3], |sums, ((reading, rest), cell)| {
+                    let weight = (self.sign * (reading - rest.0) - THRESHOLD * rest.1).max(0.0);
+                    [sums[0] + weight, sums[1] + weight * cell[0], sums[2] + weight * cell[1]]
+                });
+            [strength, rows / strength, columns / strength]
         };
         readings.chunks_exact(self.cells.len().max(1)).map(of_frame).collect()
     }
@@ -108,22 +94,15 @@ impl Centroid {
 impl Quantity {
     /// Quantity of the output called `name`.
     fn of(name: &str) -> Self {
-        let bare = columns::without_unit(name).to_lowercase();
-        let is_axis = ["x", "y"].contains(&bare.rsplit('_').next().unwrap_or_default());
-        let is_length = ["", "m", "cm", "mm", "µm"].contains(&columns::unit_of(name));
-        let of_electrode = columns::row_of(name).is_some();
-        if !of_electrode && rest::is_zero_at_rest(name) {
-            Self::Load
-        } else if !of_electrode && is_axis && is_length && !bare.contains("shear") {
-            Self::Place
-        } else {
-            Self::Other
+        match (columns::is_place(name), rest::is_zero_at_rest(name)) {
+            (true, false) => Self::Place,
+            (_, true) if columns::row_of(name).is_none() => Self::Load,
+            _ => Self::Other,
         }
     }
 
-    /// Regressors of a `touch`, if it tells the quantity.
-    fn regressors(self, touch: &Touch) -> Option<Vector3<f64>> {
-        let Touch { strength, place: [row, column] } = *touch;
+    /// Regressors of a touch, if it tells the quantity.
+    fn regressors(self, &[strength, row, column]: &Touch) -> Option<Vector3<f64>> {
         match self {
             Self::Place => (strength > 0.0).then(|| Vector3::new(row, column, 1.0)),
             Self::Load => Some(Vector3::new(strength, strength.sqrt(), 1.0)),
@@ -142,18 +121,13 @@ impl Output {
         let (mut squares, mut products) = (Matrix3::zeros(), Vector3::zeros());
         for (touch, truth) in frames.filter(|(_, truth)| !truth.is_nan()) {
             let Some(x) = quantity.regressors(touch) else { continue };
-            let weight = if quantity == Quantity::Place { touch.strength } else { 1.0 };
+            let weight = if quantity == Quantity::Place { touch[0] } else { 1.0 };
             squares += weight * x * x.transpose();
             products += weight * truth * x;
         }
-        let penalty = PENALTY * squares.diagonal();
-        let solved = Cholesky::new(squares + Matrix3::from_diagonal(&penalty));
-        let weights = solved.map_or_else(|| Vector3::new(0.0, 0.0, mean), |it| it.solve(&products));
-        Self { quantity, mean, weights }
-    }
-
-    fn predict(&self, touch: &Touch) -> f64 {
-        self.quantity.regressors(touch).map_or(self.mean, |x| x.dot(&self.weights))
+        squares += Matrix3::from_diagonal(&(PENALTY * squares.diagonal()));
+        let solved = Cholesky::new(squares).map(|it| it.solve(&products));
+        Self { quantity, mean, weights: solved.unwrap_or_else(|| Vector3::new(0.0, 0.0, mean)) }
     }
 }
 
@@ -169,8 +143,11 @@ impl FrameDecoder for Centroid {
     }
 
     fn decode(&self, (): &mut (), frames: Frames<'_>) -> Estimates {
+        let predict = |touch: &Touch, output: &Output| {
+            output.quantity.regressors(touch).map_or(output.mean, |x| x.dot(&output.weights))
+        };
         let touches = self.touches(frames.readings);
-        let of_touch = |touch| self.outputs.iter().map(move |output| output.predict(touch));
+        let of_touch = |touch| self.outputs.iter().map(move |output| predict(touch, output));
         Estimates::of_values(touches.iter().flat_map(of_touch).collect())
     }
 }

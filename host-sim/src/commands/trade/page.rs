@@ -223,12 +223,9 @@ fn no_choice(page: &mut Page, trade: &Trade) {
     for (end, i) in [("The fastest", *fastest), ("The most accurate", best)] {
         if let Some((decoder, least)) = trade.better_baseline(i) {
             let least = error(least);
-            wrapped(
-                page,
-                &format!(
-                    "{end} point is not worth its cost: the baseline {decoder} has an RMSE of {least}, which is smaller."
-                ),
-            );
+            page.line(format_args!(
+                "{end}: no model; the baseline {decoder} has a smaller error, {least}"
+            ));
             continue;
         }
         let point = &trade.points[i];

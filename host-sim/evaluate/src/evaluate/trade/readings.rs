@@ -60,13 +60,6 @@ impl Readings {
         })
     }
 
-    /// Baseline with the least error of a group, and that error, if it is smaller than a model's `rmse`.
-    pub fn better_baseline(&self, group: &str, rmse: f64) -> Option<(&str, f64)> {
-        let of = |it: &'_ DecoderErrors| metrics::rmse_of(&it.errors, group);
-        let errors = self.decoders.iter().filter_map(|it| Some((it.decoder.as_str(), of(it)?)));
-        errors.min_by(|(_, a), (_, b)| a.total_cmp(b)).filter(|(_, least)| *least < rmse)
-    }
-
     /// Number of column-wires; `None` if the readings are not those of wires.
     pub fn columns(&self) -> Option<usize> {
         self.wires.map(|wires| wires.columns)
