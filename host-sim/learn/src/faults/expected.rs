@@ -7,8 +7,9 @@ use super::FEWEST_FOR_NOISE;
 
 /// Median of the square of a standard normal number.
 const MEDIAN_SQUARE: f64 = 0.4549;
-/// Squares of errors, in those of noise, from which on a reading is far off the others.
-const FAR_OFF: f64 = 6.0;
+/// Squares of errors, in those of noise, from which on a reading is far off the others. A touch that the model does not know
+/// has up to 11 while it lasts.
+const FAR_OFF: f64 = 25.0;
 /// Rounds in which the present noise is found.
 const ROUNDS: usize = 6;
 /// Largest variance along a factor, in that of noise.
@@ -24,9 +25,19 @@ pub struct Expected {
 }
 
 /// What solves for a frame's factors, given the readings that are there, at some noise.
-struct Solver {
+pub struct Solver {
     there: Vec<bool>,
+    variance: f64,
     decomposition: Cholesky<f64, Dyn>,
+    /// Shares of the readings' noise that is left in their differences from what is expected.
+    pub left: Vec<f64>,
+}
+
+impl Solver {
+    /// Standard error of what is expected of a sum of readings that has these `parts` in the factors.
+    pub fn standard_error(&self, parts: &DVector<f64>) -> f64 {
+        (self.variance * parts.dot(&self.decomposition.solve(parts))).sqrt()
+    }
 }
 
 impl Expected {
@@ -65,62 +76,61 @@ impl Expected {
         (ohm(a, of_a) - ohm(b, of_b)) / noise
     }
 
+    /// Parts of the [`difference`](Self::difference) of two readings in the factors.
+    pub fn parts_of_difference(&self, [a, b]: [usize; 2]) -> DVector<f64> {
+        let part = |at: usize| self.parts.row(at).transpose() / self.scale[at];
+        (part(a) - part(b)) / (1.0 / self.scale[a]).hypot(1.0 / self.scale[b])
+    }
+
     fn solver(&self, there: Vec<bool>, variance: f64) -> Option<Solver> {
         let factors = self.parts.ncols();
         let mut matrix = DMatrix::identity(factors, factors) * variance;
         for (row, _) in self.parts.row_iter().zip(&there).filter(|(_, there)| **there) {
             matrix.ger(1.0, &row.transpose(), &row.transpose(), 1.0);
         }
-        Some(Solver { there, decomposition: matrix.cholesky()? })
+        let decomposition = matrix.cholesky()?;
+        let solved = decomposition.solve(&self.parts.transpose());
+        let of = |at: usize| {
+            let along = self.parts.row(at).transpose().dot(&solved.column(at));
+            if there[at] { (1.0 - along).max(1e-6) } else { 1.0 + along }
+        };
+        let left = (0..self.readings()).map(of).collect();
+        Some(Solver { there, variance, decomposition, left })
     }
 
     /// Calls `take` with each frame of `scaled` readings, what is expected of all its readings given those that are neither
-    /// missing nor `left_out`, and the share of its own noise that this leaves of each.
+    /// missing nor `left_out`, and what solved for that.
     pub fn each(
         &self,
         scaled: &[f64],
         left_out: &dyn Fn(usize) -> bool,
         variance: f64,
-        mut take: impl FnMut(&[f64], &DVector<f64>, &[f64]),
+        mut take: impl FnMut(&[f64], &DVector<f64>, &Solver),
     ) {
-        let mut known: Option<(Solver, Vec<f64>)> = None;
+        let mut known: Option<Solver> = None;
         for frame in scaled.chunks_exact(self.readings()) {
             let there: Vec<bool> =
                 (0..frame.len()).map(|at| !frame[at].is_nan() && !left_out(at)).collect();
-            if known.as_ref().is_none_or(|(solver, _)| solver.there != there) {
-                let solver = self.solver(there, variance);
-                known = solver.map(|solver| {
-                    let left = self.shares_left(&solver);
-                    (solver, left)
-                });
+            if known.as_ref().is_none_or(|solver| solver.there != there) {
+                known = self.solver(there, variance);
             }
-            let Some((solver, left)) = &known else { continue };
+            let Some(solver) = &known else { continue };
             let z = DVector::from_fn(
                 frame.len(),
                 |at, _| if solver.there[at] { frame[at] } else { 0.0 },
             );
             let factors = solver.decomposition.solve(&self.parts.tr_mul(&z));
-            take(frame, &(&self.parts * factors), left);
+            take(frame, &(&self.parts * factors), solver);
         }
-    }
-
-    /// Shares of the readings' noise that is left in their differences from what is expected.
-    fn shares_left(&self, solver: &Solver) -> Vec<f64> {
-        let solved = solver.decomposition.solve(&self.parts.transpose());
-        let of = |at: usize| {
-            let along = self.parts.row(at).transpose().dot(&solved.column(at));
-            if solver.there[at] { (1.0 - along).max(1e-6) } else { 1.0 + along }
-        };
-        (0..self.readings()).map(of).collect()
     }
 
     /// Median squares of what each reading differs from what is expected, in units of the noise in training. 0 for a
     /// reading that is there in too few frames to tell.
     fn squares(&self, scaled: &[f64], struck: &[bool], variance: f64) -> Vec<f64> {
         let mut squares = vec![Vec::new(); self.readings()];
-        self.each(scaled, &|at| struck[at], variance, |frame, expected, left| {
+        self.each(scaled, &|at| struck[at], variance, |frame, expected, solver| {
             for (at, squares) in squares.iter_mut().enumerate() {
-                let square = (frame[at] - expected[at]).powi(2) / left[at];
+                let square = (frame[at] - expected[at]).powi(2) / solver.left[at];
                 if !square.is_nan() && self.scale[at] > 0.0 {
                     squares.push(square);
                 }

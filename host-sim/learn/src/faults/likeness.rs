@@ -1,13 +1,13 @@
 //! Neighbouring wires that touch: they read alike where the other wires say that they should differ.
 
+use nalgebra::DVector;
+
 use super::expected::Expected;
 use super::{FEWEST_FOR_NOISE, Grid, Place};
 
-/// Least sum of squared differences that are expected, in those of noise: fewer do not tell.
-const EVIDENCE: f64 = 60.0;
-/// Least by which the logarithm of the likelihood that the wires touch is above that of sound wires. With so much evidence
-/// sound wires have −30 ± 8, and such that touch 30 ± 8.
-const MORE_LIKELY: f64 = 10.0;
+/// Standard errors by which what the other wires tell is certain: that the two differ in a frame, and that they do not read
+/// so in a window.
+const CERTAIN: f64 = 5.0;
 /// Largest mean square of differences, in that of noise: 1 for wires that touch.
 const ALIKE: f64 = 3.0;
 /// Largest mean square of what the other readings of a frame differ from what is expected, in that of noise: a frame that
@@ -21,45 +21,66 @@ pub fn touching(
     scaled: &[f64],
     left_out: &dyn Fn(usize) -> bool,
 ) -> Vec<Place> {
-    let struck: Vec<bool> = (0..expected.readings()).map(left_out).collect();
+    let mut struck: Vec<bool> = (0..expected.readings()).map(left_out).collect();
     let (variance, _) = expected.present_noise(scaled, &struck);
-    grid.neighbours()
-        .filter(|place| touch(grid, expected, scaled, (&struck, variance), *place))
-        .collect()
+    let mut places = Vec::new();
+    loop {
+        let certainty = |place: &Place| touch(grid, expected, scaled, (&struck, variance), *place);
+        let left = grid.neighbours().filter(|place| !places.contains(place));
+        let told = left.filter_map(|place| Some((certainty(&place)?, place)));
+        // What touches leads the others astray.
+        let Some((_, surest)) = told.max_by(|a, b| a.0.total_cmp(&b.0)) else { return places };
+        (0..struck.len()).filter(|at| grid.is_in(surest, *at)).for_each(|at| struck[at] = true);
+        places.push(surest);
+    }
 }
 
+/// Standard errors by which neighbours differ from sound ones, if they touch.
 fn touch(
     grid: &Grid,
     expected: &Expected,
     scaled: &[f64],
     (struck, variance): (&[bool], f64),
     place: Place,
-) -> bool {
-    let pairs = grid.pairs(place);
-    let (mut of_expected, mut of_both, mut of_found, mut count) = (0.0, 0.0, 0.0, 0.0);
+) -> Option<f64> {
+    let pairs = grid.pairs(place).into_iter();
+    let pairs: Vec<_> = pairs.map(|pair| (pair, expected.parts_of_difference(pair))).collect();
+    let (mut of_expected, mut of_both, mut error) = (0.0, 0.0, 0.0);
+    let (mut of_found, mut count) = (0.0, 0.0);
     let mut frames = 0;
     let out = |at: usize| struck[at] || grid.is_in(place, at);
-    expected.each(scaled, &out, variance, |frame, z, left| {
+    expected.each(scaled, &out, variance, |frame, z, solver| {
         let others = (0..frame.len()).filter(|at| !out(*at) && !frame[*at].is_nan());
-        let misfit = others.map(|at| (frame[at] - z[at]).powi(2) / left[at]);
+        let misfit = others.map(|at| (frame[at] - z[at]).powi(2) / solver.left[at]);
         let (sum, readings) = misfit.fold((0.0, 0.0), |(sum, n), square| (sum + square, n + 1.0));
         if sum > FITS * variance * readings {
             return;
         }
         frames += 1;
-        for [a, b] in &pairs {
+        let (mut square, mut both) = (0.0, 0.0);
+        let mut parts = DVector::zeros(pairs[0].1.len());
+        for ([a, b], parts_of_pair) in &pairs {
             let found = expected.difference([*a, *b], [frame[*a], frame[*b]]);
             let wanted = expected.difference([*a, *b], [z[*a], z[*b]]);
             if found.is_finite() && wanted.is_finite() {
-                of_expected += wanted * wanted;
-                of_both += wanted * found;
+                square += wanted * wanted;
+                both += wanted * found;
+                parts.axpy(wanted, parts_of_pair, 1.0);
                 of_found += found * found;
                 count += 1.0;
             }
         }
+        let error_of_frame = solver.standard_error(&parts);
+        if square > CERTAIN * error_of_frame {
+            of_expected += square;
+            of_both += both;
+            error += error_of_frame; // frames of one touch err alike
+        }
     });
-    frames >= FEWEST_FOR_NOISE
-        && of_expected > EVIDENCE * variance
-        && 0.5 * of_expected - of_both > MORE_LIKELY * variance
-        && of_found < ALIKE * variance * count
+    let certainty = (of_expected - of_both) / (variance * of_expected).sqrt().hypot(error);
+    let touch = frames >= FEWEST_FOR_NOISE
+        && certainty > CERTAIN
+        && of_both < 0.5 * of_expected
+        && of_found < ALIKE * variance * count;
+    touch.then_some(certainty)
 }

@@ -1,7 +1,9 @@
 use std::ops::Range;
 
 use taxel_data::{Purpose, Random, Stream};
-use taxel_simulate::{World, synthesise};
+use taxel_simulate::path::Path;
+use taxel_simulate::timetable::Timetable;
+use taxel_simulate::{Synthesis, World, synthesise};
 
 use super::*;
 use crate::fill;
@@ -59,13 +61,18 @@ fn every_kind_of_fault_is_named_and_sound_frames_have_none() {
     assert_eq!(named(&ground, &block), ["row-wire 7 shorted to ground"]);
     let none = with(&sound, |_, frame| frame.fill(f64::INFINITY));
     assert_eq!(named(&none, &block), ["all readings open"]);
-    let touching = with(&sound, |_, frame| {
-        for m in 0..8 {
-            let mean = f64::midpoint(frame[m * 18 + 8], frame[m * 18 + 9]);
-            frame[m * 18 + 8..][..2].fill(mean);
-        }
-    });
-    assert_eq!(named(&touching, &block), ["column-wires 9 and 10 shorted together"]);
+    let touching = |pairs: &[[usize; 2]]| {
+        with(&sound, |_, frame| {
+            pairs.iter().for_each(|[a, b]| {
+                let mean = f64::midpoint(frame[*a], frame[*b]);
+                (frame[*a], frame[*b]) = (mean, mean);
+            });
+        })
+    };
+    let columns = touching(&[8, 26, 44, 62, 80, 98, 116, 134].map(|at| [at, at + 1]));
+    assert_eq!(named(&columns, &block), ["column-wires 9 and 10 shorted together"]);
+    let rows: Vec<_> = (90..108).map(|at| [at, at + 18]).collect();
+    assert_eq!(named(&touching(&rows), &block), ["row-wires 6 and 7 shorted together"]);
     let mut draw = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
     let draws: Vec<f64> = (0..200).map(|_| draw.normal()).collect();
     let noisy = with(&sound, |line, frame| frame[100] *= 1.0 + 0.5 * draws[line]);
@@ -82,6 +89,22 @@ fn few_frames_of_a_sound_sensor_have_no_faults() {
             assert_eq!(told(&sound, Some(&block)), [], "{frames} frames of seed {seed}");
         }
     }
+}
+
+/// Contacts that slide and press as slowly as the live view's: a window has a single touch, in which the model errs alike.
+#[test]
+fn slow_touches_of_a_sound_sensor_have_no_faults() {
+    let (_, block) = sensor();
+    let path = Path {
+        speed_mm_per_s: [4.0, 12.0],
+        press_rate_hz: [0.25, 0.5],
+        duration_s: 12.0,
+        ..Path::at(0.0, 0.0)
+    };
+    let timetable = Timetable::instants((0..1200).map(|at| f64::from(at) / 100.0).collect());
+    let world = World::press();
+    let slow = Synthesis::new(&world).along(path, timetable).frames(Stream::Test, 10 * 1200);
+    assert_eq!(told(&slow.inputs, Some(&block)), []);
 }
 
 #[test]
