@@ -7,6 +7,7 @@
 pub mod moment;
 pub mod sheet;
 mod contact;
+mod touch;
 pub mod decode;
 pub mod feed;
 pub mod device;

@@ -30,6 +30,7 @@ mod frame;
 mod estimate;
 mod cortex_m4;
 pub mod health;
+pub mod contact;
 pub mod filter;
 pub mod rbf;
 pub mod projection;

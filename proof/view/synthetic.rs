@@ -283,9 +283,8 @@ impl Source {
             ..Frame::default()
         };
         let force_n = deformations.iter().map(|moved| moved[2] * N_PER_MM).sum();
-        if depth_mm > 0.02 {
-            frame.contact = Some(Contact { x_mm, y_mm, depth_mm, force_n: Some(force_n) });
-        }
+        frame.force_n = Some(force_n);
+        frame.contact = (depth_mm > 0.02).then_some(Contact { x_mm, y_mm, depth_mm });
         if self.show == "values" {
             frame.readings = (0..16)
                 .map(|index| 3.0 + (time_s + index as f32).sin() + 0.02 * self.noise())

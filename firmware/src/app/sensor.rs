@@ -1,6 +1,7 @@
 //! The sensor: which wires are scanned, how, and its baseline.
 
 use taxel_core::blob::{Columns, Floats, ModelShape};
+use taxel_core::contact::Detector;
 use taxel_core::health::{Health, Limits};
 
 use super::frame_clock::FrameClock;
@@ -34,6 +35,7 @@ pub struct Sensor<'m, F, const ROWS: usize> {
     faulty_columns: [u32; ROWS],
     pub baseline: Baseline<'m>,
     pub capture: Option<Capture>,
+    contact: Detector,
     /// Whether the last scan gave at least one reading.
     pub answers: bool,
     /// Whether the configuration changed since the last frame was decoded.
@@ -90,6 +92,7 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
             faulty_columns: [0; ROWS],
             baseline: Baseline::new(baseline),
             capture: None,
+            contact: Detector::default(),
             answers: true,
             is_configured_anew: false,
             under_way: None,
@@ -130,11 +133,14 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
         (frame, health)
     }
 
-    /// Whether the last frame differs from the baseline as under a contact.
-    pub fn is_touched(&self) -> bool {
+    /// Whether the last frame differs from the baseline as under a contact: by the largest relative change, since a device
+    /// knows no noise at rest. A frame that is not one of a series neither continues a contact nor ends it.
+    pub fn is_touched(&mut self, is_of_series: bool) -> bool {
         let change = self.baseline.largest_relative_deviation(self.frame);
-        let touched = change.is_some_and(|change| change > self.configuration.contact_threshold);
-        touched && self.capture.is_none()
+        let change = change.filter(|_| self.capture.is_none()).unwrap_or(0.0);
+        let mut alone = Detector::default();
+        let contact = if is_of_series { &mut self.contact } else { &mut alone };
+        contact.update(change, self.configuration.contact_threshold)
     }
 }
 

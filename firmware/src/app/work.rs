@@ -79,7 +79,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             cut(&mut self.estimate, self.rows, 0).status.fill(RowStatus::MissingReading);
             flags |= EstimateReport::NO_MODEL;
         }
-        if sensor.is_touched() {
+        if sensor.is_touched(filtered_us.is_some()) {
             flags |= EstimateReport::CONTACT;
         }
         let (end_us, end_cycles) = now(link);

@@ -18,20 +18,13 @@ pub struct Frame {
     pub deviations: Option<Vec<f32>>,
     /// True outputs, where they are known.
     pub truth: Option<Vec<f32>>,
-    /// Contact, if there is one.
-    pub contact: Option<Contact>,
+    /// Place of the contact in mm: x, y and depth, while something touches.
+    pub contact_mm: Option<[f32; 3]>,
+    /// Force on the sensor along x, y and z in N, if it is known; 0 when a contact ends.
+    pub force_n: Option<[f32; 3]>,
     /// State of the wires and of the model. A frame that is written with `None` leaves it as it was: when it is read it
     /// has the last one before it.
     pub status: Option<Status>,
-}
-
-/// Contact with the sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
-    /// Place: x, y, z in mm.
-    pub place_mm: [f32; 3],
-    /// Force on the sensor along x, y and z in N, if it is known.
-    pub force_n: Option<[f32; 3]>,
 }
 
 /// State of the wires and of the model.

@@ -23,7 +23,7 @@ mod reader;
 mod mend;
 
 pub use error::{Error, Result};
-pub use frame::{Contact, Frame, Health, Status};
+pub use frame::{Frame, Health, Status};
 pub use layout::{Column, Electrode, Extras, Layout};
 pub use mend::{Recovered, mend, recover};
 pub use reader::Reader;

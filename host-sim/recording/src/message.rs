@@ -3,7 +3,6 @@
 //! Readers return `None` for a message that is not one of this layout.
 
 use crate::bytes::{Bytes, Message};
-use crate::frame::Contact;
 use crate::layout::Layout;
 
 /// Frame of ROS that places are in.
@@ -235,24 +234,24 @@ pub fn read_array(
 }
 
 /// Place of a contact.
-pub fn point(ns: u64, contact: &Contact) -> Vec<u8> {
+pub fn point(ns: u64, place_mm: [f32; 3]) -> Vec<u8> {
     let mut message = Message::new();
     header(&mut message, ns, FRAME);
-    contact.place_mm.iter().for_each(|&place| message.f64(metres(place)));
+    place_mm.iter().for_each(|&place| message.f64(metres(place)));
     message.into_bytes()
 }
 
-/// Contact at a place.
-pub fn read_point(bytes: &[u8]) -> Option<Contact> {
+/// Place of a contact in mm.
+pub fn read_point(bytes: &[u8]) -> Option<[f32; 3]> {
     let mut bytes = Bytes::message(bytes)?;
     skip_header(&mut bytes)?;
-    let place_mm = [mm(bytes.f64()?), mm(bytes.f64()?), mm(bytes.f64()?)];
-    Some(Contact { place_mm, force_n: None })
+    Some([mm(bytes.f64()?), mm(bytes.f64()?), mm(bytes.f64()?)])
 }
 
-/// Force `force_n` of a contact, and its torque about the origin of the sensor's frame.
-pub fn wrench(ns: u64, place_mm: [f32; 3], force_n: [f32; 3]) -> Vec<u8> {
-    let ([x, y, z], [fx, fy, fz]) = (place_mm.map(metres), force_n.map(f64::from));
+/// Force `force_n` on the sensor, and the torque of a contact about the origin of the sensor's frame; 0 without a contact.
+pub fn wrench(ns: u64, place_mm: Option<[f32; 3]>, force_n: [f32; 3]) -> Vec<u8> {
+    let ([x, y, z], [fx, fy, fz]) =
+        (place_mm.unwrap_or_default().map(metres), force_n.map(f64::from));
     let torque = [y * fz - z * fy, z * fx - x * fz, x * fy - y * fx];
     let mut message = Message::new();
     header(&mut message, ns, FRAME);
@@ -300,7 +299,7 @@ mod tests {
 
     #[test]
     fn a_wrench_turns_about_the_origin() {
-        let bytes = wrench(0, [1000.0, 0.0, 0.0], [0.0, 0.0, 2.0]);
+        let bytes = wrench(0, Some([1000.0, 0.0, 0.0]), [0.0, 0.0, 2.0]);
         let mut read = Bytes::message(&bytes).unwrap();
         skip_header(&mut read).unwrap();
         let values: Vec<f64> = std::iter::from_fn(|| read.f64()).collect();

@@ -234,8 +234,8 @@ fn add(
                 frame.deviations = Some(deviations);
             }
         }
-        Topic::Contact => frame.contact = Some(message::read_point(data)?),
-        Topic::Wrench => frame.contact.as_mut()?.force_n = Some(message::read_wrench(data)?),
+        Topic::Contact => frame.contact_mm = Some(message::read_point(data)?),
+        Topic::Wrench => frame.force_n = Some(message::read_wrench(data)?),
         Topic::Diagnostics => {
             let mut status = None;
             read_diagnostics(data, &mut status)?;

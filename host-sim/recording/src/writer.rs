@@ -128,11 +128,11 @@ impl Writer {
                 put(array, message::array(layout, &self.free_outputs, outputs, deviations));
             }
         }
-        if let Some(contact) = &frame.contact {
-            put(Topic::Contact, message::point(ns, contact));
-            if let Some(force_n) = contact.force_n {
-                put(Topic::Wrench, message::wrench(ns, contact.place_mm, force_n));
-            }
+        if let Some(place_mm) = frame.contact_mm {
+            put(Topic::Contact, message::point(ns, place_mm));
+        }
+        if let Some(force_n) = frame.force_n {
+            put(Topic::Wrench, message::wrench(ns, frame.contact_mm, force_n));
         }
         if let Some(status) = &frame.status {
             let is_said = self

@@ -3,11 +3,11 @@
 use taxel_core::health::Limits;
 use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Estimate, Frame, RowStatus};
-use taxel_data::columns;
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::ModelBlob;
 
 use super::moment::Moment;
+use super::sheet;
 use crate::{Error, Result};
 
 /// Most rows of a model, as many as the blob format has numbers for.
@@ -31,11 +31,11 @@ impl<'b> FrameByFrame<'b> {
         let decoder =
             Decoder::new(blob.parse()).map_err(|cause| Error::failed(cause.to_string()))?;
         let metadata = decoder.metadata();
-        let in_ohm = metadata.input_names.iter().all(columns::is_judged_in_ohm);
+        let limits = sheet::limits(metadata.input_names.iter());
         let readings = metadata.input_names.iter().count();
         let reciprocals = if metadata.relative_inputs { vec![f32::NAN; readings] } else { vec![] };
         let scratch = vec![0.0; decoder.scratch_floats()];
-        Ok(Self { limits: in_ohm.then_some(Limits::USUAL), reciprocals, scratch, decoder })
+        Ok(Self { decoder, limits, reciprocals, scratch })
     }
 
     /// What is to be said while the model divides readings by a baseline, and has none yet.

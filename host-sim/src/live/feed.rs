@@ -43,6 +43,11 @@ pub trait Feed {
         None
     }
 
+    /// Frames of the untouched sensor, if it can have some.
+    fn at_rest(&self) -> &[Vec<f32>] {
+        &[]
+    }
+
     /// Takes the readings of the untouched sensor. The error says why not.
     fn zero(&mut self, _readings: &[f32]) -> std::result::Result<(), String> {
         Ok(())

@@ -321,7 +321,7 @@ impl Feed for ReplayFeed<'_> {
             let pick =
                 |truth: Vec<f32>| Some(columns.as_ref()?.iter().map(|it| truth[*it]).collect());
             moment.frame.truth = moment.frame.truth.take().and_then(pick);
-            moment.frame.contact = None;
+            (moment.frame.contact_mm, moment.frame.force_n) = (None, None);
             decoder.decode(&mut moment)?;
         } else {
             let status = moment.frame.status.as_ref();

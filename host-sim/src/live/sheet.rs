@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use taxel_core::blob::{Columns, Metadata};
 use taxel_core::checksum::CRC_32;
+use taxel_core::health::Limits;
 use taxel_data::columns;
 use taxel_recording::{Column, Electrode, Layout};
 use taxel_rig::device::DeviceIdentity;
@@ -139,6 +140,11 @@ fn deformation_of(name: &str) -> Option<([usize; 2], usize)> {
 /// Names of columns, in their order.
 pub fn names(columns: &[Column]) -> impl Iterator<Item = &str> {
     columns.iter().map(|column| column.name.as_str())
+}
+
+/// Limits of readings that are believed, if all of them are in Ω.
+pub fn limits<'n>(mut names: impl Iterator<Item = &'n str>) -> Option<Limits> {
+    names.all(columns::is_judged_in_ohm).then_some(Limits::USUAL)
 }
 
 /// Whether the model of this `metadata` takes the readings of `layout`, by their names.

@@ -18,6 +18,7 @@ use super::decode::FrameByFrame;
 use super::feed::{About, Feed, Next};
 use super::moment::Moment;
 use super::sheet;
+use super::touch::mean;
 use crate::experiment::Experiment;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
@@ -83,6 +84,7 @@ pub struct SimulationFeed<'b> {
     /// Time at which the next frame is due.
     due: Instant,
     has_truth: bool,
+    at_rest: Vec<Vec<f32>>,
     baseline: Vec<f32>,
     judge: Judge,
 }
@@ -111,7 +113,9 @@ impl<'b> SimulationFeed<'b> {
         }
         let has_truth = metadata.output_names.iter().eq(scene.world.output_names());
         let at_rest = Synthesis::new(&scene.world).untouched().frames(Stream::Test, AT_REST);
-        let baseline: Vec<f32> = at_rest.inputs.means().iter().map(|mean| *mean as f32).collect();
+        let floats = |line: &[f64]| line.iter().map(|reading| *reading as f32).collect();
+        let at_rest: Vec<Vec<f32>> = at_rest.inputs.lines().map(floats).collect();
+        let baseline = mean(&at_rest);
         let (sender, trajectories) = mpsc::sync_channel(1);
         let (world, rate) = (scene.world.clone(), frame_rate);
         spawn("synthesis", move || synthesise(&world, rate, &sender))?;
@@ -136,6 +140,7 @@ impl<'b> SimulationFeed<'b> {
             due: Instant::now(),
             has_truth,
             judge: Judge::start(&scene.world, has_truth, in_mm)?,
+            at_rest,
             baseline,
         };
         feed.decoder.set_baseline(&feed.baseline);
@@ -235,6 +240,10 @@ impl Feed for SimulationFeed<'_> {
 
     fn baseline(&self) -> Option<Vec<f32>> {
         Some(self.baseline.clone())
+    }
+
+    fn at_rest(&self) -> &[Vec<f32>] {
+        &self.at_rest
     }
 
     fn zero(&mut self, readings: &[f32]) -> std::result::Result<(), String> {

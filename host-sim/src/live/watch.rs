@@ -7,14 +7,15 @@ use std::time::{Duration, Instant};
 
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::ModelBlob;
-use taxel_recording::{Layout, Status as RecordedStatus};
+use taxel_recording::{Frame, Layout, Status as RecordedStatus};
 use taxel_view::message::{self as page, Channel, Flag, Kind, State, Status};
 use taxel_view::{Action, Command, View};
 
-use super::contact::contact;
+use super::contact::{force_n, place_mm};
 use super::feed::{Feed, Next};
 use super::moment::Moment;
 use super::recorder::{Beside, Recorder};
+use super::touch::{Touch, mean, unsteady};
 use super::wires::Wires;
 use crate::{Error, Result};
 
@@ -23,16 +24,11 @@ const LOOK: Duration = Duration::from_millis(10);
 /// Time from one status to the next, and from one judgement of the wires to the next.
 const STATUS: Duration = Duration::from_millis(500);
 /// Frames whose mean becomes the baseline.
-const ZERO_FRAMES: usize = 30;
+const ZERO_FRAMES: usize = 24;
 /// Time over which rates and errors are told.
 const WINDOW: Duration = Duration::from_secs(10);
 /// End of the colour scale in mm.
 const SCALE_MM: f32 = 1.0;
-/// Least change of a reading, relative to itself, that tells of a touch.
-const LEAST_CHANGE: f32 = 0.05;
-/// Standard deviations that a difference of two means may have by chance, of hundreds of readings.
-const MOST_DEVIATIONS: f32 = 5.0;
-
 /// What goes with what is watched.
 pub struct Watched<'b> {
     /// Model that decodes, if it is known: for its fill, and for recordings.
@@ -79,7 +75,11 @@ struct Watch<'w, 'b> {
     trouble: Option<(State, String)>,
     /// What happened to the last recording by itself.
     remark: Option<String>,
+    /// Detector of touch, as soon as frames at rest are known.
+    touch: Option<Touch>,
     is_touched: bool,
+    /// Whether a contact has ended, and no force of 0 was told yet.
+    owes_zero: bool,
     /// Times of the last frames, whether each was decoded, and squares of errors with their number.
     past: VecDeque<(Instant, bool, f64, usize)>,
     told: Instant,
@@ -89,6 +89,8 @@ impl<'w, 'b> Watch<'w, 'b> {
     fn new(feed: &'w mut dyn Feed, view: &'w View, watched: &'w Watched<'b>) -> Self {
         let wires = Wires::new(&feed.layout().readings);
         let baseline = feed.baseline();
+        let at_rest = feed.at_rest();
+        let touch = (!at_rest.is_empty()).then(|| Touch::new(feed.layout(), at_rest, None));
         Self {
             feed,
             view,
@@ -100,7 +102,9 @@ impl<'w, 'b> Watch<'w, 'b> {
             is_paused: false,
             trouble: None,
             remark: None,
+            touch,
             is_touched: false,
+            owes_zero: false,
             past: VecDeque::new(),
             told: Instant::now(),
         }
@@ -122,6 +126,7 @@ impl<'w, 'b> Watch<'w, 'b> {
                 }
                 self.wires = Wires::new(&self.feed.layout().readings);
                 (self.baseline, self.newest) = (self.feed.baseline(), VecDeque::new());
+                (self.touch, self.is_touched) = (None, false);
                 self.show_layout();
             }
         }
@@ -176,22 +181,20 @@ impl<'w, 'b> Watch<'w, 'b> {
     }
 
     fn take(&mut self, mut moment: Moment) {
-        let layout = self.feed.layout();
-        let frame = &mut moment.frame;
+        self.find_contact(&mut moment.frame);
+        let frame = &moment.frame;
         let outputs = frame.outputs.as_deref();
-        let deviations = frame.deviations.as_deref();
-        let found =
-            outputs.and_then(|outputs| contact(layout, outputs, deviations, self.is_touched));
-        frame.contact = frame.contact.or(found);
-        self.is_touched = frame.contact.is_some();
-        let (square, count) = errors(layout, outputs, frame.truth.as_deref());
+        let (square, count) = errors(self.feed.layout(), outputs, frame.truth.as_deref());
         let has_outputs = outputs.is_some();
         if self.newest.len() == ZERO_FRAMES {
             self.newest.pop_front();
         }
         self.newest.push_back(frame.readings.clone());
-        if self.baseline.is_none() && self.newest.len() == ZERO_FRAMES && !self.is_touched {
-            self.set_baseline();
+        if self.touch.is_none()
+            && self.newest.len() == ZERO_FRAMES
+            && unsteady(self.feed.layout(), self.newest.make_contiguous()).is_none()
+        {
+            self.set_rest(self.baseline.clone());
         }
         self.wires.push(&moment.frame.readings);
         self.past.push_back((moment.heard, has_outputs, square, count));
@@ -202,6 +205,22 @@ impl<'w, 'b> Watch<'w, 'b> {
         self.trouble = None;
         if !self.is_paused {
             self.view.show(for_page(&moment));
+        }
+    }
+
+    /// Tells whether something touches, where, and with which force, unless the frame does.
+    fn find_contact(&mut self, frame: &mut Frame) {
+        let layout = self.feed.layout();
+        let outputs = frame.outputs.as_deref();
+        let was_touched = self.is_touched;
+        let touch = self.touch.as_mut();
+        self.is_touched = touch.is_some_and(|touch| touch.update(&frame.readings, frame.time_us));
+        let touching = outputs.filter(|_| self.is_touched);
+        frame.contact_mm = frame.contact_mm.or_else(|| place_mm(layout, touching?));
+        frame.force_n = frame.force_n.or_else(|| force_n(layout, outputs?));
+        self.owes_zero = (self.owes_zero || was_touched) && !self.is_touched;
+        if let Some(force_n) = frame.force_n.as_mut().filter(|_| self.owes_zero) {
+            (*force_n, self.owes_zero) = ([0.0; 3], false);
         }
     }
 
@@ -244,59 +263,35 @@ impl<'w, 'b> Watch<'w, 'b> {
     }
 
     fn zero(&mut self) -> std::result::Result<String, String> {
-        if self.is_touched {
-            return Err("not zeroed: something touches the sensor; lift it, and try again".into());
-        }
         if self.newest.len() < ZERO_FRAMES {
             return Err(format!(
                 "not zeroed: it takes {ZERO_FRAMES} frames, and there are {}",
                 self.newest.len()
             ));
         }
-        if let Some((reading, share)) = self.drift() {
+        let frames = self.newest.make_contiguous();
+        let touching = self.touch.as_ref().and_then(|touch| touch.look(frames));
+        let why =
+            if touching.is_some() { "something touches the sensor" } else { "it is not steady" };
+        if let Some(seen) = touching.or_else(|| unsteady(self.feed.layout(), frames)) {
             return Err(format!(
-                "not zeroed: {} changes by {:.0} %; let go of the sensor, and try again",
-                self.feed.layout().readings[reading].name,
-                share * 100.0
+                "not zeroed: {why}. S is {:.1} times the level at which a touch begins, and {} changes most; let go of the \
+                 sensor, and try again",
+                seen.times,
+                self.feed.layout().readings[seen.reading].name
             ));
         }
-        self.set_baseline();
+        self.set_rest(None);
         let baseline = self.baseline.as_deref().unwrap_or_default();
         self.feed.zero(baseline)?;
         Ok(format!("zeroed by the mean of {ZERO_FRAMES} frames"))
     }
 
-    /// The reading that drifts most over the newest frames, and by what share of it: between the means of the two halves, beyond
-    /// what noise would do. `None` if all stand still.
-    fn drift(&self) -> Option<(usize, f32)> {
-        let half = self.newest.len() / 2;
-        let mean = |from: usize, reading: usize| {
-            self.newest.range(from..from + half).map(|frame| frame[reading]).sum::<f32>()
-                / half as f32
-        };
-        let change = |reading: usize| {
-            let means = [mean(0, reading), mean(half, reading)];
-            let squares = [0, half].into_iter().zip(means).map(|(from, mean)| {
-                self.newest
-                    .range(from..from + half)
-                    .map(|it| (it[reading] - mean).powi(2))
-                    .sum::<f32>()
-            });
-            let deviation = (squares.sum::<f32>() / (2 * half) as f32 * 2.0 / half as f32).sqrt();
-            let (step, size) = ((means[1] - means[0]).abs(), 0.5 * (means[0] + means[1]).abs());
-            (reading, if step > MOST_DEVIATIONS * deviation { step / size } else { 0.0 })
-        };
-        let changes = (0..self.newest.front()?.len()).map(change).filter(|it| it.1.is_finite());
-        changes.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|it| it.1 > LEAST_CHANGE)
-    }
-
-    fn set_baseline(&mut self) {
-        let count = self.newest.front().map_or(0, Vec::len);
-        let mean = |reading: usize| {
-            let values = self.newest.iter().map(|frame| frame[reading]).filter(|it| it.is_finite());
-            values.clone().sum::<f32>() / values.count() as f32
-        };
-        let baseline: Vec<f32> = (0..count).map(mean).collect();
+    /// Takes the newest frames for those at rest, with their mean for the baseline unless one is `known`.
+    fn set_rest(&mut self, known: Option<Vec<f32>>) {
+        let frames = self.newest.make_contiguous();
+        self.touch = Some(Touch::new(self.feed.layout(), frames, known.as_deref()));
+        let baseline = known.unwrap_or_else(|| mean(frames));
         self.view.set_baseline(baseline.clone());
         self.baseline = Some(baseline);
     }
@@ -429,11 +424,88 @@ fn for_page(moment: &Moment) -> page::Frame {
             .then(|| moment.row_status.iter().map(|status| row_flag(*status)).collect()),
         novelty: moment.novelty,
         flags: flags.into_iter().filter(|(flag, _)| moment.has(*flag)).map(|it| it.1).collect(),
-        contact: frame.contact.map(|contact| page::Contact {
-            x_mm: contact.place_mm[0],
-            y_mm: contact.place_mm[1],
-            depth_mm: contact.place_mm[2],
-            force_n: contact.force_n.map(|force| force[2]),
+        contact: frame.contact_mm.map(|[x_mm, y_mm, depth_mm]| page::Contact {
+            x_mm,
+            y_mm,
+            depth_mm,
         }),
+        force_n: frame.force_n.map(|force| force[2]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use taxel_view::message::Can;
+
+    use super::super::feed::About;
+    use super::super::sheet;
+    use super::*;
+
+    /// A feed that brings nothing by itself.
+    struct Silent(Layout);
+
+    impl Feed for Silent {
+        fn layout(&self) -> &Layout {
+            &self.0
+        }
+
+        fn about(&self) -> About {
+            let can = Can { zero: true, record: true, seek: false };
+            About { kind: Kind::Device, source: String::new(), can, duration_s: None }
+        }
+
+        fn next(&mut self, _within: Duration) -> Result<Next> {
+            Ok(Next::Nothing)
+        }
+    }
+
+    #[test]
+    fn force_is_always_there_place_while_touched_and_zero_once() {
+        let columns = |names: &[&str]| sheet::columns(names.iter().copied(), []);
+        let outputs = columns(&["x_mm", "y_mm", "force_N"]);
+        let mut feed = Silent(sheet::layout("", columns(&["a", "b", "c"]), outputs, None));
+        let (view, _commands) = View::start(0, None).unwrap();
+        let watched = Watched { blob: None, scene: None };
+        let mut watch = Watch::new(&mut feed, &view, &watched);
+        let mut number = 0_u32;
+        let mut show = |watch: &mut Watch<'_, '_>, change: f32, force_n: Option<f32>| {
+            number += 1;
+            let noise = if number.is_multiple_of(2) { 0.01 } else { -0.01 };
+            let mut frame = Frame {
+                time_us: u64::from(number) * 10_000,
+                readings: vec![5.0 + noise, 7.0 - noise + change, 9.0],
+                outputs: force_n.map(|force_n| vec![1.0, 2.0, force_n]),
+                ..Frame::default()
+            };
+            watch.find_contact(&mut frame);
+            let found = (frame.contact_mm.is_some(), frame.force_n.map(|it| it[2]));
+            watch.take(Moment::new(frame));
+            found
+        };
+        // A load that grows is no rest.
+        for step in 0..40_u8 {
+            assert_eq!(show(&mut watch, f32::from(step) * 0.05, Some(0.5)), (false, Some(0.5)));
+        }
+        assert!(watch.zero().unwrap_err().contains("not steady"));
+        for _ in 0..ZERO_FRAMES {
+            show(&mut watch, 0.0, Some(0.1));
+        }
+        assert!((watch.baseline.as_ref().unwrap()[1] - 7.0).abs() < 1e-3);
+        assert_eq!(show(&mut watch, 0.0, Some(0.1)), (false, Some(0.1)));
+        assert_eq!(show(&mut watch, 0.5, Some(2.0)), (true, Some(2.0)));
+        let refused = watch.zero().unwrap_err();
+        assert!(
+            refused.contains("something touches") && refused.contains("and b changes"),
+            "{refused}"
+        );
+        // The frame in which the contact ends has no force: the next one tells 0.
+        for (force_n, told_n) in [(None, None), (Some(0.1), Some(0.0)), (Some(0.1), Some(0.1))] {
+            assert_eq!(show(&mut watch, 0.0, force_n), (false, told_n));
+        }
+        assert!(watch.zero().unwrap_err().contains("something touches"));
+        for _ in 0..ZERO_FRAMES {
+            show(&mut watch, 0.0, Some(0.1));
+        }
+        assert_eq!(watch.zero().unwrap(), "zeroed by the mean of 24 frames");
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use taxel_core::health::Limits;
-use taxel_data::{Table, columns};
+use taxel_data::Table;
 use taxel_learn::faults::{Found, Kind, Place, WINDOW, diagnose};
 use taxel_recording::{Column, Health, Layout};
 use taxel_view::message as page;
@@ -23,8 +23,7 @@ impl Wires {
     /// Wires of readings in these columns.
     pub fn new(readings: &[Column]) -> Self {
         let names: Vec<String> = sheet::names(readings).map(String::from).collect();
-        let in_ohm = names.iter().all(|name| columns::is_judged_in_ohm(name));
-        let limits = in_ohm.then_some(Limits::USUAL);
+        let limits = sheet::limits(sheet::names(readings));
         Self { frames: VecDeque::new(), names, limits, faults: vec![] }
     }
 

@@ -107,8 +107,8 @@ function takeFrame(next) {
   if (frame.flags.includes("novel")) flags.set("nats", frame.novelty);
   const time = frame.time_us / 1e6, at = frame.contact;
   contact.wasSeen ||= !!at;
-  contact.hasForce ||= Number.isFinite(at?.force_n);
-  contact.trace.push(time, [at ? at.force_n : contact.hasForce ? 0 : null, at ? at.depth_mm : 0]);
+  contact.hasForce ||= Number.isFinite(frame.force_n);
+  contact.trace.push(time, [frame.force_n, at ? at.depth_mm : 0]);
   values.trace.push(time, values.outputs.slice(0, MOST_CHARTS).map((index) => frame.outputs[index]));
   requestDraw();
 }
@@ -237,7 +237,7 @@ function showNumbers() {
   const at = frame.contact, { hasForce, trace } = contact;
   byId("contact_card").hidden = !shape && !contact.wasSeen;
   byId("force_item").hidden = !hasForce;
-  setText("force", digits(at?.force_n ?? 0));
+  setText("force", digits(frame.force_n ?? 0));
   setText("depth", digits(at?.depth_mm ?? 0));
   setText("place", at ? `${digits(at.x_mm, 1)}, ${digits(at.y_mm, 1)}` : "–");
   const peak = trace.most(hasForce ? 1 : 2);

@@ -102,8 +102,11 @@ pub struct Frame {
     pub novelty: Option<f32>,
     /// What is to be said of the frame.
     pub flags: Vec<Flag>,
-    /// Contact, if there is one.
+    /// Contact, while something touches.
     pub contact: Option<Contact>,
+    /// Force in N along z, if it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<f32>,
 }
 
 /// What is to be said of a frame or of a row of it.
@@ -129,8 +132,6 @@ pub struct Contact {
     pub y_mm: f32,
     /// Largest Δz in mm.
     pub depth_mm: f32,
-    /// Force in N of the whole contact, if stiffness is known.
-    pub force_n: Option<f32>,
 }
 
 /// How the source is: event `status`.

@@ -4,9 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use taxel_recording::{
-    Column, Contact, Electrode, Extras, Frame, Health, Layout, Replace, Status, Writer,
-};
+use taxel_recording::{Column, Electrode, Extras, Frame, Health, Layout, Replace, Status, Writer};
 use tempfile::TempDir;
 
 /// Folder that goes with its test.
@@ -114,10 +112,8 @@ pub fn frames(layout: &Layout, count: usize) -> Vec<Frame> {
             outputs: has_outputs.then(|| values(outputs)),
             deviations: (has_outputs && number % 3 == 1).then(|| values(outputs)),
             truth: number.is_multiple_of(2).then(|| values(outputs)),
-            contact: number.is_multiple_of(3).then(|| Contact {
-                place_mm: [place[0], place[1], place[2]],
-                force_n: number.is_multiple_of(2).then_some([0.1, -0.0, 1e-40]),
-            }),
+            contact_mm: number.is_multiple_of(3).then(|| [place[0], place[1], place[2]]),
+            force_n: number.is_multiple_of(2).then_some([0.1, -0.0, 1e-40]),
             status: Some(status.clone()),
         }
     };
