@@ -1,4 +1,4 @@
-// Model "press" in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: 2223cec3.
+// Model "press" in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: cfdbbd9b.
 // To decode a frame, with this file as module `model`:
 //     let outputs: [[f32; 6]; 1] = model::decode(&readings); // readings: [[f32; 18]; 1]
 // Readings, row after row, with their units:

@@ -75,9 +75,10 @@ impl Capacity {
         self.rows * self.outputs
     }
 
-    /// Number of floats of working space for decoding: more than the readings of a frame and of two rows.
+    /// Number of floats of working space for decoding: more than the readings of a frame and of two rows, and enough for
+    /// shape and strength of a touch, and the same scaled.
     pub const fn scratch_floats(self) -> usize {
-        2 * self.rows * self.columns
+        2 * (self.rows * self.columns + 1)
     }
 
     /// Bytes of the longest message: a report of all readings, or of all outputs and their deviations, the circuit's

@@ -55,7 +55,7 @@ pub trait Slot {
 /// ```
 /// use taxel_firmware::store::blob_in_slot;
 /// # let mut slot = [0xFF_u8; 64];
-/// # slot[..5].copy_from_slice(b"TAXL\x02");
+/// # slot[..5].copy_from_slice(b"TAXL\x03");
 /// # slot[5..9].copy_from_slice(&40_u32.to_le_bytes());
 /// // A slot of 64 bytes, whose blob says that it is 40 bytes long.
 /// assert_eq!(blob_in_slot(&slot).len(), 40);

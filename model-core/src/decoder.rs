@@ -1,15 +1,19 @@
 //! Decoding a frame to an estimate: the one entry point for a device.
 
-use crate::blob::{DecodeError, Metadata, Model, ModelShape, NetworkSection};
+use crate::blob::{DecodeError, Front, MOST_FRONTS, Metadata, Model, ModelShape, NetworkSection};
+#[cfg(cortex_m4f)]
+use crate::cortex_m4;
 use crate::estimate::{Estimate, RowStatus};
-use crate::projection::Projection;
 use crate::rbf::{Format, NetworkError, fixed16};
 use crate::relative::relative;
+use crate::touch::{Kind, Touch};
 
 /// RAM in bytes that a [`Decoder`] for at most so many `rows` takes on a 32-bit target, for any K: slices into the
 /// blob. The emulator's application compares it with the compiler's own figure.
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
-    160 + 28 * rows
+    let of_rows = 24 * rows;
+    let of_frames = 52 * MOST_FRONTS;
+    144 + if of_rows > of_frames { of_rows } else { of_frames }
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
@@ -80,8 +84,17 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 #[derive(Debug, Clone, Copy)]
 pub struct Decoder<'a, const ROWS: usize> {
     model: Model<'a>,
+    networks: Networks<'a, ROWS>,
+}
+
+/// Networks of a model.
+#[derive(Debug, Clone, Copy)]
+#[expect(clippy::large_enum_variant, reason = "of eight rows, both are about as large")]
+enum Networks<'a, const ROWS: usize> {
     /// Each row's network; rows beyond the model's have none.
-    row_networks: [RowNetwork<'a>; ROWS],
+    OfRows([RowNetwork<'a>; ROWS]),
+    /// Networks that see whole frames, and what stands before each.
+    OfFrames([(Front<'a>, RowNetwork<'a>); MOST_FRONTS]),
 }
 
 /// The network of a row, made ready when the model is loaded.
@@ -123,16 +136,30 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         if rows > ROWS {
             return Err(DecodeError::TooManyRows { most: ROWS, found: rows });
         }
-        let mut row_networks = [RowNetwork::NONE; ROWS];
-        for (row, place) in row_networks.iter_mut().take(rows).enumerate() {
-            // A sound model has a network for every row.
-            let networks = model.network_count() as u8;
-            let unknown = DecodeError::UnknownNetwork { row, network: networks, networks };
-            let section = model.section_of_row(row).ok_or(unknown)?;
-            *place = RowNetwork::new(section, model.network_shape())
-                .map_err(|cause| DecodeError::Network { index: row as u8, cause })?;
+        let mut networks = if model.whole_frames() {
+            Networks::OfFrames([(Front::NONE, RowNetwork::NONE); MOST_FRONTS])
+        } else {
+            Networks::OfRows([RowNetwork::NONE; ROWS])
+        };
+        for (index, part) in model.parts().enumerate() {
+            let network = RowNetwork::new(part.section, part.shape)
+                .map_err(|cause| DecodeError::Network { index: index as u8, cause })?;
+            match &mut networks {
+                Networks::OfFrames(places) => {
+                    if let Some(place) = places.get_mut(index) {
+                        *place = (part.front, network);
+                    }
+                }
+                Networks::OfRows(places) => {
+                    for (row, place) in places.iter_mut().enumerate() {
+                        if model.network_of_row(row) == Some(index) {
+                            *place = network;
+                        }
+                    }
+                }
+            }
         }
-        Ok(Self { model, row_networks })
+        Ok(Self { model, networks })
     }
 
     /// The model that the decoder was made of.
@@ -163,12 +190,12 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
     /// Decodes one frame to an estimate in the units of the model's outputs.
     ///
     /// `scratch` is working space of [`scratch_floats`](Self::scratch_floats). A row with a missing reading is marked
-    /// in the estimate's status and does not affect the other rows. Behind a [`Projection`] one missing reading marks
-    /// all rows.
+    /// in the estimate's status and does not affect the other rows. Where networks see whole frames, one missing reading
+    /// marks all rows.
     ///
     /// Returns whether an input of a decoded row was clamped, because it lies far beyond the training range: more than
     /// an eighth of it below, or an eighth or more above. Such outputs are guesses; on many frames they mean a model of
-    /// another sensor. Behind a [`Projection`] the inputs are its features.
+    /// another sensor. Behind a [projection](crate::projection) the inputs are its features.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a slice does not have the model's length, or `scratch` is too short; the estimate
@@ -180,7 +207,11 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         scratch: &mut [f32],
         estimate: &mut Estimate<'_>,
     ) -> Result<bool, NetworkError> {
-        decode(&self.model, &self.row_networks, frame, scratch, estimate)
+        let (of_rows, of_frames) = match &self.networks {
+            Networks::OfRows(networks) => (&networks[..], &[][..]),
+            Networks::OfFrames(networks) => (&[][..], &networks[..]),
+        };
+        decode(&self.model, of_rows, of_frames, frame, scratch, estimate)
     }
 
     /// Replaces missing readings of a frame (Ω) by those expected of the others, if the model can
@@ -243,6 +274,7 @@ fn assess(
 fn decode(
     model: &Model<'_>,
     networks: &[RowNetwork<'_>],
+    of_frames: &[(Front<'_>, RowNetwork<'_>)],
     frame: Frame<'_>,
     scratch: &mut [f32],
     estimate: &mut Estimate<'_>,
@@ -252,27 +284,28 @@ fn decode(
     check_length("frame", frame.readings_ohm, rows.wrapping_mul(inputs))?;
     check_length("outputs of the estimate", estimate.outputs, rows.wrapping_mul(outputs))?;
     check_length("status of the estimate", estimate.status, rows)?;
-    // No more than that: what is left behind the parts below is readings relative to the baseline, to the last one.
-    let (expected, found) = (decoding_floats(model), scratch.len());
-    let too_short = NetworkError::Length { what: "scratch", expected, found };
-    let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
     let relative = model.metadata().relative_inputs;
-    let projection = model.projection();
-    let Some(projection) = projection else {
-        let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
-        let rows = Rows { networks, inputs, outputs };
-        return Ok(if relative {
-            rows.decode::<true>(frame, [scaled, more], estimate)
-        } else {
-            rows.decode::<false>(frame, [scaled, more], estimate)
-        });
+    let of_frames = of_frames.get(..model.network_count()).unwrap_or_default();
+    // No more than that: what is left behind the parts below is readings relative to the baseline, to the last one.
+    let expected = if model.whole_frames() {
+        let fronts = of_frames.iter().map(|(front, _)| *front);
+        floats_of_fronts(fronts, frame.readings_ohm.len(), relative)
+    } else {
+        floats_of_rows(inputs, relative)
     };
-    let of_network = projection.features();
-    let (scaled, more) = scratch.split_at_mut_checked(of_network).ok_or(too_short)?;
-    let (features, ratios) = more.split_at_mut_checked(of_network).ok_or(too_short)?;
-    let Some(network) = networks.first() else { return Ok(false) };
-    let array = Array { projection, network, relative };
-    Ok(array.decode(frame, [scaled, features, ratios], estimate))
+    let too_short = NetworkError::Length { what: "scratch", expected, found: scratch.len() };
+    let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
+    if model.whole_frames() {
+        let frames = WholeFrames { networks: of_frames, relative, rows };
+        return Ok(frames.decode(frame, scratch, estimate));
+    }
+    let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
+    let rows = Rows { networks, inputs, outputs };
+    Ok(if relative {
+        rows.decode::<true>(frame, [scaled, more], estimate)
+    } else {
+        rows.decode::<false>(frame, [scaled, more], estimate)
+    })
 }
 
 /// Networks that decode a frame row by row.
@@ -336,12 +369,35 @@ pub fn scratch_floats(model: &Model<'_>) -> usize {
 fn decoding_floats(model: &Model<'_>) -> usize {
     let ModelShape { rows, inputs, .. } = model.shape();
     let relative = model.metadata().relative_inputs;
-    let (scaled, given) = match model.projection() {
-        Some(projection) => (projection.features().saturating_mul(2), inputs.saturating_mul(rows)),
-        None => (inputs, inputs),
+    if model.whole_frames() {
+        floats_of_fronts(model.fronts(), inputs.saturating_mul(rows), relative)
+    } else {
+        floats_of_rows(inputs, relative)
+    }
+}
+
+/// Number of floats for decoding rows: scaled inputs, and readings relative to the baseline.
+fn floats_of_rows(inputs: usize, relative: bool) -> usize {
+    inputs.saturating_add(if relative { inputs } else { 0 })
+}
+
+/// Number of floats for decoding whole frames of so many `readings` behind these fronts.
+fn floats_of_fronts<'a>(
+    fronts: impl Iterator<Item = Front<'a>>,
+    readings: usize,
+    relative: bool,
+) -> usize {
+    let of_front = |front: Front<'_>| {
+        let seen = match front.touch {
+            Some(touch) => touch.inputs(),
+            None if relative => readings,
+            None => 0,
+        };
+        let features = front.projection.map_or(0, |it| it.features());
+        // Scaled inputs, features, and shape and strength or readings relative to the baseline.
+        front.inputs(readings).saturating_add(features).saturating_add(seen)
     };
-    let extra = if relative { given } else { 0 };
-    scaled.saturating_add(extra)
+    fronts.map(of_front).max().unwrap_or(0)
 }
 
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {
@@ -385,42 +441,136 @@ impl<const ROWS: usize> Decoder<'_, ROWS> {
     }
 }
 
-/// One network for all rows, behind a projection.
-struct Array<'d, 'a> {
-    projection: Projection<'a>,
-    network: &'d RowNetwork<'a>,
+/// Networks that see whole frames, each of which gives some of the outputs.
+struct WholeFrames<'d, 'a> {
+    networks: &'d [(Front<'a>, RowNetwork<'a>)],
     /// Whether inputs are relative to the baseline.
     relative: bool,
+    /// Number of rows, which share a status.
+    rows: usize,
 }
 
-impl Array<'_, '_> {
-    /// Decodes all rows of a frame at once; `scratch` is room for scaled inputs, for features and for readings relative
-    /// to the baseline. Returns whether a feature was clamped, and the rows
-    /// were decoded. Not inlined, because decoding by rows would need its stack too.
+impl WholeFrames<'_, '_> {
+    /// Decodes a frame. Returns whether an input of a network was clamped, and the frame was decoded. Not inlined, because
+    /// decoding by rows would need its stack too.
     #[inline(never)]
-    fn decode(
+    fn decode(&self, frame: Frame<'_>, scratch: &mut [f32], estimate: &mut Estimate<'_>) -> bool {
+        let mut rest = &mut *estimate.outputs;
+        let (mut any_clamped, mut worst) = (false, RowStatus::Decoded);
+        for (front, network) in self.networks {
+            let Some((outputs, more)) = rest.split_at_mut_checked(front.outputs) else { break };
+            rest = more;
+            let (clamped, status) = self.decode_part(front, network, frame, scratch, outputs);
+            any_clamped |= clamped;
+            if severity(status) > severity(worst) {
+                worst = status;
+            }
+        }
+        let statuses = estimate.status.get_mut(..self.rows).unwrap_or_default();
+        statuses.fill(worst);
+        any_clamped && severity(worst) < severity(RowStatus::Overflow)
+    }
+
+    /// Decodes the `outputs` of one network, and returns whether an input was clamped, and their status.
+    #[inline(always)]
+    fn decode_part(
         &self,
+        front: &Front<'_>,
+        network: &RowNetwork<'_>,
         frame: Frame<'_>,
-        scratch: [&mut [f32]; 3],
-        estimate: &mut Estimate<'_>,
-    ) -> bool {
-        let [scaled, features, ratios] = scratch;
-        let readings = if self.relative {
-            divide(frame.readings_ohm, frame.reciprocals, ratios);
-            &*ratios
-        } else {
-            frame.readings_ohm
+        scratch: &mut [f32],
+        outputs: &mut [f32],
+    ) -> (bool, RowStatus) {
+        let readings = frame.readings_ohm;
+        let missing = (false, RowStatus::MissingReading);
+        let split = |scratch, at| <[f32]>::split_at_mut_checked(scratch, at);
+        let Some((scaled, more)) = split(scratch, front.inputs(readings.len())) else {
+            return missing;
         };
-        self.projection.project(readings, features);
+        let features = front.projection.map_or(0, |it| it.features());
+        let Some((features, seen)) = split(more, features) else { return missing };
+        let reciprocals = self.relative.then_some(frame.reciprocals);
+        let mut strength = 0.0;
+        let inputs = match (front.touch, reciprocals) {
+            (Some(touch), _) => {
+                let Some(seen) = seen.get_mut(..touch.inputs()) else { return missing };
+                strength = touch.apply(readings, reciprocals, seen);
+                &*seen
+            }
+            (None, Some(reciprocals)) => {
+                let Some(seen) = seen.get_mut(..readings.len()) else { return missing };
+                divide(readings, reciprocals, seen);
+                &*seen
+            }
+            (None, None) => readings,
+        };
+        let inputs = match front.projection {
+            Some(projection) => {
+                projection.project(inputs, features);
+                &*features
+            }
+            None => inputs,
+        };
         let mut status = RowStatus::Decoded;
-        let network = self.network;
-        let clamped = decode_inputs(network, features, scaled, estimate.outputs, &mut status);
+        let clamped = decode_inputs(network, inputs, scaled, outputs, &mut status);
         // Features can overflow although no reading is missing.
-        if status == RowStatus::MissingReading && all_finite(readings) {
+        if status == RowStatus::MissingReading && self.is_complete(frame) {
             status = RowStatus::Overflow;
         }
-        estimate.status.fill(status);
-        clamped
+        if let (Some(touch), RowStatus::Decoded) = (front.touch, status) {
+            status = with_strength(touch, strength, network, outputs);
+        }
+        (clamped, status)
+    }
+
+    /// Whether no reading of a frame is missing, nor its baseline.
+    #[cold]
+    fn is_complete(&self, frame: Frame<'_>) -> bool {
+        let has_baseline = frame.reciprocals.len() == frame.readings_ohm.len();
+        all_finite(frame.readings_ohm)
+            && (!self.relative || has_baseline && all_finite(frame.reciprocals))
+    }
+}
+
+/// Makes `outputs` of a network what they are at this `strength`: amounts are multiplied by it, and places are NaN without a
+/// touch. Returns their status.
+#[inline(always)]
+fn with_strength(
+    touch: Touch<'_>,
+    strength: f32,
+    network: &RowNetwork<'_>,
+    outputs: &mut [f32],
+) -> RowStatus {
+    match touch.kind() {
+        Kind::Place if strength < touch.strengths().least => {
+            outputs.fill(f32::NAN);
+            RowStatus::NoTouch
+        }
+        Kind::Place => RowStatus::Decoded,
+        Kind::Amount => {
+            let most = touch.strengths().most;
+            let strength = if strength > most { most } else { strength };
+            #[cfg(cortex_m4f)]
+            cortex_m4::multiply(outputs, strength);
+            #[cfg(not(cortex_m4f))]
+            outputs.iter_mut().for_each(|output| *output *= strength);
+            // Those in `fixed16` stay finite: that is checked when a model is loaded.
+            if matches!(network, RowNetwork::F32(_)) && !all_finite(outputs) {
+                outputs.fill(f32::NAN);
+                return RowStatus::Overflow;
+            }
+            RowStatus::Decoded
+        }
+    }
+}
+
+/// Order of the statuses of networks that see the same frame: that of the frame is the highest.
+fn severity(status: RowStatus) -> u8 {
+    match status {
+        RowStatus::Decoded => 0,
+        RowStatus::NoTouch => 1,
+        RowStatus::Overflow => 2,
+        RowStatus::MissingReading => 3,
     }
 }
 

@@ -5,11 +5,14 @@
 pub enum RowStatus {
     /// The row was decoded; its outputs are valid.
     Decoded,
-    /// At least one reading of the row was missing (not a finite number); the outputs are NaN. Behind a
-    /// projection, a missing reading of any row counts.
+    /// At least one reading of the row was missing (not a finite number); the outputs are NaN. For networks that see
+    /// whole frames, a missing reading of any row counts.
     MissingReading,
-    /// Readings or weights were so large that an output overflowed; the outputs are NaN.
+    /// Readings or weights were so large that an output overflowed; the outputs are NaN. Of several networks that see
+    /// whole frames, those outputs are whose network overflowed.
     Overflow,
+    /// Nothing touches the sensor enough to have a place: outputs that are places are NaN, all others are valid.
+    NoTouch,
 }
 
 /// Where a decoder writes the outputs of a frame, and the status of each row.

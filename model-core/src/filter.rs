@@ -133,7 +133,8 @@ fn advance(tracks: &mut [Track], step: Option<Step>, lead_s: f32, estimate: &mut
     for ((tracks, outputs), status) in rows.zip(estimate.status.iter()) {
         let of_row = tracks.iter_mut().zip(outputs);
         match status {
-            RowStatus::Decoded => of_row.for_each(|(track, output)| {
+            // An output that is a place without a touch is NaN: its filter starts anew.
+            RowStatus::Decoded | RowStatus::NoTouch => of_row.for_each(|(track, output)| {
                 let [mut value, mut rate] = *track;
                 if let Some(Step { dt_s, alpha, beta_per_s }) = step {
                     value += rate * dt_s;

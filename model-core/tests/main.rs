@@ -12,4 +12,5 @@ mod extremes;
 mod fill;
 mod fixed;
 mod projection;
+mod touch;
 mod sections;

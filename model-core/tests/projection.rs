@@ -2,7 +2,7 @@
 
 use crate::common::{NEAR_CENTRE, PROJECTION, network};
 use taxel_core::blob::{
-    DecodeError, EncodeError, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
+    EncodeError, Front, Metadata, Model, ModelParts, ModelShape, encode, encoded_length_bound,
 };
 use taxel_core::projection::Projection;
 use taxel_core::rbf::Network;
@@ -16,7 +16,9 @@ fn encoded<'b>(
 ) -> Result<&'b [u8], EncodeError> {
     let projection = Projection::new(4, 2, block).ok();
     let metadata = Metadata::unnamed(ModelShape { rows: 2, inputs: 2, outputs: 1 });
-    let parts = ModelParts { projection, ..ModelParts::new(networks, row_network, metadata) };
+    let outputs = networks[0].shape().outputs;
+    let fronts = vec![Front { outputs, touch: None, projection }; networks.len()];
+    let parts = ModelParts { fronts: &fronts, ..ModelParts::new(networks, row_network, metadata) };
     assert!(encoded_length_bound(&parts) <= buffer.len());
     encode(&parts, buffer)
 }
@@ -31,7 +33,7 @@ fn the_features_of_a_whole_frame_decide_all_rows() {
     let blob = array(&mut buffer.0);
     let (decoder, model) = (Decoder::<2>::load(blob).unwrap(), Model::decode(blob).unwrap());
     let mut features = [0.0; 2];
-    model.projection().unwrap().project(&NEAR_CENTRE, &mut features);
+    model.fronts().next().unwrap().projection.unwrap().project(&NEAR_CENTRE, &mut features);
     assert_eq!(features, [54.0, 5.0]);
     let activation = (-2.0_f32 * 0.0625).exp();
     let estimate = decoder.decode(&NEAR_CENTRE[..]).unwrap();
@@ -91,18 +93,14 @@ pub fn of_one_row(buffer: &mut [u8]) -> &[u8] {
     let projection = Projection::new(4, 2, &PROJECTION).ok();
     let metadata = Metadata::unnamed(ModelShape { rows: 1, inputs: 4, outputs: 3 });
     let networks = &[network(&[1.5, 3.0, 4.5])];
-    let parts = ModelParts { projection, ..ModelParts::new(networks, &[0], metadata) };
+    let fronts = &[Front { outputs: 3, touch: None, projection }];
+    let parts = ModelParts { fronts, ..ModelParts::new(networks, &[0], metadata) };
     encode(&parts, buffer).unwrap()
 }
 
 #[test]
-fn what_cannot_stand_behind_a_projection_is_refused() {
+fn outputs_that_do_not_divide_among_the_rows_are_refused() {
     let mut buffer = Aligned([0; 1024]);
-    let twice =
-        encoded(&PROJECTION, &[network(&[1.5, 3.0]), network(&[1.5, 3.0])], &[0, 1], &mut buffer.0);
-    let expected =
-        DecodeError::CountMismatch { what: "networks behind a projection", expected: 1, found: 2 };
-    assert_eq!(twice, Err(EncodeError::Refused(expected)));
     let uneven = encoded(&PROJECTION, &[network(&[1.5, 3.0, 4.5])], &[0, 0], &mut buffer.0);
     assert_eq!(uneven, Err(EncodeError::UnevenRows { outputs: 3, rows: 2 }));
 }

@@ -68,7 +68,7 @@ impl<const R: usize> Decoded<R> {
     fn decode(&mut self, decoder: &Decoder<'_, R>, frame: &Frame<R>) -> Option<()> {
         let outputs = self.outputs.as_flattened_mut();
         let mut estimate = Estimate { outputs, status: &mut self.status };
-        let mut scratch = [0.0; 2 * COLS];
+        let mut scratch = [0.0; 2 * COLS + ARRAY_ROWS * COLS + 1];
         let frame = frame.as_flattened().into();
         self.clamped = decoder.decode_into(frame, &mut scratch, &mut estimate).ok()?;
         Some(())
@@ -318,11 +318,12 @@ pub type Say<'s> = &'s mut dyn FnMut(Arguments<'_>);
 const KERNELS: [(Format, &str); 2] =
     [(Format::F32, "kernels-f32.bin"), (Format::Fixed16, "kernels-fixed16.bin")];
 
-/// The models of one network for all rows, behind a projection.
-const ARRAYS: [(&str, &str); 3] = [
+/// The models of networks that see whole frames.
+const ARRAYS: [(&str, &str); 4] = [
     ("f32", "array-f32.bin"),
     ("fixed16", "array-fixed16.bin"),
     ("fixed16 without tail", "array-fixed16-no-tail.bin"),
+    ("touch", "array-touch.bin"),
 ];
 
 /// Says what every number format decodes of [`MANY`] frames, what a clamp finds, and what frames

@@ -10,6 +10,7 @@ use cortex_m::peripheral::MPU;
 use taxel_core::projection::Projection;
 use taxel_core::rbf::{Network, Shape, fixed16};
 use taxel_core::scale::UNITS;
+use taxel_core::touch::{Kind, Touch};
 
 use crate::checks::Numbers;
 
@@ -219,6 +220,34 @@ pub fn projections(memory: &mut Memory) -> Option<Comparison> {
         projection.project_portably(given, expected.first(features));
         let same = same_bits(found.first(features), expected.first(features));
         comparison.add(same && found.is_untouched_from(features));
+    }
+    Some(comparison)
+}
+
+/// Compares the shapes of touches of 1 to 160 readings, to either side and to one, of readings as they are and relative to
+/// the baseline. `None` if one is unsound.
+#[inline(never)]
+pub fn touches(memory: &mut Memory) -> Option<Comparison> {
+    let mut numbers = Numbers::new(8);
+    let mut comparison = Comparison::default();
+    let sizes = (1..=MOST).flat_map(|readings| [-1.0, 0.0, 1.0].map(|side| (readings, side)));
+    for ((readings, side), relative) in sizes.flat_map(|it| [(it, false), (it, true)]) {
+        let block = last(memory.words, 5 + 2 * readings);
+        block.iter_mut().for_each(|word| *word = (1.0 + numbers.draw().abs()).to_bits());
+        *block.get_mut(4)? = f32::to_bits(side);
+        let touch = Touch::new(Kind::Amount, bytemuck::cast_slice(block)).ok()?;
+        let mut given = [[0.0; MOST]; 2];
+        given.as_flattened_mut().fill_with(|| 1.5 + 3.0 * numbers.draw());
+        let [given, reciprocals] = [given[0].get(..readings)?, given[1].get(..readings)?];
+        let reciprocals = relative.then_some(reciprocals);
+        let [_, found, expected] = &mut memory.buffers;
+        found.guard();
+        // The logarithm stands behind the shape.
+        let strength = touch.apply(given, reciprocals, found.first(readings + 1));
+        let shape = expected.first(readings);
+        let same = touch.shape_portably(given, reciprocals, shape).to_bits() == strength.to_bits()
+            && same_bits(found.first(readings), shape);
+        comparison.add(same && found.is_untouched_from(readings + 1));
     }
     Some(comparison)
 }

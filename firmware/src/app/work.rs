@@ -146,6 +146,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
                 RowStatus::Decoded => 0,
                 RowStatus::MissingReading => 1,
                 RowStatus::Overflow => 2,
+                RowStatus::NoTouch => 3,
             };
         }
         let row_status = codes.get(..self.rows).unwrap_or_default();

@@ -325,7 +325,7 @@ pub struct EstimateReport<'a> {
     pub start_us: u64,
     /// Sum of the flags below.
     pub flags: u8,
-    /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow.
+    /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow, 3 no touch.
     pub row_status: &'a [u8],
     /// `rows × outputs` numbers in the units of the model's outputs, NaN where a row is not decoded; none without a
     /// model. Filtered, if the configuration says so.

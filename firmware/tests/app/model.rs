@@ -89,9 +89,9 @@ fn a_model_that_does_not_fit_the_board_is_refused_and_not_put_in_force() {
         let input_names = if names.is_empty() { unnamed.input_names } else { Columns(names) };
         check(&blob_of_a_row(shape, Metadata { input_names, ..unnamed }), fault);
     }
-    // Working space has room for 12 numbers: two for each feature.
-    check(&blob_of_features(7), ModelFault::Shape);
-    let few = blob_of_features(6);
+    // Working space has room for 14 numbers: two for each feature.
+    check(&blob_of_features(8), ModelFault::Shape);
+    let few = blob_of_features(7);
     assert_eq!(Device::new(Flash::slots()).install(&few), Ok(confirmed(&few)));
 }
 

@@ -1,7 +1,7 @@
 //! The models in `testdata`: of the paper's shape, with parameters from a generator, in every format.
 
 use taxel_core::AlignedBytes;
-use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::blob::{Front, Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::confidence::Confidence;
 use taxel_core::projection::Projection;
 use taxel_core::rbf::fixed16::{
@@ -10,6 +10,7 @@ use taxel_core::rbf::fixed16::{
 use taxel_core::rbf::float32::Parameters;
 use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
 use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
+use taxel_core::touch::{Kind, Touch};
 
 use crate::checks::{ARRAY_CONFIDENCE, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_confidence};
 
@@ -20,7 +21,7 @@ const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8
 type Maker = fn() -> AlignedBytes;
 
 /// Every model: the name of its file, and the function that makes it.
-pub const FILES: [(&str, Maker); 7] = [
+pub const FILES: [(&str, Maker); 8] = [
     ("hand-made.bin", hand_made),
     ("kernels-f32.bin", || of_format(Format::F32)),
     ("kernels-fixed16.bin", || of_format(Format::Fixed16)),
@@ -28,6 +29,7 @@ pub const FILES: [(&str, Maker); 7] = [
     ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true)),
     ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false)),
     ("array-fixed16-confidence.bin", of_confidence),
+    ("array-touch.bin", of_touch),
 ];
 
 fn draw(numbers: &mut Numbers, count: usize, middle: f32, reach: f32) -> Vec<f32> {
@@ -41,7 +43,7 @@ fn hand_made() -> AlignedBytes {
     let mut words = || float32_words(&mut numbers, shape, true, 12);
     let (even, odd) = (words(), words());
     let networks = [&even, &odd].map(|words| network(Format::F32, shape, true, words));
-    encoded("hand-made", None, &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
+    encoded("hand-made", &[], &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
 }
 
 fn row_shape(centres: usize) -> Shape {
@@ -59,7 +61,7 @@ fn of_format(format: Format) -> AlignedBytes {
         let (centres, affine) = kinds[index];
         network(format, row_shape(centres), affine, &words[index])
     });
-    encoded(format.name(), None, &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
+    encoded(format.name(), &[], &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
 }
 
 /// A model of one network for all rows behind a projection, whose features vary about as much as single readings.
@@ -67,14 +69,48 @@ fn of_array(format: Format, centres: usize, affine: bool) -> AlignedBytes {
     let mut numbers = Numbers::new(6);
     let readings = ARRAY_ROWS * COLS;
     let parts = draw(&mut numbers, readings * COLS, 0.0, 0.35);
-    let sum = |feature: usize| parts.iter().skip(feature).step_by(COLS).sum::<f32>();
-    let start = (0..COLS).map(|feature| 60.0 - 60.0 * sum(feature));
-    let block: Vec<f32> = start.chain(parts.iter().copied()).collect();
-    let projection = Projection::new(readings, COLS, &block).unwrap();
+    let block = projection_block(60.0, &parts);
+    let projection = Projection::new(readings, COLS, &block).ok();
     let shape = Shape { inputs: COLS, centres, outputs: ARRAY_ROWS * OUTPUTS };
     let words = words_of(format, &mut numbers, shape, affine);
     let network = network(format, shape, affine, &words);
-    encoded(format.name(), Some(projection), &[network], &[0; ARRAY_ROWS])
+    let front = Front { outputs: shape.outputs, touch: None, projection };
+    encoded(format.name(), &[front], &[network], &[0; ARRAY_ROWS])
+}
+
+/// The block of a projection with these `parts`, whose features are 60 where all inputs are the `middle`.
+fn projection_block(middle: f32, parts: &[f32]) -> Vec<f32> {
+    let sum = |feature: usize| parts.iter().skip(feature).step_by(COLS).sum::<f32>();
+    let start = (0..COLS).map(|feature| 60.0 - middle * sum(feature));
+    start.chain(parts.iter().copied()).collect()
+}
+
+/// A model of places in `fixed16`, whose touches move readings up, and of amounts in `f32`, whose touches move them either
+/// way; both behind projections of the shape and the strength.
+fn of_touch() -> AlignedBytes {
+    let mut numbers = Numbers::new(9);
+    let readings = ARRAY_ROWS * COLS;
+    let [of_places, of_amounts] = [[10.0, 1.0], [3.0, 0.0]].map(|[least, side]| {
+        let levels = draw(&mut numbers, readings, 60.0, 1.0);
+        let thresholds = draw(&mut numbers, readings, 1.0, 0.5);
+        let pairs = levels.into_iter().zip(thresholds).flat_map(|(level, it)| [level, it]);
+        [1e-3, 0.5, least, 200.0, side].into_iter().chain(pairs).collect::<Vec<_>>()
+    });
+    let parts = draw(&mut numbers, (readings + 1) * COLS, 0.0, 10.0);
+    let block = projection_block(0.0, &parts);
+    let shape = row_shape(17);
+    let words = [Format::Fixed16, Format::F32].map(|it| words_of(it, &mut numbers, shape, true));
+    let networks = [
+        network(Format::Fixed16, shape, true, &words[0]),
+        network(Format::F32, shape, true, &words[1]),
+    ];
+    let kinds = [(Kind::Place, &of_places), (Kind::Amount, &of_amounts)];
+    let fronts = kinds.map(|(kind, touch)| Front {
+        outputs: OUTPUTS,
+        touch: Touch::new(kind, touch).ok(),
+        projection: Projection::new(readings + 1, COLS, &block).ok(),
+    });
+    encoded("touch", &fronts, &networks, &[0; ARRAY_ROWS])
 }
 
 fn words_of(format: Format, numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
@@ -172,21 +208,21 @@ fn of_confidence() -> AlignedBytes {
     let mut block = vec![0.0; ARRAY_CONFIDENCE.block_floats()];
     write_confidence(ARRAY_CONFIDENCE, &mut block, &mut numbers);
     let confidence = Confidence::new(ARRAY_CONFIDENCE, &block).unwrap();
-    encoded_with("confidence", None, &[network], &[0; ARRAY_ROWS], Some(confidence))
+    encoded_with("confidence", &[], &[network], &[0; ARRAY_ROWS], Some(confidence))
 }
 
 fn encoded(
     name: &str,
-    projection: Option<Projection<'_>>,
+    fronts: &[Front<'_>],
     networks: &[Network<'_>],
     row_network: &[u8],
 ) -> AlignedBytes {
-    encoded_with(name, projection, networks, row_network, None)
+    encoded_with(name, fronts, networks, row_network, None)
 }
 
 fn encoded_with(
     name: &str,
-    projection: Option<Projection<'_>>,
+    fronts: &[Front<'_>],
     networks: &[Network<'_>],
     row_network: &[u8],
     confidence: Option<Confidence<'_>>,
@@ -197,6 +233,6 @@ fn encoded_with(
     let (input_units, output_units) = (unnamed.input_names, unnamed.output_names);
     let metadata = Metadata { name, thickness_mm: 5.0, input_units, output_units, ..unnamed };
     let parts =
-        ModelParts { projection, confidence, ..ModelParts::new(networks, row_network, metadata) };
+        ModelParts { fronts, confidence, ..ModelParts::new(networks, row_network, metadata) };
     encode_to_vec(&parts).unwrap()
 }

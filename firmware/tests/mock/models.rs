@@ -1,7 +1,7 @@
 //! Small models for this sensor.
 
 use taxel_core::AlignedBytes;
-use taxel_core::blob::{Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::blob::{Front, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::confidence::{Confidence, Sizes};
 use taxel_core::projection::Projection;
 use taxel_core::rbf::{Network, Shape};
@@ -60,10 +60,9 @@ pub fn blob_of_features(features: usize) -> AlignedBytes {
     let metadata = Metadata::unnamed(ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS });
     with_network(Shape { inputs: features, centres: 1, outputs }, 0, |network| {
         let networks = [network];
-        let parts = ModelParts {
-            projection: Projection::new(readings, features, &projection).ok(),
-            ..ModelParts::new(&networks, &[0; ROWS], metadata)
-        };
+        let projection = Projection::new(readings, features, &projection).ok();
+        let fronts = &[Front { outputs, touch: None, projection }];
+        let parts = ModelParts { fronts, ..ModelParts::new(&networks, &[0; ROWS], metadata) };
         encode_to_vec(&parts).unwrap()
     })
 }

@@ -6,8 +6,10 @@ use crate::table::Table;
 
 /// Lines at rest whose mean is the baseline: as many as the untouched frames that a device averages.
 pub const BASELINE_LINES: usize = 100;
-/// Share of its largest values below which an output counts as zero.
+/// Share of its largest values within which an output counts as zero.
 const ZERO: f64 = 0.01;
+/// Share of its largest values up to which an output's zero may be off, as that of a scale is that was not tared.
+const MOST_OFFSET: f64 = 0.05;
 /// One of so many values may be an outlier, and three in any case: the largest one that counts is the next.
 const WRONG_ONE_IN: usize = 200;
 /// Fewest lines that are taken for the sensor at rest.
@@ -34,23 +36,16 @@ pub fn is_zero_at_rest(name: &str) -> bool {
 }
 
 /// Lines of `file` (from 0) at which nothing touches the sensor: all of the `columns`, which are zero there, have a value
-/// within 1 % of their largest, and so have the lines before and after. Without such neighbours in at least ten lines,
+/// within 1 % of their largest values about their zero, which may be off by 5 %, and so have the lines before and after. Without such neighbours in at least ten lines,
 /// lines count by themselves; fewer than ten are none.
 pub fn lines_at_rest(file: &DataFile, columns: &[usize]) -> Vec<usize> {
-    let largest = |column: &usize| {
-        let values = (0..file.lines()).map(|line| file.value(line, *column).abs());
-        let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
-        values.sort_unstable_by(f64::total_cmp);
-        let wrong = (values.len() / WRONG_ONE_IN).max(3);
-        values.len().checked_sub(1 + wrong).map_or(0.0, |at| values[at])
-    };
-    let bounds: Vec<f64> = columns.iter().map(|column| ZERO * largest(column)).collect();
-    if bounds.iter().all(|bound| *bound == 0.0) {
+    let zeros: Vec<[f64; 2]> = columns.iter().map(|column| zero_of(file, *column)).collect();
+    if zeros.iter().all(|[_, bound]| *bound == 0.0) {
         return vec![];
     }
     let is_zero = |line: usize| {
-        let mut values = columns.iter().zip(&bounds);
-        values.all(|(column, bound)| file.value(line, *column).abs() <= *bound)
+        let mut values = columns.iter().zip(&zeros);
+        values.all(|(column, [zero, bound])| (file.value(line, *column) - zero).abs() <= *bound)
     };
     let zero: Vec<bool> = (0..file.lines()).map(is_zero).collect();
     let at_rest = |reach: usize| -> Vec<usize> {
@@ -59,6 +54,24 @@ pub fn lines_at_rest(file: &DataFile, columns: &[usize]) -> Vec<usize> {
     };
     let found = [1, 0].into_iter().map(at_rest).find(|lines| lines.len() >= FEWEST);
     found.unwrap_or_default()
+}
+
+/// Zero of a column, and how far from it a value may be that counts as zero: the middle of the most values that lie so close
+/// together, among those near 0.
+fn zero_of(file: &DataFile, column: usize) -> [f64; 2] {
+    let values = (0..file.lines()).map(|line| file.value(line, column));
+    let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+    values.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let wrong = (values.len() / WRONG_ONE_IN).max(3);
+    let largest = values.len().checked_sub(1 + wrong).map_or(0.0, |at| values[at].abs());
+    let bound = ZERO * largest;
+    values.retain(|value| value.abs() <= MOST_OFFSET * largest);
+    values.sort_unstable_by(f64::total_cmp);
+    let within = |start: usize| values.partition_point(|it| *it <= values[start] + bound) - start;
+    let densest = (0..values.len()).max_by_key(|start| (within(*start), values.len() - start));
+    let zero = densest.map_or(0.0, |start| values[start + within(start) / 2]);
+    // A true zero is not moved by noise.
+    [if zero.abs() <= bound { 0.0 } else { zero }, bound]
 }
 
 /// Readings of the untouched sensor.
@@ -155,6 +168,9 @@ mod tests {
         // 20 is still near zero, and the line before a press is left out.
         let of_press = at_rest.iter().filter(|line| (40..80).contains(*line)).copied();
         assert_eq!(of_press.collect::<Vec<_>>(), (41..60).collect::<Vec<_>>());
+        // A scale that was not tared.
+        let off: Vec<[f64; 2]> = (0..200).map(|line| [1.0, force(line) + 0.2]).collect();
+        assert_eq!(lines_at_rest(&file(&off), &[1]), at_rest);
         // Lines in random order count by themselves.
         let force = |line: usize| if line.is_multiple_of(3) { 0.0 } else { 5.0 };
         let shuffled = file(&(0..90).map(|line| [1.0, force(line)]).collect::<Vec<_>>());

@@ -111,6 +111,17 @@ impl Table {
         sums.iter().zip(self.ranges()).map(clamped).collect()
     }
 
+    /// Median of each column; NaN is skipped, and that of a column without a value.
+    pub fn medians(&self) -> Vec<f64> {
+        let of_column = |column: usize| {
+            let values = self.lines().map(|line| line[column]).filter(|value| !value.is_nan());
+            let mut values: Vec<f64> = values.collect();
+            values.sort_unstable_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        (0..self.names.len()).map(of_column).collect()
+    }
+
     /// One line with the mean of each column, which [`means`](Self::means) gives.
     #[must_use]
     pub fn mean_line(&self) -> Self {

@@ -11,7 +11,7 @@ use taxel_core::blob::NoiseKind as BlobNoiseKind;
 use taxel_core::rbf::Format;
 use taxel_data::digest::digest;
 use taxel_data::{AtRest, BadValue, Dataset, Progress, Stream, input, require};
-use taxel_learn::train::{FreshFrames, Solver, check_spread};
+use taxel_learn::train::{Features, FreshFrames, Kinds, Solver, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
 use taxel_simulate::noise::{Noise, NoiseKind};
@@ -91,6 +91,8 @@ pub struct Training {
     pub each_row: bool,
     /// Number of features that the network of all rows sees.
     pub features: Option<usize>,
+    /// How features are made of readings; `None` for what frames that are held out tell.
+    pub features_kind: Option<Features>,
     /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
     #[serde(default)]
     pub relative_inputs: bool,
@@ -249,6 +251,7 @@ impl Experiment {
             or_f32: t.format.is_none(),
             each_row: t.each_row,
             features: t.features,
+            kinds: t.features_kind.map(Kinds::all),
             ..usual
         };
         match t.method {

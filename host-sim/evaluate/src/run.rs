@@ -6,6 +6,7 @@ use taxel_data::{Dataset, Progress, Stream, Table};
 use taxel_learn::cost::{Cost, Design};
 use taxel_learn::decoders::mean::Mean;
 use taxel_learn::decoders::{BASELINES, centroid};
+use taxel_learn::kinds::Choice;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::{Decoder, ModelBlob, Options, PreparedModel};
 use taxel_simulate::Synthesis;
@@ -46,6 +47,8 @@ pub struct RunResult {
     /// What only measurements have; `None` for a scene.
     pub data: Option<DataSummary>,
     pub model: ModelSummary,
+    /// Features that training chose, and what it tried; `None` where there was no choice.
+    pub features: Option<Choice>,
     /// What the model asks of a device.
     pub device_cost: DeviceCost,
     /// Errors on the test frames, by decoder and group.
@@ -144,6 +147,9 @@ pub fn run(
     let (training, test) = subject.sets(None);
     progress.step();
 
+    let mut options = *options;
+    let features = training.choose(&mut options, progress);
+    let options = &options;
     let blob = training.blob(options, progress)?;
     let network = blob.prepare().of_inputs();
 
@@ -195,6 +201,7 @@ pub fn run(
         scene: None,
         data: None,
         model: model_summary(&training, (options, test.frames()), &network, &blob),
+        features,
         device_cost: DeviceCost::new(&blob),
         decoders,
         limit,
@@ -287,8 +294,8 @@ fn model_summary(
         training_frames: training.frames.frames(),
         test_frames,
         networks: model.networks().count(),
-        inputs_per_network: model.projection().map_or(shape.inputs, |it| it.features()),
-        projected_readings: model.projection().map_or(0, |_| shape.rows * shape.inputs),
+        inputs_per_network: model.networks().next().map_or(0, |it| it.shape().inputs),
+        projected_readings: if model.whole_frames() { shape.rows * shape.inputs } else { 0 },
         relative_inputs: model.metadata().relative_inputs,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
         outputs_per_network: model.networks().next().map_or(0, |n| n.shape().outputs),

@@ -6,6 +6,7 @@ use taxel_data::{BadValue, Dataset, Progress, Stream};
 use taxel_learn::confidence::{self, Density, HeldOut};
 use taxel_learn::decoders::LINEAR;
 use taxel_learn::fill;
+use taxel_learn::kinds::{self, Choice};
 use taxel_learn::select;
 use taxel_learn::train::{Examples, Refinement, resolution, train, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
@@ -75,6 +76,22 @@ impl<'s> TrainingSet<'s> {
         })
     }
 
+    /// Chooses features for `options` that do not say which, and tells what was tried; `None` where there is no choice.
+    pub fn choose(&self, options: &mut Options, progress: &dyn Progress) -> Option<Choice> {
+        let choice = kinds::choose(&self.frames, &self.folds(), options, progress);
+        options.kinds = choice.as_ref().map(|it| it.kinds).or(options.kinds);
+        choice
+    }
+
+    /// Fold of each frame. Those of a scene are of successive ones, since frames of a moving touch resemble each other.
+    fn folds(&self) -> Cow<'_, [usize]> {
+        const FOLDS: usize = 5;
+        match &self.more {
+            More::Scene(_) => Cow::Owned(select::block_folds(self.frames.frames(), FOLDS)),
+            More::Folds(fold_of) => Cow::Borrowed(*fold_of),
+        }
+    }
+
     /// Trains with `options` and packs the model, with a confidence and a fill if these are asked for.
     pub fn blob(&self, options: &Options, progress: &dyn Progress) -> Result<ModelBlob> {
         if self.confidence {
@@ -84,6 +101,9 @@ impl<'s> TrainingSet<'s> {
         if self.fill {
             fill::check(&self.frames)?;
         }
+        let mut options = *options;
+        let _ = self.choose(&mut options, progress);
+        let options = &options;
         let trained = self.train(options, progress)?;
         let origin = Origin { linear_rmse: self.linear_rmse(), ..self.origin.clone() };
         let blob = pack(&trained, &self.frames, &origin)?;
@@ -101,13 +121,7 @@ impl<'s> TrainingSet<'s> {
     /// RMSE of the best linear decoder for each output, one fold after the other held out. Empty with a single fold, or if an
     /// output has no value.
     pub(crate) fn linear_rmse(&self) -> Vec<f64> {
-        /// Folds of a scene's frames: successive ones, since those of a moving touch resemble each other.
-        const FOLDS: usize = 5;
-        let frames = self.frames.frames();
-        let fold_of = match &self.more {
-            More::Scene(_) => Cow::Owned(select::block_folds(frames, FOLDS)),
-            More::Folds(fold_of) => Cow::Borrowed(*fold_of),
-        };
+        let fold_of = self.folds();
         if fold_of.iter().all(|fold| *fold == 0) {
             return vec![];
         }

@@ -6,7 +6,7 @@
 mod design;
 mod memory;
 
-pub use design::{Design, NetworkDesign};
+pub use design::{Design, FrontDesign, NetworkDesign, Sides};
 pub use memory::DecoderRam;
 use serde::Serialize;
 use taxel_core::blob::ModelShape;
@@ -60,6 +60,12 @@ const REGISTERS: usize = 18;
 const STREAMED: f64 = 0.7;
 const STREAMED_OUTPUT: f64 = 2.5;
 
+/// Instructions of a touch: of a frame, of each reading to one side and to both, and of each output.
+const TOUCH: f64 = 150.0;
+const TOUCHED: [f64; 2] = [8.4, 10.7];
+const TOUCHED_OUTPUT: f64 = 1.5;
+/// Instructions of each reading that a touch takes relative to the baseline.
+const TOUCHED_RELATIVE: f64 = 1.2;
 /// Instructions of a projection for each reading, and for each product of a reading and a feature.
 const PROJECTED: [f64; 2] = [4.0, 2.05];
 /// Instructions of each reading that is made relative to the baseline.
@@ -67,6 +73,28 @@ const RELATIVE: f64 = 12.0;
 /// Instructions of the filter in time: of a frame, of each row and of each output; and cycles of one.
 const FILTER: [f64; 3] = [163.0, 24.0, 26.0];
 const FILTER_CYCLES: f64 = 1.7;
+
+/// Instructions of what stands before a `network`, for so many `readings` of a frame.
+fn before(network: &NetworkDesign, readings: f64, relative: bool) -> f64 {
+    let Some(front) = network.front else { return 0.0 };
+    let of_reading = match (front.touch, relative) {
+        (Some(sides), relative) => {
+            TOUCHED[usize::from(sides == Sides::Both)]
+                + if relative { TOUCHED_RELATIVE } else { 0.0 }
+        }
+        (None, true) => RELATIVE,
+        (None, false) => 0.0,
+    };
+    let of_outputs = TOUCHED_OUTPUT * network.shape.outputs as f64;
+    let (touch, seen) =
+        front.touch.map_or((0.0, readings), |_| (TOUCH + of_outputs, readings + 1.0));
+    let [reading, product] = PROJECTED;
+    let projection = match network.features() {
+        0 => 0.0,
+        features => seen * (reading + product * features as f64),
+    };
+    touch + of_reading * readings + projection
+}
 
 /// Cost of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -82,16 +110,12 @@ impl Cost {
     #[must_use]
     pub fn of_frame(design: &Design) -> Self {
         let readings = (design.shape.rows * design.shape.inputs) as f64;
-        let relative = if design.relative_inputs { RELATIVE * readings } else { 0.0 };
-        let [reading, product] = PROJECTED;
-        let mut instructions = match design.features() {
-            0 => relative,
-            features => relative + readings * (reading + product * features as f64),
-        };
+        let rows_relative = design.relative_inputs && !design.whole_frames();
+        let mut instructions = if rows_relative { RELATIVE * readings } else { 0.0 };
         let mut cycles = 0.0;
-        for (place, NetworkDesign { format, shape, affine_tail, .. }) in
-            design.row_networks().enumerate()
-        {
+        for (place, network) in design.row_networks().enumerate() {
+            let NetworkDesign { format, shape, affine_tail, .. } = network;
+            instructions += before(network, readings, design.relative_inputs);
             let [inputs, centres, outputs] =
                 [shape.inputs, shape.centres, shape.outputs].map(|count| count as f64);
             let streamed = shape.inputs.saturating_sub(REGISTERS) as f64;

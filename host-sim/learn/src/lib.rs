@@ -20,6 +20,7 @@ pub mod train;
 pub mod packing;
 pub mod export;
 pub mod prepared;
+pub mod kinds;
 pub mod filtered;
 pub mod confidence;
 pub mod fill;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use taxel_core::AlignedBytes;
 use taxel_core::blob::{
-    self, Columns, DecodeError, Floats, Metadata, Model, ModelParts, NoiseKind,
+    self, Columns, DecodeError, Floats, Front, Metadata, Model, ModelParts, NoiseKind,
 };
 use taxel_core::confidence::Confidence;
 use taxel_core::fill::Fill;
@@ -12,8 +12,7 @@ use taxel_core::rbf::Network;
 use taxel_data::{Dataset, columns, input};
 
 use crate::error::{Error, Result, not_packed};
-use crate::infer::infer;
-use crate::train::{self, FittedNetwork, Trained};
+use crate::train::{FittedFront, FittedNetwork, Trained};
 
 /// Largest blob in bytes that is read: 256 MB.
 pub const MOST_BLOB_BYTES: u64 = 256_000_000;
@@ -60,11 +59,11 @@ impl Origin {
 /// [`Error`] for a model beyond what the format holds.
 pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<ModelBlob> {
     let views: Vec<Network<'_>> = trained.networks.iter().map(FittedNetwork::network).collect();
-    let projection =
-        trained.projection.as_ref().map(|parameters| train::projection::view(parameters, dataset));
-    let row_network: Vec<u8> = match projection {
-        Some(_) => vec![0; dataset.rows],
-        None => (0..dataset.rows).map(|row| row as u8).collect(),
+    let fronts: Vec<Front<'_>> = trained.fronts.iter().map(FittedFront::view).collect();
+    let row_network: Vec<u8> = if fronts.is_empty() {
+        (0..dataset.rows).map(|row| row as u8).collect()
+    } else {
+        vec![0; dataset.rows]
     };
     let lines = |names: &[String]| names.join("\n");
     let units = |names: &[String]| {
@@ -77,13 +76,10 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
     } else {
         units(&dataset.inputs.names)
     };
-    let training_rmse = floats(&match projection {
-        Some(it) => training_rmse(&views, &train::projection::apply(it, dataset)),
-        None => training_rmse(&views, dataset),
-    });
     let [full_scale, linear_rmse] = [&origin.full_scale, &origin.linear_rmse].map(|it| floats(it));
+    let unknown = floats(&vec![0.0; dataset.outputs.names.len()]);
     let parts = ModelParts {
-        projection,
+        fronts: &fronts,
         confidence: None,
         linear_rmse: Floats(&linear_rmse),
         fill: None,
@@ -102,11 +98,15 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
             input_units: Columns(&input_units),
             output_names: Columns(&output_names),
             output_units: Columns(&output_units),
-            training_rmse: Floats(&training_rmse),
+            training_rmse: Floats(&unknown),
             full_scale: Floats(&full_scale),
         },
     };
-    Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(not_packed)? })
+    let packed = |parts| blob::encode_to_vec(parts).map(|bytes| ModelBlob { bytes });
+    // The packed model tells its own errors.
+    let rmse = floats(&training_rmse(&packed(&parts).map_err(not_packed)?, dataset));
+    let metadata = Metadata { training_rmse: Floats(&rmse), ..parts.metadata };
+    packed(&ModelParts { metadata, ..parts }).map_err(not_packed)
 }
 
 /// Values as a blob holds them.
@@ -114,16 +114,20 @@ fn floats(values: &[f64]) -> Vec<u8> {
     values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect()
 }
 
-fn training_rmse(networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
-    let mut rmse = Vec::new();
-    for (row, network) in networks.iter().enumerate() {
-        let table = dataset.row_table(row);
-        let predicted = infer(network, &table.inputs.values);
-        let squares = table.outputs.squared_errors(&predicted);
-        let counts = table.outputs.counts();
-        rmse.extend(squares.iter().zip(counts).map(|(s, count)| (s / count as f64).sqrt()));
+/// RMSE of each output on the frames that it was trained on; NaN for an output without a value.
+fn training_rmse(blob: &ModelBlob, dataset: &Dataset) -> Vec<f64> {
+    let decoded = blob.prepare().of_inputs().decode_lines(&dataset.inputs.values);
+    let outputs = dataset.outputs.names.len();
+    let mut sums = vec![(0.0, 0.0); outputs];
+    for (truth, decoded) in dataset.outputs.lines().zip(decoded.chunks_exact(outputs)) {
+        for ((sum, count), (truth, decoded)) in sums.iter_mut().zip(truth.iter().zip(decoded)) {
+            let square = (truth - decoded).powi(2);
+            if !square.is_nan() {
+                (*sum, *count) = (*sum + square, *count + 1.0);
+            }
+        }
     }
-    rmse
+    sums.into_iter().map(|(sum, count)| (sum / f64::max(count, 1.0)).sqrt()).collect()
 }
 
 /// Blob of a model, checked from end to end.
@@ -210,7 +214,7 @@ pub(crate) fn rebuild(
     let of_row = |row| model.network_of_row(row).map(|network| network as u8);
     let row_network: Vec<u8> = (0..model.shape().rows).filter_map(of_row).collect();
     let parts = ModelParts {
-        projection: model.projection(),
+        fronts: &model.fronts().collect::<Vec<_>>(),
         confidence,
         linear_rmse: model.linear_rmse(),
         fill,

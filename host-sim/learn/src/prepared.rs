@@ -3,17 +3,18 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use taxel_core::blob::Model;
+use taxel_core::blob::{Front, Model};
 use taxel_core::rbf::Network;
 use taxel_core::scale::CLAMP;
+use taxel_core::touch::Kind;
 use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
-use crate::infer::{assess_lines, infer_in_turn, is_missing};
+use crate::infer::{assess_lines, infer, infer_in_turn, is_missing};
 use crate::packing::ModelBlob;
 use crate::parallel;
 use crate::relative::{ratios, reciprocals};
-use crate::train::projection;
+use crate::train::{projection, touch};
 
 /// Frames that a thread fills at a time.
 const FRAMES_AT_ONCE: usize = 64;
@@ -25,8 +26,10 @@ const FRAMES_AT_ONCE: usize = 64;
 #[derive(Debug, Clone)]
 pub struct PreparedModel<'b> {
     model: Model<'b>,
-    /// Network of each row-wire, or the one network behind a projection.
+    /// Network of each row-wire, or those that see whole frames.
     networks: Arc<[Network<'b>]>,
+    /// What stands before each network that sees whole frames.
+    fronts: Arc<[Front<'b>]>,
     output_names: Vec<String>,
     /// One over the baseline of each reading; `None` for a model that takes what it is given.
     reciprocals: Option<Vec<f32>>,
@@ -42,14 +45,16 @@ impl ModelBlob {
         let model = self.parse();
         let networks: Vec<Network<'_>> = model.networks().collect();
         let of_row = |row| networks[model.network_of_row(row).expect("a row of the model")];
-        let in_turn: Vec<Network<'_>> = match model.projection() {
-            Some(_) => networks.clone(),
-            None => (0..model.shape().rows).map(of_row).collect(),
+        let in_turn: Vec<Network<'_>> = if model.whole_frames() {
+            networks.clone()
+        } else {
+            (0..model.shape().rows).map(of_row).collect()
         };
         let output_names = model.metadata().output_names.iter().map(String::from).collect();
         let readings = model.shape().rows * model.shape().inputs;
         PreparedModel {
             networks: in_turn.into(),
+            fronts: model.fronts().collect(),
             output_names,
             reciprocals: model.metadata().relative_inputs.then(|| vec![f32::NAN; readings]),
             model,
@@ -112,25 +117,63 @@ impl<'b> PreparedModel<'b> {
     }
 
     /// Decodes `readings` (`frames × inputs`) to outputs (`frames × outputs`), line after line.
+    ///
+    /// Outputs that are places are NaN in frames without a touch, as outputs of a frame with a missing reading are.
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
-        infer_in_turn(&self.networks, &self.inputs_of_networks(readings))
+        let inputs = self.model_inputs(readings);
+        if self.fronts.is_empty() {
+            return infer_in_turn(&self.networks, &inputs);
+        }
+        let decoded = self.fronts.iter().zip(self.networks.iter());
+        let decoded = decoded.map(|(front, network)| Self::decode_part(front, network, &inputs));
+        let mut parts: Vec<_> = decoded.collect();
+        if let [one] = &mut parts[..] {
+            return std::mem::take(one);
+        }
+        let frames = inputs.len() / self.inputs();
+        let of_frame = |frame: usize| {
+            let parts = self.fronts.iter().zip(&parts);
+            parts.flat_map(move |(front, part)| &part[frame * front.outputs..][..front.outputs])
+        };
+        (0..frames).flat_map(of_frame).copied().collect()
     }
 
-    /// Network of each row-wire, or the one network behind a projection.
+    /// Outputs of one network that sees whole frames, for `inputs` of the model.
+    fn decode_part(front: &Front<'_>, network: &Network<'_>, inputs: &[f64]) -> Vec<f64> {
+        let (given, strengths) = inputs_of(front, inputs);
+        let mut outputs = infer(network, &given);
+        let Some(touch) = front.touch else { return outputs };
+        for (line, strength) in outputs.chunks_exact_mut(front.outputs).zip(strengths) {
+            match touch.kind() {
+                Kind::Place if strength < touch.strengths().least => line.fill(f64::NAN),
+                Kind::Place => {}
+                Kind::Amount => {
+                    let strength = strength.min(touch.strengths().most);
+                    // As a device multiplies them, and does not tell those that overflow.
+                    let scaled = |output: &f64| f64::from(*output as f32 * strength);
+                    line.iter_mut().for_each(|output| *output = scaled(output));
+                    if line.iter().any(|output| !output.is_finite()) {
+                        line.fill(f64::NAN);
+                    }
+                }
+            }
+        }
+        outputs
+    }
+
+    /// Network of each row-wire, or those that see whole frames.
     pub(crate) fn networks(&self) -> &[Network<'b>] {
         &self.networks
     }
 
-    /// Inputs of the networks in turn: those of the model, or features of them.
-    pub(crate) fn inputs_of_networks<'r>(&self, readings: &'r [f64]) -> Cow<'r, [f64]> {
+    /// Inputs of each network in turn, for `readings` (`frames × inputs`): numbers of a whole table a network that sees
+    /// whole frames, else of all networks in one.
+    pub(crate) fn inputs_of_networks(&self, readings: &[f64]) -> Vec<Vec<f64>> {
         let inputs = self.model_inputs(readings);
-        match self.model.projection() {
-            Some(projection) => {
-                let features = projection.features();
-                Cow::Owned(projection::features(projection, features, self.inputs(), &inputs))
-            }
-            None => inputs,
+        if self.fronts.is_empty() {
+            return vec![inputs.into_owned()];
         }
+        self.fronts.iter().map(|front| inputs_of(front, &inputs).0.into_owned()).collect()
     }
 
     /// Standard deviations of the outputs for `readings` (`frames × inputs`), `frames × outputs` in their units, and the
@@ -175,46 +218,70 @@ impl<'b> PreparedModel<'b> {
     /// # Panics
     /// If `readings` are not whole frames of the model.
     pub fn clamps(&self, readings: &[f64]) -> Vec<bool> {
-        let inputs = self.networks[0].shape().inputs;
-        let of_networks = self.inputs_of_networks(readings);
-        let step = inputs * self.networks.len();
-        parallel::pieces(&of_networks, step.max(1), &|frame| {
-            let mut rows = self.networks.iter().zip(frame.chunks_exact(inputs));
-            rows.any(|(network, row)| {
-                let row: Vec<f32> = row.iter().map(|input| *input as f32).collect();
-                let decoded = row.iter().all(|input| input.is_finite());
-                decoded && network.clamps(&row, &mut vec![0.0; inputs]) == Ok(true)
-            })
-        })
+        let clamps = |network: &Network<'_>, row: &[f64]| {
+            let row: Vec<f32> = row.iter().map(|input| *input as f32).collect();
+            let decoded = row.iter().all(|input| input.is_finite());
+            decoded && network.clamps(&row, &mut vec![0.0; row.len()]) == Ok(true)
+        };
+        let mut any = vec![false; readings.len() / self.inputs()];
+        for (networks, inputs) in self.tables(readings) {
+            let width = networks[0].shape().inputs;
+            let of_frames = parallel::pieces(&inputs, width * networks.len(), &|frame| {
+                networks.iter().zip(frame.chunks_exact(width)).any(|(it, row)| clamps(it, row))
+            });
+            any.iter_mut().zip(of_frames).for_each(|(any, clamped)| *any |= clamped);
+        }
+        any
     }
 
-    /// Share of the inputs for `readings`, or of their features behind a projection, that inference clamps: those
-    /// outside the training range by more than an eighth of it.
+    /// Share of the inputs for `readings`, or of what networks that see whole frames are given of them, that inference
+    /// clamps: those outside the training range by more than an eighth of it.
     ///
     /// # Panics
     /// If `readings` are not whole frames of the model.
     pub fn share_out_of_range(&self, readings: &[f64]) -> f64 {
-        let inputs = self.networks[0].shape().inputs;
-        let readings = self.inputs_of_networks(readings);
-        let range = |network: &Network<'_>, input| network.training_range(input).map(f64::from);
-        let ranges: Vec<[f64; 2]> = self
-            .networks
-            .iter()
-            .flat_map(|network| (0..inputs).map(move |input| range(network, input)))
-            .collect();
         let (mut clamped, mut present) = (0_usize, 0_usize);
-        for line in readings.chunks_exact(ranges.len().max(1)) {
-            for (reading, [lowest, highest]) in line.iter().zip(&ranges) {
-                if !is_missing(*reading) {
-                    let place = (reading - lowest) / (highest - lowest);
-                    let inside = (f64::from(CLAMP[0])..=f64::from(CLAMP[1])).contains(&place);
-                    present += 1;
-                    clamped += usize::from(highest > lowest && !inside);
+        for (networks, inputs) in self.tables(readings) {
+            let range = |network: &Network<'_>, input| network.training_range(input).map(f64::from);
+            let of_network =
+                |it: &Network<'b>| (0..it.shape().inputs).map(|i| range(it, i)).collect::<Vec<_>>();
+            let ranges: Vec<[f64; 2]> = networks.iter().flat_map(of_network).collect();
+            for line in inputs.chunks_exact(ranges.len().max(1)) {
+                for (reading, [lowest, highest]) in line.iter().zip(&ranges) {
+                    if !is_missing(*reading) {
+                        let place = (reading - lowest) / (highest - lowest);
+                        let inside = (f64::from(CLAMP[0])..=f64::from(CLAMP[1])).contains(&place);
+                        present += 1;
+                        clamped += usize::from(highest > lowest && !inside);
+                    }
                 }
             }
         }
         clamped as f64 / present.max(1) as f64
     }
+
+    /// Networks that share a table of inputs, each table with the inputs for `readings`: all networks of rows, or one that
+    /// sees whole frames.
+    fn tables(&self, readings: &[f64]) -> impl Iterator<Item = (&[Network<'b>], Vec<f64>)> {
+        let at_once = if self.fronts.is_empty() { self.networks.len() } else { 1 };
+        self.networks.chunks(at_once).zip(self.inputs_of_networks(readings))
+    }
+}
+
+/// Inputs of the network behind `front` for `inputs` of the model, and the strength of each frame's touch; none without
+/// it.
+fn inputs_of<'r>(front: &Front<'_>, inputs: &'r [f64]) -> (Cow<'r, [f64]>, Vec<f32>) {
+    let (given, strengths) = match front.touch {
+        Some(touch) => {
+            let (given, strengths) = touch::inputs(touch, inputs);
+            (Cow::Owned(given), strengths)
+        }
+        None => (Cow::Borrowed(inputs), vec![]),
+    };
+    let Some(projection) = front.projection else { return (given, strengths) };
+    let width = projection.readings();
+    let features = projection::features(projection, projection.features(), width, &given);
+    (Cow::Owned(features), strengths)
 }
 
 impl FrameDecoder for PreparedModel<'_> {

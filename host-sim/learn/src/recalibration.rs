@@ -83,11 +83,16 @@ pub fn check(model: &Model<'_>) -> Result<()> {
     let network = |row| model.network_of_row(row);
     let shares = |row: usize| (0..row).any(|before| network(before) == network(row));
     let errors = training_errors(model);
-    let networks = if model.projection().is_some() { 1 } else { model.shape().rows };
+    let networks = if model.whole_frames() { 1 } else { model.shape().rows };
     let of_network = errors.len() / networks;
+    let fronts: Vec<_> = model.fronts().collect();
     let faults = [
         (
-            model.projection().is_none() && (0..model.shape().rows).any(shares),
+            fronts.len() > 1 || fronts.iter().any(|front| front.touch.is_some()),
+            "its features are normalised: train one with readings as they are (--features-kind plain)",
+        ),
+        (
+            !model.whole_frames() && (0..model.shape().rows).any(shares),
             "rows share a network, while their channels drift apart: train one with a network for each row",
         ),
         (
@@ -127,7 +132,7 @@ pub fn recalibrate(
     let width = model.model().metadata().output_names.iter().count();
     assert_eq!(outputs.names.len(), width, "the model's outputs");
     assert_eq!(readings.len(), outputs.len(), "outputs for each press");
-    let inputs = model.inputs_of_networks(&readings.values);
+    let inputs = model.inputs_of_networks(&readings.values).concat();
     let networks = model.networks();
     let units: Vec<Unit> = (0..networks.len())
         .into_par_iter()

@@ -213,7 +213,7 @@ impl<'d> Judge<'d> {
                 let layers =
                     refine::refine(&training, &layers, &options, settings, examples, &Silent)?;
                 let options = settings.options(&options);
-                all.push(squares(&train::fit(&layers, &options, &Silent)?.networks));
+                all.push(squares(&train::fit(&layers, &options, &Silent)?));
             }
         }
         Ok(all)

@@ -4,7 +4,11 @@
 //! alone decides how work is cut into pieces, whose results are merged in order. The network is rounded
 //! once, to the numbers of its format, as a [`FittedNetwork`].
 
+use std::borrow::Cow;
+
 use serde::Deserialize;
+use taxel_core::blob::Front;
+use taxel_core::projection::Projection;
 use taxel_core::rbf::Format;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
@@ -19,6 +23,7 @@ pub(crate) mod tasks;
 pub(crate) mod principal;
 pub mod format;
 pub mod projection;
+pub mod touch;
 pub mod memory;
 pub mod layers;
 pub mod refine;
@@ -28,6 +33,7 @@ pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
 use samples::Ridge;
 pub use samples::{HiddenLayer, InputScale, Samples};
+pub use touch::{Features, FittedTouch, Group, Kinds, THRESHOLD};
 
 /// How output weights are computed. Both ways give the same weights, but for rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -102,6 +108,9 @@ pub struct Options {
     pub each_row: bool,
     /// Number of features that all readings are projected to; `None` for the usual one ([`projection::fit`]).
     pub features: Option<usize>,
+    /// Features for outputs of either kind; `None` for those that training [chooses](crate::kinds::choose), or readings as they
+    /// are where it does not.
+    pub kinds: Option<Kinds>,
     /// Memory in bytes that training may take, about. More is refused before it is taken.
     pub most_memory_bytes: u64,
 }
@@ -123,6 +132,7 @@ impl Default for Options {
             or_f32: true,
             each_row: false,
             features: None,
+            kinds: None,
             most_memory_bytes: USUAL_MEMORY_BYTES,
         }
     }
@@ -269,15 +279,46 @@ impl Samples<'_> {
 }
 
 /// Result of training on a data set.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Trained {
-    /// Parameters of the projection in front of the one network of all rows; see [`projection`].
-    pub projection: Option<Vec<f32>>,
-    /// Networks of the row-wires in order, or the one network behind the projection.
+    /// What stands before each network that sees whole frames; nothing for networks of rows.
+    pub fronts: Vec<FittedFront>,
+    /// Networks of the row-wires in order, or those that see whole frames.
     pub networks: Vec<FittedNetwork>,
 }
 
-/// Trains one network for each row-wire of `dataset`, or one for all of them.
+/// What stands before a network that sees whole frames, as the blob will hold it.
+#[derive(Debug, Clone)]
+pub struct FittedFront {
+    /// Number of outputs of the network: those that follow the outputs of the network before.
+    pub outputs: usize,
+    /// What makes shape and strength of readings; `None` for readings as they are.
+    pub touch: Option<FittedTouch>,
+    /// Number of inputs, before the projection.
+    pub inputs: usize,
+    /// Parameters of the [`projection`]; `None` if the network is given all inputs.
+    pub projection: Option<Vec<f32>>,
+}
+
+impl FittedFront {
+    /// As the blob holds it.
+    ///
+    /// # Panics
+    /// Never: its numbers are finite.
+    pub fn view(&self) -> Front<'_> {
+        let projection = self.projection.as_ref().map(|parameters| {
+            let features = parameters.len() / (self.inputs + 1);
+            Projection::new(self.inputs, features, parameters).expect("finite")
+        });
+        Front {
+            outputs: self.outputs,
+            touch: self.touch.as_ref().map(FittedTouch::view),
+            projection,
+        }
+    }
+}
+
+/// Trains one network for each row-wire of `dataset`, or one for each kind of its outputs that sees whole frames.
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) for options that do not fit the data,
@@ -285,7 +326,12 @@ pub struct Trained {
 /// [`Error`](crate::Error)s for data that does not fit the format.
 pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
     check(dataset, options)?;
-    fit(&Layers::start(dataset, options)?, options, progress)
+    let mut trained = Trained::default();
+    for start in Start::all(dataset, options)? {
+        let layers = start.layers(options);
+        trained.add(&start, layers.projection.as_ref(), fit(&layers, options, progress)?);
+    }
+    Ok(trained)
 }
 
 /// Trains as [`train`] does, and refines centres, width and the projection before the weights are fitted.
@@ -300,9 +346,111 @@ pub fn train_refined(
     progress: &dyn Progress,
 ) -> Result<Trained> {
     check(dataset, options)?;
-    let start = Layers::start(dataset, options)?;
-    let layers = refine::refine(dataset, &start, options, settings, examples, progress)?;
-    fit(&layers, &settings.options(options), progress)
+    let mut trained = Trained::default();
+    for start in Start::all(dataset, options)? {
+        let layers = start.layers(options);
+        let layers = start.refine(&layers, options, settings, examples, progress)?;
+        let networks = fit(&layers, &settings.options(options), progress)?;
+        trained.add(&start, layers.projection.as_ref(), networks);
+    }
+    Ok(trained)
+}
+
+/// What training of outputs that share networks starts from: those of a [group](Group), or of all rows.
+#[derive(Debug, Clone)]
+pub struct Start<'d> {
+    /// The outputs, and what makes shape and strength of readings.
+    pub group: Group,
+    /// Frames to train on, as the group is trained on them.
+    pub frames: Cow<'d, Dataset>,
+    /// Index of each of these among the frames of the data set.
+    kept: Vec<usize>,
+    /// Parameters of the projection by regression.
+    pub projection: Option<Vec<f32>>,
+    /// Whether networks see whole frames.
+    whole_frames: bool,
+}
+
+impl<'d> Start<'d> {
+    /// Starts of all networks for the frames of `dataset`.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for data without a projection, or training that takes more memory than is allowed.
+    pub fn all(dataset: &'d Dataset, options: &Options) -> Result<Vec<Self>> {
+        memory::check(dataset, options, None)?;
+        if options.projects(dataset) {
+            projection::check(dataset, options.features)?;
+        }
+        let kinds = options.kinds.filter(|_| !options.each_row).unwrap_or(Kinds::AS_THEY_ARE);
+        let groups = Group::all(dataset, kinds);
+        let are_many = groups.len() > 1;
+        let start = |group: Group| {
+            let (frames, kept) = group.frames(dataset);
+            let projection = match &group.touch {
+                _ if !options.projects(&frames) => None,
+                Some(touch) => Some(touch::projection(touch, &frames, dataset, options.features)?),
+                None => Some(projection::fit(&frames, options.features)?),
+            };
+            let whole_frames = are_many || group.touch.is_some() || projection.is_some();
+            Ok(Self { group, frames, kept, projection, whole_frames })
+        };
+        groups.into_iter().map(start).collect()
+    }
+
+    /// The same with frames of its own.
+    pub fn into_owned(self) -> Start<'static> {
+        Start { frames: Cow::Owned(self.frames.into_owned()), ..self }
+    }
+
+    /// Layers with K-means centres.
+    pub fn layers(&self, options: &Options) -> Layers<'_> {
+        Layers::behind(self.projection.clone(), &self.frames, options)
+    }
+
+    /// Layers that were refined on `examples` of the data set.
+    ///
+    /// # Errors
+    /// As [`refine`](refine::refine).
+    pub fn refine(
+        &self,
+        layers: &Layers<'_>,
+        options: &Options,
+        settings: &Refinement,
+        examples: Examples<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Layers<'_>> {
+        let of =
+            |examples| refine::refine(&self.frames, layers, options, settings, examples, progress);
+        match examples {
+            Examples::Fresh(fresh) => {
+                of(Examples::Fresh(&touch::Fresh { fresh, group: &self.group }))
+            }
+            Examples::Folds(fold_of) => {
+                let folds: Vec<usize> = self.kept.iter().map(|frame| fold_of[*frame]).collect();
+                of(Examples::Folds(&folds))
+            }
+        }
+    }
+}
+
+impl Trained {
+    /// Adds `networks` that training from `start` ended with, and the `projection` in front of them.
+    pub fn add(
+        &mut self,
+        start: &Start<'_>,
+        projection: Option<&Vec<f32>>,
+        networks: Vec<FittedNetwork>,
+    ) {
+        if start.whole_frames {
+            self.fronts.push(FittedFront {
+                outputs: start.group.outputs.len(),
+                touch: start.group.touch.clone(),
+                inputs: start.frames.inputs.names.len(),
+                projection: projection.cloned(),
+            });
+        }
+        self.networks.extend(networks);
+    }
 }
 
 /// Checks the options against the data, and the data against f32.
@@ -311,17 +459,20 @@ fn check(dataset: &Dataset, options: &Options) -> Result<()> {
     resolution::check(dataset)
 }
 
-/// Fits the output weights of networks with these `layers` to the frames that they were found on.
+/// Networks with these `layers`, and output weights that are fitted to the frames that they were found on.
 ///
 /// # Errors
 /// [`Error`](crate::Error) for data or layers that the format does not hold.
 ///
 /// # Panics
 /// Never: one penalty gives one model.
-pub fn fit(layers: &Layers<'_>, options: &Options, progress: &dyn Progress) -> Result<Trained> {
+pub(crate) fn fit(
+    layers: &Layers<'_>,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<Vec<FittedNetwork>> {
     let mut models = fit_each(layers, options, &[options.penalty], progress)?;
-    let networks = models.pop().expect("one model a penalty");
-    Ok(Trained { projection: layers.projection.clone(), networks })
+    Ok(models.pop().expect("one model a penalty"))
 }
 
 /// Fits output weights as [`fit`] does, with each of `penalties` instead of the options' own: the networks of one model

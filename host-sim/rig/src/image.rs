@@ -39,7 +39,7 @@ pub fn capacity_for(model: &Model<'_>, has: Capacity) -> Result<Capacity, String
     };
     needed.iter().find(possible).copied().ok_or_else(|| {
         let most = MOST_BUFFER_BYTES / 1024;
-        let remedy = if model.projection().is_some() { "give fewer inputs or --features" } else { "give fewer inputs" };
+        let remedy = if model.whole_frames() { "give fewer inputs or --features" } else { "give fewer inputs" };
         if columns > MOST_COLUMNS || rows > MOST_ROWS {
             format!(
                 "no image scans its {rows} × {columns} wires: {MOST_ROWS} × {MOST_COLUMNS} are the most; choose others with \

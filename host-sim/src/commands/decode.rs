@@ -8,7 +8,9 @@ use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
+use taxel_core::blob::Front;
 use taxel_core::filter::State;
+use taxel_core::touch::Kind;
 use taxel_data::Clock;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::{DataFile, FieldTexts};
@@ -30,7 +32,7 @@ use super::{Common, print, stderr};
 /// Decode readings from a data file, one line of estimates a line.
 ///
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
-/// array, all outputs of the line are. A model trained with --fill tells missing readings from the others instead.
+/// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --fill tells missing readings from the others instead.
 /// Estimates are written with the digits that tell an f32 from its neighbours.
 ///
 /// The last column, `status`, is the sum of a device's flags (docs/link.md): 0 for a sound frame, 2 a faulty reading,
@@ -160,7 +162,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         page.line(format_args!("{novel} of them are novel: unlike the frames of training"));
     }
     if incomplete > 0 {
-        let lost = if model.model().projection().is_some() {
+        let lost = if model.model().whole_frames() {
             "all outputs are empty there"
         } else {
             "the outputs of its row-wire are empty"
@@ -174,9 +176,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 const NOVELTY: &str = "novelty_nats";
 const DEVIATION: &str = "_deviation";
 
-/// Whether a row's outputs are no numbers though no reading is missing.
-fn overflows(inputs: &[f64], outputs: &[f64]) -> bool {
-    outputs[0].is_nan() && !inputs.iter().any(|input| is_missing(*input))
+/// Whether a row's outputs are no numbers though no reading is missing. `of_places` says which outputs are
+/// places: there is none without a touch.
+fn overflows(inputs: &[f64], outputs: &[f64], of_places: &[bool]) -> bool {
+    let mut others = outputs.iter().zip(of_places).filter(|(_, is_place)| !**is_place);
+    others.any(|(output, _)| output.is_nan()) && !inputs.iter().any(|input| is_missing(*input))
 }
 
 /// Number of frames that are unlike those of training; one that misses a reading cannot be told, and is NaN.
@@ -195,13 +199,18 @@ fn flags(
     let clamps = model.clamps(&readings.values);
     let inputs = model.model_inputs(&readings.values);
     let shape = model.model().shape();
-    let whole_array = model.model().projection().is_some();
+    let whole_array = model.model().whole_frames();
     let of_row = |count: usize, rows: usize| if whole_array { count * rows } else { count };
     let (in_row, out_row) = (of_row(shape.inputs, shape.rows), of_row(shape.outputs, shape.rows));
+    let is_place = |front: Front<'_>| front.touch.is_some_and(|touch| touch.kind() == Kind::Place);
+    let of_fronts = model.model().fronts();
+    let mut of_places: Vec<bool> =
+        of_fronts.flat_map(|front| vec![is_place(front); front.outputs]).collect();
+    of_places.resize(out_row, false);
     let lines = inputs.chunks_exact(readings.names.len()).zip(estimate.lines());
     let of_line = |(line, (inputs, outputs)): (usize, (&[f64], &[f64]))| {
         let mut rows = inputs.chunks_exact(in_row).zip(outputs.chunks_exact(out_row));
-        let overflow = rows.any(|(inputs, outputs)| overflows(inputs, outputs));
+        let overflow = rows.any(|(inputs, outputs)| overflows(inputs, outputs, &of_places));
         let is_novel = novelty.is_some_and(|novelty| novelty[line] > 0.0);
         let flags = [
             (health.is_faulty[line], EstimateReport::FAULTY_READING),
@@ -338,8 +347,10 @@ mod tests {
     #[test]
     fn a_missing_reading_is_no_overflow_and_makes_no_frame_novel() {
         let nan = f64::NAN;
-        assert!(overflows(&[50.0, 51.0], &[nan]) && !overflows(&[50.0, nan], &[nan]));
-        assert!(!overflows(&[50.0, 51.0], &[0.1]));
+        let overflows =
+            |inputs: [f64; 2], output| overflows(&inputs, &[output, nan], &[false, true]);
+        assert!(overflows([50.0, 51.0], nan) && !overflows([50.0, nan], nan));
+        assert!(!overflows([50.0, 51.0], 0.1), "a place is none without a touch");
         assert_eq!(novel(&[nan, 0.5, -0.5, 0.0]), 1);
     }
 }

@@ -121,7 +121,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let at_rest =
         rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &Spread::of(&readings)));
     let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
-    let estimate = model.decode_table(&readings);
+    let estimate = metrics::with_places(&truth, model.decode_table(&readings));
     let thickness_mm = f64::from(metadata.thickness_mm);
     let measure = Measure {
         full_scale: metadata.full_scale.iter().map(f64::from).collect(),
@@ -129,9 +129,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         limit: None,
     };
     // The mean is judged on the same pairs as the model, and computed from them.
-    for (truth, estimate) in truth.values.iter_mut().zip(&estimate.values) {
-        *truth = if estimate.is_nan() { f64::NAN } else { *truth };
-    }
+    let pairs = truth.values.iter_mut().zip(&estimate.values);
+    pairs.filter(|(_, estimate)| estimate.is_nan()).for_each(|(truth, _)| *truth = f64::NAN);
     let is_empty = |line: &&[f64]| line.iter().all(|value| value.is_nan());
     let without_reading = estimate.lines().filter(is_empty).count();
     let judged = Decoded { log: &log, outputs: &truth, estimates: &estimate.values };

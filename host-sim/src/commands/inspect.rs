@@ -150,7 +150,12 @@ fn summarise(blob: &ModelBlob) -> Summary {
             .fill()
             .map(|it| FillSummary { factors: it.factors(), bytes: 4 * it.block().len() }),
         relative_inputs: metadata.relative_inputs,
-        projected_features: model.projection().map_or(0, |it| it.features()),
+        projected_features: model
+            .fronts()
+            .filter_map(|it| it.projection)
+            .map(|it| it.features())
+            .max()
+            .unwrap_or(0),
         networks: networks.collect(),
         noise_kind: format!("{:?}", metadata.noise_kind).to_lowercase(),
         noise_level: metadata.noise_level,
@@ -276,6 +281,7 @@ fn page_of(s: &Summary) -> print::Page {
         ("estimate", ram.estimate),
         ("scaled readings", ram.scaled_readings),
         ("features", ram.features),
+        ("touch", ram.touch),
         ("relative inputs", ram.relative_inputs),
         ("activations", ram.activations),
     ];

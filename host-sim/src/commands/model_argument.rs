@@ -4,7 +4,7 @@ use clap::Args;
 use taxel_core::blob::Model;
 use taxel_core::rbf::Format;
 use taxel_learn::Options;
-use taxel_learn::train::Solver;
+use taxel_learn::train::{Features, Kinds, Solver};
 
 use super::arguments::{format, solver};
 use super::stderr;
@@ -67,6 +67,11 @@ pub struct ModelArguments {
     /// as many as a row has readings; none for outputs that belong to no row].
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     features: Option<usize>,
+    /// Features: `plain`, made of readings as they are; or `normalised`, the shape of a touch apart from its strength, made of
+    /// what exceeds 3 standard deviations of a reading at rest (normalised:K: K of them) [default: those with the least error
+    /// on frames that are held out, for places and for amounts].
+    #[arg(long, value_name = "KIND", conflicts_with_all = ["paper", "each_row"])]
+    features_kind: Option<Features>,
     /// Number format of the weights [default: the scene's, or fixed16, or f32 where that does not hold the model].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
@@ -89,6 +94,7 @@ impl ModelArguments {
             options = options.for_each_row(false);
         }
         options.features = self.features.or(options.features);
+        options.kinds = self.features_kind.map(Kinds::all).or(options.kinds);
         options.solver = self.solver.unwrap_or(options.solver);
         if let Some(format) = self.format {
             (options.format, options.or_f32) = (format, false);

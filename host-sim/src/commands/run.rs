@@ -186,6 +186,9 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         "a frame on a Cortex-M4F: {} instructions, {} cycles",
         model.frame_cost.instructions, model.frame_cost.cycles
     ));
+    if let Some(choice) = &result.features {
+        print::wrapped(&mut page, &choice.to_string());
+    }
     page.line("");
     let decoders: Vec<_> =
         result.decoders.iter().map(|d| (d.decoder.as_str(), d.errors.as_slice())).collect();

@@ -14,6 +14,7 @@ use serde::Serialize;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{columns, output};
 use taxel_learn::fill;
+use taxel_learn::kinds::Choice;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::select::Selection;
 use taxel_learn::train::Solver;
@@ -91,6 +92,8 @@ struct Summary {
     refined: bool,
     /// Whether inputs are readings relative to the baseline.
     relative_inputs: bool,
+    /// Features that training chose, and what it tried; `None` where there was no choice.
+    features: Option<Choice>,
     /// Whether the model tells deviations and novelty.
     confidence: bool,
     /// Whether the model fills missing readings from the others.
@@ -132,6 +135,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let selection = choice::choose(arguments, &subject, &set, &mut options)?;
 
     let progress = Terminal::new();
+    let features = set.choose(&mut options, &progress);
     let blob = set.blob(&options, &progress)?;
     output::write_bytes(&arguments.output, blob.bytes())?;
 
@@ -150,6 +154,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         solver: options.solver.name(),
         refined: set.refine,
         relative_inputs: set.frames.relative_inputs,
+        features,
         confidence: model.confidence().is_some(),
         fill: model.fill().is_some(),
         formats: model.networks().map(|n| n.format().name()).collect(),
@@ -246,6 +251,9 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         page.line(format_args!(
             "  ({asked} centres were asked for; the data has fewer distinct samples)"
         ));
+    }
+    if let Some(choice) = &summary.features {
+        print::wrapped(&mut page, &choice.to_string());
     }
     let Worth { judged_on, verdict, .. } = &summary.worth;
     print::verdict(&mut page, Some(judged_on.words()), verdict);

@@ -3,18 +3,18 @@
 use super::error::DecodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, MAGIC, MetadataSection, PREFIX_BYTES, Prefix,
-    RbfHeader, ShapeField, TAG_METADATA,
+    RbfHeader, ShapeField, TAG_FRONT, TAG_METADATA,
 };
+use super::front::{Front, MOST_FRONTS};
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use super::sections::{
-    check_count, cut_fill, take, take_block, take_confidence, take_linear, take_projection,
-    take_relative_inputs,
+    check_count, cut_fill, take, take_block, take_confidence, take_linear, take_relative_inputs,
 };
 use crate::checksum::CRC_32;
 use crate::confidence::{Confidence, Sizes};
 use crate::fill::Fill;
-use crate::projection::Projection;
 use crate::rbf::{Cut, Format, Network, NetworkError, Shape, fixed16, float32};
+use crate::scale::UNITS;
 
 /// A model, borrowed from a blob whose every byte and value has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +23,8 @@ pub struct Model<'a> {
     crc: u32,
     row_network: &'a [u8],
     metadata: Metadata<'a>,
-    projection: Option<Projection<'a>>,
+    /// Whether networks see whole frames, each behind a front.
+    whole_frames: bool,
     confidence: Option<&'a [f32]>,
     /// Directions and components of the confidence.
     confidence_sizes: [u16; 2],
@@ -61,10 +62,6 @@ impl<'a> Model<'a> {
         let (section, rest) = take::<MetadataSection>(rest, "metadata")?;
         let (relative_inputs, rest) = take_relative_inputs(rest);
         let metadata = checked_metadata(&section, relative_inputs, shape)?;
-        let (projection, rest) = take_projection(rest, shape)?;
-        if projection.is_some() {
-            check_count("networks behind a projection", 1, networks.into())?;
-        }
         let (confidence, rest) = take_confidence(rest, shape)?;
         let last_sections = rest;
         let (linear_rmse, rest) = take_linear(last_sections, shape)?;
@@ -85,7 +82,7 @@ impl<'a> Model<'a> {
             crc,
             row_network,
             metadata,
-            projection,
+            whole_frames: network_sections.first() == Some(&TAG_FRONT),
             confidence: confidence.map(|it| it.block()),
             // As in the blob.
             confidence_sizes: confidence
@@ -93,12 +90,22 @@ impl<'a> Model<'a> {
             networks,
             last_sections,
         };
-        let mut rest = network_sections;
+        let (mut rest, mut outputs) = (network_sections, 0_usize);
         for index in 0..networks {
-            let (network, after) = take_network(rest, model.network_shape(), index)?;
+            let (part, after) = model.take_part(rest, index)?;
+            part.front.check()?;
             // Every value is looked at once, here; later reads only cut slices.
+            let network = part.network().map_err(|cause| DecodeError::Network { index, cause })?;
             network.check_values().map_err(|cause| DecodeError::Network { index, cause })?;
+            part.check_scaled(&network, index)?;
+            outputs = outputs.saturating_add(part.front.outputs);
             rest = after;
+        }
+        if model.whole_frames {
+            check_count("outputs of networks", shape.rows * shape.outputs, outputs)?;
+            if usize::from(networks) > MOST_FRONTS {
+                return Err(DecodeError::Malformed { section: "list of networks" });
+            }
         }
         if !rest.is_empty() {
             return Err(DecodeError::LeftOver { bytes: rest.len() });
@@ -150,10 +157,16 @@ impl<'a> Model<'a> {
         self.networks.into()
     }
 
-    /// The projection from a whole frame to the network's inputs; `None` if each row's readings are its network's
-    /// inputs. Behind a projection there is one network, and its outputs are those of all rows.
-    pub fn projection(&self) -> Option<Projection<'a>> {
-        self.projection
+    /// Whether networks see whole frames, and give outputs of all rows one after the other. Else each row's readings are
+    /// the inputs of its network.
+    pub fn whole_frames(&self) -> bool {
+        self.whole_frames
+    }
+
+    /// What stands before each network that sees whole frames, in their order; nothing for networks of rows.
+    pub fn fronts(&self) -> impl Iterator<Item = Front<'a>> {
+        let of_frames = self.whole_frames.then(|| self.parts());
+        of_frames.into_iter().flatten().map(|part| part.front)
     }
 
     /// The model's confidence in its outputs; `None` if it has none.
@@ -183,37 +196,70 @@ impl<'a> Model<'a> {
         cut_fill(rest, self.shape).unwrap_or_default()
     }
 
-    /// Inputs and outputs of each network; behind a projection, its features and the outputs of all rows.
-    pub(crate) fn network_shape(&self) -> ModelShape {
-        let ModelShape { rows, outputs, .. } = self.shape;
-        let Some(projection) = self.projection else { return self.shape };
-        ModelShape { rows: 1, inputs: projection.features(), outputs: rows * outputs }
+    /// Networks in the order of the blob, with what stands before each.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = Part<'a>> {
+        let (model, mut rest) = (*self, self.cut_fill().1);
+        (0..self.networks).map_while(move |index| {
+            let (part, after) = model.take_part(rest, index).ok()?;
+            rest = after;
+            Some(part)
+        })
     }
 
     /// The networks, in the order of the blob.
     pub fn networks(&self) -> impl Iterator<Item = Network<'a>> {
-        let (shape, mut rest) = (self.network_shape(), self.cut_fill().1);
-        (0..self.networks).map_while(move |index| {
-            let (network, after) = take_network(rest, shape, index).ok()?;
-            rest = after;
-            Some(network)
-        })
+        self.parts().map_while(|part| part.network().ok())
     }
 
-    /// The section of the network that serves `row` (from 0).
-    pub(crate) fn section_of_row(&self, row: usize) -> Option<NetworkSection<'a>> {
-        let mut rest = self.cut_fill().1;
-        for index in 0..self.network_of_row(row)? {
-            (_, rest) = NetworkSection::take(rest, self.network_shape(), index as u8).ok()?;
-        }
-        let index = self.network_of_row(row)?;
-        let taken = NetworkSection::take(rest, self.network_shape(), index as u8);
-        taken.ok().map(|(section, _)| section)
+    /// Cuts a network and what stands before it from the front of `bytes`; checks lengths, but no values.
+    fn take_part(&self, bytes: &'a [u8], index: u8) -> Result<(Part<'a>, &'a [u8]), DecodeError> {
+        let (front, rest) = if self.whole_frames {
+            check_tag(TAG_FRONT, bytes.first().copied().unwrap_or_default())?;
+            Front::take(bytes, self.shape)?
+        } else {
+            (Front::NONE, bytes)
+        };
+        let shape = if self.whole_frames {
+            let readings = self.shape.rows * self.shape.inputs;
+            ModelShape { rows: 1, inputs: front.inputs(readings), outputs: front.outputs }
+        } else {
+            self.shape
+        };
+        let (section, rest) = NetworkSection::take(rest, shape, index)?;
+        Ok((Part { front, section, shape }, rest))
     }
 
     /// Index of the network that serves `row` (from 0), or `None` for a row outside the sensor.
     pub fn network_of_row(&self, row: usize) -> Option<usize> {
         self.row_network.get(row).copied().map(usize::from)
+    }
+}
+
+/// A network, what stands before it, and its inputs and outputs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Part<'a> {
+    pub front: Front<'a>,
+    pub section: NetworkSection<'a>,
+    pub shape: ModelShape,
+}
+
+impl<'a> Part<'a> {
+    /// The network; its values are not checked again.
+    fn network(&self) -> Result<Network<'a>, NetworkError> {
+        self.section.network(self.shape)
+    }
+
+    /// Checks that outputs in `fixed16`, which are not looked at on a device, stay finite times the largest strength.
+    fn check_scaled(&self, network: &Network<'_>, index: u8) -> Result<(), DecodeError> {
+        let (Some(touch), Network::Fixed16(network)) = (self.front.touch, network) else {
+            return Ok(());
+        };
+        let most = |scale: &f32| scale * UNITS * touch.strengths().most;
+        if network.parameters().output_scale.iter().all(|scale| most(scale).is_finite()) {
+            return Ok(());
+        }
+        let cause = NetworkError::NotFinite { what: "the largest output" };
+        Err(DecodeError::Network { index, cause })
     }
 }
 
@@ -386,15 +432,4 @@ impl<'a> NetworkSection<'a> {
 
 fn network_shape(shape: ModelShape, centres: u16) -> Shape {
     Shape { inputs: shape.inputs, centres: centres.into(), outputs: shape.outputs }
-}
-
-/// Cuts one network from the front of `bytes`; checks lengths, but no values.
-fn take_network(
-    bytes: &[u8],
-    shape: ModelShape,
-    index: u8,
-) -> Result<(Network<'_>, &[u8]), DecodeError> {
-    let (section, rest) = NetworkSection::take(bytes, shape, index)?;
-    let network = section.network(shape);
-    Ok((network.map_err(|cause| DecodeError::Network { index, cause })?, rest))
 }

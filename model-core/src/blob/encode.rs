@@ -8,21 +8,21 @@ use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, ConfidenceHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, FillHeader, LinearSection, MAGIC,
-    MetadataSection, Prefix, ProjectionHeader, RbfHeader, ShapeField, TAG_CONFIDENCE, TAG_FILL,
-    TAG_LINEAR, TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
+    MetadataSection, Prefix, RbfHeader, ShapeField, TAG_CONFIDENCE, TAG_FILL, TAG_LINEAR,
+    TAG_METADATA, TAG_RELATIVE_INPUTS,
 };
+use super::front::Front;
 use super::metadata::{Floats, Metadata};
 use crate::checksum::CRC_32;
 use crate::confidence::Confidence;
 use crate::fill::Fill;
-use crate::projection::Projection;
 use crate::rbf::Network;
 
 /// Contents of a blob: what [`encode`] writes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParts<'a> {
-    /// Projection from a frame to the inputs of one network for all rows; `None` with a network a row.
-    pub projection: Option<Projection<'a>>,
+    /// What stands before each network that sees whole frames; nothing for networks of rows.
+    pub fronts: &'a [Front<'a>],
     /// Confidence in the outputs.
     pub confidence: Option<Confidence<'a>>,
     /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if it
@@ -41,9 +41,8 @@ pub struct ModelParts<'a> {
 impl<'a> ModelParts<'a> {
     /// Networks that decode rows from their readings, and nothing else. Each row has an index into `networks`.
     pub fn new(networks: &'a [Network<'a>], row_network: &'a [u8], metadata: Metadata<'a>) -> Self {
-        let (projection, confidence, fill) = (None, None, None);
-        let linear_rmse = Floats(&[]);
-        Self { projection, confidence, linear_rmse, fill, networks, row_network, metadata }
+        let (fronts, linear_rmse, confidence, fill) = (&[], Floats(&[]), None, None);
+        Self { fronts, confidence, linear_rmse, fill, networks, row_network, metadata }
     }
 }
 
@@ -61,12 +60,10 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     let errors = m.training_rmse.0.len() + parts.linear_rmse.0.len();
     let numbers = errors + m.full_scale.0.len() + parts.row_network.len();
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
-    let blocks = [
-        parts.projection.map(|it| it.block()),
-        parts.confidence.map(|it| it.block()),
-        parts.fill.map(|it| it.block()),
-    ];
-    let blocks: usize = blocks.iter().flatten().map(|it| SECTION_FIELDS + it.len() * 4).sum();
+    let fronts = parts.fronts.iter().flat_map(Front::block).map(<[u32]>::len);
+    let floats = [parts.confidence.map(|it| it.block()), parts.fill.map(|it| it.block())];
+    let blocks = floats.iter().flatten().map(|it| it.len()).chain(fronts);
+    let blocks: usize = blocks.map(|words| SECTION_FIELDS + words * 4).sum();
     FIXED_FIELDS + text + numbers + blocks + weights
 }
 
@@ -82,23 +79,8 @@ fn block_bytes(network: &Network<'_>) -> usize {
 /// # Errors
 /// Every variant of [`EncodeError`].
 pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
-    let first = parts.networks.first().map(Network::shape);
-    let (mut inputs, mut outputs) = first.map_or((0, 0), |s| (s.inputs, s.outputs));
-    for (index, network) in parts.networks.iter().enumerate() {
-        if (network.shape().inputs, network.shape().outputs) != (inputs, outputs) {
-            return Err(EncodeError::UnequalNetworks { index });
-        }
-    }
-
     let rows = parts.row_network.len();
-    if let Some(projection) = parts.projection {
-        // One network has the outputs of all rows, and features for inputs.
-        inputs = projection.readings() / rows.max(1);
-        if !outputs.is_multiple_of(rows.max(1)) {
-            return Err(EncodeError::UnevenRows { outputs, rows });
-        }
-        outputs /= rows.max(1);
-    }
+    let [inputs, outputs] = of_row(parts, rows)?;
 
     let mut writer = Writer { buffer, at: 0 };
     writer.put(&Prefix { magic: MAGIC, version: FORMAT_VERSION, length: [0; 4] })?;
@@ -129,11 +111,6 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     if m.relative_inputs {
         writer.put(&TAG_RELATIVE_INPUTS)?;
     }
-    if let Some(projection) = parts.projection {
-        let features = fit("number of features", projection.features(), u16::MAX)?;
-        writer.put(&ProjectionHeader { tag: TAG_PROJECTION, features })?;
-        writer.put_block(&[bytemuck::cast_slice(projection.block())])?;
-    }
     if let Some(confidence) = parts.confidence {
         let sizes = confidence.sizes();
         let directions = fit("number of directions", sizes.directions, u16::MAX)?;
@@ -150,6 +127,13 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         writer.put_block(&[bytemuck::cast_slice(fill.block())])?;
     }
     for (index, network) in parts.networks.iter().enumerate() {
+        if let Some(front) = parts.fronts.get(index) {
+            let features = front.projection.map_or(0, |it| it.features());
+            let features = fit("number of features", features, u16::MAX)?;
+            let outputs = fit("number of outputs", front.outputs, u16::MAX)?;
+            writer.put(&front.header(features, outputs))?;
+            writer.put_block(&front.block())?;
+        }
         writer.put_network(fit("network index", index, u8::MAX)?, network)?;
     }
     let length = writer.finish()?;
@@ -157,6 +141,40 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     let blob = buffer.get(..length).ok_or(EncodeError::BufferTooSmall)?;
     Model::decode(blob)?;
     Ok(blob)
+}
+
+/// Numbers of inputs and of outputs of each of so many `rows`.
+fn of_row(parts: &ModelParts<'_>, rows: usize) -> Result<[usize; 2], EncodeError> {
+    let shapes = || parts.networks.iter().map(Network::shape).enumerate();
+    let Some((_, first)) = shapes().next() else { return Ok([0; 2]) };
+    if parts.fronts.is_empty() {
+        let sizes = [first.inputs, first.outputs];
+        let mut others = shapes().filter(|(_, it)| [it.inputs, it.outputs] != sizes);
+        return others
+            .next()
+            .map_or(Ok(sizes), |(index, _)| Err(EncodeError::UnequalNetworks { index }));
+    }
+    let readings = |front: &Front<'_>, inputs: usize| match (front.touch, front.projection) {
+        (Some(touch), _) => touch.readings(),
+        (None, Some(projection)) => projection.readings(),
+        (None, None) => inputs,
+    };
+    let most = parts.fronts.first().map_or(0, |front| readings(front, first.inputs));
+    let mut outputs = 0;
+    for (index, shape) in shapes() {
+        let front = parts.fronts.get(index).ok_or(EncodeError::UnfitFront { index })?;
+        let fits = shape.inputs == front.inputs(most) && readings(front, shape.inputs) == most;
+        if !fits || shape.outputs != front.outputs {
+            return Err(EncodeError::UnfitFront { index });
+        }
+        outputs += shape.outputs;
+    }
+    let rows = rows.max(1);
+    if outputs.is_multiple_of(rows) {
+        Ok([most / rows, outputs / rows])
+    } else {
+        Err(EncodeError::UnevenRows { outputs, rows })
+    }
 }
 
 /// Encodes `parts` as a blob on the heap.

@@ -92,6 +92,12 @@ pub enum DecodeError {
         /// Name of the field.
         field: &'static str,
     },
+    /// The parameters of what stands before a projection are not valid.
+    #[error("touch: {cause}")]
+    Touch {
+        /// What is wrong with them.
+        cause: NetworkError,
+    },
     /// The projection's parameters are not valid.
     #[error("projection: {cause}")]
     Projection {
@@ -150,16 +156,22 @@ pub enum EncodeError {
         /// Largest value that the format holds.
         most: usize,
     },
+    /// Networks and what stands before them do not go together: they are not equally many, or inputs or outputs differ.
+    #[error("network {index} does not fit what stands before it")]
+    UnfitFront {
+        /// Index of the network, from 0.
+        index: usize,
+    },
     /// A network has another number of inputs or outputs than network 0.
     #[error("network {index} has another shape than network 0")]
     UnequalNetworks {
         /// Index of the network, from 0.
         index: usize,
     },
-    /// The outputs of the one network behind a projection do not divide among the rows.
+    /// The outputs of networks that see whole frames do not divide among the rows.
     #[error("{outputs} outputs do not divide among {rows} rows")]
     UnevenRows {
-        /// Number of outputs of the network.
+        /// Number of outputs of all networks.
         outputs: usize,
         /// Number of rows.
         rows: usize,

@@ -9,7 +9,7 @@ use crate::rbf::Format;
 /// The first four bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"TAXL";
 /// Version of the blob format that this crate parses and encodes.
-pub const FORMAT_VERSION: u8 = 2;
+pub const FORMAT_VERSION: u8 = 3;
 
 /// Number of bytes before the postcard fields: magic, version, length.
 pub(super) const PREFIX_BYTES: usize = 9;
@@ -23,7 +23,7 @@ pub(super) const FLOAT_ALIGNMENT: usize = 4;
 pub(super) const TAG_METADATA: u8 = 0;
 /// Tag of a section without fields: the model's inputs are relative to the baseline.
 pub(super) const TAG_RELATIVE_INPUTS: u8 = 3;
-pub(super) const TAG_PROJECTION: u8 = 4;
+pub(super) const TAG_FRONT: u8 = 4;
 pub(super) const TAG_CONFIDENCE: u8 = 5;
 pub(super) const TAG_LINEAR: u8 = 6;
 pub(super) const TAG_FILL: u8 = 7;
@@ -96,11 +96,15 @@ impl RbfHeader {
     }
 }
 
-/// Header of the projection's section; padding and its floats follow.
+/// Header of what stands before a network that sees whole frames; padding and its floats follow.
 #[derive(Serialize, Deserialize)]
-pub(super) struct ProjectionHeader {
+pub(super) struct FrontHeader {
     pub tag: u8,
-    /// Number of features, which are the network's inputs.
+    /// Number of outputs of the network.
+    pub outputs: u16,
+    /// 0: readings as they are. 1: shape and strength, for outputs that are places. 2: for amounts.
+    pub kind: u8,
+    /// Number of features of the projection; 0 without one.
     pub features: u16,
 }
 
@@ -128,7 +132,7 @@ mod tests {
 
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
-        let others = [TAG_METADATA, TAG_PROJECTION, TAG_RELATIVE_INPUTS];
+        let others = [TAG_METADATA, TAG_FRONT, TAG_RELATIVE_INPUTS];
         let more = [TAG_CONFIDENCE, TAG_FILL, TAG_LINEAR];
         for tag in others.into_iter().chain(more) {
             assert_eq!(Format::from_tag(tag), None);

@@ -10,6 +10,7 @@ mod metadata;
 mod error;
 mod format;
 mod sections;
+mod front;
 mod decode;
 mod encode;
 
@@ -23,4 +24,5 @@ pub use encode::encode_to_vec;
 pub use encode::{ModelParts, encode, encoded_length_bound};
 pub use error::{DecodeError, EncodeError};
 pub use format::{FORMAT_VERSION, MAGIC};
+pub use front::{Front, MOST_FRONTS};
 pub use metadata::{Columns, Floats, Metadata, ModelShape, NoiseKind};

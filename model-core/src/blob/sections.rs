@@ -2,13 +2,12 @@
 
 use super::error::DecodeError;
 use super::format::{
-    ConfidenceHeader, FLOAT_ALIGNMENT, FillHeader, LinearSection, ProjectionHeader, TAG_CONFIDENCE,
-    TAG_FILL, TAG_LINEAR, TAG_PROJECTION, TAG_RELATIVE_INPUTS,
+    ConfidenceHeader, FLOAT_ALIGNMENT, FillHeader, LinearSection, TAG_CONFIDENCE, TAG_FILL,
+    TAG_LINEAR, TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Floats, ModelShape};
 use crate::confidence::{Confidence, Sizes};
 use crate::fill::{self, Fill};
-use crate::projection::{self, Projection};
 
 /// Takes the postcard fields `T` of a `section` from the front of `bytes`.
 pub(super) fn take<'a, T: serde::Deserialize<'a>>(
@@ -77,24 +76,6 @@ pub(super) fn take_linear(
     let bytes = shape.rows.saturating_mul(shape.outputs).saturating_mul(4);
     check_count("bytes of linear errors", bytes, section.rmse.len())?;
     Ok((Floats(section.rmse), rest))
-}
-
-/// Cuts the projection from the front of `bytes` if there is one, and checks it.
-pub(super) fn take_projection(
-    bytes: &[u8],
-    shape: ModelShape,
-) -> Result<(Option<Projection<'_>>, &[u8]), DecodeError> {
-    const SECTION: &str = "projection section";
-    if bytes.first() != Some(&TAG_PROJECTION) {
-        return Ok((None, bytes));
-    }
-    let (header, rest) = take::<ProjectionHeader>(bytes, SECTION)?;
-    let (readings, features) = (shape.rows * shape.inputs, header.features.into());
-    let floats = projection::block_floats(readings, features);
-    let (block, rest) = take_floats(rest, SECTION, "bytes of projection", floats)?;
-    let projection = Projection::new(readings, features, block)
-        .map_err(|cause| DecodeError::Projection { cause })?;
-    Ok((Some(projection), rest))
 }
 
 /// Cuts the confidence from the front of `bytes` if there is one, and checks it.

@@ -94,7 +94,13 @@
     bne 1f
     lsls r8, r3, #31 @ odd?
     mov r8, #18
-    bne 1f
+    beq 4f
+    vldmia r1!, {s31}
+    projection_line 18, s31
+    subs r3, #1
+    it eq
+    bxeq lr
+4:
     lsrs r3, r3, #2
     bcc 2f
     adds r3, #1

@@ -11,6 +11,7 @@ core::arch::global_asm!(
     include_str!("fixed16.s"),
     include_str!("mixture.s"),
     include_str!("projection.s"),
+    include_str!("touch.s"),
     options(raw)
 );
 
@@ -60,6 +61,16 @@ unsafe extern "C" {
         count: usize,
         features: usize,
     );
+    fn taxel_multiply(numbers: *mut f32, count: usize, factor: f32);
+    fn taxel_touch(
+        readings: *const f32,
+        pairs: *const [f32; 2],
+        shape: *mut f32,
+        count: usize,
+        reciprocals: *const f32,
+        floor: f32,
+        side: f32,
+    ) -> f32;
     fn taxel_density(component: *const f32, features: *const f32, count: usize, floor: f32) -> f32;
 }
 
@@ -98,6 +109,34 @@ pub(crate) unsafe fn project(block: &[f32], readings: &[f32], features: &mut [f3
     unsafe {
         taxel_project(readings.as_ptr(), block.as_ptr(), features.as_mut_ptr(), count, of);
     }
+}
+
+/// Multiplies all `numbers` by a `factor`.
+pub(crate) fn multiply(numbers: &mut [f32], factor: f32) {
+    // SAFETY: the routine reads and writes the numbers alone.
+    unsafe { taxel_multiply(numbers.as_mut_ptr(), numbers.len(), factor) }
+}
+
+/// Writes the shape of a touch, and returns its strength. `pairs` are level and threshold of each reading.
+///
+/// # Safety
+/// The caller must check that there are as many pairs, places of the shape and, if any, reciprocals as there are `readings`,
+/// which are not 0.
+#[inline(always)]
+pub(crate) unsafe fn touch(
+    pairs: &[[f32; 2]],
+    readings: &[f32],
+    reciprocals: Option<&[f32]>,
+    shape: &mut [f32],
+    [floor, side]: [f32; 2],
+) -> f32 {
+    let count = readings.len();
+    debug_assert!(count > 0 && pairs.len() == count && shape.len() == count);
+    debug_assert!(reciprocals.is_none_or(|of| of.len() == count));
+    let (pairs, shape) = (pairs.as_ptr(), shape.as_mut_ptr());
+    let reciprocals = reciprocals.map_or(core::ptr::null(), <[f32]>::as_ptr);
+    // SAFETY: the caller has checked the lengths.
+    unsafe { taxel_touch(readings.as_ptr(), pairs, shape, count, reciprocals, floor, side) }
 }
 
 /// Density of a mixture's component at `features`, as

@@ -136,7 +136,7 @@ fn look_at(model: &Model<'_>) {
 
 fn check(model: &Model<'_>, readings: &[f32], estimate: &Estimate<'_>) {
     let shape = model.shape();
-    let whole_array = model.projection().is_some();
+    let whole_array = model.whole_frames();
     for (row, status) in estimate.status.iter().enumerate() {
         let outputs = &estimate.outputs[row * shape.outputs..(row + 1) * shape.outputs];
         let of_row = row * shape.inputs..(row + 1) * shape.inputs;
@@ -145,8 +145,12 @@ fn check(model: &Model<'_>, readings: &[f32], estimate: &Estimate<'_>) {
         if *status == RowStatus::Decoded {
             assert!(outputs.iter().all(|y| y.is_finite()), "decoded to {outputs:?}");
             assert!(is_complete, "decoded without a reading");
+        } else if *status == RowStatus::NoTouch {
+            assert!(whole_array && is_complete, "no touch of {seen:?}");
         } else {
-            assert!(outputs.iter().all(|y| y.is_nan()), "{status:?}, and {outputs:?}");
+            // A frame's status is that of one of its networks.
+            let is_partial = whole_array && *status == RowStatus::Overflow;
+            assert!(is_partial || outputs.iter().all(|y| y.is_nan()), "{status:?}: {outputs:?}");
             let relative = model.metadata().relative_inputs;
             let is_missing = *status == RowStatus::MissingReading;
             assert!(relative || !is_missing || !is_complete, "missing in a whole frame");

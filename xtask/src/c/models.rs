@@ -1,13 +1,13 @@
-//! Models that are exported and tried: three shapes, each in every number format.
+//! Models that are exported and tried: four shapes, each in every number format.
 
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
-use taxel_data::dataset::Dataset;
+use taxel_data::dataset::{AtRest, Dataset};
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::confidence::{self, Density, HeldOut, Settings};
-use taxel_learn::train::train;
+use taxel_learn::train::{Features, Kinds, THRESHOLD, train};
 use taxel_learn::{ModelBlob, Options, Origin, fill, pack, relative};
 use taxel_simulate::{Synthesis, World};
 
@@ -18,6 +18,12 @@ const NOISE: f64 = 0.05;
 const FRAMES: usize = 1500;
 const SPREAD_OF_ARRAY: f64 = 0.4;
 
+/// Noise level below which a touch of a few cells stands out.
+const NOISE_OF_TOUCH: f64 = 0.003;
+
+/// Features that the place of a touch is inferred from.
+const FEATURES_OF_PLACE: usize = 5;
+
 /// Shape of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
@@ -27,25 +33,33 @@ pub enum Shape {
     Array,
     /// A mat of 4 × 7 cells: a network a row without affine tail, inputs relative to the baseline, a confidence.
     Mat,
+    /// Place, depth and force of a contact on 4 × 4 cells, by two networks behind shape and strength of the touch: the first
+    /// has a projection. In f32 inputs are relative to the baseline. In fixed16 they are not, and every other reading
+    /// moves the other way.
+    Touch,
 }
 
 impl Shape {
-    pub const ALL: [Self; 3] = [Self::Rows, Self::Array, Self::Mat];
+    pub const ALL: [Self; 4] = [Self::Rows, Self::Array, Self::Mat, Self::Touch];
 
     pub fn name(self) -> &'static str {
         match self {
             Self::Rows => "rows",
             Self::Array => "array",
             Self::Mat => "mat",
+            Self::Touch => "touch",
         }
     }
 
     fn world(self) -> World {
-        let mut world = World::press();
-        if self == Self::Mat {
-            world.read_rows = (0..4).collect();
-            world.sensor = world.sensor.with_columns(&[0, 3, 6, 8, 11, 14, 17]);
-        }
+        let columns: &[usize] = match self {
+            Self::Rows | Self::Array => return World::press(),
+            Self::Mat => &[0, 3, 6, 8, 11, 14, 17],
+            Self::Touch => &[3, 6, 11, 14],
+        };
+        let mut world = if self == Self::Touch { World::contact() } else { World::press() };
+        world.read_rows = (0..4).collect();
+        world.sensor = world.sensor.with_columns(columns);
         world
     }
 }
@@ -79,37 +93,61 @@ fn made(shape: Shape, format: Format, frames: usize) -> Outcome<Model> {
     let failed =
         |cause: taxel_learn::Error| format!("{} in {}: {cause}", shape.name(), format.name());
     let world = shape.world();
+    let noise = if shape == Shape::Touch { NOISE_OF_TOUCH } else { NOISE };
+    let all = Synthesis::new(&world).noise_level(noise);
+    let mirrors = shape == Shape::Touch && format == Format::Fixed16;
+    let rest = all.clone().untouched().frames(Stream::Calibration, FRAMES).inputs;
+    let at_rest = AtRest::of(&rest);
     let synthesis = |stream, frames| {
-        let dataset = Synthesis::new(&world).noise_level(NOISE).frames(stream, frames);
-        let baseline = means(&dataset.inputs);
+        let mut dataset = all.frames(stream, frames);
+        if mirrors {
+            let levels = at_rest.level.iter().cycle().enumerate();
+            let readings = dataset.inputs.values.iter_mut().zip(levels);
+            readings
+                .filter(|(_, (i, _))| i % 2 == 1)
+                .for_each(|(it, (_, level))| *it = 2.0 * level - *it);
+        }
+        let baseline = if shape == Shape::Touch { means(&rest) } else { means(&dataset.inputs) };
         (dataset, baseline)
     };
     let (dataset, baseline) = synthesis(Stream::Training, FRAMES);
     let (held_out, _) = synthesis(Stream::Calibration, FRAMES);
-    let of_model = |dataset: Dataset| match shape {
-        Shape::Mat => relative::dataset(dataset, &baseline),
+    let of_model = |dataset: Dataset| match (shape, format) {
+        (Shape::Mat, _) => relative::dataset(dataset, &baseline),
+        (Shape::Touch, Format::F32) => {
+            let at_rest = Some(AtRest::of(&relative::inputs(&rest, &baseline)));
+            Dataset { at_rest, ..relative::dataset(dataset, &baseline) }
+        }
+        (Shape::Touch, _) => Dataset { at_rest: Some(at_rest.clone()), ..dataset },
         _ => dataset,
     };
     let (dataset, held_out) = (of_model(dataset), of_model(held_out));
     let usual = Options::of_rows();
-    let array = shape == Shape::Array;
+    let kinds = Kinds::all(Features::Normalised { threshold: THRESHOLD });
     let options = Options {
         format,
         affine_tail: shape != Shape::Mat,
-        each_row: !array,
-        spread: if array { SPREAD_OF_ARRAY } else { usual.spread },
+        each_row: !matches!(shape, Shape::Array | Shape::Touch),
+        spread: if shape == Shape::Array { SPREAD_OF_ARRAY } else { usual.spread },
+        kinds: (shape == Shape::Touch).then_some(kinds),
         ..usual
     };
     let origin = Origin::of_data("press", 0, world.seed, &dataset);
-    let trained = train(&dataset, &options, &Silent).map_err(failed)?;
+    let mut trained = train(&dataset, &options, &Silent).map_err(failed)?;
+    if shape == Shape::Touch {
+        let projected = Options { features: Some(FEATURES_OF_PLACE), ..options };
+        let mut projected = train(&dataset, &projected, &Silent).map_err(failed)?;
+        trained.fronts[0] = projected.fronts.remove(0);
+        trained.networks[0] = projected.networks.remove(0);
+    }
     let mut blob = pack(&trained, &dataset, &origin).map_err(failed)?;
-    if shape != Shape::Rows {
+    if matches!(shape, Shape::Array | Shape::Mat) {
         let density = Density::fit(&dataset, &Settings::default());
         let mut others = HeldOut::default();
         others.add(&blob, &density, &held_out);
         blob = confidence::add(&blob, &density, &others).map_err(failed)?;
     }
-    if shape != Shape::Mat {
+    if matches!(shape, Shape::Rows | Shape::Array) {
         blob = fill::add(&blob, &dataset.inputs).map_err(failed)?;
     }
     let is_as_asked = blob.parse().networks().all(|network| network.format() == format);

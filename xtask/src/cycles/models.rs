@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
 use taxel_data::{Silent, Stream};
-use taxel_learn::train::train;
+use taxel_learn::train::{Features, Kinds, train};
 use taxel_learn::{ModelBlob, Options, Origin, pack};
 use taxel_simulate::outputs::{ContactOutput, ElectrodeOutputs, Outputs, Quantity};
 use taxel_simulate::sensor::{Axis, Sensor, default_lower_electrodes_mm};
@@ -30,6 +30,10 @@ enum Shape {
     Array,
     /// One network for all readings and the contact's place and force.
     Contact,
+    /// One network for all deformations, of shape and strength of a touch.
+    TouchArray,
+    /// A network for the contact's place and one for its force, of shape and strength of a touch.
+    TouchContact,
     /// A network for each of four rows of seven readings, to 6 compressions.
     Mat,
     /// A network for each of eight rows of 32 readings, to 6 compressions.
@@ -40,10 +44,12 @@ enum Shape {
 
 impl Shape {
     /// Every shape, with the numbers of centres that are accepted.
-    const ALL: [(Self, &'static [usize]); 6] = [
+    const ALL: [(Self, &'static [usize]); 8] = [
         (Self::Rows, &[16, 64]),
         (Self::Array, &[16, 64, 128]),
         (Self::Contact, &[64]),
+        (Self::TouchArray, &[64]),
+        (Self::TouchContact, &[64]),
         (Self::Mat, &[64]),
         (Self::Wide, &[64]),
         (Self::Row, &[64]),
@@ -54,6 +60,8 @@ impl Shape {
             Self::Rows => "8 x (18 -> 18)",
             Self::Array => "144 -> 144",
             Self::Contact => "144 -> 3",
+            Self::TouchArray => "touch 144 -> 144",
+            Self::TouchContact => "touch 144 -> 3",
             Self::Mat => "4 x (7 -> 6)",
             Self::Wide => "8 x (32 -> 6)",
             Self::Row => "1 x (12 -> 6)",
@@ -61,15 +69,19 @@ impl Shape {
     }
 
     fn is_array(self) -> bool {
-        matches!(self, Self::Array | Self::Contact)
+        self.is_touch() || matches!(self, Self::Array | Self::Contact)
+    }
+
+    fn is_touch(self) -> bool {
+        matches!(self, Self::TouchArray | Self::TouchContact)
     }
 
     fn world(self) -> World {
         let mut world = World::press();
         let z = ElectrodeOutputs { quantity: Quantity::Deformation, axes: vec![Axis::Z] };
         let (rows, columns) = match self {
-            Self::Rows | Self::Array => return world,
-            Self::Contact => {
+            Self::Rows | Self::Array | Self::TouchArray => return world,
+            Self::Contact | Self::TouchContact => {
                 let contact = vec![ContactOutput::Centre, ContactOutput::Force];
                 return World { outputs: Outputs::Contact(contact), ..world };
             }
@@ -155,7 +167,9 @@ fn made(format: Format, shape: Shape, centres: usize) -> Outcome<Model> {
     let usual = Options::of_rows();
     let each_row = !shape.is_array();
     let spread = if each_row { usual.spread } else { SPREAD_OF_ARRAY };
-    let options = Options { format, centres, each_row, spread, ..usual };
+    let features = Features::Normalised { threshold: 0.0 };
+    let kinds = shape.is_touch().then_some(Kinds::all(features));
+    let options = Options { format, centres, each_row, spread, kinds, ..usual };
     let origin = Origin::of_data("press", 0, world.seed, &dataset);
     let failed = |cause: taxel_learn::Error| format!("{} in {format:?}: {cause}", shape.name());
     let trained = train(&dataset, &options, &Silent).map_err(failed)?;

@@ -31,7 +31,7 @@ macro_rules! models {
 }
 models! {
     "kernels-f32.bin" "kernels-fixed16.bin" "array-f32.bin" "array-fixed16.bin" "array-fixed16-no-tail.bin"
-    "array-fixed16-confidence.bin"
+    "array-fixed16-confidence.bin" "array-touch.bin"
 }
 
 fn say(line: Arguments<'_>) {

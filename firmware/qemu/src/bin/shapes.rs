@@ -20,5 +20,6 @@ fn main() -> ! {
     let mut memory = unsafe { Memory::take(&peripherals.MPU) };
     log("fixed16", unwrap!(shapes::networks(&mut memory)));
     log("projection", unwrap!(shapes::projections(&mut memory)));
+    log("touch", unwrap!(shapes::touches(&mut memory)));
     exit::success()
 }

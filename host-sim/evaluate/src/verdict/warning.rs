@@ -286,7 +286,7 @@ fn smaller(bytes: usize, design: &Design) -> Vec<String> {
     );
     let readings = design.shape.rows * design.shape.inputs;
     let features = projection::usual_features(design.shape.rows, readings);
-    if !design.projection && features < readings {
+    if !design.whole_frames() && features < readings {
         let mut array =
             Design::of_array(design.shape, first.format, first.shape.centres, first.affine_tail);
         array.networks.iter_mut().for_each(|it| it.shape.inputs = features);

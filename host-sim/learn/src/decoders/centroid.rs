@@ -17,8 +17,8 @@ const PENALTY: f64 = 1e-9;
 
 /// Decoder of places from the centroid of a touch, and of loads from its strength.
 ///
-/// A cell's weight w is what its reading changes beyond [`THRESHOLD`], S is the sum of all. A place is affine in the
-/// centroid Σ w·(row, column)/S, a load is affine in S and √S.
+/// A cell's weight w is what its reading changes beyond three standard deviations at rest, S is the sum of all. A place is
+/// affine in the centroid Σ w·(row, column)/S, a load is affine in S and √S.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Centroid {
     /// Row-wire and column-wire of each reading, from 1.

@@ -57,7 +57,7 @@ pub fn source(model: &Model<'_>) -> Result<String, Unheld> {
 /// Networks of `model`, if a `Fixed` has room for all of it.
 fn held<'a>(model: &Model<'a>) -> Result<Vec<float32::Network<'a>>, Unheld> {
     let parts = [
-        (model.projection().is_some(), Unheld::Projection),
+        (model.whole_frames(), Unheld::Projection),
         (model.metadata().relative_inputs, Unheld::RelativeInputs),
         (model.confidence().is_some(), Unheld::Confidence),
         (model.fill().is_some(), Unheld::Fill),

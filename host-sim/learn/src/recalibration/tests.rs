@@ -112,7 +112,7 @@ fn errors_before_and_after_are_those_of_decoding_and_of_presses_that_no_fit_has_
         let model = blob.prepare();
         // Far beyond the clamp.
         let readings = drifted(&frames.inputs, &[1.3]);
-        let inputs = model.inputs_of_networks(&readings.values);
+        let inputs = model.inputs_of_networks(&readings.values).concat();
         let mut unit = Unit::new(0, &model, &inputs, &frames.outputs);
         assert_eq!(unit.numbers, (0..80).collect::<Vec<_>>());
         let decoded = model.decode_table(&readings);

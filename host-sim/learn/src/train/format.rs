@@ -10,7 +10,7 @@ use taxel_core::rbf::{self, Format, Network, NetworkError, Shape};
 
 use taxel_data::{RowTable, Table};
 
-use super::least_squares::{Decomposed, Design, Factor};
+use super::least_squares::{Decomposed, Design, Factor, Weighed, weighed};
 use super::samples::{Ridge, Samples};
 use super::tasks::{Factors, Task};
 use super::{HiddenLayer, Options, Solver};
@@ -66,9 +66,13 @@ impl FittedNetwork {
         left: &[f64],
     ) -> Result<Self> {
         let outputs = &table.outputs;
+        let weights = table.weights.as_deref();
         let predicted = infer(&self.network(), &table.inputs.values);
-        let found = outputs.squared_errors(&predicted);
-        let totals = column_squares(&targets.deviations.values, targets.outputs());
+        let truth = weighed(weights, &outputs.values).into_owned();
+        let truth = Table { names: outputs.names.clone(), values: truth };
+        let found = truth.squared_errors(&weighed(weights, &predicted));
+        let totals =
+            column_squares(&weighed(weights, &targets.deviations.values), targets.outputs());
         let errors = found.into_iter().zip(left).zip(totals).zip(&targets.means);
         for (output, ((((found, left), total), mean), count)) in
             errors.zip(outputs.counts()).enumerate()
@@ -208,11 +212,16 @@ impl<'s> Fit<'s> {
         let frames = self.frames[task.columns[0]];
         let (initial_covariance, of_tail) =
             (ridge.initial_covariance(frames), ridge.of_tail(frames));
-        let (targets, outputs) = (&*task.targets, task.columns.len());
+        let weights = task.table.weights.as_deref();
+        let (targets, outputs) = (&*weighed(weights, &task.targets), task.columns.len());
         let design = self.held.design(&task.table);
+        let design: &dyn Design = match weights {
+            Some(weights) => &Weighed { design: &*design, weights },
+            None => &*design,
+        };
         match self.solver {
             Solver::Qr => decomposed
-                .get_or_init(|| Decomposed::new(&*design, targets, outputs))
+                .get_or_init(|| Decomposed::new(design, targets, outputs))
                 .factor_with(|regressor| {
                     // Activations come first, then the inputs of the tail, then 1.
                     let last = design.regressors() - 1;
@@ -221,7 +230,7 @@ impl<'s> Fit<'s> {
                     let root = 1.0 / initial_covariance.sqrt();
                     if is_tail && of_tail > 0.0 { root.hypot(of_tail.sqrt()) } else { root }
                 }),
-            Solver::Rls => Factor::by_recursion(&*design, targets, outputs, initial_covariance),
+            Solver::Rls => Factor::by_recursion(design, targets, outputs, initial_covariance),
         }
     }
 
@@ -236,7 +245,8 @@ impl<'s> Fit<'s> {
     fn left(&self, factors: &Factors) -> Vec<f64> {
         // The squares of the targets without those along the regressors.
         let squares = |values: &[f64]| column_squares(values, self.targets.outputs());
-        let all = squares(&self.targets.deviations.values).into_iter();
+        let weights = self.table.weights.as_deref();
+        let all = squares(&weighed(weights, &self.targets.deviations.values)).into_iter();
         all.zip(squares(&factors.projection())).map(|(all, along)| (all - along).max(0.0)).collect()
     }
 }

@@ -4,6 +4,7 @@
 //! arrives at the same weights sample by sample. Taking many samples at once ([`Decomposed`]) changes the order of
 //! rounding only.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::parallel;
@@ -28,6 +29,38 @@ pub trait Design: Sync {
     /// It is called once for every sample, on any thread, a few samples at a time. The squares of the
     /// values, and sums of these over all samples, must fit an f64.
     fn fill(&self, samples: Range<usize>, values: &mut [f64]);
+}
+
+/// Regressors of samples times a factor on each sample's error. Targets are multiplied [alike](weighed).
+pub(crate) struct Weighed<'w> {
+    pub design: &'w dyn Design,
+    pub weights: &'w [f64],
+}
+
+impl Design for Weighed<'_> {
+    fn regressors(&self) -> usize {
+        self.design.regressors()
+    }
+
+    fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
+        let weights = &self.weights[samples.clone()];
+        self.design.fill(samples, values);
+        weigh(weights, values);
+    }
+}
+
+/// Multiplies each line of `values` by its weight.
+fn weigh(weights: &[f64], values: &mut [f64]) {
+    let lines = values.chunks_exact_mut(values.len() / weights.len().max(1)).zip(weights);
+    lines.for_each(|(line, weight)| line.iter_mut().for_each(|value| *value *= weight));
+}
+
+/// `targets` times the factors on the samples' errors, if these have any.
+pub(crate) fn weighed<'t>(weights: Option<&[f64]>, targets: &'t [f64]) -> Cow<'t, [f64]> {
+    let Some(weights) = weights else { return targets.into() };
+    let mut targets = targets.to_vec();
+    weigh(weights, &mut targets);
+    targets.into()
 }
 
 /// Triangular factor of a fit: the weights W solve R·W = z, and RᵀR is the information matrix Σ h hᵀ +

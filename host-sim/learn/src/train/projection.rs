@@ -35,7 +35,7 @@ const MOST_FACTORS: usize = 3;
 /// Number of features for so many `readings` of so many `rows`, unless a user says otherwise: as many as one row has
 /// readings, or [`USUAL_FEATURES`] for a single row table.
 pub fn usual_features(rows: usize, readings: usize) -> usize {
-    if rows > 1 { readings / rows } else { USUAL_FEATURES }
+    if rows > 1 { (readings / rows).min(USUAL_FEATURES) } else { USUAL_FEATURES }
 }
 
 /// Number of features that [`fit`] can give for `dataset`, if so many are `wanted`: fewer than the readings, and no more
@@ -48,8 +48,26 @@ pub fn features_at_most(dataset: &Dataset, wanted: usize) -> usize {
 /// Whether all readings of `dataset` can be projected to the [usual](usual_features) number of features.
 pub(super) fn is_usual_for(dataset: &Dataset) -> bool {
     let readings = dataset.inputs.names.len();
-    let usual = usual_features(dataset.rows, readings);
-    usual < readings && factors(&dataset.outputs, usual).len() >= usual
+    usual_features(dataset.rows, readings) < readings
+}
+
+/// Checks a number of features that all readings of `dataset` are to be projected to.
+///
+/// # Errors
+/// [`Error`] for a number of features that cannot be had.
+pub fn check(dataset: &Dataset, features: Option<usize>) -> Result<()> {
+    let readings = dataset.inputs.names.len();
+    if let Some(features) = features {
+        let possible = (1..=features_at_most(dataset, features)).contains(&features);
+        require(possible, "features", features, || {
+            format!(
+                "give from 1 to {}, fewer than the {readings} readings and no more than the {} outputs and their products",
+                features_at_most(dataset, readings),
+                dataset.outputs.names.len()
+            )
+        })?;
+    }
+    Ok(())
 }
 
 /// Fits the projection of `dataset`'s readings to so many `features`; by default to the [usual](usual_features) number,
@@ -62,26 +80,13 @@ pub(super) fn is_usual_for(dataset: &Dataset) -> bool {
 pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
     let readings = dataset.inputs.names.len();
     let usual = usual_features(dataset.rows, readings);
-    if let Some(features) = features {
-        let possible = (1..=features_at_most(dataset, features)).contains(&features);
-        require(possible, "features", features, || {
-            format!(
-                "give from 1 to {}, fewer than the {readings} readings and no more than the {} outputs and their products",
-                features_at_most(dataset, readings),
-                dataset.outputs.names.len()
-            )
-        })?;
-    }
+    check(dataset, features)?;
     let features = features.unwrap_or(usual);
     let targets = targets(&dataset.outputs, features);
     let features = features.min(targets.names.len());
-    let means = dataset.inputs.means();
-    let parts = directions(&dataset.inputs, &targets, features)?;
-    let parts: Vec<f64> = (0..readings)
-        .flat_map(|reading| (0..features).map(move |feature| (reading, feature)))
-        .map(|place| parts[place])
-        .collect();
-    about_means(&parts, &means)
+    let weights = dataset.weights.as_deref();
+    let parts = directions((&dataset.inputs, weights), &targets, features)?;
+    about_means(parts.transpose().as_slice(), &dataset.inputs.means())
 }
 
 /// Parameters of the projection with these `parts` (`readings × features`), whose features are 0 at the `means`
@@ -166,7 +171,7 @@ pub fn features(
 
 /// What the projection has to tell: the `outputs`, and where these are fewer than `features`, their products of two
 /// or three factors. Then all are about their means and have a standard deviation of 1.
-fn targets(outputs: &Table, features: usize) -> Cow<'_, Table> {
+pub(super) fn targets(outputs: &Table, features: usize) -> Cow<'_, Table> {
     let all = factors(outputs, features);
     if all.len() == outputs.names.len() {
         return Cow::Borrowed(outputs);
@@ -214,9 +219,13 @@ fn standardised(table: &Table) -> Table {
 }
 
 /// Each reading's part in every feature, one feature a column.
-fn directions(inputs: &Table, outputs: &Table, features: usize) -> Result<DMatrix<f64>> {
+fn directions(
+    (inputs, weights): (&Table, Option<&[f64]>),
+    outputs: &Table,
+    features: usize,
+) -> Result<DMatrix<f64>> {
     let readings = inputs.names.len();
-    let all = Covariances::new(inputs, outputs, readings);
+    let all = Covariances::new((inputs, weights), outputs);
     let (regression, predicted) = if outputs.values.iter().all(|value| !value.is_nan()) {
         let regression = all.regression()?;
         let predicted = all.with_outputs.tr_mul(&regression);
@@ -227,11 +236,10 @@ fn directions(inputs: &Table, outputs: &Table, features: usize) -> Result<DMatri
         for columns in outputs.missing_together() {
             let lines = outputs.lines_with(&columns);
             let all_inputs: Vec<usize> = (0..readings).collect();
-            let of_task = Covariances::new(
-                &inputs.part(&lines, &all_inputs),
-                &outputs.part(&lines, &columns),
-                readings,
-            );
+            let weights = weights.map(|it| lines.iter().map(|line| it[*line]).collect::<Vec<_>>());
+            let inputs = inputs.part(&lines, &all_inputs);
+            let of_task =
+                Covariances::new((&inputs, weights.as_deref()), &outputs.part(&lines, &columns));
             let parts = of_task.regression()?;
             for (column, part) in columns.iter().zip(parts.column_iter()) {
                 regression.column_mut(*column).copy_from(&part);
@@ -256,8 +264,10 @@ struct Covariances {
 }
 
 impl Covariances {
-    fn new(inputs: &Table, outputs: &Table, readings: usize) -> Self {
-        let products = products(inputs, outputs, &inputs.means());
+    fn new((inputs, weights): (&Table, Option<&[f64]>), outputs: &Table) -> Self {
+        let readings = inputs.names.len();
+        let means = [inputs, outputs].map(|table| means(table, weights)).concat();
+        let products = products((inputs, weights), outputs, &means);
         let width = readings + outputs.names.len();
         let mut of_readings =
             DMatrix::from_fn(readings, readings, |i, j| products[i.min(j) * width + i.max(j)]);
@@ -280,26 +290,43 @@ impl Covariances {
 }
 
 /// Sums Σ zᵢ·zⱼ over all frames for every i ≤ j, with z the readings and then the outputs, about their
-/// means. Pieces are added in their order, whatever the number of threads.
-fn products(readings: &Table, targets: &Table, means: &[f64]) -> Vec<f64> {
-    let means = [means, &targets.means()].concat();
+/// means, times the frame's weight. Pieces are added in their order, whatever the number of threads.
+pub(super) fn products(
+    (readings, weights): (&Table, Option<&[f64]>),
+    targets: &Table,
+    means: &[f64],
+) -> Vec<f64> {
     let width = means.len();
     let (inputs, outputs) = (readings.names.len(), targets.names.len());
     let of_piece = |piece| {
         let mut sums = vec![0.0; width * width];
         let readings = parallel::piece(&readings.values, FRAMES_AT_ONCE * inputs, piece);
         let targets = parallel::piece(&targets.values, FRAMES_AT_ONCE * outputs, piece);
-        for (readings, targets) in readings.chunks_exact(inputs).zip(targets.chunks_exact(outputs))
-        {
+        let lines = readings.chunks_exact(inputs).zip(targets.chunks_exact(outputs));
+        for (index, (readings, targets)) in lines.enumerate() {
+            let weight = weights.map_or(1.0, |it| it[piece * FRAMES_AT_ONCE + index]);
             // Readings in f32, as the device has them.
             let readings = readings.iter().map(|reading| f64::from(*reading as f32));
             let values = readings.chain(targets.iter().copied());
-            let z: Vec<f64> = values.zip(&means).map(|(value, mean)| value - mean).collect();
+            let z = values.zip(means).map(|(value, mean)| (value - mean) * weight);
+            let z: Vec<f64> = z.collect();
             widest!(add_products(&z, inputs, &mut sums));
         }
         sums
     };
     sum(&parallel::map(readings.len().div_ceil(FRAMES_AT_ONCE), &of_piece))
+}
+
+/// Mean of each column, in which lines count by the squares of their `weights`.
+pub(super) fn means(table: &Table, weights: Option<&[f64]>) -> Vec<f64> {
+    let Some(weights) = weights else { return table.means() };
+    let mut sums = vec![0.0; table.names.len()];
+    for (line, weight) in table.lines().zip(weights) {
+        sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += value * weight * weight);
+    }
+    let all: f64 = weights.iter().map(|weight| weight * weight).sum();
+    sums.iter_mut().for_each(|sum| *sum /= all);
+    sums
 }
 
 /// Sums of lists of the same length, added in their order.

@@ -2,10 +2,11 @@
 
 use std::borrow::Cow;
 
+use taxel_data::Silent;
 use taxel_data::dataset::Dataset;
 use taxel_learn::Options;
-use taxel_learn::train::Solver;
-use taxel_learn::train::projection::{self, features_at_most};
+use taxel_learn::train::projection::features_at_most;
+use taxel_learn::train::{Solver, Start};
 use taxel_simulate::Synthesis;
 use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
@@ -27,8 +28,6 @@ pub(super) struct Frames<'s> {
     pub wires: Option<Wires>,
     /// Time of a scan; `None` if it is unknown.
     pub scan_ms: Option<f64>,
-    /// Options for training, except for the settings that the plan varies.
-    pub options: Options,
     pub set: TrainingSet<'s>,
     /// Moving contacts that points are judged by; `None` for still frames.
     pub touches: Option<Touches<'s>>,
@@ -41,14 +40,16 @@ pub(super) struct Frames<'s> {
 
 /// What networks see of a frame.
 pub(super) struct Inputs {
-    /// Projection of the whole array; `None` if each network sees the readings of its row.
-    pub projection: Option<Vec<f32>>,
+    /// Options for training these networks, but for their number of centres.
+    pub options: Options,
+    /// What training of each network, or of all networks of rows, starts from.
+    pub starts: Vec<Start<'static>>,
 }
 
 impl Inputs {
     /// Whether each row has a network of its own.
     pub fn each_row(&self) -> bool {
-        self.projection.is_none()
+        self.options.each_row
     }
 }
 
@@ -92,13 +93,14 @@ impl<'s> Frames<'s> {
             options.features = options.features.map(possible);
         }
         let each_row: &[bool] = match (of_array, set.frames.rows) {
-            (true, _) => &[false],
-            (false, 1) => &[true],
+            (true, _) | (false, 1) => &[false],
             (false, _) => &[true, false],
         };
         let inputs = |&each_row: &bool| {
-            let fit = || projection::fit(&set.frames, options.features);
-            Ok(Inputs { projection: (!each_row).then(fit).transpose()? })
+            let mut options = options.for_each_row(each_row);
+            let _ = set.choose(&mut options, &Silent);
+            let starts = Start::all(&set.frames, &options)?;
+            Ok(Inputs { options, starts: starts.into_iter().map(Start::into_owned).collect() })
         };
         let inputs = each_row.iter().map(inputs).collect::<Result<_>>()?;
         let scan_ms = plan.device.scan_ms(wires, samples_averaged);
@@ -107,7 +109,6 @@ impl<'s> Frames<'s> {
             noise,
             wires,
             scan_ms,
-            options,
             set,
             touches,
             others: OtherContacts::new(subject, noise, group),

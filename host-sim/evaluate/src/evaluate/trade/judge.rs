@@ -5,7 +5,7 @@ use taxel_core::filter::{Settings, Track};
 use taxel_core::rbf::Format;
 use taxel_data::progress::Progress;
 use taxel_learn::cost::{Cost, DecoderRam, Design};
-use taxel_learn::train::{Examples, FittedNetwork, Layers, Refinement, Samples, refine};
+use taxel_learn::train::{Examples, FittedNetwork, Refinement, Samples, Start, refine};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 
 use super::progress::Part;
@@ -40,17 +40,19 @@ impl Judged {
         progress: &dyn Progress,
     ) -> Result<()> {
         let frames = ways.frames;
-        let (projection, fitted) = fit(ways, progress)?;
+        let fitted = fit(ways, progress)?;
         for (index, format) in formats().enumerate() {
-            let of_rows = fitted.iter().map(|row| row[index].as_ref().cloned());
-            let networks = match of_rows.collect::<std::result::Result<_, _>>() {
-                Ok(networks) => networks,
-                Err(cause) => {
-                    self.leave_out(format, ways, cause);
-                    continue;
-                }
-            };
-            let trained = Trained { projection: projection.clone(), networks };
+            let mut trained = Trained::default();
+            let added = ways.inputs.starts.iter().zip(&fitted).try_for_each(|(start, fitted)| {
+                let of_rows = fitted.networks.iter().map(|row| row[index].as_ref().cloned());
+                let networks = of_rows.collect::<std::result::Result<Vec<_>, _>>()?;
+                trained.add(start, fitted.projection.as_ref(), networks);
+                Ok(())
+            });
+            if let Err(cause) = added {
+                self.leave_out(format, ways, cause);
+                continue;
+            }
             let origin = &frames.set.origin;
             let noise = (origin.noise.0, frames.noise_level());
             let origin = Origin { noise, ..origin.clone() };
@@ -144,11 +146,11 @@ pub(super) fn steps(ways: &Ways<'_>) -> usize {
 
 /// Steps of refinement, and of fitting weights, which take about as long each.
 fn parts(Ways { frames, inputs, .. }: &Ways<'_>) -> [usize; 2] {
-    let networks = if inputs.each_row() { frames.training().rows } else { 1 };
+    let networks = if inputs.each_row() { frames.training().rows } else { inputs.starts.len() };
     let steps = Refinement::default().steps;
     let refining = match frames.set.examples() {
         None => 0,
-        Some(Examples::Fresh(_)) => steps,
+        Some(Examples::Fresh(_)) => steps * inputs.starts.len(),
         Some(Examples::Folds(_)) => refine::fold_steps(steps, networks),
     };
     [refining, networks]
@@ -163,35 +165,43 @@ fn weight(centres: usize) -> usize {
 /// Networks of a row, or of the whole array: one of each format, or why there is none.
 type OfFormats = Vec<taxel_learn::Result<FittedNetwork>>;
 
-/// Networks of every format on the same layers, for every row, and their projection.
+/// Networks that share layers, of every format for every row, and the projection in front of them.
+struct Fitted {
+    projection: Option<Vec<f32>>,
+    networks: Vec<OfFormats>,
+}
+
+/// Networks of every format on the same layers, for each start of training.
 fn fit(
     ways @ Ways { frames, inputs, centres }: &Ways<'_>,
     progress: &dyn Progress,
-) -> Result<(Option<Vec<f32>>, Vec<OfFormats>)> {
-    let dataset = frames.training();
-    let own = frames.options.for_each_row(inputs.each_row());
-    let centres = *centres;
-    let mut options = Options { centres, ..own };
-    options.check_for(dataset)?;
-    let [refining, fitting] = parts(ways).map(|steps| Part::new(progress, steps, weight(centres)));
-    // Layers are shared by all formats.
-    let mut layers = Layers::behind(inputs.projection.clone(), dataset, &options);
-    if let Some(examples) = frames.set.examples() {
-        let settings = Refinement::default();
-        layers = refine::refine(dataset, &layers, &options, &settings, examples, &refining)?;
-        options = settings.options(&options);
-    }
+) -> Result<Vec<Fitted>> {
+    let own = Options { centres: *centres, ..inputs.options };
+    own.check_for(frames.training())?;
+    let [refining, fitting] = parts(ways).map(|steps| Part::new(progress, steps, weight(*centres)));
+    let of_start = |start| {
+        // Layers are shared by all formats.
+        let start: &Start<'_> = start;
+        let (mut layers, mut options) = (start.layers(&own), own);
+        if let Some(examples) = frames.set.examples() {
+            let settings = Refinement::default();
+            layers = start.refine(&layers, &own, &settings, examples, &refining)?;
+            options = settings.options(&own);
+        }
+        let rows = layers.hidden.par_iter().enumerate();
+        let fitted = rows.map(|(row, layer)| {
+            let table = layers.seen.row_table(row);
+            let samples = Samples::new(&table);
+            let fit = |format| samples.fit_layer(layer, &Options { format, ..options });
+            let fitted = formats().collect::<Vec<_>>().into_par_iter().map(fit).collect();
+            fitting.step();
+            fitted
+        });
+        let networks = fitted.collect();
+        Ok(Fitted { projection: layers.projection, networks })
+    };
+    let fitted = inputs.starts.iter().map(of_start).collect();
     refining.finish();
-    let rows = layers.hidden.par_iter().enumerate();
-    let fitted = rows.map(|(row, layer)| {
-        let table = layers.seen.row_table(row);
-        let samples = Samples::new(&table);
-        let fit = |format| samples.fit_layer(layer, &Options { format, ..options });
-        let fitted = formats().collect::<Vec<_>>().into_par_iter().map(fit).collect();
-        fitting.step();
-        fitted
-    });
-    let fitted = fitted.collect();
     fitting.finish();
-    Ok((layers.projection, fitted))
+    fitted
 }

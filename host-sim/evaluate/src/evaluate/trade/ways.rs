@@ -4,10 +4,9 @@
 use std::collections::HashSet;
 
 use taxel_core::blob::ModelShape;
-use taxel_core::rbf::Format;
-use taxel_data::dataset::Dataset;
-use taxel_learn::cost::{Cost, Design};
-use taxel_learn::train::projection;
+use taxel_core::rbf::{Format, Shape};
+use taxel_learn::cost::{Cost, Design, NetworkDesign};
+use taxel_learn::train::{Start, projection};
 
 use super::choice::Offer;
 use super::frames::{Frames, Inputs};
@@ -39,7 +38,7 @@ impl<'f> Ways<'f> {
         let dataset = self.frames.training();
         let columns = dataset.inputs.names.iter().chain(&dataset.outputs.names);
         let names_bytes: usize = columns.map(|name| name.len() + 1).sum();
-        let distinct = distinct_samples(dataset, self.inputs, self.centres);
+        let distinct = distinct_samples(self.inputs, self.centres);
         let mut offers = Vec::new();
         for format in formats() {
             let design = self.design(format, &distinct);
@@ -63,14 +62,19 @@ impl<'f> Ways<'f> {
             inputs: of_row(&dataset.inputs.names),
             outputs: of_row(&dataset.outputs.names),
         };
-        let mut design = match &self.inputs.projection {
-            None => Design::of_rows(shape, format, centres, true),
-            Some(parameters) => {
-                let mut design = Design::of_array(shape, format, centres, true);
-                let features = parameters.len() / (dataset.inputs.names.len() + 1);
-                design.networks.iter_mut().for_each(|network| network.shape.inputs = features);
-                design
-            }
+        let mut design = if self.inputs.each_row() {
+            Design::of_rows(shape, format, centres, true)
+        } else {
+            let mut design = Design::of_array(shape, format, centres, true);
+            let of_start = |start: &Start<'_>| {
+                let inputs = start.frames.inputs.names.len();
+                let features = start.projection.as_ref().map(|it| it.len() / (inputs + 1));
+                let outputs = start.group.outputs.len();
+                let shape = Shape { inputs: features.unwrap_or(inputs), centres, outputs };
+                NetworkDesign { shape, ..design.networks[0] }
+            };
+            design.networks = self.inputs.starts.iter().map(of_start).collect();
+            design
         };
         for (network, most) in design.networks.iter_mut().zip(distinct) {
             network.shape.centres = centres.min(*most);
@@ -81,20 +85,23 @@ impl<'f> Ways<'f> {
 }
 
 /// Number of distinct samples of each network's inputs, counted up to `most`: networks have no more centres.
-fn distinct_samples(dataset: &Dataset, inputs: &Inputs, most: usize) -> Vec<usize> {
-    let seen = projection::seen(inputs.projection.as_deref(), dataset);
-    let of_row = seen.inputs.names.len() / seen.rows;
-    let distinct = |row: usize| {
-        let mut found: HashSet<Vec<u32>> = HashSet::new();
-        for line in seen.inputs.lines() {
-            let sample = &line[row * of_row..][..of_row];
-            // Zero of either sign is one number.
-            found.insert(sample.iter().map(|value| (*value as f32 + 0.0).to_bits()).collect());
-            if found.len() == most {
-                break;
+fn distinct_samples(inputs: &Inputs, most: usize) -> Vec<usize> {
+    let of_start = |start: &Start<'_>| {
+        let seen = projection::seen(start.projection.as_deref(), &start.frames);
+        let of_row = seen.inputs.names.len() / seen.rows;
+        let distinct = |row: usize| {
+            let mut found: HashSet<Vec<u32>> = HashSet::new();
+            for line in seen.inputs.lines() {
+                let sample = &line[row * of_row..][..of_row];
+                // Zero of either sign is one number.
+                found.insert(sample.iter().map(|value| (*value as f32 + 0.0).to_bits()).collect());
+                if found.len() == most {
+                    break;
+                }
             }
-        }
-        found.len()
+            found.len()
+        };
+        (0..seen.rows).map(distinct).collect::<Vec<_>>()
     };
-    (0..seen.rows).map(distinct).collect()
+    inputs.starts.iter().flat_map(of_start).collect()
 }

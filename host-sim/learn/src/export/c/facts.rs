@@ -95,10 +95,11 @@ impl<'b> Facts<'b> {
             ("DECODED", RowStatus::Decoded),
             ("MISSING_READING", RowStatus::MissingReading),
             ("OVERFLOW", RowStatus::Overflow),
+            ("NO_TOUCH", RowStatus::NoTouch),
         ] {
             values.set(key, status as u8);
         }
-        let array = model.projection().is_some();
+        let array = model.whole_frames();
         values.set("OR_ANOTHER_ROWS", said(array, ", or one of another row"));
         values.set("NETWORKS", self.networks());
         values.set("CONSTANT_BYTES", self.constant_bytes);

@@ -3,7 +3,9 @@
 use taxel_core::blob::Model;
 use taxel_core::rbf::NetworkError;
 use taxel_core::relative::reciprocal;
+use taxel_core::touch::{Strengths, Touch};
 use taxel_core::{Decoder, Frame, OwnedEstimate, RowStatus};
+use taxel_data::exp;
 
 use super::numbers::{array, table, word};
 use crate::error::{Error, Result};
@@ -69,26 +71,31 @@ fn bits(values: &[f32]) -> Vec<String> {
     values.iter().map(|value| word(value.to_bits())).collect()
 }
 
-/// A baseline, and frames: two within the range of training, the second with a reading far beyond it; and the first one
-/// with a missing reading.
+/// A baseline, and frames: two within the range of training, the second with a reading far beyond it; the first one with
+/// a missing reading; and, if networks see the shape of a touch, one without a touch.
 fn frames(model: &Model<'_>) -> (Vec<f32>, Vec<Vec<f32>>) {
     let shape = model.shape();
     let count = shape.rows * shape.inputs;
     let relative = model.metadata().relative_inputs;
     let baseline: Vec<f32> =
         (0..count).map(|i| if relative { 40.0 + (i % 7) as f32 } else { 1.0 }).collect();
-    let frame = |number: usize| -> Vec<f32> {
-        let inputs = match model.projection() {
-            Some(_) => of_array(model, number * count),
-            None => of_rows(model, number * count),
-        };
+    let readings = |inputs: Vec<f32>| -> Vec<f32> {
         inputs.iter().zip(&baseline).map(|(input, baseline)| input * baseline).collect()
+    };
+    let touch = model.fronts().find_map(|front| front.touch);
+    let frame = |number: usize| {
+        readings(match touch {
+            Some(touch) => of_touch(&touch, number),
+            None if model.whole_frames() => of_array(model, number * count),
+            None => of_rows(model, number * count),
+        })
     };
     let (within, mut beyond) = (frame(0), frame(1));
     beyond[count - 1] *= 4.0;
     let mut missing = within.clone();
     missing[0] = f32::NAN;
-    (baseline, vec![within, beyond, missing])
+    let at_rest = touch.map(|it| readings(pairs(&it).iter().map(|[level, _]| *level).collect()));
+    (baseline, [within, beyond, missing].into_iter().chain(at_rest).collect())
 }
 
 /// Numbers from 0 to 1 that are spread well: multiples of the golden ratio, without their whole part.
@@ -96,22 +103,47 @@ fn spread(index: usize) -> f64 {
     (index as f64 * 0.618_033_988_75).fract()
 }
 
-/// Inputs of networks of single rows, within their range of training.
+/// Inputs of networks of single rows, or of one that is given all readings, within their range of training.
 fn of_rows(model: &Model<'_>, start: usize) -> Vec<f32> {
     let (shape, networks) = (model.shape(), model.networks().collect::<Vec<_>>());
     let input = |place: usize| {
         let network = networks[model.network_of_row(place / shape.inputs).unwrap_or_default()];
-        let [low, high] = network.training_range(place % shape.inputs).map(f64::from);
+        let inputs = network.shape().inputs;
+        let [low, high] = network.training_range(place % inputs).map(f64::from);
         (low + (high - low) * spread(start + place)) as f32
     };
     (0..shape.rows * shape.inputs).map(input).collect()
 }
 
+/// Level at rest and threshold of each reading.
+fn pairs<'m>(touch: &Touch<'m>) -> &'m [[f32; 2]] {
+    let block = touch.block();
+    block[block.len() - 2 * touch.readings()..].as_chunks().0
+}
+
+/// Inputs of a touch of half the largest strength, which spreads over neighbouring readings. Its `number` says where, and
+/// to which side it moves them if they may move to either.
+fn of_touch(touch: &Touch<'_>, number: usize) -> Vec<f32> {
+    let Strengths { most, side, .. } = touch.strengths();
+    let strength = 0.5 * f64::from(most);
+    let side = if side == 0.0 { [1.0, -1.0][number % 2] } else { f64::from(side) };
+    let count = touch.readings();
+    let centre = count as f64 * spread(1 + number);
+    let share = |reading: usize| exp(-(reading as f64 - centre).powi(2) / 4.0);
+    let sum: f64 = (0..count).map(share).sum();
+    let input = |(reading, [level, threshold]): (usize, &[f32; 2])| {
+        let change = f64::from(*threshold) + strength * share(reading) / sum;
+        (f64::from(*level) + side * change) as f32
+    };
+    pairs(touch).iter().enumerate().map(input).collect()
+}
+
 /// Readings of an array whose features are within their range of training, by Kaczmarz's method from a mean frame on, if
-/// the model knows one.
+/// the model knows one. Without a projection, the readings themselves are.
 fn of_array(model: &Model<'_>, start: usize) -> Vec<f32> {
-    let (Some(projection), Some(network)) = (model.projection(), model.networks().next()) else {
-        return Vec::new();
+    let projection = model.fronts().find_map(|front| front.projection);
+    let (Some(projection), Some(network)) = (projection, model.networks().next()) else {
+        return of_rows(model, start);
     };
     let (features, count) = (projection.features(), projection.readings());
     let mean = model.fill().map(|it| it.block()).or(model.confidence().map(|it| it.block()));

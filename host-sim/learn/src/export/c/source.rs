@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use taxel_core::blob::Model;
+use taxel_core::blob::{Front, Model};
 use taxel_core::exp::{EXP_COEFFICIENTS, LN_2_PARTS};
 use taxel_core::rbf::{Format, Network, fixed16, float32};
+use taxel_core::touch::Kind;
 
 use super::name::Name;
 use super::numbers::{array, float, floats, string, word, words};
@@ -14,8 +15,10 @@ use crate::error::Result;
 
 const HEADER: &str = include_str!("source/model.h");
 const START: &str = include_str!("source/start.c");
+const READINGS: &str = include_str!("source/readings.c");
 const FLOAT32: &str = include_str!("source/float32.c");
 const FIXED16: &str = include_str!("source/fixed16.c");
+const PART: &str = include_str!("source/part.c");
 const DECODE: &str = include_str!("source/decode.c");
 const CONFIDENCE: &str = include_str!("source/confidence.c");
 const FILL: &str = include_str!("source/fill.c");
@@ -23,24 +26,85 @@ const END: &str = include_str!("source/end.c");
 
 /// Flags of a model, by which parts of templates are chosen.
 pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
-    let has = |format| model.networks().any(|network| network.format() == format);
-    let (array, confidence) = (model.projection().is_some(), model.confidence().is_some());
+    let is_f32 = model.networks().any(|network| network.format() == Format::F32);
+    let (array, confidence) = (model.whole_frames(), model.confidence().is_some());
     let fill = model.fill().is_some();
     let affine = model.networks().any(|network| network.has_affine_tail());
+    let touches = model.fronts().any(|front| front.touch.is_some());
     let flags = [
-        ("f32", has(Format::F32)),
-        ("fixed16", has(Format::Fixed16)),
         ("affine", affine),
         ("rows", !array),
         ("array", array),
         ("relative", model.metadata().relative_inputs),
         ("confidence", confidence),
         ("fill", fill),
-        ("project", array || confidence),
+        ("touches", touches),
+        ("bits", confidence || touches),
+        ("project", confidence || model.fronts().any(|front| front.projection.is_some())),
         ("root", confidence || fill),
-        ("exp", confidence || has(Format::F32)),
+        ("exp", confidence || is_f32),
     ];
-    flags.into_iter().filter(|(_, set)| *set).map(|(flag, _)| flag).collect()
+    those_set(&flags)
+}
+
+fn those_set(flags: &[(&'static str, bool)]) -> Vec<&'static str> {
+    flags.iter().filter(|(_, set)| *set).map(|(flag, _)| *flag).collect()
+}
+
+/// Networks of one shape: those of all rows, or one that sees whole frames.
+struct Part<'m> {
+    networks: Vec<(usize, Network<'m>)>,
+    /// What stands before the network of whole frames.
+    front: Option<Front<'m>>,
+    /// End of the names of its functions and tables.
+    suffix: String,
+}
+
+impl<'m> Part<'m> {
+    fn all(model: &Model<'m>) -> Vec<Self> {
+        let networks = model.networks().enumerate();
+        if !model.whole_frames() {
+            let suffix = String::new();
+            return vec![Self { networks: networks.collect(), front: None, suffix }];
+        }
+        let of_frames = |(network, front): ((usize, _), _)| {
+            let suffix = format!("_{}", network.0);
+            Self { networks: vec![network], front: Some(front), suffix }
+        };
+        networks.zip(model.fronts()).map(of_frames).collect()
+    }
+
+    fn has(&self, format: Format) -> bool {
+        self.networks.iter().any(|(_, network)| network.format() == format)
+    }
+
+    /// Its own flags, in a model whose inputs may be `relative`.
+    fn flags(&self, relative: bool) -> Vec<&'static str> {
+        let kind = self.front.and_then(|front| front.touch).map(|touch| touch.kind());
+        those_set(&[
+            ("f32", self.has(Format::F32)),
+            ("touch", kind.is_some()),
+            ("ratios", kind.is_none() && relative),
+            ("place", kind == Some(Kind::Place)),
+            ("amount", kind == Some(Kind::Amount)),
+            ("projection", self.front.is_some_and(|front| front.projection.is_some())),
+        ])
+    }
+
+    /// Macros of its sizes, which are undefined behind it.
+    fn sizes(&self, readings: usize) -> String {
+        let Some((_, network)) = self.networks.first() else { return String::new() };
+        let shape = network.shape();
+        let mut sizes = vec![("INPUTS", shape.inputs), ("NETWORK_OUTPUTS", shape.outputs)];
+        if let Some(front) = self.front {
+            sizes.push(("SEEN", front.touch.map_or(readings, |it| it.inputs())));
+            sizes.push(("PROJECTED", front.projection.map_or(0, |it| it.features())));
+        }
+        if self.has(Format::Fixed16) {
+            sizes.push(("SQUARE_SHIFT", fixed16::square_shift(shape.inputs) as usize));
+        }
+        macros(&sizes)
+    }
 }
 
 /// The header.
@@ -58,17 +122,32 @@ pub fn code(model: &Model<'_>, name: &Name, flags: &[&str], facts: &mut Values) 
         "NAMES",
         names.map(|name| format!("        {},\n", string(name))).collect::<Vec<_>>().concat(),
     );
-    let has = |flag| flags.contains(&flag);
-    let text = |template| fill(template, name, flags, facts);
-    let mut code = text(START);
-    for (format, template) in [("f32", FLOAT32), ("fixed16", FIXED16)] {
-        if has(format) {
-            code += &text(template);
+    let mut code = fill(START, name, flags, facts) + &fill(READINGS, name, flags, facts);
+    let (mut calls, mut outputs, mut written) = (String::new(), 0, Vec::new());
+    for part in Part::all(model) {
+        let suffix = &part.suffix;
+        facts.set("OF", suffix);
+        code += &part.sizes(model.shape().rows * model.shape().inputs);
+        let own = part.flags(model.metadata().relative_inputs);
+        for (format, template) in [(Format::F32, FLOAT32), (Format::Fixed16, FIXED16)] {
+            if part.has(format) {
+                let first = if written.contains(&format) { "" } else { "first" };
+                code += &fill(template, name, &[flags, &[first]].concat(), facts);
+                written.push(format);
+            }
+        }
+        code += &tables(model, &part);
+        code += &fill(PART, name, &[flags, &own].concat(), facts);
+        if let Some(front) = part.front {
+            let given = format!("readings, outputs + {outputs}, &worst, scratch");
+            let _ = writeln!(calls, "    clamped |= decode_part{suffix}({given});");
+            outputs += front.outputs;
         }
     }
-    code += &networks(model);
+    facts.set("PARTS", calls);
+    let text = |template| fill(template, name, flags, facts);
     code += &text(DECODE);
-    if has("confidence") {
+    if flags.contains(&"confidence") {
         code += &confidence(model);
         code += &text(CONFIDENCE);
     }
@@ -82,26 +161,23 @@ pub fn code(model: &Model<'_>, name: &Name, flags: &[&str], facts: &mut Values) 
     Ok(code + &text(END))
 }
 
-/// Macros of all sizes.
+/// Macros of the sizes of a model.
 fn sizes(model: &Model<'_>) -> String {
     let shape = model.shape();
-    let of_network = model.networks().next().map(|network| network.shape());
-    let (inputs, outputs) = of_network.map_or((0, 0), |it| (it.inputs, it.outputs));
     let mut sizes = vec![
         ("ROWS", shape.rows),
         ("READINGS", shape.rows * shape.inputs),
         ("OUTPUTS", shape.rows * shape.outputs),
-        ("INPUTS", inputs),
-        ("NETWORK_OUTPUTS", outputs),
     ];
-    if model.networks().any(|network| network.format() == Format::Fixed16) {
-        sizes.push(("SQUARE_SHIFT", fixed16::square_shift(inputs) as usize));
-    }
     if let Some(confidence) = model.confidence() {
         let of = confidence.sizes();
         sizes.extend([("DIRECTIONS", of.directions), ("COMPONENTS", of.components)]);
     }
     sizes.extend(model.fill().map(|fill| ("FACTORS", fill.factors())));
+    macros(&sizes)
+}
+
+fn macros(sizes: &[(&str, usize)]) -> String {
     let lines = sizes.iter().map(|(name, size)| format!("#define {name} {size}u\n"));
     lines.collect::<Vec<_>>().concat()
 }
@@ -119,16 +195,18 @@ fn tell_constants(facts: &mut Values) {
     }
 }
 
-/// Tables of all networks and of what lies around them, and the function that infers by one of them.
-fn networks(model: &Model<'_>) -> String {
+/// Tables of the networks of a part and of what stands before them, and the function that infers by one of them.
+fn tables(model: &Model<'_>, part: &Part<'_>) -> String {
     let any_affine = model.networks().any(|network| network.has_affine_tail());
     let (mut tables, mut cases) = (String::new(), Vec::new());
-    for (index, network) in model.networks().enumerate() {
+    let suffix = &part.suffix;
+    for (index, network) in &part.networks {
         let of = |part: &str| format!("network_{index}_{part}");
         let (kind, affine, fields) = match network {
             Network::F32(inner) => float32(inner.parameters(), &of, &mut tables),
             Network::Fixed16(inner) => fixed16(&inner.parameters(), &of, &mut tables),
         };
+        let call = format!("infer_{kind}{suffix}(&network_{index}, inputs, scratch, outputs)");
         let affine = match (any_affine, affine) {
             (false, _) => String::new(),
             (true, true) => format!(", {}", of("affine")),
@@ -139,15 +217,23 @@ fn networks(model: &Model<'_>) -> String {
             tables,
             "static const struct {kind} network_{index} = {{\n    {fields}{affine}\n}};\n\n"
         );
-        cases.push(format!("return infer_{kind}(&network_{index}, inputs, scratch, outputs);\n"));
+        cases.push(format!("return {call};\n"));
     }
-    if let Some(projection) = model.projection() {
-        tables += &floats("projection", projection.block());
+    if let Some(front) = part.front {
+        if let Some(touch) = front.touch {
+            tables += &floats(&format!("touch{suffix}"), touch.block());
+        }
+        if let Some(projection) = front.projection {
+            tables += &floats(&format!("projection{suffix}"), projection.block());
+        }
     } else {
         let rows = (0..model.shape().rows).filter_map(|row| model.network_of_row(row));
         tables += &array("uint8_t", "row_network", rows.map(|network| network.to_string()));
     }
-    tables += "\nstatic int infer(unsigned network, const float *inputs, float *scratch, float *outputs)\n{\n";
+    let _ = write!(
+        tables,
+        "\nstatic int infer{suffix}(unsigned network, const float *inputs, float *scratch, float *outputs)\n{{\n"
+    );
     let last = cases.pop().unwrap_or_default();
     if cases.is_empty() {
         return tables + "    (void)network;\n    " + &last + "}\n\n";
@@ -233,10 +319,5 @@ fn confidence(model: &Model<'_>) -> String {
         rest = after;
     }
     let threshold = block.last().copied().unwrap_or_default();
-    let reading =
-        if model.metadata().relative_inputs { "relative(readings, i)" } else { "readings[i]" };
-    format!(
-        "{text}#define NOVELTY_THRESHOLD {}\n#define READING(i) {reading}\n\n",
-        float(threshold)
-    )
+    format!("{text}#define NOVELTY_THRESHOLD {}\n\n", float(threshold))
 }

@@ -101,14 +101,14 @@ impl Movable {
         let mut regressors = exponents.clone();
         for line in &mut regressors {
             widest!(exponentiate_non_positive(line));
-            line[piece.samples..].fill(0.0);
         }
         if affine_tail {
             regressors.extend_from_slice(&mixed);
         }
-        let mut ones = [0.0; SIDE];
-        ones[..piece.samples].fill(1.0);
-        regressors.push(ones);
+        for line in &mut regressors {
+            line.iter_mut().zip(&piece.weights).for_each(|(value, weight)| *value *= weight);
+        }
+        regressors.push(piece.weights);
         Activated { mixed, exponents, regressors }
     }
 
@@ -137,8 +137,7 @@ impl Movable {
             gradient[width_place] += sums.iter().sum::<f64>();
         }
 
-        let ones = activated.regressors.last().expect("the bias's regressor");
-        let with_one: Vec<Line> = activated.mixed.iter().chain([ones]).copied().collect();
+        let with_one: Vec<Line> = activated.mixed.iter().copied().chain([[1.0; SIDE]]).collect();
         let mut sums = vec![0.0; centres * (inputs + 1)];
         add_products(&by_exponents, &with_one, &mut sums);
         let lines = self.centres().chunks_exact(inputs).zip(sums.chunks_exact(inputs + 1));
@@ -155,7 +154,7 @@ impl Movable {
             add_combinations(&vec![1.0; centres], &by_exponents, &mut total);
             for (j, (by_mixed, mixed)) in by_mixed.iter_mut().zip(&activated.mixed).enumerate() {
                 for s in 0..SIDE {
-                    let by_tail = if affine_tail { by_tail[j][s] } else { 0.0 };
+                    let by_tail = if affine_tail { by_tail[j][s] * piece.weights[s] } else { 0.0 };
                     by_mixed[s] = by_tail + (by_mixed[s] - mixed[s] * total[0][s]) * per_variance;
                 }
             }
@@ -178,23 +177,33 @@ fn exponents_of(inputs: &[Line], centre: &[f64], decay: f64) -> Line {
 pub(super) struct Piece {
     /// Scaled inputs, a line each.
     pub(super) inputs: Vec<Line>,
-    /// What the outputs should be, a line each; NaN where one is missing.
+    /// What the outputs should be times the weight, a line each; NaN where one is missing.
     pub(super) targets: Vec<Line>,
+    /// Factor on the error of each sample; 1 where all count alike.
+    pub(super) weights: Line,
     /// Number of samples, at most [`SIDE`].
     pub(super) samples: usize,
 }
 
 impl Piece {
-    /// Lays samples side by side: `inputs` (`samples × width`) with their `targets` (`samples × outputs`).
-    pub(super) fn all(inputs: &[f64], width: usize, targets: &[f64], outputs: usize) -> Vec<Self> {
+    /// Lays samples side by side: `inputs` (`samples × width`) with their `targets` (`samples × outputs`) and `weights`.
+    pub(super) fn all(
+        (inputs, width): (&[f64], usize),
+        (targets, outputs): (&[f64], usize),
+        weights: &[f64],
+    ) -> Vec<Self> {
         let pieces = inputs.chunks(SIDE * width).zip(targets.chunks(SIDE * outputs));
-        pieces
-            .map(|(inputs, targets)| Self {
-                samples: inputs.len() / width,
-                inputs: side_by_side(inputs, width),
-                targets: side_by_side(targets, outputs),
-            })
-            .collect()
+        let piece = |((inputs, targets), some): ((&[f64], &[f64]), &[f64])| {
+            let mut weights = [0.0; SIDE];
+            weights[..some.len()].copy_from_slice(some);
+            let mut targets = side_by_side(targets, outputs);
+            for line in &mut targets {
+                line.iter_mut().zip(&weights).for_each(|(target, weight)| *target *= weight);
+            }
+            let (samples, inputs) = (some.len(), side_by_side(inputs, width));
+            Self { inputs, targets, weights, samples }
+        };
+        pieces.zip(weights.chunks(SIDE)).map(piece).collect()
     }
 
     /// Number of samples that have output number `output`.

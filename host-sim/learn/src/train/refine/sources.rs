@@ -153,7 +153,10 @@ impl Sources {
                 }
             };
             let targets = targets.part(lines, &outputs).values;
-            Piece::all(&inputs, inputs.len() / lines.len(), &targets, outputs.len())
+            let weight = |line: &usize| frames.weights.as_ref().map_or(1.0, |it| it[*line]);
+            let weights: Vec<f64> = lines.iter().map(weight).collect();
+            let width = inputs.len() / lines.len();
+            Piece::all((&inputs, width), (&targets, outputs.len()), &weights)
         };
         let pieces = parallel::map(lines.len().div_ceil(SIDE), &of_lines);
         pieces.into_iter().flatten().collect()

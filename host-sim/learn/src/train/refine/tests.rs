@@ -58,7 +58,8 @@ fn gradients_are_slopes_of_the_loss() {
         // The second piece of the rest is not full.
         let [rest, held] = [(300, 1), (100, 2)].map(|(count, purpose)| {
             let (x, y) = samples(given, 18, count, purpose);
-            Piece::all(&x, given, &y, 18)
+            let weights: Vec<f64> = (0..count).map(|s| 0.5 + (s % 7) as f64 / 6.0).collect();
+            Piece::all((&x, given), (&y, 18), &weights)
         });
         let [rest, held] = [&rest, &held].map(|pieces| pieces.iter().collect::<Vec<_>>());
         let tasks = [(0..18).collect()];
@@ -83,14 +84,15 @@ fn of_two_tasks(tasks: &[Vec<usize>; 2], count: usize, purpose: u64) -> [Vec<Pie
         let y: Vec<f64> = lines()
             .flat_map(|s| tasks[task].iter().map(|c| y[3 * s + c]).collect::<Vec<_>>())
             .collect();
-        Piece::all(&x, 3, &y, tasks[task].len())
+        let width = tasks[task].len();
+        Piece::all((&x, 3), (&y, width), &vec![1.0; y.len() / width])
     });
     for (s, line) in y.chunks_exact_mut(3).enumerate() {
         let missing = (0..2).filter(|task| !has(*task, s)).flat_map(|task| &tasks[task]);
         missing.for_each(|column| line[*column] = f64::NAN);
     }
     let [first, second] = alone;
-    [Piece::all(&x, 3, &y, 3), first, second]
+    [Piece::all((&x, 3), (&y, 3), &vec![1.0; count]), first, second]
 }
 
 #[test]
@@ -136,7 +138,7 @@ fn a_task_without_samples_on_both_sides_has_no_loss() {
     let without = |output: Option<usize>, count: usize, purpose: u64| {
         let (x, mut y) = samples(3, 2, count, purpose);
         y.chunks_exact_mut(2).for_each(|line| output.into_iter().for_each(|o| line[o] = f64::NAN));
-        Piece::all(&x, 3, &y, 2)
+        Piece::all((&x, 3), (&y, 2), &vec![1.0; count])
     };
     let loss = |rest: Option<usize>, held: Option<usize>| {
         let (rest, held) = (without(rest, 300, 1), without(held, 100, 2));
@@ -165,9 +167,8 @@ fn quick() -> Refinement {
 
 /// Root mean square of the errors in z of a model of one network on `test`.
 fn rmse(trained: &crate::train::Trained, test: &Dataset) -> f64 {
-    let seen = crate::train::projection::seen(trained.projection.as_deref(), test);
-    let network = trained.networks[0].network();
-    let estimate = infer(&network, &seen.inputs.values);
+    let blob = crate::pack(trained, test, &crate::Origin::of_data("", 0, 1, test)).unwrap();
+    let estimate = blob.prepare().decode_lines(&test.inputs.values);
     let squares: f64 = test.outputs.squared_errors(&estimate).iter().skip(2).step_by(3).sum();
     (3.0 * squares / estimate.len() as f64).sqrt()
 }
@@ -195,7 +196,8 @@ fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
             })
         };
         let (one, three) = (refined(1), refined(3));
-        assert_eq!((&one.projection, &one.networks), (&three.projection, &three.networks));
+        let projections = [&one, &three].map(|it| it.fronts.first().map(|front| &front.projection));
+        assert_eq!((projections[0], &one.networks), (projections[1], &three.networks));
         assert_eq!(one.networks[0].format(), format);
         let start = train(&training, &options, &Silent).unwrap();
         let ratio = rmse(&one, &test) / rmse(&start, &test);
@@ -230,7 +232,8 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let layers = Layers::start(&training, &options).unwrap();
         let layers = refine(&training, &layers, &options, &quick(), examples, &taken).unwrap();
         let refined = quick().options(&options);
-        let refined = crate::train::fit(&layers, &refined, &Silent).unwrap();
+        let networks = crate::train::fit(&layers, &refined, &Silent).unwrap();
+        let refined = crate::train::Trained { fronts: vec![], networks };
         let start = train(&training, &options, &Silent).unwrap();
         let ratio = rmse(&refined, &test) / rmse(&start, &test);
         assert!(ratio < most, "{noise}: {ratio}");

@@ -1,3 +1,5 @@
+
+//@if first
 /* An input in units, as far as 32 bits hold it, without its fraction; 0 for what is not a number. Sets *clamped if it is
  * not held. Most inputs are, which the exponent's bits tell; C leaves the conversion of others open.
  */
@@ -100,8 +102,15 @@ static uint32_t activation(uint32_t v)
 #endif
 }
 
+/* An input in steps of 2^16 units, in the low half of a word. */
+static uint32_t step_of(const struct fixed16 *network, const float *inputs, unsigned i, int *clamped)
+{
+    return (uint32_t)whole_units((inputs[i] - network->midpoint[i]) * network->per_unit[i], clamped) >> 16;
+}
+
+//@end
 /* Adds the weights of a group for its activations, which are in eight pairs. */
-NOT_INLINE static void add_weights(const uint32_t *weights, const uint32_t *pairs, float *sums)
+NOT_INLINE static void add_weights@OF@(const uint32_t *weights, const uint32_t *pairs, float *sums)
 {
     /* Activations stay in registers while weights pass. */
     const uint32_t p0 = pairs[0], p1 = pairs[1], p2 = pairs[2], p3 = pairs[3];
@@ -121,14 +130,8 @@ NOT_INLINE static void add_weights(const uint32_t *weights, const uint32_t *pair
     }
 }
 
-/* An input in steps of 2^16 units, in the low half of a word. */
-static uint32_t step_of(const struct fixed16 *network, const float *inputs, unsigned i, int *clamped)
-{
-    return (uint32_t)whole_units((inputs[i] - network->midpoint[i]) * network->per_unit[i], clamped) >> 16;
-}
-
 /* Infers outputs; `x` is room for the inputs. Returns whether one was clamped, or is not finite. */
-static int infer_fixed16(const struct fixed16 *network, const float *inputs, float *x, float *outputs)
+static int infer_fixed16@OF@(const struct fixed16 *network, const float *inputs, float *x, float *outputs)
 {
     int clamped = 0;
     uint64_t square = 0;
@@ -173,7 +176,7 @@ static int infer_fixed16(const struct fixed16 *network, const float *inputs, flo
             pairs[k + 1] = activation(vc) | activation(vd) << 16;
             line = d + 1;
         }
-        add_weights(line, pairs, outputs);
+        add_weights@OF@(line, pairs, outputs);
         line += 8 * NETWORK_OUTPUTS;
     }
     for (unsigned j = 0; j < NETWORK_OUTPUTS; j++) {

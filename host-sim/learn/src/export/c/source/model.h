@@ -32,7 +32,9 @@ enum taxel_model_status {
     /* A reading of the row is not finite@OR_ANOTHER_ROWS@; the outputs are NaN. */
     TAXEL_MODEL_MISSING_READING = @MISSING_READING@,
     /* Readings are so large that an output overflowed; the outputs are NaN. */
-    TAXEL_MODEL_OVERFLOW = @OVERFLOW@
+    TAXEL_MODEL_OVERFLOW = @OVERFLOW@,
+    /* Nothing touches the sensor enough to have a place: outputs that are places are NaN, all others are valid. */
+    TAXEL_MODEL_NO_TOUCH = @NO_TOUCH@
 };
 
 /* Decodes one frame: `readings` [TAXEL_MODEL_READINGS], NaN where one is missing, to `outputs` [TAXEL_MODEL_OUTPUTS]

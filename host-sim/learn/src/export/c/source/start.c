@@ -36,7 +36,7 @@
 #endif
 
 @SIZES@
-//@if confidence
+//@if bits
 /* The bits of a float: a copy, because C forbids to look at a float as at an integer. */
 static uint32_t bits_of(float value)
 {
@@ -79,6 +79,13 @@ static int all_finite(const float *values, unsigned count)
         }
     }
     return 1;
+}
+
+/* Writes NaN where outputs cannot be told, and why. */
+static void give_up(float *outputs, unsigned count, uint8_t *status, uint8_t why)
+{
+    fill_with(outputs, count, not_a_number());
+    *status = why;
 }
 
 //@if project

@@ -1,0 +1,321 @@
+//! Normalised features: the shape of a touch apart from its strength ([`taxel_core::touch`]).
+//!
+//! Outputs are of two kinds. *Places* are told by the shape alone. *Amounts*, which scale with the touch, are learnt as
+//! multiples of its strength S. A network for each kind has a projection, centres and weights of its own. Frames count by
+//! what they can tell: errors of amounts are those of the outputs themselves, and errors of places weigh little where a
+//! touch is weak. `docs/features.md` has measurements.
+
+use std::borrow::Cow;
+use std::fmt::{self, Display};
+use std::ops::Range;
+use std::str::FromStr;
+
+use serde::Deserialize;
+use taxel_core::touch::{Kind, Touch};
+use taxel_data::{AtRest, Dataset, Table, columns, exp, normal_share_below};
+
+use super::FreshFrames;
+use crate::parallel;
+
+mod features;
+
+pub(super) use features::projection;
+
+/// Frames that a thread takes at a time.
+const FRAMES_AT_ONCE: usize = 256;
+/// Name of the input that is the logarithm of the strength.
+const STRENGTH: &str = "strength";
+/// S₀ as a share of the typical strength: behind a threshold, below which nothing is left, and without one.
+const FLOOR: [f64; 2] = [1e-4, 0.1];
+/// What is added to S before its logarithm, as a share of the typical strength.
+const LOGARITHM_FLOOR: f64 = 1e-2;
+/// Largest share of changes against the side that most are on, for readings that a touch moves to one side.
+const OTHER_SIDE: f64 = 0.1;
+/// Factor on the largest strength in training up to which amounts grow.
+const MOST: f64 = 1.125;
+/// Standard deviations of the strength at rest that a touch with a place is above the mean there.
+const LEAST_DEVIATIONS: f64 = 6.0;
+
+/// Usual threshold on changes, in standard deviations at rest. Between 2 and 4 it hardly matters.
+pub const THRESHOLD: f64 = 3.0;
+
+/// How the inputs of a network are made of readings.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(try_from = "String")]
+pub enum Features {
+    /// Readings, or their ratios to the baseline, as they are.
+    AsTheyAre,
+    /// Shape and strength of what exceeds so many standard deviations of a reading at rest.
+    Normalised {
+        /// Number of standard deviations.
+        threshold: f64,
+    },
+}
+
+impl Display for Features {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AsTheyAre => f.write_str("plain"),
+            Self::Normalised { threshold } => write!(f, "normalised:{threshold}"),
+        }
+    }
+}
+
+impl FromStr for Features {
+    type Err = String;
+
+    /// Parses `plain`, `normalised` or `normalised:K`.
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let rule = || {
+            "give plain, normalised, or normalised:K, with a threshold of K (0 to 10) standard deviations".to_owned()
+        };
+        let threshold = match text.split_once(':') {
+            None if text == "plain" => return Ok(Self::AsTheyAre),
+            None if text == "normalised" => THRESHOLD,
+            Some(("normalised", number)) => number.parse().map_err(|_| rule())?,
+            _ => return Err(rule()),
+        };
+        if (0.0..=10.0).contains(&threshold) {
+            Ok(Self::Normalised { threshold })
+        } else {
+            Err(rule())
+        }
+    }
+}
+
+impl TryFrom<String> for Features {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<Self, String> {
+        text.parse()
+    }
+}
+
+/// Features for outputs of either kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kinds {
+    /// Features for places.
+    pub places: Features,
+    /// Features for amounts.
+    pub amounts: Features,
+}
+
+impl Kinds {
+    /// Readings as they are for all outputs.
+    pub const AS_THEY_ARE: Self = Self::all(Features::AsTheyAre);
+
+    /// The same features for all outputs.
+    pub const fn all(features: Features) -> Self {
+        Self { places: features, amounts: features }
+    }
+
+    fn of(self, kind: Kind) -> Features {
+        match kind {
+            Kind::Place => self.places,
+            Kind::Amount => self.amounts,
+        }
+    }
+}
+
+/// Outputs that share a network, and what stands before it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// Outputs of the data set.
+    pub outputs: Range<usize>,
+    /// What makes shape and strength of readings; `None` for readings as they are.
+    pub touch: Option<FittedTouch>,
+}
+
+/// What makes shape and strength of readings, as the blob will hold it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedTouch {
+    kind: Kind,
+    block: Vec<f32>,
+    /// Typical strength of a touch in training: ΣS²/ΣS.
+    typical: f64,
+}
+
+impl Group {
+    /// Groups of the outputs of `dataset`, in their order: one of all outputs if `kinds` has readings as they are for all
+    /// of them, else one for each run of outputs of a kind.
+    pub fn all(dataset: &Dataset, kinds: Kinds) -> Vec<Self> {
+        let names = &dataset.outputs.names;
+        let kind = |index: &usize| {
+            if columns::is_place(&names[*index]) { Kind::Place } else { Kind::Amount }
+        };
+        let all: Vec<usize> = (0..names.len()).collect();
+        if all.iter().all(|index| kinds.of(kind(index)) == Features::AsTheyAre) {
+            return vec![Self { outputs: 0..names.len(), touch: None }];
+        }
+        let runs = all.chunk_by(|a, b| kind(a) == kind(b));
+        let of_run = |run: &[usize]| {
+            let kind = kind(&run[0]);
+            let touch = match kinds.of(kind) {
+                Features::AsTheyAre => None,
+                Features::Normalised { threshold } => {
+                    Some(FittedTouch::fit(dataset, kind, threshold))
+                }
+            };
+            Self { outputs: run[0]..run[run.len() - 1] + 1, touch }
+        };
+        runs.map(of_run).collect()
+    }
+
+    /// What is trained on for these outputs: the frames of `dataset` that have one of them, and their indices.
+    pub fn frames<'d>(&self, dataset: &'d Dataset) -> (Cow<'d, Dataset>, Vec<usize>) {
+        let count = dataset.outputs.names.len();
+        if self.touch.is_none() && self.outputs.len() == count {
+            return (Cow::Borrowed(dataset), (0..dataset.frames()).collect());
+        }
+        let outputs = dataset.outputs.columns(self.outputs.start, self.outputs.len());
+        let has_one = |line: &[f64]| line.iter().any(|output| !output.is_nan());
+        let lines = outputs.lines().enumerate().filter(|(_, line)| has_one(line));
+        let kept: Vec<usize> = lines.map(|(index, _)| index).collect();
+        let frames = Dataset { outputs, ..dataset.clone() }.subset(&kept);
+        let frames = match &self.touch {
+            Some(touch) => touch.apply(frames),
+            None => frames,
+        };
+        (Cow::Owned(frames), kept)
+    }
+}
+
+/// Fresh frames as a group of outputs is trained on them.
+pub(super) struct Fresh<'f> {
+    pub fresh: &'f dyn FreshFrames,
+    pub group: &'f Group,
+}
+
+impl FreshFrames for Fresh<'_> {
+    fn frames(&self, step: usize, count: usize) -> Dataset {
+        self.group.frames(&self.fresh.frames(step, count)).0.into_owned()
+    }
+}
+
+impl FittedTouch {
+    /// Fits level, threshold and strengths to `dataset`, for outputs of this `kind`.
+    fn fit(dataset: &Dataset, kind: Kind, threshold: f64) -> Self {
+        let AtRest { level, deviation } =
+            dataset.at_rest.clone().unwrap_or_else(|| unknown_rest(&dataset.inputs));
+        let of_readings = level.iter().zip(&deviation);
+        let pairs: Vec<f32> =
+            of_readings.flat_map(|(level, d)| [*level as f32, (threshold * d) as f32]).collect();
+        let made = |[floor, logarithm_floor, least, most]: [f64; 4], side: f32| {
+            let head = [floor, logarithm_floor, least, most].map(|it| it as f32);
+            Self { kind, block: [&head[..], &[side], &pairs].concat(), typical: 1.0 }
+        };
+        let smallest = f64::from(f32::MIN_POSITIVE) * 1e9;
+        let either = made([smallest; 4], 0.0);
+        let (changes, _) = inputs(either.view(), &dataset.inputs.values);
+        let side = one_side(&changes, level.len());
+        let strengths = inputs(made([smallest; 4], side).view(), &dataset.inputs.values).1;
+        let strengths = strengths.into_iter().map(f64::from);
+        let (sum, squares, most) = strengths.fold((0.0, 0.0, 0.0), |(sum, squares, most), s| {
+            (sum + s, squares + s * s, f64::max(most, s))
+        });
+        let typical = f64::max(squares / sum, smallest);
+        let has_threshold = pairs.iter().skip(1).step_by(2).any(|threshold| *threshold > 0.0);
+        let floor = typical * FLOOR[usize::from(!has_threshold)];
+        let logarithm_floor = typical * LOGARITHM_FLOOR;
+        let least = floor + strength_at_rest(&deviation, threshold);
+        Self { typical, ..made([floor, logarithm_floor, least, (most + floor) * MOST], side) }
+    }
+
+    /// As the blob holds it.
+    ///
+    /// # Panics
+    /// Never: its numbers are finite.
+    pub fn view(&self) -> Touch<'_> {
+        Touch::new(self.kind, &self.block).expect("numbers that are finite")
+    }
+
+    /// How much the place of a touch of this strength counts: half as much as at most where it is typical.
+    fn weight(&self, strength: f64) -> f64 {
+        strength / (strength + self.typical)
+    }
+
+    /// How much each of `frames` (`frames × readings`) tells of a place, from 0 without a touch to 1.
+    pub fn weights(&self, frames: &[f64]) -> Vec<f64> {
+        let least = self.view().strengths().least;
+        let weight = |s: f32| if s < least { 0.0 } else { self.weight(s.into()) };
+        inputs(self.view(), frames).1.into_iter().map(weight).collect()
+    }
+
+    /// Frames with shape and strength as inputs, and with outputs and weights as the network's training needs them.
+    fn apply(&self, dataset: Dataset) -> Dataset {
+        let (values, strengths) = inputs(self.view(), &dataset.inputs.values);
+        let strengths = strengths.into_iter().map(f64::from);
+        let mut names = dataset.inputs.names.clone();
+        names.push(STRENGTH.into());
+        let mut outputs = dataset.outputs.clone();
+        let weights: Vec<f64> = match self.kind {
+            Kind::Place => strengths.map(|s| self.weight(s).sqrt()).collect(),
+            Kind::Amount => {
+                let strengths: Vec<f64> = strengths.collect();
+                let lines = outputs.values.chunks_exact_mut(outputs.names.len()).zip(&strengths);
+                lines.for_each(|(line, s)| line.iter_mut().for_each(|output| *output /= s));
+                strengths.iter().map(|s| s / self.typical).collect()
+            }
+        };
+        let inputs = Table { names, values };
+        Dataset { inputs, outputs, weights: Some(weights), relative_inputs: false, ..dataset }
+    }
+}
+
+/// 1 or −1 if nearly all of the shapes' changes are up or down, and else 0. `inputs` are those of frames with so many
+/// `readings`.
+fn one_side(inputs: &[f64], readings: usize) -> f32 {
+    let (mut up, mut down) = (0.0, 0.0);
+    for frame in inputs.chunks_exact(readings + 1) {
+        for change in &frame[..readings] {
+            if *change > 0.0 { up += change } else { down -= change }
+        }
+    }
+    if down < OTHER_SIDE * (up + down) {
+        1.0
+    } else if up < OTHER_SIDE * (up + down) {
+        -1.0
+    } else {
+        0.0
+    }
+}
+
+/// Strength that noise alone hardly reaches, of readings with these standard deviations at rest, by the moments of what
+/// normal noise exceeds the threshold by.
+fn strength_at_rest(deviations: &[f64], threshold: f64) -> f64 {
+    let density = exp(-0.5 * threshold * threshold) / std::f64::consts::TAU.sqrt();
+    let above = 1.0 - normal_share_below(threshold);
+    let mean = 2.0 * (density - threshold * above);
+    let square = 2.0 * ((1.0 + threshold * threshold) * above - threshold * density);
+    let (sum, squares): (f64, f64) =
+        deviations.iter().fold((0.0, 0.0), |(sum, squares), d| (sum + d, squares + d * d));
+    mean * sum + LEAST_DEVIATIONS * ((square - mean * mean) * squares).sqrt()
+}
+
+/// Level of inputs whose rest is not known, without noise: 0 where they are changes already, and else their median.
+fn unknown_rest(inputs: &Table) -> AtRest {
+    let (means, deviations) = (inputs.means(), inputs.deviations());
+    let near = means.iter().zip(&deviations).filter(|(mean, d)| mean.abs() <= **d).count();
+    let count = means.len();
+    let level = if 2 * near >= count { vec![0.0; count] } else { inputs.medians() };
+    AtRest { level, deviation: vec![0.0; count] }
+}
+
+/// Inputs that a network is given for `frames` (`frames × readings`), `frames × inputs`, and the strength of each.
+pub fn inputs(touch: Touch<'_>, frames: &[f64]) -> (Vec<f64>, Vec<f32>) {
+    let readings = touch.readings();
+    let of_piece = |frames: &[f64]| {
+        let (mut line, mut made) = (vec![0.0; readings], vec![0.0; touch.inputs()]);
+        let mut values = Vec::with_capacity(frames.len() / readings * made.len());
+        let mut strengths = Vec::with_capacity(frames.len() / readings);
+        for frame in frames.chunks_exact(readings) {
+            line.iter_mut().zip(frame).for_each(|(place, reading)| *place = *reading as f32);
+            strengths.push(touch.apply(&line, None, &mut made));
+            values.extend(made.iter().map(|input| f64::from(*input)));
+        }
+        (values, strengths)
+    };
+    let pieces = parallel::pieces(frames, FRAMES_AT_ONCE * readings, &of_piece);
+    let (values, strengths): (Vec<_>, Vec<_>) = pieces.into_iter().unzip();
+    (values.concat(), strengths.concat())
+}

@@ -1,0 +1,203 @@
+//! Features of a touch: where it is by a linear map of its shape, what else tells of the outputs, and its strength.
+
+use nalgebra::DMatrix;
+use taxel_data::{Dataset, Table, columns};
+
+use super::super::principal;
+use super::super::projection::{USUAL_FEATURES, about_means, means, products, targets};
+use super::{FittedTouch, Kind};
+use crate::error::{Result, no_regression};
+
+/// Penalties on the map that are tried, each as a share of the mean variance of an input.
+const PENALTIES: [f64; 4] = [1e-5, 1e-3, 1e-1, 10.0];
+/// Successive parts of the frames, each of which the map is judged on that is fitted to the others.
+const PARTS: usize = 5;
+/// Spread of other features over that of places.
+const SHARE: f64 = 0.5;
+
+/// Projection of shape and strength to features, for `frames` of a group of outputs of `dataset`: the places of the data
+/// set, if it has any; the outputs themselves, by [regression](super::super::projection::fit), but for places on a mat; and
+/// the strength. Returns f₀, then each input's part in every feature (`inputs × features`).
+///
+/// # Errors
+/// [`Error`](crate::Error) for data without a regression, or with a projection beyond f32.
+pub fn projection(
+    touch: &FittedTouch,
+    frames: &Dataset,
+    dataset: &Dataset,
+    features: Option<usize>,
+) -> Result<Vec<f32>> {
+    let most = features.unwrap_or(USUAL_FEATURES).max(2);
+    let inputs = frames.inputs.names.len();
+    let map = places(touch, dataset)?;
+    let is_mat = map.is_some() && cells(&dataset.inputs.names).is_some();
+    let of_places = map.as_ref().map_or(0, DMatrix::ncols);
+    let others = most.saturating_sub(of_places + 1);
+    let others = if touch.kind == Kind::Place && is_mat { 0 } else { others };
+    let mut blocks: Vec<DMatrix<f64>> = map.into_iter().collect();
+    if others > 0 {
+        blocks.push(regressed(frames, others)?);
+    }
+    blocks.push(DMatrix::from_fn(inputs, 1, |input, _| f64::from(u8::from(input + 1 == inputs))));
+    let spread = |block: &DMatrix<f64>| spread(frames, block);
+    let largest = spread(&blocks[0]);
+    for block in &mut blocks[1..] {
+        let own = spread(block);
+        *block *= if own > 0.0 { SHARE * largest / own } else { 0.0 };
+    }
+    let count = blocks.iter().map(DMatrix::ncols).sum();
+    let mut parts = DMatrix::zeros(inputs, count);
+    let mut columns = blocks.iter().flat_map(DMatrix::column_iter);
+    parts.column_iter_mut().zip(&mut columns).for_each(|(mut to, from)| to.copy_from(&from));
+    about_means(parts.transpose().as_slice(), &frames.inputs.means())
+}
+
+/// Largest standard deviation of the features with these parts.
+fn spread(frames: &Dataset, parts: &DMatrix<f64>) -> f64 {
+    let inputs = DMatrix::from_row_slice(frames.frames(), parts.nrows(), &frames.inputs.values);
+    let features = inputs * parts;
+    features.column_iter().map(|column| column.variance().sqrt()).fold(0.0, f64::max)
+}
+
+/// Linear map of shapes to the places that `dataset` has as outputs, one a column; `None` without any. It is a ridge
+/// regression towards the centroid, where inputs are cells of a mat: what data cannot tell stays as a centroid has it.
+fn places(touch: &FittedTouch, dataset: &Dataset) -> Result<Option<DMatrix<f64>>> {
+    let names = &dataset.outputs.names;
+    let of_places: Vec<usize> =
+        (0..names.len()).filter(|i| columns::is_place(&names[*i])).collect();
+    let lines = dataset.outputs.lines_with(&of_places);
+    if of_places.is_empty() || lines.is_empty() {
+        return Ok(None);
+    }
+    let all: Vec<usize> = (0..lines.len()).collect();
+    let touched = dataset.subset(&lines);
+    let outputs = touched.outputs.part(&all, &of_places);
+    let touch = FittedTouch { kind: Kind::Place, ..touch.clone() };
+    let frames = touch.apply(Dataset { outputs, ..touched });
+    let cells = cells(&dataset.inputs.names);
+    Ok(Some(regression(&frames, &frames.outputs, (true, cells))?.0))
+}
+
+/// Directions of shape and strength that tell most of the outputs of `frames`, so many of them or fewer, one a column.
+fn regressed(frames: &Dataset, count: usize) -> Result<DMatrix<f64>> {
+    let targets = targets(&frames.outputs, count);
+    let (map, moments) = regression(frames, &targets, (false, None))?;
+    let predicted = map.tr_mul(&(&moments.of_inputs * &map));
+    let predicted = (&predicted + predicted.transpose()) * 0.5;
+    Ok(map * principal::directions(predicted, count.min(targets.names.len())))
+}
+
+/// Ridge regression of `targets` on the inputs of `frames`, one a column, and the moments of all frames. That of places is one
+/// on the `shape_alone`, and towards the centroid if there are `cells`. The penalty is the one with the least error on
+/// frames that the regression was not fitted to.
+fn regression(
+    frames: &Dataset,
+    targets: &Table,
+    (shape_alone, cells): (bool, Option<DMatrix<f64>>),
+) -> Result<(DMatrix<f64>, Moments)> {
+    let lines = targets.lines_with(&(0..targets.names.len()).collect::<Vec<_>>());
+    let (all_inputs, all_targets): (Vec<usize>, Vec<usize>) =
+        ((0..frames.inputs.names.len()).collect(), (0..targets.names.len()).collect());
+    let of_lines = |lines: &[usize]| {
+        let weights: Option<Vec<f64>> =
+            frames.weights.as_ref().map(|it| lines.iter().map(|line| it[*line]).collect());
+        (frames.inputs.part(lines, &all_inputs), weights, targets.part(lines, &all_targets))
+    };
+    let (inputs, weights, outputs) = of_lines(&lines);
+    let mean = [&inputs, &outputs].map(|table| means(table, weights.as_deref())).concat();
+    let of_part = |lines: &[usize]| {
+        let (inputs, weights, outputs) = of_lines(lines);
+        Moments::new(&inputs, weights.as_deref(), &outputs, &mean)
+    };
+    let parts: Vec<Moments> =
+        lines.chunks(lines.len().div_ceil(PARTS).max(1)).map(of_part).collect();
+    let whole = parts.iter().skip(1).fold(parts[0].clone(), |sum, part| sum.plus(part, 1.0));
+    let prior = match cells {
+        Some(cells) => whole.centroid(&cells)?,
+        None => DMatrix::zeros(whole.of_inputs.nrows(), targets.names.len()),
+    };
+    let map = |moments: &Moments, penalty| moments.map(&prior, penalty, shape_alone);
+    let mut best = (f64::INFINITY, PENALTIES[0]);
+    for penalty in PENALTIES {
+        let mut error = 0.0;
+        for part in &parts {
+            error += part.error(&map(&whole.plus(part, -1.0), penalty)?);
+        }
+        if error < best.0 {
+            best = (error, penalty);
+        }
+    }
+    Ok((map(&whole, best.1)?, whole))
+}
+
+/// Column and row of each cell, and 0 for the strength, if the inputs are cells of a mat: `inputs × 2`.
+fn cells(names: &[String]) -> Option<DMatrix<f64>> {
+    let cell = |name: &String| columns::cell_of(name).map(|([row, column], _)| [column, row]);
+    let cells: Vec<[usize; 2]> = names.iter().map(cell).collect::<Option<_>>()?;
+    let values = cells.as_flattened().iter().map(|at| *at as f64).chain([0.0; 2]);
+    Some(DMatrix::from_row_iterator(names.len() + 1, 2, values))
+}
+
+/// Sums of products of inputs, of inputs with outputs, and of outputs, about the means of all frames.
+#[derive(Clone)]
+struct Moments {
+    of_inputs: DMatrix<f64>,
+    with_outputs: DMatrix<f64>,
+    of_outputs: f64,
+}
+
+impl Moments {
+    fn new(inputs: &Table, weights: Option<&[f64]>, outputs: &Table, mean: &[f64]) -> Self {
+        let (n, width) = (inputs.names.len(), mean.len());
+        let sums = products((inputs, weights), outputs, mean);
+        let square = |(place, value): (usize, &f64)| {
+            let weight = weights.map_or(1.0, |it| it[place / (width - n)]);
+            (weight * (value - mean[n + place % (width - n)])).powi(2)
+        };
+        Self {
+            of_inputs: DMatrix::from_fn(n, n, |i, j| sums[i.min(j) * width + i.max(j)]),
+            with_outputs: DMatrix::from_fn(n, width - n, |i, o| sums[i * width + n + o]),
+            of_outputs: outputs.values.iter().enumerate().map(square).sum(),
+        }
+    }
+
+    fn plus(&self, other: &Self, factor: f64) -> Self {
+        Self {
+            of_inputs: &self.of_inputs + &other.of_inputs * factor,
+            with_outputs: &self.with_outputs + &other.with_outputs * factor,
+            of_outputs: self.of_outputs + other.of_outputs * factor,
+        }
+    }
+
+    /// Regression of the outputs on the two coordinates of the centroid, as a map of the inputs.
+    fn centroid(&self, cells: &DMatrix<f64>) -> Result<DMatrix<f64>> {
+        let mut of_centroid = cells.tr_mul(&(&self.of_inputs * cells));
+        let least = 1e-9 * of_centroid.trace().max(f64::MIN_POSITIVE);
+        (0..2).for_each(|i| of_centroid[(i, i)] += least);
+        let factor = of_centroid.cholesky().ok_or_else(no_regression)?;
+        Ok(cells * factor.solve(&cells.tr_mul(&self.with_outputs)))
+    }
+
+    /// Regression of the outputs on the inputs with a `penalty` on what differs from `prior`, or on the shape alone.
+    fn map(&self, prior: &DMatrix<f64>, penalty: f64, shape_alone: bool) -> Result<DMatrix<f64>> {
+        let mut normal = self.of_inputs.clone();
+        let strength = normal.nrows() - 1;
+        let mean = (0..strength).map(|i| normal[(i, i)]).sum::<f64>() / strength as f64;
+        (0..=strength).for_each(|i| normal[(i, i)] += (penalty * mean).max(f64::MIN_POSITIVE));
+        let mut left = &self.with_outputs - &self.of_inputs * prior;
+        if shape_alone {
+            normal.row_mut(strength).fill(0.0);
+            normal.column_mut(strength).fill(0.0);
+            normal[(strength, strength)] = 1.0;
+            left.row_mut(strength).fill(0.0);
+        }
+        Ok(prior + normal.cholesky().ok_or_else(no_regression)?.solve(&left))
+    }
+
+    /// Squared error of a `map` on these frames.
+    fn error(&self, map: &DMatrix<f64>) -> f64 {
+        let along = map.dot(&self.with_outputs);
+        let square = map.dot(&(&self.of_inputs * map));
+        self.of_outputs - 2.0 * along + square
+    }
+}
