@@ -491,7 +491,7 @@ impl WholeFrames<'_, '_> {
         let Some((features, seen)) = split(more, features) else { return missing };
         let reciprocals = self.relative.then_some(frame.reciprocals);
         let mut strength = 0.0;
-        let inputs = match (front.touch, reciprocals) {
+        let inputs = match (&front.touch, reciprocals) {
             (Some(touch), _) => {
                 let Some(seen) = seen.get_mut(..touch.inputs()) else { return missing };
                 strength = touch.apply(readings, reciprocals, seen);
@@ -517,7 +517,7 @@ impl WholeFrames<'_, '_> {
         if status == RowStatus::MissingReading && self.is_complete(frame) {
             status = RowStatus::Overflow;
         }
-        if let (Some(touch), RowStatus::Decoded) = (front.touch, status) {
+        if let (Some(touch), RowStatus::Decoded) = (&front.touch, status) {
             status = with_strength(touch, strength, network, outputs);
         }
         (clamped, status)
@@ -536,7 +536,7 @@ impl WholeFrames<'_, '_> {
 /// touch. Returns their status.
 #[inline(always)]
 fn with_strength(
-    touch: Touch<'_>,
+    touch: &Touch<'_>,
     strength: f32,
     network: &RowNetwork<'_>,
     outputs: &mut [f32],

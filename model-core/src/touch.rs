@@ -51,6 +51,8 @@ pub struct Touch<'a> {
     kind: Kind,
     /// The [`Strengths`], and then the level at rest and the threshold of one reading after the other.
     block: &'a [f32],
+    /// Found once, because the assembly asks in every frame.
+    whole_changes: bool,
 }
 
 impl<'a> Touch<'a> {
@@ -79,17 +81,25 @@ impl<'a> Touch<'a> {
         if !are_sound || !pairs.iter().all(sound) {
             return Err(NetworkError::NotFinite { what: "touch" });
         }
-        Ok(Self { kind, block })
+        Ok(Self::of_checked(kind, block))
     }
 
     /// Makes one of a block that [`new`](Self::new) has checked before.
     pub(crate) fn of_checked(kind: Kind, block: &'a [f32]) -> Self {
-        Self { kind, block }
+        let mut touch = Self { kind, block, whole_changes: false };
+        let without_threshold = touch.pairs().iter().all(|[_, threshold]| *threshold == 0.0);
+        touch.whole_changes = without_threshold && touch.strengths().side == 0.0;
+        touch
     }
 
     /// What the network's outputs are to the strength.
     pub fn kind(&self) -> Kind {
         self.kind
+    }
+
+    /// Whether w is all of a: there is no threshold, and a touch moves readings either way. This costs less.
+    pub fn whole_changes(&self) -> bool {
+        self.whole_changes
     }
 
     /// Numbers that it was made of.
@@ -149,8 +159,9 @@ impl<'a> Touch<'a> {
         #[cfg(cortex_m4f)]
         {
             let Strengths { floor, side, .. } = self.strengths();
+            let (pairs, whole) = (self.pairs(), self.whole_changes);
             // SAFETY: the lengths are equal, and not 0, because `new` rejects such a touch.
-            unsafe { cortex_m4::touch(self.pairs(), readings, reciprocals, shape, [floor, side]) }
+            unsafe { cortex_m4::touch(pairs, readings, reciprocals, shape, [floor, side], whole) }
         }
         #[cfg(not(cortex_m4f))]
         self.shape_portably(readings, reciprocals, shape)

@@ -224,17 +224,22 @@ pub fn projections(memory: &mut Memory) -> Option<Comparison> {
     Some(comparison)
 }
 
-/// Compares the shapes of touches of 1 to 160 readings, to either side and to one, of readings as they are and relative to
-/// the baseline. `None` if one is unsound.
+/// Compares the shapes of touches of 1 to 160 readings, to either side (with thresholds and without) and to one, of readings
+/// as they are and relative to the baseline. `None` if one is unsound.
 #[inline(never)]
 pub fn touches(memory: &mut Memory) -> Option<Comparison> {
     let mut numbers = Numbers::new(8);
     let mut comparison = Comparison::default();
-    let sizes = (1..=MOST).flat_map(|readings| [-1.0, 0.0, 1.0].map(|side| (readings, side)));
-    for ((readings, side), relative) in sizes.flat_map(|it| [(it, false), (it, true)]) {
+    let sizes = (1..=MOST).flat_map(|readings| {
+        [(-1.0, 1.0), (0.0, 1.0), (1.0, 1.0), (0.0, 0.0)].map(|it| (readings, it))
+    });
+    for ((readings, (side, threshold)), relative) in sizes.flat_map(|it| [(it, false), (it, true)])
+    {
         let block = last(memory.words, 5 + 2 * readings);
         block.iter_mut().for_each(|word| *word = (1.0 + numbers.draw().abs()).to_bits());
         *block.get_mut(4)? = f32::to_bits(side);
+        let thresholds = block.iter_mut().skip(6).step_by(2);
+        thresholds.for_each(|it| *it = (threshold * f32::from_bits(*it)).to_bits());
         let touch = Touch::new(Kind::Amount, bytemuck::cast_slice(block)).ok()?;
         let mut given = [[0.0; MOST]; 2];
         given.as_flattened_mut().fill_with(|| 1.5 + 3.0 * numbers.draw());

@@ -60,9 +60,10 @@ const REGISTERS: usize = 18;
 const STREAMED: f64 = 0.7;
 const STREAMED_OUTPUT: f64 = 2.5;
 
-/// Instructions of a touch: of a frame, of each reading to one side and to both, and of each output.
+/// Instructions of a touch: of a frame, of each reading (to one side, to both, and to both without a threshold), and of
+/// each output.
 const TOUCH: f64 = 150.0;
-const TOUCHED: [f64; 2] = [8.4, 10.7];
+const TOUCHED: [f64; 3] = [8.4, 10.7, 6.3];
 const TOUCHED_OUTPUT: f64 = 1.5;
 /// Instructions of each reading that a touch takes relative to the baseline.
 const TOUCHED_RELATIVE: f64 = 1.2;
@@ -79,8 +80,7 @@ fn before(network: &NetworkDesign, readings: f64, relative: bool) -> f64 {
     let Some(front) = network.front else { return 0.0 };
     let of_reading = match (front.touch, relative) {
         (Some(sides), relative) => {
-            TOUCHED[usize::from(sides == Sides::Both)]
-                + if relative { TOUCHED_RELATIVE } else { 0.0 }
+            TOUCHED[sides as usize] + if relative { TOUCHED_RELATIVE } else { 0.0 }
         }
         (None, true) => RELATIVE,
         (None, false) => 0.0,

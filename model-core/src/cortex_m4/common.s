@@ -32,10 +32,15 @@
 
 @ s\to = s\left \operation s\right, and so on with the registers behind each: \count times.
     .macro each count, operation, to, left, right
+    apart \count, \operation, \to, 1, \left, 1, \right, 1
+    .endm
+
+@ s\to = s\left \operation s\right, \count times: the registers lie so many numbers apart.
+    .macro apart count, operation, to, to_step, left, left_step, right, right_step
     .altmacro
     .set done, 0
     .rept \count
-    each_one \operation, %(\to + done), %(\left + done), s, %(\right + done)
+    each_one \operation, %(\to + \to_step * done), %(\left + \left_step * done), s, %(\right + \right_step * done)
     .set done, done + 1
     .endr
     .noaltmacro
@@ -71,15 +76,15 @@
     vcvt.\to\().\from s\number, s\number
     .endm
 
-@ Loads s18 and the registers behind it, \count in all, from \at, which moves past the numbers.
-    .macro load_from_18 count, at
+@ Loads or stores s\first and the registers behind it, \count in all, at \at, which moves past the numbers.
+    .macro transfer operation, first, count, at
     .altmacro
-    load_to %(17 + \count), \at
+    transfer_to \operation, \first, %(\first + \count - 1), \at
     .noaltmacro
     .endm
 
-    .macro load_to last, at
-    vldmia \at!, {s18-s\last}
+    .macro transfer_to operation, first, last, at
+    \operation \at!, {s\first-s\last}
     .endm
 
 @ s0..s17 = s0..s17 \operation the 18 numbers at \at; \at moves past them. s18..s27 are overwritten.

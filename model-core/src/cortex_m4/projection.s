@@ -14,7 +14,7 @@
     each_with 6, vmul, 18, 18, \factor
     each 6, vadd, 12, 12, 18
     .else
-    load_from_18 \outputs, r0
+    transfer vldmia, 18, \outputs, r0
     add r0, r0, r11
     each_with \outputs, vmul, 18, 18, \factor
     each \outputs, vadd, 0, 0, 18
@@ -45,7 +45,7 @@
     lsrs r3, r3, #1
 1:
     vldmia r1!, {s30-s31}
-    load_from_18 2 * \outputs, r0
+    transfer vldmia, 18, 2 * \outputs, r0
     each_with \outputs, vmul, 18, 18, s30
     each_with \outputs, vmul, 18 + \outputs, 18 + \outputs, s31
     each \outputs, vadd, 0, 0, 18

@@ -70,6 +70,7 @@ unsafe extern "C" {
         reciprocals: *const f32,
         floor: f32,
         side: f32,
+        whole_changes: bool,
     ) -> f32;
     fn taxel_density(component: *const f32, features: *const f32, count: usize, floor: f32) -> f32;
 }
@@ -117,7 +118,8 @@ pub(crate) fn multiply(numbers: &mut [f32], factor: f32) {
     unsafe { taxel_multiply(numbers.as_mut_ptr(), numbers.len(), factor) }
 }
 
-/// Writes the shape of a touch, and returns its strength. `pairs` are level and threshold of each reading.
+/// Writes the shape of a touch, and returns its strength. `pairs` are level and threshold of each reading; if changes are
+/// `whole`, the side and all thresholds are 0.
 ///
 /// # Safety
 /// The caller must check that there are as many pairs, places of the shape and, if any, reciprocals as there are `readings`,
@@ -129,6 +131,7 @@ pub(crate) unsafe fn touch(
     reciprocals: Option<&[f32]>,
     shape: &mut [f32],
     [floor, side]: [f32; 2],
+    whole: bool,
 ) -> f32 {
     let count = readings.len();
     debug_assert!(count > 0 && pairs.len() == count && shape.len() == count);
@@ -136,7 +139,7 @@ pub(crate) unsafe fn touch(
     let (pairs, shape) = (pairs.as_ptr(), shape.as_mut_ptr());
     let reciprocals = reciprocals.map_or(core::ptr::null(), <[f32]>::as_ptr);
     // SAFETY: the caller has checked the lengths.
-    unsafe { taxel_touch(readings.as_ptr(), pairs, shape, count, reciprocals, floor, side) }
+    unsafe { taxel_touch(readings.as_ptr(), pairs, shape, count, reciprocals, floor, side, whole) }
 }
 
 /// Density of a mixture's component at `features`, as

@@ -2,17 +2,6 @@
 @ Shape and strength of a touch. In assembly because the compiler loads and stores number by number.
 @ ---------------------------------------------------------------------------------------------------------
 
-@ s\to = s\left \operation s\right, \count times: the registers lie so many numbers apart.
-    .macro apart count, operation, to, to_step, left, left_step, right, right_step
-    .altmacro
-    .set done, 0
-    .rept \count
-    each_one \operation, %(\to + \to_step * done), %(\left + \left_step * done), s, %(\right + \right_step * done)
-    .set done, done + 1
-    .endr
-    .noaltmacro
-    .endm
-
 @ s0.. = |s\from..|, \count times, in registers that lie so many numbers apart.
     .macro magnitudes count, to, from, from_step
     .altmacro
@@ -53,13 +42,13 @@
     strd r8, r9, [r2], #8
     .endm
 
-@ s24.. = s6, s8.. + s18.., and s30 += each of s24.., \count times, one behind.
-    .macro sums_and_total count
-    vadd.f32 s24, s6, s18
+@ s24.. as \one makes them, and s30 += each of them, \count times, one behind.
+    .macro with_total count, one
     .altmacro
+    \one 0
     .set done, 1
     .rept \count - 1
-    each_one vadd, %(24 + done), %(6 + 2 * done), s, %(18 + done)
+    \one %(done)
     each_one vadd, 30, 30, s, %(23 + done)
     .set done, done + 1
     .endr
@@ -67,100 +56,112 @@
     .noaltmacro
     .endm
 
+    .macro sum_with_magnitude number
+    each_one vadd, %(24 + \number), %(6 + 2 * \number), s, %(18 + \number)
+    .endm
+
+    .macro magnitude_of_change number
+    magnitude %(24 + \number), \number
+    .endm
+
 @ Loads \count readings at r0, relative to the baseline if r4 is not 0; then levels and thresholds at r1 to s6...
 @ s0.. = changes.
-    .macro changes count, last, last_of_pairs, last_of_baseline
-    vldmia r0!, {s0-s\last}
+    .macro changes count
+    transfer vldmia, 0, \count, r0
     cbz r4, 2f
-    vldmia r4!, {s18-s\last_of_baseline}
+    transfer vldmia, 18, \count, r4
     each \count, vmul, 0, 0, 18
 2:
-    vldmia r1!, {s6-s\last_of_pairs}
+    transfer vldmia, 6, 2 * \count, r1
     apart \count, vsub, 0, 1, 0, 1, 6, 2
     .endm
 
 @ Twice what \count readings exceed their thresholds to either side, written at r2. s30 += the magnitudes.
-    .macro either_side count, last, last_of_pairs, last_of_baseline, last_of_sums
-    changes \count, \last, \last_of_pairs, \last_of_baseline
+    .macro either_side count
+    changes \count
     magnitudes \count, 18, 0, 1
     apart \count, vsub, 6, 2, 18, 1, 7, 2
     magnitudes \count, 18, 6, 2
-    sums_and_total \count
+    with_total \count, sum_with_magnitude
     store_with_signs \count
     .endm
 
 @ The same to the side s31.
-    .macro one_side count, last, last_of_pairs, last_of_baseline, last_of_sums
-    changes \count, \last, \last_of_pairs, \last_of_baseline
+    .macro one_side count
+    changes \count
     each_with \count, vmul, 0, 0, s31
     apart \count, vsub, 6, 2, 0, 1, 7, 2
     magnitudes \count, 18, 6, 2
-    sums_and_total \count
-    vstmia r2!, {s24-s\last_of_sums}
+    with_total \count, sum_with_magnitude
+    transfer vstmia, 24, \count, r2
     .endm
 
-@ All readings, six at a time, and then one by one.
-    .macro all_readings name
-    subs r3, r3, #6
+@ The same to either side where all thresholds are 0. Bits are equal: with a change a, |a| + ||a|| is |a + a|.
+    .macro whole_changes count
+    changes \count
+    each \count, vadd, 0, 0, 0
+    with_total \count, magnitude_of_change
+    transfer vstmia, 0, \count, r2
+    .endm
+
+@ \name for as many numbers as \left says, \many at a time, and then one by one.
+    .macro for_all name, many, left
+    subs \left, \left, #\many
     blo 3f
 1:
-    \name 6, 5, 17, 23, 29
-    subs r3, r3, #6
+    \name \many
+    subs \left, \left, #\many
     bhs 1b
 3:
-    adds r3, r3, #6
+    adds \left, \left, #\many
     beq 5f
 4:
-    \name 1, 0, 7, 18, 24
-    subs r3, r3, #1
+    \name 1
+    subs \left, \left, #1
     bne 4b
 5:
     .endm
 
+    .macro products count
+    transfer vldmia, 1, \count, r2
+    each_with \count, vmul, 1, 1, s0
+    transfer vstmia, 1, \count, r0
+    .endm
+
 @ void taxel_multiply(numbers: *mut f32 [count], count: u32, factor: f32)
-@ numbers = numbers · factor. r0, r1 and s1..s12 are overwritten.
+@ numbers = numbers · factor. r0 to r2 and s1..s12 are overwritten.
     function taxel_multiply
-    subs r1, r1, #12
-    blo 2f
-1:
-    vldmia r0, {s1-s12}
-    each_with 12, vmul, 1, 1, s0
-    vstmia r0!, {s1-s12}
-    subs r1, r1, #12
-    bhs 1b
-2:
-    adds r1, r1, #12
-    beq 4f
-3:
-    vldr s1, [r0]
-    vmul.f32 s1, s1, s0
-    vstmia r0!, {s1}
-    subs r1, r1, #1
-    bne 3b
-4:
+    mov r2, r0
+    for_all products, 12, r1
     bx lr
     .size taxel_multiply, . - taxel_multiply
 
 @ f32 taxel_touch(readings: *const f32 [count], pairs: *const f32 [2 · count], shape: *mut f32 [count],
-@                 count: u32 ≥ 1, reciprocals: *const f32 [count] or 0, floor: f32, side: f32)
+@                 count: u32 ≥ 1, reciprocals: *const f32 [count] or 0, floor: f32, side: f32,
+@                 whole_changes: bool)
 @ Writes the shape and returns the strength, as touch.rs says.
     function taxel_touch
     push {r4-r11, lr}
     vpush {s16-s31}
-    ldr r4, [sp, #16 * 4 + 9 * 4]
+    ldrd r4, r9, [sp, #16 * 4 + 9 * 4]
     mov r5, r2
     mov r6, r3
     vmov r7, s0
     vmov.f32 s31, s1
     mov r12, #0
     vmov s30, r12
+    cmp r9, #0
+    bne 8f
     vcmp.f32 s31, #0.0
     vmrs APSR_nzcv, fpscr
     bne 6f
-    all_readings either_side
+    for_all either_side, 6, r3
     b 7f
 6:
-    all_readings one_side
+    for_all one_side, 6, r3
+    b 7f
+8:
+    for_all whole_changes, 6, r3
 7:
     vmov.f32 s1, #0.5
     vmov s0, r7

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
-use taxel_data::{Silent, Stream};
+use taxel_data::{AtRest, Silent, Stream};
 use taxel_learn::train::{Features, Kinds, train};
 use taxel_learn::{ModelBlob, Options, Origin, pack};
 use taxel_simulate::outputs::{ContactOutput, ElectrodeOutputs, Outputs, Quantity};
@@ -30,9 +30,9 @@ enum Shape {
     Array,
     /// One network for all readings and the contact's place and force.
     Contact,
-    /// One network for all deformations, of shape and strength of a touch.
+    /// One network for all deformations, of shape and strength of a touch without thresholds.
     TouchArray,
-    /// A network for the contact's place and one for its force, of shape and strength of a touch.
+    /// A network for the contact's place and one for its force, of shape and strength of a touch beyond thresholds.
     TouchContact,
     /// A network for each of four rows of seven readings, to 6 compressions.
     Mat,
@@ -163,11 +163,17 @@ pub fn train_all() -> Outcome<Vec<Model>> {
 
 fn made(format: Format, shape: Shape, centres: usize) -> Outcome<Model> {
     let world = shape.world();
-    let dataset = Synthesis::new(&world).noise_level(NOISE).frames(Stream::Training, FRAMES);
+    let synthesis = Synthesis::new(&world);
+    let mut dataset = synthesis.clone().noise_level(NOISE).frames(Stream::Training, FRAMES);
+    // Thresholds are multiples of the noise at rest. With little of it, the first frame is a touch.
+    if shape == Shape::TouchContact {
+        let rest = synthesis.noise_level(0.01 * NOISE).untouched();
+        dataset.at_rest = Some(AtRest::of(&rest.frames(Stream::Calibration, FRAMES).inputs));
+    }
     let usual = Options::of_rows();
     let each_row = !shape.is_array();
     let spread = if each_row { usual.spread } else { SPREAD_OF_ARRAY };
-    let features = Features::Normalised { threshold: 0.0 };
+    let features = Features::Normalised { threshold: 3.0 };
     let kinds = shape.is_touch().then_some(Kinds::all(features));
     let options = Options { format, centres, each_row, spread, kinds, ..usual };
     let origin = Origin::of_data("press", 0, world.seed, &dataset);

@@ -51,13 +51,17 @@ pub enum Sides {
     One,
     /// Either way.
     Both,
+    /// Either way, without a threshold.
+    Whole,
 }
 
 impl FrontDesign {
     /// The design of a `front`.
     pub fn new(front: &Front<'_>) -> Self {
-        let sides = |touch: Touch<'_>| {
-            if touch.strengths().side == 0.0 { Sides::Both } else { Sides::One }
+        let sides = |touch: Touch<'_>| match touch.strengths().side {
+            _ if touch.whole_changes() => Sides::Whole,
+            0.0 => Sides::Both,
+            _ => Sides::One,
         };
         Self { touch: front.touch.map(sides), projection: front.projection.is_some() }
     }
