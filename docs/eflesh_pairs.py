@@ -11,6 +11,7 @@ RECORDINGS = {
     "shear": "shear_force/20250416_200533_probe",
     "spatial": "spatial_resolution/20250316_155729_probe",
 }
+TRUTH = {"b.c2": "x_mm", "b.c3": "y_mm", "b.c5": "weight_g"}
 
 
 def table(path, before=""):
@@ -24,6 +25,6 @@ for name, folder in RECORDINGS.items():
     sensor = table(folder / "sensor_post_baselines.csv")
     states = table(folder / "states.csv", "b.").drop_duplicates("b.c1")
     nearest = {"left_on": "c1", "right_on": "b.c1", "direction": "nearest", "tolerance": 0.02}
-    pairs = pd.merge_asof(sensor, states, **nearest).dropna(subset="b.c1")
+    pairs = pd.merge_asof(sensor, states, **nearest).dropna(subset="b.c1").rename(columns=TRUTH)
     pairs.to_csv(f"{name}.csv", index=False)
     print(f"{name}: {len(pairs)} of {len(sensor)} lines")

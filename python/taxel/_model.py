@@ -68,6 +68,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         (`r1c1_ohm`), whose outputs belong to rows.
     features : int or None
         Features of that projection.
+    features_kind : str or None
+        How features are made of readings: "plain", "normalised" or "normalised:K" (docs/features.md); None for those with the
+        least error on lines held out, for places and for amounts.
     grid : (int, int) or None
         Rows and columns of a mat whose cells are the columns of X, row by row. Without it, names of a DataFrame may tell a mat
         (`r1c1`, or numbers that fill a square).
@@ -101,6 +104,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         format: str | None = None,
         each_row: bool = False,
         features: int | None = None,
+        features_kind: str | None = None,
         grid: tuple[int, int] | None = None,
         relative_inputs: bool = False,
         confidence: bool = False,
@@ -114,6 +118,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.format = format
         self.each_row = each_row
         self.features = features
+        self.features_kind = features_kind
         self.grid = grid
         self.relative_inputs = relative_inputs
         self.confidence = confidence
@@ -154,6 +159,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         arguments += option("--penalty", self.penalty)
         arguments += option("--no-refine", not self.refine) + option("--format", self.format)
         arguments += option("--each-row", self.each_row) + option("--features", self.features)
+        arguments += option("--features-kind", self.features_kind)
         arguments += option("--fill", self.fill) + option("--grid", grid)
         if self.relative_inputs:
             arguments += ["--relative-inputs", *option("--rest", [pattern(names_y)])]

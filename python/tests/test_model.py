@@ -160,7 +160,13 @@ def test_fewer_lines_than_centres_take_fewer_with_a_warning():
 
 @pytest.mark.parametrize(
     ("parameters", "message"),
-    [({"centres": 0}, "centres"), ({"format": "f16"}, "f16"), ({"spread": -1.0}, "spread"), ({"penalty": -2.0}, "penalty")],
+    [
+        ({"centres": 0}, "centres"),
+        ({"format": "f16"}, "f16"),
+        ({"spread": -1.0}, "spread"),
+        ({"penalty": -2.0}, "penalty"),
+        ({"features_kind": "shape"}, "normalised"),
+    ],
 )
 def test_bad_parameters_are_value_errors_with_the_message_of_the_command(parameters, message):
     x, y = smooth()
