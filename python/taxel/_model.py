@@ -218,8 +218,10 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         *,
         baseline: ArrayLike | None = None,
     ) -> float:
-        """Coefficient of determination R², as a mean over the outputs."""
+        """Coefficient of determination R², as a mean over the outputs. An estimate that is NaN counts as the mean, as a place
+        does where nothing touches."""
         y, estimate = two_dimensional(y, "y"), two_dimensional(self.predict(X, baseline=baseline), "y")
+        estimate = np.where(np.isnan(estimate), np.mean(y, axis=0), estimate)
         weights = None if sample_weight is None else np.asarray(sample_weight)
         left = np.average((y - estimate) ** 2, axis=0, weights=weights)
         mean = np.average(y, axis=0, weights=weights)

@@ -96,6 +96,19 @@ def test_names_of_pandas_are_those_of_the_model():
         model.predict(x[["right", "left", "thumb"]])
 
 
+def test_a_place_is_none_without_a_touch_and_counts_as_the_mean():
+    lines = np.arange(1200)
+    force = np.where(lines // 60 % 2, 5.0, 0.0)
+    place = np.where(force[:, None] > 0, RANDOM.uniform(1, 3, (len(lines), 2)), 2.0)
+    cells = np.stack(np.meshgrid(range(5), range(5)), axis=-1).reshape(25, 1, 2)
+    x = 100 + force * np.exp(-np.sum((cells - place) ** 2, axis=-1)) + RANDOM.normal(0, 0.01, (25, len(lines)))
+    y = pandas.DataFrame(np.column_stack([place, force]), columns=["x_mm", "y_mm", "force_n"])
+    model = taxel.Model(16, refine=False, grid=(5, 5), features_kind="normalised").fit(x.T, y)
+    is_told = ~np.isnan(model.predict(x.T))
+    assert is_told[force > 0].all() and is_told[:, 2].all() and is_told[force == 0, :2].mean() < 0.01
+    assert model.score(x.T, y) > 0.99
+
+
 def test_missing_readings_are_filled_by_a_model_that_can():
     x, y = smooth(1500, 4)
     x[:, 3] = x[:, 0] + 0.5 * x[:, 1] + RANDOM.normal(0, 0.05, len(x))
