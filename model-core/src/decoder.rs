@@ -461,7 +461,7 @@ impl WholeFrames<'_, '_> {
             let Some((outputs, more)) = rest.split_at_mut_checked(front.outputs) else { break };
             rest = more;
             let (clamped, status) = self.decode_part(front, network, frame, scratch, outputs);
-            any_clamped |= clamped;
+            any_clamped |= clamped && status == RowStatus::Decoded;
             if severity(status) > severity(worst) {
                 worst = status;
             }

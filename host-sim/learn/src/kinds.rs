@@ -14,6 +14,7 @@ use crate::train::{Features, Group, Kinds, Options, THRESHOLD, train};
 const MOST_FRAMES: [usize; 2] = [4000, 2000];
 /// Most centres of the networks that are tried.
 const MOST_CENTRES: usize = 32;
+
 /// Share of the score of features as they are that others must be below.
 const BETTER: f64 = 0.99;
 
@@ -60,7 +61,8 @@ pub struct Tried {
 /// and all but the last fold, and judged by that fold. `None` where there is nothing to choose: with a network for each
 /// row, with a single fold, or where `options` say which.
 ///
-/// Readings at rest tell the noise; without them no threshold is tried.
+/// Readings at rest tell the noise; without them no threshold is tried. Amounts of few readings, which a network is given
+/// itself, are learnt from readings as they are: refinement makes more of these than small networks tell.
 pub fn choose(
     dataset: &Dataset,
     fold_of: &[usize],
@@ -68,7 +70,7 @@ pub fn choose(
     progress: &dyn Progress,
 ) -> Option<Choice> {
     let last = fold_of.iter().max().copied().unwrap_or(0);
-    if options.kinds.is_some() || options.each_row || last == 0 {
+    if options.kinds.is_some() || !options.sees_frames(dataset) || last == 0 {
         return None;
     }
     let mut candidates = vec![Features::AsTheyAre, Features::Normalised { threshold: 0.0 }];
@@ -96,6 +98,9 @@ pub fn choose(
     let mut tried = Vec::new();
     let mean = |[a, b]: [f64; 2]| 0.5 * (a + b);
     let mut pick = |kind: usize, outputs: &'static str| {
+        if kind == 1 && !options.projects(dataset) {
+            return Features::AsTheyAre;
+        }
         let plain = scores[0][kind];
         // Better on both parts, and by more than chance.
         let is_better = |of: [f64; 2]| {

@@ -173,7 +173,20 @@ impl<'b> PreparedModel<'b> {
         if self.fronts.is_empty() {
             return vec![inputs.into_owned()];
         }
-        self.fronts.iter().map(|front| inputs_of(front, &inputs).0.into_owned()).collect()
+        let of_front = |front: &Front<'_>| {
+            let (given, strengths) = inputs_of(front, &inputs);
+            let mut given = given.into_owned();
+            // A place without a touch is not decoded.
+            let touch = front.touch.filter(|touch| touch.kind() == Kind::Place);
+            if let (Some(touch), false) = (touch, strengths.is_empty()) {
+                let width = given.len() / strengths.len();
+                let least = touch.strengths().least;
+                let lines = given.chunks_exact_mut(width).zip(&strengths);
+                lines.filter(|(_, s)| **s < least).for_each(|(line, _)| line.fill(f64::NAN));
+            }
+            given
+        };
+        self.fronts.iter().map(of_front).collect()
     }
 
     /// Standard deviations of the outputs for `readings` (`frames × inputs`), `frames × outputs` in their units, and the

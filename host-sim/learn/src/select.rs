@@ -5,12 +5,10 @@ use taxel_data::{BadValue, Dataset, Progress, Silent};
 
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
-use crate::infer::infer;
+use crate::packing::{Origin, pack};
 use crate::parallel;
-use crate::train::{
-    self, Examples, FittedNetwork, Layers, Options, Refinement,
-    refine::{self, LEAST_FOLDS},
-};
+use crate::train::refine::LEAST_FOLDS;
+use crate::train::{self, Examples, Options, Refinement, Start, Trained};
 
 mod folds;
 mod grid;
@@ -186,34 +184,39 @@ impl<'d> Judge<'d> {
         options: &Options,
     ) -> Result<Vec<Vec<f64>>> {
         let (training, test) = split(self.dataset, self.fold_of, fold);
-        let mut layers = Layers::start(&training, options)?;
-        let squares = |networks: &Vec<FittedNetwork>| -> Vec<f64> {
-            let networks = networks.iter().enumerate();
-            let of_row = |(row, network): (usize, &FittedNetwork)| {
-                let test = test.row_table(row);
-                let network = network.network();
-                let predicted = infer(&network, &test.inputs.values);
-                test.outputs.squared_errors(&predicted)
-            };
-            networks.flat_map(of_row).collect()
+        let starts = Start::all(&training, options)?;
+        let mut layers: Vec<_> = starts.iter().map(|start| start.layers(options)).collect();
+        let origin = Origin::of_data("", 0, 0, &training);
+        let squares = |trained: &Trained| -> Result<Vec<f64>> {
+            let blob = pack(trained, &training, &origin)?;
+            let decoded = blob.prepare().of_inputs().decode_lines(&test.inputs.values);
+            Ok(test.outputs.squared_errors(&decoded))
         };
+        let inner = without(self.fold_of, fold);
         let mut all = Vec::new();
         for spread in spreads {
-            layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
-            let Some(settings) = self.refinement else {
-                let models = train::fit_each(&layers, options, penalties, &Silent)?;
-                all.extend(models.iter().map(squares));
-                continue;
-            };
-            let inner = without(self.fold_of, fold);
-            let examples = Examples::Folds(&inner);
-            for penalty in penalties {
-                // Where centres move to depends on the penalty.
-                let options = Options { penalty: *penalty, ..*options };
-                let layers =
-                    refine::refine(&training, &layers, &options, settings, examples, &Silent)?;
-                let options = settings.options(&options);
-                all.push(squares(&train::fit(&layers, &options, &Silent)?));
+            let hidden = layers.iter_mut().flat_map(|layers| &mut layers.hidden);
+            hidden.for_each(|layer| layer.spread = *spread);
+            let mut models = vec![Trained::default(); penalties.len()];
+            for (start, layers) in starts.iter().zip(&layers) {
+                let Some(settings) = self.refinement else {
+                    let fitted = train::fit_each(layers, options, penalties, &Silent)?;
+                    for (model, networks) in models.iter_mut().zip(fitted) {
+                        model.add(start, layers.projection.as_ref(), networks);
+                    }
+                    continue;
+                };
+                for (model, penalty) in models.iter_mut().zip(penalties) {
+                    // Where centres move to depends on the penalty.
+                    let options = Options { penalty: *penalty, ..*options };
+                    let examples = Examples::Folds(&inner);
+                    let layers = start.refine(layers, &options, settings, examples, &Silent)?;
+                    let networks = train::fit(&layers, &settings.options(&options), &Silent)?;
+                    model.add(start, layers.projection.as_ref(), networks);
+                }
+            }
+            for model in &models {
+                all.push(squares(model)?);
             }
         }
         Ok(all)

@@ -182,6 +182,11 @@ impl Options {
             && (dataset.rows > 1 || self.features.is_some() || projection::is_usual_for(dataset))
     }
 
+    /// Whether networks of `dataset` see whole frames: a single row is one.
+    pub fn sees_frames(&self, dataset: &Dataset) -> bool {
+        !self.each_row || dataset.rows == 1
+    }
+
     /// Checks the options against the frames of `dataset` and the outputs that these have.
     ///
     /// # Errors
@@ -381,7 +386,8 @@ impl<'d> Start<'d> {
         if options.projects(dataset) {
             projection::check(dataset, options.features)?;
         }
-        let kinds = options.kinds.filter(|_| !options.each_row).unwrap_or(Kinds::AS_THEY_ARE);
+        let kinds =
+            options.kinds.filter(|_| options.sees_frames(dataset)).unwrap_or(Kinds::AS_THEY_ARE);
         let groups = Group::all(dataset, kinds);
         let are_many = groups.len() > 1;
         let start = |group: Group| {

@@ -59,7 +59,10 @@ fn the_contact_is_trained_evaluated_inspected_and_run() {
 
     let printed = folder.succeed(&["run", "scene.toml"]);
     assert!(printed.contains("RMSE by true contact_depth_mm") && !printed.contains("row-wire"));
-    assert!(printed.contains("2 networks, 144 readings -> 3 features -> K = 24 -> 2 outputs"), "{printed}");
+    assert!(
+        printed.contains("2 networks, 144 readings -> 3 features -> K = 24 -> 2 outputs"),
+        "{printed}"
+    );
     let page = std::fs::read_to_string(folder.path("out/contact/report.html")).unwrap();
     assert!(page.contains("by the true contact depth") && !page.contains("NaN"));
 }

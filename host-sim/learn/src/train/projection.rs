@@ -29,6 +29,8 @@ const NOISE_FLOOR: f64 = 1e-3;
 /// Number of features for outputs that belong to no row-wire, unless a user says otherwise. The device's routines keep
 /// so many inputs in registers.
 pub const USUAL_FEATURES: usize = 18;
+/// Most readings of a single row table that a network is given itself where outputs give few features.
+const MOST_DIRECT: usize = 48;
 /// Largest degree of the products of outputs.
 const MOST_FACTORS: usize = 3;
 
@@ -45,10 +47,13 @@ pub fn features_at_most(dataset: &Dataset, wanted: usize) -> usize {
     wanted.min(readings.saturating_sub(1)).min(factors(&dataset.outputs, wanted).len())
 }
 
-/// Whether all readings of `dataset` can be projected to the [usual](usual_features) number of features.
+/// Whether all readings of `dataset` are projected: to the [usual](usual_features) number of features, or to fewer where
+/// readings are many.
 pub(super) fn is_usual_for(dataset: &Dataset) -> bool {
     let readings = dataset.inputs.names.len();
-    usual_features(dataset.rows, readings) < readings
+    let usual = usual_features(dataset.rows, readings);
+    let enough = readings > MOST_DIRECT || factors(&dataset.outputs, usual).len() >= usual;
+    usual < readings && enough
 }
 
 /// Checks a number of features that all readings of `dataset` are to be projected to.
