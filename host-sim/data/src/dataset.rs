@@ -19,7 +19,7 @@ pub const USUAL_INPUTS: &str = "r*c*_ohm";
 
 /// Readings and outputs for training or evaluation, one frame a line.
 ///
-/// Columns are ordered by row-wire if each names one, so that every row-wire has its own [`RowTable`];
+/// Columns are ordered by row-wire if each names one, so that every row-wire has its own [table](Self::row_table);
 /// otherwise there is a single row table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
@@ -31,7 +31,8 @@ pub struct Dataset {
     pub outputs: Table,
     /// Number of row tables: equal groups of consecutive columns, each with a network of its own.
     pub rows: usize,
-    /// Whether inputs share the largest span of any when they are scaled: see [`RowTable::common_span`].
+    /// Whether every input is scaled by the largest span of any, about its own middle. Features of a projection share one
+    /// unit: the wider one's range, the more it tells about the outputs.
     pub common_span: bool,
     /// Whether inputs are readings relative to the baseline (R/R₀), without a unit, and not readings as they are.
     pub relative_inputs: bool,
@@ -86,17 +87,31 @@ impl Dataset {
         self.inputs.names.iter().chain(&self.outputs.names).map(String::as_str).collect()
     }
 
-    /// Readings and outputs of row table number `row` (from 0).
+    /// Inputs and outputs of the network of row number `row` (from 0), as a set of one row.
     ///
     /// # Panics
     /// If the set has no such row table.
-    pub fn row_table(&self, row: usize) -> RowTable {
+    #[must_use]
+    pub fn row_table(&self, row: usize) -> Self {
         let cut = |table: &Table| {
             let count = table.names.len() / self.rows;
             table.columns(row * count, count)
         };
         let (inputs, outputs) = (cut(&self.inputs), cut(&self.outputs));
-        RowTable { inputs, outputs, common_span: self.common_span, weights: self.weights.clone() }
+        Self { inputs, outputs, rows: 1, at_rest: None, weights: self.weights.clone(), ..*self }
+    }
+
+    /// Range `[low, high]` by which each input is scaled, in the input's unit.
+    pub fn input_ranges(&self) -> Vec<[f64; 2]> {
+        let mut ranges = self.inputs.ranges();
+        if self.common_span {
+            let half = ranges.iter().map(|[low, high]| 0.5 * (high - low)).fold(0.0, f64::max);
+            for [low, high] in &mut ranges {
+                let middle = 0.5 * (*low + *high);
+                (*low, *high) = (middle - half, middle + half);
+            }
+        }
+        ranges
     }
 
     /// Selects the columns that match the patterns `inputs` and `outputs` (see [`columns::select`]), by
@@ -164,13 +179,8 @@ impl Dataset {
     /// If there is no such frame.
     #[must_use]
     pub fn subset(&self, indices: &[usize]) -> Self {
-        let pick = |table: &Table| {
-            let n = table.names.len();
-            let line = |i: &usize| table.values[i * n..(i + 1) * n].to_vec();
-            Table { names: table.names.clone(), values: indices.iter().flat_map(line).collect() }
-        };
         let weights = self.weights.as_ref().map(|it| indices.iter().map(|i| it[*i]).collect());
-        let (inputs, outputs) = (pick(&self.inputs), pick(&self.outputs));
+        let [inputs, outputs] = [&self.inputs, &self.outputs].map(|table| table.pick(indices));
         Self { inputs, outputs, weights, at_rest: self.at_rest.clone(), ..*self }
     }
 }
@@ -261,49 +271,6 @@ impl UnusedInputs {
     pub fn names(&self) -> Vec<String> {
         let duplicated = self.duplicated.iter().map(|(name, _)| name);
         self.dead.iter().chain(&self.constant).chain(duplicated).cloned().collect()
-    }
-}
-
-/// Readings and outputs of one network: those of one row-wire, or of the whole data set.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RowTable {
-    /// Readings that the network is given, `frames × inputs`.
-    pub inputs: Table,
-    /// Outputs that it should predict, `frames × outputs`.
-    pub outputs: Table,
-    /// Whether every input is scaled by the largest span of any, about its own middle. Features of a
-    /// projection share one unit: the wider one's range, the more it tells about the outputs.
-    pub common_span: bool,
-    /// Factor on the error of each line in least squares; `None` where all lines count alike.
-    pub weights: Option<Vec<f64>>,
-}
-
-impl RowTable {
-    /// Range `[low, high]` by which each input is scaled, in the input's unit.
-    pub fn input_ranges(&self) -> Vec<[f64; 2]> {
-        let mut ranges = self.inputs.ranges();
-        if self.common_span {
-            let half = ranges.iter().map(|[low, high]| 0.5 * (high - low)).fold(0.0, f64::max);
-            for [low, high] in &mut ranges {
-                let middle = 0.5 * (*low + *high);
-                (*low, *high) = (middle - half, middle + half);
-            }
-        }
-        ranges
-    }
-
-    /// First `frames` lines of both tables.
-    ///
-    /// # Panics
-    /// If there are fewer.
-    #[must_use]
-    pub fn first(&self, frames: usize) -> Self {
-        let cut = |table: &Table| Table {
-            names: table.names.clone(),
-            values: table.values[..frames * table.names.len()].to_vec(),
-        };
-        let weights = self.weights.as_ref().map(|weights| weights[..frames].to_vec());
-        Self { inputs: cut(&self.inputs), outputs: cut(&self.outputs), weights, ..*self }
     }
 }
 

@@ -24,7 +24,7 @@ pub mod rest;
 
 pub use clock::Clock;
 pub use data_file::DataFile;
-pub use dataset::{AtRest, Dataset, RowTable};
+pub use dataset::{AtRest, Dataset};
 pub use elementary::{exp, ln, normal_share_below, sin_cos};
 pub use error::{BadValue, Error, Result, require};
 pub use progress::{Progress, Silent};

@@ -1,5 +1,7 @@
 //! Tables of numbers with named columns.
 
+use crate::columns;
+
 /// Table of numbers with named columns, one frame a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
@@ -78,6 +80,16 @@ impl Table {
         let has = |line: &[f64]| columns.iter().all(|column| !line[*column].is_nan());
         let lines = self.lines().enumerate().filter(|(_, line)| has(line));
         lines.map(|(number, _)| number).collect()
+    }
+
+    /// Table of these `lines`, in that order.
+    ///
+    /// # Panics
+    /// If there is no such line.
+    #[must_use]
+    pub fn pick(&self, lines: &[usize]) -> Self {
+        let values = lines.iter().flat_map(|line| self.line(*line)).copied().collect();
+        Self { names: self.names.clone(), values }
     }
 
     /// Table of these `lines` and `columns`, in that order.
@@ -161,6 +173,22 @@ impl Table {
             }
         }
         sums
+    }
+
+    /// `estimates` of the same shape, `lines × columns`, with the mean of the column for places that are not told, because
+    /// nothing seems to touch: a decoder that always tells one says as much there. Lines that are not decoded at all stay
+    /// as they are.
+    pub fn with_places(&self, mut estimates: Vec<f64>) -> Vec<f64> {
+        let places: Vec<bool> = self.names.iter().map(|name| columns::is_place(name)).collect();
+        let (means, all_are) = (self.means(), !places.contains(&false));
+        for line in estimates.chunks_exact_mut(means.len().max(1)) {
+            if all_are || line.iter().any(|value| !value.is_nan()) {
+                let missing = line.iter_mut().zip(&places).zip(&means);
+                let missing = missing.filter(|((value, is_place), _)| **is_place && value.is_nan());
+                missing.for_each(|((value, _), mean)| *value = *mean);
+            }
+        }
+        estimates
     }
 
     /// Table of so many `lines`: the lines of this one, again and again from the first.

@@ -80,11 +80,10 @@ pub fn by_load(
         let [from, to] = shares.map(|share| rounded(share * measure.full_scale[column]));
         let is_within = |line: &usize| (from..to).contains(&truth.line(*line)[column].abs());
         let lines: Vec<usize> = (0..truth.len()).filter(is_within).collect();
-        let all: Vec<usize> = (0..names.len()).collect();
-        let chosen = truth.part(&lines, &all);
+        let chosen = truth.pick(&lines);
         let errors = |estimate: &[f64]| {
             let estimate = Table { names: names.clone(), values: estimate.to_vec() };
-            metrics::by_group(&chosen, &estimate.part(&lines, &all).values, &measure)
+            metrics::by_group(&chosen, &estimate.pick(&lines).values, &measure)
         };
         LoadErrors {
             load: names[column].clone(),

@@ -277,27 +277,11 @@ impl Definition {
 /// # Panics
 /// If `estimate` is not as long as `truth`, or `measure` does not have one full scale a column.
 pub fn by_group(truth: &Table, estimate: &[f64], measure: &Measure) -> Vec<Errors> {
-    let names = truth.names.clone();
-    let estimate = &with_places(truth, Table { names, values: estimate.to_vec() }).values;
+    let estimate = &truth.with_places(estimate.to_vec());
     columns::groups(&truth.names)
         .iter()
         .map(|(group, members)| of_columns(group, members, truth, estimate, measure))
         .collect()
-}
-
-/// Estimates with the mean of the truth for places that are not told, because nothing seems to touch: a decoder that always
-/// tells one says as much there. Lines that are not decoded at all stay as they are.
-pub fn with_places(truth: &Table, mut estimate: Table) -> Table {
-    let places: Vec<bool> = truth.names.iter().map(|name| columns::is_place(name)).collect();
-    let (means, all_are) = (truth.means(), !places.contains(&false));
-    for line in estimate.values.chunks_exact_mut(means.len().max(1)) {
-        if all_are || line.iter().any(|value| !value.is_nan()) {
-            let missing = line.iter_mut().zip(&places).zip(&means);
-            let missing = missing.filter(|((value, is_place), _)| **is_place && value.is_nan());
-            missing.for_each(|((value, _), mean)| *value = *mean);
-        }
-    }
-    estimate
 }
 
 #[derive(Default)]

@@ -8,7 +8,7 @@ use taxel_learn::decoders::LINEAR;
 use taxel_learn::fill;
 use taxel_learn::kinds::{self, Choice};
 use taxel_learn::select;
-use taxel_learn::train::{Examples, Refinement, resolution, train, train_refined};
+use taxel_learn::train::{Examples, Refinement, resolution, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
 
@@ -68,12 +68,9 @@ impl<'s> TrainingSet<'s> {
 
     /// Trains with `options`, refined if that is asked for.
     pub fn train(&self, options: &Options, progress: &dyn Progress) -> Result<Trained> {
-        Ok(match self.examples() {
-            None => train(&self.frames, options, progress)?,
-            Some(examples) => {
-                train_refined(&self.frames, options, &Refinement::default(), examples, progress)?
-            }
-        })
+        let settings = Refinement::default();
+        let refinement = self.examples().map(|examples| (&settings, examples));
+        Ok(train_refined(&self.frames, options, refinement, progress)?)
     }
 
     /// Chooses features for `options` that do not say which, and tells what was tried; `None` where there is no choice.

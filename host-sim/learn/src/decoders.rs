@@ -1,6 +1,6 @@
 //! Decoders besides the packed network, and their common parts.
 
-use taxel_data::{Dataset, RowTable};
+use taxel_data::Dataset;
 
 use crate::decoder::{Decoder, Estimates, FrameDecoder, Frames};
 use crate::infer::infer;
@@ -67,11 +67,7 @@ impl RowDecoder for FittedNetwork {
 
 impl<D: RowDecoder + Send> Rows<D> {
     /// Fits one decoder to each row of `training`, by `fit`.
-    pub fn fit(
-        name: &'static str,
-        training: &Dataset,
-        fit: impl Fn(&RowTable) -> D + Sync,
-    ) -> Self {
+    pub fn fit(name: &'static str, training: &Dataset, fit: impl Fn(&Dataset) -> D + Sync) -> Self {
         let decoders = parallel::map(training.rows, &|row| fit(&training.row_table(row)));
         Self::new(name, training, decoders)
     }

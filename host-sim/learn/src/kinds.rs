@@ -6,7 +6,6 @@ use serde::Serialize;
 use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Progress, Silent, columns};
 
-use crate::packing::{Origin, pack};
 use crate::train::kmeans::Search;
 use crate::train::{Features, Group, Kinds, Options, THRESHOLD, train};
 
@@ -141,10 +140,8 @@ fn judge(
         kinds: Some(Kinds { places: features, amounts: features }),
         ..*options
     };
-    let origin = Origin::of_data("", 0, options.seed, training);
-    let packed = train(training, &options, &Silent).and_then(|it| pack(&it, training, &origin));
-    let Ok(blob) = packed else { return [f64::INFINITY; 2] };
-    let decoded = blob.prepare().of_inputs().decode_lines(&held.inputs.values);
+    let Ok(trained) = train(training, &options, &Silent) else { return [f64::INFINITY; 2] };
+    let decoded = trained.decode(&held.inputs.values);
     let names = &held.outputs.names;
     let weights = Group::all(training, Kinds { places: judged_by, amounts: Features::AsTheyAre });
     let touch = weights.into_iter().find_map(|group| group.touch);

@@ -101,7 +101,7 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
     let (mut kept, mut lines) = (Vec::with_capacity(frames), 0);
     for (frame, is_confirmed) in confirmed.iter().enumerate() {
         let far = |t: usize| {
-            let named = tables[t].names.iter().zip(line(tables[t], frame)).zip(&columns[t]);
+            let named = tables[t].names.iter().zip(tables[t].line(frame)).zip(&columns[t]);
             named.filter(|((_, value), column)| is_outside(**value, column.usual))
         };
         let is_explained = |t: usize| pressed[t].explains(frame) || *is_confirmed;
@@ -126,7 +126,7 @@ pub fn find(dataset: &Dataset, line_number: impl Fn(usize) -> u64) -> Outliers {
 fn confirmed(tables: [&Table; 2], columns: &[Vec<Column>; 2]) -> Vec<bool> {
     // How far out the furthest value of a line is, in usual ranges of its column.
     let distance = |t: usize, frame: usize| {
-        let values = line(tables[t], frame).iter().zip(&columns[t]);
+        let values = tables[t].line(frame).iter().zip(&columns[t]);
         let outside = values.filter(|(value, column)| is_outside(**value, column.usual));
         let distances = outside.map(|(value, column)| {
             let range = column.usual[1] - column.usual[0];
@@ -197,11 +197,11 @@ impl Pressed {
     /// Presses that `other` shows, and the distances of `table` in them.
     fn new(table: &Table, columns: &[Column], other: &Table, of_other: &[Column]) -> Self {
         let moved = |frame: usize| {
-            let mut values = line(other, frame).iter().zip(of_other);
+            let mut values = other.line(frame).iter().zip(of_other);
             values.any(|(v, column)| column.rest.is_some_and(|rest| is_outside(*v, rest)))
         };
         let distance = |frame: usize| {
-            let values = line(table, frame).iter().zip(columns);
+            let values = table.line(frame).iter().zip(columns);
             values.map(|(value, column)| (value - column.median).abs()).fold(0.0, f64::max)
         };
         let distances: Vec<f64> = (0..table.len())
@@ -222,12 +222,6 @@ impl Pressed {
         let distance = self.distances.get(frame).copied().unwrap_or(0.0);
         distance > 0.0 && distance <= self.largest
     }
-}
-
-/// Values of a line.
-fn line(table: &Table, frame: usize) -> &[f64] {
-    let count = table.names.len();
-    &table.values[frame * count..][..count]
 }
 
 /// Number of the largest values that are far above all others, of values in ascending order. The others begin at `low`.

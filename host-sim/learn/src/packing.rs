@@ -9,9 +9,10 @@ use taxel_core::blob::{
 use taxel_core::confidence::Confidence;
 use taxel_core::fill::Fill;
 use taxel_core::rbf::Network;
-use taxel_data::{Dataset, columns, input};
+use taxel_data::{Dataset, Table, columns, input};
 
 use crate::error::{Error, Result, not_packed};
+use crate::prepared;
 use crate::train::{FittedFront, FittedNetwork, Trained};
 
 /// Largest blob in bytes that is read: 256 MB.
@@ -77,7 +78,8 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
         units(&dataset.inputs.names)
     };
     let [full_scale, linear_rmse] = [&origin.full_scale, &origin.linear_rmse].map(|it| floats(it));
-    let unknown = floats(&vec![0.0; dataset.outputs.names.len()]);
+    let decoded = prepared::decode(&fronts, &views, &dataset.inputs.values);
+    let training_rmse = floats(&training_rmse(&decoded, &dataset.outputs));
     let parts = ModelParts {
         fronts: &fronts,
         confidence: None,
@@ -98,15 +100,11 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
             input_units: Columns(&input_units),
             output_names: Columns(&output_names),
             output_units: Columns(&output_units),
-            training_rmse: Floats(&unknown),
+            training_rmse: Floats(&training_rmse),
             full_scale: Floats(&full_scale),
         },
     };
-    let packed = |parts| blob::encode_to_vec(parts).map(|bytes| ModelBlob { bytes });
-    // The packed model tells its own errors.
-    let rmse = floats(&training_rmse(&packed(&parts).map_err(not_packed)?, dataset));
-    let metadata = Metadata { training_rmse: Floats(&rmse), ..parts.metadata };
-    packed(&ModelParts { metadata, ..parts }).map_err(not_packed)
+    Ok(ModelBlob { bytes: blob::encode_to_vec(&parts).map_err(not_packed)? })
 }
 
 /// Values as a blob holds them.
@@ -115,11 +113,9 @@ fn floats(values: &[f64]) -> Vec<u8> {
 }
 
 /// RMSE of each output on the frames that it was trained on; NaN for an output without a value.
-fn training_rmse(blob: &ModelBlob, dataset: &Dataset) -> Vec<f64> {
-    let decoded = blob.prepare().of_inputs().decode_lines(&dataset.inputs.values);
-    let outputs = dataset.outputs.names.len();
-    let mut sums = vec![(0.0, 0.0); outputs];
-    for (truth, decoded) in dataset.outputs.lines().zip(decoded.chunks_exact(outputs)) {
+fn training_rmse(decoded: &[f64], truth: &Table) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); truth.names.len()];
+    for (truth, decoded) in truth.lines().zip(decoded.chunks_exact(truth.names.len())) {
         for ((sum, count), (truth, decoded)) in sums.iter_mut().zip(truth.iter().zip(decoded)) {
             let square = (truth - decoded).powi(2);
             if !square.is_nan() {

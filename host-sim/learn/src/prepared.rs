@@ -6,7 +6,7 @@ use std::sync::Arc;
 use taxel_core::blob::{Front, Model};
 use taxel_core::rbf::Network;
 use taxel_core::scale::CLAMP;
-use taxel_core::touch::Kind;
+use taxel_core::touch::{Kind, Strengths};
 use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
@@ -120,45 +120,7 @@ impl<'b> PreparedModel<'b> {
     ///
     /// Outputs that are places are NaN in frames without a touch, as outputs of a frame with a missing reading are.
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
-        let inputs = self.model_inputs(readings);
-        if self.fronts.is_empty() {
-            return infer_in_turn(&self.networks, &inputs);
-        }
-        let decoded = self.fronts.iter().zip(self.networks.iter());
-        let decoded = decoded.map(|(front, network)| Self::decode_part(front, network, &inputs));
-        let mut parts: Vec<_> = decoded.collect();
-        if let [one] = &mut parts[..] {
-            return std::mem::take(one);
-        }
-        let frames = inputs.len() / self.inputs();
-        let of_frame = |frame: usize| {
-            let parts = self.fronts.iter().zip(&parts);
-            parts.flat_map(move |(front, part)| &part[frame * front.outputs..][..front.outputs])
-        };
-        (0..frames).flat_map(of_frame).copied().collect()
-    }
-
-    /// Outputs of one network that sees whole frames, for `inputs` of the model.
-    fn decode_part(front: &Front<'_>, network: &Network<'_>, inputs: &[f64]) -> Vec<f64> {
-        let (given, strengths) = inputs_of(front, inputs);
-        let mut outputs = infer(network, &given);
-        let Some(touch) = front.touch else { return outputs };
-        for (line, strength) in outputs.chunks_exact_mut(front.outputs).zip(strengths) {
-            match touch.kind() {
-                Kind::Place if strength < touch.strengths().least => line.fill(f64::NAN),
-                Kind::Place => {}
-                Kind::Amount => {
-                    let strength = strength.min(touch.strengths().most);
-                    // As a device multiplies them, and does not tell those that overflow.
-                    let scaled = |output: &f64| f64::from(*output as f32 * strength);
-                    line.iter_mut().for_each(|output| *output = scaled(output));
-                    if line.iter().any(|output| !output.is_finite()) {
-                        line.fill(f64::NAN);
-                    }
-                }
-            }
-        }
-        outputs
+        decode(&self.fronts, &self.networks, &self.model_inputs(readings))
     }
 
     /// Network of each row-wire, or those that see whole frames.
@@ -281,6 +243,44 @@ impl<'b> PreparedModel<'b> {
     }
 }
 
+/// Decodes `inputs` of a model (`frames × inputs`) to outputs (`frames × outputs`), with `networks` of rows in turn, or with
+/// those behind `fronts`.
+pub(crate) fn decode(fronts: &[Front<'_>], networks: &[Network<'_>], inputs: &[f64]) -> Vec<f64> {
+    if fronts.is_empty() {
+        return infer_in_turn(networks, inputs);
+    }
+    let decoded = fronts.iter().zip(networks).map(|(front, it)| decode_part(front, it, inputs));
+    let mut parts: Vec<Vec<f64>> = decoded.collect();
+    if let [one] = &mut parts[..] {
+        return std::mem::take(one);
+    }
+    let mut parts: Vec<_> =
+        fronts.iter().zip(&parts).map(|(front, part)| part.chunks_exact(front.outputs)).collect();
+    let frames = parts.first().map_or(0, ExactSizeIterator::len);
+    let mut of_frame = || parts.iter_mut().filter_map(Iterator::next).collect::<Vec<_>>().concat();
+    (0..frames).flat_map(|_| of_frame()).collect()
+}
+
+/// Outputs of one network that sees whole frames, for `inputs` of the model.
+fn decode_part(front: &Front<'_>, network: &Network<'_>, inputs: &[f64]) -> Vec<f64> {
+    let (given, strengths) = inputs_of(front, inputs);
+    let mut outputs = infer(network, &given);
+    let Some(touch) = front.touch else { return outputs };
+    let Strengths { least, most, .. } = touch.strengths();
+    for (line, strength) in outputs.chunks_exact_mut(front.outputs).zip(strengths) {
+        if touch.kind() == Kind::Amount {
+            // As a device multiplies them, and does not tell those that overflow.
+            let scaled = |output: &f64| f64::from(*output as f32 * strength.min(most));
+            line.iter_mut().for_each(|output| *output = scaled(output));
+        }
+        let is_told = touch.kind() == Kind::Amount || strength >= least;
+        if !is_told || line.iter().any(|output| !output.is_finite()) {
+            line.fill(f64::NAN);
+        }
+    }
+    outputs
+}
+
 /// Inputs of the network behind `front` for `inputs` of the model, and the strength of each frame's touch; none without
 /// it.
 fn inputs_of<'r>(front: &Front<'_>, inputs: &'r [f64]) -> (Cow<'r, [f64]>, Vec<f32>) {
@@ -291,10 +291,10 @@ fn inputs_of<'r>(front: &Front<'_>, inputs: &'r [f64]) -> (Cow<'r, [f64]>, Vec<f
         }
         None => (Cow::Borrowed(inputs), vec![]),
     };
-    let Some(projection) = front.projection else { return (given, strengths) };
-    let width = projection.readings();
-    let features = projection::features(projection, projection.features(), width, &given);
-    (Cow::Owned(features), strengths)
+    match front.projection {
+        Some(projection) => (Cow::Owned(projection::features(projection, &given)), strengths),
+        None => (given, strengths),
+    }
 }
 
 impl FrameDecoder for PreparedModel<'_> {

@@ -5,10 +5,9 @@ use taxel_data::{BadValue, Dataset, Progress, Silent};
 
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
-use crate::packing::{Origin, pack};
 use crate::parallel;
 use crate::train::refine::LEAST_FOLDS;
-use crate::train::{self, Examples, Options, Refinement, Start, Trained};
+use crate::train::{self, Examples, FittedNetwork, Options, Refinement, Start, Trained};
 
 mod folds;
 mod grid;
@@ -184,42 +183,38 @@ impl<'d> Judge<'d> {
         options: &Options,
     ) -> Result<Vec<Vec<f64>>> {
         let (training, test) = split(self.dataset, self.fold_of, fold);
-        let starts = Start::all(&training, options)?;
-        let mut layers: Vec<_> = starts.iter().map(|start| start.layers(options)).collect();
-        let origin = Origin::of_data("", 0, 0, &training);
-        let squares = |trained: &Trained| -> Result<Vec<f64>> {
-            let blob = pack(trained, &training, &origin)?;
-            let decoded = blob.prepare().of_inputs().decode_lines(&test.inputs.values);
-            Ok(test.outputs.squared_errors(&decoded))
-        };
         let inner = without(self.fold_of, fold);
-        let mut all = Vec::new();
-        for spread in spreads {
-            let hidden = layers.iter_mut().flat_map(|layers| &mut layers.hidden);
-            hidden.for_each(|layer| layer.spread = *spread);
-            let mut models = vec![Trained::default(); penalties.len()];
-            for (start, layers) in starts.iter().zip(&layers) {
+        let mut all = vec![Trained::default(); spreads.len() * penalties.len()];
+        for start in Start::all(&training, options)? {
+            let mut layers = start.layers(options);
+            let mut places = all.iter_mut();
+            let mut add = |projection: Option<&Vec<f32>>, models: Vec<Vec<FittedNetwork>>| {
+                let models = places.by_ref().zip(models);
+                models.for_each(|(trained, networks)| trained.add(&start, projection, networks));
+            };
+            for spread in spreads {
+                layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
                 let Some(settings) = self.refinement else {
-                    let fitted = train::fit_each(layers, options, penalties, &Silent)?;
-                    for (model, networks) in models.iter_mut().zip(fitted) {
-                        model.add(start, layers.projection.as_ref(), networks);
-                    }
+                    let models = train::fit(&layers, options, penalties, &Silent)?;
+                    add(layers.projection.as_ref(), models);
                     continue;
                 };
-                for (model, penalty) in models.iter_mut().zip(penalties) {
+                for penalty in penalties {
                     // Where centres move to depends on the penalty.
                     let options = Options { penalty: *penalty, ..*options };
                     let examples = Examples::Folds(&inner);
-                    let layers = start.refine(layers, &options, settings, examples, &Silent)?;
-                    let networks = train::fit(&layers, &settings.options(&options), &Silent)?;
-                    model.add(start, layers.projection.as_ref(), networks);
+                    let layers = start.refine(&layers, &options, settings, examples, &Silent)?;
+                    let options = settings.options(&options);
+                    let models = train::fit(&layers, &options, &[options.penalty], &Silent)?;
+                    add(layers.projection.as_ref(), models);
                 }
             }
-            for model in &models {
-                all.push(squares(model)?);
-            }
         }
-        Ok(all)
+        let squares = |trained: &Trained| {
+            let decoded = trained.decode(&test.inputs.values);
+            test.outputs.squared_errors(&test.outputs.with_places(decoded))
+        };
+        Ok(all.iter().map(squares).collect())
     }
 
     /// Baselines on the same folds.
@@ -299,6 +294,8 @@ mod tests {
     fn without_an_output_that_changes_the_score_is_0_and_not_minus_0() {
         assert!(score(&[0.5], &[0.0]).is_sign_positive());
     }
+    use crate::train::{Features, Kinds};
+    use taxel_data::AtRest;
     use taxel_data::random::{Purpose, Random, Stream};
     use taxel_data::table::Table;
 
@@ -364,6 +361,35 @@ mod tests {
         assert!(grown.edges.is_empty(), "{grown:?}");
         let grown_to = grown.best().penalty.unwrap();
         assert!((grown_to / chosen - 1.0).abs() < 1e-9, "{grown_to} {chosen}");
+    }
+
+    #[test]
+    fn settings_are_compared_with_the_features_of_the_model() {
+        let mut random = Random::new(4, Stream::Training, Purpose::Noise, 0, 0);
+        let mut data =
+            Dataset::empty(["a", "b"].map(String::from).into(), vec!["x_mm".into()], 1, 0);
+        data.at_rest = Some(AtRest { level: vec![0.0; 2], deviation: vec![0.0; 2] });
+        for _ in 0..400 {
+            let (x, strength) = (random.unit(), random.between([0.2, 5.0]));
+            data.inputs.values.extend([strength * (1.0 - x), strength * x]);
+            data.outputs.values.push(x);
+        }
+        let folds = block_folds(data.frames(), 4);
+        let candidates = Candidates {
+            centres: vec![10],
+            spreads: vec![0.4],
+            penalties: vec![None],
+            most_spreads: 0,
+            most_penalties: 0,
+        };
+        let rmse = |features: Features| {
+            let options = Options { kinds: Some(Kinds::all(features)), ..Options::default() };
+            let selection = cross_validate(&data, &folds, &candidates, &options, None, &Silent);
+            selection.unwrap().best().rmse[0]
+        };
+        let [plain, normalised] =
+            [Features::AsTheyAre, Features::Normalised { threshold: 0.0 }].map(rmse);
+        assert!(normalised < 0.5 * plain, "{normalised} {plain}");
     }
 
     fn best_spread(outputs: &[&str]) -> f64 {

@@ -8,12 +8,11 @@ use std::borrow::Cow;
 
 use serde::Deserialize;
 use taxel_core::blob::Front;
-use taxel_core::projection::Projection;
 use taxel_core::rbf::Format;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
 use crate::error::Result;
-use crate::parallel;
+use crate::{parallel, prepared};
 
 pub mod resolution;
 pub mod kmeans;
@@ -311,14 +310,11 @@ impl FittedFront {
     /// # Panics
     /// Never: its numbers are finite.
     pub fn view(&self) -> Front<'_> {
-        let projection = self.projection.as_ref().map(|parameters| {
-            let features = parameters.len() / (self.inputs + 1);
-            Projection::new(self.inputs, features, parameters).expect("finite")
-        });
+        let projection = self.projection.as_deref();
         Front {
             outputs: self.outputs,
             touch: self.touch.as_ref().map(FittedTouch::view),
-            projection,
+            projection: projection.map(|parameters| projection::view(parameters, self.inputs)),
         }
     }
 }
@@ -330,33 +326,32 @@ impl FittedFront {
 /// [`Error::Unfit`](crate::Error::Unfit) for a column that f32 does not hold, and other
 /// [`Error`](crate::Error)s for data that does not fit the format.
 pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> Result<Trained> {
-    check(dataset, options)?;
-    let mut trained = Trained::default();
-    for start in Start::all(dataset, options)? {
-        let layers = start.layers(options);
-        trained.add(&start, layers.projection.as_ref(), fit(&layers, options, progress)?);
-    }
-    Ok(trained)
+    train_refined(dataset, options, None, progress)
 }
 
-/// Trains as [`train`] does, and refines centres, width and the projection before the weights are fitted.
+/// Trains as [`train`] does. With a `refinement` on examples, centres, width and the projection are refined before the
+/// weights are fitted.
 ///
 /// # Errors
 /// As [`train`] and [`refine`](refine::refine).
 pub fn train_refined(
     dataset: &Dataset,
     options: &Options,
-    settings: &Refinement,
-    examples: Examples<'_>,
+    refinement: Option<(&Refinement, Examples<'_>)>,
     progress: &dyn Progress,
 ) -> Result<Trained> {
-    check(dataset, options)?;
+    options.check_for(dataset)?;
+    resolution::check(dataset)?;
     let mut trained = Trained::default();
     for start in Start::all(dataset, options)? {
-        let layers = start.layers(options);
-        let layers = start.refine(&layers, options, settings, examples, progress)?;
-        let networks = fit(&layers, &settings.options(options), progress)?;
-        trained.add(&start, layers.projection.as_ref(), networks);
+        let (mut layers, mut options) = (start.layers(options), *options);
+        if let Some((settings, examples)) = refinement {
+            layers = start.refine(&layers, &options, settings, examples, progress)?;
+            options = settings.options(&options);
+        }
+        for networks in fit(&layers, &options, &[options.penalty], progress)? {
+            trained.add(&start, layers.projection.as_ref(), networks);
+        }
     }
     Ok(trained)
 }
@@ -410,7 +405,24 @@ impl<'d> Start<'d> {
 
     /// Layers with K-means centres.
     pub fn layers(&self, options: &Options) -> Layers<'_> {
-        Layers::behind(self.projection.clone(), &self.frames, options)
+        let seen = projection::seen(self.projection.as_deref(), &self.frames);
+        let of_row = |row: usize| {
+            let table = seen.row_table(row);
+            let samples = Samples::new(&table);
+            samples.layer(samples.centres(options, row), options)
+        };
+        let hidden = parallel::map(seen.rows, &of_row);
+        Layers { projection: self.projection.clone(), seen, hidden }
+    }
+
+    /// What stands before its network with this `projection`, if it sees whole frames.
+    pub fn front(&self, projection: Option<&Vec<f32>>) -> Option<FittedFront> {
+        self.whole_frames.then(|| FittedFront {
+            outputs: self.group.outputs.len(),
+            touch: self.group.touch.clone(),
+            inputs: self.frames.inputs.names.len(),
+            projection: projection.cloned(),
+        })
     }
 
     /// Layers that were refined on `examples` of the data set.
@@ -447,43 +459,24 @@ impl Trained {
         projection: Option<&Vec<f32>>,
         networks: Vec<FittedNetwork>,
     ) {
-        if start.whole_frames {
-            self.fronts.push(FittedFront {
-                outputs: start.group.outputs.len(),
-                touch: start.group.touch.clone(),
-                inputs: start.frames.inputs.names.len(),
-                projection: projection.cloned(),
-            });
-        }
+        self.fronts.extend(start.front(projection));
         self.networks.extend(networks);
+    }
+
+    /// Decodes `inputs` (`frames × inputs`) to outputs (`frames × outputs`), as the packed model does.
+    pub fn decode(&self, inputs: &[f64]) -> Vec<f64> {
+        let fronts: Vec<Front<'_>> = self.fronts.iter().map(FittedFront::view).collect();
+        let networks: Vec<_> = self.networks.iter().map(FittedNetwork::network).collect();
+        prepared::decode(&fronts, &networks, inputs)
     }
 }
 
-/// Checks the options against the data, and the data against f32.
-fn check(dataset: &Dataset, options: &Options) -> Result<()> {
-    options.check_for(dataset)?;
-    resolution::check(dataset)
-}
-
-/// Networks with these `layers`, and output weights that are fitted to the frames that they were found on.
+/// Networks with these `layers`, and output weights that are fitted to the frames that they were found on, with each of
+/// `penalties` instead of the options' own: those of one model for each. They share the decomposition of the samples.
 ///
 /// # Errors
 /// [`Error`](crate::Error) for data or layers that the format does not hold.
-///
-/// # Panics
-/// Never: one penalty gives one model.
 pub(crate) fn fit(
-    layers: &Layers<'_>,
-    options: &Options,
-    progress: &dyn Progress,
-) -> Result<Vec<FittedNetwork>> {
-    let mut models = fit_each(layers, options, &[options.penalty], progress)?;
-    Ok(models.pop().expect("one model a penalty"))
-}
-
-/// Fits output weights as [`fit`] does, with each of `penalties` instead of the options' own: the networks of one model
-/// for each. They share the decomposition of the samples.
-pub(crate) fn fit_each(
     layers: &Layers<'_>,
     options: &Options,
     penalties: &[Option<f64>],

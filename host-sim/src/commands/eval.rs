@@ -121,7 +121,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let at_rest =
         rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &Spread::of(&readings)));
     let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
-    let estimate = metrics::with_places(&truth, model.decode_table(&readings));
+    let mut estimate = model.decode_table(&readings);
+    estimate.values = truth.with_places(estimate.values);
     let thickness_mm = f64::from(metadata.thickness_mm);
     let measure = Measure {
         full_scale: metadata.full_scale.iter().map(f64::from).collect(),
@@ -200,11 +201,10 @@ fn centroid_of(
     truth: &Table,
     lines_at_rest: Option<&[usize]>,
 ) -> Option<Vec<f64>> {
-    let columns: Vec<usize> = (0..readings.names.len()).collect();
     let frames = Dataset {
         inputs: readings.clone(),
         outputs: truth.clone(),
-        at_rest: Some(AtRest::of(&readings.part(lines_at_rest?, &columns))),
+        at_rest: Some(AtRest::of(&readings.pick(lines_at_rest?))),
         ..Dataset::empty(vec![], vec![], 1, 0)
     };
     Some(CENTROID.fit(&frames)?.decode_all(&readings.values, 1).values)

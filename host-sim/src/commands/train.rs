@@ -132,10 +132,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let message = "--select chooses for networks that are given readings: add --each-row, or leave it out";
         return Err(Error::Usage(message.into()));
     }
-    let progress = Terminal::new();
-    let features = set.choose(&mut options, &progress);
-    let selection = choice::choose(arguments, &subject, &set, &mut options)?;
+    let (features, selection) = choice::choose(arguments, &subject, &set, &mut options)?;
 
+    let progress = Terminal::new();
     let blob = set.blob(&options, &progress)?;
     output::write_bytes(&arguments.output, blob.bytes())?;
 

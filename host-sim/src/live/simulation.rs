@@ -113,7 +113,6 @@ impl<'b> SimulationFeed<'b> {
         }
         let has_truth = metadata.output_names.iter().eq(scene.world.output_names());
         let at_rest = Synthesis::new(&scene.world).untouched().frames(Stream::Test, AT_REST);
-        let floats = |line: &[f64]| line.iter().map(|reading| *reading as f32).collect();
         let at_rest: Vec<Vec<f32>> = at_rest.inputs.lines().map(floats).collect();
         let baseline = mean(&at_rest);
         let (sender, trajectories) = mpsc::sync_channel(1);
@@ -157,6 +156,10 @@ impl<'b> SimulationFeed<'b> {
     }
 }
 
+fn floats(values: &[f64]) -> Vec<f32> {
+    values.iter().map(|value| *value as f32).collect()
+}
+
 fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> Result<()> {
     let spawned = thread::Builder::new().name(name.into()).spawn(work);
     spawned.map(drop).map_err(|cause| Error::failed(format!("no thread for {name}: {cause}")))
@@ -177,17 +180,7 @@ fn synthesise(world: &World, frame_rate: f64, sender: &SyncSender<Dataset>) {
         } else {
             let still = synthesis.frames_from(Stream::Test, number, 1);
             let times = (STILL_S * frame_rate).ceil().max(1.0) as usize;
-            Dataset {
-                inputs: taxel_data::Table {
-                    values: still.inputs.values.repeat(times),
-                    ..still.inputs.clone()
-                },
-                outputs: taxel_data::Table {
-                    values: still.outputs.values.repeat(times),
-                    ..still.outputs.clone()
-                },
-                ..still
-            }
+            still.subset(&vec![0; times])
         };
         if sender.send(frames).is_err() {
             return;
@@ -218,17 +211,13 @@ impl Feed for SimulationFeed<'_> {
         if self.place == self.current.frames() {
             self.go_on()?;
         }
-        let line = |table: &taxel_data::Table| -> Vec<f64> {
-            let width = table.names.len();
-            table.values[self.place * width..(self.place + 1) * width].to_vec()
-        };
-        let (readings, outputs) = (line(&self.current.inputs), line(&self.current.outputs));
-        let floats = |values: &[f64]| values.iter().map(|value| *value as f32).collect::<Vec<_>>();
+        let [readings, outputs] =
+            [&self.current.inputs, &self.current.outputs].map(|table| table.line(self.place));
         let frame = Frame {
             time_us: (self.number as f64 * self.period.as_secs_f64() * 1e6) as u64,
             number: self.number as u32,
-            readings: floats(&readings),
-            truth: self.has_truth.then(|| floats(&outputs)),
+            readings: floats(readings),
+            truth: self.has_truth.then(|| floats(outputs)),
             ..Frame::default()
         };
         (self.number, self.place) = (self.number + 1, self.place + 1);
@@ -303,10 +292,10 @@ impl Judge {
     }
 
     /// Judges this frame, if it is time to, and the one before is done.
-    fn look(&mut self, readings: Vec<f64>, frame: &Frame) {
+    fn look(&mut self, readings: &[f64], frame: &Frame) {
         if let Some(sender) = &self.sender
             && self.last.elapsed() > JUDGED
-            && sender.try_send((readings, frame.clone())).is_ok()
+            && sender.try_send((readings.to_vec(), frame.clone())).is_ok()
         {
             self.last = Instant::now();
         }

@@ -61,7 +61,8 @@ impl Touch {
             let squares = changes.iter().map(|it| it[reading] * it[reading]);
             let squares = squares.filter(|it| it.is_finite());
             let variance = squares.clone().sum::<f32>() / (squares.count() as f32 - 1.0);
-            variance.sqrt().max(LEAST_DEVIATION * rest.abs()).max(least)
+            // NaN for a reading without a value at rest.
+            variance.sqrt().max(LEAST_DEVIATION * rest.abs()).max(least) + 0.0 * rest
         };
         touch.deviations = touch.baseline.iter().enumerate().map(deviation).collect();
         let largest = changes.iter().map(|it| touch.strength(it)).fold(0.0, f32::max);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use taxel_data::{Dataset, Progress, Purpose, Random, RowTable, Stream, columns};
+use taxel_data::{Dataset, Progress, Purpose, Random, Stream, columns};
 use taxel_learn::decoders::standard::{self, StandardNetwork};
 use taxel_learn::decoders::textbook::{Textbook, TextbookNetwork};
 use taxel_learn::decoders::{BASELINES, RowDecoder, Rows, mean};
@@ -292,7 +292,7 @@ fn row_networks(
     };
     // The centres do not depend on the spread.
     let centres = samples.centres(&options(1.0), row);
-    let few = table.first(settings.standard_frames);
+    let few = table.subset(&(0..settings.standard_frames).collect::<Vec<_>>());
     let each = settings.spreads.par_iter().map(|&spread| {
         let network = samples.fit(&centres, &options(spread))?;
         Ok((network, StandardNetwork::fit(&few, spread)))
@@ -313,8 +313,8 @@ fn textbook_networks(
     training: &Dataset,
 ) -> RowNetworks<TextbookNetwork, TextbookNetwork> {
     let table = training.row_table(row);
-    let few = table.first(settings.standard_frames);
-    let hidden = |table: &RowTable, centres| {
+    let few = table.subset(&(0..settings.standard_frames).collect::<Vec<_>>());
+    let hidden = |table: &Dataset, centres| {
         let mut random = Random::new(seed, Stream::Training, Purpose::Centres, 0, row as u64);
         Arc::new(Textbook::new(table, centres, &mut random))
     };

@@ -80,7 +80,7 @@ impl RestOverTime {
             return None;
         }
         let means_of = |range: &std::ops::Range<usize>| {
-            rest.readings.part(&range.clone().collect::<Vec<_>>(), &all).means()
+            rest.readings.pick(&range.clone().collect::<Vec<_>>()).means()
         };
         let means: Vec<Vec<f64>> = ranges.iter().map(means_of).collect();
         let (at_rest, deviations) = (rest.readings.means(), &spread.deviations);

@@ -1,6 +1,6 @@
 //! Baseline: the best linear decoder of each row-wire, which a network must beat.
 
-use taxel_data::{Dataset, RowTable};
+use taxel_data::Dataset;
 
 use super::{RowDecoder, Rows};
 use crate::train::least_squares::{Factor, Regressors};
@@ -27,7 +27,7 @@ pub fn fit(training: &Dataset) -> Rows<LinearRow> {
 
 impl LinearRow {
     /// Fits the best linear decoder of `table` in the sense of least squares, each output on the lines that have it.
-    pub fn fit(table: &RowTable) -> Self {
+    pub fn fit(table: &Dataset) -> Self {
         let (scale, inputs) = (InputScale::new(table), table.inputs.names.len());
         let regressors = Regressors { centres: &[], inputs, decays: &[1.0], affine_tail: true };
         let factor = |task: Task<'_>| {

@@ -2,7 +2,7 @@
 //! weights interpolate exactly. It is not meant for a device, so it stays in f64.
 
 use nalgebra::DMatrix;
-use taxel_data::RowTable;
+use taxel_data::Dataset;
 
 use super::RowDecoder;
 use crate::train::least_squares::Regressors;
@@ -29,7 +29,7 @@ impl StandardNetwork {
     /// Returns `None` where the interpolation matrix is singular (duplicates), or so nearly singular
     /// that the solution misses the samples by more than a thousandth (a spread far above the
     /// distances).
-    pub fn fit(table: &RowTable, spread: f64) -> Option<Self> {
+    pub fn fit(table: &Dataset, spread: f64) -> Option<Self> {
         let samples = Samples::new(table);
         let (count, outputs) = (table.inputs.len(), table.outputs.names.len());
         let decay = [1.0 / (2.0 * spread * spread)];

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use taxel_data::{Random, RowTable};
+use taxel_data::{Dataset, Random};
 
 use super::RowDecoder;
 use crate::train::kmeans;
@@ -21,7 +21,7 @@ pub struct Textbook {
 impl Textbook {
     /// Divides the inputs of `table` by their maxima and places `centres` centres by K-means; with as many centres as
     /// lines, every line is one.
-    pub fn new(table: &RowTable, centres: usize, random: &mut Random) -> Self {
+    pub fn new(table: &Dataset, centres: usize, random: &mut Random) -> Self {
         let ranges = table.inputs.ranges();
         let factor = |[_, high]: &[f64; 2]| if *high == 0.0 { 0.0 } else { 1.0 / high };
         let scale = ranges.iter().map(factor).collect();
@@ -51,7 +51,7 @@ impl Textbook {
     /// `initial_covariance`.
     pub fn fit(
         self: &Arc<Self>,
-        table: &RowTable,
+        table: &Dataset,
         spread: f64,
         initial_covariance: f64,
     ) -> TextbookNetwork {
@@ -114,16 +114,15 @@ mod tests {
 
     use super::*;
 
-    fn table() -> RowTable {
+    fn table() -> Dataset {
         let values =
             |of: fn(f64) -> [f64; 2]| (0..40).flat_map(|i| of(f64::from(i) / 40.0)).collect();
         let named =
             |names: [&str; 2], values| Table { names: names.map(String::from).to_vec(), values };
-        RowTable {
+        Dataset {
             inputs: named(["a", "b"], values(|t| [50.0 + 10.0 * t, 80.0 - 20.0 * t * t])),
             outputs: named(["y", "z"], values(|t| [t.sin(), 1.0 - t])),
-            common_span: false,
-            weights: None,
+            ..Dataset::empty(vec![], vec![], 1, 0)
         }
     }
 
@@ -131,13 +130,13 @@ mod tests {
     fn each_output_has_the_weights_of_a_network_for_it_alone() {
         let both = table();
         let random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
-        let fit = |table: &RowTable| {
+        let fit = |table: &Dataset| {
             let hidden = Textbook::new(table, 7, &mut random.clone());
             Arc::new(hidden).fit(table, 0.1, 1e6)
         };
         let together = fit(&both);
         for output in 0..2 {
-            let alone = fit(&RowTable { outputs: both.outputs.columns(output, 1), ..both.clone() });
+            let alone = fit(&Dataset { outputs: both.outputs.columns(output, 1), ..both.clone() });
             assert_eq!(alone.hidden.centres, together.hidden.centres, "outputs take no part");
             let of_both = together.weights.iter().skip(output).step_by(2);
             for (a, b) in alone.weights.iter().zip(of_both) {

@@ -8,7 +8,7 @@ use std::cell::OnceCell;
 
 use taxel_core::rbf::{self, Format, Network, NetworkError, Shape};
 
-use taxel_data::{RowTable, Table};
+use taxel_data::{Dataset, Table};
 
 use super::least_squares::{Decomposed, Design, Factor, Weighed, weighed};
 use super::samples::{Ridge, Samples};
@@ -61,7 +61,7 @@ impl FittedNetwork {
     /// than [`MOST_GROWTH`].
     pub(super) fn unless_lost(
         self,
-        table: &RowTable,
+        table: &Dataset,
         targets: &Targets,
         left: &[f64],
     ) -> Result<Self> {
@@ -165,7 +165,7 @@ impl Weights {
 /// Gaussians of a network as a number format holds them: all that is rounded before weights are fitted.
 trait Held: Send + Sync {
     /// Regressors that a device computes for the inputs of `table`, line after line.
-    fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't>;
+    fn design<'t>(&'t self, table: &'t Dataset) -> Box<dyn Design + 't>;
 
     /// Network with the weights of `factors`, which were fitted to the deviations of `targets`.
     ///
@@ -176,7 +176,7 @@ trait Held: Send + Sync {
 
 /// Samples of a table that weights are fitted to.
 struct Fit<'s> {
-    table: &'s RowTable,
+    table: &'s Dataset,
     targets: &'s Targets,
     solver: Solver,
     held: &'s dyn Held,
@@ -190,7 +190,7 @@ struct Fit<'s> {
 impl<'s> Fit<'s> {
     fn new(
         held: &'s dyn Held,
-        table: &'s RowTable,
+        table: &'s Dataset,
         targets: &'s Targets,
         solver: Solver,
         frames: &'s [usize],

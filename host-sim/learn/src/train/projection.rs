@@ -87,10 +87,8 @@ pub fn fit(dataset: &Dataset, features: Option<usize>) -> Result<Vec<f32>> {
     let usual = usual_features(dataset.rows, readings);
     check(dataset, features)?;
     let features = features.unwrap_or(usual);
-    let targets = targets(&dataset.outputs, features);
-    let features = features.min(targets.names.len());
-    let weights = dataset.weights.as_deref();
-    let parts = directions((&dataset.inputs, weights), &targets, features)?;
+    let frames = with_targets(dataset, features);
+    let parts = directions(&frames, features.min(frames.outputs.names.len()))?;
     about_means(parts.transpose().as_slice(), &dataset.inputs.means())
 }
 
@@ -117,55 +115,40 @@ pub(super) fn about_means(parts: &[f64], means: &[f64]) -> Result<Vec<f32>> {
     }
 }
 
-/// Projection of `dataset`'s readings with the given `parameters`.
+/// Projection of so many `readings` with the given `parameters`.
 ///
 /// # Panics
-/// If `parameters` are not as many as [`fit`] makes for this data set.
-pub fn view<'b>(parameters: &'b [f32], dataset: &Dataset) -> Projection<'b> {
-    let readings = dataset.inputs.names.len();
+/// If `parameters` are not as many as [`fit`] makes for so many readings.
+pub fn view(parameters: &[f32], readings: usize) -> Projection<'_> {
     Projection::new(readings, parameters.len() / (readings + 1), parameters)
         .expect("a projection of these readings")
 }
 
-/// What networks are given of the frames of `dataset`: these themselves, or what a projection of these `parameters`
-/// [makes](apply) of them.
+/// What networks are given of the frames of `dataset`: these themselves, or what a projection of these `parameters` makes
+/// of them. That is one row, with the features as inputs, all scaled by the largest span of any.
 ///
 /// # Panics
 /// If the projection is one of other readings.
 pub fn seen<'d>(parameters: Option<&[f32]>, dataset: &'d Dataset) -> Cow<'d, Dataset> {
-    match parameters {
-        Some(parameters) => Cow::Owned(apply(view(parameters, dataset), dataset)),
-        None => Cow::Borrowed(dataset),
-    }
-}
-
-/// Data set that the network behind the projection is trained on: one row, with the features as inputs,
-/// all scaled by the largest span of any.
-pub fn apply(projection: Projection<'_>, dataset: &Dataset) -> Dataset {
-    let (width, count) = (dataset.inputs.names.len(), projection.features());
-    let names = (1..=count).map(|feature| format!("feature{feature}")).collect();
-    let values = features(projection, count, width, &dataset.inputs.values);
-    Dataset {
+    let Some(parameters) = parameters else { return Cow::Borrowed(dataset) };
+    let projection = view(parameters, dataset.inputs.names.len());
+    let names = (1..=projection.features()).map(|feature| format!("feature{feature}")).collect();
+    let values = features(projection, &dataset.inputs.values);
+    Cow::Owned(Dataset {
         inputs: Table { names, values },
         outputs: dataset.outputs.clone(),
         common_span: true,
         weights: dataset.weights.clone(),
         ..Dataset::empty(vec![], vec![], 1, 0)
-    }
+    })
 }
 
 /// Projects every line of `readings` as the device does: `lines × features`, in the outputs' unit.
-///
-/// A line has `width` readings and gets so many `features`.
-pub fn features(
-    projection: Projection<'_>,
-    features: usize,
-    width: usize,
-    readings: &[f64],
-) -> Vec<f64> {
+pub fn features(projection: Projection<'_>, readings: &[f64]) -> Vec<f64> {
+    let width = projection.readings();
     let of_line = |line: &[f64]| {
         let line: Vec<f32> = line.iter().map(|reading| *reading as f32).collect();
-        let mut features = vec![0.0; features];
+        let mut features = vec![0.0; projection.features()];
         projection.project(&line, &mut features);
         features.into_iter().map(f64::from)
     };
@@ -174,21 +157,22 @@ pub fn features(
     parallel::pieces(readings, FRAMES_AT_ONCE * width, &of_piece).concat()
 }
 
-/// What the projection has to tell: the `outputs`, and where these are fewer than `features`, their products of two
-/// or three factors. Then all are about their means and have a standard deviation of 1.
-pub(super) fn targets(outputs: &Table, features: usize) -> Cow<'_, Table> {
-    let all = factors(outputs, features);
-    if all.len() == outputs.names.len() {
-        return Cow::Borrowed(outputs);
+/// Frames of `dataset` with what the projection has to tell for outputs: the outputs, and where these are fewer than
+/// `features`, their products of two or three factors. Then all are about their means and have a standard deviation of 1.
+pub(super) fn with_targets(dataset: &Dataset, features: usize) -> Cow<'_, Dataset> {
+    let all = factors(&dataset.outputs, features);
+    if all.len() == dataset.outputs.names.len() {
+        return Cow::Borrowed(dataset);
     }
-    let outputs = standardised(outputs);
+    let outputs = standardised(&dataset.outputs);
     let of_line = |line: &[f64]| -> Vec<f64> {
         let product = |factors: &Vec<usize>| factors.iter().map(|factor| line[*factor]).product();
         all.iter().map(product).collect()
     };
     let values = outputs.lines().flat_map(of_line).collect();
     let names = (1..=all.len()).map(|product| format!("product{product}")).collect();
-    Cow::Owned(standardised(&Table { names, values }))
+    let outputs = standardised(&Table { names, values });
+    Cow::Owned(Dataset { outputs, ..dataset.clone() })
 }
 
 /// Factors of each target: the columns of `outputs`, and of their products if these are needed for so many `features`.
@@ -224,92 +208,111 @@ fn standardised(table: &Table) -> Table {
 }
 
 /// Each reading's part in every feature, one feature a column.
-fn directions(
-    (inputs, weights): (&Table, Option<&[f64]>),
-    outputs: &Table,
-    features: usize,
-) -> Result<DMatrix<f64>> {
-    let readings = inputs.names.len();
-    let all = Covariances::new((inputs, weights), outputs);
-    let (regression, predicted) = if outputs.values.iter().all(|value| !value.is_nan()) {
-        let regression = all.regression()?;
-        let predicted = all.with_outputs.tr_mul(&regression);
-        (regression, predicted)
+fn directions(frames: &Dataset, features: usize) -> Result<DMatrix<f64>> {
+    let all = with_noise(frames);
+    let is_complete = frames.outputs.values.iter().all(|value| !value.is_nan());
+    let regression = if is_complete {
+        solved(all.of_inputs.clone(), &all.with_outputs)?
     } else {
-        // Outputs that are missing in some lines are regressed on the others.
-        let mut regression = DMatrix::zeros(readings, outputs.names.len());
-        for columns in outputs.missing_together() {
-            let lines = outputs.lines_with(&columns);
-            let all_inputs: Vec<usize> = (0..readings).collect();
-            let weights = weights.map(|it| lines.iter().map(|line| it[*line]).collect::<Vec<_>>());
-            let inputs = inputs.part(&lines, &all_inputs);
-            let of_task =
-                Covariances::new((&inputs, weights.as_deref()), &outputs.part(&lines, &columns));
-            let parts = of_task.regression()?;
-            for (column, part) in columns.iter().zip(parts.column_iter()) {
-                regression.column_mut(*column).copy_from(&part);
-            }
-        }
-        let predicted = regression.tr_mul(&(&all.of_readings * &regression));
-        (regression, predicted)
+        by_task(frames, |frames| {
+            let of_task = with_noise(frames);
+            solved(of_task.of_inputs, &of_task.with_outputs)
+        })?
     };
-    let predicted = (&predicted + predicted.transpose()) * 0.5;
-    let mut parts = DMatrix::zeros(readings, features);
-    let directions = principal::directions(predicted, features);
+    let predicted = if is_complete {
+        all.with_outputs.tr_mul(&regression)
+    } else {
+        regression.tr_mul(&(&all.of_inputs * &regression))
+    };
+    Ok(strongest(&regression, &predicted, features))
+}
+
+/// Directions of the inputs that tell most of the outputs by a `regression`, one a column; `predicted` is the covariance of
+/// what it predicts.
+pub(super) fn strongest(
+    regression: &DMatrix<f64>,
+    predicted: &DMatrix<f64>,
+    features: usize,
+) -> DMatrix<f64> {
+    let directions = principal::directions((predicted + predicted.transpose()) * 0.5, features);
+    let mut parts = DMatrix::zeros(regression.nrows(), features);
     for (mut part, direction) in parts.column_iter_mut().zip(directions.column_iter()) {
-        part.copy_from(&(&regression * direction));
+        part.copy_from(&(regression * direction));
     }
-    Ok(parts)
+    parts
 }
 
-/// Sums of products of readings, and of readings with outputs, all about their means.
-struct Covariances {
-    of_readings: DMatrix<f64>,
-    with_outputs: DMatrix<f64>,
-}
-
-impl Covariances {
-    fn new((inputs, weights): (&Table, Option<&[f64]>), outputs: &Table) -> Self {
-        let readings = inputs.names.len();
-        let means = [inputs, outputs].map(|table| means(table, weights)).concat();
-        let products = products((inputs, weights), outputs, &means);
-        let width = readings + outputs.names.len();
-        let mut of_readings =
-            DMatrix::from_fn(readings, readings, |i, j| products[i.min(j) * width + i.max(j)]);
-        for reading in 0..readings {
-            // A reading that never changes gets a part of 0, since it is 0 about its mean.
-            let own = of_readings[(reading, reading)];
-            of_readings[(reading, reading)] =
-                if own > 0.0 { own * (1.0 + NOISE_FLOOR * NOISE_FLOOR) } else { 1.0 };
+/// Regression of all outputs on the inputs, one a column: `fit` is given outputs that are missing in the same frames, in the
+/// frames that have them.
+pub(super) fn by_task(
+    frames: &Dataset,
+    mut fit: impl FnMut(&Dataset) -> Result<DMatrix<f64>>,
+) -> Result<DMatrix<f64>> {
+    let (inputs, outputs) = (frames.inputs.names.len(), frames.outputs.names.len());
+    let mut regression = DMatrix::zeros(inputs, outputs);
+    for columns in frames.outputs.missing_together() {
+        let lines = frames.outputs.lines_with(&columns);
+        let outputs = frames.outputs.part(&lines, &columns);
+        let parts = fit(&Dataset { outputs, ..frames.subset(&lines) })?;
+        for (column, part) in columns.iter().zip(parts.column_iter()) {
+            regression.column_mut(*column).copy_from(&part);
         }
-        let with_outputs =
-            DMatrix::from_fn(readings, width - readings, |i, o| products[i * width + readings + o]);
-        Self { of_readings, with_outputs }
     }
+    Ok(regression)
+}
 
-    /// Regression of the outputs on the readings.
-    fn regression(&self) -> Result<DMatrix<f64>> {
-        let decomposed = self.of_readings.clone().cholesky().ok_or_else(no_regression)?;
-        Ok(decomposed.solve(&self.with_outputs))
+/// Solution X of the normal equations `of_inputs`·X = `with_outputs`.
+pub(super) fn solved(of_inputs: DMatrix<f64>, with_outputs: &DMatrix<f64>) -> Result<DMatrix<f64>> {
+    Ok(of_inputs.cholesky().ok_or_else(no_regression)?.solve(with_outputs))
+}
+
+/// Sums of products of inputs, of inputs with outputs, and of outputs, about given means.
+#[derive(Clone)]
+pub(super) struct Moments {
+    pub of_inputs: DMatrix<f64>,
+    pub with_outputs: DMatrix<f64>,
+    pub of_outputs: f64,
+}
+
+impl Moments {
+    pub fn new(frames: &Dataset, means: &[f64]) -> Self {
+        let (n, width) = (frames.inputs.names.len(), means.len());
+        let sums = products(frames, means);
+        let square = |(place, value): (usize, &f64)| {
+            let weight = frames.weights.as_ref().map_or(1.0, |it| it[place / (width - n)]);
+            (weight * (value - means[n + place % (width - n)])).powi(2)
+        };
+        Self {
+            of_inputs: DMatrix::from_fn(n, n, |i, j| sums[i.min(j) * width + i.max(j)]),
+            with_outputs: DMatrix::from_fn(n, width - n, |i, o| sums[i * width + n + o]),
+            of_outputs: frames.outputs.values.iter().enumerate().map(square).sum(),
+        }
     }
 }
 
-/// Sums Σ zᵢ·zⱼ over all frames for every i ≤ j, with z the readings and then the outputs, about their
+/// Moments of `frames` about their means, with the noise floor added to every reading.
+fn with_noise(frames: &Dataset) -> Moments {
+    let mut moments = Moments::new(frames, &means(frames));
+    for reading in 0..frames.inputs.names.len() {
+        // A reading that never changes gets a part of 0, since it is 0 about its mean.
+        let own = &mut moments.of_inputs[(reading, reading)];
+        *own = if *own > 0.0 { *own * (1.0 + NOISE_FLOOR * NOISE_FLOOR) } else { 1.0 };
+    }
+    moments
+}
+
+/// Sums Σ zᵢ·zⱼ over all frames for every i ≤ j, with z the inputs and then the outputs, about their
 /// means, times the frame's weight. Pieces are added in their order, whatever the number of threads.
-pub(super) fn products(
-    (readings, weights): (&Table, Option<&[f64]>),
-    targets: &Table,
-    means: &[f64],
-) -> Vec<f64> {
+fn products(frames: &Dataset, means: &[f64]) -> Vec<f64> {
     let width = means.len();
-    let (inputs, outputs) = (readings.names.len(), targets.names.len());
+    let (inputs, outputs) = (frames.inputs.names.len(), frames.outputs.names.len());
     let of_piece = |piece| {
         let mut sums = vec![0.0; width * width];
-        let readings = parallel::piece(&readings.values, FRAMES_AT_ONCE * inputs, piece);
-        let targets = parallel::piece(&targets.values, FRAMES_AT_ONCE * outputs, piece);
+        let readings = parallel::piece(&frames.inputs.values, FRAMES_AT_ONCE * inputs, piece);
+        let targets = parallel::piece(&frames.outputs.values, FRAMES_AT_ONCE * outputs, piece);
         let lines = readings.chunks_exact(inputs).zip(targets.chunks_exact(outputs));
-        for (index, (readings, targets)) in lines.enumerate() {
-            let weight = weights.map_or(1.0, |it| it[piece * FRAMES_AT_ONCE + index]);
+        for (line, (readings, targets)) in (piece * FRAMES_AT_ONCE..).zip(lines) {
+            let weight = frames.weights.as_ref().map_or(1.0, |it| it[line]);
             // Readings in f32, as the device has them.
             let readings = readings.iter().map(|reading| f64::from(*reading as f32));
             let values = readings.chain(targets.iter().copied());
@@ -319,19 +322,22 @@ pub(super) fn products(
         }
         sums
     };
-    sum(&parallel::map(readings.len().div_ceil(FRAMES_AT_ONCE), &of_piece))
+    sum(&parallel::map(frames.frames().div_ceil(FRAMES_AT_ONCE), &of_piece))
 }
 
-/// Mean of each column, in which lines count by the squares of their `weights`.
-pub(super) fn means(table: &Table, weights: Option<&[f64]>) -> Vec<f64> {
-    let Some(weights) = weights else { return table.means() };
-    let mut sums = vec![0.0; table.names.len()];
-    for (line, weight) in table.lines().zip(weights) {
-        sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += value * weight * weight);
-    }
-    let all: f64 = weights.iter().map(|weight| weight * weight).sum();
-    sums.iter_mut().for_each(|sum| *sum /= all);
-    sums
+/// Mean of each input and of each output, to which frames count by the squares of their weights.
+pub(super) fn means(frames: &Dataset) -> Vec<f64> {
+    let of_table = |table: &Table| {
+        let Some(weights) = &frames.weights else { return table.means() };
+        let mut sums = vec![0.0; table.names.len()];
+        for (line, weight) in table.lines().zip(weights) {
+            sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += value * weight * weight);
+        }
+        let all: f64 = weights.iter().map(|weight| weight * weight).sum();
+        sums.iter_mut().for_each(|sum| *sum /= all);
+        sums
+    };
+    [&frames.inputs, &frames.outputs].map(of_table).concat()
 }
 
 /// Sums of lists of the same length, added in their order.

@@ -1,7 +1,7 @@
 //! Samples of one network, scaled as the device scales them, and what is fitted to them.
 
 use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS};
-use taxel_data::{Purpose, Random, RowTable, Stream};
+use taxel_data::{Dataset, Purpose, Random, Stream};
 
 use super::{Options, kmeans};
 
@@ -29,7 +29,7 @@ pub struct InputScale {
 
 impl InputScale {
     /// Scale of a table's inputs, rounded to the numbers that the blob holds.
-    pub fn new(table: &RowTable) -> Self {
+    pub fn new(table: &Dataset) -> Self {
         // Ranges of the readings in f32, as the device has them.
         let ranges: Vec<[f32; 2]> =
             table.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
@@ -68,7 +68,7 @@ pub(super) struct CentredScale {
 }
 
 impl CentredScale {
-    pub fn new(table: &RowTable) -> Self {
+    pub fn new(table: &Dataset) -> Self {
         let range = |range: [f64; 2]| range.map(|v| f64::from(v as f32));
         let ranges = || table.input_ranges().into_iter().map(range);
         let per_unit = |[low, high]: [f64; 2]| {
@@ -86,7 +86,7 @@ impl CentredScale {
     }
 
     /// Scales all inputs of `table` like the device does before its clamp, line after line.
-    pub fn units<'a>(&'a self, table: &'a RowTable) -> impl Iterator<Item = f32> + 'a {
+    pub fn units<'a>(&'a self, table: &'a Dataset) -> impl Iterator<Item = f32> + 'a {
         table.inputs.lines().flat_map(|line| {
             let ranges = self.midpoint.iter().zip(&self.per_unit);
             line.iter().zip(ranges).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
@@ -133,12 +133,12 @@ pub struct Samples<'b> {
     pub(crate) scale: InputScale,
     /// Scaled inputs, `samples × inputs`.
     pub(crate) scaled: Vec<f64>,
-    pub(crate) table: &'b RowTable,
+    pub(crate) table: &'b Dataset,
 }
 
 impl<'b> Samples<'b> {
     /// Scales the inputs of `table` to [0, 1].
-    pub fn new(table: &'b RowTable) -> Self {
+    pub fn new(table: &'b Dataset) -> Self {
         let scale = InputScale::new(table);
         Self { scaled: scale.apply(&table.inputs.values), scale, table }
     }

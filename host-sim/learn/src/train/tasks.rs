@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 use taxel_data::error::quoted;
-use taxel_data::{BadValue, RowTable, Table, require};
+use taxel_data::{BadValue, Dataset, Table, require};
 
 use super::least_squares::Factor;
 
@@ -14,28 +14,23 @@ use super::least_squares::Factor;
 pub(crate) struct Task<'t> {
     pub columns: Vec<usize>,
     /// Lines that have these outputs.
-    pub table: Cow<'t, RowTable>,
+    pub table: Cow<'t, Dataset>,
     /// What weights are fitted to, `lines × columns`.
     pub targets: Cow<'t, [f64]>,
 }
 
 impl<'t> Task<'t> {
     /// Tasks of `table`, with `targets` for its outputs: missing ones are missing there too.
-    pub fn all(table: &'t RowTable, targets: &'t Table) -> Vec<Self> {
+    pub fn all(table: &'t Dataset, targets: &'t Table) -> Vec<Self> {
         let of_columns = |columns: Vec<usize>| {
             let lines = targets.lines_with(&columns);
             if columns.len() == targets.names.len() && lines.len() == targets.len() {
                 let targets = Cow::Borrowed(targets.values.as_slice());
                 return Self { columns, table: Cow::Borrowed(table), targets };
             }
-            let all_inputs: Vec<usize> = (0..table.inputs.names.len()).collect();
-            let inputs = table.inputs.part(&lines, &all_inputs);
             let outputs = table.outputs.part(&lines, &columns);
             let targets = Cow::Owned(targets.part(&lines, &columns).values);
-            let weights = table.weights.as_ref();
-            let weights = weights.map(|it| lines.iter().map(|line| it[*line]).collect());
-            let common_span = table.common_span;
-            let table = Cow::Owned(RowTable { inputs, outputs, common_span, weights });
+            let table = Cow::Owned(Dataset { outputs, ..table.subset(&lines) });
             Self { columns, table, targets }
         };
         targets.missing_together().into_iter().map(of_columns).collect()

@@ -1,4 +1,4 @@
-use taxel_data::{Purpose, Random, RowTable, Silent, Stream, Table};
+use taxel_data::{Dataset, Purpose, Random, Silent, Stream, Table};
 
 use super::*;
 use crate::decoders::RowDecoder;
@@ -7,7 +7,7 @@ use crate::decoders::standard::StandardNetwork;
 use crate::infer::infer;
 
 /// Table of `frames` of a smooth function of two inputs, with a little noise.
-fn table(frames: usize, noise: f64) -> RowTable {
+fn table(frames: usize, noise: f64) -> Dataset {
     let mut random = Random::new(11, Stream::Training, Purpose::Noise, 0, 0);
     let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
     for _ in 0..frames {
@@ -17,11 +17,10 @@ fn table(frames: usize, noise: f64) -> RowTable {
         outputs.extend([wave + noise * random.normal(), a - 2.0 * b + noise * random.normal()]);
     }
     let names = |list: [&str; 2]| list.map(String::from).to_vec();
-    RowTable {
-        common_span: false,
-        weights: None,
+    Dataset {
         inputs: Table { names: names(["a_ohm", "b_ohm"]), values: inputs },
         outputs: Table { names: names(["wave_mm", "plane_mm"]), values: outputs },
+        ..Dataset::empty(vec![], vec![], 1, 0)
     }
 }
 
@@ -94,7 +93,7 @@ fn training_that_takes_more_memory_than_is_allowed_is_refused_before_it_is_taken
 
 /// The usual table, whose first output is missing wherever the second one is below −0.3. The input's range is that of the
 /// lines that have all outputs.
-fn with_missing_outputs(frames: usize) -> RowTable {
+fn with_missing_outputs(frames: usize) -> Dataset {
     let mut table = table(frames, 0.05);
     table.inputs.values[..4].copy_from_slice(&[40.0, 95.0, 60.0, 100.0]);
     for line in table.outputs.values.chunks_exact_mut(2).skip(2) {
@@ -109,10 +108,10 @@ fn with_missing_outputs(frames: usize) -> RowTable {
 }
 
 /// Lines of `table` that have the output number `column`, with that output alone.
-fn alone(table: &RowTable, column: usize) -> RowTable {
+fn alone(table: &Dataset, column: usize) -> Dataset {
     let lines = table.outputs.lines_with(&[column]);
     let inputs = table.inputs.part(&lines, &[0, 1]);
-    RowTable { inputs, outputs: table.outputs.part(&lines, &[column]), ..table.clone() }
+    Dataset { inputs, outputs: table.outputs.part(&lines, &[column]), ..table.clone() }
 }
 
 #[test]
@@ -126,7 +125,7 @@ fn each_output_has_the_network_that_the_lines_with_it_alone_would_give() {
         let centres = samples.centres(&usual, 0);
         for penalty in [None, Some(1e-6)] {
             let options = Options { penalty, ..usual };
-            let predicted = |table: &RowTable| {
+            let predicted = |table: &Dataset| {
                 let fitted = Samples::new(table).fit(&centres, &options).unwrap();
                 (fitted.format(), infer(&fitted.network(), &samples.table.inputs.values))
             };
@@ -151,13 +150,9 @@ fn the_linear_decoder_fits_each_output_on_the_lines_that_have_it() {
     }
 }
 
-fn dataset(RowTable { inputs, outputs, common_span, .. }: RowTable) -> Dataset {
-    Dataset { inputs, outputs, common_span, ..Dataset::empty(vec![], vec![], 1, 0) }
-}
-
 #[test]
 fn outputs_with_too_few_frames_are_refused_by_name() {
-    let mut data = dataset(with_missing_outputs(3000));
+    let mut data = with_missing_outputs(3000);
     let count = data.fewest_values();
     let refused = |data: &Dataset, options: &Options| {
         train(data, options, &Silent).expect_err("refused").to_string()

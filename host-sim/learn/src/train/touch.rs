@@ -195,8 +195,10 @@ impl FreshFrames for Fresh<'_> {
 impl FittedTouch {
     /// Fits level, threshold and strengths to `dataset`, for outputs of this `kind`.
     fn fit(dataset: &Dataset, kind: Kind, threshold: f64) -> Self {
-        let AtRest { level, deviation } =
-            dataset.at_rest.clone().unwrap_or_else(|| unknown_rest(&dataset.inputs));
+        // An input may have no value at rest.
+        let is_known = |rest: &AtRest| rest.level.iter().all(|level| level.is_finite());
+        let known = dataset.at_rest.clone().filter(is_known);
+        let AtRest { level, deviation } = known.unwrap_or_else(|| unknown_rest(&dataset.inputs));
         let of_readings = level.iter().zip(&deviation);
         let pairs: Vec<f32> =
             of_readings.flat_map(|(level, d)| [*level as f32, (threshold * d) as f32]).collect();

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
-use taxel_data::{RowTable, Silent, Stream, Table, columns};
+use taxel_data::{Dataset, Silent, Stream, Table, columns};
 use taxel_learn::infer::infer;
 use taxel_learn::train::least_squares::{Factor, Regressors};
 use taxel_learn::train::{InputScale, Samples, train};
@@ -27,7 +27,7 @@ fn world(name: &str, noise: f64) -> World {
 }
 
 /// Predictions of a network in f64, with neither centres nor weights rounded.
-fn in_f64(training: &RowTable, centres: &[f64], options: &Options, test: &RowTable) -> Vec<f64> {
+fn in_f64(training: &Dataset, centres: &[f64], options: &Options, test: &Dataset) -> Vec<f64> {
     let scale = InputScale::new(training);
     let regressors = Regressors {
         centres,

@@ -6,6 +6,7 @@ use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use taxel_data::Table;
 use taxel_learn::Options;
+use taxel_learn::kinds::Choice;
 use taxel_learn::select::{self, Candidates, Edge, Scored, Selection};
 use taxel_learn::train::Refinement;
 
@@ -20,13 +21,14 @@ const PENALTIES: [f64; 6] = [1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5];
 /// Most values beyond these grids that are tried.
 const MOST_STEPS: usize = 4;
 
-/// Sets `options` as the `arguments` say; with `--select` by cross-validation, which is returned.
+/// Sets `options` as the `arguments` say; with `--select` by cross-validation. Returns what was tried of features, and of
+/// settings.
 pub fn choose(
     arguments: &Arguments,
     subject: &Subject,
     set: &TrainingSet<'_>,
     options: &mut Options,
-) -> Result<Option<Selection>> {
+) -> Result<(Option<Choice>, Option<Selection>)> {
     let usual = Options::default().centres;
     if arguments.network.centres.is_empty() && subject.scene().is_none() && options.centres < usual
     {
@@ -38,8 +40,10 @@ pub fn choose(
     }
     if !arguments.select {
         arguments.network.apply(options)?;
-        return Ok(None);
+        return Ok((set.choose(options, &Terminal::new()), None));
     }
+    // Settings are compared with the features that the model will have.
+    let features = set.choose(options, &Terminal::new());
     let fold_of = match subject {
         Subject::Measured(data) => data.fold_of.clone(),
         Subject::Scene(_) => arguments.subject.data.folds_of(&set.frames.outputs, options.seed)?,
@@ -56,7 +60,7 @@ pub fn choose(
     (options.centres, options.spread) = (best.centres, best.spread);
     options.penalty = best.penalty;
     selection.edges.iter().for_each(|edge| stderr::remark(format_args!("note: {}", beyond(edge))));
-    Ok(Some(selection))
+    Ok((features, Some(selection)))
 }
 
 /// Candidates as given, and usual ones for the rest. Only grids of usual ones grow.

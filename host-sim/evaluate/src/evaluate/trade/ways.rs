@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::{Format, Shape};
-use taxel_learn::cost::{Cost, Design, NetworkDesign};
+use taxel_learn::cost::{Cost, Design, FrontDesign, NetworkDesign};
 use taxel_learn::train::{Start, projection};
 
 use super::choice::Offer;
@@ -62,24 +62,27 @@ impl<'f> Ways<'f> {
             inputs: of_row(&dataset.inputs.names),
             outputs: of_row(&dataset.outputs.names),
         };
-        let mut design = if self.inputs.each_row() {
-            Design::of_rows(shape, format, centres, true)
-        } else {
-            let mut design = Design::of_array(shape, format, centres, true);
-            let of_start = |start: &Start<'_>| {
-                let inputs = start.frames.inputs.names.len();
-                let features = start.projection.as_ref().map(|it| it.len() / (inputs + 1));
-                let outputs = start.group.outputs.len();
-                let shape = Shape { inputs: features.unwrap_or(inputs), centres, outputs };
-                NetworkDesign { shape, ..design.networks[0] }
+        let of_start = |start: &Start<'_>| {
+            let front = start.front(start.projection.as_ref());
+            let (rows, inputs) = match &front {
+                Some(front) => (1, front.view().inputs(dataset.inputs.names.len())),
+                None => (shape.rows, shape.inputs),
             };
-            design.networks = self.inputs.starts.iter().map(of_start).collect();
-            design
+            let shape = Shape { inputs, centres, outputs: start.group.outputs.len() / rows };
+            let front = front.map(|front| FrontDesign::new(&front.view()));
+            vec![NetworkDesign { format, shape, affine_tail: true, front }; rows]
+        };
+        let networks: Vec<_> = self.inputs.starts.iter().flat_map(of_start).collect();
+        let mut design = Design {
+            shape,
+            row_network: (0..networks.len()).collect(),
+            networks,
+            relative_inputs: dataset.relative_inputs,
+            weights_in_ram: false,
         };
         for (network, most) in design.networks.iter_mut().zip(distinct) {
             network.shape.centres = centres.min(*most);
         }
-        design.relative_inputs = dataset.relative_inputs;
         design.in_ram_if_it_fits()
     }
 }

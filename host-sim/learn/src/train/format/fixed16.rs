@@ -13,7 +13,7 @@ use taxel_core::rbf::fixed16::{
 };
 use taxel_core::rbf::{Format, NetworkError, Shape};
 use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
-use taxel_data::{BadValue, RowTable};
+use taxel_data::{BadValue, Dataset};
 
 use super::super::least_squares::{Design, Factor};
 use super::super::samples::CentredScale;
@@ -252,7 +252,7 @@ impl Rounded {
 }
 
 impl Held for Exponents {
-    fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't> {
+    fn design<'t>(&'t self, table: &'t Dataset) -> Box<dyn Design + 't> {
         let network = Network::try_new(self.shape, false, &self.without_weights);
         Box::new(FixedDesign {
             network: network.expect("checked when made"),

@@ -2,7 +2,7 @@
 
 use taxel_core::rbf::float32::Parameters;
 use taxel_core::rbf::{Format, Shape};
-use taxel_data::RowTable;
+use taxel_data::Dataset;
 
 use super::super::least_squares::{Design, Regressors};
 use super::super::tasks::Factors;
@@ -40,7 +40,7 @@ impl Gaussians {
 }
 
 impl Held for Gaussians {
-    fn design<'t>(&'t self, table: &'t RowTable) -> Box<dyn Design + 't> {
+    fn design<'t>(&'t self, table: &'t Dataset) -> Box<dyn Design + 't> {
         Box::new(self.regressors().of(self.scale.apply(&table.inputs.values)))
     }
 

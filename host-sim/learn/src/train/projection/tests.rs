@@ -1,9 +1,10 @@
-use taxel_data::{Purpose, Random, Stream};
+use taxel_data::{Purpose, Random, Silent, Stream};
 use taxel_simulate::{World, synthesise};
 
 use super::*;
 use crate::decoders::RowDecoder;
 use crate::decoders::linear::LinearRow;
+use crate::train::{Features, Kinds, Options, train};
 
 /// Data set of readings r1…r6 in two rows of three; the outputs are known sums of them.
 fn known(frames: usize, noise: f64) -> Dataset {
@@ -22,14 +23,14 @@ fn known(frames: usize, noise: f64) -> Dataset {
 }
 
 fn projection<'b>(dataset: &Dataset, parameters: &'b [f32]) -> Projection<'b> {
-    view(parameters, dataset)
+    view(parameters, dataset.inputs.names.len())
 }
 
 #[test]
 fn features_carry_all_that_outputs_take_from_readings() {
     let data = known(400, 0.01);
     let parameters = fit(&data, None).unwrap();
-    let seen = apply(projection(&data, &parameters), &data);
+    let seen = seen(Some(&parameters), &data);
     assert_eq!((seen.rows, seen.inputs.names.len(), seen.inputs.len()), (1, 3, 400));
     // Two sums decide all outputs: two features follow them to the noise, and the third is noise.
     let spans: Vec<f64> = seen.inputs.ranges().iter().map(|[low, high]| high - low).collect();
@@ -50,7 +51,7 @@ fn a_line_is_projected_as_on_the_device_and_nan_where_a_reading_is_missing() {
     let mut data = known(20, 0.0);
     data.inputs.values[7] = f64::NAN;
     let parameters = fit(&known(20, 0.0), None).unwrap();
-    let seen = features(projection(&data, &parameters), 3, 6, &data.inputs.values);
+    let seen = features(projection(&data, &parameters), &data.inputs.values);
     let line: Vec<f32> = data.inputs.values[..6].iter().map(|r| *r as f32).collect();
     let mut expected = [0.0; 3];
     projection(&data, &parameters).project(&line, &mut expected);
@@ -63,7 +64,7 @@ fn few_outputs_are_told_by_features_of_their_products() {
     let data = synthesise(&World::contact(), Stream::Training, 3000);
     let parameters = fit(&data, None).unwrap();
     assert_eq!(parameters.len(), USUAL_FEATURES * 145);
-    let seen = apply(projection(&data, &parameters), &data);
+    let seen = seen(Some(&parameters), &data);
     let spans: Vec<f64> = seen.inputs.ranges().iter().map(|[low, high]| high - low).collect();
     assert!(spans.iter().all(|span| *span > 0.0), "{spans:?}");
     // One output has three powers, and there are no more features than that.
@@ -102,7 +103,8 @@ fn outputs_that_are_never_together_have_no_products() {
 fn products_are_those_of_standardised_outputs() {
     let names = ["a", "b"].map(String::from).to_vec();
     let outputs = Table { names, values: vec![1.0, 10.0, 3.0, 10.0, 5.0, 40.0, 7.0, 0.0] };
-    let targets = targets(&outputs, 5);
+    let data = Dataset { outputs, ..Dataset::empty(vec![], vec![], 1, 0) };
+    let (targets, outputs) = (&with_targets(&data, 5).outputs, &data.outputs);
     // a, b, aa, ab, bb.
     assert_eq!(targets.names.len(), 5);
     let z = |line: usize| [(2 * line) as f64 - 3.0, outputs.values[2 * line + 1] - 15.0];
@@ -124,12 +126,28 @@ fn features_are_those_of_the_lines_that_have_an_output() {
         line[..2].fill(f64::NAN);
     }
     let left = |of: &Dataset| {
-        let seen = apply(projection(&data, &fit(of, None).unwrap()), &data);
+        let seen = seen(Some(&fit(of, None).unwrap()), &data);
         let table = seen.row_table(0);
         let predicted = LinearRow::fit(&table).predict(&table.inputs.values);
         table.outputs.squared_errors(&predicted)
     };
     for (partly, all) in left(&partly).into_iter().zip(left(&data)) {
         assert!((0.8..1.25).contains(&(partly / all)), "{partly} {all}");
+    }
+}
+
+#[test]
+fn amounts_that_are_never_together_are_learnt_on_their_own_frames() {
+    let mut data = synthesise(&World::contact(), Stream::Training, 1200);
+    data.outputs = data.outputs.columns(2, 2);
+    for (number, line) in data.outputs.values.chunks_exact_mut(2).enumerate() {
+        line[number % 2] = f64::NAN;
+    }
+    let kinds = Some(Kinds::all(Features::Normalised { threshold: 0.0 }));
+    let trained = train(&data, &Options { centres: 8, kinds, ..Options::default() }, &Silent);
+    let squares = data.outputs.squared_errors(&trained.unwrap().decode(&data.inputs.values));
+    for (square, deviation) in squares.iter().zip(data.outputs.deviations()) {
+        let share = (square / 600.0).sqrt() / deviation;
+        assert!(share < 0.5, "{share}");
     }
 }

@@ -149,7 +149,7 @@ impl Sources {
             let inputs = match &self.inputs {
                 Inputs::Rows(scales) => scales[network].apply(&readings),
                 Inputs::Projected(projected) => {
-                    projected.sources(projection::view(&projected.parameters, frames), &readings)
+                    projected.sources(projection::view(&projected.parameters, width), &readings)
                 }
             };
             let targets = targets.part(lines, &outputs).values;
@@ -207,7 +207,7 @@ impl Projected {
     /// Sources of the frames with these `readings`, line after line.
     fn sources(&self, view: Projection<'_>, readings: &[f64]) -> Vec<f64> {
         let count = self.readings.len();
-        let features = projection::features(view, self.features, count, readings);
+        let features = projection::features(view, readings);
         let mut sources = Vec::with_capacity(features.len() + readings.len());
         let lines = features.chunks_exact(self.features).zip(readings.chunks_exact(count));
         for (features, readings) in lines {

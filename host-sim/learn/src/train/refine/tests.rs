@@ -8,7 +8,7 @@ use super::loss::{Loss, held_out_errors, on_held_out, on_same};
 use super::movable::{Movable, Piece, Sizes};
 use super::*;
 use crate::infer::infer;
-use crate::train::{train, train_refined};
+use crate::train::{Start, fit, train, train_refined};
 
 fn draws(purpose: u64) -> impl FnMut() -> f64 {
     let mut random = Random::new(11, Stream::Test, Purpose::Damage, purpose, 0);
@@ -192,7 +192,7 @@ fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let examples = Examples::Fresh(&fresh);
             pool.install(|| {
-                train_refined(&training, &options, &quick(), examples, &Silent).unwrap()
+                train_refined(&training, &options, Some((&quick(), examples)), &Silent).unwrap()
             })
         };
         let (one, three) = (refined(1), refined(3));
@@ -229,10 +229,11 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let fold_of: Vec<usize> = (0..frames).map(|frame| frame % 4).collect();
         let examples = Examples::Folds(&fold_of);
         let taken = Taken(AtomicUsize::new(0));
-        let layers = Layers::start(&training, &options).unwrap();
+        let start = Start::all(&training, &options).unwrap().remove(0);
+        let layers = start.layers(&options);
         let layers = refine(&training, &layers, &options, &quick(), examples, &taken).unwrap();
         let refined = quick().options(&options);
-        let networks = crate::train::fit(&layers, &refined, &Silent).unwrap();
+        let networks = fit(&layers, &refined, &[refined.penalty], &Silent).unwrap().remove(0);
         let refined = crate::train::Trained { fronts: vec![], networks };
         let start = train(&training, &options, &Silent).unwrap();
         let ratio = rmse(&refined, &test) / rmse(&start, &test);
@@ -252,12 +253,13 @@ fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
     data.inputs.values.fill_with(&mut draw);
     data.outputs.values.fill_with(&mut draw);
     let options = Options { centres: 12, format: Format::Fixed16, ..Options::of_rows() };
-    let start = Layers::start(&data, &options).unwrap();
+    let start = Start::all(&data, &options).unwrap().remove(0);
+    let start = start.layers(&options);
     let least = width::least(&start.hidden[0].centres, &[[0.0, 1.0]; 2]);
     let held = |spread: f64| {
         let mut layers = start.clone();
         layers.hidden[0].spread = spread;
-        crate::train::fit(&layers, &options, &Silent).is_ok()
+        fit(&layers, &options, &[None], &Silent).is_ok()
     };
     assert!(held(least) && !held(0.999 * least), "{least}");
 }
@@ -267,7 +269,8 @@ fn settings_that_cannot_be_used_are_refused_by_name() {
     let world = World { read_rows: vec![3], ..World::press() };
     let training = Synthesis::new(&world).frames(Stream::Training, 50);
     let options = Options { centres: 4, ..Options::of_rows() };
-    let start = Layers::start(&training, &options).unwrap();
+    let start = Start::all(&training, &options).unwrap().remove(0);
+    let start = start.layers(&options);
     let refused = |settings: Refinement, folds: usize, field: &str| {
         let fold_of: Vec<usize> = (0..50).map(|frame| frame % folds).collect();
         let examples = Examples::Folds(&fold_of);
@@ -297,7 +300,7 @@ fn refinement_leaves_narrow_gaussians_narrow() {
         let options = Options { centres: 40, spread: 0.03, ..Options::of_rows() };
         let fold_of: Vec<usize> = (0..x.len()).map(|frame| frame % 5).collect();
         let examples = Examples::Folds(&fold_of);
-        let refined = train_refined(&data, &options, &quick(), examples, &Silent).unwrap();
+        let refined = train_refined(&data, &options, Some((&quick(), examples)), &Silent).unwrap();
         let start = train(&data, &options, &Silent).unwrap();
         let error = |trained: &crate::train::Trained| {
             let network = trained.networks[0].network();

@@ -1,10 +1,11 @@
 //! Features of a touch: where it is by a linear map of its shape, what else tells of the outputs, and its strength.
 
 use nalgebra::DMatrix;
-use taxel_data::{Dataset, Table, columns};
+use taxel_data::{Dataset, columns};
 
-use super::super::principal;
-use super::super::projection::{USUAL_FEATURES, about_means, means, products, targets};
+use super::super::projection::{
+    Moments, USUAL_FEATURES, about_means, by_task, means, solved, strongest, with_targets,
+};
 use super::{FittedTouch, Kind};
 use crate::error::{Result, no_regression};
 
@@ -69,52 +70,45 @@ fn places(touch: &FittedTouch, dataset: &Dataset) -> Result<Option<DMatrix<f64>>
     if of_places.is_empty() || lines.is_empty() {
         return Ok(None);
     }
-    let all: Vec<usize> = (0..lines.len()).collect();
-    let touched = dataset.subset(&lines);
-    let outputs = touched.outputs.part(&all, &of_places);
+    let outputs = dataset.outputs.part(&lines, &of_places);
     let touch = FittedTouch { kind: Kind::Place, ..touch.clone() };
-    let frames = touch.apply(Dataset { outputs, ..touched });
+    let frames = touch.apply(Dataset { outputs, ..dataset.subset(&lines) });
     let cells = cells(&dataset.inputs.names);
-    Ok(Some(regression(&frames, &frames.outputs, (true, cells))?.0))
+    Ok(Some(regression(&frames, true, cells.as_ref())?.0))
 }
 
 /// Directions of shape and strength that tell most of the outputs of `frames`, so many of them or fewer, one a column.
 fn regressed(frames: &Dataset, count: usize) -> Result<DMatrix<f64>> {
-    let targets = targets(&frames.outputs, count);
-    let (map, moments) = regression(frames, &targets, (false, None))?;
-    let predicted = map.tr_mul(&(&moments.of_inputs * &map));
-    let predicted = (&predicted + predicted.transpose()) * 0.5;
-    Ok(map * principal::directions(predicted, count.min(targets.names.len())))
+    let frames = with_targets(frames, count);
+    let inputs = frames.inputs.names.len();
+    let mut of_inputs = DMatrix::zeros(inputs, inputs);
+    let map = by_task(&frames, |frames| {
+        let (map, moments) = regression(frames, false, None)?;
+        of_inputs += moments.of_inputs;
+        Ok(map)
+    })?;
+    let predicted = map.tr_mul(&(&of_inputs * &map));
+    Ok(strongest(&map, &predicted, count.min(frames.outputs.names.len())))
 }
 
-/// Ridge regression of `targets` on the inputs of `frames`, one a column, and the moments of all frames. That of places is one
-/// on the `shape_alone`, and towards the centroid if there are `cells`. The penalty is the one with the least error on
-/// frames that the regression was not fitted to.
+/// Ridge regression of the outputs of `frames`, none of which is missing, on their inputs, one a column, and the moments of
+/// the frames. That of places is one on the `shape_alone`, and towards the centroid if there are `cells`. The penalty is the
+/// one with the least error on frames that the regression was not fitted to.
 fn regression(
     frames: &Dataset,
-    targets: &Table,
-    (shape_alone, cells): (bool, Option<DMatrix<f64>>),
+    shape_alone: bool,
+    cells: Option<&DMatrix<f64>>,
 ) -> Result<(DMatrix<f64>, Moments)> {
-    let lines = targets.lines_with(&(0..targets.names.len()).collect::<Vec<_>>());
-    let (all_inputs, all_targets): (Vec<usize>, Vec<usize>) =
-        ((0..frames.inputs.names.len()).collect(), (0..targets.names.len()).collect());
-    let of_lines = |lines: &[usize]| {
-        let weights: Option<Vec<f64>> =
-            frames.weights.as_ref().map(|it| lines.iter().map(|line| it[*line]).collect());
-        (frames.inputs.part(lines, &all_inputs), weights, targets.part(lines, &all_targets))
-    };
-    let (inputs, weights, outputs) = of_lines(&lines);
-    let mean = [&inputs, &outputs].map(|table| means(table, weights.as_deref())).concat();
-    let of_part = |lines: &[usize]| {
-        let (inputs, weights, outputs) = of_lines(lines);
-        Moments::new(&inputs, weights.as_deref(), &outputs, &mean)
-    };
+    let mean = means(frames);
+    let lines: Vec<usize> = (0..frames.frames()).collect();
+    let of_part = |lines: &[usize]| Moments::new(&frames.subset(lines), &mean);
     let parts: Vec<Moments> =
         lines.chunks(lines.len().div_ceil(PARTS).max(1)).map(of_part).collect();
-    let whole = parts.iter().skip(1).fold(parts[0].clone(), |sum, part| sum.plus(part, 1.0));
+    let (first, others) = parts.split_first().ok_or_else(no_regression)?;
+    let whole = others.iter().fold(first.clone(), |sum, part| sum.plus(part, 1.0));
     let prior = match cells {
-        Some(cells) => whole.centroid(&cells)?,
-        None => DMatrix::zeros(whole.of_inputs.nrows(), targets.names.len()),
+        Some(cells) => whole.centroid(cells)?,
+        None => DMatrix::zeros(whole.of_inputs.nrows(), frames.outputs.names.len()),
     };
     let map = |moments: &Moments, penalty| moments.map(&prior, penalty, shape_alone);
     let mut best = (f64::INFINITY, PENALTIES[0]);
@@ -138,29 +132,7 @@ fn cells(names: &[String]) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_row_iterator(names.len() + 1, 2, values))
 }
 
-/// Sums of products of inputs, of inputs with outputs, and of outputs, about the means of all frames.
-#[derive(Clone)]
-struct Moments {
-    of_inputs: DMatrix<f64>,
-    with_outputs: DMatrix<f64>,
-    of_outputs: f64,
-}
-
 impl Moments {
-    fn new(inputs: &Table, weights: Option<&[f64]>, outputs: &Table, mean: &[f64]) -> Self {
-        let (n, width) = (inputs.names.len(), mean.len());
-        let sums = products((inputs, weights), outputs, mean);
-        let square = |(place, value): (usize, &f64)| {
-            let weight = weights.map_or(1.0, |it| it[place / (width - n)]);
-            (weight * (value - mean[n + place % (width - n)])).powi(2)
-        };
-        Self {
-            of_inputs: DMatrix::from_fn(n, n, |i, j| sums[i.min(j) * width + i.max(j)]),
-            with_outputs: DMatrix::from_fn(n, width - n, |i, o| sums[i * width + n + o]),
-            of_outputs: outputs.values.iter().enumerate().map(square).sum(),
-        }
-    }
-
     fn plus(&self, other: &Self, factor: f64) -> Self {
         Self {
             of_inputs: &self.of_inputs + &other.of_inputs * factor,
@@ -174,8 +146,7 @@ impl Moments {
         let mut of_centroid = cells.tr_mul(&(&self.of_inputs * cells));
         let least = 1e-9 * of_centroid.trace().max(f64::MIN_POSITIVE);
         (0..2).for_each(|i| of_centroid[(i, i)] += least);
-        let factor = of_centroid.cholesky().ok_or_else(no_regression)?;
-        Ok(cells * factor.solve(&cells.tr_mul(&self.with_outputs)))
+        Ok(cells * solved(of_centroid, &cells.tr_mul(&self.with_outputs))?)
     }
 
     /// Regression of the outputs on the inputs with a `penalty` on what differs from `prior`, or on the shape alone.
@@ -191,7 +162,7 @@ impl Moments {
             normal[(strength, strength)] = 1.0;
             left.row_mut(strength).fill(0.0);
         }
-        Ok(prior + normal.cholesky().ok_or_else(no_regression)?.solve(&left))
+        Ok(prior + solved(normal, &left)?)
     }
 
     /// Squared error of a `map` on these frames.
