@@ -7,7 +7,7 @@ use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Progress, Silent, columns};
 
 use crate::train::kmeans::Search;
-use crate::train::{Features, Group, Kinds, Options, THRESHOLD, train};
+use crate::train::{Features, Kinds, Options, THRESHOLD, train};
 
 /// Most frames that are trained on, and most that are judged by, for each part that is held out.
 const MOST_FRAMES: [usize; 2] = [4000, 2000];
@@ -77,7 +77,6 @@ pub fn choose(
         candidates.push(Features::Normalised { threshold: THRESHOLD });
     }
     progress.stage("choose features", 2 * candidates.len());
-    let judged_by = *candidates.last()?;
     // By candidate, kind of outputs and fold.
     let mut scores = vec![[[0.0; 2]; 2]; candidates.len()];
     for (part_held, fold) in [0, last].into_iter().enumerate() {
@@ -89,7 +88,7 @@ pub fn choose(
         };
         let (training, held) = (part(false, MOST_FRAMES[0]), part(true, MOST_FRAMES[1]));
         for (features, scores) in candidates.iter().zip(&mut scores) {
-            let found = judge(&training, &held, [*features, judged_by], options);
+            let found = judge(&training, &held, *features, options);
             scores.iter_mut().zip(found).for_each(|(of_kind, score)| of_kind[part_held] = score);
             progress.step();
         }
@@ -125,14 +124,9 @@ pub fn choose(
 }
 
 /// Scores of places and of amounts on frames that are `held`, of a network with these features that is trained on the
-/// others; 0 for a kind without outputs, and infinite where it cannot be trained. Places count by the strength of a touch
-/// that other features tell.
-fn judge(
-    training: &Dataset,
-    held: &Dataset,
-    [features, judged_by]: [Features; 2],
-    options: &Options,
-) -> [f64; 2] {
+/// others; 0 for a kind without outputs, and infinite where it cannot be trained. A place that is not told counts as the
+/// mean.
+fn judge(training: &Dataset, held: &Dataset, features: Features, options: &Options) -> [f64; 2] {
     let options = Options {
         centres: options.centres.min(MOST_CENTRES),
         format: Format::F32,
@@ -143,12 +137,8 @@ fn judge(
     let Ok(trained) = train(training, &options, &Silent) else { return [f64::INFINITY; 2] };
     let decoded = trained.decode(&held.inputs.values);
     let names = &held.outputs.names;
-    let weights = Group::all(training, Kinds { places: judged_by, amounts: Features::AsTheyAre });
-    let touch = weights.into_iter().find_map(|group| group.touch);
-    let weights = touch.map(|touch| touch.weights(&held.inputs.values));
     let deviations = held.outputs.deviations();
     let error = |output: usize| {
-        let is_place = columns::is_place(&names[output]);
         let (mut sum, mut count) = (0.0, 0.0);
         for frame in 0..held.frames() {
             let place = frame * names.len() + output;
@@ -156,9 +146,8 @@ fn judge(
             // A touch that is missed is as wrong as the mean is.
             let missed =
                 if decoded[place].is_nan() { deviations[output] } else { decoded[place] - truth };
-            let weight = weights.as_ref().filter(|_| is_place).map_or(1.0, |it| it[frame]);
             if !truth.is_nan() {
-                (sum, count) = (sum + weight * missed.powi(2), count + weight);
+                (sum, count) = (sum + missed.powi(2), count + 1.0);
             }
         }
         if count > 0.0 { sum / count } else { 0.0 }

@@ -236,13 +236,6 @@ impl FittedTouch {
         strength / (strength + self.typical)
     }
 
-    /// How much each of `frames` (`frames × readings`) tells of a place, from 0 without a touch to 1.
-    pub fn weights(&self, frames: &[f64]) -> Vec<f64> {
-        let least = self.view().strengths().least;
-        let weight = |s: f32| if s < least { 0.0 } else { self.weight(s.into()) };
-        inputs(self.view(), frames).1.into_iter().map(weight).collect()
-    }
-
     /// Frames with shape and strength as inputs, and with outputs and weights as the network's training needs them.
     fn apply(&self, dataset: Dataset) -> Dataset {
         let (values, strengths) = inputs(self.view(), &dataset.inputs.values);
