@@ -390,7 +390,11 @@ impl<'d> Start<'d> {
             let projection = match &group.touch {
                 _ if !options.projects(&frames) => None,
                 Some(touch) => Some(touch::projection(touch, &frames, dataset, options.features)?),
-                None => Some(projection::fit(&frames, options.features)?),
+                None => {
+                    // Some of the outputs have fewer products than all of them.
+                    let possible = |wanted| projection::features_at_most(&frames, wanted);
+                    Some(projection::fit(&frames, options.features.map(possible))?)
+                }
             };
             let whole_frames = are_many || group.touch.is_some() || projection.is_some();
             Ok(Self { group, frames, kept, projection, whole_frames })
