@@ -14,8 +14,9 @@ const MOST_FRAMES: [usize; 2] = [4000, 2000];
 /// Most centres of the networks that are tried.
 const MOST_CENTRES: usize = 32;
 
-/// Share of the score of features as they are that others must be below.
-const BETTER: f64 = 0.99;
+/// Share of the score of features as they are that others must be below, if one network then serves all outputs, and if
+/// places and amounts get a network each, which costs more.
+const BETTER: [f64; 2] = [0.99, 0.95];
 
 /// Features that were chosen, and what was tried.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -94,6 +95,9 @@ pub fn choose(
         }
     }
     let mut tried = Vec::new();
+    let places = dataset.outputs.names.iter().filter(|name| columns::is_place(name)).count();
+    let are_both = places > 0 && places < dataset.outputs.names.len();
+    let better = BETTER[usize::from(are_both)];
     let mean = |[a, b]: [f64; 2]| 0.5 * (a + b);
     let mut pick = |kind: usize, outputs: &'static str| {
         if kind == 1 && !options.projects(dataset) {
@@ -102,7 +106,7 @@ pub fn choose(
         let plain = scores[0][kind];
         // Better on both parts, and by more than chance.
         let is_better = |of: [f64; 2]| {
-            (0..2).all(|part| of[part] < plain[part]) && mean(of) < BETTER * mean(plain)
+            (0..2).all(|part| of[part] < plain[part]) && mean(of) < better * mean(plain)
         };
         let others = (1..candidates.len()).filter(|index| is_better(scores[*index][kind]));
         let score = |index: &usize| mean(scores[*index][kind]);
