@@ -35,9 +35,9 @@ pub fn is_zero_at_rest(name: &str) -> bool {
     LOADS.contains(&unit) || unit == "mm" && displaced || unit.is_empty() && named()
 }
 
-/// Lines of `file` (from 0) at which nothing touches the sensor: all of the `columns`, which are zero there, have a value
-/// within 1 % of their largest values about their zero, which may be off by 5 %, and so have the lines before and after. Without such neighbours in at least ten lines,
-/// lines count by themselves; fewer than ten are none.
+/// Lines of `file` (from 0) at which nothing touches the sensor: all of the `columns`, which are zero there, have a
+/// value within 1 % of their largest values about their zero, which may be off by 5 %, and so have the lines before and
+/// after. Without such neighbours in at least ten lines, lines count by themselves; fewer than ten are none.
 pub fn lines_at_rest(file: &DataFile, columns: &[usize]) -> Vec<usize> {
     let zeros: Vec<[f64; 2]> = columns.iter().map(|column| zero_of(file, *column)).collect();
     if zeros.iter().all(|[_, bound]| *bound == 0.0) {

@@ -135,7 +135,7 @@ fn judge(training: &Dataset, held: &Dataset, features: Features, options: &Optio
         centres: options.centres.min(MOST_CENTRES),
         format: Format::F32,
         search: Search { restarts: 1, ..options.search },
-        kinds: Some(Kinds { places: features, amounts: features }),
+        kinds: Some(Kinds::all(features)),
         ..*options
     };
     let Ok(trained) = train(training, &options, &Silent) else { return [f64::INFINITY; 2] };

@@ -139,8 +139,7 @@ impl<'b> PreparedModel<'b> {
             let (given, strengths) = inputs_of(front, &inputs);
             let mut given = given.into_owned();
             // A place without a touch is not decoded.
-            let touch = front.touch.filter(|touch| touch.kind() == Kind::Place);
-            if let (Some(touch), false) = (touch, strengths.is_empty()) {
+            if let (Some(touch), false) = (front.of_places(), strengths.is_empty()) {
                 let width = given.len() / strengths.len();
                 let least = touch.strengths().least;
                 let lines = given.chunks_exact_mut(width).zip(&strengths);

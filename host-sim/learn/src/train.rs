@@ -402,7 +402,7 @@ impl<'d> Start<'d> {
         groups.into_iter().map(start).collect()
     }
 
-    /// The same with frames of its own.
+    /// This start with frames of its own.
     pub fn into_owned(self) -> Start<'static> {
         Start { frames: Cow::Owned(self.frames.into_owned()), ..self }
     }

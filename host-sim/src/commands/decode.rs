@@ -8,9 +8,7 @@ use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use taxel_core::blob::Front;
 use taxel_core::filter::State;
-use taxel_core::touch::Kind;
 use taxel_data::Clock;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::{DataFile, FieldTexts};
@@ -32,7 +30,8 @@ use super::{Common, print, stderr};
 /// Decode readings from a data file, one line of estimates a line.
 ///
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
-/// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --fill tells missing readings from the others instead.
+/// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --fill tells
+/// missing readings from the others instead.
 /// Estimates are written with the digits that tell an f32 from its neighbours.
 ///
 /// The last column, `status`, is the sum of a device's flags (docs/link.md): 0 for a sound frame, 2 a faulty reading,
@@ -202,10 +201,9 @@ fn flags(
     let whole_array = model.model().whole_frames();
     let of_row = |count: usize, rows: usize| if whole_array { count * rows } else { count };
     let (in_row, out_row) = (of_row(shape.inputs, shape.rows), of_row(shape.outputs, shape.rows));
-    let is_place = |front: Front<'_>| front.touch.is_some_and(|touch| touch.kind() == Kind::Place);
     let of_fronts = model.model().fronts();
     let mut of_places: Vec<bool> =
-        of_fronts.flat_map(|front| vec![is_place(front); front.outputs]).collect();
+        of_fronts.flat_map(|front| vec![front.of_places().is_some(); front.outputs]).collect();
     of_places.resize(out_row, false);
     let lines = inputs.chunks_exact(readings.names.len()).zip(estimate.lines());
     let of_line = |(line, (inputs, outputs)): (usize, (&[f64], &[f64]))| {

@@ -31,7 +31,7 @@ const CENTRES: usize = 64;
 const DURATION_S: f64 = 12.0;
 const MOST_STEPS: f64 = 6000.0;
 /// A contact that is slow enough to be watched, where the scene has none that moves.
-const SLOW: Path = Path {
+pub(super) const SLOW: Path = Path {
     speed_mm_per_s: [4.0, 12.0],
     press_rate_hz: [0.25, 0.5],
     peak_depth_mm: None,

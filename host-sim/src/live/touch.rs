@@ -169,19 +169,9 @@ mod tests {
     use taxel_simulate::{Synthesis, World};
 
     use super::super::sheet;
+    use super::super::simulation::SLOW;
     use super::*;
     use crate::experiment::Experiment;
-
-    /// Presses of 2 to 4 s, as a view shows them of a scene without motion.
-    const SLOW: Path = Path {
-        speed_mm_per_s: [4.0, 12.0],
-        press_rate_hz: [0.25, 0.5],
-        peak_depth_mm: None,
-        centre_mm: None,
-        half_length_mm: None,
-        duration_s: 12.0,
-        trajectories: 1,
-    };
 
     /// A scene's world, of which only the force is asked, and its detector.
     fn start(scene: &str) -> (World, Touch) {

@@ -34,6 +34,11 @@ impl<'a> Front<'a> {
         }
     }
 
+    /// What makes shape and strength of readings, if the network's outputs are places, which are none without a touch.
+    pub fn of_places(&self) -> Option<Touch<'a>> {
+        self.touch.filter(|touch| touch.kind() == Kind::Place)
+    }
+
     /// Words of its numbers, in slices that follow each other.
     pub(super) fn block(&self) -> [&'a [u32]; 2] {
         let words = |block: Option<&'a [f32]>| bytemuck::cast_slice(block.unwrap_or_default());

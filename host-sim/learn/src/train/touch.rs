@@ -104,7 +104,7 @@ impl Kinds {
     /// Readings as they are for all outputs.
     pub const AS_THEY_ARE: Self = Self::all(Features::AsTheyAre);
 
-    /// The same features for all outputs.
+    /// These features for all outputs.
     pub const fn all(features: Features) -> Self {
         Self { places: features, amounts: features }
     }
