@@ -41,7 +41,7 @@ const OHM: [f32; 2] = [60.0, f32::NAN];
 fn requests() -> Vec<Example> {
     let readings_ohm = Floats::new(&OHM);
     // A blob of 1000 bytes for the paper's sensor, with one network for all rows.
-    let head = *b"TAXL\x02\xe8\x03\0\0\x08\x12\x12\x01\x08\0\0";
+    let head = *b"TAXL\x03\xe8\x03\0\0\x08\x12\x12\x01\x08\0\0";
     let default = Configuration::DEFAULT;
     let filtering = Configuration {
         filter_time_constant_us: 5000,

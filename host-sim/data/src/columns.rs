@@ -145,12 +145,13 @@ pub fn quantity_of(name: &str) -> &str {
 }
 
 /// Whether the output called `name` tells where a touch is, and not how much there is of it: `x_mm`, `contact_y_mm`,
-/// `pos_x`, and no force or shear along x.
+/// `pos_x`, and no force, shear or displacement along x.
 pub fn is_place(name: &str) -> bool {
     let bare = without_unit(name).to_lowercase();
     let is_axis = ["x", "y"].contains(&bare.rsplit('_').next().unwrap_or_default());
     let is_length = ["", "m", "cm", "mm", "µm"].contains(&unit_of(name));
-    let is_amount = ["shear", "force", "torque", "moment"].iter().any(|it| bare.contains(it));
+    let is_amount =
+        ["shear", "force", "torque", "moment", "displacement"].iter().any(|it| bare.contains(it));
     is_axis && is_length && row_of(name).is_none() && !is_amount
 }
 

@@ -1,6 +1,7 @@
 //! Main job: synthesise or read frames, train, write the blob, read it back, decode, evaluate.
 
 use serde::Serialize;
+use taxel_core::rbf::Shape;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{Dataset, Progress, Stream, Table};
 use taxel_learn::cost::{Cost, Design};
@@ -108,16 +109,16 @@ pub struct ModelSummary {
     pub training_frames: usize,
     pub test_frames: usize,
     pub networks: usize,
-    /// Number of inputs of each network: its row's readings, or features of all readings.
-    pub inputs_per_network: usize,
+    /// Numbers of inputs of the networks: of readings of a row, or of features of all readings. One number if all have it.
+    pub inputs_per_network: Vec<usize>,
     /// Number of readings that are projected to these features; 0 without a projection.
     pub projected_readings: usize,
     /// Whether inputs are readings relative to the baseline.
     pub relative_inputs: bool,
     /// Number of centres of each network (the largest).
     pub centres: usize,
-    /// Number of outputs of each network: its row's outputs, or those of all rows.
-    pub outputs_per_network: usize,
+    /// Numbers of outputs of the networks, of a row or of all rows. One number if all have it.
+    pub outputs_per_network: Vec<usize>,
     /// Width σ on scaled inputs; after refinement the mean over the networks.
     pub spread: f64,
     /// Whether centres, widths and the projection were refined after K-means.
@@ -281,6 +282,22 @@ fn scene_summary(scene: &Experiment) -> SceneSummary {
     }
 }
 
+impl ModelSummary {
+    /// Inputs of the networks, and their outputs, in words.
+    pub fn ends(&self, arrow: &str) -> [String; 2] {
+        let of_each = |numbers: &[usize]| {
+            numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ")
+        };
+        let readings = if self.relative_inputs { "relative readings" } else { "readings" };
+        let inputs = of_each(&self.inputs_per_network);
+        let inputs = match self.projected_readings {
+            0 => format!("{inputs} {readings}"),
+            count => format!("{count} {readings} {arrow} {inputs} features"),
+        };
+        [inputs, format!("{} outputs", of_each(&self.outputs_per_network))]
+    }
+}
+
 fn model_summary(
     training: &TrainingSet<'_>,
     (options, test_frames): (&Options, usize),
@@ -290,15 +307,22 @@ fn model_summary(
     let model = prepared.model();
     let shape = model.shape();
     let frame_cost = Cost::of_frame(&Design::new(blob));
+    let numbers = |of: fn(Shape) -> usize| {
+        let mut all: Vec<usize> = model.networks().map(|it| of(it.shape())).collect();
+        if all.iter().all(|it| *it == all[0]) {
+            all.truncate(1);
+        }
+        all
+    };
     ModelSummary {
         training_frames: training.frames.frames(),
         test_frames,
         networks: model.networks().count(),
-        inputs_per_network: model.networks().next().map_or(0, |it| it.shape().inputs),
+        inputs_per_network: numbers(|shape| shape.inputs),
         projected_readings: if model.whole_frames() { shape.rows * shape.inputs } else { 0 },
         relative_inputs: model.metadata().relative_inputs,
         centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
-        outputs_per_network: model.networks().next().map_or(0, |n| n.shape().outputs),
+        outputs_per_network: numbers(|shape| shape.outputs),
         spread: if training.refine { blob.spread() } else { options.spread },
         refined: training.refine,
         blob_bytes: blob.bytes().len(),

@@ -164,19 +164,12 @@ fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
         ),
     };
     page.line(format_args!("{}: {from}, seed {}", result.subject, result.seed));
+    let [inputs, outputs] = model.ends("->");
     page.line(format_args!(
-        "model: {} network{}, {} -> K = {} -> {} outputs, spread {}{}, {} bytes, CRC-32 {}",
+        "model: {} network{}, {inputs} -> K = {} -> {outputs}, spread {}{}, {} bytes, CRC-32 {}",
         model.networks,
         if model.networks == 1 { "" } else { "s" },
-        {
-            let readings = if model.relative_inputs { "relative readings" } else { "readings" };
-            match model.projected_readings {
-                0 => format!("{} {readings}", model.inputs_per_network),
-                count => format!("{count} {readings} -> {} features", model.inputs_per_network),
-            }
-        },
         model.centres,
-        model.outputs_per_network,
         model.spread,
         if model.refined { " (refined)" } else { "" },
         model.blob_bytes,

@@ -90,12 +90,7 @@ impl<'a> View<'a> {
 
 fn facts(result: &RunResult, noise: Option<&str>) -> Vec<(&'static str, String)> {
     let (scene, model) = (&result.scene, &result.model);
-    let readings = if model.relative_inputs { "relative readings" } else { "readings" };
-    let inputs = match model.projected_readings {
-        0 => format!("{} {readings}", model.inputs_per_network),
-        count => format!("{count} {readings} → {} features", model.inputs_per_network),
-    };
-    let outputs = format!("{} outputs", model.outputs_per_network);
+    let [inputs, outputs] = model.ends("→");
     let drift = match scene.as_ref().map_or(0.0, |scene| scene.gain_drift) {
         0.0 => String::new(),
         gain => format!(", gain drift ±{}", percent(gain)),

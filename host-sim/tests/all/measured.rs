@@ -88,7 +88,7 @@ fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing()
         assert!(notes.contains(note), "{notes}");
     }
     let result = json(&printed);
-    assert_eq!(result["model"]["inputs_per_network"], 2);
+    assert_eq!(result["model"]["inputs_per_network"][0], 2);
     assert_eq!(result["model"]["training_frames"], 200);
     let unused = &result["data"]["unused_inputs"];
     assert_eq!(unused["duplicated"], serde_json::json!([["twin", "a"]]));

@@ -33,6 +33,18 @@ pub fn check(dataset: &Dataset) -> Result<()> {
             }
         }
     }
+    // Frames at rest need not be among those that are trained on.
+    let at_rest = dataset.at_rest.iter().flat_map(|rest| rest.level.iter().zip(&rest.deviation));
+    for (name, (level, deviation)) in dataset.inputs.names.iter().zip(at_rest) {
+        if level.abs().max(*deviation) > LARGEST {
+            let why =
+                format!("values beyond {LARGEST:e} are too large for f32: check these frames");
+            let column = quoted(name);
+            return Err(Error::unfit(format!(
+                "column {column} is {level:?} ± {deviation:?} at rest, and {why}"
+            )));
+        }
+    }
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-use taxel_data::{Dataset, Purpose, Random, Silent, Stream, Table};
+use taxel_data::{AtRest, Dataset, Purpose, Random, Silent, Stream, Table};
 
 use super::*;
 use crate::decoders::RowDecoder;
@@ -162,4 +162,12 @@ fn outputs_with_too_few_frames_are_refused_by_name() {
     assert!(message.contains("wave_mm") && message.contains(&format!("the {count} ")), "{message}");
     data.outputs.values.iter_mut().step_by(2).for_each(|value| *value = f64::NAN);
     assert!(refused(&data, &Options { centres: 1, ..Options::of_rows() }).contains("wave_mm"));
+}
+
+#[test]
+fn readings_at_rest_that_f32_does_not_hold_are_refused_by_name() {
+    let rest = AtRest { level: vec![50.0, 1e39], deviation: vec![0.1; 2] };
+    let frames = Dataset { at_rest: Some(rest), ..table(100, 0.2) };
+    let refused = train(&frames, &Options::of_rows(), &Silent).unwrap_err().to_string();
+    assert!(refused.starts_with("column \"b_ohm\" is 1e39 ± 0.1 at rest"), "{refused}");
 }
