@@ -15,54 +15,15 @@
 //! place: a sensor at rest drove weights to 1e19 in f32. So every update gives back the share of I/δ that it forgets
 //! (Gunnarsson, "Combining tracking and regularization in recursive least squares identification", CDC 1996). Weights
 //! and R stay bounded for any number of samples, and unexcited directions fade towards weight 0.
-//!
-//! Without forgetting (λ = 1) the sums outgrow f32: rounding makes the error 1.05 times that in f64 after 1e6 samples,
-//! 1.4 times after 1e7. Choose λ < 1 for recursions that never end.
 
-use std::fmt::{self, Debug};
-use std::ops::{Add, Div, Mul, Sub};
+use std::fmt;
 
 use taxel_data::{BadValue, require, widest};
 
-/// A floating-point type that the recursion can work in: `f32` or `f64`.
-pub trait Real:
-    Copy
-    + Debug
-    + PartialOrd
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-{
-    /// The number 0.
-    const ZERO: Self;
-    /// The number 1.
-    const ONE: Self;
-    /// √(smallest normal number): the square of a smaller diagonal or entry is not a normal number.
-    const NEGLIGIBLE: Self;
-    /// Largest entry of a sample: sums of many squares of it are still finite.
-    const LARGEST: Self;
-    /// Square root of the number.
-    #[must_use]
-    fn sqrt(self) -> Self;
-}
-
-macro_rules! real {
-    ($float:ident, $negligible:expr, $largest:expr) => {
-        impl Real for $float {
-            const ZERO: Self = 0.0;
-            const ONE: Self = 1.0;
-            const NEGLIGIBLE: Self = $negligible;
-            const LARGEST: Self = $largest;
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                $float::sqrt(self)
-            }
-        }
-    };
-}
-real!(f32, 1.084_202_2e-19, 1e15);
-real!(f64, 1.491_668_146_240_041_3e-154, 1e150);
+/// √(smallest normal number): the square of a smaller diagonal or entry is not a normal number.
+const NEGLIGIBLE: f64 = 1.491_668_146_240_041_3e-154;
+/// Largest entry of a sample: sums of many squares of it are still finite.
+pub const LARGEST: f64 = 1e150;
 
 /// A sample holds a number that is not finite or too large. It changed nothing: one NaN in R would stay for good.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,69 +39,68 @@ impl std::error::Error for UnusableSample {}
 
 /// Recursive least squares over samples of so many regressors and outputs.
 ///
-/// There are as many regressors as activations, affine inputs and the bias's 1 together. A never-ending recursion
-/// needs λ < 1.
+/// There are as many regressors as activations, affine inputs and the bias's 1 together.
 ///
 /// ```
 /// use taxel_learn::rls::{Rls, UnusableSample};
-/// let mut rls = Rls::<f32>::new([2, 1], 1e6, 0.999)?;
+/// let mut rls = Rls::new([2, 1], 1e6, 0.999)?;
 /// for t in 0..100 {
-///     let x = t as f32 / 100.0;
+///     let x = f64::from(t) / 100.0;
 ///     rls.update(&mut [x, 1.0], &mut [3.0 * x - 1.0]).unwrap(); // y = 3x − 1
 /// }
 /// let weights = rls.weights();
 /// assert!((weights[0] - 3.0).abs() < 1e-3 && (weights[1] + 1.0).abs() < 1e-3);
-/// assert_eq!(rls.update(&mut [f32::NAN, 1.0], &mut [0.0]), Err(UnusableSample));
+/// assert_eq!(rls.update(&mut [f64::NAN, 1.0], &mut [0.0]), Err(UnusableSample));
 /// # Ok::<(), taxel_data::BadValue>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rls<T> {
+pub struct Rls {
     /// Triangle R, `regressors × regressors`, row-major.
-    pub(crate) root: Vec<T>,
+    pub(crate) root: Vec<f64>,
     /// Transformed targets z, `regressors × outputs`.
-    pub(crate) projection: Vec<T>,
+    pub(crate) projection: Vec<f64>,
     regressors: usize,
     outputs: usize,
-    root_forgetting: T,
+    root_forgetting: f64,
     /// What a direction gets back at its turn, once in as many updates as there are regressors.
-    share: T,
+    share: f64,
     turn: usize,
 }
 
-impl<T: Real> Rls<T> {
+impl Rls {
     /// Starts with weights 0, covariance δ·I and forgetting factor λ (1 forgets nothing).
     ///
     /// # Errors
     /// [`BadValue`] if δ is not positive and finite or 1/δ is out of range, and if λ is not in (0, 1].
     pub fn new(
         [regressors, outputs]: [usize; 2],
-        initial_covariance: T,
-        forgetting_factor: T,
+        initial_covariance: f64,
+        forgetting_factor: f64,
     ) -> Result<Self, BadValue> {
-        let diagonal = T::ONE / initial_covariance.sqrt();
+        let diagonal = 1.0 / initial_covariance.sqrt();
         require(
-            diagonal > T::NEGLIGIBLE && diagonal <= T::LARGEST,
+            diagonal > NEGLIGIBLE && diagonal <= LARGEST,
             "initial_covariance",
             format!("{initial_covariance:?}"),
             || "give a positive number, such as 1e6".into(),
         )?;
         require(
-            forgetting_factor > T::ZERO && forgetting_factor <= T::ONE,
+            forgetting_factor > 0.0 && forgetting_factor <= 1.0,
             "forgetting_factor",
             format!("{forgetting_factor:?}"),
             || "give a number above 0, up to 1".into(),
         )?;
-        let mut root = vec![T::ZERO; regressors * regressors];
+        let mut root = vec![0.0; regressors * regressors];
         start(&mut root, regressors, diagonal);
         // What λ leaves of the information 1/δ in as many updates as there are regressors.
-        let left = (0..regressors).fold(T::ONE, |left, _| left * forgetting_factor);
+        let left = (0..regressors).fold(1.0, |left, _| left * forgetting_factor);
         Ok(Self {
             root,
-            projection: vec![T::ZERO; regressors * outputs],
+            projection: vec![0.0; regressors * outputs],
             regressors,
             outputs,
             root_forgetting: forgetting_factor.sqrt(),
-            share: diagonal * (T::ONE - left).sqrt(),
+            share: diagonal * (1.0 - left).sqrt(),
             turn: 0,
         })
     }
@@ -153,20 +113,24 @@ impl<T: Real> Rls<T> {
     ///
     /// # Panics
     /// If there are not as many regressors or targets as the recursion was made for.
-    pub fn update(&mut self, regressor: &mut [T], target: &mut [T]) -> Result<(), UnusableSample> {
+    pub fn update(
+        &mut self,
+        regressor: &mut [f64],
+        target: &mut [f64],
+    ) -> Result<(), UnusableSample> {
         assert_eq!([regressor.len(), target.len()], [self.regressors, self.outputs]);
         if !(is_usable(regressor) && is_usable(target)) {
             return Err(UnusableSample);
         }
         let Self { root, projection, root_forgetting, share, .. } = self;
-        if *root_forgetting < T::ONE {
+        if *root_forgetting < 1.0 {
             let values = root.iter_mut().chain(&mut *projection);
-            values.for_each(|value| *value = *value * *root_forgetting);
+            values.for_each(|value| *value *= *root_forgetting);
         }
         rotate(root, projection, regressor, target);
-        if *share > T::ZERO {
-            regressor.fill(T::ZERO);
-            target.fill(T::ZERO);
+        if *share > 0.0 {
+            regressor.fill(0.0);
+            target.fill(0.0);
             regressor[self.turn] = *share;
             rotate(root, projection, regressor, target);
             self.turn = (self.turn + 1) % self.regressors;
@@ -175,52 +139,52 @@ impl<T: Real> Rls<T> {
     }
 
     /// Weights that fit all samples so far best, in the least-squares sense: `regressors × outputs`.
-    pub fn weights(&self) -> Vec<T> {
-        let mut weights = vec![T::ZERO; self.projection.len()];
+    pub fn weights(&self) -> Vec<f64> {
+        let mut weights = vec![0.0; self.projection.len()];
         solve(&self.root, &self.projection, self.regressors, &mut weights);
         weights
     }
 }
 
 /// Whether every value of a sample is finite, and not so large that its square would not be.
-pub fn is_usable<T: Real>(sample: &[T]) -> bool {
-    sample.iter().all(|value| *value <= T::LARGEST && T::ZERO - *value <= T::LARGEST)
+pub fn is_usable(sample: &[f64]) -> bool {
+    sample.iter().all(|value| value.abs() <= LARGEST)
 }
 
 /// Makes a triangle of `n` regressors that of R = I·`diagonal`.
-pub(crate) fn start<T: Real>(root: &mut [T], n: usize, diagonal: T) {
-    root.fill(T::ZERO);
+pub(crate) fn start(root: &mut [f64], n: usize, diagonal: f64) {
+    root.fill(0.0);
     root.iter_mut().step_by(n + 1).for_each(|place| *place = diagonal);
 }
 
 /// Rotates one sample into R and z. `regressor` (h, n) and `target` (y, one value an output) must be
 /// [usable](is_usable); they hold rotated values afterwards. Leading zeros of h take no work.
-pub(crate) fn rotate<T: Real>(
-    root: &mut [T],
-    projection: &mut [T],
-    regressor: &mut [T],
-    target: &mut [T],
+pub(crate) fn rotate(
+    root: &mut [f64],
+    projection: &mut [f64],
+    regressor: &mut [f64],
+    target: &mut [f64],
 ) {
     widest!(rotate_inlined(root, projection, regressor, target));
 }
 
 #[inline(always)]
-fn rotate_inlined<T: Real>(
-    root: &mut [T],
-    projection: &mut [T],
-    regressor: &mut [T],
-    target: &mut [T],
+fn rotate_inlined(
+    root: &mut [f64],
+    projection: &mut [f64],
+    regressor: &mut [f64],
+    target: &mut [f64],
 ) {
     let rows = root.chunks_exact_mut(regressor.len());
     for (i, (row, z_row)) in rows.zip(projection.chunks_exact_mut(target.len())).enumerate() {
         let (row, h) = (&mut row[i..], &mut regressor[i..]);
         let (pivot, entry) = (row[0], h[0]);
         let length = (pivot * pivot + entry * entry).sqrt();
-        if entry == T::ZERO || length <= T::ZERO {
+        if entry == 0.0 || length <= 0.0 {
             continue;
         }
         let (cosine, sine) = (pivot / length, entry / length);
-        let turn = |r: &mut T, h: &mut T| {
+        let turn = |r: &mut f64, h: &mut f64| {
             (*r, *h) = (cosine * *r + sine * *h, cosine * *h - sine * *r);
         };
         row.iter_mut().zip(h).for_each(|(r, h)| turn(r, h));
@@ -231,21 +195,21 @@ fn rotate_inlined<T: Real>(
 /// Solves R·W = z by back substitution into `weights` (`n × outputs` row-major), with a square R (`n × n` row-major).
 ///
 /// A direction that was never excited, and whose information forgetting has faded to nothing, gets weight 0.
-pub(crate) fn solve<T: Real>(root: &[T], projection: &[T], n: usize, weights: &mut [T]) {
+pub(crate) fn solve(root: &[f64], projection: &[f64], n: usize, weights: &mut [f64]) {
     let outputs = weights.len() / n;
     for i in (0..n).rev() {
         let row = &root[i * n..][i..n];
         let (head, solved) = weights.split_at_mut((i + 1) * outputs);
         let w_row = &mut head[i * outputs..];
-        if row[0] <= T::NEGLIGIBLE {
-            w_row.fill(T::ZERO);
+        if row[0] <= NEGLIGIBLE {
+            w_row.fill(0.0);
             continue;
         }
         w_row.copy_from_slice(&projection[i * outputs..][..outputs]);
         for (&r, later) in row[1..].iter().zip(solved.chunks_exact(outputs)) {
-            w_row.iter_mut().zip(later).for_each(|(w, &l)| *w = *w - r * l);
+            w_row.iter_mut().zip(later).for_each(|(w, &l)| *w -= r * l);
         }
-        w_row.iter_mut().for_each(|w| *w = *w / row[0]);
+        w_row.iter_mut().for_each(|w| *w /= row[0]);
     }
 }
 
