@@ -16,7 +16,7 @@
 
 #[cfg(cortex_m4f)]
 use crate::cortex_m4;
-use crate::exp::{Exponential, Polynomial};
+use crate::exp::exp;
 use crate::projection::{self, Projection};
 use crate::rbf::NetworkError;
 
@@ -216,7 +216,7 @@ impl<'a> Confidence<'a> {
         }
         let mut sum = 0.0;
         for density in densities.iter_mut() {
-            *density = Polynomial::exp(*density - best);
+            *density = exp(*density - best);
             sum += *density;
         }
         deviations(densities, arrays.variances, deviation);

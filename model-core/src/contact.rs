@@ -29,15 +29,3 @@ impl Detector {
         self.is_touched
     }
 }
-
-/// Strength S of a touch, dimensionless: the sum of what each |change| from the baseline, in standard deviations at rest,
-/// exceeds `threshold` by. A change or a deviation that is NaN counts nothing.
-///
-/// ```
-/// use taxel_core::contact::strength;
-/// assert_eq!(strength(&[3.0, -8.0, 1.0, f32::NAN], &[1.0, 2.0, 1.0, 1.0], 2.0), 3.0);
-/// ```
-pub fn strength(changes: &[f32], deviations: &[f32], threshold: f32) -> f32 {
-    let pairs = changes.iter().zip(deviations);
-    pairs.map(|(change, deviation)| (change.abs() / deviation - threshold).max(0.0)).sum()
-}

@@ -14,7 +14,7 @@
 //! dt comes from the frames' times, not from an assumed period. `docs/filter.md` explains it.
 
 use crate::estimate::{Estimate, RowStatus};
-use crate::exp::{Exponential, Polynomial};
+use crate::exp::exp;
 
 /// Settings of the filter. The default is off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,7 +43,7 @@ impl Settings {
         if gap_us == 0 || gap_us > Self::MOST_TIME_CONSTANTS * tau_us {
             return None;
         }
-        let theta = Polynomial::exp(-(gap_us as f32 / tau_us as f32));
+        let theta = exp(-(gap_us as f32 / tau_us as f32));
         let (rest, dt_s) = (1.0 - theta, gap_us as f32 * 1e-6);
         Some(Step { dt_s, alpha: rest * (1.0 + theta), beta_per_s: rest * rest / dt_s })
     }

@@ -1,6 +1,6 @@
 //! Whether something touches a sensor, by its readings alone.
 
-use taxel_core::contact::{Detector, strength};
+use taxel_core::contact::Detector;
 use taxel_core::health::Limits;
 use taxel_recording::Layout;
 
@@ -55,7 +55,8 @@ impl Touch {
         };
         let changes: Vec<Vec<f32>> = at_rest.iter().map(|frame| touch.changes(frame)).collect();
         let cells = if touch.is_grid() { 9.0_f32 } else { 1.0 };
-        let is_whole = at_rest.iter().flatten().all(|reading| reading.fract() == 0.0);
+        let mut known = at_rest.iter().flatten().filter(|reading| reading.is_finite());
+        let is_whole = known.all(|reading| reading.fract() == 0.0);
         let least = if is_whole { LEAST_WHOLE / cells.sqrt() } else { 0.0 };
         let deviation = |(reading, rest): (usize, &f32)| {
             let squares = changes.iter().map(|it| it[reading] * it[reading]);
@@ -105,8 +106,10 @@ impl Touch {
         (self.detector.is_touched() || strongest.times > 1.0).then_some(strongest)
     }
 
+    /// Strength S: what each change exceeds the threshold by, in standard deviations at rest. One that is NaN counts nothing.
     fn strength(&self, changes: &[f32]) -> f32 {
-        strength(changes, &self.deviations, THRESHOLD)
+        let pairs = changes.iter().zip(&self.deviations);
+        pairs.map(|(change, deviation)| (change.abs() / deviation - THRESHOLD).max(0.0)).sum()
     }
 
     fn is_grid(&self) -> bool {

@@ -3,11 +3,9 @@
 //! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.
 
-use core::marker::PhantomData;
-
 use super::parameters::{Cut, NetworkError, Shape, check_finite, check_length, check_spans};
 use crate::cortex_m4::{INPUTS, OUTPUTS};
-use crate::exp::{Exponential, Polynomial};
+use crate::exp::exp;
 use crate::scale::scale_and_tell;
 
 /// The parameters of one network, borrowed from where they lie.
@@ -39,14 +37,11 @@ impl Parameters<'_> {
 }
 
 /// A network in f32, whose parameters have been checked against its shape.
-///
-/// `E` computes the activations. Blobs are decoded with [`Polynomial`]; others serve to compare exponentials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)] // the shape first, so that it is at the same place in a network of any format
-pub struct Network<'a, E = Polynomial> {
+pub struct Network<'a> {
     shape: Shape,
     parameters: Parameters<'a>,
-    exponential: PhantomData<E>,
 }
 
 impl<'a> Network<'a> {
@@ -96,7 +91,7 @@ impl<'a> Network<'a> {
 
     /// Makes a network of parameters whose lengths fit the shape; no value is checked.
     pub(crate) const fn of_arrays(shape: Shape, parameters: Parameters<'a>) -> Self {
-        Self { shape, parameters, exponential: PhantomData }
+        Self { shape, parameters }
     }
 
     pub(crate) fn check_values(&self) -> Result<(), NetworkError> {
@@ -203,14 +198,6 @@ impl<'a> Network<'a> {
         self.infer_scaled(scaled, output);
     }
 
-    /// The same network, whose activations `E` computes.
-    pub fn with_exponential<E>(self) -> Network<'a, E> {
-        let Self { shape, parameters, .. } = self;
-        Network { shape, parameters, exponential: PhantomData }
-    }
-}
-
-impl<E: Exponential> Network<'_, E> {
     /// Infers `output` from `scaled` inputs.
     ///
     /// `scaled` and `output` must have the lengths of the shape; elements beyond are ignored.
@@ -237,7 +224,7 @@ impl<E: Exponential> Network<'_, E> {
         }
         let centres = p.centres.chunks_exact(inputs).zip(p.output_weights.chunks_exact(outputs));
         for ((centre, weights), decay) in centres.zip(p.decay) {
-            let activation = E::exp(-decay * squared_distance(scaled, centre));
+            let activation = exp(-decay * squared_distance(scaled, centre));
             accumulate(output, activation, weights);
         }
         for (y, &b) in output.iter_mut().zip(p.bias) {
