@@ -163,8 +163,9 @@ impl ModelBlob {
     /// [`Error`] for a confidence of another model, or a blob that becomes too large.
     pub fn with_confidence(&self, confidence: Confidence<'_>) -> Result<Self> {
         let model = self.parse();
-        let networks: Vec<Network<'_>> = model.networks().collect();
-        rebuild(&model, &networks, Some(confidence), model.fill())
+        let (fronts, networks): (Vec<_>, Vec<_>) =
+            (model.fronts().collect(), model.networks().collect());
+        rebuild(&model, &fronts, &networks, Some(confidence), model.fill())
     }
 
     /// Blob of this model that fills missing readings by `fill`, instead of its own.
@@ -173,8 +174,9 @@ impl ModelBlob {
     /// [`Error`] for a fill of another model, or a blob that becomes too large.
     pub fn with_fill(&self, fill: Fill<'_>) -> Result<Self> {
         let model = self.parse();
-        let networks: Vec<Network<'_>> = model.networks().collect();
-        rebuild(&model, &networks, model.confidence(), Some(fill))
+        let (fronts, networks): (Vec<_>, Vec<_>) =
+            (model.fronts().collect(), model.networks().collect());
+        rebuild(&model, &fronts, &networks, model.confidence(), Some(fill))
     }
 
     /// Mean width σ of all Gaussians, on inputs scaled to [0, 1], to four digits.
@@ -197,12 +199,13 @@ impl ModelBlob {
     }
 }
 
-/// Blob of `model` with these `networks`, confidence and fill instead of its own.
+/// Blob of `model` with these `fronts`, `networks`, confidence and fill instead of its own.
 ///
 /// # Errors
 /// [`Error`] for parts that do not belong together, or a blob that becomes too large.
 pub(crate) fn rebuild(
     model: &Model<'_>,
+    fronts: &[Front<'_>],
     networks: &[Network<'_>],
     confidence: Option<Confidence<'_>>,
     fill: Option<Fill<'_>>,
@@ -210,7 +213,7 @@ pub(crate) fn rebuild(
     let of_row = |row| model.network_of_row(row).map(|network| network as u8);
     let row_network: Vec<u8> = (0..model.shape().rows).filter_map(of_row).collect();
     let parts = ModelParts {
-        fronts: &model.fronts().collect::<Vec<_>>(),
+        fronts,
         confidence,
         linear_rmse: model.linear_rmse(),
         fill,

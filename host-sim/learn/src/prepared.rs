@@ -123,11 +123,6 @@ impl<'b> PreparedModel<'b> {
         decode(&self.fronts, &self.networks, &self.model_inputs(readings))
     }
 
-    /// Network of each row-wire, or those that see whole frames.
-    pub(crate) fn networks(&self) -> &[Network<'b>] {
-        &self.networks
-    }
-
     /// Inputs of each network in turn, for `readings` (`frames × inputs`): numbers of a whole table a network that sees
     /// whole frames, else of all networks in one.
     pub(crate) fn inputs_of_networks(&self, readings: &[f64]) -> Vec<Vec<f64>> {

@@ -1,63 +1,61 @@
-//! Recalibration: a model's inputs, fitted to a sensor that has changed, from reference presses.
+//! Recalibration: what a model's features take of readings, fitted to a sensor that has changed, from reference presses.
 //!
 //! Readings drift: channel by channel, by gain and by offset. Within the small range of readings that a press spans,
-//! either is a shift of the channel. So a shift s of every network's inputs is what recalibration finds: of the readings
-//! of a row, or of the features behind a projection. Weights and centres stay as they were trained.
+//! either is a shift of the channel. So recalibration finds one shift for each number that is taken: of the readings of a
+//! row, of the features behind a projection, or of the levels at rest that a touch's shape and strength are told by.
+//! Everything else stays as it was trained, and decoding costs the same.
 //!
-//! Inputs x are in spans of the training range, and errors in training errors of each output. The network f is taken as
-//! a smooth function in f64 without its clamp: a tenth more gain moves an input by a whole training range, where clamped
-//! inputs have no slope. For each press p, inputs xₚ and true outputs yₚ are known.
+//! Shifts are in spans: the training range of a network's input, or the range of a reading in the presses. Errors are in
+//! training errors of each output.
 //!
-//! 1. **Guess.** Centres are inputs whose outputs the network tells. A linear regression of the centres on their
-//!    outputs, with a `RIDGE`, says which inputs g(yₚ) the stated outputs should have had. The guess s₀ is the median
-//!    of xₚ − g(yₚ) over all presses.
-//! 2. **Fit.** The shift minimises Σₚ (m/3)·ln(1 + 3eₚ²) + `PRIOR`²·‖s − s₀‖², with eₚ² the mean squared error of
-//!    f(xₚ − s) in its m outputs. The logarithm belongs to errors with Cauchy's distribution: a press that is far from
-//!    explained, or whose outputs were misstated, says little. Gauss–Newton steps find the minimum; each weighs the
-//!    presses by 1/(1 + 3eₚ²), solves by orthogonal rotations ([`rls`]), and is halved until the sum falls.
+//! 1. **Guess.** The level at rest is the mean of the presses whose outputs are 0, or else a quantile that hardly any touch
+//!    reaches. Inputs of a network are shifted so that their range meets that of training at one end, at the other or
+//!    between: each by the one of five shifts with which the presses' errors are least, one after the other, twice.
+//! 2. **Fit.** The shift s minimises Σₚ (m/3)·ln(1 + 3eₚ²) + `PRIOR`²·‖s − s₀‖², with s₀ the guess and eₚ² the mean squared
+//!    error of press p in its m outputs. The logarithm belongs to errors with Cauchy's distribution: a press that is far
+//!    from explained, or whose outputs were misstated, says little. Gauss–Newton steps find the minimum, with slopes by
+//!    differences of what a device decodes; each is halved until the sum falls.
 //! 3. **Judge.** Guess and fit are repeated without a fifth of the presses, five times, and tell the error on presses
-//!    that they have not seen. Errors before and after are judged as a device decodes, with the clamp. A network whose
-//!    Σ ln(1 + 3eₚ²) falls by less than a tenth keeps its inputs.
+//!    that they have not seen. A network whose Σ ln(1 + 3eₚ²) falls by less than a tenth keeps what it takes.
 //!
 //! docs/drift.md has what it reaches.
 
-use rayon::prelude::*;
-use taxel_core::blob::Model;
+use taxel_core::blob::{Front, Model};
 use taxel_core::rbf::Network;
-use taxel_data::Table;
+use taxel_core::touch::{Touch, block_floats};
+use taxel_data::{Table, columns};
 
 use crate::error::{Error, Result};
+use crate::infer::is_missing;
 use crate::packing::{ModelBlob, rebuild};
-use crate::prepared::PreparedModel;
-use crate::rls;
+use crate::parallel;
+use crate::prepared::{PreparedModel, decode};
+use crate::rls::Rls;
 use crate::train::FittedNetwork;
 
-mod smooth;
-
-use smooth::Smooth;
-
-/// Root of the ridge penalty of the regression that guesses, for outputs in training errors.
-const RIDGE: f64 = 3.0;
-/// 1/σ: shifts are expected to be a quarter of a training range from the guess.
+/// 1/σ: shifts are expected to be a quarter of a span from the guess.
 const PRIOR: f64 = 4.0;
 /// Weight of a squared error in the weight of its press.
 const DOUBT: f64 = 3.0;
+/// Error of a stated output that a device does not tell, as it tells no place of a weak touch.
+const UNTOLD: f64 = 2.0;
+/// Share of the presses beyond half of them that leave a reading as untouched as rest does, to either side.
+const REST_SHARE: f64 = 0.3;
+/// Step in spans by which slopes are told.
+const STEP: f64 = 0.02;
 /// Most Gauss–Newton steps of a fit, and most times that one is halved.
-const MOST_STEPS: usize = 50;
-const MOST_HALVINGS: usize = 20;
-/// Longest step, in training ranges, that ends a fit.
-const SMALLEST_STEP: f64 = 1e-4;
+const MOST_STEPS: usize = 30;
+const MOST_HALVINGS: i32 = 6;
+/// Share of the sum by which a step must lower it to be followed by another.
+const LEAST_GAIN: f64 = 1e-4;
 /// Number of parts of the presses, of which each in turn is kept from a fit that is judged by it.
 const PARTS: usize = 5;
 /// Largest cost of a network that is better than before, relative to that before.
 const WORTH: f64 = 0.9;
-/// Farthest that a usable input may be from the zero of its training range, in training ranges.
-const FARTHEST: f64 = 8.0;
-/// Largest usable error of an output, in training errors.
-const MOST_ERRORS: f64 = 1e4;
 /// Least training error that counts, relative to the full scale of the output.
 const LEAST_ERROR: f64 = 1e-3;
-/// Least mean variance of the stated outputs, in squared training errors, with which presses count as different.
+/// Fewest presses that a network is recalibrated by, and least mean variance of their outputs in squared training errors.
+const FEWEST: usize = 10;
 const LEAST_VARIETY: f64 = 0.05;
 
 /// A model that was recalibrated, and what its presses say of it.
@@ -65,13 +63,11 @@ const LEAST_VARIETY: f64 = 0.05;
 pub struct Recalibrated {
     /// The model in its own number format.
     pub blob: ModelBlob,
-    /// Number of presses that at least one network could use.
+    /// Number of presses that every network could use.
     pub presses: usize,
-    /// Number of networks: rows, or 1 behind a projection.
-    pub networks: usize,
     /// Root mean square error of the model before, in training errors of each output.
     pub error_before: f64,
-    /// The same of the recalibrated model, on presses that its fit has not seen.
+    /// Root mean square error of the recalibrated model, on presses that its fit has not seen.
     pub error_after: f64,
 }
 
@@ -80,42 +76,24 @@ pub struct Recalibrated {
 /// # Errors
 /// [`Error::Unfit`] with what stands against it.
 pub fn check(model: &Model<'_>) -> Result<()> {
-    let network = |row| model.network_of_row(row);
-    let shares = |row: usize| (0..row).any(|before| network(before) == network(row));
-    let errors = training_errors(model);
-    let networks = if model.whole_frames() { 1 } else { model.shape().rows };
-    let of_network = errors.len() / networks;
-    let fronts: Vec<_> = model.fronts().collect();
-    let faults = [
-        (
-            fronts.len() > 1 || fronts.iter().any(|front| front.touch.is_some()),
-            "its features are normalised: train one with readings as they are (--features-kind plain)",
-        ),
-        (
-            !model.whole_frames() && (0..model.shape().rows).any(shares),
-            "rows share a network, while their channels drift apart: train one with a network for each row",
-        ),
-        (
-            model.confidence().is_some(),
-            "its confidence is of the sensor as it was: train one without --confidence",
-        ),
-        (
-            model.fill().is_some(),
-            "its fill of missing readings is of the sensor as it was: train one without --fill",
-        ),
-        (
-            errors.chunks_exact(of_network).any(|errors| errors.iter().all(|error| *error <= 0.0)),
-            "it tells no training errors of a network: `train` writes them",
-        ),
-    ];
-    match faults.into_iter().find(|(is_there, _)| *is_there) {
-        Some((_, fault)) => Err(Error::unfit(format!("the model cannot be recalibrated: {fault}"))),
-        None => Ok(()),
-    }
+    let rows = model.shape().rows;
+    let fault = if !model.whole_frames() && model.network_count() < rows {
+        "rows share a network, while their channels drift apart: train one with a network for each row"
+    } else if model.confidence().is_some() {
+        "its confidence is of the sensor as it was: train one without --confidence"
+    } else if model.fill().is_some() {
+        "its fill of missing readings is of the sensor as it was: train one without --fill"
+    } else if training_errors(model).iter().all(|error| *error <= 0.0) {
+        "it tells no training errors: `train` writes them"
+    } else {
+        return Ok(());
+    };
+    Err(Error::unfit(format!("the model cannot be recalibrated: {fault}")))
 }
 
 /// Recalibrates a `model`, with its baseline if it needs one, by presses: their `readings`, NaN where missing, and what
-/// the `outputs` truly were, each a line a press in the model's columns.
+/// the `outputs` truly were, each a line a press in the model's columns. Where nothing touches, outputs are 0, and places
+/// may be NaN.
 ///
 /// # Errors
 /// [`Error::Unfit`] for a model that presses cannot recalibrate; [`Error::Failed`] if a network has seen too few presses, or
@@ -129,55 +107,39 @@ pub fn recalibrate(
     outputs: &Table,
 ) -> Result<Recalibrated> {
     check(model.model())?;
-    let width = model.model().metadata().output_names.iter().count();
-    assert_eq!(outputs.names.len(), width, "the model's outputs");
+    assert_eq!(outputs.names.len(), training_errors(model.model()).len(), "the model's outputs");
     assert_eq!(readings.len(), outputs.len(), "outputs for each press");
-    let inputs = model.inputs_of_networks(&readings.values).concat();
-    let networks = model.networks();
-    let units: Vec<Unit> = (0..networks.len())
-        .into_par_iter()
-        .map(|index| Unit::new(index, model, &inputs, outputs))
-        .collect();
+    let units = Unit::all(model, readings, outputs);
     if let Some(network) = units.iter().position(|unit| !unit.is_excited()) {
-        let row = (networks.len() > 1).then_some(network + 1);
-        let row = row.map_or(String::new(), |row| format!("row {row} has seen "));
         return Err(Error::failed(format!(
-            "{row}too few presses, or presses that are too alike; press other places"
+            "network {} of {} has seen fewer than {FEWEST} presses, or presses that are too alike; press other places",
+            network + 1,
+            units.len()
         )));
     }
-    let fits: Vec<Fit> = units.par_iter().map(Unit::recalibrate).collect();
-    if !fits.iter().any(|fit| fit.is_better) {
+    let fits = parallel::map(units.len(), &|unit| units[unit].recalibrate());
+    if fits.iter().all(|(shift, _)| shift.is_none()) {
         let reason =
             "no better model came of the presses; the model is as good, or the presses are wrong";
         return Err(Error::failed(reason));
     }
-    let shifted: Result<Vec<(usize, FittedNetwork)>> = units
-        .iter()
-        .zip(&fits)
-        .zip(networks)
-        .enumerate()
-        .map(|(row, ((unit, fit), network))| {
-            let index = model.model().network_of_row(row).expect("a row of the model");
-            let none = vec![0.0; fit.shift.len()];
-            let shift = if fit.is_better { &fit.shift } else { &none };
-            Ok((index, unit.shifted(network, shift)?))
-        })
-        .collect();
-    let mut shifted = shifted?;
-    shifted.sort_by_key(|(index, _)| *index);
-    let views: Vec<Network<'_>> = shifted.iter().map(|(_, network)| network.network()).collect();
-    let used = |press: &usize| units.iter().any(|unit| unit.numbers.contains(press));
-    let root_mean =
-        |error: fn(&Fit) -> f64| (fits.iter().map(error).sum::<f64>() / fits.len() as f64).sqrt();
+    let shifted = units.iter().zip(&fits).map(|(unit, (shift, _))| unit.shifted(shift.as_deref()));
+    let (networks, blocks): (Vec<FittedNetwork>, Vec<Vec<f32>>) =
+        shifted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+    let networks: Vec<Network<'_>> = networks.iter().map(FittedNetwork::network).collect();
+    let mut fronts: Vec<Front<'_>> = model.model().fronts().collect();
+    for (front, block) in fronts.iter_mut().zip(&blocks) {
+        let shifted = |touch: Touch<'_>| Touch::new(touch.kind(), block);
+        front.touch = front.touch.map(|touch| shifted(touch).expect("levels that are finite"));
+    }
+    let [error_before, error_after] = [0, 1].map(|which| {
+        mean(&fits.iter().map(|(_, squares)| squares[which]).collect::<Vec<_>>()).sqrt()
+    });
     Ok(Recalibrated {
-        blob: rebuild(model.model(), &views, None, None)?,
-        presses: (0..outputs.len()).filter(used).count(),
-        networks: networks.len(),
-        error_before: root_mean(|fit| fit.square_before),
-        error_after: root_mean(|fit| {
-            // A network that gets no better keeps its inputs.
-            if fit.is_better { fit.square_after } else { fit.square_before }
-        }),
+        blob: rebuild(model.model(), &fronts, &networks, None, None)?,
+        presses: units.iter().map(|unit| unit.presses.len()).min().unwrap_or(0),
+        error_before,
+        error_after,
     })
 }
 
@@ -190,236 +152,256 @@ fn training_errors(model: &Model<'_>) -> Vec<f64> {
     errors.take(shape.rows * shape.outputs).collect()
 }
 
-/// One network, and the presses that it can use. Outputs that never changed in training are left out of them.
-struct Unit {
-    network: Smooth,
-    /// Training error of each output that counts, with the output's number.
-    errors: Vec<(usize, f64)>,
-    /// Number of each press.
-    numbers: Vec<usize>,
-    /// Inputs of each press, in spans.
-    inputs: Vec<Vec<f64>>,
-    /// True outputs of each press, in training errors.
-    stated: Vec<Vec<f64>>,
+/// One network, and the presses that it can use.
+#[derive(Clone)]
+struct Unit<'m> {
+    network: Network<'m>,
+    /// What stands before the network, if it tells the shape of a touch: the levels at rest are shifted then, and else the
+    /// network's inputs.
+    front: Option<Front<'m>>,
+    /// Training error of each output; 0 for one that does not count.
+    errors: Vec<f64>,
+    presses: Vec<Press>,
 }
 
-/// What the presses say of one network.
-struct Fit {
-    shift: Vec<f64>,
-    square_before: f64,
-    square_after: f64,
-    is_better: bool,
+#[derive(Clone)]
+struct Press {
+    /// What is shifted: readings, or inputs of the network.
+    taken: Vec<f64>,
+    /// True outputs in their units.
+    stated: Vec<f64>,
+    is_untouched: bool,
 }
 
-impl Unit {
-    fn new(index: usize, model: &PreparedModel<'_>, inputs: &[f64], outputs: &Table) -> Self {
-        let networks = model.networks();
-        let network = Smooth::new(&networks[index]);
-        let (width, count) = (network.shape.inputs, network.shape.outputs);
-        let own = |values: &[f64], press: usize, width: usize| {
-            let first = (press * networks.len() + index) * width;
-            values[first..first + width].to_vec()
-        };
-        let errors = own(&training_errors(model.model()), 0, count).into_iter().enumerate();
-        let errors = errors.filter(|(_, error)| *error > 0.0).collect();
-        let mut unit = Self { network, errors, numbers: vec![], inputs: vec![], stated: vec![] };
-        for press in 0..outputs.len() {
-            let x = own(inputs, press, width);
-            let scale = unit.network.zeros.iter().zip(&unit.network.per_unit);
-            let x: Vec<f64> =
-                x.iter().zip(scale).map(|(x, (zero, per_unit))| (x - zero) * per_unit).collect();
-            let stated = unit.in_errors(&own(&outputs.values, press, count));
-            let decoded = unit.in_errors(&unit.network.decode(&x));
-            let near = |e: &f64| e.abs() <= MOST_ERRORS;
-            let usable = x.iter().all(|x| x.abs() <= FARTHEST)
-                && stated.iter().zip(&decoded).all(|(y, decoded)| near(&(decoded - y)));
-            if usable {
-                unit.numbers.push(press);
-                unit.inputs.push(x);
-                unit.stated.push(stated);
+impl<'m> Unit<'m> {
+    /// All networks of a `model` in their order.
+    fn all(model: &PreparedModel<'m>, readings: &Table, outputs: &Table) -> Vec<Self> {
+        let parsed = model.model();
+        let (fronts, all_errors) = (parsed.fronts().collect::<Vec<_>>(), training_errors(parsed));
+        let inputs = model.model_inputs(&readings.values);
+        let of_networks = model.inputs_of_networks(&readings.values);
+        let mut outputs_before = 0;
+        let unit = |(index, network): (usize, Network<'m>)| {
+            let front = fronts.get(index).copied();
+            let touch = front.and_then(|front| front.touch);
+            let of_row = |row: &usize| parsed.network_of_row(*row) == Some(index);
+            let row = (0..parsed.shape().rows).find(of_row).filter(|_| front.is_none());
+            let count = network.shape().outputs;
+            let from = row.map_or(outputs_before, |row| row * count);
+            outputs_before += count;
+            let is_shared = front.is_none() || touch.is_some();
+            let table = if is_shared { &inputs[..] } else { &of_networks[index] };
+            let width = touch.map_or(network.shape().inputs, |touch| touch.readings());
+            let press = |(line, all): (&[f64], &[f64])| {
+                let is_untouched = is_untouched(&outputs.names, all);
+                let mut stated = all[from..from + count].to_vec();
+                if is_untouched && front.is_some_and(|front| front.of_places().is_some()) {
+                    stated.fill(f64::NAN);
+                }
+                let taken = line[row.unwrap_or(0) * width..][..width].to_vec();
+                Press { taken, stated, is_untouched }
+            };
+            let lines = table.chunks_exact(table.len() / readings.len()).zip(outputs.lines());
+            let is_usable = |press: &Press| !press.taken.iter().any(|it| is_missing(*it));
+            Self {
+                network,
+                front: front.filter(|_| touch.is_some()),
+                errors: all_errors[from..from + count].to_vec(),
+                presses: lines.map(press).filter(is_usable).collect(),
             }
-        }
-        unit
+        };
+        parsed.networks().enumerate().map(unit).collect()
     }
 
-    /// The `outputs` that count, in training errors.
-    fn in_errors(&self, outputs: &[f64]) -> Vec<f64> {
-        self.errors.iter().map(|(output, error)| outputs[*output] / error).collect()
-    }
-
-    /// Whether there are as many presses as unknowns, and different ones.
+    /// Whether there are enough presses, and different ones.
     fn is_excited(&self) -> bool {
-        let count = self.stated.len();
-        let means = mean_line(&self.stated);
-        let squares = self.stated.iter().map(|line| mean_square(line, &means));
-        count >= self.network.shape.inputs && squares.sum::<f64>() / count as f64 >= LEAST_VARIETY
+        let values = self.presses.iter().flat_map(|press| press.stated.clone()).collect();
+        let stated = Table { names: vec![String::new(); self.errors.len()], values };
+        let parts = stated.deviations().into_iter().zip(&self.errors);
+        let variances = parts.filter(|it| *it.1 > 0.0).map(|(of, error)| (of / error).powi(2));
+        let variances: Vec<f64> = variances.filter(|it| it.is_finite()).collect();
+        self.presses.len() >= FEWEST && mean(&variances) >= LEAST_VARIETY
     }
 
-    fn recalibrate(&self) -> Fit {
-        let all: Vec<usize> = (0..self.inputs.len()).collect();
-        let shift = self.fit(&all);
-        let none = vec![0.0; shift.len()];
-        let before: Vec<f64> = all.iter().map(|press| self.square_decoded(&none, *press)).collect();
-        let after = self.squares_after();
-        let cost = |squares: &[f64]| squares.iter().map(|square| doubted(*square)).sum::<f64>();
-        let mean = |squares: &[f64]| squares.iter().sum::<f64>() / squares.len() as f64;
-        Fit {
-            shift,
-            square_before: mean(&before),
-            square_after: mean(&after),
-            is_better: cost(&after) < WORTH * cost(&before),
-        }
-    }
-
-    /// Mean squared error of each press as a device decodes it, by the network that was fitted without this press and
-    /// the others of its part.
-    fn squares_after(&self) -> Vec<f64> {
-        let mut squares = vec![0.0; self.inputs.len()];
+    /// Shift, unless the network is no better with it, and mean squared errors before and after.
+    fn recalibrate(&self) -> (Option<Vec<f64>>, [f64; 2]) {
+        let shift = self.fit();
+        let before = self.squares(&vec![0.0; shift.len()]);
+        let mut after = before.clone();
         for part in 0..PARTS {
-            let (judged, fitted): (Vec<_>, Vec<_>) =
-                (0..squares.len()).partition(|press| press % PARTS == part);
-            let shift = self.fit(&fitted);
-            for press in judged {
-                squares[press] = self.square_decoded(&shift, press);
-            }
+            let [judged, fitted] = [true, false].map(|is_judged| {
+                let presses = self.presses.iter().enumerate();
+                let kept = presses.filter(|(press, _)| (press % PARTS == part) == is_judged);
+                Self { presses: kept.map(|(_, press)| press.clone()).collect(), ..self.clone() }
+            });
+            let squares = judged.squares(&fitted.fit());
+            after.iter_mut().skip(part).step_by(PARTS).zip(squares).for_each(|(it, of)| *it = of);
         }
-        squares
+        let is_better = doubted(&after) < WORTH * doubted(&before);
+        if is_better {
+            (Some(shift), [mean(&before), mean(&after)])
+        } else {
+            (None, [mean(&before); 2])
+        }
     }
 
-    /// Guesses the shift: the median difference of the inputs of these `presses` to those that the stated outputs should
-    /// have had.
-    fn guess(&self, presses: &[usize]) -> Vec<f64> {
-        let (inputs, regressors) = (self.network.shape.inputs, self.errors.len());
-        let centres: Vec<&[f64]> = self.network.centres.chunks_exact(inputs).collect();
-        let outputs: Vec<Vec<f64>> =
-            centres.iter().map(|x| self.in_errors(&self.network.infer(x, &mut []))).collect();
-        let [centre, output] = [mean_line(&centres), mean_line(&outputs)];
-        let mut triangle = vec![0.0; regressors * regressors];
-        let mut projection = vec![0.0; regressors * inputs];
-        rls::start(&mut triangle, regressors, RIDGE);
-        for (x, y) in centres.iter().zip(&outputs) {
-            let [mut y, mut x] = [difference(y, &output), difference(x, &centre)];
-            rls::rotate(&mut triangle, &mut projection, &mut y, &mut x);
-        }
-        let mut parts = vec![0.0; regressors * inputs];
-        rls::solve(&triangle, &projection, regressors, &mut parts);
-        let mut differences: Vec<Vec<f64>> = vec![vec![]; inputs];
-        for press in presses {
-            let (x, stated) = (&self.inputs[*press], &self.stated[*press]);
-            let mut left = difference(x, &centre);
-            for (y, parts) in difference(stated, &output).iter().zip(parts.chunks_exact(inputs)) {
-                left.iter_mut().zip(parts).for_each(|(left, part)| *left -= y * part);
+    /// Errors of all presses as a device decodes them, with what is taken shifted: 0 for what is not stated.
+    fn errors_at(&self, shift: &[f64]) -> Vec<f64> {
+        let taken = self.presses.iter().flat_map(|press| press.taken.iter().zip(shift));
+        let inputs: Vec<f64> = taken.map(|(it, shift)| it - shift).collect();
+        let decoded = decode(self.front.as_slice(), &[self.network], &inputs);
+        let stated = self.presses.iter().flat_map(|press| press.stated.iter().zip(&self.errors));
+        let error = |(decoded, (stated, error)): (&f64, (&f64, &f64))| {
+            if stated.is_nan() || *error <= 0.0 {
+                0.0
+            } else if decoded.is_nan() {
+                UNTOLD
+            } else {
+                (decoded - stated) / error
             }
-            differences.iter_mut().zip(left).for_each(|(all, left)| all.push(left));
-        }
-        let median = |mut values: Vec<f64>| {
-            let middle = values.len() / 2;
-            *values.select_nth_unstable_by(middle, f64::total_cmp).1
         };
-        differences.into_iter().map(median).collect()
+        decoded.iter().zip(stated).map(error).collect()
     }
 
-    /// The shift that explains these `presses` best, near the guess that they give.
-    fn fit(&self, presses: &[usize]) -> Vec<f64> {
-        let guess = &self.guess(presses)[..];
-        let inputs = guess.len();
-        let cost = |shift: &[f64]| {
-            let errors = presses.iter().map(|press| doubted(self.square(shift, *press)));
-            let from_guess: f64 = difference(shift, guess).iter().map(|d| d * d).sum();
-            self.errors.len() as f64 / DOUBT * errors.sum::<f64>() + PRIOR.powi(2) * from_guess
+    /// Mean squared error of each press, with what is taken shifted.
+    fn squares(&self, shift: &[f64]) -> Vec<f64> {
+        let errors = self.errors_at(shift);
+        errors.chunks_exact(self.errors.len()).map(mean_square).collect()
+    }
+
+    /// Shift from which a fit starts, and the span of each of its numbers.
+    fn guess(&self) -> (Vec<f64>, Vec<f64>) {
+        let numbers = 0..self.presses[0].taken.len();
+        let quantile = |number: usize, share: f64| {
+            let mut values: Vec<f64> = self.presses.iter().map(|it| it.taken[number]).collect();
+            values.sort_by(f64::total_cmp);
+            values[((values.len() - 1) as f64 * share).round() as usize]
         };
-        let mut shift = guess.to_vec();
-        let mut lowest = cost(&shift);
-        let mut triangle = vec![0.0; inputs * inputs];
-        let mut step = vec![0.0; inputs];
+        // One in fifty at either end may be wrong.
+        let range = |number: usize| [0.02, 0.98].map(|share| quantile(number, share));
+        if let Some(touch) = self.front.and_then(|front| front.touch) {
+            let usual = 0.5 - REST_SHARE * f64::from(touch.strengths().side);
+            let of_reading = |number: usize| {
+                let untouched = self.presses.iter().filter(|it| it.is_untouched);
+                let rest: Vec<f64> = untouched.map(|it| it.taken[number]).collect();
+                let rest = if rest.is_empty() { quantile(number, usual) } else { mean(&rest) };
+                let [low, high] = range(number);
+                (rest - f64::from(touch.block()[block_floats(number)]), high - low)
+            };
+            return numbers.map(of_reading).unzip();
+        }
+        let of_input = |input: usize| {
+            let ([low, high], [from, to]) = (range(input), self.network.training_range(input));
+            let [from, to] = [from, to].map(f64::from);
+            // An input that never changed in training stays.
+            if to > from { ([low - from, high - to], to - from) } else { ([0.0; 2], 0.0) }
+        };
+        let (ends, spans): (Vec<[f64; 2]>, Vec<f64>) = numbers.clone().map(of_input).unzip();
+        let between = |input: usize, share: f64| {
+            let [low, high] = ends[input];
+            low + share * (high - low)
+        };
+        let mut guess: Vec<f64> = numbers.clone().map(|input| between(input, 0.5)).collect();
+        for input in numbers.clone().chain(numbers) {
+            let tried = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| {
+                guess[input] = between(input, share);
+                (doubted(&self.squares(&guess)), guess[input])
+            });
+            guess[input] = tried.into_iter().fold(tried[0], |a, b| if b.0 < a.0 { b } else { a }).1;
+        }
+        (guess, spans)
+    }
+
+    /// The shift that explains the presses best, near the guess that they give.
+    fn fit(&self) -> Vec<f64> {
+        let (guess, spans) = self.guess();
+        let outputs = self.errors.len();
+        let at = |steps: &[f64]| -> Vec<f64> {
+            let moved = guess.iter().zip(steps).zip(&spans);
+            moved.map(|((guess, step), span)| guess + step * span).collect()
+        };
+        let cost = |steps: &[f64]| {
+            let from_guess = PRIOR.powi(2) * steps.iter().map(|step| step * step).sum::<f64>();
+            outputs as f64 / DOUBT * doubted(&self.squares(&at(steps))) + from_guess
+        };
+        let mut steps = vec![0.0; guess.len()];
+        let mut lowest = cost(&steps);
         for _ in 0..MOST_STEPS {
-            rls::start(&mut triangle, inputs, PRIOR);
-            let mut target = difference(guess, &shift);
-            target.iter_mut().for_each(|target| *target *= PRIOR);
-            for press in presses {
-                self.rotate(&shift, *press, &mut triangle, &mut target);
+            let errors = self.errors_at(&at(&steps));
+            let moved = parallel::map(guess.len(), &|number| {
+                let mut steps = steps.clone();
+                steps[number] += STEP;
+                self.errors_at(&at(&steps))
+            });
+            let mut rls = Rls::new([guess.len(), 1], PRIOR.powi(-2), 1.0).expect("a usual prior");
+            for (index, error) in errors.iter().enumerate() {
+                let of_press = &errors[index / outputs * outputs..][..outputs];
+                let weight = (1.0 + DOUBT * mean_square(of_press)).sqrt().recip();
+                let slope = |moved: &Vec<f64>| weight * (moved[index] - error) / STEP;
+                let mut slopes: Vec<f64> = moved.iter().map(slope).collect();
+                let before: f64 = slopes.iter().zip(&steps).map(|(slope, step)| slope * step).sum();
+                // A press that decodes to more than any number says nothing.
+                let _ = rls.update(&mut slopes, &mut [before - weight * error]);
             }
-            rls::solve(&triangle, &target, inputs, &mut step);
-            let mut is_lower = false;
-            for _ in 0..MOST_HALVINGS {
-                let next: Vec<f64> = shift.iter().zip(&step).map(|(s, step)| s + step).collect();
+            let (best, before) = (rls.weights(), lowest);
+            for halvings in 0..MOST_HALVINGS {
+                let part =
+                    |(step, best): (&f64, &f64)| step + 0.5_f64.powi(halvings) * (best - step);
+                let next: Vec<f64> = steps.iter().zip(&best).map(part).collect();
                 let found = cost(&next);
                 if found < lowest {
-                    (shift, lowest, is_lower) = (next, found, true);
+                    (steps, lowest) = (next, found);
                     break;
                 }
-                step.iter_mut().for_each(|step| *step /= 2.0);
             }
-            let longest = step.iter().fold(0.0_f64, |longest, step| longest.max(step.abs()));
-            if !is_lower || longest < SMALLEST_STEP {
+            if lowest > (1.0 - LEAST_GAIN) * before {
                 break;
             }
         }
-        shift
+        at(&steps)
     }
 
-    /// Rotates what a press says of a step from `shift` into the `triangle` and its `target`.
-    fn rotate(&self, shift: &[f64], press: usize, triangle: &mut [f64], target: &mut [f64]) {
-        let inputs = shift.len();
-        let mut slopes = vec![0.0; inputs * self.network.shape.outputs];
-        let values = self.network.infer(&difference(&self.inputs[press], shift), &mut slopes);
-        let (values, stated) = (self.in_errors(&values), &self.stated[press]);
-        let root_weight = (1.0 + DOUBT * mean_square(&values, stated)).sqrt().recip();
-        for (((output, error), value), stated) in self.errors.iter().zip(values).zip(stated) {
-            // A shift lowers the input.
-            let slopes = &mut slopes[output * inputs..][..inputs];
-            slopes.iter_mut().for_each(|slope| *slope *= root_weight / error);
-            rls::rotate(triangle, target, slopes, &mut [(value - stated) * root_weight]);
-        }
-    }
-
-    /// Mean squared error of a press with its inputs shifted, as a device decodes it.
-    fn square_decoded(&self, shift: &[f64], press: usize) -> f64 {
-        let values = self.network.decode(&difference(&self.inputs[press], shift));
-        mean_square(&self.in_errors(&values), &self.stated[press])
-    }
-
-    /// Mean squared error of a press with its inputs shifted, by the smooth network.
-    fn square(&self, shift: &[f64], press: usize) -> f64 {
-        let values = self.network.infer(&difference(&self.inputs[press], shift), &mut []);
-        mean_square(&self.in_errors(&values), &self.stated[press])
-    }
-
-    /// The `network` in its own number format, with its inputs shifted. Every format's words begin with the zeros.
-    fn shifted(&self, network: &Network<'_>, shift: &[f64]) -> Result<FittedNetwork> {
-        let mut words: Vec<u32> = match network {
+    /// The network, and the numbers of the touch before it, with what they take shifted.
+    fn shifted(&self, shift: Option<&[f64]>) -> Result<(FittedNetwork, Vec<f32>)> {
+        // Every format's words begin with the zeros of the inputs.
+        let mut words: Vec<u32> = match &self.network {
             Network::F32(network) => network.parameters().words().collect(),
             Network::Fixed16(network) => network.block().to_vec(),
         };
-        let scale = self.network.zeros.iter().zip(&self.network.per_unit);
-        for ((word, (zero, per_unit)), shift) in words.iter_mut().zip(scale).zip(shift) {
-            // An input that never changed in training stays.
-            if *per_unit > 0.0 {
-                *word = ((zero + shift / per_unit) as f32).to_bits();
-            }
+        let mut block: Vec<f32> = vec![];
+        let moved = |zero: f32, shift: f64| (f64::from(zero) + shift) as f32;
+        let shift = shift.unwrap_or_default();
+        if let Some(touch) = self.front.and_then(|front| front.touch) {
+            block = touch.block().to_vec();
+            let levels = block[block_floats(0)..].iter_mut().step_by(2);
+            levels.zip(shift).for_each(|(level, shift)| *level = moved(*level, *shift));
+        } else {
+            let zeros = words.iter_mut().zip(shift);
+            zeros.for_each(|(word, shift)| *word = moved(f32::from_bits(*word), *shift).to_bits());
         }
-        let (shape, affine) = (network.shape(), network.has_affine_tail());
-        FittedNetwork::try_new(shape, network.format(), affine, words)
+        let (shape, affine) = (self.network.shape(), self.network.has_affine_tail());
+        Ok((FittedNetwork::try_new(shape, self.network.format(), affine, words)?, block))
     }
 }
 
-/// Cost of a press with this mean squared error: little more for a large one.
-fn doubted(square: f64) -> f64 {
-    (DOUBT * square).ln_1p()
+/// Whether a press states that nothing touches: all outputs that are no places are 0.
+fn is_untouched(names: &[String], stated: &[f64]) -> bool {
+    let amounts = names.iter().zip(stated).filter(|(name, _)| !columns::is_place(name));
+    let mut amounts = amounts.map(|(_, stated)| *stated).peekable();
+    amounts.peek().is_some() && amounts.all(|stated| stated == 0.0)
 }
 
-fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
+/// Sum over presses of the cost of their mean squared errors: little more for a large one.
+fn doubted(squares: &[f64]) -> f64 {
+    squares.iter().map(|square| (DOUBT * square).ln_1p()).sum()
 }
 
-fn mean_square(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64
+fn mean_square(errors: &[f64]) -> f64 {
+    errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64
 }
 
-fn mean_line<L: AsRef<[f64]>>(lines: &[L]) -> Vec<f64> {
-    let width = lines.first().map_or(0, |line| line.as_ref().len());
-    let mean = |i: usize| lines.iter().map(|line| line.as_ref()[i]).sum::<f64>();
-    (0..width).map(|i| mean(i) / lines.len() as f64).collect()
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 #[cfg(test)]

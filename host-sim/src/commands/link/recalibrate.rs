@@ -8,7 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use taxel_core::blob::Model;
 use taxel_core::health::Limits;
-use taxel_data::{DataFile, Table, output};
+use taxel_data::{DataFile, Table, columns, output};
 use taxel_firmware::link::message::{Configuration, Refusal};
 use taxel_learn::ModelBlob;
 use taxel_learn::health::judge;
@@ -41,7 +41,6 @@ pub struct Arguments {
 struct Summary {
     presses: usize,
     presses_unusable: usize,
-    networks: usize,
     /// Root mean square errors on presses that the fit has not seen, in training errors of each output.
     error_before: f64,
     error_after: f64,
@@ -63,7 +62,8 @@ pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> R
     recalibration::check(model.model())?;
     let metadata = model.model().metadata();
     let file = DataFile::read(&arguments.presses)?;
-    let outputs = outputs_of(&file, table_of(&file, metadata.output_names.iter())?)?;
+    let outputs = table_of(&file, metadata.output_names.iter())?;
+    check_stated(&file, &outputs)?;
     let identity = device.identify()?;
     if !identity.has_in_force(model.model().crc()) {
         return Err(Error::Usage(
@@ -90,21 +90,22 @@ pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> R
     conclude(&found, outputs.len(), common)
 }
 
-/// The `outputs` of a file's presses, of which none may be missing.
-fn outputs_of(file: &DataFile, outputs: Table) -> Result<Table> {
-    let unfit = |message: String| Error::Unfit { path: file.path.clone(), message };
-    if outputs.is_empty() {
-        return Err(unfit("it has no line; give one for each press".into()));
-    }
-    if let Some(place) = outputs.values.iter().position(|value| value.is_nan()) {
-        let (line, column) = (place / outputs.names.len(), place % outputs.names.len());
-        return Err(unfit(format!(
+/// Checks that every press of a `file` states all `outputs`; a place may be empty, as where nothing touches.
+fn check_stated(file: &DataFile, outputs: &Table) -> Result<()> {
+    let width = outputs.names.len();
+    let is_missing = |place: &usize| {
+        outputs.values[*place].is_nan() && !columns::is_place(&outputs.names[place % width])
+    };
+    let message = match (0..outputs.values.len()).find(is_missing) {
+        Some(place) => format!(
             "line {}: {} is missing; every press needs all outputs",
-            file.line_number(line),
-            outputs.names[column]
-        )));
-    }
-    Ok(outputs)
+            file.line_number(place / width),
+            outputs.names[place % width]
+        ),
+        None if outputs.is_empty() => "it has no line; give one for each press".into(),
+        None => return Ok(()),
+    };
+    Err(Error::Unfit { path: file.path.clone(), message })
 }
 
 /// Asks for one press after the other, and lets the device scan each: mean readings, NaN where one was faulty.
@@ -139,24 +140,23 @@ fn record_presses(
 }
 
 fn conclude(found: &Recalibrated, given: usize, common: &Common) -> Result<()> {
-    let model_crc = format!("{:08x}", found.blob.parse().crc());
     let summary = Summary {
         presses: found.presses,
         presses_unusable: given - found.presses,
-        networks: found.networks,
         error_before: found.error_before,
         error_after: found.error_after,
-        model_crc: model_crc.clone(),
+        model_crc: format!("{:08x}", found.blob.parse().crc()),
     };
     if common.json {
         return print::json(&summary);
     }
     let mut page = print::Page::default();
     page.line(format_args!(
-        "The model is mended: {model_crc} is active, also after a restart. `undo` returns to the previous one."
+        "The model is mended: {} is active, also after a restart. `undo` returns to the previous one.",
+        summary.model_crc
     ));
     page.line(format_args!(
-        "{:<17} {} used, {} unusable (a reading missing, or far out of range)",
+        "{:<17} {} used, {} unusable (a reading missing)",
         "presses", summary.presses, summary.presses_unusable
     ));
     page.line(format_args!(
