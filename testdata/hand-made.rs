@@ -1,16 +1,15 @@
 // Model "hand-made" in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: 8def53c7.
-// To decode a frame, with this file as module `model`:
-//     let outputs: [[f32; 18]; 8] = model::decode(&readings); // readings: [[f32; 18]; 8]
 // Readings, row after row, with their units:
 //     x, x (144 times)
 // Outputs, row after row, with their units:
 //     y, y (144 times)
-use taxel_core::Fixed;
+#[allow(unused_imports)]
+use taxel_core::{blob, confidence, fill, projection, rbf, rbf::arrays, touch};
 
 /// Network of rows 1, 3, 5, 7.
 #[rustfmt::skip]
 #[allow(clippy::approx_constant, clippy::unreadable_literal)]
-pub static ROW_1: Fixed<18, 12, 18> = Fixed {
+pub static NETWORK_0: arrays::F32<18, 12, 18, 18> = arrays::F32 {
     input_minimum: [53.156418, 53.203396, 54.210648, 53.802433, 53.76725, 54.12172, 53.158222, 53.71196, 53.965588, 53.893154, 54.266605, 53.730385, 53.09728, 53.19461, 54.826077, 53.39541, 54.026447, 54.94941],
     input_per_span: [0.07425797, 0.07820883, 0.08367026, 0.08498272, 0.08740355, 0.073786795, 0.07969419, 0.0790648, 0.073528685, 0.078693666, 0.0715143, 0.08203632, 0.07583497, 0.071064815, 0.08319962, 0.07357962, 0.083477385, 0.08453423],
     centres: [
@@ -63,13 +62,12 @@ pub static ROW_1: Fixed<18, 12, 18> = Fixed {
         [-0.048054304, -0.06100321, -0.054733872, 0.017476773, -0.024222529, -0.06733395, 0.012949956, 0.00977397, -0.055260625, 0.085247494, -0.03213921, 0.0877231, -0.033679523, 0.010509312, 0.047843803, 0.081444465, 0.040150404, 0.043694068],
         [0.06250091, -0.05625112, -0.022201706, -0.004989588, -0.08651052, 0.022505535, -0.012462891, 0.06854451, -0.025875974, -0.047255553, -0.020137561, 0.075228475, -0.024047745, 0.0037950873, 0.04479889, -0.026759638, 0.08002915, 0.09757425],
     ],
-}
-.checked();
+};
 
 /// Network of rows 2, 4, 6, 8.
 #[rustfmt::skip]
 #[allow(clippy::approx_constant, clippy::unreadable_literal)]
-pub static ROW_2: Fixed<18, 12, 18> = Fixed {
+pub static NETWORK_1: arrays::F32<18, 12, 18, 18> = arrays::F32 {
     input_minimum: [53.34695, 53.189312, 54.099648, 53.15906, 54.735134, 53.48002, 54.249825, 53.145336, 53.036835, 53.444237, 54.861805, 53.369503, 54.731804, 53.848812, 53.90047, 54.25663, 54.12412, 54.45685],
     input_per_span: [0.07913343, 0.08636036, 0.07975393, 0.07677257, 0.0777801, 0.079674035, 0.08976854, 0.08070228, 0.08771829, 0.0874469, 0.08236108, 0.077965476, 0.07978678, 0.08841639, 0.07569238, 0.07364469, 0.07032601, 0.08326233],
     centres: [
@@ -122,13 +120,30 @@ pub static ROW_2: Fixed<18, 12, 18> = Fixed {
         [0.07539666, -0.031203115, -0.027646257, 0.030330002, -0.060810506, -0.030489827, -0.03480604, 0.056369066, 0.068581596, 0.09628909, 0.036696125, 0.0036355616, 0.05515169, 0.054774392, 0.097196214, -0.05748273, -0.05081102, -0.01792928],
         [0.08472725, 0.054637253, 0.06726594, 0.005583787, 0.06888759, -0.053383302, -0.036215592, 0.071640566, 0.049967494, -0.065956555, 0.06260448, 0.055610538, -0.08663505, 0.00068444014, 0.06681601, 0.012635589, -0.029115343, 0.06890817],
     ],
+};
+
+/// The model.
+#[rustfmt::skip]
+#[allow(clippy::approx_constant, clippy::unreadable_literal)]
+pub static MODEL: taxel_core::Fixed<rbf::float32::Network<'static>, 8, 18, 18, 18> = taxel_core::Fixed {
+    networks: taxel_core::Networks::OfRows(&[
+        NETWORK_0.network(),
+        NETWORK_1.network(),
+        NETWORK_0.network(),
+        NETWORK_1.network(),
+        NETWORK_0.network(),
+        NETWORK_1.network(),
+        NETWORK_0.network(),
+        NETWORK_1.network(),
+    ]),
+    relative_inputs: false,
+    confidence: None,
+    fill: None,
 }
 .checked();
 
-/// Outputs of a frame from its readings, row after row. A row with a reading that is not finite has NaN.
-#[rustfmt::skip]
+/// Decodes a frame of readings, row after row. One that is not finite is missing.
 #[must_use]
-pub fn decode(readings: &[[f32; 18]; 8]) -> [[f32; 18]; 8] {
-    let [row_1, row_2, row_3, row_4, row_5, row_6, row_7, row_8] = readings;
-    [ROW_1.infer(row_1), ROW_2.infer(row_2), ROW_1.infer(row_3), ROW_2.infer(row_4), ROW_1.infer(row_5), ROW_2.infer(row_6), ROW_1.infer(row_7), ROW_2.infer(row_8)]
+pub fn decode(readings: &[[f32; 18]; 8]) -> taxel_core::Decoded<8, 18> {
+    MODEL.decode(readings, None)
 }

@@ -1,6 +1,4 @@
 // Model "press" in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: cfdbbd9b.
-// To decode a frame, with this file as module `model`:
-//     let outputs: [[f32; 6]; 1] = model::decode(&readings); // readings: [[f32; 18]; 1]
 // Readings, row after row, with their units:
 //     r4c1_ohm, Ω
 //     r4c2_ohm, Ω
@@ -27,12 +25,13 @@
 //     r4e4_dz_mm, mm
 //     r4e5_dz_mm, mm
 //     r4e6_dz_mm, mm
-use taxel_core::Fixed;
+#[allow(unused_imports)]
+use taxel_core::{blob, confidence, fill, projection, rbf, rbf::arrays, touch};
 
 /// Network of row 1.
 #[rustfmt::skip]
 #[allow(clippy::approx_constant, clippy::unreadable_literal)]
-pub static ROW_1: Fixed<18, 16, 6> = Fixed {
+pub static NETWORK_0: arrays::F32<18, 16, 6, 18> = arrays::F32 {
     input_minimum: [55.685295, 52.224457, 49.825268, 47.628784, 46.130394, 45.054535, 44.019413, 43.773514, 43.388775, 43.610233, 43.53169, 44.291943, 45.08275, 46.2069, 47.754307, 49.927574, 52.40977, 55.687977],
     input_per_span: [0.19671796, 0.196776, 0.21080938, 0.21460441, 0.22137605, 0.23755062, 0.22502829, 0.24755953, 0.23802191, 0.24914156, 0.22886057, 0.24517655, 0.22623253, 0.23192838, 0.2228335, 0.22294758, 0.20387809, 0.20015393],
     centres: [
@@ -93,13 +92,23 @@ pub static ROW_1: Fixed<18, 16, 6> = Fixed {
         [-0.16184863, -0.11187688, -0.07016198, 0.032089423, -0.020396544, -0.2473561],
         [-0.0013462809, -0.098991565, 0.03764726, 0.10417762, -0.08273125, -0.32596955],
     ],
+};
+
+/// The model.
+#[rustfmt::skip]
+#[allow(clippy::approx_constant, clippy::unreadable_literal)]
+pub static MODEL: taxel_core::Fixed<rbf::float32::Network<'static>, 1, 18, 6, 18> = taxel_core::Fixed {
+    networks: taxel_core::Networks::OfRows(&[
+        NETWORK_0.network(),
+    ]),
+    relative_inputs: false,
+    confidence: None,
+    fill: None,
 }
 .checked();
 
-/// Outputs of a frame from its readings, row after row. A row with a reading that is not finite has NaN.
-#[rustfmt::skip]
+/// Decodes a frame of readings, row after row. One that is not finite is missing.
 #[must_use]
-pub fn decode(readings: &[[f32; 18]; 1]) -> [[f32; 6]; 1] {
-    let [row_1] = readings;
-    [ROW_1.infer(row_1)]
+pub fn decode(readings: &[[f32; 18]; 1]) -> taxel_core::Decoded<1, 6> {
+    MODEL.decode(readings, None)
 }

@@ -42,7 +42,7 @@ impl<P: OutputPin, S: SpiDevice, T: DelayNs> Sensor<P, S, T> {
     pub fn estimate_dz_mm(&mut self) -> [f32; 6] {
         let mut readings_ohm = [[f32::NAN; 18]];
         self.scanner.scan(SETTINGS, WIRES, readings_ohm.as_flattened_mut());
-        let [dz_mm] = row4::decode(&readings_ohm);
+        let [dz_mm] = row4::decode(&readings_ohm).outputs;
         dz_mm
     }
 }

@@ -72,6 +72,7 @@ fn every_format_decodes_many_frames_on_the_host_as_in_the_emulator() {
 }
 
 #[test]
-fn networks_of_fixed_size_decode_as_their_blobs_on_the_host_as_in_the_emulator() {
-    expect("fixed", |say| fixed::compare_all(model("hand-made.bin"), model("row4.bin"), say));
+fn models_of_fixed_size_decode_as_their_blobs_on_the_host_as_in_the_emulator() {
+    let blobs = ["hand-made.bin", "row4.bin", "array-touch.bin"].map(model);
+    expect("fixed", |say| fixed::compare_all(blobs, say));
 }

@@ -156,13 +156,22 @@ impl<'a> Confidence<'a> {
         Ok(Self { sizes, block })
     }
 
+    /// Makes a confidence of an array in a program, as [`new`](Self::new) takes it. Numbers are not looked at.
+    ///
+    /// # Panics
+    /// If the array has another length.
+    pub const fn of_array(sizes: Sizes, array: &'a [f32]) -> Self {
+        assert!(array.len() == sizes.block_floats(), "a confidence of another length");
+        Self::of_checked(sizes, array)
+    }
+
     /// Makes a confidence of a block that [`new`](Self::new) has checked before.
-    pub(crate) fn of_checked(sizes: Sizes, block: &'a [f32]) -> Self {
+    pub(crate) const fn of_checked(sizes: Sizes, block: &'a [f32]) -> Self {
         Self { sizes, block }
     }
 
     /// The confidence's sizes.
-    pub fn sizes(&self) -> Sizes {
+    pub const fn sizes(&self) -> Sizes {
         self.sizes
     }
 

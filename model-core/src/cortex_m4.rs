@@ -47,7 +47,7 @@ impl Form {
 impl<'a> Block<'a> {
     /// Makes a block of these counts.
     #[inline(always)]
-    pub fn new(counts: [usize; 3], affine: bool, words: &'a [u32]) -> Self {
+    pub const fn new(counts: [usize; 3], affine: bool, words: &'a [u32]) -> Self {
         let [inputs, centres, outputs] = counts;
         let sizes = if inputs != INPUTS || outputs > OUTPUTS {
             Form::OTHER_SIZES

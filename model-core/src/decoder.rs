@@ -1,10 +1,12 @@
 //! Decoding a frame to an estimate: the one entry point for a device.
 
-use crate::blob::{DecodeError, Front, MOST_FRONTS, Metadata, Model, ModelShape, NetworkSection};
+use crate::blob::{DecodeError, Front, MOST_FRONTS, Metadata, Model, ModelShape};
+use crate::confidence::Confidence;
 #[cfg(cortex_m4f)]
 use crate::cortex_m4;
 use crate::estimate::{Estimate, RowStatus};
-use crate::rbf::{Format, NetworkError, fixed16};
+use crate::infer::{Infer, Row, RowNetwork, all_finite};
+use crate::rbf::NetworkError;
 use crate::relative::relative;
 use crate::touch::{Kind, Touch};
 
@@ -84,38 +86,17 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 #[derive(Debug, Clone, Copy)]
 pub struct Decoder<'a, const ROWS: usize> {
     model: Model<'a>,
-    networks: Networks<'a, ROWS>,
+    networks: OwnNetworks<'a, ROWS>,
 }
 
-/// Networks of a model.
+/// Networks of a blob.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::large_enum_variant, reason = "of eight rows, both are about as large")]
-enum Networks<'a, const ROWS: usize> {
+enum OwnNetworks<'a, const ROWS: usize> {
     /// Each row's network; rows beyond the model's have none.
     OfRows([RowNetwork<'a>; ROWS]),
     /// Networks that see whole frames, and what stands before each.
     OfFrames([(Front<'a>, RowNetwork<'a>); MOST_FRONTS]),
-}
-
-/// The network of a row, made ready when the model is loaded.
-#[derive(Debug, Clone, Copy)]
-enum RowNetwork<'a> {
-    /// A network in `f32`, which is large: it is cut from its section for each row.
-    F32(NetworkSection<'a>),
-    /// A network in `fixed16`.
-    Fixed16(fixed16::Network<'a>),
-}
-
-impl<'a> RowNetwork<'a> {
-    /// No network: whatever it is given is missing.
-    const NONE: Self = Self::F32(NetworkSection::EMPTY);
-
-    fn new(section: NetworkSection<'a>, shape: ModelShape) -> Result<Self, NetworkError> {
-        match section.format() {
-            Format::F32 => Ok(Self::F32(section)),
-            Format::Fixed16 => section.fixed16(shape).map(Self::Fixed16),
-        }
-    }
 }
 
 impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
@@ -137,20 +118,20 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
             return Err(DecodeError::TooManyRows { most: ROWS, found: rows });
         }
         let mut networks = if model.whole_frames() {
-            Networks::OfFrames([(Front::NONE, RowNetwork::NONE); MOST_FRONTS])
+            OwnNetworks::OfFrames([(Front::NONE, RowNetwork::NONE); MOST_FRONTS])
         } else {
-            Networks::OfRows([RowNetwork::NONE; ROWS])
+            OwnNetworks::OfRows([RowNetwork::NONE; ROWS])
         };
         for (index, part) in model.parts().enumerate() {
             let network = RowNetwork::new(part.section, part.shape)
                 .map_err(|cause| DecodeError::Network { index: index as u8, cause })?;
             match &mut networks {
-                Networks::OfFrames(places) => {
+                OwnNetworks::OfFrames(places) => {
                     if let Some(place) = places.get_mut(index) {
                         *place = (part.front, network);
                     }
                 }
-                Networks::OfRows(places) => {
+                OwnNetworks::OfRows(places) => {
                     for (row, place) in places.iter_mut().enumerate() {
                         if model.network_of_row(row) == Some(index) {
                             *place = network;
@@ -207,11 +188,20 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         scratch: &mut [f32],
         estimate: &mut Estimate<'_>,
     ) -> Result<bool, NetworkError> {
-        let (of_rows, of_frames) = match &self.networks {
-            Networks::OfRows(networks) => (&networks[..], &[][..]),
-            Networks::OfFrames(networks) => (&[][..], &networks[..]),
+        let networks = match &self.networks {
+            OwnNetworks::OfRows(networks) => Networks::OfRows(networks),
+            OwnNetworks::OfFrames(networks) => {
+                let count = self.model.network_count();
+                Networks::OfFrames(networks.get(..count).unwrap_or_default())
+            }
         };
-        decode(&self.model, of_rows, of_frames, frame, scratch, estimate)
+        let relative = self.metadata().relative_inputs;
+        decode_blob(
+            &FrameDecoder { shape: self.shape(), relative, networks },
+            frame,
+            scratch,
+            estimate,
+        )
     }
 
     /// Replaces missing readings of a frame (Ω) by those expected of the others, if the model can
@@ -238,90 +228,141 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         scratch: &mut [f32],
         deviation: &mut [f32],
     ) -> Result<Option<f32>, NetworkError> {
-        assess(&self.model, frame, scratch, deviation)
+        let Some(confidence) = self.model.confidence() else { return Ok(None) };
+        let relative = self.metadata().relative_inputs;
+        assess(&confidence, relative, frame, scratch, deviation).map(Some)
     }
 }
 
 /// Assesses one frame as [`Decoder::assess_into`] does.
 ///
-/// Not inlined on a device, for the same reason as [`decode`].
+/// Not inlined on a device, for the same reason as [`decode_blob`].
 #[cfg_attr(cortex_m4f, inline(never))]
-fn assess(
-    model: &Model<'_>,
+pub fn assess(
+    confidence: &Confidence<'_>,
+    relative_inputs: bool,
     frame: Frame<'_>,
     scratch: &mut [f32],
     deviation: &mut [f32],
-) -> Result<Option<f32>, NetworkError> {
-    let Some(confidence) = model.confidence() else { return Ok(None) };
+) -> Result<f32, NetworkError> {
     check_length("frame", frame.readings_ohm, confidence.sizes().readings)?;
     let readings = frame.readings_ohm.iter().copied();
-    let novelty = if model.metadata().relative_inputs {
+    if relative_inputs {
         check_length("reciprocals", frame.reciprocals, confidence.sizes().readings)?;
         let ratios = readings.zip(frame.reciprocals).map(|(r, of)| relative(r, *of));
         confidence.assess(ratios, scratch, deviation)
     } else {
         confidence.assess(readings, scratch, deviation)
-    };
-    novelty.map(Some)
+    }
 }
 
-/// Decodes one frame as [`Decoder::decode_into`] does, with the networks of the rows.
+/// Networks of a model, with what each is given.
+#[derive(Debug, Clone, Copy)]
+pub enum Networks<'n, 'a, N> {
+    /// A network for each row.
+    OfRows(&'n [N]),
+    /// Networks that see whole frames, and what stands before each. Each gives the outputs that follow those of the network
+    /// before.
+    OfFrames(&'n [(Front<'a>, N)]),
+}
+
+/// What decodes frames, wherever its networks lie.
+#[derive(Debug, Clone, Copy)]
+pub struct FrameDecoder<'n, 'a, N> {
+    pub shape: ModelShape,
+    /// Whether inputs are relative to the baseline.
+    pub relative: bool,
+    pub networks: Networks<'n, 'a, N>,
+}
+
+/// Decodes one frame with the networks of a blob.
 ///
 /// Neither generic nor inlined on a device: it is thus compiled with this crate, for speed, while the rest of an
 /// image is compiled for size.
 #[cfg_attr(cortex_m4f, inline(never))]
 #[cfg_attr(not(cortex_m4f), inline(always))]
-fn decode(
-    model: &Model<'_>,
-    networks: &[RowNetwork<'_>],
-    of_frames: &[(Front<'_>, RowNetwork<'_>)],
+fn decode_blob(
+    decoder: &FrameDecoder<'_, '_, RowNetwork<'_>>,
     frame: Frame<'_>,
     scratch: &mut [f32],
     estimate: &mut Estimate<'_>,
 ) -> Result<bool, NetworkError> {
-    let ModelShape { rows, inputs, outputs } = model.shape();
-    // A model has a name for each, so that no product overflows.
-    check_length("frame", frame.readings_ohm, rows.wrapping_mul(inputs))?;
-    check_length("outputs of the estimate", estimate.outputs, rows.wrapping_mul(outputs))?;
-    check_length("status of the estimate", estimate.status, rows)?;
-    let relative = model.metadata().relative_inputs;
-    let of_frames = of_frames.get(..model.network_count()).unwrap_or_default();
-    // No more than that: what is left behind the parts below is readings relative to the baseline, to the last one.
-    let expected = if model.whole_frames() {
-        let fronts = of_frames.iter().map(|(front, _)| *front);
-        floats_of_fronts(fronts, frame.readings_ohm.len(), relative)
-    } else {
-        floats_of_rows(inputs, relative)
-    };
-    let too_short = NetworkError::Length { what: "scratch", expected, found: scratch.len() };
-    let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
-    if model.whole_frames() {
-        let frames = WholeFrames { networks: of_frames, relative, rows };
-        return Ok(frames.decode(frame, scratch, estimate));
+    decoder.decode(frame, scratch, estimate)
+}
+
+impl<N: Infer> FrameDecoder<'_, '_, N> {
+    /// Decodes one frame as [`Decoder::decode_into`] does.
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] if a slice does not have the model's length, or `scratch` is too short.
+    #[inline(always)]
+    pub fn decode(
+        &self,
+        frame: Frame<'_>,
+        scratch: &mut [f32],
+        estimate: &mut Estimate<'_>,
+    ) -> Result<bool, NetworkError> {
+        let ModelShape { rows, inputs, outputs } = self.shape;
+        // A model has a name for each, so that no product overflows.
+        check_length("frame", frame.readings_ohm, rows.wrapping_mul(inputs))?;
+        check_length("outputs of the estimate", estimate.outputs, rows.wrapping_mul(outputs))?;
+        check_length("status of the estimate", estimate.status, rows)?;
+        let expected = self.scratch_floats();
+        let too_short = NetworkError::Length { what: "scratch", expected, found: scratch.len() };
+        // No more than that: what is left behind the parts below is readings relative to the baseline, to the last one.
+        let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
+        match self.networks {
+            Networks::OfFrames(networks) => {
+                let frames = WholeFrames { networks, relative: self.relative, rows };
+                Ok(frames.decode(frame, scratch, estimate))
+            }
+            Networks::OfRows(networks) => {
+                let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
+                let rows = Rows { networks, inputs, outputs };
+                Ok(if self.relative {
+                    rows.decode::<true>(frame, [scaled, more], estimate)
+                } else {
+                    rows.decode::<false>(frame, [scaled, more], estimate)
+                })
+            }
+        }
     }
-    let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
-    let rows = Rows { networks, inputs, outputs };
-    Ok(if relative {
-        rows.decode::<true>(frame, [scaled, more], estimate)
-    } else {
-        rows.decode::<false>(frame, [scaled, more], estimate)
-    })
+}
+
+impl<N> FrameDecoder<'_, '_, N> {
+    /// Number of floats of working space that decoding needs.
+    #[inline(always)]
+    pub const fn scratch_floats(&self) -> usize {
+        let ModelShape { rows, inputs, .. } = self.shape;
+        let mut fronts = match self.networks {
+            Networks::OfRows(_) => return floats_of_rows(inputs, self.relative),
+            Networks::OfFrames(networks) => networks,
+        };
+        let mut most = 0;
+        while let [(front, _), rest @ ..] = fronts {
+            let floats = floats_of_front(front, inputs.saturating_mul(rows), self.relative);
+            if floats > most {
+                most = floats;
+            }
+            fronts = rest;
+        }
+        most
+    }
 }
 
 /// Networks that decode a frame row by row.
-struct Rows<'d, 'a> {
-    networks: &'d [RowNetwork<'a>],
+struct Rows<'d, N> {
+    networks: &'d [N],
     /// Number of readings a row.
     inputs: usize,
     /// Number of outputs a row.
     outputs: usize,
 }
 
-impl Rows<'_, '_> {
+impl<N: Infer> Rows<'_, N> {
     /// Decodes the rows of a frame. The scratch is room for scaled inputs, and for readings relative to the baseline if
     /// the networks take them (`RELATIVE`). Returns whether an input was clamped.
-    #[cfg_attr(cortex_m4f, inline(never))]
-    #[cfg_attr(not(cortex_m4f), inline(always))]
+    #[inline(always)]
     fn decode<const RELATIVE: bool>(
         &self,
         frame: Frame<'_>,
@@ -342,7 +383,8 @@ impl Rows<'_, '_> {
             } else {
                 readings
             };
-            any_clamped |= decode_inputs(network, given, scaled, outputs, status);
+            let scaled = &mut *scaled;
+            any_clamped |= network.infer_row(Row { inputs: given, scaled, outputs, status });
         }
         any_clamped
     }
@@ -369,35 +411,31 @@ pub fn scratch_floats(model: &Model<'_>) -> usize {
 fn decoding_floats(model: &Model<'_>) -> usize {
     let ModelShape { rows, inputs, .. } = model.shape();
     let relative = model.metadata().relative_inputs;
-    if model.whole_frames() {
-        floats_of_fronts(model.fronts(), inputs.saturating_mul(rows), relative)
-    } else {
-        floats_of_rows(inputs, relative)
+    if !model.whole_frames() {
+        return floats_of_rows(inputs, relative);
     }
+    let readings = inputs.saturating_mul(rows);
+    model.fronts().map(|front| floats_of_front(&front, readings, relative)).max().unwrap_or(0)
 }
 
 /// Number of floats for decoding rows: scaled inputs, and readings relative to the baseline.
-fn floats_of_rows(inputs: usize, relative: bool) -> usize {
+const fn floats_of_rows(inputs: usize, relative: bool) -> usize {
     inputs.saturating_add(if relative { inputs } else { 0 })
 }
 
-/// Number of floats for decoding whole frames of so many `readings` behind these fronts.
-fn floats_of_fronts<'a>(
-    fronts: impl Iterator<Item = Front<'a>>,
-    readings: usize,
-    relative: bool,
-) -> usize {
-    let of_front = |front: Front<'_>| {
-        let seen = match front.touch {
-            Some(touch) => touch.inputs(),
-            None if relative => readings,
-            None => 0,
-        };
-        let features = front.projection.map_or(0, |it| it.features());
-        // Scaled inputs, features, and shape and strength or readings relative to the baseline.
-        front.inputs(readings).saturating_add(features).saturating_add(seen)
+/// Number of floats for decoding whole frames of so many `readings` behind a `front`: scaled inputs, features, and shape
+/// and strength or readings relative to the baseline.
+const fn floats_of_front(front: &Front<'_>, readings: usize, relative: bool) -> usize {
+    let seen = match &front.touch {
+        Some(touch) => touch.inputs(),
+        None if relative => readings,
+        None => 0,
     };
-    fronts.map(of_front).max().unwrap_or(0)
+    let features = match &front.projection {
+        Some(projection) => projection.features(),
+        None => 0,
+    };
+    front.inputs(readings).saturating_add(features).saturating_add(seen)
 }
 
 fn check_length<T>(what: &'static str, slice: &[T], expected: usize) -> Result<(), NetworkError> {
@@ -442,15 +480,15 @@ impl<const ROWS: usize> Decoder<'_, ROWS> {
 }
 
 /// Networks that see whole frames, each of which gives some of the outputs.
-struct WholeFrames<'d, 'a> {
-    networks: &'d [(Front<'a>, RowNetwork<'a>)],
+struct WholeFrames<'d, 'a, N> {
+    networks: &'d [(Front<'a>, N)],
     /// Whether inputs are relative to the baseline.
     relative: bool,
     /// Number of rows, which share a status.
     rows: usize,
 }
 
-impl WholeFrames<'_, '_> {
+impl<N: Infer> WholeFrames<'_, '_, N> {
     /// Decodes a frame. Returns whether an input of a network was clamped, and the frame was decoded. Not inlined, because
     /// decoding by rows would need its stack too.
     #[inline(never)]
@@ -476,7 +514,7 @@ impl WholeFrames<'_, '_> {
     fn decode_part(
         &self,
         front: &Front<'_>,
-        network: &RowNetwork<'_>,
+        network: &N,
         frame: Frame<'_>,
         scratch: &mut [f32],
         outputs: &mut [f32],
@@ -512,13 +550,14 @@ impl WholeFrames<'_, '_> {
             None => inputs,
         };
         let mut status = RowStatus::Decoded;
-        let clamped = decode_inputs(network, inputs, scaled, outputs, &mut status);
+        let row = Row { inputs, scaled, outputs: &mut *outputs, status: &mut status };
+        let clamped = network.infer_row(row);
         // Features can overflow although no reading is missing.
         if status == RowStatus::MissingReading && self.is_complete(frame) {
             status = RowStatus::Overflow;
         }
         if let (Some(touch), RowStatus::Decoded) = (&front.touch, status) {
-            status = with_strength(touch, strength, network, outputs);
+            status = with_strength(touch, strength, network.can_overflow(), outputs);
         }
         (clamped, status)
     }
@@ -538,7 +577,7 @@ impl WholeFrames<'_, '_> {
 fn with_strength(
     touch: &Touch<'_>,
     strength: f32,
-    network: &RowNetwork<'_>,
+    can_overflow: bool,
     outputs: &mut [f32],
 ) -> RowStatus {
     match touch.kind() {
@@ -554,8 +593,7 @@ fn with_strength(
             cortex_m4::multiply(outputs, strength);
             #[cfg(not(cortex_m4f))]
             outputs.iter_mut().for_each(|output| *output *= strength);
-            // Those in `fixed16` stay finite: that is checked when a model is loaded.
-            if matches!(network, RowNetwork::F32(_)) && !all_finite(outputs) {
+            if can_overflow && !all_finite(outputs) {
                 outputs.fill(f32::NAN);
                 return RowStatus::Overflow;
             }
@@ -571,95 +609,5 @@ fn severity(status: RowStatus) -> u8 {
         RowStatus::NoTouch => 1,
         RowStatus::Overflow => 2,
         RowStatus::MissingReading => 3,
-    }
-}
-
-/// Infers the outputs of a row, or of all rows at once, and writes their `status`; outputs are NaN if they could not be
-/// decoded. Returns whether they were, and an input was clamped.
-#[inline(always)]
-fn decode_inputs(
-    network: &RowNetwork<'_>,
-    inputs: &[f32],
-    scaled: &mut [f32],
-    outputs: &mut [f32],
-    status: &mut RowStatus,
-) -> bool {
-    let clamped = match network {
-        RowNetwork::F32(section) => return decode_f32(section, inputs, scaled, outputs, status),
-        RowNetwork::Fixed16(network) => network.infer(inputs, scaled, outputs),
-    };
-    *status = RowStatus::Decoded;
-    clamped && !is_missing(inputs, outputs, status)
-}
-
-/// Infers the outputs of a network in `f32`, which has no assembly routine, as [`decode_inputs`] does.
-#[cfg_attr(cortex_m4f, inline(never))]
-#[cfg_attr(not(cortex_m4f), inline(always))]
-fn decode_f32(
-    section: &NetworkSection<'_>,
-    inputs: &[f32],
-    scaled: &mut [f32],
-    outputs: &mut [f32],
-    status: &mut RowStatus,
-) -> bool {
-    let shape = ModelShape { rows: 1, inputs: inputs.len(), outputs: outputs.len() };
-    let Ok(network) = section.float32(shape) else {
-        outputs.fill(f32::NAN);
-        *status = RowStatus::MissingReading;
-        return false;
-    };
-    let clamped = network.scale(inputs, scaled);
-    if clamped && is_missing(inputs, outputs, status) {
-        return false;
-    }
-    network.infer_scaled_shared(scaled, outputs);
-    // In `fixed16` outputs cannot overflow; that is checked when a model is loaded.
-    let finite = all_finite(outputs);
-    *status = if finite { RowStatus::Decoded } else { RowStatus::Overflow };
-    if !finite {
-        outputs.fill(f32::NAN);
-    }
-    finite && clamped
-}
-
-/// Whether one of `inputs` is missing; the outputs are NaN then, and their `status` says so.
-#[cold]
-#[inline(never)]
-fn is_missing(inputs: &[f32], outputs: &mut [f32], status: &mut RowStatus) -> bool {
-    let missing = !all_finite(inputs);
-    if missing {
-        outputs.fill(f32::NAN);
-        *status = RowStatus::MissingReading;
-    }
-    missing
-}
-
-/// Whether all `values` are finite, by the carry out of the exponent, without a branch for each.
-#[inline(never)]
-fn all_finite(values: &[f32]) -> bool {
-    const EXPONENT: u32 = 0x7F80_0000;
-    const LAST_PLACE: u32 = 0x0080_0000;
-    let add = |carry, value: &f32| carry | ((value.to_bits() & EXPONENT) + LAST_PLACE);
-    // In groups, because the compiler does not unroll the loop for a device.
-    let (groups, rest) = values.as_chunks::<6>();
-    let carry = groups.iter().flatten().fold(0, add);
-    rest.iter().fold(carry, add) >> 31 == 0
-}
-
-#[cfg(test)]
-mod tests {
-    use super::all_finite;
-
-    #[test]
-    fn numbers_that_are_not_finite_are_found_anywhere() {
-        let finite = [0.0, -0.0, 1.0, f32::MAX, f32::MIN, f32::MIN_POSITIVE, 1e-45, -1e-45];
-        assert!(all_finite(&finite));
-        for place in 0..finite.len() {
-            for other in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-                let mut values = finite;
-                values[place] = other;
-                assert!(!all_finite(&values), "{other} at {place}");
-            }
-        }
     }
 }

@@ -63,13 +63,22 @@ impl<'a> Fill<'a> {
         }
     }
 
+    /// Makes a fill of an array in a program, as [`new`](Self::new) takes it. Numbers are not looked at.
+    ///
+    /// # Panics
+    /// If the array has another length.
+    pub const fn of_array(readings: usize, factors: usize, array: &'a [f32]) -> Self {
+        assert!(array.len() == block_floats(readings, factors), "a fill of another length");
+        Self::of_checked(readings, factors, array)
+    }
+
     /// Makes a fill of a block that [`new`](Self::new) has checked before, or will.
-    pub(crate) fn of_checked(readings: usize, factors: usize, block: &'a [f32]) -> Self {
+    pub(crate) const fn of_checked(readings: usize, factors: usize, block: &'a [f32]) -> Self {
         Self { readings, factors, block }
     }
 
     /// Number of readings in a frame.
-    pub fn readings(&self) -> usize {
+    pub const fn readings(&self) -> usize {
         self.readings
     }
 
@@ -84,7 +93,7 @@ impl<'a> Fill<'a> {
     }
 
     /// Number of floats of working space that [`fill`](Self::fill) needs.
-    pub fn scratch_floats(&self) -> usize {
+    pub const fn scratch_floats(&self) -> usize {
         triangle(self.factors).saturating_add(self.factors)
     }
 

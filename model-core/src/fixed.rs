@@ -1,24 +1,28 @@
-//! A network in arrays of fixed size, for a program that never changes its model.
+//! Models in arrays of fixed size, for programs that never change their model.
 
-use crate::rbf::{Shape, float32};
+use crate::blob::ModelShape;
+use crate::confidence::Confidence;
+use crate::decoder::{Frame, FrameDecoder, Networks, assess};
+use crate::estimate::{Estimate, RowStatus};
+use crate::fill::Fill;
+use crate::infer::Infer;
 
-/// Network of `INPUTS` readings, `CENTRES` Gaussians and `OUTPUTS` outputs, whose parameters are arrays of its own.
+/// Model in arrays of fixed size: `ROWS` rows of `INPUTS` readings and `OUTPUTS` outputs.
 ///
-/// It needs no blob, no buffer and no error: its sizes are part of its type, and [`checked`](Self::checked) looks at its
-/// numbers when the program is compiled. `host-sim export model.bin --rust FILE.rs` writes a trained model as statics of
-/// this type, one for each row-wire.
+/// It needs no blob, no buffer and no error: its sizes are part of its type, and are checked when the program is compiled.
+/// `host-sim export model.bin --rust FILE.rs` writes any trained model as such a static. It gives what
+/// [`Decoder`](crate::Decoder) gives of the blob, to the bit.
 ///
-/// It infers what [`Decoder`](crate::Decoder) decodes from the blob, to the bit, for the number format
-/// [`f32`](crate::rbf::Format::F32). The assembly routine of the other format reads an array of words.
-///
-/// Each reading is scaled to [0, 1] on its training range, and clamped an eighth beyond it. With x the scaled readings, the
-/// outputs are A·x + Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b.
+/// `N` is the type of its networks: [`float32::Network`](crate::rbf::float32::Network), [`fixed16::Network`](crate::rbf::fixed16::Network), or
+/// [`rbf::Network`](crate::rbf::Network) if both are there. So a program has the code of its own number format alone.
+/// `SCRATCH` is the number of floats of working space, which lies on the stack.
 ///
 /// ```
-/// use taxel_core::Fixed;
+/// use taxel_core::rbf::{arrays::F32, float32::Network};
+/// use taxel_core::{Fixed, Networks, RowStatus};
 ///
 /// // Two readings (Ω), one centre, one output (mm).
-/// static NETWORK: Fixed<2, 1, 1> = Fixed {
+/// static NETWORK: F32<2, 1, 1> = F32 {
 ///     input_minimum: [50.0, 50.0],
 ///     input_per_span: [0.1, 0.1],
 ///     centres: [[0.5, 0.5]],
@@ -26,115 +30,153 @@ use crate::rbf::{Shape, float32};
 ///     output_weights: [[3.0]],
 ///     bias: [1.0],
 ///     affine: [[0.0], [0.0]],
+/// };
+/// static MODEL: Fixed<Network<'static>, 1, 2, 1, 2> = Fixed {
+///     networks: Networks::OfRows(&[NETWORK.network()]),
+///     relative_inputs: false,
+///     confidence: None,
+///     fill: None,
 /// }
 /// .checked();
 ///
 /// // At its centre the activation is 1, so the output is weight + bias.
-/// assert_eq!(NETWORK.infer(&[55.0, 55.0]), [4.0]);
+/// assert_eq!(MODEL.decode(&[[55.0, 55.0]], None).outputs, [[4.0]]);
 /// // A reading that could not be taken leaves nothing to tell.
-/// assert!(NETWORK.infer(&[55.0, f32::NAN])[0].is_nan());
+/// let decoded = MODEL.decode(&[[55.0, f32::NAN]], None);
+/// assert_eq!(decoded.status, [RowStatus::MissingReading]);
+/// assert!(decoded.outputs[0][0].is_nan());
 /// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fixed<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize> {
-    /// Smallest reading of each input in training, in the reading's unit.
-    pub input_minimum: [f32; INPUTS],
-    /// 1/(maximum − minimum) of each input; 0 for a channel that never changed.
-    pub input_per_span: [f32; INPUTS],
-    /// Centres c on scaled inputs.
-    pub centres: [[f32; INPUTS]; CENTRES],
-    /// Decay d = 1/(2σ²) of each centre, on scaled inputs.
-    pub decay: [f32; CENTRES],
-    /// Output weights ω of each centre, in the outputs' units.
-    pub output_weights: [[f32; OUTPUTS]; CENTRES],
-    /// Bias b in the outputs' units.
-    pub bias: [f32; OUTPUTS],
-    /// Affine tail A on scaled inputs, one array an input; zeros for a network without one.
-    pub affine: [[f32; OUTPUTS]; INPUTS],
+#[derive(Debug, Clone)]
+pub struct Fixed<
+    N: 'static,
+    const ROWS: usize,
+    const INPUTS: usize,
+    const OUTPUTS: usize,
+    const SCRATCH: usize,
+> {
+    /// Networks of the rows, or of whole frames.
+    pub networks: Networks<'static, 'static, N>,
+    /// Whether inputs are [relative](crate::relative) to the baseline.
+    pub relative_inputs: bool,
+    /// What tells deviations and novelty.
+    pub confidence: Option<Confidence<'static>>,
+    /// What fills missing readings.
+    pub fill: Option<Fill<'static>>,
 }
 
-impl<const INPUTS: usize, const CENTRES: usize, const OUTPUTS: usize>
-    Fixed<INPUTS, CENTRES, OUTPUTS>
+/// Estimate of a frame, in arrays of fixed size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decoded<const ROWS: usize, const OUTPUTS: usize> {
+    /// Outputs of each row, in the units of the model's output columns. NaN where a row could not be decoded.
+    pub outputs: [[f32; OUTPUTS]; ROWS],
+    /// How the decoding of each row ended.
+    pub status: [RowStatus; ROWS],
+    /// Whether an input of a decoded row was clamped ([`Decoder::decode_into`](crate::Decoder::decode_into)).
+    pub clamped: bool,
+}
+
+impl<N: Infer, const ROWS: usize, const INPUTS: usize, const OUTPUTS: usize, const SCRATCH: usize>
+    Fixed<N, ROWS, INPUTS, OUTPUTS, SCRATCH>
 {
-    /// Returns the network if its numbers are sound: all finite, decays positive, spans not negative. A network that was
-    /// not checked never panics either, but its outputs may mean nothing.
+    /// Returns the model if its sizes fit each other.
     ///
     /// # Panics
-    /// If a number is not sound. In a `static` or a `const` that is an error of the compiler:
+    /// If a size does not fit. In a `static` or a `const` that is an error of the compiler:
     ///
     /// ```compile_fail
-    /// # use taxel_core::Fixed;
-    /// static NETWORK: Fixed<1, 1, 1> = Fixed {
-    ///     decay: [-2.0], // "a decay is not a positive number"
-    ///     input_minimum: [50.0],
-    ///     input_per_span: [0.1],
-    ///     centres: [[0.5]],
-    ///     output_weights: [[3.0]],
-    ///     bias: [1.0],
-    ///     affine: [[0.0]],
+    /// use taxel_core::{Fixed, Networks, rbf::float32::Network};
+    /// static MODEL: Fixed<Network<'static>, 1, 2, 1, 2> = Fixed {
+    ///     networks: Networks::OfRows(&[]), // "a row has no network"
+    ///     relative_inputs: false,
+    ///     confidence: None,
+    ///     fill: None,
     /// }
     /// .checked();
-    /// # let _ = &NETWORK;
+    /// # let _ = &MODEL;
     /// ```
     #[must_use]
     pub const fn checked(self) -> Self {
-        assert!(all(&self.decay, Rule::Positive), "a decay is not a positive number");
-        assert!(all(&self.input_per_span, Rule::NotNegative), "a span is negative or not finite");
-        assert!(all(&self.input_minimum, Rule::Finite), "a minimum is not finite");
-        assert!(all(self.centres.as_flattened(), Rule::Finite), "a centre is not finite");
-        assert!(all(self.output_weights.as_flattened(), Rule::Finite), "a weight is not finite");
-        assert!(all(&self.bias, Rule::Finite), "a bias is not finite");
-        assert!(all(self.affine.as_flattened(), Rule::Finite), "the affine tail is not finite");
+        match self.networks {
+            Networks::OfRows(networks) => assert!(networks.len() == ROWS, "a row has no network"),
+            Networks::OfFrames(mut networks) => {
+                let mut outputs = 0;
+                while let [(front, _), rest @ ..] = networks {
+                    outputs += front.outputs;
+                    networks = rest;
+                }
+                assert!(outputs == ROWS * OUTPUTS, "networks give another number of outputs");
+            }
+        }
+        let mut scratch = self.decoder().scratch_floats();
+        if let Some(confidence) = &self.confidence {
+            let sizes = confidence.sizes();
+            assert!(sizes.readings == ROWS * INPUTS, "confidence in other readings");
+            assert!(sizes.outputs == ROWS * OUTPUTS, "confidence in other outputs");
+            scratch = larger(scratch, sizes.scratch_floats());
+        }
+        if let Some(fill) = &self.fill {
+            assert!(fill.readings() == ROWS * INPUTS, "a fill of other readings");
+            scratch = larger(scratch, fill.scratch_floats());
+        }
+        assert!(scratch <= SCRATCH, "too little working space");
         self
     }
 
-    /// Infers the outputs, in their units, from one `reading` an input, in its unit. All outputs are NaN if a reading is
-    /// not finite, or if an output would not be.
-    pub fn infer(&self, readings: &[f32; INPUTS]) -> [f32; OUTPUTS] {
-        const { assert!(INPUTS > 0 && CENTRES > 0 && OUTPUTS > 0, "a dimension is zero") };
-        let shape = Shape { inputs: INPUTS, centres: CENTRES, outputs: OUTPUTS };
-        let network = float32::Network::of_arrays(shape, self.parameters());
-        let (mut scaled, mut outputs) = ([0.0; INPUTS], [f32::NAN; OUTPUTS]);
-        if network.scale(readings, &mut scaled) && !all(readings, Rule::Finite) {
-            return outputs;
-        }
-        network.infer_scaled_shared(&scaled, &mut outputs);
-        if all(&outputs, Rule::Finite) { outputs } else { [f32::NAN; OUTPUTS] }
+    #[inline(always)]
+    const fn decoder(&self) -> FrameDecoder<'static, 'static, N> {
+        let shape = ModelShape { rows: ROWS, inputs: INPUTS, outputs: OUTPUTS };
+        FrameDecoder { shape, relative: self.relative_inputs, networks: self.networks }
     }
 
-    /// The parameters as slices, as [`float32::Network::try_new`] takes them.
-    pub const fn parameters(&self) -> float32::Parameters<'_> {
-        float32::Parameters {
-            input_minimum: &self.input_minimum,
-            input_per_span: &self.input_per_span,
-            centres: self.centres.as_flattened(),
-            decay: &self.decay,
-            output_weights: self.output_weights.as_flattened(),
-            bias: &self.bias,
-            affine: self.affine.as_flattened(),
-        }
+    /// Decodes a frame of readings in Ω; NaN is missing. A model with relative inputs takes
+    /// [reciprocals](crate::relative::reciprocal) of the baseline, too: without them all readings are missing.
+    #[inline(always)]
+    pub fn decode(
+        &self,
+        readings_ohm: &[[f32; INPUTS]; ROWS],
+        reciprocals: Option<&[[f32; INPUTS]; ROWS]>,
+    ) -> Decoded<ROWS, OUTPUTS> {
+        let mut outputs = [[f32::NAN; OUTPUTS]; ROWS];
+        let mut status = [RowStatus::MissingReading; ROWS];
+        let frame = frame(readings_ohm, reciprocals);
+        let mut estimate = Estimate { outputs: outputs.as_flattened_mut(), status: &mut status };
+        // No length can be wrong.
+        let clamped = self.decoder().decode(frame, &mut [0.0; SCRATCH], &mut estimate);
+        Decoded { outputs, status, clamped: clamped.unwrap_or_default() }
+    }
+
+    /// Writes the standard deviation of each output, and returns the novelty of a frame in nats, as
+    /// [`Decoder::assess_into`](crate::Decoder::assess_into) does; NaN if the model has no confidence.
+    #[inline(always)]
+    pub fn assess(
+        &self,
+        readings_ohm: &[[f32; INPUTS]; ROWS],
+        reciprocals: Option<&[[f32; INPUTS]; ROWS]>,
+        deviation: &mut [[f32; OUTPUTS]; ROWS],
+    ) -> f32 {
+        let Some(confidence) = &self.confidence else { return f32::NAN };
+        let (frame, deviation) = (frame(readings_ohm, reciprocals), deviation.as_flattened_mut());
+        let relative = self.relative_inputs;
+        let novelty = assess(confidence, relative, frame, &mut [0.0; SCRATCH], deviation);
+        novelty.unwrap_or(f32::NAN)
+    }
+
+    /// Replaces missing readings by those expected of the others, if the model can, and returns their number.
+    #[inline(always)]
+    pub fn fill(&self, readings_ohm: &mut [[f32; INPUTS]; ROWS]) -> usize {
+        let readings_ohm = readings_ohm.as_flattened_mut();
+        self.fill.map_or(0, |fill| fill.fill(readings_ohm, &mut [0.0; SCRATCH]))
     }
 }
 
-/// What a number must be.
-#[derive(Clone, Copy)]
-enum Rule {
-    Finite,
-    NotNegative,
-    Positive,
+const fn larger(a: usize, b: usize) -> usize {
+    if a > b { a } else { b }
 }
 
-/// Whether all `values` are finite and keep to the `rule`.
-const fn all(mut values: &[f32], rule: Rule) -> bool {
-    while let [value, rest @ ..] = values {
-        let kept = match rule {
-            Rule::Finite => true,
-            Rule::NotNegative => *value >= 0.0,
-            Rule::Positive => *value > 0.0,
-        };
-        if !(kept && value.is_finite()) {
-            return false;
-        }
-        values = rest;
-    }
-    true
+fn frame<'f, const ROWS: usize, const INPUTS: usize>(
+    readings_ohm: &'f [[f32; INPUTS]; ROWS],
+    reciprocals: Option<&'f [[f32; INPUTS]; ROWS]>,
+) -> Frame<'f> {
+    let reciprocals = reciprocals.map_or(&[][..], |it| it.as_flattened());
+    Frame { readings_ohm: readings_ohm.as_flattened(), reciprocals }
 }

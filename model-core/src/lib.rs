@@ -38,6 +38,7 @@ pub mod projection;
 pub mod confidence;
 pub mod fill;
 pub mod blob;
+mod infer;
 mod decoder;
 mod fixed;
 
@@ -46,9 +47,9 @@ pub use blob::Aligned;
 pub use blob::AlignedBytes;
 #[cfg(feature = "std")]
 pub use decoder::OwnedEstimate;
-pub use decoder::{Decoder, Frame, decoder_ram_bytes, scratch_floats};
+pub use decoder::{Decoder, Frame, Networks, decoder_ram_bytes, scratch_floats};
 pub use estimate::{Estimate, RowStatus};
-pub use fixed::Fixed;
+pub use fixed::{Decoded, Fixed};
 pub use frame::{ColumnWire, ColumnWires, RowWire, Wires};
 
 /// The README's example is a test.

@@ -37,6 +37,15 @@ impl<'a> Projection<'a> {
         Ok(Self { features, block })
     }
 
+    /// Makes a projection of an array in a program: f₀, then for each reading its part in each feature. Numbers are not
+    /// looked at.
+    pub const fn of_array<const FEATURES: usize, const LINES: usize>(
+        array: &'a [[f32; FEATURES]; LINES],
+    ) -> Self {
+        const { assert!(FEATURES > 0 && LINES > 1, "a projection without readings or features") };
+        Self { features: FEATURES, block: array.as_flattened() }
+    }
+
     /// Makes a projection of a block that [`new`](Self::new) has checked before.
     pub(crate) fn of_checked(features: usize, block: &'a [f32]) -> Self {
         Self { features, block }
@@ -48,7 +57,7 @@ impl<'a> Projection<'a> {
     }
 
     /// Number of features.
-    pub fn features(&self) -> usize {
+    pub const fn features(&self) -> usize {
         self.features
     }
 

@@ -18,6 +18,7 @@ mod parameters;
 mod format;
 pub mod float32;
 pub mod fixed16;
+pub mod arrays;
 
 pub use format::Format;
 pub(crate) use parameters::Cut;

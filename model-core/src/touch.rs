@@ -84,10 +84,27 @@ impl<'a> Touch<'a> {
         Ok(Self::of_checked(kind, block))
     }
 
+    /// Makes one of an array in a program, as [`new`](Self::new) takes it. Numbers are not looked at.
+    ///
+    /// # Panics
+    /// If it has no reading, or half of one.
+    pub const fn of_array(kind: Kind, array: &'a [f32]) -> Self {
+        assert!(
+            array.len() > HEAD && (array.len() - HEAD).is_multiple_of(2),
+            "a touch of half a reading"
+        );
+        Self::of_checked(kind, array)
+    }
+
     /// Makes one of a block that [`new`](Self::new) has checked before.
-    pub(crate) fn of_checked(kind: Kind, block: &'a [f32]) -> Self {
+    pub(crate) const fn of_checked(kind: Kind, block: &'a [f32]) -> Self {
         let mut touch = Self { kind, block, whole_changes: false };
-        let without_threshold = touch.pairs().iter().all(|[_, threshold]| *threshold == 0.0);
+        let mut without_threshold = true;
+        let mut pairs = touch.pairs();
+        while let [[_, threshold], rest @ ..] = pairs {
+            without_threshold &= *threshold == 0.0;
+            pairs = rest;
+        }
         touch.whole_changes = without_threshold && touch.strengths().side == 0.0;
         touch
     }
@@ -108,25 +125,30 @@ impl<'a> Touch<'a> {
     }
 
     /// Number of readings of a frame.
-    pub fn readings(&self) -> usize {
+    pub const fn readings(&self) -> usize {
         self.pairs().len()
     }
 
     /// Number of inputs that it makes of them: one more.
-    pub fn inputs(&self) -> usize {
+    pub const fn inputs(&self) -> usize {
         self.readings().saturating_add(1)
     }
 
     /// Its numbers before those of single readings.
-    pub fn strengths(&self) -> Strengths {
-        let head = self.block.first_chunk::<HEAD>().unwrap_or(&[f32::NAN; HEAD]);
-        let [floor, logarithm_floor, least, most, side] = *head;
+    pub const fn strengths(&self) -> Strengths {
+        let [floor, logarithm_floor, least, most, side] = match self.block.first_chunk::<HEAD>() {
+            Some(head) => *head,
+            None => [f32::NAN; HEAD],
+        };
         Strengths { floor, logarithm_floor, least, most, side }
     }
 
     /// Level at rest and threshold of one reading after the other.
-    fn pairs(&self) -> &'a [[f32; 2]] {
-        self.block.get(HEAD..).unwrap_or_default().as_chunks::<2>().0
+    const fn pairs(&self) -> &'a [[f32; 2]] {
+        match self.block.split_at_checked(HEAD) {
+            Some((_, pairs)) => pairs.as_chunks::<2>().0,
+            None => &[],
+        }
     }
 
     /// Writes shape and logarithm of the strength of a frame to `inputs`, and returns the strength S. `reciprocals` are

@@ -1,9 +1,10 @@
-//! Exported models in C: compiled in many ways, and compared with taxel-core bit for bit (docs/c.md).
+//! Exported models in C and Rust: compiled in many ways, and compared with taxel-core bit for bit (docs/c.md).
 
 mod models;
 mod frames;
 mod build;
 mod count;
+mod rust;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -38,6 +39,7 @@ pub fn run(options: &Options) -> Outcome {
     let is_there = |build: &&Build| build.needs().iter().all(|it| !missing.contains(it));
     let present: Vec<&Build> = builds.iter().filter(is_there).collect();
     let mut failed = compare(&present, &models, &folder, frames)?;
+    failed.extend(rust::compare(&models, &folder).err());
     if let Some(build) = present.iter().find(|build| build.needs().contains(&build::ARM)) {
         failed.extend(count::print(&models, &folder, build).err());
     }

@@ -80,8 +80,8 @@ enum Command {
     /// Count in QEMU what decoding costs a Cortex-M4, and compare with firmware/cycles.csv and with what `host-sim`
     /// predicts.
     Cycles(cycles::Options),
-    /// Export models as C, compile them with gcc, clang and arm-none-eabi-gcc in many ways, and compare all bits with
-    /// taxel-core's, on this machine and in QEMU. Then count what a frame costs a Cortex-M4F. docs/c.md has the tables.
+    /// Export models as C and Rust, compile them with gcc, clang, arm-none-eabi-gcc and rustc in many ways, and compare all bits
+    /// with taxel-core's, on this machine and in QEMU. Then count what a frame costs a Cortex-M4F. docs/c.md has the tables.
     C(c::Options),
     /// Build the wheel of the Python module, install it in an environment of its own, and run its tests (docs/python.md).
     Python,

@@ -130,7 +130,7 @@ fn print_line(image: &Budget<'_>, size: &Size) {
 
 /// Whether a mangled name is that of a network in the module `row4`, as `host-sim export` writes it.
 fn is_weights(name: &str) -> bool {
-    name.contains("4row45ROW_")
+    name.contains("4row49NETWORK_")
 }
 
 #[cfg(test)]
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn weights_are_the_networks_of_the_exported_module_alone() {
-        let names = ["_ZN7minimal4row45ROW_417h5d2cE", "_RNvNtCs1_7minimal4row45ROW_4"];
+        let names = ["_ZN7minimal4row49NETWORK_017h5d2cE", "_RNvNtCs1_7minimal4row49NETWORK_0"];
         assert!(names.into_iter().all(is_weights));
         assert!(!is_weights("_ZN4link7message6REPORT11ROW_AT_REST17h0E"));
     }

@@ -4,3 +4,15 @@ mod text;
 
 pub mod c;
 pub mod rust;
+
+use crate::cost::Design;
+use crate::packing::ModelBlob;
+
+/// Number of bytes that the numbers of the model in `blob` take, in any language.
+#[must_use]
+pub fn constant_bytes(blob: &ModelBlob) -> usize {
+    let model = blob.parse();
+    let floats = model.confidence().map_or(0, |it| it.block().len())
+        + model.fill().map_or(0, |it| it.block().len());
+    Design::new(blob).parameter_bytes() + 4 * floats
+}

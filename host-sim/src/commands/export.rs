@@ -1,6 +1,6 @@
 //! Command `export`: a model as source code.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::{Error, Result};
 use clap::{ArgGroup, Args};
@@ -8,7 +8,7 @@ use serde::Serialize;
 use taxel_data::output::write_bytes;
 use taxel_learn::ModelBlob;
 use taxel_learn::export::c::{self, Name};
-use taxel_learn::export::rust::{self, Unheld};
+use taxel_learn::export::{constant_bytes, rust};
 
 use super::{Common, print};
 
@@ -17,16 +17,13 @@ use super::{Common, print};
 /// In C, it is a library in a folder: one source file in C99 with its header, and what CMake, Arduino, PlatformIO and Zephyr
 /// need. It needs no heap and no other library, holds any model, and gives the bits that the blob gives (docs/c.md).
 ///
-/// In Rust, it is a file with one `static` of `taxel_core::Fixed` a row-wire, and a function `decode` from the readings of a
-/// frame to its outputs. Nothing in it can fail, and it gives the bits that the blob gives. A Fixed holds networks of single
-/// rows in the number format f32, and nothing else (docs/formats.md).
+/// In Rust, it is a file of arrays of fixed size, and functions that call `taxel_core` with them. Nothing in it is parsed, and
+/// nothing can fail. It holds any model, too, and gives the bits that the blob gives (docs/formats.md).
 #[derive(Args)]
 #[command(group(ArgGroup::new("language").required(true)))]
 #[command(after_help = "Examples:
   host-sim train press -o press.bin
   host-sim export press.bin --c lib/press --name press
-
-  host-sim train press --each-row --format f32 -o press.bin
   host-sim export press.bin --rust src/press.rs")]
 pub struct Arguments {
     /// Weight blob.
@@ -56,18 +53,17 @@ struct Summary {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let (written, weight_bytes, blob);
+    let read = || ModelBlob::read(&arguments.model);
+    let (written, blob);
     if let Some(file) = &arguments.rust {
         print::check_output(file, &[&arguments.model])
             .map_err(|cause| Error::Usage(format!("{cause} (--rust)")))?;
-        blob = ModelBlob::read(&arguments.model)?;
-        write_rust(arguments, file, &blob)?;
-        (written, weight_bytes) = (file, rust::weight_bytes(&blob.parse()));
+        (written, blob) = (file, read()?);
+        write_bytes(file, rust::source(&blob.parse()).as_bytes())?;
     } else {
         let folder = arguments.c.as_ref().ok_or_else(|| Error::Usage("--c or --rust".into()))?;
-        blob = ModelBlob::read(&arguments.model)?;
+        (written, blob) = (folder, read()?);
         c::write(&blob, &arguments.name, folder)?;
-        (written, weight_bytes) = (folder, c::constant_bytes(&blob));
     }
     let model = blob.parse();
     let summary = Summary {
@@ -75,7 +71,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         model_crc: format!("{:08x}", model.crc()),
         rows: model.shape().rows,
         networks: model.network_count(),
-        weight_bytes,
+        weight_bytes: constant_bytes(&blob),
         file: written.clone(),
     };
     print::result(common, &summary, || {
@@ -90,26 +86,4 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             summary.model_crc
         ))
     })
-}
-
-fn write_rust(arguments: &Arguments, file: &Path, blob: &ModelBlob) -> Result<()> {
-    let source = rust::source(&blob.parse()).map_err(|part| Error::Unfit {
-        path: arguments.model.clone(),
-        message: format!(
-            "a Fixed has no room for {part}: train it {} (docs/formats.md), or export it with --c",
-            remedy(part)
-        ),
-    })?;
-    Ok(write_bytes(file, source.as_bytes())?)
-}
-
-/// How to train a model without this part.
-fn remedy(part: Unheld) -> &'static str {
-    match part {
-        Unheld::Projection => "with --each-row",
-        Unheld::RelativeInputs => "without --relative-inputs",
-        Unheld::Confidence => "without --confidence",
-        Unheld::Fill => "without --fill",
-        Unheld::Format(_) => "with --format f32",
-    }
 }

@@ -23,7 +23,7 @@ fn exported(folder: &Folder, blob: &str) -> String {
 #[test]
 fn sources_in_testdata_are_those_that_the_command_writes() {
     let folder = Folder::new("export");
-    for name in ["hand-made", "row4"] {
+    for name in ["array-touch", "hand-made", "row4"] {
         let source = fs::read_to_string(in_testdata(&format!("{name}.rs"))).unwrap();
         assert!(
             exported(&folder, &format!("{name}.bin")) == source,
@@ -33,31 +33,21 @@ fn sources_in_testdata_are_those_that_the_command_writes() {
 }
 
 #[test]
-fn parts_that_a_fixed_has_no_room_for_are_refused_by_name_with_the_fix() {
-    let folder = Folder::new("export_refused");
+fn a_source_in_rust_has_functions_for_the_parts_of_its_model_alone() {
+    let folder = Folder::new("export_rust");
     folder.write("scene.toml", small_scene().replace("frames = 3000", "frames = 400"));
-    let train = ["train", "scene.toml", "--format", "f32", "-o", "m.bin"];
-    for (option, says) in [
-        ("--confidence", "has no room for a confidence: train it without --confidence"),
-        ("--fill", "has no room for a fill of missing readings: train it without --fill"),
-        (
-            "--relative-inputs",
-            "inputs relative to the baseline: train it without --relative-inputs",
-        ),
-        ("--features=18", "a projection of the whole array: train it with --each-row"),
-        ("--format=fixed16", "the number format fixed16: train it with --format f32"),
+    let functions = ["pub fn decode(", "pub fn assess(", "pub fn fill("];
+    for (options, has) in [
+        (&["--each-row", "--relative-inputs"][..], [true, false, false]),
+        (&["--confidence", "--fill"], [true; 3]),
     ] {
-        let given = match option.strip_prefix("--format") {
-            Some(_) => vec!["train", "scene.toml", option, "-o", "m.bin"],
-            None => [&train[..], &[option]].concat(),
-        };
-        folder.succeed(&given);
-        let said = folder.fail(&["export", "m.bin", "--rust", "m.rs"], 2);
-        assert!(said.contains("m.bin: ") && said.contains(says), "{option}: {said}");
-        assert!(!folder.path("m.rs").exists());
+        folder.succeed(&[&["train", "scene.toml", "-o", "m.bin"], options].concat());
+        let said = folder.succeed(&["export", "m.bin", "--rust", "m.rs"]);
+        assert!(said.contains("m.rs: 2 rows, "), "{said}");
+        let source = fs::read_to_string(folder.path("m.rs")).unwrap();
+        assert_eq!(functions.map(|function| source.contains(function)), has);
+        assert_eq!(source.contains("reciprocals: &[["), options.contains(&"--relative-inputs"));
     }
-    folder.succeed(&train);
-    assert!(folder.succeed(&["export", "m.bin", "--rust", "m.rs"]).contains("2 rows, 2 networks"));
     let said = folder.fail(&["export", "m.bin", "--rust", "m.bin"], 2);
     assert!(said.contains("m.bin") && said.contains("(--rust)"), "{said}");
     // A full disk is no fault of the option.

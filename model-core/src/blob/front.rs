@@ -26,8 +26,8 @@ impl<'a> Front<'a> {
     pub(crate) const NONE: Self = Self { outputs: 0, touch: None, projection: None };
 
     /// Number of inputs that a network behind it has, for so many `readings` of a frame.
-    pub fn inputs(&self, readings: usize) -> usize {
-        match (self.projection, self.touch) {
+    pub const fn inputs(&self, readings: usize) -> usize {
+        match (&self.projection, &self.touch) {
             (Some(projection), _) => projection.features(),
             (None, Some(touch)) => touch.inputs(),
             (None, None) => readings,

@@ -102,7 +102,7 @@ impl<'a> Network<'a> {
 
     /// Makes a network after checking the length alone, for a block whose values were checked before.
     #[inline(always)]
-    pub(crate) fn with_length_checked(
+    pub(crate) const fn with_length_checked(
         shape: Shape,
         affine: bool,
         block: &'a [u32],
@@ -114,20 +114,21 @@ impl<'a> Network<'a> {
         if inputs > MOST_INPUTS {
             return Err(NetworkError::TooManyInputs { most: MOST_INPUTS, found: inputs });
         }
-        check_length("block", block, Self::block_words(shape, affine))?;
-        Ok(Self(Block::new([inputs, centres, outputs], affine, block)))
+        match check_length("block", block, Self::block_words(shape, affine)) {
+            Ok(()) => Ok(Self(Block::new([inputs, centres, outputs], affine, block))),
+            Err(cause) => Err(cause),
+        }
     }
 
     /// Number of words in the block of a network of this shape, with an affine tail or without.
     #[inline]
-    pub fn block_words(shape: Shape, affine: bool) -> usize {
+    pub const fn block_words(shape: Shape, affine: bool) -> usize {
         let Shape { inputs, centres, outputs } = shape;
         let pairs = inputs.div_ceil(2);
         let affine = if affine { pairs.saturating_mul(outputs) } else { 0 };
         let centres = centres.div_ceil(CENTRES_AT_ONCE).saturating_mul(words_at_once(shape));
-        [inputs, inputs, 1, outputs, outputs, affine, centres]
-            .into_iter()
-            .fold(0, usize::saturating_add)
+        let scales = inputs.saturating_add(outputs).saturating_mul(2).saturating_add(1);
+        scales.saturating_add(affine).saturating_add(centres)
     }
 
     /// The network's numbers of inputs, centres and outputs.
@@ -329,7 +330,7 @@ impl<'a> Network<'a> {
 
 /// Number of words that a group of sixteen centres takes in [`Parameters::centres`].
 #[inline]
-pub fn words_at_once(shape: Shape) -> usize {
+pub const fn words_at_once(shape: Shape) -> usize {
     CENTRES_AT_ONCE
         .saturating_mul(1 + shape.inputs.div_ceil(2))
         .saturating_add((CENTRES_AT_ONCE / 2).saturating_mul(shape.outputs))

@@ -83,7 +83,7 @@ impl<'a> Cut<'a> {
     }
 }
 
-pub(super) fn check_length<T>(
+pub(super) const fn check_length<T>(
     what: &'static str,
     values: &[T],
     expected: usize,

@@ -85,11 +85,5 @@ pub fn write(blob: &ModelBlob, name: &Name, folder: &Path) -> Result<()> {
     write_folder(folder, &library(blob, name)?)
 }
 
-/// Number of bytes that the constants of the library of `blob` take.
-#[must_use]
-pub fn constant_bytes(blob: &ModelBlob) -> usize {
-    facts::constant_bytes(blob)
-}
-
 #[cfg(test)]
 mod tests;

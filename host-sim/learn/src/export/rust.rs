@@ -1,91 +1,66 @@
-//! Models as Rust source: statics of fixed size.
+//! Models as Rust source: statics of fixed size, and functions that decode with them.
 
-use std::fmt::{self, Write as _};
+use std::fmt;
 
-use taxel_core::blob::Model;
-use taxel_core::rbf::float32::{self, Parameters};
-use taxel_core::rbf::{Format, Network};
+use taxel_core::blob::{Front, Model, ModelShape};
+use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
+use taxel_core::scratch_floats;
 
 use super::text::{columns, rows_of};
 
-/// Part of a model that [`Fixed`](taxel_core::Fixed) has no room for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unheld {
-    /// Projection of all readings to one network's inputs.
-    Projection,
-    /// Inputs relative to the baseline.
-    RelativeInputs,
-    /// Deviations and novelty.
-    Confidence,
-    /// Filling of missing readings.
-    Fill,
-    /// Network in another number format than `f32`.
-    Format(Format),
-}
+/// Numbers on a line.
+const ON_A_LINE: usize = 8;
 
-impl fmt::Display for Unheld {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Projection => f.write_str("a projection of the whole array"),
-            Self::RelativeInputs => f.write_str("inputs relative to the baseline"),
-            Self::Confidence => f.write_str("a confidence"),
-            Self::Fill => f.write_str("a fill of missing readings"),
-            Self::Format(format) => write!(f, "networks in the number format {}", format.name()),
-        }
-    }
-}
+/// What stands before each item that holds numbers.
+const ATTRIBUTES: &str =
+    "#[rustfmt::skip]\n#[allow(clippy::approx_constant, clippy::unreadable_literal)]\n";
 
-/// Rust source of a `model`: a static [`Fixed`](taxel_core::Fixed) for each network, and a function `decode` from the
-/// readings of a frame to its outputs, with the bits that [`Decoder`](taxel_core::Decoder) gives.
+/// Part that a model does not have.
+const NONE: &str = "None";
+
+/// Rust source of a `model`: statics of all its numbers, a [`Fixed`](taxel_core::Fixed) of them, and functions that call it,
+/// with the bits that [`Decoder`](taxel_core::Decoder) gives.
 ///
-/// The static of a row-wire is called `ROW_1`, `ROW_2` and so on; rows that share a network share the first one's.
-/// Numbers are written with the digits that tell them from their neighbours in f32.
-///
-/// # Errors
-/// The first part of the model that a `Fixed` has no room for.
-pub fn source(model: &Model<'_>) -> Result<String, Unheld> {
-    let networks = held(model)?;
-    let mut source = header(model);
-    for (index, network) in networks.iter().enumerate() {
-        let rows: Vec<usize> = rows_of(model, index).collect();
-        write_static(&mut source, &rows, network);
-    }
-    write_decode(&mut source, model);
-    Ok(source)
-}
-
-/// Networks of `model`, if a `Fixed` has room for all of it.
-fn held<'a>(model: &Model<'a>) -> Result<Vec<float32::Network<'a>>, Unheld> {
-    let parts = [
-        (model.whole_frames(), Unheld::Projection),
-        (model.metadata().relative_inputs, Unheld::RelativeInputs),
-        (model.confidence().is_some(), Unheld::Confidence),
-        (model.fill().is_some(), Unheld::Fill),
-    ];
-    if let Some((_, part)) = parts.into_iter().find(|(present, _)| *present) {
-        return Err(part);
-    }
-    let in_f32 = |network: Network<'a>| match network {
-        Network::F32(network) => Ok(network),
-        Network::Fixed16(_) => Err(Unheld::Format(network.format())),
+/// There is a function `decode`; `assess` of a model with a confidence, and `fill` of one that fills missing readings. Numbers
+/// are written with the digits that tell them from their neighbours in f32.
+#[must_use]
+pub fn source(model: &Model<'_>) -> String {
+    let of_format = |format| model.networks().any(|network| network.format() == format);
+    let [is_f32, is_fixed16] = [Format::F32, Format::Fixed16].map(of_format);
+    let kind = match (is_f32, is_fixed16) {
+        (true, true) => "rbf::Network<'static>",
+        (true, false) => "rbf::float32::Network<'static>",
+        (false, _) => "rbf::fixed16::Network<'static>",
     };
-    model.networks().map(in_f32).collect()
+    let (mut source, mut networks) = (header(model), Vec::new());
+    for (index, network) in model.networks().enumerate() {
+        let doc = format!("Network of {}", decoded(model, index));
+        let name = format!("NETWORK_{index}");
+        let (kind, value) = match network {
+            Network::F32(inner) => float32(&inner),
+            Network::Fixed16(inner) => fixed16(&inner),
+        };
+        source += &item(&doc, &name, &kind, &value);
+        networks.push(match network {
+            Network::F32(_) if is_fixed16 => format!("rbf::Network::F32({name}.network())"),
+            Network::Fixed16(_) if is_f32 => format!("rbf::Network::Fixed16({name}.network())"),
+            _ => format!("{name}.network()"),
+        });
+    }
+    source + &fixed(model, &networks, kind) + &functions(model)
 }
 
 /// Comment on the model: its name and CRC, a call, and its columns.
 fn header(model: &Model<'_>) -> String {
-    let (shape, metadata) = (model.shape(), model.metadata());
-    let [inputs, outputs] =
-        [shape.inputs, shape.outputs].map(|count| format!("[[f32; {count}]; {}]", shape.rows));
+    let metadata = model.metadata();
     let columns =
         |names, units| columns(names, units, "//     ", |it| it.escape_debug().to_string());
     format!(
         "// Model {:?} in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: {:08x}.\n\
-         // To decode a frame, with this file as module `model`:\n\
-         //     let outputs: {outputs} = model::decode(&readings); // readings: {inputs}\n\
          // Readings, row after row, with their units:\n{}\
          // Outputs, row after row, with their units:\n{}\
-         use taxel_core::Fixed;\n",
+         #[allow(unused_imports)]\n\
+         use taxel_core::{{blob, confidence, fill, projection, rbf, rbf::arrays, touch}};\n",
         metadata.name,
         model.crc(),
         columns(metadata.input_names, metadata.input_units),
@@ -93,79 +68,203 @@ fn header(model: &Model<'_>) -> String {
     )
 }
 
-/// Adds the static of a `network` that decodes these `rows`; nothing if it decodes none.
-fn write_static(source: &mut String, rows: &[usize], network: &float32::Network<'_>) {
-    let Some(first) = rows.first() else { return };
-    let (shape, p) = (network.shape(), network.parameters());
-    let Parameters { input_minimum, input_per_span, centres, decay, output_weights, bias, .. } = *p;
-    let affine = match p.affine {
-        [] => &vec![0.0; shape.inputs * shape.outputs][..],
-        affine => affine,
-    };
-    let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();
-    let plural = if rows.len() == 1 { "" } else { "s" };
-    // Writing to a string cannot fail.
-    let _ = write!(
-        source,
-        "\n/// Network of row{plural} {}.\n\
-         #[rustfmt::skip]\n\
-         #[allow(clippy::approx_constant, clippy::unreadable_literal)]\n\
-         pub static ROW_{first}: Fixed<{}, {}, {}> = Fixed {{\n\
-         \x20   input_minimum: {input_minimum:?},\n\
-         \x20   input_per_span: {input_per_span:?},\n\
-         \x20   centres: [\n{}    ],\n\
-         \x20   decay: {decay:?},\n\
-         \x20   output_weights: [\n{}    ],\n\
-         \x20   bias: {bias:?},\n\
-         \x20   affine: [\n{}    ],\n\
-         }}\n\
-         .checked();\n",
-        rows.join(", "),
-        shape.inputs,
-        shape.centres,
-        shape.outputs,
-        lines(centres, shape.inputs),
-        lines(output_weights, shape.outputs),
-        lines(affine, shape.outputs),
+/// What the network of this `index` decodes.
+fn decoded(model: &Model<'_>, index: usize) -> String {
+    if model.whole_frames() {
+        return "whole frames".into();
+    }
+    let rows: Vec<String> = rows_of(model, index).map(|row| row.to_string()).collect();
+    format!("row{} {}", if rows.len() == 1 { "" } else { "s" }, rows.join(", "))
+}
+
+/// Type and value of a network in `f32`.
+fn float32(network: &float32::Network<'_>) -> (String, String) {
+    let (Shape { inputs, centres, outputs }, p) = (network.shape(), network.parameters());
+    let tail = p.affine.len() / outputs;
+    let value = format!(
+        "arrays::F32 {{\n\
+         \x20   input_minimum: {:?},\n\
+         \x20   input_per_span: {:?},\n\
+         \x20   centres: {},\n\
+         \x20   decay: {:?},\n\
+         \x20   output_weights: {},\n\
+         \x20   bias: {:?},\n\
+         \x20   affine: {},\n\
+         }}",
+        p.input_minimum,
+        p.input_per_span,
+        arrays(p.centres.chunks_exact(inputs)),
+        p.decay,
+        arrays(p.output_weights.chunks_exact(outputs)),
+        p.bias,
+        arrays(p.affine.chunks_exact(outputs)),
     );
+    (format!("arrays::F32<{inputs}, {centres}, {outputs}, {tail}>"), value)
 }
 
-/// Arrays of `length` numbers, one a line.
-fn lines(values: &[f32], length: usize) -> String {
-    let lines = values.chunks_exact(length).map(|line| format!("        {line:?},\n"));
-    lines.collect::<Vec<_>>().concat()
-}
-
-fn write_decode(source: &mut String, model: &Model<'_>) {
-    let shape = model.shape();
-    let network_of = |row| {
-        let index = model.network_of_row(row).unwrap_or_default();
-        rows_of(model, index).next().unwrap_or_default()
+/// Type and value of a network in `fixed16`.
+fn fixed16(network: &fixed16::Network<'_>) -> (String, String) {
+    let (Shape { inputs, centres, outputs }, p) = (network.shape(), network.parameters());
+    let (pairs, groups) = (inputs.div_ceil(2), centres.div_ceil(fixed16::CENTRES_AT_ONCE));
+    let tail = p.affine.len() / pairs;
+    let weights = fixed16::CENTRES_AT_ONCE / 2;
+    let group = |group: &[u32]| {
+        let (exponents, of_outputs) = group.split_at(fixed16::CENTRES_AT_ONCE * (1 + pairs));
+        let exponent = |line: &[u32]| {
+            format!(
+                "        arrays::Exponent {{ b: {}, a: {:?} }},\n",
+                line[0],
+                in_pairs(&line[1..])
+            )
+        };
+        let exponents: String = exponents.chunks_exact(1 + pairs).map(exponent).collect();
+        let of_outputs = arrays(of_outputs.chunks_exact(weights).map(in_pairs));
+        format!(
+            "        arrays::Group {{ exponents: [\n{exponents}        ], weights: {of_outputs} }},\n"
+        )
     };
-    let rows: Vec<String> = (1..=shape.rows).map(|row| format!("row_{row}")).collect();
-    let calls = rows.iter().enumerate();
-    let calls = calls.map(|(row, name)| format!("ROW_{}.infer({name})", network_of(row)));
-    let _ = write!(
-        source,
-        "\n/// Outputs of a frame from its readings, row after row. A row with a reading that is not finite has NaN.\n\
-         #[rustfmt::skip]\n\
+    let of_groups: String = p.centres.chunks_exact(p.centres.len() / groups).map(group).collect();
+    let value = format!(
+        "arrays::Fixed16 {{\n\
+         \x20   input_midpoint: {:?},\n\
+         \x20   input_per_unit: {:?},\n\
+         \x20   decay: {},\n\
+         \x20   bias: {:?},\n\
+         \x20   output_scale: {:?},\n\
+         \x20   affine: {},\n\
+         \x20   groups: [\n{of_groups}    ],\n\
+         }}",
+        p.input_midpoint,
+        p.input_per_unit,
+        p.decay,
+        p.bias,
+        p.output_scale,
+        arrays(p.affine.chunks_exact(pairs).map(in_pairs)),
+    );
+    let sizes = format!("{inputs}, {centres}, {outputs}, {pairs}, {groups}, {tail}");
+    (format!("arrays::Fixed16<{sizes}>"), value)
+}
+
+/// The two `i16` of each word, the low half first.
+fn in_pairs(words: &[u32]) -> Vec<[i16; 2]> {
+    words.iter().map(|word| [*word as i16, (*word >> 16) as i16]).collect()
+}
+
+/// Statics of what stands before the network of this `index`, which sees whole frames, and the expression of it.
+fn front(index: usize, front: &Front<'_>) -> (String, String) {
+    let (mut items, [mut touch, mut projection]) = (String::new(), [NONE, NONE].map(String::from));
+    if let Some(it) = front.touch {
+        let (name, kind) = (format!("TOUCH_{index}"), it.kind());
+        let doc = "Shape and strength of a touch: `Strengths`, then level at rest and threshold of each reading";
+        items += &flat(doc, &name, it.block());
+        touch = format!("Some(touch::Touch::of_array(touch::Kind::{kind:?}, &{name}))");
+    }
+    if let Some(it) = front.projection {
+        let (name, features) = (format!("PROJECTION_{index}"), it.features());
+        let kind = format!("[[f32; {features}]; {}]", it.block().len() / features);
+        let doc = "Features: what they begin with, then what a unit of each number adds to them";
+        items += &item(doc, &name, &kind, &arrays(it.block().chunks_exact(features)));
+        projection = format!("Some(projection::Projection::of_array(&{name}))");
+    }
+    let outputs = front.outputs;
+    let front = "blob::Front";
+    (items, format!("{front} {{ outputs: {outputs}, touch: {touch}, projection: {projection} }}"))
+}
+
+/// Static of the whole model, whose networks are these expressions of this `kind`, and statics of its other parts.
+fn fixed(model: &Model<'_>, networks: &[String], kind: &str) -> String {
+    let (mut items, [mut confidence, mut fill]) = (String::new(), [NONE, NONE].map(String::from));
+    if let Some(it) = model.confidence() {
+        items += &flat("Block of `Confidence::new`", "CONFIDENCE", it.block());
+        let sizes = format!("confidence::{:?}", it.sizes());
+        confidence = format!("Some(confidence::Confidence::of_array({sizes}, &CONFIDENCE))");
+    }
+    if let Some(it) = model.fill() {
+        items += &flat("Block of `Fill::new`", "FILL", it.block());
+        let sizes = format!("{}, {}", it.readings(), it.factors());
+        fill = format!("Some(fill::Fill::of_array({sizes}, &FILL))");
+    }
+    let mut listed = Vec::new();
+    for (index, of_frames) in model.fronts().enumerate() {
+        let (of_front, front) = front(index, &of_frames);
+        items += &of_front;
+        listed.push(format!("        ({front}, {}),\n", networks[index]));
+    }
+    let is_array = model.whole_frames();
+    let of_rows = (0..model.shape().rows).filter(|_| !is_array);
+    for network in of_rows.filter_map(|row| model.network_of_row(row)) {
+        listed.push(format!("        {},\n", networks[network]));
+    }
+    let ModelShape { rows, inputs, outputs } = model.shape();
+    let (relative, scratch) = (model.metadata().relative_inputs, scratch_floats(model));
+    let value = format!(
+        "taxel_core::Fixed {{\n\
+         \x20   networks: taxel_core::Networks::{}(&[\n{}    ]),\n\
+         \x20   relative_inputs: {relative},\n\
+         \x20   confidence: {confidence},\n\
+         \x20   fill: {fill},\n\
+         }}\n.checked()",
+        if is_array { "OfFrames" } else { "OfRows" },
+        listed.concat(),
+    );
+    let kind = format!("taxel_core::Fixed<{kind}, {rows}, {inputs}, {outputs}, {scratch}>");
+    items + &item("The model", "MODEL", &kind, &value)
+}
+
+/// Functions that call the model.
+fn functions(model: &Model<'_>) -> String {
+    let ModelShape { rows, inputs, outputs } = model.shape();
+    let readings = format!("[[f32; {inputs}]; {rows}]");
+    let (more, given, doc) = if model.metadata().relative_inputs {
+        let doc = " `reciprocals` are those of the baseline (`taxel_core::relative::reciprocal`).";
+        (format!(", reciprocals: &{readings}"), "Some(reciprocals)", doc)
+    } else {
+        (String::new(), "None", "")
+    };
+    let decode = format!(
+        "\n/// Decodes a frame of readings, row after row. One that is not finite is missing.{doc}\n\
          #[must_use]\n\
-         pub fn decode(readings: &[[f32; {}]; {}]) -> [[f32; {}]; {}] {{\n\
-         \x20   let [{}] = readings;\n\
-         \x20   [{}]\n\
-         }}\n",
-        shape.inputs,
-        shape.rows,
-        shape.outputs,
-        shape.rows,
-        rows.join(", "),
-        calls.collect::<Vec<_>>().join(", "),
+         pub fn decode(readings: &{readings}{more}) -> taxel_core::Decoded<{rows}, {outputs}> {{\n\
+         \x20   MODEL.decode(readings, {given})\n\
+         }}\n"
     );
+    let assess = model.confidence().map(|_| {
+        format!(
+            "\n/// Writes the deviation of each output of a frame, and returns its novelty in nats: above 0, it is unlike the\n\
+             /// frames of training.{doc}\n\
+             #[allow(dead_code)]\n\
+             pub fn assess(readings: &{readings}{more}, deviation: &mut [[f32; {outputs}]; {rows}]) -> f32 {{\n\
+             \x20   MODEL.assess(readings, {given}, deviation)\n\
+             }}\n"
+        )
+    });
+    let fill = model.fill().map(|_| {
+        format!(
+            "\n/// Replaces missing readings by those expected of the others, and returns their number.\n\
+             #[allow(dead_code)]\n\
+             pub fn fill(readings: &mut {readings}) -> usize {{\n\
+             \x20   MODEL.fill(readings)\n\
+             }}\n"
+        )
+    });
+    decode + &assess.unwrap_or_default() + &fill.unwrap_or_default()
 }
 
-/// Number of bytes that the statics of `model`'s networks take.
-#[must_use]
-pub fn weight_bytes(model: &Model<'_>) -> usize {
-    let floats = |network: Network<'_>| float32::Network::block_words(network.shape(), true);
-    4 * model.networks().map(floats).sum::<usize>()
+/// Static array of floats.
+fn flat(doc: &str, name: &str, values: &[f32]) -> String {
+    let floats: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
+    let lines = floats.chunks(ON_A_LINE).map(|line| format!("    {},\n", line.join(", ")));
+    let value = format!("[\n{}]", lines.collect::<Vec<_>>().concat());
+    item(doc, name, &format!("[f32; {}]", values.len()), &value)
+}
+
+/// An array of arrays, each on a line.
+fn arrays(lines: impl Iterator<Item = impl fmt::Debug>) -> String {
+    let lines = lines.map(|line| format!("        {line:?},\n"));
+    format!("[\n{}    ]", lines.collect::<Vec<_>>().concat())
+}
+
+/// A static.
+fn item(doc: &str, name: &str, kind: &str, value: &str) -> String {
+    format!("\n/// {doc}.\n{ATTRIBUTES}pub static {name}: {kind} = {value};\n")
 }

@@ -6,6 +6,7 @@ use taxel_core::{RowStatus, scratch_floats};
 use super::numbers::comment;
 use super::template::Values;
 use crate::cost::{Cost, Design};
+use crate::export::constant_bytes;
 use crate::export::text::columns;
 use crate::packing::ModelBlob;
 
@@ -15,14 +16,6 @@ pub struct Facts<'b> {
     constant_bytes: usize,
     /// What a frame costs Taxel's own firmware.
     cost: Cost,
-}
-
-/// Number of bytes of a model's numbers.
-pub fn constant_bytes(blob: &ModelBlob) -> usize {
-    let model = blob.parse();
-    let floats = model.confidence().map_or(0, |it| it.block().len())
-        + model.fill().map_or(0, |it| it.block().len());
-    Design::new(blob).parameter_bytes() + 4 * floats
 }
 
 impl<'b> Facts<'b> {
