@@ -195,7 +195,12 @@ impl<'d> Judge<'d> {
             for spread in spreads {
                 layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
                 let Some(settings) = self.refinement else {
-                    let models = train::fit(&layers, options, penalties, &Silent)?;
+                    let with = |penalty: &Option<f64>| {
+                        let options = Options { penalty: *penalty, ..*options };
+                        Ok(start.fitting(&layers, &options, None)?.penalty)
+                    };
+                    let penalties = penalties.iter().map(with).collect::<Result<Vec<_>>>()?;
+                    let models = train::fit(&layers, options, &penalties, &Silent)?;
                     add(layers.projection.as_ref(), models);
                     continue;
                 };
@@ -204,7 +209,7 @@ impl<'d> Judge<'d> {
                     let options = Options { penalty: *penalty, ..*options };
                     let examples = Examples::Folds(&inner);
                     let layers = start.refine(&layers, &options, settings, examples, &Silent)?;
-                    let options = settings.options(&options);
+                    let options = start.fitting(&layers, &options, Some(settings))?;
                     let models = train::fit(&layers, &options, &[options.penalty], &Silent)?;
                     add(layers.projection.as_ref(), models);
                 }

@@ -6,9 +6,11 @@
 
 use std::borrow::Cow;
 
+use nalgebra::DMatrix;
 use serde::Deserialize;
 use taxel_core::blob::Front;
 use taxel_core::rbf::Format;
+use taxel_core::touch::Kind;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
 use crate::error::Result;
@@ -276,7 +278,7 @@ impl Samples<'_> {
         penalties: &[Option<f64>],
     ) -> Result<Vec<FittedNetwork>> {
         let with = |penalty: &Option<f64>| Options { penalty: *penalty, ..*options };
-        let ridge = |penalty| Ridge::new(layer, self.inputs(), &with(penalty));
+        let ridge = |penalty| Ridge::new(self.inputs(), &with(penalty));
         let ridges: Vec<Ridge> = penalties.iter().map(ridge).collect();
         format::fit(self, layer, options, &ridges)
     }
@@ -344,11 +346,11 @@ pub fn train_refined(
     resolution::check(dataset)?;
     let mut trained = Trained::default();
     for start in Start::all(dataset, options)? {
-        let (mut layers, mut options) = (start.layers(options), *options);
+        let mut layers = start.layers(options);
         if let Some((settings, examples)) = refinement {
-            layers = start.refine(&layers, &options, settings, examples, progress)?;
-            options = settings.options(&options);
+            layers = start.refine(&layers, options, settings, examples, progress)?;
         }
+        let options = start.fitting(&layers, options, refinement.map(|(settings, _)| settings))?;
         for networks in fit(&layers, &options, &[options.penalty], progress)? {
             trained.add(&start, layers.projection.as_ref(), networks);
         }
@@ -367,6 +369,8 @@ pub struct Start<'d> {
     kept: Vec<usize>,
     /// Parameters of the projection by regression.
     pub projection: Option<Vec<f32>>,
+    /// Features of the frames that are places, as maps tell them that were fitted to others.
+    held_out: Option<DMatrix<f64>>,
     /// Whether networks see whole frames.
     whole_frames: bool,
 }
@@ -387,9 +391,14 @@ impl<'d> Start<'d> {
         let are_many = groups.len() > 1;
         let start = |group: Group| {
             let (frames, kept) = group.frames(dataset);
+            let mut held_out = None;
             let projection = match &group.touch {
                 _ if !options.projects(&frames) => None,
-                Some(touch) => Some(touch::projection(touch, &frames, dataset, options.features)?),
+                Some(touch) => {
+                    let fitted = touch::projection(touch, &frames, dataset, options.features)?;
+                    held_out = Some(fitted.held_out);
+                    Some(fitted.parameters)
+                }
                 None => {
                     // Some of the outputs have fewer products than all of them.
                     let possible = |wanted| projection::features_at_most(&frames, wanted);
@@ -397,7 +406,7 @@ impl<'d> Start<'d> {
                 }
             };
             let whole_frames = are_many || group.touch.is_some() || projection.is_some();
-            Ok(Self { group, frames, kept, projection, whole_frames })
+            Ok(Self { group, frames, kept, projection, held_out, whole_frames })
         };
         groups.into_iter().map(start).collect()
     }
@@ -417,6 +426,37 @@ impl<'d> Start<'d> {
         };
         let hidden = parallel::map(seen.rows, &of_row);
         Layers { projection: self.projection.clone(), seen, hidden }
+    }
+
+    /// Options for fitting weights to these `layers`: with the usual penalty, if `options` give none. That of places is
+    /// chosen on frames that are held out.
+    ///
+    /// # Errors
+    /// As [`train`].
+    pub fn fitting(
+        &self,
+        layers: &Layers<'_>,
+        options: &Options,
+        refinement: Option<&Refinement>,
+    ) -> Result<Options> {
+        let penalty = match (options.penalty, &self.group.touch) {
+            (None, Some(touch)) if touch.kind() == Kind::Place => {
+                let mut seen =
+                    projection::seen(self.projection.as_deref(), &self.frames).into_owned();
+                // A map tells frames that it was fitted to better than others.
+                if let Some(told) = self.held_out.as_ref().filter(|it| it.nrows() == seen.frames())
+                {
+                    let lines = seen.inputs.values.chunks_exact_mut(seen.inputs.names.len());
+                    let places = lines.zip(told.row_iter());
+                    places.for_each(|(line, told)| {
+                        line.iter_mut().zip(&told).for_each(|(to, from)| *to = *from)
+                    });
+                }
+                Some(touch::best_penalty(&seen, &layers.hidden[0], options)?)
+            }
+            (given, _) => given.or(refinement.map(|settings| settings.ridge)),
+        };
+        Ok(Options { penalty, ..*options })
     }
 
     /// What stands before its network with this `projection`, if it sees whole frames.

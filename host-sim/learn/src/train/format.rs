@@ -210,8 +210,6 @@ impl<'s> Fit<'s> {
 
     fn factor(&self, task: &Task<'_>, decomposed: &OnceCell<Decomposed>, ridge: Ridge) -> Factor {
         let frames = self.frames[task.columns[0]];
-        let (initial_covariance, of_tail) =
-            (ridge.initial_covariance(frames), ridge.of_tail(frames));
         let weights = task.table.weights.as_deref();
         let (targets, outputs) = (&*weighed(weights, &task.targets), task.columns.len());
         let design = self.held.design(&task.table);
@@ -222,15 +220,10 @@ impl<'s> Fit<'s> {
         match self.solver {
             Solver::Qr => decomposed
                 .get_or_init(|| Decomposed::new(design, targets, outputs))
-                .factor_with(|regressor| {
-                    // Activations come first, then the inputs of the tail, then 1.
-                    let last = design.regressors() - 1;
-                    let is_tail = (last.saturating_sub(self.table.inputs.names.len())..last)
-                        .contains(&regressor);
-                    let root = 1.0 / initial_covariance.sqrt();
-                    if is_tail && of_tail > 0.0 { root.hypot(of_tail.sqrt()) } else { root }
-                }),
-            Solver::Rls => Factor::by_recursion(design, targets, outputs, initial_covariance),
+                .factor_with(|it| ridge.root(frames, it, design.regressors())),
+            Solver::Rls => {
+                Factor::by_recursion(design, targets, outputs, ridge.initial_covariance(frames))
+            }
         }
     }
 

@@ -78,11 +78,6 @@ impl Default for Refinement {
 }
 
 impl Refinement {
-    /// Options for fitting weights to refined layers: with this penalty, if `options` give none.
-    pub fn options(&self, options: &Options) -> Options {
-        Options { penalty: Some(options.penalty.unwrap_or(self.ridge)), ..*options }
-    }
-
     /// Number of pieces in which the samples of a step are held, each with the square of all weights.
     pub(super) fn pieces(&self, frames: usize, centres: usize, examples: Examples<'_>) -> usize {
         match examples {

@@ -9,6 +9,9 @@ use super::{Options, kmeans};
 const FEW_FRAMES: usize = 50;
 /// Least error of a reading over its range, whatever few frames say.
 const LEAST_ERROR: f64 = 1e-3;
+/// Most penalty on the squared weights of the affine tail, for each frame. A larger one is for the Gaussians alone: a
+/// plane fits no noise.
+const MOST_OF_TAIL: f64 = 1e-7;
 
 /// Hidden layer of a network: its Gaussians.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,15 +101,14 @@ impl CentredScale {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ridge {
     options: Options,
-    /// Number of activations, inputs and 1.
-    regressors: usize,
+    /// Number of inputs.
+    inputs: usize,
 }
 
 impl Ridge {
-    /// Penalties that `options` ask for, of a network with this `layer`.
-    pub fn new(layer: &HiddenLayer, inputs: usize, options: &Options) -> Self {
-        let regressors = layer.centres.len() / inputs + inputs + 1;
-        Self { options: *options, regressors }
+    /// Penalties that `options` ask for, of a network with so many `inputs`.
+    pub fn new(inputs: usize, options: &Options) -> Self {
+        Self { options: *options, inputs }
     }
 
     /// One over the penalty on every weight: the initial covariance δ of a recursion.
@@ -114,16 +116,27 @@ impl Ridge {
         self.options.initial_covariance(frames)
     }
 
-    /// What is added to the penalty on the weights of the affine tail. A recursion has none.
+    /// Root of the penalty on the weights of each regressor, of which there are so many: those of activations, of the
+    /// inputs in the affine tail, and of 1. A recursion has one for all.
     ///
     /// Where none is chosen and frames are few, the affine tail is fitted as if every reading had an error of a
     /// [thousandth of its range](LEAST_ERROR). Readings of neighbouring wires hardly differ in some directions; a few
     /// frames without noise are fitted best by large weights there, which ruin all others. With many frames, or noise,
     /// it makes no difference.
-    pub fn of_tail(&self, frames: usize) -> f64 {
-        let is_few = frames < FEW_FRAMES * self.regressors;
-        let is_usual = self.options.affine_tail && self.options.penalty.is_none();
-        if is_few && is_usual { frames as f64 * LEAST_ERROR.powi(2) } else { 0.0 }
+    pub fn root(&self, frames: usize, regressor: usize, regressors: usize) -> f64 {
+        let root = 1.0 / self.initial_covariance(frames).sqrt();
+        let last = regressors - 1;
+        let inputs = if self.options.affine_tail { self.inputs } else { 0 };
+        let is_few = frames < FEW_FRAMES * regressors;
+        match self.options.penalty {
+            Some(penalty) if penalty > MOST_OF_TAIL && regressor >= last - inputs => {
+                (MOST_OF_TAIL * frames as f64).sqrt()
+            }
+            None if is_few && (last - inputs..last).contains(&regressor) => {
+                root.hypot((frames as f64 * LEAST_ERROR.powi(2)).sqrt())
+            }
+            _ => root,
+        }
     }
 }
 

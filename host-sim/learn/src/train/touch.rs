@@ -18,8 +18,10 @@ use super::FreshFrames;
 use crate::parallel;
 
 mod features;
+mod penalty;
 
 pub(super) use features::projection;
+pub(super) use penalty::best as best_penalty;
 
 /// Frames that a thread takes at a time.
 const FRAMES_AT_ONCE: usize = 256;
@@ -208,8 +210,8 @@ impl FittedTouch {
         };
         let smallest = f64::from(f32::MIN_POSITIVE) * 1e9;
         let either = made([smallest; 4], 0.0);
-        let (changes, _) = inputs(either.view(), &dataset.inputs.values);
-        let side = one_side(&changes, level.len());
+        let (shapes, strengths) = inputs(either.view(), &dataset.inputs.values);
+        let side = one_side(&shapes, &strengths);
         let strengths = inputs(made([smallest; 4], side).view(), &dataset.inputs.values).1;
         let strengths = strengths.into_iter().map(f64::from);
         let (sum, squares, most) = strengths.fold((0.0, 0.0, 0.0), |(sum, squares, most), s| {
@@ -223,6 +225,11 @@ impl FittedTouch {
         Self { typical, ..made([floor, logarithm_floor, least, (most + floor) * MOST], side) }
     }
 
+    /// Kind of the outputs.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
     /// As the blob holds it.
     ///
     /// # Panics
@@ -231,22 +238,24 @@ impl FittedTouch {
         Touch::new(self.kind, &self.block).expect("numbers that are finite")
     }
 
-    /// How much the place of a touch of this strength counts: half as much as at most where it is typical.
-    fn weight(&self, strength: f64) -> f64 {
-        strength / (strength + self.typical)
+    /// How much the place of a touch of this strength counts: half as much as at most where it is typical, and nothing
+    /// where a device does not tell it.
+    fn weight(&self, strength: f32) -> f64 {
+        let is_told = strength >= self.view().strengths().least;
+        let strength = f64::from(strength);
+        if is_told { strength / (strength + self.typical) } else { 0.0 }
     }
 
     /// Frames with shape and strength as inputs, and with outputs and weights as the network's training needs them.
     fn apply(&self, dataset: Dataset) -> Dataset {
         let (values, strengths) = inputs(self.view(), &dataset.inputs.values);
-        let strengths = strengths.into_iter().map(f64::from);
         let mut names = dataset.inputs.names.clone();
         names.push(STRENGTH.into());
         let mut outputs = dataset.outputs.clone();
         let weights: Vec<f64> = match self.kind {
-            Kind::Place => strengths.map(|s| self.weight(s).sqrt()).collect(),
+            Kind::Place => strengths.iter().map(|s| self.weight(*s).sqrt()).collect(),
             Kind::Amount => {
-                let strengths: Vec<f64> = strengths.collect();
+                let strengths: Vec<f64> = strengths.into_iter().map(f64::from).collect();
                 let lines = outputs.values.chunks_exact_mut(outputs.names.len()).zip(&strengths);
                 lines.for_each(|(line, s)| line.iter_mut().for_each(|output| *output /= s));
                 strengths.iter().map(|s| s / self.typical).collect()
@@ -257,13 +266,15 @@ impl FittedTouch {
     }
 }
 
-/// 1 or −1 if nearly all of the shapes' changes are up or down, and else 0. `inputs` are those of frames with so many
-/// `readings`.
-fn one_side(inputs: &[f64], readings: usize) -> f32 {
+/// 1 or −1 if nearly all changes of frames with these `shapes` and strengths are up or down, and else 0. Noise at rest, which
+/// has either sign, hardly counts.
+fn one_side(shapes: &[f64], strengths: &[f32]) -> f32 {
     let (mut up, mut down) = (0.0, 0.0);
-    for frame in inputs.chunks_exact(readings + 1) {
-        for change in &frame[..readings] {
-            if *change > 0.0 { up += change } else { down -= change }
+    let inputs = shapes.len() / strengths.len().max(1);
+    for (frame, strength) in shapes.chunks_exact(inputs.max(1)).zip(strengths) {
+        for share in &frame[..inputs - 1] {
+            let change = share * f64::from(*strength);
+            if change > 0.0 { up += change } else { down -= change }
         }
     }
     if down < OTHER_SIDE * (up + down) {

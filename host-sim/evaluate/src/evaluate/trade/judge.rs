@@ -182,12 +182,13 @@ fn fit(
     let of_start = |start| {
         // Layers are shared by all formats.
         let start: &Start<'_> = start;
-        let (mut layers, mut options) = (start.layers(&own), own);
-        if let Some(examples) = frames.set.examples() {
-            let settings = Refinement::default();
+        let mut layers = start.layers(&own);
+        let settings = Refinement::default();
+        let examples = frames.set.examples();
+        if let Some(examples) = examples {
             layers = start.refine(&layers, &own, &settings, examples, &refining)?;
-            options = settings.options(&own);
         }
+        let options = start.fitting(&layers, &own, examples.is_some().then_some(&settings))?;
         let rows = layers.hidden.par_iter().enumerate();
         let fitted = rows.map(|(row, layer)| {
             let table = layers.seen.row_table(row);

@@ -232,7 +232,7 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let start = Start::all(&training, &options).unwrap().remove(0);
         let layers = start.layers(&options);
         let layers = refine(&training, &layers, &options, &quick(), examples, &taken).unwrap();
-        let refined = quick().options(&options);
+        let refined = start.fitting(&layers, &options, Some(&quick())).unwrap();
         let networks = fit(&layers, &refined, &[refined.penalty], &Silent).unwrap().remove(0);
         let refined = crate::train::Trained { fronts: vec![], networks };
         let start = train(&training, &options, &Silent).unwrap();

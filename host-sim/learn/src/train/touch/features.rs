@@ -1,5 +1,7 @@
 //! Features of a touch: where it is by a linear map of its shape, what else tells of the outputs, and its strength.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 use taxel_data::{Dataset, columns};
 
@@ -16,9 +18,18 @@ const PARTS: usize = 5;
 /// Spread of other features over that of places.
 const SHARE: f64 = 0.5;
 
+/// Projection of shape and strength to features.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// f₀, then each input's part in every feature (`inputs × features`).
+    pub parameters: Vec<f32>,
+    /// First features, which are places, as maps tell them that were fitted to other frames (`frames × places`).
+    pub held_out: DMatrix<f64>,
+}
+
 /// Projection of shape and strength to features, for `frames` of a group of outputs of `dataset`: the places of the data
 /// set, if it has any; the outputs themselves, by [regression](super::super::projection::fit), but for places on a mat; and
-/// the strength. Returns f₀, then each input's part in every feature (`inputs × features`).
+/// the strength.
 ///
 /// # Errors
 /// [`Error`](crate::Error) for data without a regression, or with a projection beyond f32.
@@ -27,10 +38,10 @@ pub fn projection(
     frames: &Dataset,
     dataset: &Dataset,
     features: Option<usize>,
-) -> Result<Vec<f32>> {
+) -> Result<Fitted> {
     let most = features.unwrap_or(USUAL_FEATURES).max(2);
     let inputs = frames.inputs.names.len();
-    let map = places(touch, dataset)?;
+    let (map, held_out) = places(touch, dataset)?.unzip();
     let is_mat = map.is_some() && cells(&dataset.inputs.names).is_some();
     let of_places = map.as_ref().map_or(0, DMatrix::ncols);
     let others = most.saturating_sub(of_places + 1);
@@ -50,7 +61,8 @@ pub fn projection(
     let mut parts = DMatrix::zeros(inputs, count);
     let mut columns = blocks.iter().flat_map(DMatrix::column_iter);
     parts.column_iter_mut().zip(&mut columns).for_each(|(mut to, from)| to.copy_from(&from));
-    about_means(parts.transpose().as_slice(), &frames.inputs.means())
+    let parameters = about_means(parts.transpose().as_slice(), &frames.inputs.means())?;
+    Ok(Fitted { parameters, held_out: held_out.unwrap_or_else(|| DMatrix::zeros(0, 0)) })
 }
 
 /// Largest standard deviation of the features with these parts.
@@ -60,9 +72,10 @@ fn spread(frames: &Dataset, parts: &DMatrix<f64>) -> f64 {
     features.column_iter().map(|column| column.variance().sqrt()).fold(0.0, f64::max)
 }
 
-/// Linear map of shapes to the places that `dataset` has as outputs, one a column; `None` without any. It is a ridge
-/// regression towards the centroid, where inputs are cells of a mat: what data cannot tell stays as a centroid has it.
-fn places(touch: &FittedTouch, dataset: &Dataset) -> Result<Option<DMatrix<f64>>> {
+/// Linear map of shapes to the places that `dataset` has as outputs, one a column, and what maps fitted to other frames
+/// make of those with places; `None` without any. It is a ridge regression towards the centroid, where inputs are cells of
+/// a mat: what data cannot tell stays as a centroid has it.
+fn places(touch: &FittedTouch, dataset: &Dataset) -> Result<Option<(DMatrix<f64>, DMatrix<f64>)>> {
     let names = &dataset.outputs.names;
     let of_places: Vec<usize> =
         (0..names.len()).filter(|i| columns::is_place(&names[*i])).collect();
@@ -74,7 +87,19 @@ fn places(touch: &FittedTouch, dataset: &Dataset) -> Result<Option<DMatrix<f64>>
     let touch = FittedTouch { kind: Kind::Place, ..touch.clone() };
     let frames = touch.apply(Dataset { outputs, ..dataset.subset(&lines) });
     let cells = cells(&dataset.inputs.names);
-    Ok(Some(regression(&frames, true, cells.as_ref())?.0))
+    let Regression { map, of_parts, .. } = regression(&frames, true, cells.as_ref())?;
+    let means = frames.inputs.means();
+    let about =
+        |line: usize, input: usize| frames.inputs.values[line * means.len() + input] - means[input];
+    let told = parts(frames.frames()).zip(&of_parts).map(|(part, map)| {
+        DMatrix::from_fn(part.len(), means.len(), |line, input| about(part.start + line, input))
+            * map
+    });
+    let told: Vec<DMatrix<f64>> = told.collect();
+    let mut held_out = DMatrix::zeros(frames.frames(), map.ncols());
+    let mut lines = told.iter().flat_map(|it| it.row_iter());
+    held_out.row_iter_mut().zip(&mut lines).for_each(|(mut to, from)| to.copy_from(&from));
+    Ok(Some((map, held_out)))
 }
 
 /// Directions of shape and strength that tell most of the outputs of `frames`, so many of them or fewer, one a column.
@@ -83,7 +108,7 @@ fn regressed(frames: &Dataset, count: usize) -> Result<DMatrix<f64>> {
     let inputs = frames.inputs.names.len();
     let mut of_inputs = DMatrix::zeros(inputs, inputs);
     let map = by_task(&frames, |frames| {
-        let (map, moments) = regression(frames, false, None)?;
+        let Regression { map, moments, .. } = regression(frames, false, None)?;
         of_inputs += moments.of_inputs;
         Ok(map)
     })?;
@@ -91,37 +116,52 @@ fn regressed(frames: &Dataset, count: usize) -> Result<DMatrix<f64>> {
     Ok(strongest(&map, &predicted, count.min(frames.outputs.names.len())))
 }
 
-/// Ridge regression of the outputs of `frames`, none of which is missing, on their inputs, one a column, and the moments of
-/// the frames. That of places is one on the `shape_alone`, and towards the centroid if there are `cells`. The penalty is the
-/// one with the least error on frames that the regression was not fitted to.
+/// Ridge regression of outputs on inputs.
+struct Regression {
+    /// Regression on all frames, one output a column.
+    map: DMatrix<f64>,
+    /// Moments of the frames.
+    moments: Moments,
+    /// Regression on all frames but those of each part.
+    of_parts: Vec<DMatrix<f64>>,
+}
+
+/// Successive parts of so many frames.
+pub(super) fn parts(frames: usize) -> impl Iterator<Item = Range<usize>> {
+    let length = frames.div_ceil(PARTS).max(1);
+    (0..frames).step_by(length).map(move |start| start..frames.min(start + length))
+}
+
+/// Ridge regression of the outputs of `frames`, none of which is missing, on their inputs. That of places is one on the
+/// `shape_alone`, and towards the centroid if there are `cells`. The penalty is the one with the least error on frames that
+/// the regression was not fitted to.
 fn regression(
     frames: &Dataset,
     shape_alone: bool,
     cells: Option<&DMatrix<f64>>,
-) -> Result<(DMatrix<f64>, Moments)> {
+) -> Result<Regression> {
     let mean = means(frames);
-    let lines: Vec<usize> = (0..frames.frames()).collect();
-    let of_part = |lines: &[usize]| Moments::new(&frames.subset(lines), &mean);
-    let parts: Vec<Moments> =
-        lines.chunks(lines.len().div_ceil(PARTS).max(1)).map(of_part).collect();
+    let of_part =
+        |lines: Range<usize>| Moments::new(&frames.subset(&lines.collect::<Vec<_>>()), &mean);
+    let parts: Vec<Moments> = parts(frames.frames()).map(of_part).collect();
     let (first, others) = parts.split_first().ok_or_else(no_regression)?;
     let whole = others.iter().fold(first.clone(), |sum, part| sum.plus(part, 1.0));
     let prior = match cells {
-        Some(cells) => whole.centroid(cells)?,
+        Some(cells) => whole.centroid(cells, &mean)?,
         None => DMatrix::zeros(whole.of_inputs.nrows(), frames.outputs.names.len()),
     };
     let map = |moments: &Moments, penalty| moments.map(&prior, penalty, shape_alone);
-    let mut best = (f64::INFINITY, PENALTIES[0]);
+    let mut best = (f64::INFINITY, PENALTIES[0], vec![]);
     for penalty in PENALTIES {
-        let mut error = 0.0;
-        for part in &parts {
-            error += part.error(&map(&whole.plus(part, -1.0), penalty)?);
-        }
+        let of_part = |part: &Moments| map(&whole.plus(part, -1.0), penalty);
+        let of_parts = parts.iter().map(of_part).collect::<Result<Vec<_>>>()?;
+        let error = parts.iter().zip(&of_parts).map(|(part, map)| part.error(map)).sum();
         if error < best.0 {
-            best = (error, penalty);
+            best = (error, penalty, of_parts);
         }
     }
-    Ok((map(&whole, best.1)?, whole))
+    let (_, penalty, of_parts) = best;
+    Ok(Regression { map: map(&whole, penalty)?, moments: whole, of_parts })
 }
 
 /// Column and row of each cell, and 0 for the strength, if the inputs are cells of a mat: `inputs × 2`.
@@ -141,12 +181,19 @@ impl Moments {
         }
     }
 
-    /// Regression of the outputs on the two coordinates of the centroid, as a map of the inputs.
-    fn centroid(&self, cells: &DMatrix<f64>) -> Result<DMatrix<f64>> {
-        let mut of_centroid = cells.tr_mul(&(&self.of_inputs * cells));
+    /// Regression of the outputs on the two coordinates of the centroid, as a map of the inputs with these `means`.
+    fn centroid(&self, cells: &DMatrix<f64>, means: &[f64]) -> Result<DMatrix<f64>> {
+        // About the mean place: changes of either sign may sum to anything.
+        let strength = cells.nrows() - 1;
+        let mut cells = cells.clone();
+        for mut along in cells.column_iter_mut() {
+            let mean: f64 = along.iter().zip(means).map(|(cell, share)| cell * share).sum();
+            along.rows_mut(0, strength).add_scalar_mut(-mean);
+        }
+        let mut of_centroid = cells.tr_mul(&(&self.of_inputs * &cells));
         let least = 1e-9 * of_centroid.trace().max(f64::MIN_POSITIVE);
         (0..2).for_each(|i| of_centroid[(i, i)] += least);
-        Ok(cells * solved(of_centroid, &cells.tr_mul(&self.with_outputs))?)
+        Ok(&cells * solved(of_centroid, &cells.tr_mul(&self.with_outputs))?)
     }
 
     /// Regression of the outputs on the inputs with a `penalty` on what differs from `prior`, or on the shape alone.

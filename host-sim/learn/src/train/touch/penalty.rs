@@ -1,0 +1,70 @@
+//! Penalty on the Gaussians of a network of places: many presses tell them much, and few nothing.
+
+use taxel_core::rbf::Format;
+use taxel_data::Dataset;
+
+use super::super::least_squares::weighed;
+use super::super::{HiddenLayer, Options, Samples};
+use super::features::parts;
+use crate::error::Result;
+use crate::infer::infer;
+
+/// Penalties that are tried, for each frame. The largest leaves hardly more than the affine tail.
+const PENALTIES: [f64; 5] = [1e-7, 1e-5, 1e-3, 1e-2, 1e-1];
+/// Penalty with the least error on parts of `seen` that weights were not fitted to, of a network with this `layer`.
+///
+/// # Errors
+/// [`Error`](crate::Error) for a network that f32 does not hold.
+pub fn best(seen: &Dataset, layer: &HiddenLayer, options: &Options) -> Result<f64> {
+    let options = Options { format: Format::F32, ..*options };
+    let all = seen.weights.clone().unwrap_or_else(|| vec![1.0; seen.frames()]);
+    let mut errors = [0.0; PENALTIES.len()];
+    // Frames of a press follow one another: a part holds whole presses.
+    for part in parts(seen.frames()) {
+        let mut weights = all.clone();
+        weights[part.clone()].fill(0.0);
+        let training = Dataset { weights: Some(weights), ..seen.clone() };
+        let networks = Samples::new(&training).fit_each(layer, &options, &PENALTIES.map(Some))?;
+        let held = seen.subset(&part.collect::<Vec<_>>());
+        let weights = held.weights.as_deref();
+        let truth = weighed(weights, &held.outputs.values);
+        for (error, network) in errors.iter_mut().zip(&networks) {
+            let estimates = infer(&network.network(), &held.inputs.values);
+            let estimates = weighed(weights, &estimates);
+            let off = estimates.iter().zip(&*truth).map(|(a, b)| (a - b).powi(2));
+            *error += off.filter(|square| !square.is_nan()).sum::<f64>();
+        }
+    }
+    let least = (0..errors.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b]));
+    Ok(PENALTIES[least.unwrap_or(0)])
+}
+
+#[cfg(test)]
+mod tests {
+    use taxel_data::random::{Purpose, Random, Stream};
+
+    use super::*;
+
+    /// Penalty that is chosen where x follows the place p of 25 presses in 40 frames each, and a bend of the map by so much.
+    fn chosen(bend: f64) -> f64 {
+        let mut random = Random::new(5, Stream::Training, Purpose::Noise, 0, 0);
+        let mut data = Dataset::empty(vec!["p".into()], vec!["x_mm".into()], 1, 0);
+        for _ in 0..25 {
+            let (place, error) = (random.unit(), 0.02 * random.normal());
+            for _ in 0..40 {
+                let p = place + 0.003 * random.normal();
+                data.inputs.values.push(p);
+                data.outputs.values.push(p + bend * (9.0 * p).sin() + error);
+            }
+        }
+        let layer =
+            HiddenLayer { centres: (0..24).map(|k| f64::from(k) / 23.0).collect(), spread: 0.05 };
+        best(&data, &layer, &Options::default()).unwrap()
+    }
+
+    #[test]
+    fn gaussians_are_penalised_where_they_fit_the_errors_of_single_presses() {
+        assert_eq!(chosen(0.0), PENALTIES[PENALTIES.len() - 1]);
+        assert!(chosen(0.3) < 1e-2);
+    }
+}
