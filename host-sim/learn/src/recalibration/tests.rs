@@ -129,7 +129,7 @@ fn places_and_forces_of_a_touch_are_recalibrated_too() {
             };
             let (before, after) = (ratio(&old), ratio(&found.blob));
             println!("{count} presses, {untouched} untouched, output {output}: {after:.3}");
-            assert!(before > 3.0 && after <= 1.12, "{count} {output}: {before} {after}");
+            assert!(before > 3.0 && after <= 1.15, "{count} {output}: {before} {after}");
         }
     }
 }
