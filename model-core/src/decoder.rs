@@ -580,26 +580,22 @@ fn with_strength(
     can_overflow: bool,
     outputs: &mut [f32],
 ) -> RowStatus {
-    match touch.kind() {
-        Kind::Place if strength < touch.strengths().least => {
-            outputs.fill(f32::NAN);
-            RowStatus::NoTouch
-        }
-        Kind::Place => RowStatus::Decoded,
-        Kind::Amount => {
-            let most = touch.strengths().most;
-            let strength = if strength > most { most } else { strength };
-            #[cfg(cortex_m4f)]
-            cortex_m4::multiply(outputs, strength);
-            #[cfg(not(cortex_m4f))]
-            outputs.iter_mut().for_each(|output| *output *= strength);
-            if can_overflow && !all_finite(outputs) {
-                outputs.fill(f32::NAN);
-                return RowStatus::Overflow;
-            }
-            RowStatus::Decoded
-        }
+    let Some(factor) = touch.factor(strength) else {
+        outputs.fill(f32::NAN);
+        return RowStatus::NoTouch;
+    };
+    if touch.kind() == Kind::Place {
+        return RowStatus::Decoded;
     }
+    #[cfg(cortex_m4f)]
+    cortex_m4::multiply(outputs, factor);
+    #[cfg(not(cortex_m4f))]
+    outputs.iter_mut().for_each(|output| *output *= factor);
+    if can_overflow && !all_finite(outputs) {
+        outputs.fill(f32::NAN);
+        return RowStatus::Overflow;
+    }
+    RowStatus::Decoded
 }
 
 /// Order of the statuses of networks that see the same frame: that of the frame is the highest.

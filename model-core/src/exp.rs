@@ -30,10 +30,11 @@ pub fn exp(x: f32) -> f32 {
     if x < -87.0 {
         return 0.0;
     }
-    let n = (x * core::f32::consts::LOG2_E + ROUND) - ROUND;
+    let rounded = x * core::f32::consts::LOG2_E + ROUND;
+    let n = rounded - ROUND;
     let r = (x - n * high) - n * low;
     let mantissa = (((((c6 * r + c5) * r + c4) * r + c3) * r + c2) * r + c1) * r + c0;
-    mantissa * f32::from_bits(((n as i32).wrapping_add(127) as u32) << 23)
+    mantissa * f32::from_bits(rounded.to_bits().wrapping_add(127) << 23)
 }
 
 #[cfg(test)]

@@ -144,10 +144,23 @@ impl<'a> Touch<'a> {
     }
 
     /// Level at rest and threshold of one reading after the other.
-    const fn pairs(&self) -> &'a [[f32; 2]] {
+    pub const fn pairs(&self) -> &'a [[f32; 2]] {
         match self.block.split_at_checked(HEAD) {
             Some((_, pairs)) => pairs.as_chunks::<2>().0,
             None => &[],
+        }
+    }
+
+    /// Factor of a network's outputs at this `strength`; `None` for places without a touch.
+    #[inline(always)]
+    pub fn factor(&self, strength: f32) -> Option<f32> {
+        match self.kind {
+            Kind::Place if strength < self.strengths().least => None,
+            Kind::Place => Some(1.0),
+            Kind::Amount => {
+                let most = self.strengths().most;
+                Some(if strength > most { most } else { strength })
+            }
         }
     }
 
@@ -204,19 +217,25 @@ impl<'a> Touch<'a> {
         }
         let mut sum = 0.0;
         for (input, [level, threshold]) in shape.iter_mut().zip(self.pairs()) {
-            let change = *input - level;
-            let twice = if side == 0.0 {
-                twice_positive(change.abs() - threshold)
-            } else {
-                twice_positive(side * change - threshold)
-            };
+            let [twice, signed] = twice_beyond(*input - level, *threshold, side);
             sum += twice;
-            *input = if side == 0.0 { twice.copysign(change) } else { twice };
+            *input = signed;
         }
         let strength = 0.5 * sum + floor;
         let scale = 0.5 / strength;
         shape.iter_mut().for_each(|input| *input *= scale);
         strength
+    }
+}
+
+/// Twice what of a `change` exceeds the `threshold` to this `side`, or to any (0), and the same with the sign of the change.
+#[inline(always)]
+pub fn twice_beyond(change: f32, threshold: f32, side: f32) -> [f32; 2] {
+    if side == 0.0 {
+        let twice = twice_positive(change.abs() - threshold);
+        [twice, twice.copysign(change)]
+    } else {
+        [twice_positive(side * change - threshold); 2]
     }
 }
 

@@ -1,4 +1,4 @@
-"""Decoding a table on one core: numpy's batches against Taxel's lines, which are the device's bit for bit.
+"""Decoding a table on one core: numpy's batches against Taxel's, whose estimates are the device's bit for bit.
 
 numpy's side expands distances into a matrix product, exponentiates in place and multiplies by the weights, in
 batches that stay in the processor's cache; in f64, which is numpy's own choice, and in f32, which is Taxel's.

@@ -12,7 +12,7 @@ use taxel_core::rbf::Network;
 use taxel_data::{Dataset, Table, columns, input};
 
 use crate::error::{Error, Result, not_packed};
-use crate::prepared;
+use crate::infer;
 use crate::train::{FittedFront, FittedNetwork, Trained};
 
 /// Largest blob in bytes that is read: 256 MB.
@@ -78,7 +78,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
         units(&dataset.inputs.names)
     };
     let [full_scale, linear_rmse] = [&origin.full_scale, &origin.linear_rmse].map(|it| floats(it));
-    let decoded = prepared::decode(&fronts, &views, &dataset.inputs.values);
+    let decoded = infer::decode(&fronts, &views, &dataset.inputs.values);
     let training_rmse = floats(&training_rmse(&decoded, &dataset.outputs));
     let parts = ModelParts {
         fronts: &fronts,

@@ -9,6 +9,12 @@ fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().for_each(work);
 }
 
+/// Calls `work` with the index of each piece of `values`, of so many values each, and with the piece, in any order.
+pub(crate) fn fill(values: &mut [f64], size: usize, work: &(dyn Fn(usize, &mut [f64]) + Sync)) {
+    let pieces = values.par_chunks_mut(size).enumerate();
+    pieces.for_each(|(index, piece)| work(index, piece));
+}
+
 /// Results of `of` for each number below `count`, in that order.
 pub(crate) fn map<T: Send + Sync>(count: usize, of: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
     let results: Vec<OnceLock<T>> = (0..count).map(|_| OnceLock::new()).collect();

@@ -6,11 +6,10 @@ use std::sync::Arc;
 use taxel_core::blob::{Front, Model};
 use taxel_core::rbf::Network;
 use taxel_core::scale::CLAMP;
-use taxel_core::touch::{Kind, Strengths};
 use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
-use crate::infer::{assess_lines, infer, infer_in_turn, is_missing};
+use crate::infer::{assess_lines, decode, is_missing};
 use crate::packing::ModelBlob;
 use crate::parallel;
 use crate::relative::{ratios, reciprocals};
@@ -235,44 +234,6 @@ impl<'b> PreparedModel<'b> {
         let at_once = if self.fronts.is_empty() { self.networks.len() } else { 1 };
         self.networks.chunks(at_once).zip(self.inputs_of_networks(readings))
     }
-}
-
-/// Decodes `inputs` of a model (`frames × inputs`) to outputs (`frames × outputs`), with `networks` of rows in turn, or with
-/// those behind `fronts`.
-pub(crate) fn decode(fronts: &[Front<'_>], networks: &[Network<'_>], inputs: &[f64]) -> Vec<f64> {
-    if fronts.is_empty() {
-        return infer_in_turn(networks, inputs);
-    }
-    let decoded = fronts.iter().zip(networks).map(|(front, it)| decode_part(front, it, inputs));
-    let mut parts: Vec<Vec<f64>> = decoded.collect();
-    if let [one] = &mut parts[..] {
-        return std::mem::take(one);
-    }
-    let mut parts: Vec<_> =
-        fronts.iter().zip(&parts).map(|(front, part)| part.chunks_exact(front.outputs)).collect();
-    let frames = parts.first().map_or(0, ExactSizeIterator::len);
-    let mut of_frame = || parts.iter_mut().filter_map(Iterator::next).collect::<Vec<_>>().concat();
-    (0..frames).flat_map(|_| of_frame()).collect()
-}
-
-/// Outputs of one network that sees whole frames, for `inputs` of the model.
-fn decode_part(front: &Front<'_>, network: &Network<'_>, inputs: &[f64]) -> Vec<f64> {
-    let (given, strengths) = inputs_of(front, inputs);
-    let mut outputs = infer(network, &given);
-    let Some(touch) = front.touch else { return outputs };
-    let Strengths { least, most, .. } = touch.strengths();
-    for (line, strength) in outputs.chunks_exact_mut(front.outputs).zip(strengths) {
-        if touch.kind() == Kind::Amount {
-            // As a device multiplies them, and does not tell those that overflow.
-            let scaled = |output: &f64| f64::from(*output as f32 * strength.min(most));
-            line.iter_mut().for_each(|output| *output = scaled(output));
-        }
-        let is_told = touch.kind() == Kind::Amount || strength >= least;
-        if !is_told || line.iter().any(|output| !output.is_finite()) {
-            line.fill(f64::NAN);
-        }
-    }
-    outputs
 }
 
 /// Inputs of the network behind `front` for `inputs` of the model, and the strength of each frame's touch; none without

@@ -26,10 +26,11 @@ use taxel_core::touch::{Touch, block_floats};
 use taxel_data::{Table, columns};
 
 use crate::error::{Error, Result};
+use crate::infer::decode;
 use crate::infer::is_missing;
 use crate::packing::{ModelBlob, rebuild};
 use crate::parallel;
-use crate::prepared::{PreparedModel, decode};
+use crate::prepared::PreparedModel;
 use crate::rls::Rls;
 use crate::train::FittedNetwork;
 

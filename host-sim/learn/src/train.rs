@@ -14,7 +14,7 @@ use taxel_core::touch::Kind;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
 use crate::error::Result;
-use crate::{parallel, prepared};
+use crate::{infer, parallel};
 
 pub mod resolution;
 pub mod kmeans;
@@ -511,7 +511,7 @@ impl Trained {
     pub fn decode(&self, inputs: &[f64]) -> Vec<f64> {
         let fronts: Vec<Front<'_>> = self.fronts.iter().map(FittedFront::view).collect();
         let networks: Vec<_> = self.networks.iter().map(FittedNetwork::network).collect();
-        prepared::decode(&fronts, &networks, inputs)
+        infer::decode(&fronts, &networks, inputs)
     }
 }
 

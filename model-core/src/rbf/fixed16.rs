@@ -283,7 +283,8 @@ impl<'a> Network<'a> {
         x.iter_mut().for_each(|x| *x = clamp_steps(f32::from_bits(*x as u32)));
         let sums = bytemuck::cast_slice_mut::<f32, i32>(output);
         sums.iter_mut().zip(p.bias).for_each(|(sum, &bias)| *sum = bias);
-        let (pairs, shared) = (x.len().div_ceil(2).max(1), shared_term(p.decay, x));
+        let (pairs, shared) =
+            (x.len().div_ceil(2).max(1), shared_term(p.decay, square(x), x.len()));
         for (sum, row) in sums.iter_mut().zip(p.affine.chunks_exact(pairs)) {
             *sum = add_products(*sum, row, x);
         }
@@ -323,7 +324,7 @@ impl<'a> Network<'a> {
     /// Activations in Q15, for one group of sixteen centres after the other, of inputs `x` in steps
     /// ([`clamp_steps`]). A trainer fits output weights to them.
     pub fn activations(&self, x: &[i32]) -> impl Iterator<Item = [i32; CENTRES_AT_ONCE]> {
-        let shared = shared_term(self.parameters().decay, x);
+        let shared = shared_term(self.parameters().decay, square(x), x.len());
         self.centres().map(move |(exponents, _)| activations_of(exponents, shared, x))
     }
 }
@@ -365,17 +366,22 @@ pub fn square_shift(inputs: usize) -> u32 {
     inputs.checked_ilog2().unwrap_or(0).saturating_sub(1).max(4)
 }
 
-/// The term g‖x‖² of the exponent, which all centres share.
+/// The sum of squares ‖x‖² of inputs in steps.
 #[inline(always)]
-fn shared_term(decay: u32, x: &[i32]) -> u32 {
-    let square: u64 = x.iter().map(|&x| u64::from(x.unsigned_abs()).pow(2)).sum();
-    let shift = square_shift(x.len());
+fn square(x: &[i32]) -> u64 {
+    x.iter().map(|&x| u64::from(x.unsigned_abs()).pow(2)).sum()
+}
+
+/// The term g‖x‖² of the exponent, which all centres share, of the sum of squares of so many `inputs`.
+#[inline(always)]
+pub fn shared_term(decay: u32, square: u64, inputs: usize) -> u32 {
+    let shift = square_shift(inputs);
     (((square >> shift) * u64::from(decay)) >> (DECAY_FRACTION_BITS - shift)) as u32
 }
 
-/// The activation 2^−v in Q15.
+/// The activation 2^−v in Q15, of an exponent v in units of its last place.
 #[inline(always)]
-fn power(v: u32) -> i32 {
+pub fn power(v: u32) -> i32 {
     let fraction = i64::from(v & ((1 << EXPONENT_FRACTION_BITS) - 1));
     let [c3, c2, c1, c0] = CUBIC;
     let mut p = c3;

@@ -1,4 +1,4 @@
-//! Decoding of a table by the device's own code, line by line on one core, in each number format.
+//! Decoding of a table on one core, in each number format.
 
 use std::hint::black_box;
 

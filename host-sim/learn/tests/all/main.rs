@@ -6,5 +6,6 @@ mod table;
 mod cost;
 mod decoding;
 mod number_formats;
+mod random_models;
 mod extremes;
 mod relative;
