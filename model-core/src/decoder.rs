@@ -307,17 +307,28 @@ impl<N: Infer> FrameDecoder<'_, '_, N> {
         check_length("frame", frame.readings_ohm, rows.wrapping_mul(inputs))?;
         check_length("outputs of the estimate", estimate.outputs, rows.wrapping_mul(outputs))?;
         check_length("status of the estimate", estimate.status, rows)?;
-        let expected = self.scratch_floats();
-        let too_short = NetworkError::Length { what: "scratch", expected, found: scratch.len() };
-        // No more than that: what is left behind the parts below is readings relative to the baseline, to the last one.
-        let scratch = scratch.get_mut(..expected).ok_or(too_short)?;
+        let too_short = |expected, found| NetworkError::Length { what: "scratch", expected, found };
         match self.networks {
             Networks::OfFrames(networks) => {
+                let readings = frame.readings_ohm.len();
+                let floats =
+                    |(front, _): &(Front<'_>, N)| floats_of_front(front, readings, self.relative);
+                let expected = networks.iter().map(floats).max().unwrap_or(0);
+                let found = scratch.len();
+                // No more than that: what is left behind the parts below is readings relative to the baseline, to the last.
+                let scratch =
+                    scratch.get_mut(..expected).ok_or_else(|| too_short(expected, found))?;
                 let frames = WholeFrames { networks, relative: self.relative, rows };
                 Ok(frames.decode(frame, scratch, estimate))
             }
             Networks::OfRows(networks) => {
-                let (scaled, more) = scratch.split_at_mut_checked(inputs).ok_or(too_short)?;
+                let expected = floats_of_rows(inputs, self.relative);
+                let found = scratch.len();
+                let scratch =
+                    scratch.get_mut(..expected).ok_or_else(|| too_short(expected, found))?;
+                let (scaled, more) = scratch
+                    .split_at_mut_checked(inputs)
+                    .ok_or_else(|| too_short(expected, found))?;
                 let rows = Rows { networks, inputs, outputs };
                 Ok(if self.relative {
                     rows.decode::<true>(frame, [scaled, more], estimate)
