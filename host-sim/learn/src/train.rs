@@ -449,7 +449,7 @@ impl<'d> Start<'d> {
                     let lines = seen.inputs.values.chunks_exact_mut(seen.inputs.names.len());
                     let places = lines.zip(told.row_iter());
                     places.for_each(|(line, told)| {
-                        line.iter_mut().zip(&told).for_each(|(to, from)| *to = *from)
+                        line.iter_mut().zip(&told).for_each(|(to, from)| *to = *from);
                     });
                 }
                 Some(touch::best_penalty(&seen, &layers.hidden[0], options)?)
