@@ -26,8 +26,7 @@ use taxel_core::touch::{Touch, block_floats};
 use taxel_data::{Table, columns};
 
 use crate::error::{Error, Result};
-use crate::infer::decode;
-use crate::infer::is_missing;
+use crate::infer::{decode, is_missing};
 use crate::packing::{ModelBlob, rebuild};
 use crate::parallel;
 use crate::prepared::PreparedModel;

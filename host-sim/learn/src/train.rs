@@ -91,7 +91,7 @@ pub struct Options {
     /// Whether the network adds an affine tail A·x. Only the [paper's own way](Options::as_in_paper) has none.
     pub affine_tail: bool,
     /// Ridge penalty on squared weights, for each training frame: at 1 it is as strong as an input that is always 1,
-    /// and as strong as all activations that are fully on. `None` for the usual one: 1/[`INITIAL_COVARIANCE`] for all
+    /// and as strong as all activations that are fully on; on the affine tail it is at most 1e-7. `None` for the usual one: 1/[`INITIAL_COVARIANCE`] for all
     /// frames together, or [`Refinement::ridge`] if training is refined.
     pub penalty: Option<f64>,
     /// How output weights are computed.
@@ -396,7 +396,7 @@ impl<'d> Start<'d> {
                 _ if !options.projects(&frames) => None,
                 Some(touch) => {
                     let fitted = touch::projection(touch, &frames, dataset, options.features)?;
-                    held_out = Some(fitted.held_out);
+                    held_out = fitted.held_out;
                     Some(fitted.parameters)
                 }
                 None => {

@@ -68,9 +68,7 @@ impl FittedNetwork {
         let outputs = &table.outputs;
         let weights = table.weights.as_deref();
         let predicted = infer(&self.network(), &table.inputs.values);
-        let truth = weighed(weights, &outputs.values).into_owned();
-        let truth = Table { names: outputs.names.clone(), values: truth };
-        let found = truth.squared_errors(&weighed(weights, &predicted));
+        let found = weighed_errors(table, &predicted);
         let totals =
             column_squares(&weighed(weights, &targets.deviations.values), targets.outputs());
         let errors = found.into_iter().zip(left).zip(totals).zip(&targets.means);
@@ -242,6 +240,14 @@ impl<'s> Fit<'s> {
         let all = squares(&weighed(weights, &self.targets.deviations.values)).into_iter();
         all.zip(squares(&factors.projection())).map(|(all, along)| (all - along).max(0.0)).collect()
     }
+}
+
+/// Sum of the squared errors of each output of `table`, times the squares of its frames' weights, for `predicted` ones.
+pub(super) fn weighed_errors(table: &Dataset, predicted: &[f64]) -> Vec<f64> {
+    let (weights, outputs) = (table.weights.as_deref(), &table.outputs);
+    let values = weighed(weights, &outputs.values).into_owned();
+    let truth = Table { names: outputs.names.clone(), values };
+    truth.squared_errors(&weighed(weights, predicted))
 }
 
 /// Sum of the squares of each of so many columns; NaN is skipped.

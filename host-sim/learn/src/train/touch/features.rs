@@ -24,7 +24,7 @@ pub struct Fitted {
     /// f₀, then each input's part in every feature (`inputs × features`).
     pub parameters: Vec<f32>,
     /// First features, which are places, as maps tell them that were fitted to other frames (`frames × places`).
-    pub held_out: DMatrix<f64>,
+    pub held_out: Option<DMatrix<f64>>,
 }
 
 /// Projection of shape and strength to features, for `frames` of a group of outputs of `dataset`: the places of the data
@@ -62,7 +62,7 @@ pub fn projection(
     let mut columns = blocks.iter().flat_map(DMatrix::column_iter);
     parts.column_iter_mut().zip(&mut columns).for_each(|(mut to, from)| to.copy_from(&from));
     let parameters = about_means(parts.transpose().as_slice(), &frames.inputs.means())?;
-    Ok(Fitted { parameters, held_out: held_out.unwrap_or_else(|| DMatrix::zeros(0, 0)) })
+    Ok(Fitted { parameters, held_out })
 }
 
 /// Largest standard deviation of the features with these parts.
@@ -89,16 +89,14 @@ fn places(touch: &FittedTouch, dataset: &Dataset) -> Result<Option<(DMatrix<f64>
     let cells = cells(&dataset.inputs.names);
     let Regression { map, of_parts, .. } = regression(&frames, true, cells.as_ref())?;
     let means = frames.inputs.means();
-    let about =
-        |line: usize, input: usize| frames.inputs.values[line * means.len() + input] - means[input];
-    let told = parts(frames.frames()).zip(&of_parts).map(|(part, map)| {
-        DMatrix::from_fn(part.len(), means.len(), |line, input| about(part.start + line, input))
-            * map
-    });
-    let told: Vec<DMatrix<f64>> = told.collect();
     let mut held_out = DMatrix::zeros(frames.frames(), map.ncols());
-    let mut lines = told.iter().flat_map(|it| it.row_iter());
-    held_out.row_iter_mut().zip(&mut lines).for_each(|(mut to, from)| to.copy_from(&from));
+    for (part, map) in parts(frames.frames()).zip(&of_parts) {
+        let value = |line: usize, input: usize| {
+            frames.inputs.values[(part.start + line) * means.len() + input] - means[input]
+        };
+        let inputs = DMatrix::from_fn(part.len(), means.len(), value);
+        held_out.rows_mut(part.start, part.len()).copy_from(&(inputs * map));
+    }
     Ok(Some((map, held_out)))
 }
 

@@ -3,7 +3,7 @@
 use taxel_core::rbf::Format;
 use taxel_data::Dataset;
 
-use super::super::least_squares::weighed;
+use super::super::format::weighed_errors;
 use super::super::{HiddenLayer, Options, Samples};
 use super::features::parts;
 use crate::error::Result;
@@ -11,6 +11,7 @@ use crate::infer::infer;
 
 /// Penalties that are tried, for each frame. The largest leaves hardly more than the affine tail.
 const PENALTIES: [f64; 5] = [1e-7, 1e-5, 1e-3, 1e-2, 1e-1];
+
 /// Penalty with the least error on parts of `seen` that weights were not fitted to, of a network with this `layer`.
 ///
 /// # Errors
@@ -18,21 +19,16 @@ const PENALTIES: [f64; 5] = [1e-7, 1e-5, 1e-3, 1e-2, 1e-1];
 pub fn best(seen: &Dataset, layer: &HiddenLayer, options: &Options) -> Result<f64> {
     let options = Options { format: Format::F32, ..*options };
     let all = seen.weights.clone().unwrap_or_else(|| vec![1.0; seen.frames()]);
-    let mut errors = [0.0; PENALTIES.len()];
+    let (mut training, mut errors) = (seen.clone(), [0.0; PENALTIES.len()]);
     // Frames of a press follow one another: a part holds whole presses.
     for part in parts(seen.frames()) {
-        let mut weights = all.clone();
-        weights[part.clone()].fill(0.0);
-        let training = Dataset { weights: Some(weights), ..seen.clone() };
+        training.weights = Some(all.clone());
+        training.weights.iter_mut().for_each(|weights| weights[part.clone()].fill(0.0));
         let networks = Samples::new(&training).fit_each(layer, &options, &PENALTIES.map(Some))?;
         let held = seen.subset(&part.collect::<Vec<_>>());
-        let weights = held.weights.as_deref();
-        let truth = weighed(weights, &held.outputs.values);
         for (error, network) in errors.iter_mut().zip(&networks) {
             let estimates = infer(&network.network(), &held.inputs.values);
-            let estimates = weighed(weights, &estimates);
-            let off = estimates.iter().zip(&*truth).map(|(a, b)| (a - b).powi(2));
-            *error += off.filter(|square| !square.is_nan()).sum::<f64>();
+            *error += weighed_errors(&held, &estimates).iter().sum::<f64>();
         }
     }
     let least = (0..errors.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b]));
