@@ -91,8 +91,9 @@ pub struct Options {
     /// Whether the network adds an affine tail A·x. Only the [paper's own way](Options::as_in_paper) has none.
     pub affine_tail: bool,
     /// Ridge penalty on squared weights, for each training frame: at 1 it is as strong as an input that is always 1,
-    /// and as strong as all activations that are fully on; on the affine tail it is at most 1e-7. `None` for the usual one: 1/[`INITIAL_COVARIANCE`] for all
-    /// frames together, or [`Refinement::ridge`] if training is refined.
+    /// and as strong as all activations that are fully on; on the affine tail it is at most 1e-7. `None` for the usual one:
+    /// 1/[`INITIAL_COVARIANCE`] for all frames together, or [`Refinement::ridge`] if training is refined. That of places
+    /// behind normalised features is chosen ([`Start::fitting`]).
     pub penalty: Option<f64>,
     /// How output weights are computed.
     pub solver: Solver,
