@@ -18,9 +18,11 @@ const DEPTHS: [[f64; 2]; 6] = [
     [RELATIVE_THRESHOLD, f64::INFINITY],
 ];
 
+/// Range of all frames.
+const ALL: [f64; 2] = [0.0, f64::INFINITY];
+
 /// Ranges of a force, as shares of full scale: all frames, and those above a tenth and three tenths.
-const FORCES: [[f64; 2]; 3] =
-    [[0.0, f64::INFINITY], [RELATIVE_THRESHOLD, f64::INFINITY], [0.3, f64::INFINITY]];
+const FORCES: [[f64; 2]; 3] = [ALL, [RELATIVE_THRESHOLD, f64::INFINITY], [0.3, f64::INFINITY]];
 
 /// Errors on the frames whose contact has a depth or a force in some range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -31,6 +33,8 @@ pub struct LoadErrors {
     pub from: f64,
     /// Magnitude that is not reached; `None` for no bound.
     pub to: Option<f64>,
+    /// Whether these are the frames alone whose place the model tells: below its least strength there is none.
+    pub told: bool,
     pub frames: usize,
     /// Errors of the model by group of outputs.
     pub errors: Vec<Errors>,
@@ -43,6 +47,7 @@ impl LoadErrors {
     pub fn range(&self) -> String {
         let unit = columns::unit_of(&self.load);
         match self.to {
+            _ if self.told => "place told".into(),
             Some(to) => format!("{} to {to} {unit}", self.from),
             None => format!("from {} {unit}", self.from),
         }
@@ -52,7 +57,8 @@ impl LoadErrors {
 }
 
 /// Errors of the model's `estimate` and of the `centroid`'s by the true depth of the contact; of places without a depth, by
-/// the last force. Nothing for other outputs.
+/// the last force. Nothing for other outputs. Where the model tells no place of some frames, the last of the ranges is of
+/// all frames that it tells one of.
 ///
 /// Estimates are laid out like `truth`, `lines × columns`. The last range of depth holds all frames that are deeper than
 /// [`RELATIVE_THRESHOLD`] of full scale.
@@ -76,9 +82,15 @@ pub fn by_load(
     };
     // Ratios to the limit belong to frames in their order.
     let measure = Measure { limit: None, ..measure.clone() };
-    let of_range = |shares: &[f64; 2]| {
+    let places: Vec<usize> = (0..names.len()).filter(|i| columns::is_place(&names[*i])).collect();
+    let estimates = estimate.chunks_exact(names.len());
+    let is_told: Vec<bool> =
+        estimates.map(|line| places.iter().all(|place| !line[*place].is_nan())).collect();
+    let of_range = |(shares, told): (&[f64; 2], bool)| {
         let [from, to] = shares.map(|share| rounded(share * measure.full_scale[column]));
-        let is_within = |line: &usize| (from..to).contains(&truth.line(*line)[column].abs());
+        let is_within = |line: &usize| {
+            (from..to).contains(&truth.line(*line)[column].abs()) && (!told || is_told[*line])
+        };
         let lines: Vec<usize> = (0..truth.len()).filter(is_within).collect();
         let chosen = truth.pick(&lines);
         let errors = |estimate: &[f64]| {
@@ -89,12 +101,15 @@ pub fn by_load(
             load: names[column].clone(),
             from,
             to: to.is_finite().then_some(to),
+            told,
             frames: lines.len(),
             errors: errors(estimate),
             centroid: centroid.map(errors).unwrap_or_default(),
         }
     };
-    ranges.iter().map(of_range).filter(|range| range.frames > 0).collect()
+    let told = is_told.contains(&false).then_some((&ALL, true));
+    let ranges = ranges.iter().map(|range| (range, false)).chain(told);
+    ranges.map(of_range).filter(|range| range.frames > 0).collect()
 }
 
 /// A magnitude with three digits, as people read it.
@@ -128,6 +143,10 @@ mod tests {
         assert_eq!(of(&found[1]), ("from 0.1 N".into(), 2, 0.5_f64.sqrt()));
         assert_eq!(of(&found[2]), ("from 0.3 N".into(), 1, 0.0));
         assert_eq!((found[0].frames, found[0].centroid[0].rmse, found.len()), (3, 0.0, 3));
+        // The faintest touch has no place: it counts as the mean, and then the others have a range of their own.
+        let faint = [f64::NAN, 0.05, 9.0, -0.2, 10.0, 0.9];
+        let found = by_load(&truth, &faint, None, &measure);
+        assert_eq!((of(&found[3]), found.len()), (("place told".into(), 2, 0.5_f64.sqrt()), 4));
         let other = Table { names: vec!["fx_n".into()], values: vec![1.0] };
         let measure = Measure { full_scale: vec![1.0], ..measure };
         assert!(by_load(&other, &[1.0], None, &measure).is_empty());

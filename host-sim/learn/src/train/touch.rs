@@ -221,7 +221,7 @@ impl FittedTouch {
         let has_threshold = pairs.iter().skip(1).step_by(2).any(|threshold| *threshold > 0.0);
         let floor = typical * FLOOR[usize::from(!has_threshold)];
         let logarithm_floor = typical * LOGARITHM_FLOOR;
-        let least = floor + strength_at_rest(&deviation, threshold);
+        let least = floor + strength_at_rest(&deviation, threshold, side);
         Self { typical, ..made([floor, logarithm_floor, least, (most + floor) * MOST], side) }
     }
 
@@ -287,12 +287,13 @@ fn one_side(shapes: &[f64], strengths: &[f32]) -> f32 {
 }
 
 /// Strength that noise alone hardly reaches, of readings with these standard deviations at rest, by the moments of what
-/// normal noise exceeds the threshold by.
-fn strength_at_rest(deviations: &[f64], threshold: f64) -> f64 {
+/// normal noise exceeds the threshold by, to one `side` or, for 0, to both.
+fn strength_at_rest(deviations: &[f64], threshold: f64, side: f32) -> f64 {
     let density = exp(-0.5 * threshold * threshold) / std::f64::consts::TAU.sqrt();
     let above = 1.0 - normal_share_below(threshold);
-    let mean = 2.0 * (density - threshold * above);
-    let square = 2.0 * ((1.0 + threshold * threshold) * above - threshold * density);
+    let sides = if side == 0.0 { 2.0 } else { 1.0 };
+    let mean = sides * (density - threshold * above);
+    let square = sides * ((1.0 + threshold * threshold) * above - threshold * density);
     let (sum, squares): (f64, f64) =
         deviations.iter().fold((0.0, 0.0), |(sum, squares), d| (sum + d, squares + d * d));
     mean * sum + LEAST_DEVIATIONS * ((square - mean * mean) * squares).sqrt()
