@@ -122,6 +122,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &Spread::of(&readings)));
     let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
     let mut estimate = model.decode_table(&readings);
+    let with_untold = estimate.values.clone();
     estimate.values = truth.with_places(estimate.values);
     let thickness_mm = f64::from(metadata.thickness_mm);
     let measure = Measure {
@@ -182,7 +183,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         values: truth.values.len(),
         values_evaluated,
         health,
-        by_load: by_load(&truth, &estimate.values, of_centroid.as_deref(), &measure),
+        by_load: by_load(&truth, &with_untold, of_centroid.as_deref(), &measure),
         over_time,
     };
     if let Some(html) = &arguments.html {
