@@ -162,11 +162,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut decoders = vec![DecoderErrors::new(NETWORK, errors)];
     decoders.extend(of_centroid.as_ref().map(|estimate| of(centroid::NAME, estimate)));
     decoders.push(of(mean::NAME, &truth.means().repeat(truth.len())));
-    let verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
+    let mut verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
         .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift));
+    if of_centroid.is_some() {
+        verdict.sentence += " The centroid's scale is fitted to these lines, the model is not.";
+    }
     let summary = Summary {
         model_file: arguments.model.clone(),
         model_crc: format!("{:08x}", model.model().crc()),
