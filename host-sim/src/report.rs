@@ -4,7 +4,6 @@
 //! one page serves light and dark.
 
 use taxel_data::output::Inner;
-use taxel_evaluate::evaluate::limit::LimitResult;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
 use taxel_evaluate::sweep::Merged;
@@ -33,9 +32,12 @@ mod html;
 mod trade;
 mod limit;
 mod points;
+mod sections;
 
 pub use figures::{FOLDER as FIGURES, Page};
+pub use limit::{sections as of_limit, several as of_limits};
 pub use points::{evenly, result_text, setting_cells, setting_heads};
+pub use sections::Sections;
 pub use view::{Made, View, in_words};
 
 use figures::Figures;
@@ -58,11 +60,6 @@ pub fn view_html(view: &View<'_>) -> String {
 /// Page for a trade between speed and accuracy, with the `command` that computed it.
 pub fn trade_html(trade: &Trade, command: &str) -> Page {
     trade::html(trade, command)
-}
-
-/// Page for a limit, with the `command` that computed it: what the sensor can know.
-pub fn limit_html(limit: &LimitResult, command: &str) -> Page {
-    limit::html(limit, command)
 }
 
 /// Page for the results of a sweep or a comparison, whose files begin with `stem`, with the `command` that made them.

@@ -124,12 +124,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut estimate = model.decode_table(&readings);
     let with_untold = estimate.values.clone();
     estimate.values = truth.with_places(estimate.values);
-    let thickness_mm = f64::from(metadata.thickness_mm);
-    let measure = Measure {
-        full_scale: metadata.full_scale.iter().map(f64::from).collect(),
-        thickness_mm: (thickness_mm > 0.0).then_some(thickness_mm),
-        limit: None,
-    };
+    let measure = measure_of(metadata);
     // The mean is judged on the same pairs as the model, and computed from them.
     let pairs = truth.values.iter_mut().zip(&estimate.values);
     pairs.filter(|(_, estimate)| estimate.is_nan()).for_each(|(truth, _)| *truth = f64::NAN);
@@ -162,14 +157,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut decoders = vec![DecoderErrors::new(NETWORK, errors)];
     decoders.extend(of_centroid.as_ref().map(|estimate| of(centroid::NAME, estimate)));
     decoders.push(of(mean::NAME, &truth.means().repeat(truth.len())));
-    let mut verdict = Verdict::new(&decoders, &LimitSummary::new(&Err(Refusal::Measured)))
+    let verdict = verdict_of(&decoders)
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
         .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift));
-    if of_centroid.is_some() {
-        verdict.sentence += " The centroid's scale is fitted to these lines, the model is not.";
-    }
     let summary = Summary {
         model_file: arguments.model.clone(),
         model_crc: format!("{:08x}", model.model().crc()),
@@ -197,6 +189,25 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         output::write_bytes(html, page.as_bytes())?;
     }
     print::result(common, &summary, || text_of(&summary))
+}
+
+/// Measure for errors of a model's outputs.
+fn measure_of(metadata: &Metadata<'_>) -> Measure {
+    let thickness_mm = f64::from(metadata.thickness_mm);
+    Measure {
+        full_scale: metadata.full_scale.iter().map(f64::from).collect(),
+        thickness_mm: (thickness_mm > 0.0).then_some(thickness_mm),
+        limit: None,
+    }
+}
+
+/// What the model is worth beside `decoders` that are fitted to the very lines it is judged on.
+fn verdict_of(decoders: &[DecoderErrors]) -> Verdict {
+    let mut verdict = Verdict::new(decoders, &LimitSummary::new(&Err(Refusal::Measured)));
+    if decoders.iter().any(|it| it.decoder == centroid::NAME) {
+        verdict.sentence += " The centroid's scale is fitted to these lines, the model is not.";
+    }
+    verdict
 }
 
 /// Estimates of the centroid, whose scale is fitted to these lines, as the mean is: a model keeps none.

@@ -1,8 +1,9 @@
-//! Page of a limit: what a sensor can know, with pictures.
+//! Limit of a scene: what a sensor can know, with pictures.
 
-use std::fmt::Write as _;
+use std::slice;
 
 use taxel_limit::identify::Observability;
+use taxel_limit::reference::GroupLimit;
 
 use super::axes::Axis;
 use super::chart::{Chart, Mark, STYLES, Series};
@@ -10,19 +11,19 @@ use super::colour::ColourScale;
 use super::errors::BAR_PX;
 use super::face::Face;
 use super::face_map::{Map, Values};
-use super::figures::{Figure, Figures, Page, Panel};
-use super::format::{noise, significant, symbol, with_unit};
-use super::html::document;
-use super::svg::{Shape, escape};
-use super::tables::numbers;
+use super::figures::{Figure, Panel};
+use super::format::{UNDEFINED, noise, significant, symbol, with_unit};
+use super::sections::{Digits, Fact, Section, Sections, TableOf};
+use super::svg::Shape;
 use super::ticks;
 use taxel_evaluate::evaluate::limit::{Figures as Limits, Level, LimitResult};
-use taxel_evaluate::metrics::DecoderErrors;
 
 /// Signal-to-noise ratios below this are not drawn.
 const LEAST_RATIO: f64 = 1e-3;
 /// Sizes of charts in wide and in narrow windows.
 const SIZES: [[f64; 2]; 2] = [[920.0, 400.0], [480.0, 400.0]];
+/// Signal-to-noise ratios that a table has of each row.
+const SHOWN_RATIOS: usize = 4;
 /// Directions that are drawn at most.
 const MOST_DIRECTIONS: usize = 60;
 
@@ -67,124 +68,211 @@ fn directions(level: &Level) -> Chart {
     }
 }
 
-/// Page of a limit, with the `command` that computed it.
-pub fn html(result: &LimitResult, command: &str) -> Page {
-    let title = format!("Taxel: what the sensor can know, {}", result.subject);
-    let mut figures = Figures::in_files("");
-    let mut body = format!(
-        "<header>\n<h1>{}</h1>\n<p>{} noise; {} test frames; seed {}</p>\n{}</header>\n",
-        escape(&title),
+/// Sections of a scene's limit.
+pub fn sections(result: &LimitResult) -> Sections {
+    let mut sections = Sections::new(format!("What the sensor of {} can know", result.subject));
+    sections.note(format!(
+        "{} noise; {} test frames; seed {}",
         result.noise_kind.name(),
         result.frames,
-        result.seed,
-        least(result)
-    );
+        result.seed
+    ));
+    sections.sections.push(Section::Facts(least(result)));
     if result.levels.len() > 1 {
         let caption = "Least possible RMSE from all readings against the noise, both logarithmic. Dashed: predicting the mean.";
-        body += &figures.html(&Figure::of_chart(
-            "limit-by-noise",
-            caption.into(),
-            &by_noise(result),
-            SIZES,
-        ));
+        let chart = by_noise(result);
+        sections.figure(Figure::of_chart("limit-by-noise", caption.into(), &chart, SIZES));
     }
     for level in &result.levels {
-        let seen = &level.observability;
-        let noise = noise(result.noise_kind, level.noise_level);
-        let of_level = match result.levels.len() {
-            1 => String::new(),
-            _ => format!(
-                "-at-{}",
-                noise.replace('\u{a0}', "-").replace('%', "percent").replace('Ω', "ohm")
-            ),
-        };
-        let _ = writeln!(body, "<h2>What {noise} noise leaves visible</h2>");
-        let caption = format!(
-            "Signal-to-noise ratio of every direction: how far one standard deviation of the prior moves the readings, in \
-             standard deviations of the noise. {} of {} directions are observable, above the dashed line. Ratios below \
-             {LEAST_RATIO} are not drawn.",
-            seen.observable, seen.unknowns
-        );
-        let name = format!("directions{of_level}");
-        body += &figures.html(&Figure::of_chart(&name, caption, &directions(level), SIZES));
-        let caption = "Share of the prior's variance of each electrode's Δx, Δy and Δz that all readings take away, for a sensor \
-                       linearised at the mean deformation: 0 is invisible, 1 is known.";
-        let name = format!("known{of_level}");
-        body += &figures.html(&Figure::of_panels(&name, caption.into(), &known(result, seen)));
+        figures(&mut sections, result, level);
     }
-    body += &limits(result);
-    let _ = writeln!(body, "<p class=\"note\">Made by <code>{}</code></p>", escape(command));
-    Page { html: document(&title, &body), figures: figures.files }
+    sections.heading("Least possible errors");
+    let mut lines = vec![];
+    for level in &result.levels {
+        for of in &level.limits {
+            lines.push(Line { result, level, readings: name(&of.row_wires), of });
+        }
+    }
+    limits(&mut sections, &lines);
+    models(&mut sections, slice::from_ref(result));
+    sections.heading("Directions of the deformation");
+    directions_table(&mut sections, result);
+    sections
+}
+
+/// Sections of several scenes: what all readings of each one show.
+pub fn several(results: &[LimitResult]) -> Sections {
+    let mut sections = Sections::new("What the sensors can know");
+    let mut lines = vec![];
+    for (result, level) in levels(results) {
+        lines.push(Line { result, level, readings: result.subject.clone(), of: &level.limits[0] });
+    }
+    limits(&mut sections, &lines);
+    models(&mut sections, results);
+    sections
+}
+
+fn levels(results: &[LimitResult]) -> impl Iterator<Item = (&LimitResult, &Level)> {
+    results.iter().flat_map(|result| result.levels.iter().map(move |level| (result, level)))
+}
+
+/// Limits from some readings at a level of noise.
+struct Line<'r> {
+    result: &'r LimitResult,
+    level: &'r Level,
+    readings: String,
+    of: &'r Limits,
+}
+
+impl Line<'_> {
+    fn noise(&self) -> String {
+        noise(self.result.noise_kind, self.level.noise_level)
+    }
+}
+
+/// Adds a table of limits, with columns for each group of outputs, and the reasons for those that are not given.
+fn limits(sections: &mut Sections, lines: &[Line<'_>]) {
+    let caption = "Least possible RMSE of any decoder, ± its standard error over the frames: root of the posteriors' mean variance. \
+                   Prior: always predicting the mean. ESS: smallest and median effective sample size of the posteriors. Own error: \
+                   largest share of the squared error that is the sample's own; it is subtracted.";
+    let mut table = TableOf::new(lines, caption)
+        .names("readings", |line| line.readings.clone())
+        .names("noise", Line::noise);
+    let mut names: Vec<&GroupLimit> = vec![];
+    for group in lines.iter().flat_map(|line| &line.of.groups) {
+        if names.iter().all(|known| known.group != group.group) {
+            names.push(group);
+        }
+    }
+    for name in names {
+        let of = |line: &Line<'_>| line.of.groups.iter().find(|it| it.group == name.group).cloned();
+        let limit = |line: &Line<'_>| of(line).map(|it| [it.limit, it.limit_standard_error]);
+        let prior = |line: &Line<'_>| of(line).map(|it| it.prior_rmse);
+        let (symbol, digits) = (symbol(&name.group), Digits::Decimals(4));
+        table = table.estimates(&symbol, &name.unit, digits, limit).numbers(
+            &format!("prior {symbol}"),
+            &name.unit,
+            digits,
+            prior,
+        );
+    }
+    let samples = |line: &Line<'_>| {
+        let samples = line.of.effective_samples;
+        samples.map_or(UNDEFINED.into(), |it| format!("{:.0}, {:.0}", it.least, it.median))
+    };
+    let own = |line: &Line<'_>| {
+        line.of.groups.iter().map(|group| 100.0 * group.monte_carlo_share).reduce(f64::max)
+    };
+    let table = table.texts("ESS", "", samples);
+    sections.table(table.numbers("own error", "%", Digits::Decimals(2), own));
+    for line in lines {
+        if let Some(reason) = &line.of.refused {
+            sections.note(format!("{}, {}: not given: {reason}", line.readings, line.noise()));
+        }
+    }
+}
+
+/// Adds a table of the errors of models on the same frames, if there are any.
+fn models(sections: &mut Sections, results: &[LimitResult]) {
+    let mut rows = vec![];
+    for (result, level) in levels(results) {
+        let noise = noise(result.noise_kind, level.noise_level);
+        for model in &level.decoders {
+            rows.extend(model.errors.iter().map(|it| (result, noise.clone(), model, it)));
+        }
+    }
+    if rows.is_empty() {
+        return;
+    }
+    let caption = "Models: RMSE on these frames, and its ratio to the limit of all readings.";
+    let table = TableOf::new(&rows, caption)
+        .names("model", |(_, _, model, _)| model.decoder.clone())
+        .names("scene", |(result, ..)| result.subject.clone())
+        .names("noise", |(_, noise, ..)| noise.clone())
+        .names("output", |(.., errors)| with_unit(&symbol(&errors.group), &errors.unit))
+        .numbers("RMSE", "", Digits::Decimals(4), |(.., errors)| Some(errors.rmse))
+        .estimates("× limit", "", Digits::Decimals(3), |(.., errors)| {
+            Some([errors.ratio_to_limit?, errors.ratio_standard_error?])
+        });
+    sections.table(table);
+}
+
+/// Figures of what one level of noise leaves visible.
+fn figures(sections: &mut Sections, result: &LimitResult, level: &Level) {
+    let seen = &level.observability;
+    let noise = noise(result.noise_kind, level.noise_level);
+    let of_level = match result.levels.len() {
+        1 => String::new(),
+        _ => format!(
+            "-at-{}",
+            noise.replace('\u{a0}', "-").replace('%', "percent").replace('Ω', "ohm")
+        ),
+    };
+    sections.heading(format!("What {noise} noise leaves visible"));
+    let caption = format!(
+        "Signal-to-noise ratio of every direction: how far one standard deviation of the prior moves the readings, in \
+         standard deviations of the noise. {} of {} directions are observable, above the dashed line. Ratios below \
+         {LEAST_RATIO} are not drawn.",
+        seen.observable, seen.unknowns
+    );
+    let name = format!("directions{of_level}");
+    sections.figure(Figure::of_chart(&name, caption, &directions(level), SIZES));
+    let caption = "Share of the prior's variance of each electrode's Δx, Δy and Δz that all readings take away, for a sensor \
+                   linearised at the mean deformation: 0 is invisible, 1 is known.";
+    let name = format!("known{of_level}");
+    sections.figure(Figure::of_panels(&name, caption.into(), &known(result, seen)));
 }
 
 /// Least possible errors of all readings at the first noise level.
-fn least(result: &LimitResult) -> String {
-    let of_first = |level: &Level| noise(result.noise_kind, level.noise_level);
-    let noise = result.levels.first().map_or(String::new(), of_first);
-    let figures = result.levels.first().and_then(|level| level.limits.first());
-    let groups = figures.iter().flat_map(|figures| &figures.groups).map(|group| {
-        format!(
-            "<div><dt>Least possible RMSE of {} at {noise} noise</dt><dd>{}\u{a0}<span>{}</span></dd></div>\n",
-            escape(&symbol(&group.group)),
-            significant(group.limit, 3),
-            escape(&group.unit)
-        )
-    });
-    let groups: String = groups.collect();
-    if groups.is_empty() { groups } else { format!("<dl>\n{groups}</dl>\n") }
+fn least(result: &LimitResult) -> Vec<Fact> {
+    let of_level = |level: &Level| {
+        let noise = noise(result.noise_kind, level.noise_level);
+        let groups = level.limits.first().map_or(&[][..], |figures| &figures.groups);
+        let fact = |group: &GroupLimit| Fact {
+            label: format!("Least possible RMSE of {} at {noise} noise", symbol(&group.group)),
+            value: significant(group.limit, 3),
+            unit: group.unit.clone(),
+        };
+        groups.iter().map(fact).collect()
+    };
+    result.levels.first().map_or(vec![], of_level)
 }
 
-/// Line of the table for a model: its errors, and their ratios to the limit.
-fn model_row(noise: &str, model: &DecoderErrors) -> String {
-    let cells = model.errors.iter().map(|errors| {
-        let ratio = errors.ratio_to_limit.map_or(String::new(), |r| format!(" ({r:.3} ×)"));
-        format!("{:.4}{ratio}", errors.rmse)
-    });
-    let (name, cells) = (escape(&model.decoder), numbers("td", cells));
-    format!("<tr><td>{noise}</td><td>model {name}</td>{cells}<td></td></tr>\n")
-}
-
-/// Table of the limits.
-fn limits(result: &LimitResult) -> String {
-    let mut html = String::from(
-        "<h2>Least possible errors</h2>\n<figure class=\"table\">\n<figcaption>Least possible RMSE of any decoder, ± its standard error. ESS: smallest \
-         and median effective sample size of the posteriors. Of a model: RMSE on these frames, and its ratio to the \
-         limit of all readings.</figcaption>\n<div class=\"scroll\" tabindex=\"0\" \
-         role=\"region\" aria-label=\"Limits\">\n<table>\n<thead><tr><th>noise</th><th>readings</th>",
-    );
-    let groups =
-        result.levels.iter().flat_map(|level| &level.limits).map(|figures| &figures.groups);
-    let groups = groups.max_by_key(|groups| groups.len());
-    let groups = groups.into_iter().flatten();
-    let heads = groups.map(|group| escape(&with_unit(&symbol(&group.group), &group.unit)));
-    html += &numbers("th", heads.chain(["ESS".into()]));
-    html += "</tr></thead>\n<tbody>\n";
+/// Adds a table of what readings tell about the deformation along each axis, and of the first directions.
+fn directions_table(sections: &mut Sections, result: &LimitResult) {
+    let mut rows = vec![];
     for level in &result.levels {
         let noise = noise(result.noise_kind, level.noise_level);
-        for figures in &level.limits {
-            let _ = write!(html, "<tr><td>{noise}</td><td>{}</td>", name(figures));
-            if let Some(refused) = &figures.refused {
-                let _ = write!(
-                    html,
-                    "<td colspan=\"4\" style=\"white-space: normal\">not given: {}</td>",
-                    escape(refused)
-                );
-            }
-            let limits = figures.groups.iter();
-            let limits = limits.map(|g| format!("{:.4} ± {:.4}", g.limit, g.limit_standard_error));
-            let samples = figures.effective_samples;
-            let samples = samples.map(|e| format!("{:.0}, {:.0}", e.least, e.median));
-            html += &(numbers("td", limits.chain(samples)) + "</tr>\n");
-        }
-        for model in &level.decoders {
-            html += &model_row(&noise, model);
-        }
+        let all = [&level.observability].into_iter().chain(&level.by_row);
+        rows.extend(all.map(|seen| (noise.clone(), seen)));
     }
-    html + "</tbody>\n</table>\n</div>\n</figure>\n"
+    let caption = "Observable directions move the readings by more than the noise for one standard deviation of the prior: their \
+                   signal-to-noise ratio is above 1. Known: share of the prior's variance that readings take away, and RMSE that \
+                   is left, for a sensor linearised at the mean deformation. S/N: ratios of the first directions.";
+    let mut table = TableOf::new(&rows, caption)
+        .names("readings", |(_, seen)| name(&seen.row_wires))
+        .names("noise", |(noise, _)| noise.clone())
+        .texts("observable", "", |(_, seen)| format!("{} of {}", seen.observable, seen.unknowns));
+    for (axis, letter) in ["Δx", "Δy", "Δz"].into_iter().enumerate() {
+        let known = |(_, seen): &(_, &Observability)| Some(100.0 * seen.axes[axis].known);
+        let rmse = |(_, seen): &(_, &Observability)| Some(seen.axes[axis].rmse_mm);
+        table = table.numbers(&format!("known {letter}"), "%", Digits::Decimals(0), known).numbers(
+            &format!("RMSE {letter}"),
+            "mm",
+            Digits::Decimals(4),
+            rmse,
+        );
+    }
+    let ratios = |(_, seen): &(_, &Observability)| {
+        let ratios = seen.signal_to_noise.iter().take(SHOWN_RATIOS);
+        ratios.map(|ratio| significant(*ratio, 3)).collect::<Vec<_>>().join(" ")
+    };
+    sections.table(table.texts("S/N", "", ratios));
 }
 
-fn name(figures: &Limits) -> String {
-    match &figures.row_wires[..] {
+/// Name of the readings of these row-wires.
+fn name(row_wires: &[usize]) -> String {
+    match row_wires {
         [row] => format!("row {row}"),
         rows => format!("all {} rows", rows.len()),
     }
@@ -196,7 +284,7 @@ fn by_noise(result: &LimitResult) -> Chart {
     let names = of_array().map(|(_, figures)| &figures.groups).max_by_key(|groups| groups.len());
     let mut series = Vec::new();
     for (group, (class, shape)) in names.into_iter().flatten().zip(STYLES).take(3) {
-        let line = |of: &dyn Fn(&taxel_limit::reference::GroupLimit) -> f64| {
+        let line = |of: &dyn Fn(&GroupLimit) -> f64| {
             let mut points: Vec<[f64; 2]> = of_array()
                 .filter_map(|(noise, f)| {
                     f.groups.iter().find(|g| g.group == group.group).map(|g| [noise, of(g)])

@@ -1,0 +1,340 @@
+//! Sections: a result is declared once, and shown as text and as a page.
+//!
+//! A result is a list of [`Section`]s: facts, tables, figures and notes. A [`Table`] has a column for each quantity, with
+//! its heading, its unit and its digits. Text and page are made of the same sections, so that neither can say anything
+//! else than the other.
+
+use std::fmt::Write as _;
+
+use super::figures::{Figure, Figures, Page};
+use super::format::{UNDEFINED, fixed, significant, with_unit};
+use super::html::document;
+use super::svg::escape;
+use super::tables::numbers;
+
+/// Characters in a line of text, at most.
+const WIDTH: usize = 120;
+/// Space between columns of text.
+const GAP: &str = "  ";
+
+/// Result as people read it.
+#[derive(Debug, Default)]
+pub struct Sections {
+    pub title: String,
+    pub sections: Vec<Section>,
+}
+
+/// Part of a result.
+#[derive(Debug)]
+pub enum Section {
+    /// Heading of the sections that follow.
+    Heading(String),
+    /// Numbers that are read first, each with its label and its unit.
+    Facts(Vec<Fact>),
+    Table(Table),
+    /// Figure, which text goes without.
+    Figure(Figure),
+    /// Paragraph of plain text.
+    Note(String),
+}
+
+/// Number with its label.
+#[derive(Debug)]
+pub struct Fact {
+    pub label: String,
+    pub value: String,
+    pub unit: String,
+}
+
+/// Quantities of several things, one thing a line.
+#[derive(Debug)]
+pub struct Table {
+    /// Sentence that tells what it has.
+    pub caption: String,
+    columns: Vec<Column>,
+    lines: usize,
+}
+
+#[derive(Debug)]
+struct Column {
+    heading: String,
+    /// Whether it names what the line is about, and is not a quantity of it.
+    is_name: bool,
+    cells: Vec<String>,
+}
+
+/// Digits of a quantity.
+#[derive(Debug, Clone, Copy)]
+pub enum Digits {
+    /// So many after the point.
+    Decimals(usize),
+    /// So many from the first that is not 0.
+    Significant(usize),
+}
+
+impl Digits {
+    /// Text of a number; a dash for one that is missing.
+    pub fn text(self, value: Option<f64>) -> String {
+        match (value, self) {
+            (None, _) => UNDEFINED.into(),
+            (Some(value), Self::Decimals(decimals)) => fixed(value, decimals),
+            (Some(value), Self::Significant(digits)) => significant(value, digits),
+        }
+    }
+
+    /// Text of a number with its standard error.
+    pub fn with_error(self, value: Option<[f64; 2]>) -> String {
+        let text = |[value, error]: [f64; 2]| {
+            format!("{} ± {}", self.text(Some(value)), self.text(Some(error)))
+        };
+        value.map_or(UNDEFINED.into(), text)
+    }
+}
+
+/// Table of `rows`, whose columns are told by what they take from a row.
+#[derive(Debug)]
+pub struct TableOf<'r, R> {
+    rows: &'r [R],
+    table: Table,
+}
+
+impl<'r, R> TableOf<'r, R> {
+    /// Table without columns.
+    pub fn new(rows: &'r [R], caption: impl Into<String>) -> Self {
+        Self { rows, table: Table { caption: caption.into(), columns: vec![], lines: rows.len() } }
+    }
+
+    /// Adds a column of names, which say what rows are about.
+    #[must_use]
+    pub fn names(self, heading: &str, name: impl Fn(&'r R) -> String) -> Self {
+        self.column(heading, true, name)
+    }
+
+    /// Adds a column of a quantity in a `unit`, as text.
+    #[must_use]
+    pub fn texts(self, heading: &str, unit: &str, text: impl Fn(&'r R) -> String) -> Self {
+        self.column(&with_unit(heading, unit), false, text)
+    }
+
+    /// Adds a column of a quantity in a `unit`; `None` where it is not defined.
+    #[must_use]
+    pub fn numbers(
+        self,
+        heading: &str,
+        unit: &str,
+        digits: Digits,
+        value: impl Fn(&'r R) -> Option<f64>,
+    ) -> Self {
+        self.texts(heading, unit, |row| digits.text(value(row)))
+    }
+
+    /// Adds a column of a quantity in a `unit` with its standard error.
+    #[must_use]
+    pub fn estimates(
+        self,
+        heading: &str,
+        unit: &str,
+        digits: Digits,
+        value: impl Fn(&'r R) -> Option<[f64; 2]>,
+    ) -> Self {
+        self.texts(heading, unit, |row| digits.with_error(value(row)))
+    }
+
+    fn column(mut self, heading: &str, is_name: bool, cell: impl Fn(&'r R) -> String) -> Self {
+        let cells = self.rows.iter().map(cell).collect();
+        self.table.columns.push(Column { heading: heading.into(), is_name, cells });
+        self
+    }
+}
+
+impl Table {
+    /// Lines of text of at most [`WIDTH`] characters: columns that do not fit follow below, behind the names once more.
+    fn text(&self) -> String {
+        let (names, quantities): (Vec<&Column>, Vec<&Column>) =
+            self.columns.iter().partition(|column| column.is_name);
+        let of_names: usize = names.iter().map(|column| column.width() + GAP.len()).sum();
+        let mut blocks: Vec<Vec<&Column>> = vec![];
+        let mut left = 0;
+        for column in quantities {
+            let width = column.width() + GAP.len();
+            if left < width {
+                blocks.push(names.clone());
+                left = (WIDTH + GAP.len()).saturating_sub(of_names).max(width);
+            }
+            left -= width;
+            blocks.last_mut().expect("pushed before").push(column);
+        }
+        let of_block = |block: &Vec<&Column>| -> String {
+            let heading = |column: &&Column| column.padded(&column.heading);
+            let cell = |line: usize| move |column: &&Column| column.padded(&column.cells[line]);
+            let joined = |cells: Vec<String>| cells.join(GAP).trim_end().to_owned() + "\n";
+            let lines = (0..self.lines).map(|line| joined(block.iter().map(cell(line)).collect()));
+            joined(block.iter().map(heading).collect()) + &lines.collect::<String>()
+        };
+        blocks.iter().map(of_block).collect::<Vec<_>>().join("\n")
+    }
+
+    fn html(&self, number: usize) -> String {
+        let tag = |column: &Column, tag: &str, text: &str| {
+            let text = escape(text);
+            if column.is_name { format!("<{tag}>{text}</{tag}>") } else { numbers(tag, [text]) }
+        };
+        let heads = self.columns.iter().map(|column| tag(column, "th", &column.heading));
+        let mut html = format!(
+            "<figure id=\"table-{number}\" class=\"table\">\n<figcaption><b>Table {number}.</b> {}</figcaption>\n<div class=\"scroll\" \
+             tabindex=\"0\" role=\"region\" aria-label=\"Table {number}\">\n<table class=\"wrap\">\n<thead><tr>{}</tr></thead>\n<tbody>\n",
+            escape(&self.caption),
+            heads.collect::<String>()
+        );
+        for line in 0..self.lines {
+            let cell = |column: &Column| tag(column, "td", &column.cells[line]);
+            // Writing to a string cannot fail.
+            let _ =
+                writeln!(html, "<tr>{}</tr>", self.columns.iter().map(cell).collect::<String>());
+        }
+        html + "</tbody>\n</table>\n</div>\n</figure>\n"
+    }
+}
+
+impl Column {
+    fn width(&self) -> usize {
+        let cells = self.cells.iter().chain([&self.heading]);
+        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+    }
+
+    fn padded(&self, cell: &str) -> String {
+        let width = self.width();
+        if self.is_name { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+    }
+}
+
+impl Sections {
+    /// No section yet.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), sections: vec![] }
+    }
+
+    pub fn heading(&mut self, text: impl Into<String>) {
+        self.sections.push(Section::Heading(text.into()));
+    }
+
+    pub fn note(&mut self, text: impl Into<String>) {
+        self.sections.push(Section::Note(text.into()));
+    }
+
+    pub fn table<R>(&mut self, table: TableOf<'_, R>) {
+        self.sections.push(Section::Table(table.table));
+    }
+
+    pub fn figure(&mut self, figure: Figure) {
+        self.sections.push(Section::Figure(figure));
+    }
+
+    /// Text for a terminal.
+    pub fn text(&self) -> String {
+        let mut text = format!("{}\n", self.title);
+        for section in &self.sections {
+            let part = match section {
+                // Headings stand above figures alone in many places, which text goes without.
+                Section::Heading(_) | Section::Figure(_) => continue,
+                Section::Facts(facts) => {
+                    let fact = |Fact { label, value, unit }: &Fact| {
+                        format!("{label}: {value} {unit}").trim_end().to_owned() + "\n"
+                    };
+                    facts.iter().map(fact).collect()
+                }
+                Section::Table(table) => format!("{}\n{}", wrapped(&table.caption), table.text()),
+                Section::Note(note) => wrapped(note),
+            };
+            text += "\n";
+            text += &part;
+        }
+        text
+    }
+
+    /// Page with the files of its figures, and the `command` that made it.
+    pub fn page(&self, command: &str) -> Page {
+        let mut figures = Figures::in_files("");
+        let mut html = format!("<h1>{}</h1>\n", escape(&self.title));
+        let mut tables = 0;
+        for section in &self.sections {
+            let part = match section {
+                Section::Heading(text) => format!("<h2>{}</h2>\n", escape(text)),
+                Section::Facts(facts) => {
+                    let fact = |Fact { label, value, unit }: &Fact| {
+                        let [label, value, unit] = [label, value, unit].map(|it| escape(it));
+                        format!(
+                            "<div><dt>{label}</dt><dd>{value}\u{a0}<span>{unit}</span></dd></div>\n"
+                        )
+                    };
+                    format!("<dl>\n{}</dl>\n", facts.iter().map(fact).collect::<String>())
+                }
+                Section::Table(table) => {
+                    tables += 1;
+                    table.html(tables)
+                }
+                Section::Figure(figure) => figures.html(figure),
+                Section::Note(note) => format!("<p class=\"note\">{}</p>\n", escape(note)),
+            };
+            html += &part;
+        }
+        let _ = writeln!(html, "<p class=\"note\">Made by <code>{}</code></p>", escape(command));
+        let title = format!("Taxel: {}", self.title);
+        Page { html: document(&title, &html), figures: figures.files }
+    }
+}
+
+/// Text in lines of at most [`WIDTH`] characters.
+pub fn wrapped(text: &str) -> String {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let line = lines.last_mut().expect("never empty");
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > WIDTH {
+            lines.push(word.into());
+            continue;
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line.push_str(word);
+    }
+    lines.join("\n") + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_and_page_have_the_same_cells() {
+        let rows = [("dz", Some([0.0371, 0.0002]), 0.998), ("d<x", None, -0.5)];
+        let table = TableOf::new(&rows, "Errors <of> two outputs.")
+            .names("output", |row| row.0.into())
+            .estimates("RMSE", "mm", Digits::Decimals(4), |row| row.1)
+            .numbers("R²", "", Digits::Significant(2), |row| Some(row.2));
+        let mut sections = Sections::new("A & B");
+        sections.table(table);
+        let text = sections.text();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[4], "output        RMSE (mm)     R²");
+        assert_eq!(lines[5], "dz      0.0371 ± 0.0002   1.00");
+        assert_eq!(lines[6], "d<x                   –  −0.50");
+        let page = sections.page("host-sim x").html;
+        let line =
+            "<tr><td>d&lt;x</td><td class=\"number\">–</td><td class=\"number\">−0.50</td></tr>";
+        assert!(page.contains(line) && page.contains("<title>Taxel: A &amp; B</title>"), "{page}");
+    }
+
+    #[test]
+    fn columns_that_do_not_fit_stand_below_behind_the_names() {
+        let mut table = TableOf::new(&["row 1"], "Many.").names("wire", |row| (*row).into());
+        for column in 0..20 {
+            let heading = format!("column {column}");
+            table = table.numbers(&heading, "", Digits::Decimals(1), |_| Some(f64::from(column)));
+        }
+        let text = table.table.text();
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert_eq!(text.matches("row 1").count(), 2);
+        assert_eq!(text.matches("column").count(), 20);
+    }
+}
