@@ -6,7 +6,6 @@
 use taxel_data::output::Inner;
 use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
-use taxel_evaluate::sweep::Merged;
 
 pub mod format;
 pub mod ticks;
@@ -36,8 +35,8 @@ mod sections;
 
 pub use figures::{FOLDER as FIGURES, Page};
 pub use limit::{sections as of_limit, several as of_limits};
-pub use points::{evenly, result_text, setting_cells, setting_heads};
-pub use sections::Sections;
+pub use points::{result_text, sections as of_points};
+pub use sections::{Sections, TableOf};
 pub use view::{Made, View, in_words};
 
 use figures::Figures;
@@ -60,11 +59,6 @@ pub fn view_html(view: &View<'_>) -> String {
 /// Page for a trade between speed and accuracy, with the `command` that computed it.
 pub fn trade_html(trade: &Trade, command: &str) -> Page {
     trade::html(trade, command)
-}
-
-/// Page for the results of a sweep or a comparison, whose files begin with `stem`, with the `command` that made them.
-pub fn sweep_html(merged: &Merged, stem: &str, command: &str) -> Page {
-    points::html(merged, stem, command)
 }
 
 #[cfg(test)]

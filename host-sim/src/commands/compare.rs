@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::report::result_text;
+use crate::report::{TableOf, result_text};
 use crate::sweep::fields::require_known;
 use crate::sweep::file::{Bound, Wanted};
 use crate::sweep::merge::{PointResult, Setting};
@@ -14,7 +14,7 @@ use clap::Args;
 use toml::Value;
 
 use super::decoder_arguments::{DecoderArguments, ReadoutOption};
-use super::merged::{self, Files};
+use super::merged::Files;
 use super::progress::Terminal;
 use super::{Common, arguments, command_line, print};
 
@@ -131,23 +131,29 @@ fn table(page: &mut print::Page, merged: &Merged, first: &str) {
     columns.retain(|column| seen.insert(*column));
     let mut fields: Vec<&str> = merged.fields.iter().map(String::as_str).collect();
     fields.retain(|field| ![SCENE, SEED].contains(field));
-    let heads = ["layout"].into_iter().chain(columns.iter().copied()).chain(fields.iter().copied());
-    let mut lines: Vec<Vec<String>> = vec![heads.map(String::from).collect()];
-    for (layout, own) in &layouts {
-        let within = own.iter().filter(|setting| setting.is_within);
+    let error_of =
+        |setting: &&Setting| setting.results.get(error).copied().unwrap_or(f64::INFINITY);
+    let mut rows: Vec<(&str, Option<&Setting>)> = vec![];
+    for (layout, own) in layouts {
         // A layout with other outputs has its limit and its first decoder.
-        let error_of =
-            |setting: &&&Setting| setting.results.get(error).copied().unwrap_or(f64::INFINITY);
-        let best = within.min_by(|a, b| error_of(a).total_cmp(&error_of(b)));
-        let result = |name: &&str| best.map_or("-".into(), |best| result_text(best, name));
-        let value = |field: &&str| {
-            best.and_then(|best| best.values.get(*field)).map_or("-".into(), ToString::to_string)
-        };
-        let cells = columns.iter().map(result).chain(fields.iter().map(value));
-        lines.push([(*layout).to_owned()].into_iter().chain(cells).collect());
+        let within = own.into_iter().filter(|setting| setting.is_within);
+        rows.push((layout, within.min_by(|a, b| error_of(a).total_cmp(&error_of(b)))));
     }
-    merged::table(page, &lines);
-    if lines.iter().any(|line| line.iter().skip(1).all(|cell| cell == "-")) {
+    let mut table = TableOf::new(&rows, "Layouts, each with its best decoder.")
+        .names("layout", |(layout, _)| (*layout).into());
+    for field in fields {
+        table = table.names(field, move |(_, best)| {
+            let value = best.and_then(|best| best.values.get(field));
+            value.map_or("-".into(), ToString::to_string)
+        });
+    }
+    for column in columns {
+        table = table.texts(column, "", move |(_, best)| {
+            best.map_or("-".into(), |best| result_text(best, column))
+        });
+    }
+    page.line(table.text().trim_end());
+    if rows.iter().any(|(_, best)| best.is_none()) {
         page.line("-: no decoder of the layout is within the bound");
     }
     for failed in merged.failed() {

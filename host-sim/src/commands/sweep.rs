@@ -9,7 +9,7 @@ use clap::{Args, Parser};
 use serde::Serialize;
 use taxel_data::digest::digest;
 
-use super::merged::{self, Files};
+use super::merged::Files;
 use super::progress::Terminal;
 use super::subject_argument::SubjectArgument;
 use super::{Common, arguments, command_line, print, stderr};
@@ -230,7 +230,7 @@ fn merge(
     let command = command_line::of_this_process("sweep", &[], None);
     files.write(&merged, &command)?;
     print::result(common, &merged, || {
-        let mut page = merged::page(&merged);
+        let mut page = print::Page::of(files.sections(&merged).text().trim_end());
         page.line(format_args!("\nwritten: {}", files.names()));
         page
     })?;

@@ -1,19 +1,17 @@
-//! Page of a sweep: its points and their front, what the axes explain, and the best settings' scenes.
-
-use std::fmt::Write as _;
+//! Results of a sweep: its points and their front, what the axes explain, and the best settings' scenes.
 
 use super::axes::Axis;
 use super::chart::{Chart, Mark, Series};
 use super::data::{Data, number};
-use super::figures::{Figure, Figures, Page, link};
+use super::figures::Figure;
 use super::format::{counted, significant, symbol};
-use super::html::document;
-use super::svg::{Anchor, Shape, Svg, TEXT_PX, escape, text_width};
-use super::tables::numbers;
+use super::sections::{Digits, Section, Sections, TableOf};
+use super::svg::{Anchor, Shape, Svg, TEXT_PX, text_width};
 use super::ticks;
 use taxel_evaluate::metrics::unit_of_rmse;
 use taxel_evaluate::sweep::Merged;
-use taxel_evaluate::sweep::effects::Effect;
+use taxel_evaluate::sweep::effects::Level;
+use taxel_evaluate::sweep::file::Bound;
 use taxel_evaluate::sweep::merge::Setting;
 use taxel_evaluate::sweep::plan::SEED;
 
@@ -218,155 +216,129 @@ fn shares(merged: &Merged) -> Data {
     data
 }
 
-/// Page of a sweep.
-pub fn html(merged: &Merged, stem: &str, command: &str) -> Page {
-    let mut figures = Figures::in_files(&format!("{stem}-"));
-    let title = format!("Taxel: sweep {}", merged.plan);
-    let failed = merged.failed().count();
-    let missing = merged.missing.len();
-    let mut lacking = String::new();
-    for (count, what) in
-        [(failed, "failed"), (missing, "missing")].into_iter().filter(|(count, _)| *count > 0)
-    {
-        let _ = write!(lacking, "; {count} {what}");
-    }
+/// Sections of a sweep or a comparison whose files begin with `stem`.
+pub fn sections(merged: &Merged, stem: &str) -> Sections {
+    let mut sections = Sections::new(format!("Sweep {}", merged.plan));
+    sections.prefix = format!("{stem}-");
+    sections.files = vec![format!("{stem}.csv")];
+    let within = merged.settings.iter().filter(|setting| setting.is_within).count();
+    let bounded = if merged.bounds.is_empty() { 0 } else { within };
+    let counts = [
+        (merged.failed().count(), "failed"),
+        (merged.missing.len(), "missing"),
+        (bounded, "within the bounds"),
+        (merged.front().len(), "on the front"),
+    ];
+    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
+    let (points, settings) = (merged.points.len(), merged.settings.len());
+    let all = [counted(points, "point"), counted(settings, "setting")].into_iter();
+    let all = all.chain(counts.map(|(count, what)| format!("{count} {what}")));
+    let all = all.collect::<Vec<_>>().join(", ");
+    sections.note(format!("{all}; {}", merged.build));
+    merged.none_within().into_iter().for_each(|sentence| sections.note(sentence));
     for (note, count) in merged.notes() {
-        let _ = write!(lacking, "; {count} with {note}");
-    }
-    let mut body = format!(
-        "<header>\n<h1>{}</h1>\n<p>{}{lacking}; {}; {}</p>\n</header>\n",
-        escape(&title),
-        counted(merged.points.len(), "point"),
-        counted(merged.settings.len(), "setting"),
-        link(&format!("{stem}.csv"), "all points as a table"),
-    );
-    if let Some(sentence) = merged.none_within() {
-        let _ = writeln!(body, "<p>{}</p>", escape(&sentence));
+        sections
+            .note(format!("{} with {note}; the JSON says why of each", counted(count, "point")));
     }
     if let Some(chart) = front(merged) {
-        let bounds: Vec<String> =
-            merged.bounds.iter().map(|(name, bound)| in_bound(name, *bound)).collect();
-        let bounds = if bounds.is_empty() {
-            String::new()
-        } else {
-            format!(" Bounds: {}.", bounds.join(", "))
-        };
-        let caption = format!(
-            "Every setting. On the Pareto front of {} no other setting within the bounds is as good in all and better in \
-             one.{bounds}",
-            merged.objectives.iter().map(|it| name(it)).collect::<Vec<_>>().join(" and ")
-        );
-        body += &figures.html(&Figure::of_chart("front", caption, &chart, [WIDE, NARROW]));
+        let caption = "Every setting, and the Pareto front, on which no other setting within the bounds is as good in all \
+                       objectives and better in one.";
+        sections.figure(Figure::of_chart("front", caption.into(), &chart, [WIDE, NARROW]));
     }
-    body += &front_table(merged);
+    front_table(&mut sections, merged);
     if !merged.effects.is_empty() {
+        sections.heading("What the axes do");
         let drawings = [WIDE, NARROW].map(|size| bars(merged, size[0]));
         let caption = "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of \
                        its logarithm where all values are positive. What is left belongs to axes together, and to chance.";
-        body += "<h2>What the axes do</h2>\n";
-        body += &figures.html(&Figure::of_drawings(
-            "effects",
-            caption.into(),
-            drawings,
-            shares(merged),
-        ));
-        body += &levels(merged);
+        let data = shares(merged);
+        sections.figure(Figure::of_drawings("effects", caption.into(), drawings, data));
+        shares_table(&mut sections, merged);
+        levels(&mut sections, merged);
     }
-    let _ = writeln!(
-        body,
-        "<p class=\"note\">Made by <code>{}</code>, {}</p>",
-        escape(command),
-        escape(&merged.build)
-    );
-    Page { html: document(&title, &body), figures: figures.files }
+    sections
 }
 
-fn in_bound(name: &str, bound: taxel_evaluate::sweep::file::Bound) -> String {
-    use taxel_evaluate::sweep::file::Bound;
+fn in_bound(name: &str, bound: Bound) -> String {
     match bound {
         Bound::Most(most) => format!("{name} at most {most}"),
         Bound::Least { least } => format!("{name} at least {least}"),
     }
 }
 
-/// A table with these heads, its caption and its lines.
-fn table(caption: &str, first: &str, heads: impl Iterator<Item = String>, lines: &str) -> String {
-    format!(
-        "<figure class=\"table\">\n<figcaption>{caption}</figcaption>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" \
-         aria-label=\"{first}\">\n<table class=\"wrap\">\n<thead><tr><th>{first}</th>{}</tr></thead>\n<tbody>\n{lines}</tbody>\n</table>\n</div>\n\
-         </figure>\n",
-        numbers("th", heads)
-    )
+/// Adds columns of the fields that settings differ in and of their objectives.
+fn with_settings<'r>(
+    table: TableOf<'r, &'r Setting>,
+    merged: &'r Merged,
+) -> TableOf<'r, &'r Setting> {
+    let mut table = table;
+    for (place, head) in setting_heads(merged).iter().enumerate() {
+        table = table.names(head, |setting| setting_cells(merged, setting)[place].clone());
+    }
+    for objective in &merged.objectives {
+        table = table.texts(&name(objective), "", |setting| result_text(setting, objective));
+    }
+    table
 }
 
-fn front_table(merged: &Merged) -> String {
+/// Adds the settings on the front, evenly chosen where they are many.
+fn front_table(sections: &mut Sections, merged: &Merged) {
     let front = merged.front();
     let places = evenly(front.len(), SHOWN);
-    let mut lines = String::new();
-    let mut scenes = String::new();
-    for place in &places {
-        let setting = front[*place];
-        let (fields, results) = (setting_cells(merged, setting), merged.objectives.iter());
-        let results = results.map(|name| result_text(setting, name));
-        let mut cells = fields.into_iter().map(|cell| escape(&cell)).chain(results);
-        let first = cells.next().unwrap_or_default();
-        let _ = writeln!(lines, "<tr><td>{first}</td>{}</tr>", numbers("td", cells));
-        if let Some(scene) = &setting.scene {
-            let _ = write!(
-                scenes,
-                "<details>\n<summary>{}</summary>\n<pre>{}</pre>\n</details>\n",
-                escape(&setting.in_words()),
-                escape(scene)
-            );
-        }
-    }
+    let shown: Vec<&Setting> = places.iter().map(|place| front[*place]).collect();
+    let bounds = merged.bounds.iter().map(|(name, bound)| in_bound(name, *bound));
+    let bounds = bounds.collect::<Vec<_>>().join(", ");
+    let bounds = if bounds.is_empty() { bounds } else { format!(" Bounds: {bounds}.") };
     let some = if front.len() > SHOWN {
-        format!(" {SHOWN} of {} settings.", front.len())
+        format!(" {SHOWN} of {} settings; the files have all.", front.len())
     } else {
         String::new()
     };
-    let mut heads =
-        setting_heads(merged).into_iter().chain(merged.objectives.iter().map(|it| name(it)));
-    let first = heads.next().unwrap_or_default();
-    let table = table(&format!("The front.{some}"), &first, heads.map(|it| escape(&it)), &lines);
-    format!(
-        "{table}<details>\n<summary>Scenes of these settings</summary>\n<p class=\"note\">Each can be saved as a file, and \
-         run.</p>\n{scenes}</details>\n"
-    )
+    let caption = format!("The Pareto front.{some}{bounds}");
+    sections.table(with_settings(TableOf::new(&shown, caption), merged));
+    let scenes = shown.iter().filter_map(|setting| {
+        let scene = vec![Section::Listing(setting.scene.clone()?)];
+        Some(Section::Folded(setting.in_words(), scene))
+    });
+    let scenes: Vec<Section> = scenes.collect();
+    if !scenes.is_empty() {
+        let summary = "Scenes of these settings, each of which can be saved as a file, and run";
+        sections.sections.push(Section::Folded(summary.into(), scenes));
+    }
 }
 
-/// Means of each objective by the levels of each axis.
-fn levels(merged: &Merged) -> String {
-    let mut lines = String::new();
-    for field in &merged.fields {
-        let of_field: Vec<Option<&Effect>> =
-            merged.objectives.iter().map(|objective| merged.effect(field, objective)).collect();
-        let Some(first) = of_field.iter().flatten().next() else { continue };
-        let _ = writeln!(
-            lines,
-            "<tr><th class=\"group\" scope=\"rowgroup\">{}</th></tr>",
-            escape(field)
-        );
-        for (place, level) in first.levels.iter().enumerate() {
-            let means = of_field.iter().map(|effect| {
-                let level = effect.and_then(|effect| effect.levels.get(place));
-                level.map_or("-".into(), |level| significant(level.mean, 3))
-            });
-            let _ = writeln!(
-                lines,
-                "<tr><td>{} <small>{} settings</small></td>{}</tr>",
-                escape(&level.name),
-                level.points,
-                numbers("td", means)
-            );
-        }
+/// Adds the share of each objective's variance that each axis explains.
+fn shares_table(sections: &mut Sections, merged: &Merged) {
+    let fields: Vec<&String> = merged.fields_with_effects().collect();
+    let caption = "Share of the variance that each axis explains, in per cent.";
+    let mut table = TableOf::new(&fields, caption).names("axis", |field| (*field).clone());
+    for objective in &merged.objectives {
+        table = table.numbers(&name(objective), "", Digits::Decimals(0), |field| {
+            merged.effect(field, objective).map(|effect| 100.0 * effect.share)
+        });
     }
-    let heads = merged.objectives.iter().map(|it| escape(&name(it)));
-    let table = table(
-        "Geometric means over all settings of a level, whatever their other axes are.",
-        "axis",
-        heads,
-        &lines,
-    );
-    format!("<details>\n<summary>Means by level</summary>\n{table}</details>\n")
+    sections.table(table);
+}
+
+/// Adds means of each objective by the levels of each axis.
+fn levels(sections: &mut Sections, merged: &Merged) {
+    let mut rows: Vec<(&String, usize, &Level)> = vec![];
+    for field in &merged.fields {
+        let first = merged.objectives.iter().find_map(|objective| merged.effect(field, objective));
+        let levels = first.map_or(&[][..], |effect| &effect.levels);
+        rows.extend(levels.iter().enumerate().map(|(place, level)| (field, place, level)));
+    }
+    let caption = "Geometric means over all settings of a level, whatever their other axes are.";
+    let mut table = TableOf::new(&rows, caption)
+        .names("axis", |(field, ..)| (*field).clone())
+        .names("level", |(.., level)| level.name.clone())
+        .texts("settings", "", |(.., level)| level.points.to_string());
+    for objective in &merged.objectives {
+        table = table.numbers(&name(objective), "", Digits::Significant(3), |(field, place, _)| {
+            let level = merged.effect(field, objective)?.levels.get(*place)?;
+            Some(level.mean)
+        });
+    }
+    let summary = "Means by level".into();
+    sections.sections.push(Section::Folded(summary, vec![table.section()]));
 }

@@ -6,7 +6,7 @@
 
 use std::fmt::Write as _;
 
-use super::figures::{Figure, Figures, Page};
+use super::figures::{Figure, Figures, Page, link};
 use super::format::{UNDEFINED, fixed, significant, with_unit};
 use super::html::document;
 use super::svg::escape;
@@ -21,6 +21,10 @@ const GAP: &str = "  ";
 #[derive(Debug, Default)]
 pub struct Sections {
     pub title: String,
+    /// What names of figures' files begin with.
+    pub prefix: String,
+    /// Files beside the page that have the numbers.
+    pub files: Vec<String>,
     pub sections: Vec<Section>,
 }
 
@@ -36,6 +40,10 @@ pub enum Section {
     Figure(Figure),
     /// Paragraph of plain text.
     Note(String),
+    /// Sections behind a summary that a reader opens, which text goes without.
+    Folded(String, Vec<Section>),
+    /// Text with its own lines, which text goes without.
+    Listing(String),
 }
 
 /// Number with its label.
@@ -140,6 +148,16 @@ impl<'r, R> TableOf<'r, R> {
         self.texts(heading, unit, |row| digits.with_error(value(row)))
     }
 
+    /// Table as text, without its caption.
+    pub fn text(&self) -> String {
+        self.table.text()
+    }
+
+    /// Table without its rows.
+    pub fn section(self) -> Section {
+        Section::Table(self.table)
+    }
+
     fn column(mut self, heading: &str, is_name: bool, cell: impl Fn(&'r R) -> String) -> Self {
         let cells = self.rows.iter().map(cell).collect();
         self.table.columns.push(Column { heading: heading.into(), is_name, cells });
@@ -211,7 +229,7 @@ impl Column {
 impl Sections {
     /// No section yet.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), sections: vec![] }
+        Self { title: title.into(), ..Self::default() }
     }
 
     pub fn heading(&mut self, text: impl Into<String>) {
@@ -223,7 +241,7 @@ impl Sections {
     }
 
     pub fn table<R>(&mut self, table: TableOf<'_, R>) {
-        self.sections.push(Section::Table(table.table));
+        self.sections.push(table.section());
     }
 
     pub fn figure(&mut self, figure: Figure) {
@@ -236,7 +254,10 @@ impl Sections {
         for section in &self.sections {
             let part = match section {
                 // Headings stand above figures alone in many places, which text goes without.
-                Section::Heading(_) | Section::Figure(_) => continue,
+                Section::Heading(_)
+                | Section::Figure(_)
+                | Section::Folded(..)
+                | Section::Listing(_) => continue,
                 Section::Facts(facts) => {
                     let fact = |Fact { label, value, unit }: &Fact| {
                         format!("{label}: {value} {unit}").trim_end().to_owned() + "\n"
@@ -254,33 +275,53 @@ impl Sections {
 
     /// Page with the files of its figures, and the `command` that made it.
     pub fn page(&self, command: &str) -> Page {
-        let mut figures = Figures::in_files("");
         let mut html = format!("<h1>{}</h1>\n", escape(&self.title));
-        let mut tables = 0;
+        let mut numbers = Numbers { figures: Figures::in_files(&self.prefix), tables: 0 };
         for section in &self.sections {
-            let part = match section {
-                Section::Heading(text) => format!("<h2>{}</h2>\n", escape(text)),
-                Section::Facts(facts) => {
-                    let fact = |Fact { label, value, unit }: &Fact| {
-                        let [label, value, unit] = [label, value, unit].map(|it| escape(it));
-                        format!(
-                            "<div><dt>{label}</dt><dd>{value}\u{a0}<span>{unit}</span></dd></div>\n"
-                        )
-                    };
-                    format!("<dl>\n{}</dl>\n", facts.iter().map(fact).collect::<String>())
-                }
-                Section::Table(table) => {
-                    tables += 1;
-                    table.html(tables)
-                }
-                Section::Figure(figure) => figures.html(figure),
-                Section::Note(note) => format!("<p class=\"note\">{}</p>\n", escape(note)),
-            };
-            html += &part;
+            html += &numbers.html(section);
         }
-        let _ = writeln!(html, "<p class=\"note\">Made by <code>{}</code></p>", escape(command));
+        let files: Vec<String> = self.files.iter().map(|file| link(file, file)).collect();
+        let files =
+            if files.is_empty() { String::new() } else { format!(": {}", files.join(", ")) };
+        let command = escape(command);
+        let _ = writeln!(html, "<p class=\"note\">Made by <code>{command}</code>{files}</p>");
         let title = format!("Taxel: {}", self.title);
-        Page { html: document(&title, &html), figures: figures.files }
+        Page { html: document(&title, &html), figures: numbers.figures.files }
+    }
+}
+
+/// Numbers of figures and tables, as they come.
+struct Numbers {
+    figures: Figures,
+    tables: usize,
+}
+
+impl Numbers {
+    fn html(&mut self, section: &Section) -> String {
+        match section {
+            Section::Heading(text) => format!("<h2>{}</h2>\n", escape(text)),
+            Section::Facts(facts) => {
+                let fact = |Fact { label, value, unit }: &Fact| {
+                    let [label, value, unit] = [label, value, unit].map(|it| escape(it));
+                    format!(
+                        "<div><dt>{label}</dt><dd>{value}\u{a0}<span>{unit}</span></dd></div>\n"
+                    )
+                };
+                format!("<dl>\n{}</dl>\n", facts.iter().map(fact).collect::<String>())
+            }
+            Section::Table(table) => {
+                self.tables += 1;
+                table.html(self.tables)
+            }
+            Section::Figure(figure) => self.figures.html(figure),
+            Section::Note(note) => format!("<p class=\"note\">{}</p>\n", escape(note)),
+            Section::Folded(summary, sections) => {
+                let inner: String = sections.iter().map(|section| self.html(section)).collect();
+                let summary = escape(summary);
+                format!("<details>\n<summary>{summary}</summary>\n{inner}</details>\n")
+            }
+            Section::Listing(text) => format!("<pre>{}</pre>\n", escape(text)),
+        }
     }
 }
 
