@@ -20,6 +20,9 @@ const NAMES: [&str; 11] = [
     "uhrzeit",
 ];
 
+/// Names that say their unit, as those of Arduino's clocks do, with its length in seconds.
+const COUNTERS: [(&str, f64); 2] = [("millis", 1e-3), ("micros", 1e-6)];
+
 /// Units of time, with their length in seconds.
 const UNITS: [(&str, f64); 5] =
     [("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("min", 60.0)];
@@ -88,7 +91,9 @@ impl Clock {
         let name = &file.header[column];
         let first = at.first().copied().unwrap_or(0.0);
         let unit = columns::unit_of(name);
-        let stated = UNITS.iter().find(|(known, _)| *known == unit).map(|(_, seconds)| *seconds);
+        let (bare, known) = (bare(name), UNITS.iter().find(|(known, _)| *known == unit));
+        let stated = known.or_else(|| COUNTERS.iter().find(|(counter, _)| *counter == bare));
+        let stated = stated.map(|(_, seconds)| *seconds);
         let since_1970 =
             || SINCE_1970.iter().find(|(least, _)| (*least..5.0 * least).contains(&first));
         let seconds = stated.or_else(|| since_1970().map(|(_, seconds)| *seconds));
@@ -112,12 +117,16 @@ impl Clock {
 /// Columns that are called as times are.
 fn time_columns(file: &DataFile) -> impl Iterator<Item = usize> {
     let is_time = |name: &str| {
-        let bare = columns::without_unit(name).to_lowercase();
-        let unit = columns::unit_of(name);
-        NAMES.contains(&bare.as_str())
+        let (bare, unit) = (bare(name), columns::unit_of(name));
+        (NAMES.contains(&bare.as_str()) || COUNTERS.iter().any(|(counter, _)| *counter == bare))
             && (unit.is_empty() || UNITS.iter().any(|(known, _)| *known == unit))
     };
     (0..file.header.len()).filter(move |column| is_time(&file.header[*column]))
+}
+
+/// A column's `name` without a unit, in lower case.
+fn bare(name: &str) -> String {
+    columns::without_unit(name).to_lowercase()
 }
 
 fn times(file: &DataFile, column: usize) -> Vec<f64> {
@@ -183,6 +192,8 @@ mod tests {
             "a,Timestamp\n1,2026-11-01 00:00:00.0\n2,2026-11-01 00:00:01.0\n3,2026-11-01 00:00:02.0\n",
             "stamp,a\n1700000000000,1\n1700000001000,2\n1700000002000,3\n",
             "t (s),a\n7,1\n8,2\n9,3\n",
+            "millis,a\n500,1\n1500,2\n2500,3\n",
+            "Micros,a\n1,1\n1000001,2\n2000001,3\n",
         ] {
             let clock = clock(text, None).unwrap();
             assert_eq!((clock.unit, &clock.at[..]), ("s", &[0.0, 1.0, 2.0][..]), "{text}");
