@@ -136,8 +136,7 @@ impl Verdict {
             model.networks().map(|network| size(network.shape())).max().unwrap_or(0)
         };
         let (centres, inputs) = (of_networks(|it| it.centres), of_networks(|it| it.inputs));
-        self.with(Warning::other_image(&model))
-            .with(Warning::few_frames(frames, centres, inputs))
+        self.with(Warning::few_frames(frames, centres, inputs))
             .with(Warning::few_frames_for_confidence(frames, model.confidence().is_some()))
             .with(Warning::larger_than_slot(blob.bytes().len(), &Design::new(blob)))
     }

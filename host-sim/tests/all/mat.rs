@@ -46,6 +46,10 @@ fn a_mat_of_numbered_columns_is_named_after_its_wires_and_told_its_image() {
     assert!(notes.contains("note: column-wire 3: none of its readings tells anything"), "{notes}");
     let told = String::from_utf8(output.stdout).unwrap();
     assert!(told.contains("TAXEL_CAPACITY=16x16x18"), "{told}");
+    // Whether a model that `run` makes is for a device, nobody has said.
+    let run = [&["run"], &TRAIN[1..TRAIN.len() - 1], &["out", "--centres", "8"]].concat();
+    let said = folder.succeed(&run);
+    assert!(said.contains("network") && !said.contains("TAXEL_CAPACITY"), "{said}");
     let inspected = folder.succeed(&["inspect", "m.bin"]);
     for words in [
         "r1c1_adc_0 … r16c16_adc_255 (239)",

@@ -18,7 +18,7 @@ use taxel_simulate::path::Path;
 use crate::error::{Error, NoPoint, Result};
 use crate::metrics::{self, DecoderErrors, LimitSummary, Measure};
 use crate::subject::Subject;
-use crate::verdict::Verdict;
+use crate::verdict::{Verdict, Warning};
 
 mod progress;
 mod device;
@@ -190,7 +190,9 @@ impl Trade {
         let all: Vec<_> = std::iter::once(network).chain(decoders.iter().cloned()).collect();
         let verdict = Verdict::new(&all, limit);
         match ModelBlob::of_bytes(self.blob(point)) {
-            Ok(blob) => verdict.of_blob(&blob, self.training_frames),
+            Ok(blob) => verdict
+                .with(Warning::other_image(&blob.parse()))
+                .of_blob(&blob, self.training_frames),
             Err(_) => verdict,
         }
         .of_frames(self.outliers.as_ref(), self.test_frames)

@@ -74,6 +74,7 @@ impl Worth {
         };
         let no_limit = LimitSummary::new(&Err(Refusal::Measured));
         let verdict = Verdict::new(&decoders, &no_limit)
+            .with(Warning::other_image(&blob.parse()))
             .of_blob(blob, set.frames.frames())
             .of_frames(subject.measurements().map(|data| &data.outliers), set.frames.frames())
             .with(subject.scene().and_then(|_| Warning::not_positive(&set.frames.inputs)));
