@@ -150,13 +150,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let same_file = metadata.scene_digest == file.digest(&names)? && knows(metadata, &file)?;
     let values_evaluated = errors.iter().map(|group| group.count).sum();
     let at_rest = over_time.as_ref().and_then(|log| log.rest.as_ref());
-    let of = |name: &str, estimate: &[f64]| {
-        DecoderErrors::new(name, metrics::by_group(&truth, estimate, &measure))
-    };
     let of_centroid = centroid_of(&readings, &truth, lines_at_rest.as_deref());
-    let mut decoders = vec![DecoderErrors::new(NETWORK, errors)];
-    decoders.extend(of_centroid.as_ref().map(|estimate| of(centroid::NAME, estimate)));
-    decoders.push(of(mean::NAME, &truth.means().repeat(truth.len())));
+    let decoders = decoders_of(&truth, errors, of_centroid.as_deref(), &measure);
     let verdict = verdict_of(&decoders)
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(same_file))
@@ -189,6 +184,22 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         output::write_bytes(html, page.as_bytes())?;
     }
     print::result(common, &summary, || text_of(&summary))
+}
+
+/// The model's `errors`, and those of decoders that are fitted to the lines of `truth`: the centroid and the mean.
+fn decoders_of(
+    truth: &Table,
+    errors: Vec<Errors>,
+    of_centroid: Option<&[f64]>,
+    measure: &Measure,
+) -> Vec<DecoderErrors> {
+    let of = |name: &str, estimate: &[f64]| {
+        DecoderErrors::new(name, metrics::by_group(truth, estimate, measure))
+    };
+    let mut decoders = vec![DecoderErrors::new(NETWORK, errors)];
+    decoders.extend(of_centroid.map(|estimate| of(centroid::NAME, estimate)));
+    decoders.push(of(mean::NAME, &truth.means().repeat(truth.len())));
+    decoders
 }
 
 /// Measure for errors of a model's outputs.
