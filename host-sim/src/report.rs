@@ -4,7 +4,6 @@
 //! one page serves light and dark.
 
 use taxel_data::output::Inner;
-use taxel_evaluate::evaluate::trade::Trade;
 use taxel_evaluate::run::RunResult;
 
 pub mod format;
@@ -37,6 +36,7 @@ pub use figures::{FOLDER as FIGURES, Page};
 pub use limit::{sections as of_limit, several as of_limits};
 pub use points::{result_text, sections as of_points};
 pub use sections::{Sections, TableOf};
+pub use trade::sections as of_trade;
 pub use view::{Made, View, in_words};
 
 use figures::Figures;
@@ -54,11 +54,6 @@ pub fn html(result: &RunResult, made: &Made) -> Page {
 /// Page for a model, whatever its result is from: as [`html`], without files beside it.
 pub fn view_html(view: &View<'_>) -> String {
     html::page(view, Figures::default()).html
-}
-
-/// Page for a trade between speed and accuracy, with the `command` that computed it.
-pub fn trade_html(trade: &Trade, command: &str) -> Page {
-    trade::html(trade, command)
 }
 
 #[cfg(test)]

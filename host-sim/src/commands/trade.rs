@@ -19,7 +19,6 @@ use super::subject_argument::SubjectArgument;
 use super::{Common, command_line, print, stderr};
 
 mod files;
-mod others;
 mod page;
 
 /// Trade speed for accuracy: measure every decoder, and choose the best.

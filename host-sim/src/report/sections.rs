@@ -99,7 +99,7 @@ impl Digits {
     }
 }
 
-/// Table of `rows`, whose columns are told by what they take from a row.
+/// Table of `rows`, whose columns are told by what they take from a row. A column in which nothing is defined is left out.
 #[derive(Debug)]
 pub struct TableOf<'r, R> {
     rows: &'r [R],
@@ -159,8 +159,10 @@ impl<'r, R> TableOf<'r, R> {
     }
 
     fn column(mut self, heading: &str, is_name: bool, cell: impl Fn(&'r R) -> String) -> Self {
-        let cells = self.rows.iter().map(cell).collect();
-        self.table.columns.push(Column { heading: heading.into(), is_name, cells });
+        let cells: Vec<String> = self.rows.iter().map(cell).collect();
+        if cells.iter().any(|cell| cell != UNDEFINED) {
+            self.table.columns.push(Column { heading: heading.into(), is_name, cells });
+        }
         self
     }
 }

@@ -1,155 +1,279 @@
-//! Report of a trade between speed and accuracy: a picture, and a page.
+//! Trade between speed and accuracy: three answers, a picture, and the front.
 
-use std::fmt::Write as _;
-
-use super::figures::{Figure, Figures, Page};
-use super::format::{fixed, grouped, noise, significant, symbol, unbroken};
-use super::html::document;
-use super::svg::escape;
-use taxel_evaluate::evaluate::trade::Trade;
+use super::figures::Figure;
+use super::format::{UNDEFINED, fixed, grouped, noise, symbol};
+use super::sections::{Digits, Sections, TableOf};
+use taxel_evaluate::evaluate::trade::{Bounds, Point, Readings, Trade};
+use taxel_evaluate::metrics;
 
 mod words;
 mod plot;
-mod table;
 
-/// Page of a trade, with the `command` that computed it.
-pub fn html(trade: &Trade, command: &str) -> Page {
-    let title = format!("Taxel: speed against accuracy, {}", trade.subject);
+/// Sections of a trade, with the points of its front or with `all` of them.
+pub fn sections(trade: &Trade, all: bool) -> Sections {
+    let mut sections = Sections::new(format!("Speed against accuracy: {}", trade.subject));
+    sections.files = vec!["trade.csv".into(), "trade.json".into()];
     let tested = match &trade.test_choice {
         Some(choice) => format!("{} measured test frames ({choice})", grouped(trade.test_frames)),
         None => format!(
-            "Noise {} a sample; {} test frames",
+            "noise {} a sample, {} test frames",
             trade.noise_kind.map_or(String::new(), |kind| noise(kind, trade.noise_level)),
             grouped(trade.test_frames)
         ),
     };
-    let tested = match &trade.motion {
-        Some(path) => format!(
-            "{tested}; errors are those of the newest finished estimate on {}",
-            path.in_words()
-        ),
-        None => tested,
-    };
-    let mut body = format!(
-        "<header>\n<h1>{}</h1>\n<p>{}; {} ways to decode on a Cortex-M4F at {}\u{a0}MHz.</p>\n</header>\n",
-        escape(&title),
-        escape(&unbroken(&tested)),
+    let motion = trade.motion.as_ref().map_or(String::new(), |path| {
+        let path = path.in_words();
+        format!("; errors are those of the newest finished estimate, every ms, on {path}")
+    });
+    sections.note(format!(
+        "{} ways to decode on a Cortex-M4F at {} MHz; {tested}{motion}.",
         trade.points.len(),
-        trade.device.clock_mhz,
+        trade.device.clock_mhz
+    ));
+    answers(&mut sections, trade);
+    chosen(&mut sections, trade);
+    picture(&mut sections, trade);
+    front(&mut sections, trade, all);
+    references(&mut sections, trade);
+    others(&mut sections, trade);
+    trade.left_out.iter().for_each(|note| sections.note(format!("Left out: {note}.")));
+    sections
+}
+
+/// Rows of points: what marks them, and their indices.
+type Marked = (String, usize);
+
+/// Adds columns of the errors of points.
+fn with_errors<'r>(table: TableOf<'r, Marked>, trade: &'r Trade) -> TableOf<'r, Marked> {
+    let rmse = format!("RMSE of {}", symbol(&trade.group));
+    let point = |row: &Marked| &trade.points[row.1];
+    table
+        .numbers(&rmse, &trade.unit, Digits::Significant(3), |row| {
+            Some(point(row).rmse(&trade.group))
+        })
+        .numbers("× limit", "", Digits::Decimals(2), |row| point(row).ratio_to_limit(&trade.group))
+}
+
+/// Adds the points that a reader looks for first: the chosen one, the most accurate, the knee, and the fastest that is nearly
+/// as accurate.
+fn answers(sections: &mut Sections, trade: &Trade) {
+    let mut rows: Vec<Marked> = vec![];
+    let found = [
+        ("chosen", trade.chosen),
+        ("most accurate", trade.most_accurate()),
+        ("knee", trade.knee()),
+        ("fastest within 10 %", trade.fastest_within(1.1)),
+    ];
+    for (answer, point) in found {
+        let Some(point) = point else { continue };
+        match rows.iter_mut().find(|(_, known)| *known == point) {
+            Some((names, _)) => names.extend([", ", answer]),
+            None => rows.push((answer.into(), point)),
+        }
+    }
+    let caption = "What one looks for first. Knee: where the front bends most. Within 10 %: of the smallest error. The option makes trade choose the point, and write its blob.";
+    let table = TableOf::new(&rows, caption).names("answer", |(answer, _)| answer.clone()).names(
+        "decoder",
+        |(_, point)| {
+            let point = &trade.points[*point];
+            format!("{}, {}", point.way(), words::brief(trade, point))
+        },
     );
-    body += &answer(trade);
+    let table = with_errors(table, trade)
+        .texts("frames/s", "", |row| words::rate(trade.points[row.1].times.frames_per_s))
+        .numbers("age", "ms", Digits::Decimals(2), |row| trade.points[row.1].times.age_ms)
+        .texts("blob", "B", |row| grouped(trade.points[row.1].blob_bytes));
+    let table = table.texts("option", "", |(_, point)| {
+        format!("--max-error {}", words::above(trade.points[*point].rmse(&trade.group)))
+    });
+    sections.table(table);
+}
+
+/// Adds what is chosen, what it is worth, and how a device is configured for it; of no choice, why, and what the most accurate
+/// point is worth.
+fn chosen(sections: &mut Sections, trade: &Trade) {
+    let why = trade.refused.as_ref().map_or(
+        "no bound was given (--max-error, --frame-rate, --max-latency-ms, --max-cycles or --max-flash)".into(),
+        ToString::to_string,
+    );
+    let (start, point) = match (trade.chosen, trade.most_accurate()) {
+        (Some(chosen), _) => (format!("Chosen for {}:", words::bounds(&trade.bounds)), chosen),
+        (None, Some(best)) => (format!("Nothing is chosen: {why}. The most accurate is"), best),
+        (None, None) => return,
+    };
+    let (verdict, name) = (trade.verdict_on(point), trade.points[point].name());
+    if let Some((decoder, least)) = trade.better_baseline(point) {
+        let least = words::error(trade, least);
+        sections.note(format!(
+            "{start} no model; the baseline {decoder} has a smaller error, {least}."
+        ));
+        return;
+    }
+    sections.note(format!("{start} {name}. {}", verdict.sentence));
+    sections.note(cost(&trade.points[point]));
+    sections.note(trade.line_note());
+    verdict.warnings.iter().for_each(|warning| sections.note(warning.to_string()));
+    if trade.chosen.is_none() {
+        return;
+    }
+    if let Some(columns) = &trade.main_readings().column_wires {
+        sections.note(format!("In a scene, below [readout]: column_wires = {columns:?}"));
+    }
+    let options = words::device_options(trade, &trade.points[point]);
+    if !options.is_empty() {
+        sections.note(format!("On a device: host-sim link PORT configure{options}"));
+    }
+}
+
+/// What a point costs a device.
+fn cost(point: &Point) -> String {
+    let ms = |time| fixed(time, 3);
+    let times = &point.times;
+    let time = match times.scan_ms {
+        Some(scan_ms) => format!(
+            "An estimate is finished {} ms after the start of its scan ({} ms to scan, {} ms to decode). There are at most {} \
+             frames a second. An estimate is {} ms old when it is used, on average",
+            ms(times.frame_ms),
+            ms(scan_ms),
+            ms(times.decode_ms),
+            words::rate(times.frames_per_s),
+            ms(times.age_ms.unwrap_or_default())
+        ),
+        None => format!("Decoding a frame takes {} ms, besides its scan", ms(times.decode_ms)),
+    };
+    format!(
+        "{time}; {} cycles, {} bytes of flash, {} bytes of RAM.",
+        grouped(point.frame.cycles as usize),
+        grouped(point.blob_bytes),
+        grouped(point.ram_bytes)
+    )
+}
+
+fn picture(sections: &mut Sections, trade: &Trade) {
     let (chart, outside) = plot::chart(trade);
     let outside = match outside {
         0 => String::new(),
         1 => " One dominated point lies outside.".into(),
         outside => format!(" {outside} dominated points lie outside."),
     };
-    let networks = if trade.points.iter().any(|point| !point.each_row) {
-        " Rows: a network for each row-wire; array: one for all of them."
-    } else {
-        ""
-    };
-    let caption = format!(
-        "RMSE of {} against the time of a frame, both logarithmic. The line joins the Pareto front: no other point is as good \
-         in both and better in one. Its points have their number of centres K. Lines outside are in the legend alone.{networks}{outside}{}",
-        symbol(&trade.group),
-        hidden_bounds(trade)
-    );
-    let mut figures = Figures::in_files("");
-    let figure =
-        Figure::of_chart("error-by-time", caption, &chart, [[920.0, 540.0], [480.0, 600.0]]);
-    body += &figures.html(&figure);
-    let _ = write!(
-        body,
-        "<figure id=\"table-1\" class=\"table\">\n<figcaption><b>Table 1.</b> The Pareto front, from fast to slow. \
-         <a href=\"trade.csv\">trade.csv</a> has all {} points and all outputs.</figcaption>\n{}<p class=\"note\">{}</p>\n\
-         <p class=\"note\">Cycles are those of decoding by a Cortex-M4F whose memory never waits, predicted to a tenth \
-         (not checked against silicon). {}</p>\n</figure>\n\
-         <p class=\"note\">Made by <code>{}</code></p>\n",
-        grouped(trade.points.len()),
-        table::of_front(trade),
-        escape(&named(trade, &references(trade))),
-        unbroken(&scan(trade)),
-        escape(command),
-    );
-    Page { html: document(&title, &body), figures: figures.files }
-}
-
-/// What was chosen, what it is worth and what it costs.
-fn answer(trade: &Trade) -> String {
-    let Some(chosen) = trade.chosen else {
-        let why = trade.refused.as_ref().map_or("no bound was given".into(), ToString::to_string);
-        let why = format!("Nothing is chosen: {why}.");
-        return format!(
-            "<section class=\"summary\">\n<p>{}</p>\n</section>\n",
-            escape(&unbroken(&why))
-        );
-    };
-    let point = &trade.points[chosen];
-    let verdict = trade.verdict_on(chosen);
-    let times = &point.times;
-    let mut html = format!(
-        "<section class=\"summary\">\n<p><b>Chosen for {}: {}.</b> {}</p>\n<dl>\n",
-        escape(&unbroken(&words::bounds(&trade.bounds))),
-        escape(&unbroken(&point.name())),
-        escape(&named(trade, &verdict.sentence))
-    );
-    let mut fact = |name: &str, value: String, unit: &str| {
-        let (name, unit) = (escape(name), escape(unit));
-        let _ =
-            writeln!(html, "<div><dt>{name}</dt><dd>{value}\u{a0}<span>{unit}</span></dd></div>");
-    };
-    let rmse = significant(point.rmse(&trade.group), 3);
-    fact(&format!("RMSE of {}", symbol(&trade.group)), rmse, &trade.unit);
-    if let Some(scan_ms) = times.scan_ms {
-        fact("Frames a second, at most", words::rate(times.frames_per_s), "");
-        fact("Scan", fixed(scan_ms, 2), "ms");
-    }
-    if let Some(age_ms) = times.age_ms {
-        fact("Age when used", significant(age_ms, 3), "ms");
-    }
-    fact("Decoding", significant(1000.0 * times.decode_ms, 3), "µs");
-    fact("Blob", significant(point.blob_bytes as f64 / 1000.0, 3), "kB");
-    html += "</dl>\n";
-    let warnings = verdict.warnings.iter().map(ToString::to_string);
-    for note in std::iter::once(trade.line_note()).chain(warnings) {
-        let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(&named(trade, &note)));
-    }
-    html + "</section>\n"
-}
-
-/// Sentence in which the outputs have their symbol, and no number is parted from its unit.
-fn named(trade: &Trade, sentence: &str) -> String {
-    let name = |text: String, (group, _): (&str, _)| text.replace(group, &symbol(group));
-    unbroken(&trade.groups().fold(sentence.to_owned(), name))
-}
-
-/// Errors to compare with, and what they are of if readings differ.
-fn references(trade: &Trade) -> String {
-    let others = trade.readings.iter().filter(|_| trade.readings.len() > 1).map(|readings| {
-        let all = readings.references(&trade.group).skip(1);
-        let all = all.map(|(name, rmse)| format!("{name} {}", words::error(trade, rmse)));
-        format!(" With {}: {}.", trade.distinction(readings), all.collect::<Vec<_>>().join(", "))
-    });
-    let main = trade.main_readings();
-    match trade.distinction(main) {
-        of if of.is_empty() => main.limit.note(),
-        of => format!("With {of}: {}{}", main.limit.note(), others.collect::<String>()),
-    }
-}
-
-/// Bounds that the picture cannot show.
-fn hidden_bounds(trade: &Trade) -> String {
-    let bounds = taxel_evaluate::evaluate::trade::Bounds {
+    let hidden = Bounds {
         cycles: trade.bounds.cycles,
         blob_bytes: trade.bounds.blob_bytes,
         ..Default::default()
     };
-    if bounds.any() {
-        format!(" Not drawn: the bounds of {}.", words::bounds(&bounds))
+    let hidden = if hidden.any() {
+        format!(" Not drawn: the bounds of {}.", words::bounds(&hidden))
     } else {
         String::new()
+    };
+    let caption = format!(
+        "RMSE of {} against the time of a frame, both logarithmic. The line joins the Pareto front: no other point is as good \
+         in both and better in one. Its points have their number of centres K. Lines outside are in the legend alone.{outside}{hidden}",
+        symbol(&trade.group)
+    );
+    let sizes = [[920.0, 540.0], [480.0, 600.0]];
+    sections.figure(Figure::of_chart("error-by-time", caption, &chart, sizes));
+}
+
+/// Adds points of the front from fast to slow, and the chosen one; or all points, as they were measured.
+fn front(sections: &mut Sections, trade: &Trade, all: bool) {
+    let mut shown = if all { (0..trade.points.len()).collect() } else { trade.front() };
+    shown.extend(trade.chosen.filter(|chosen| !shown.contains(chosen)));
+    let mark = |point: usize| match (trade.chosen == Some(point), trade.points[point].on_front) {
+        (true, _) => "chosen",
+        (false, true) => "front",
+        (false, false) => "",
+    };
+    let rows: Vec<Marked> = shown.into_iter().map(|point| (mark(point).into(), point)).collect();
+    let more = trade.points.len() - rows.len();
+    let which = if all {
+        "All points.".to_owned()
+    } else {
+        format!(
+            "The Pareto front, from fast to slow; {more} more points with --all, and in trade.csv."
+        )
+    };
+    let caption = format!(
+        "{which} Array: one network for all rows, behind a projection. Samples: averaged for a reading. Filter: time constant of \
+         an α–β filter behind the decoder. × limit: to the least possible RMSE with as many samples and the same columns. Worst \
+         other: largest error on contacts that it was not trained on. Frame: time from the start of a scan to its estimate. Age: mean time from the middle of a scan until its \
+         estimate is used. Cycles: of decoding by a Cortex-M4F whose memory never waits, predicted to a tenth (not checked \
+         against silicon). {}",
+        scan(trade)
+    );
+    let point = |row: &Marked| &trade.points[row.1];
+    let count = |count: Option<usize>| count.map_or(UNDEFINED.into(), |it| it.to_string());
+    let averaged = trade.points.iter().any(|point| point.samples_averaged > 1);
+    let table = TableOf::new(&rows, caption)
+        .names("", |(mark, _)| mark.clone())
+        .names("format", |row| point(row).way())
+        .names("K", |row| point(row).centres.to_string())
+        .names("columns", |row| count(point(row).columns))
+        .names("samples", |row| count(averaged.then_some(point(row).samples_averaged)))
+        .names("filter", |row| {
+            point(row)
+                .filter
+                .map_or(UNDEFINED.into(), |it| format!("{:.1} ms", it.time_constant_ms))
+        });
+    let worst = |row: &Marked| point(row).worst_other().map(|worst| worst.rmse);
+    let table = with_errors(table, trade)
+        .numbers("worst other", &trade.unit, Digits::Significant(3), worst)
+        .numbers("frame", "ms", Digits::Decimals(3), |row| Some(point(row).times.frame_ms))
+        .numbers("age", "ms", Digits::Decimals(3), |row| point(row).times.age_ms)
+        .texts("frames/s", "", |row| words::rate(point(row).times.frames_per_s))
+        .texts("cycles", "", |row| grouped(point(row).frame.cycles as usize))
+        .texts("blob", "B", |row| grouped(point(row).blob_bytes))
+        .texts("RAM", "B", |row| grouped(point(row).ram_bytes));
+    sections.table(table);
+}
+
+/// Adds errors to compare with, of each choice of readings.
+fn references(sections: &mut Sections, trade: &Trade) {
+    let mut rows: Vec<(&Readings, &str, f64)> = vec![];
+    for (place, readings) in trade.readings.iter().enumerate() {
+        // Always predicting the mean is the same whatever is read.
+        let references = readings.references(&trade.group).skip(usize::from(place > 0));
+        rows.extend(references.map(|(name, rmse)| (readings, name, rmse)));
     }
+    let all = if trade.group == metrics::ALL {
+        " RMSE of all: mean over the outputs of RMSE/standard deviation σ; always predicting the mean has 1."
+    } else {
+        ""
+    };
+    let readings = trade.main_readings();
+    let of = match trade.distinction(readings) {
+        of if of.is_empty() => of,
+        of => format!(" With {of}:"),
+    };
+    let caption = format!("Errors to compare with.{all}{of} {}", readings.limit.note());
+    let unknown = || UNDEFINED.to_owned();
+    let table = TableOf::new(&rows, caption)
+        .names("decoder", |(_, name, _)| (*name).into())
+        .names("columns", |(it, ..)| it.columns().map_or_else(unknown, |count| count.to_string()))
+        .names("samples", |(it, ..)| it.samples_averaged.to_string())
+        .numbers("RMSE", &trade.unit, Digits::Significant(3), |(.., rmse)| Some(*rmse));
+    sections.table(table);
+}
+
+/// Adds what the chosen point, or the most accurate one, is worth on contacts that it was not trained on.
+fn others(sections: &mut Sections, trade: &Trade) {
+    let shown = trade.chosen.or_else(|| trade.most_accurate());
+    let Some(point) = shown.map(|point| &trade.points[point]) else { return };
+    if point.others.is_empty() {
+        return;
+    }
+    let counted = if trade.worst_case {
+        "Front and choice count the worst of these and its own."
+    } else {
+        "--worst-case chooses by the worst."
+    };
+    let which = if trade.chosen.is_some() { "chosen" } else { "most accurate" };
+    let caption =
+        format!("The {which} point on still contacts that it was not trained on. {counted}");
+    let table = TableOf::new(&point.others, caption)
+        .names("contact", |other| other.name.clone())
+        .numbers("RMSE", &trade.unit, Digits::Significant(3), |other| Some(other.rmse));
+    sections.table(table);
 }
 
 /// Where the time of a scan comes from.
@@ -159,9 +283,11 @@ fn scan(trade: &Trade) -> String {
             format!("The time of a scan was given: {ms} ms for each sample of a reading.")
         }
         (None, Some(wires)) => format!(
-            "The time of a scan is computed from the board’s firmware for {} rows, within 3 % of the emulated board.",
-            wires.rows
+            "The time of a scan is computed from the board's firmware for {} × {} wires, within 3 % of the emulated board.",
+            wires.rows, wires.columns
         ),
-        (None, None) => "The time of a scan is unknown.".into(),
+        (None, None) => {
+            "The time of a scan is unknown (--scan-ms): frame is that of decoding alone.".into()
+        }
     }
 }

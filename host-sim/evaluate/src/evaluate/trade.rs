@@ -179,6 +179,29 @@ impl Trade {
         front.into_iter().find(|i| rmse(i) <= SAME_ERROR * least)
     }
 
+    /// Fastest point of the front whose error is at most so many times the smallest.
+    pub fn fastest_within(&self, factor: f64) -> Option<usize> {
+        let least = self.counted_rmse(self.most_accurate()?);
+        self.front().into_iter().find(|i| self.counted_rmse(*i) <= factor * least)
+    }
+
+    /// Point of the front that lies farthest below the line between its ends, in the logarithms of time and error; `None` where
+    /// none does.
+    pub fn knee(&self) -> Option<usize> {
+        let front = self.front();
+        let at = |i: usize| {
+            let (ms, rmse) = (self.points[i].times.frame_ms, self.counted_rmse(i));
+            [ms.ln(), rmse.ln()]
+        };
+        let ([x0, y0], [x1, y1]) = (at(*front.first()?), at(*front.last()?));
+        let below = |i: usize| {
+            let [x, y] = at(i);
+            (y0 - y) / (y0 - y1) - (x - x0) / (x1 - x0)
+        };
+        let depths = front.into_iter().map(|i| (i, below(i))).filter(|(_, depth)| *depth > 0.0);
+        depths.max_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(i, _)| i)
+    }
+
     /// Verdict on a point by the errors of all groups, with what its blob gives reason to beware of.
     ///
     /// # Panics

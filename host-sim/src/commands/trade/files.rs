@@ -20,7 +20,7 @@ pub const FILES: FileSet = FileSet {
 pub fn write(folder: &Path, trade: &Trade, command: &str) -> Result<()> {
     let csv = csv_of(trade);
     let json = print::json_text(trade)?;
-    let page = report::trade_html(trade, command);
+    let page = report::of_trade(trade, false).page(command);
     let mut files = vec![
         ("trade.csv", csv.as_bytes()),
         ("trade.json", json.as_bytes()),

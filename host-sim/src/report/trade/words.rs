@@ -43,3 +43,29 @@ pub fn bounds(bounds: &Bounds) -> String {
     ];
     given.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
+
+/// The least number with three digits that is not below an error, as a bound that it keeps.
+pub fn above(rmse: f64) -> String {
+    let step = 10_f64.powi(rmse.log10().floor() as i32 - 2);
+    significant((rmse / step).ceil() * step, 3)
+}
+
+/// Options that configure a device for a point.
+pub fn device_options(trade: &Trade, point: &Point) -> String {
+    let period = period_us(trade, point).map(|us| format!(" --period-us {us}"));
+    let oversampling =
+        (point.samples_averaged > 1).then(|| format!(" --oversampling {}", point.samples_averaged));
+    let filter = point.filter.map(|filter| {
+        format!(" --filter-ms {} --lead-ms {}", filter.time_constant_ms, filter.lead_ms)
+    });
+    [period, oversampling, filter].into_iter().flatten().collect()
+}
+
+/// Period of frames in µs to configure: as asked for, or the shortest that the point can keep up with. On contacts that move
+/// the latter, at which the point was judged.
+fn period_us(trade: &Trade, point: &Point) -> Option<u64> {
+    let shortest = point.times.scan_ms.map(|_| (1000.0 * point.times.period_ms()).ceil())?;
+    let asked = trade.bounds.frame_rate_hz.filter(|_| trade.motion.is_none());
+    let asked = asked.map(|hz| (1e6 / hz).floor());
+    Some(asked.unwrap_or(shortest) as u64)
+}
