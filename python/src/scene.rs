@@ -107,7 +107,7 @@ impl Scene {
         })?;
         let array = |table: taxel_data::table::Table| {
             let columns = table.names.len();
-            PyArray1::from_vec(py, table.values)
+            PyArray1::from_vec(py, table.values.into_vec())
                 .reshape([count, columns])
                 .map(|it| (it, table.names))
         };

@@ -66,7 +66,8 @@ impl Dataset {
         rows: usize,
         frames: usize,
     ) -> Self {
-        let table = |names: Vec<String>| Table { values: vec![0.0; names.len() * frames], names };
+        let table =
+            |names: Vec<String>| Table { values: vec![0.0; names.len() * frames].into(), names };
         let (inputs, outputs) = (table(input_names), table(output_names));
         let (at_rest, weights) = (None, None);
         Self { inputs, outputs, rows, common_span: false, relative_inputs: false, at_rest, weights }

@@ -1,13 +1,14 @@
 //! Tables of numbers with named columns.
 
 use crate::columns;
+use crate::values::Values;
 
 /// Table of numbers with named columns, one frame a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     pub names: Vec<String>,
     /// Values, `lines × columns`, line after line; NaN is missing.
-    pub values: Vec<f64>,
+    pub values: Values,
 }
 
 impl Table {
@@ -36,13 +37,7 @@ impl Table {
 
     /// Smallest and largest value of each column, `[low, high]`; NaN is skipped.
     pub fn ranges(&self) -> Vec<[f64; 2]> {
-        let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; self.names.len()];
-        for line in self.lines() {
-            for ([low, high], value) in ranges.iter_mut().zip(line) {
-                (*low, *high) = (low.min(*value), high.max(*value));
-            }
-        }
-        ranges
+        ranges(self.lines(), self.names.len())
     }
 
     /// Number of values in each column that are not missing.
@@ -82,14 +77,18 @@ impl Table {
         lines.map(|(number, _)| number).collect()
     }
 
-    /// Table of these `lines`, in that order.
+    /// Table of these `lines`, in that order. All of them share the values of this one.
     ///
     /// # Panics
     /// If there is no such line.
     #[must_use]
     pub fn pick(&self, lines: &[usize]) -> Self {
-        let values = lines.iter().flat_map(|line| self.line(*line)).copied().collect();
-        Self { names: self.names.clone(), values }
+        if lines.iter().copied().eq(0..self.len()) {
+            return self.clone();
+        }
+        let mut values = Vec::with_capacity(lines.len() * self.names.len());
+        lines.iter().for_each(|line| values.extend_from_slice(self.line(*line)));
+        Self { names: self.names.clone(), values: values.into() }
     }
 
     /// Table of these `lines` and `columns`, in that order.
@@ -98,29 +97,18 @@ impl Table {
     /// If there is no such line or column.
     #[must_use]
     pub fn part(&self, lines: &[usize], columns: &[usize]) -> Self {
-        let of_line = |line: &usize| {
-            let line = self.line(*line);
-            columns.iter().map(move |column| line[*column])
-        };
-        Self {
-            names: columns.iter().map(|column| self.names[*column].clone()).collect(),
-            values: lines.iter().flat_map(of_line).collect(),
+        let mut values = Vec::with_capacity(lines.len() * columns.len());
+        for line in lines.iter().map(|line| self.line(*line)) {
+            values.extend(columns.iter().map(|column| line[*column]));
         }
+        let names = columns.iter().map(|column| self.names[*column].clone()).collect();
+        Self { names, values: values.into() }
     }
 
     /// Mean of each column; NaN is skipped. Rounding moves it out of no column's range, so that the mean of equal values
     /// is that value.
     pub fn means(&self) -> Vec<f64> {
-        let mut sums = vec![(0.0, 0.0); self.names.len()];
-        for line in self.lines() {
-            for ((sum, count), value) in sums.iter_mut().zip(line).filter(|(_, v)| !v.is_nan()) {
-                (*sum, *count) = (*sum + value, *count + 1.0);
-            }
-        }
-        let clamped = |((sum, count), [low, high]): (&(f64, f64), [f64; 2])| {
-            if low <= high { (sum / count).clamp(low, high) } else { f64::NAN }
-        };
-        sums.iter().zip(self.ranges()).map(clamped).collect()
+        means(self.lines().map(|line| line.iter().copied()), self.names.len())
     }
 
     /// Median of each column; NaN is skipped, and that of a column without a value.
@@ -137,7 +125,7 @@ impl Table {
     /// One line with the mean of each column, which [`means`](Self::means) gives.
     #[must_use]
     pub fn mean_line(&self) -> Self {
-        Self { names: self.names.clone(), values: self.means() }
+        Self { names: self.names.clone(), values: self.means().into() }
     }
 
     /// Standard deviation of each column; NaN is skipped. 0 for a column that does not change as far as f32 can tell,
@@ -165,6 +153,12 @@ impl Table {
     /// (NaN) are skipped; a missing estimate of a value is not.
     pub fn squared_errors(&self, estimates: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; self.names.len()];
+        self.add_squared_errors(estimates, &mut sums);
+        sums
+    }
+
+    /// Adds [squared errors](Self::squared_errors) to the `sums` of other lines, one a column.
+    pub fn add_squared_errors(&self, estimates: &[f64], sums: &mut [f64]) {
         for (line, estimates) in self.lines().zip(estimates.chunks_exact(sums.len().max(1))) {
             for (sum, (value, estimate)) in sums.iter_mut().zip(line.iter().zip(estimates)) {
                 if !value.is_nan() {
@@ -172,7 +166,6 @@ impl Table {
                 }
             }
         }
-        sums
     }
 
     /// `estimates` of the same shape, `lines × columns`, with the mean of the column for places that are not told, because
@@ -199,17 +192,51 @@ impl Table {
         Self { names: self.names.clone(), values }
     }
 
-    /// Table of the `count` columns from index `from` on.
+    /// Table of the `count` columns from index `from` on. All of them share the values of this one.
     ///
     /// # Panics
     /// If the table has fewer columns.
     #[must_use]
     pub fn columns(&self, from: usize, count: usize) -> Self {
+        if count == self.names.len() {
+            return self.clone();
+        }
         let names = self.names[from..from + count].to_vec();
         let mut values = Vec::with_capacity(self.len() * count);
         self.lines().for_each(|line| values.extend_from_slice(&line[from..from + count]));
-        Self { names, values }
+        Self { names, values: values.into() }
     }
+}
+
+/// Smallest and largest value of each of so many columns of `lines`, as [`Table::ranges`] has it.
+pub fn ranges<'l>(lines: impl Iterator<Item = &'l [f64]>, columns: usize) -> Vec<[f64; 2]> {
+    let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; columns];
+    for line in lines {
+        for ([low, high], value) in ranges.iter_mut().zip(line) {
+            (*low, *high) = (low.min(*value), high.max(*value));
+        }
+    }
+    ranges
+}
+
+/// Mean of each of so many columns of `lines`, as [`Table::means`] has it.
+pub fn means<L>(lines: impl Iterator<Item = L>, columns: usize) -> Vec<f64>
+where
+    L: IntoIterator<Item = f64>,
+{
+    let mut sums = vec![(0.0, 0.0, [f64::INFINITY, f64::NEG_INFINITY]); columns];
+    for line in lines {
+        for ((sum, count, [low, high]), value) in sums.iter_mut().zip(line) {
+            if !value.is_nan() {
+                (*sum, *count) = (*sum + value, *count + 1.0);
+                (*low, *high) = (low.min(value), high.max(value));
+            }
+        }
+    }
+    let mean = |(sum, count, [low, high]): (f64, f64, [f64; 2])| {
+        if low <= high { (sum / count).clamp(low, high) } else { f64::NAN }
+    };
+    sums.into_iter().map(mean).collect()
 }
 
 #[cfg(test)]
@@ -219,9 +246,9 @@ mod tests {
     #[test]
     fn the_mean_of_equal_values_is_that_value() {
         // Three times 0.1 is more than 0.3.
-        let table = Table { names: vec!["a".into()], values: vec![0.1; 3] };
+        let table = Table { names: vec!["a".into()], values: vec![0.1; 3].into() };
         assert_eq!((table.means(), table.deviations()), (vec![0.1], vec![0.0]));
-        let rounded = Table { names: vec!["a".into()], values: vec![100.0, 100.0 + 1e-9] };
+        let rounded = Table { names: vec!["a".into()], values: vec![100.0, 100.0 + 1e-9].into() };
         assert_eq!(rounded.deviations(), [0.0]);
     }
 
@@ -229,15 +256,15 @@ mod tests {
     fn columns_that_are_missing_in_the_same_lines_go_together() {
         let names = ["x", "f", "y"].map(String::from).to_vec();
         let values = vec![1.0, 2.0, 3.0, f64::NAN, 4.0, f64::NAN, 5.0, 6.0, 7.0];
-        let table = Table { names, values };
+        let table = Table { names, values: values.into() };
         assert_eq!(table.missing_together(), [vec![0, 2], vec![1]]);
         assert_eq!(table.lines_with(&[0, 2]), [0, 2]);
         let part = table.part(&[0, 2], &[2, 0]);
         assert_eq!(
-            (part.names, part.values),
+            (part.names, part.values.into_vec()),
             (vec!["y".into(), "x".into()], vec![3.0, 1.0, 7.0, 5.0])
         );
-        let complete = Table { names: table.names, values: vec![0.0; 6] };
+        let complete = Table { names: table.names, values: vec![0.0; 6].into() };
         assert_eq!(complete.missing_together(), [[0, 1, 2]]);
     }
 
@@ -246,7 +273,7 @@ mod tests {
         let nan = f64::NAN;
         let names = ["a", "b", "c"].map(String::from).to_vec();
         let values = vec![1.0, 2.0, nan, nan, 4.0, nan, 3.0, nan, nan];
-        let table = Table { names, values };
+        let table = Table { names, values: values.into() };
         assert_eq!(table.means()[..2], [2.0, 3.0]);
         assert!(table.means()[2].is_nan());
         assert_eq!(table.deviations(), [1.0, 1.0, 0.0]);
@@ -254,7 +281,7 @@ mod tests {
         assert_eq!(table.missing_together(), [[0], [1], [2]]);
         assert_eq!(table.squared_errors(&[0.0; 9]), [10.0, 20.0, 0.0]);
         let values = vec![nan, 10.0, 1.0, 20.0, 3.0, nan, 5.0, 40.0];
-        let table = Table { names: ["a", "b"].map(String::from).to_vec(), values };
+        let table = Table { names: ["a", "b"].map(String::from).to_vec(), values: values.into() };
         // Missing values move none of the others into another column.
         let of = |squares: f64| (squares / 3.0).sqrt();
         assert_eq!(table.deviations(), [of(8.0), of(4200.0 / 9.0)]);

@@ -94,7 +94,7 @@ pub fn by_load(
         let lines: Vec<usize> = (0..truth.len()).filter(is_within).collect();
         let chosen = truth.pick(&lines);
         let errors = |estimate: &[f64]| {
-            let estimate = Table { names: names.clone(), values: estimate.to_vec() };
+            let estimate = Table { names: names.clone(), values: estimate.to_vec().into() };
             metrics::by_group(&chosen, &estimate.pick(&lines).values, &measure)
         };
         LoadErrors {
@@ -125,7 +125,7 @@ mod tests {
     fn frames_are_told_apart_by_their_true_depth_or_force() {
         let names = ["contact_x_mm", DEPTH].map(String::from).to_vec();
         // The shallow contact is 4 mm off, those that are deeper 1 mm and 0.
-        let truth = Table { names, values: vec![10.0, 0.02, 10.0, 0.1, 10.0, 0.9] };
+        let truth = Table { names, values: vec![10.0, 0.02, 10.0, 0.1, 10.0, 0.9].into() };
         let estimate = [14.0, 0.02, 9.0, 0.1, 10.0, 0.9];
         let measure = Measure { full_scale: vec![20.0, 1.0], thickness_mm: None, limit: None };
         let found = by_load(&truth, &estimate, None, &measure);
@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(found.len(), 4, "no frame is between 0.05 and 0.1 mm");
         // Of a place and a force, from all frames to the firmest; a model of forces alone has no such table.
         let names = ["x_mm", "force_n"].map(String::from).to_vec();
-        let truth = Table { names, values: vec![10.0, 0.05, 10.0, -0.2, 10.0, 0.9] };
+        let truth = Table { names, values: vec![10.0, 0.05, 10.0, -0.2, 10.0, 0.9].into() };
         let found = by_load(&truth, &estimate, Some(&truth.values), &measure);
         let of = |range: &LoadErrors| (range.range(), range.frames, range.errors[0].rmse);
         assert_eq!(of(&found[1]), ("from 0.1 N".into(), 2, 0.5_f64.sqrt()));
@@ -147,7 +147,7 @@ mod tests {
         let faint = [f64::NAN, 0.05, 9.0, -0.2, 10.0, 0.9];
         let found = by_load(&truth, &faint, None, &measure);
         assert_eq!((of(&found[3]), found.len()), (("place told".into(), 2, 0.5_f64.sqrt()), 4));
-        let other = Table { names: vec!["fx_n".into()], values: vec![1.0] };
+        let other = Table { names: vec!["fx_n".into()], values: vec![1.0].into() };
         let measure = Measure { full_scale: vec![1.0], ..measure };
         assert!(by_load(&other, &[1.0], None, &measure).is_empty());
     }

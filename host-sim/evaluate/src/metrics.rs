@@ -383,7 +383,7 @@ mod tests {
     fn every_definition_by_hand() {
         let truth = Table {
             names: ["r1e1_dz_mm", "r1e1_dx_mm", "r1e2_dz_mm"].map(String::from).to_vec(),
-            values: vec![0.0, 1.0, 1.0, 1.0, -1.0, 0.5],
+            values: vec![0.0, 1.0, 1.0, 1.0, -1.0, 0.5].into(),
         };
         let estimate = [0.5, 1.0, 1.0, 1.0, -1.0, f64::NAN];
         let measure = Measure { full_scale: vec![1.0; 3], thickness_mm: Some(5.0), limit: None };
@@ -401,7 +401,7 @@ mod tests {
 
     #[test]
     fn errors_of_both_signs_count_and_small_truths_have_no_relative_error() {
-        let truth = Table { names: vec!["dz_mm".into()], values: vec![1.0, 2.0, 0.05] };
+        let truth = Table { names: vec!["dz_mm".into()], values: vec![1.0, 2.0, 0.05].into() };
         let measure = Measure { full_scale: vec![1.0], thickness_mm: Some(5.0), limit: None };
         let errors = &by_group(&truth, &[1.5, 1.5, 0.55], &measure)[0];
         let found =
@@ -424,7 +424,7 @@ mod tests {
     fn there_is_no_r_squared_of_values_that_only_rounding_tells_apart() {
         for values in [vec![0.1; 300], vec![0.1, 0.1_f64.next_up(), 0.1]] {
             let estimate: Vec<f64> = values.iter().map(|value| value + 0.01).collect();
-            let truth = Table { names: vec!["b".into()], values };
+            let truth = Table { names: vec!["b".into()], values: values.into() };
             let measure = Measure { full_scale: vec![1.0], thickness_mm: None, limit: None };
             assert_eq!(by_group(&truth, &estimate, &measure)[0].r_squared, None);
             assert_eq!(
@@ -438,7 +438,7 @@ mod tests {
     fn the_mean_explains_nothing_whatever_the_offset() {
         for offset in [0.0, 1e3, 1e6, 1e9] {
             let values: Vec<f64> = (0..1000).map(|i| offset + f64::from(i % 37)).collect();
-            let truth = Table { names: vec!["b".into()], values };
+            let truth = Table { names: vec!["b".into()], values: values.into() };
             let means = truth.means().repeat(truth.len());
             let measure = Measure { full_scale: vec![1.0], thickness_mm: None, limit: None };
             let r_squared = by_group(&truth, &means, &measure)[0].r_squared.unwrap();

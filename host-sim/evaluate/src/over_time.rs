@@ -141,7 +141,7 @@ mod tests {
     }
 
     fn table(name: &str, values: Vec<f64>) -> Table {
-        Table { names: vec![name.into()], values }
+        Table { names: vec![name.into()], values: values.into() }
     }
 
     #[test]

@@ -266,7 +266,7 @@ fn readings_at_rest(subject: &Subject) -> Option<Vec<f64>> {
             let at_rest = Synthesis::new(&scene.world).ideal().drift(None).untouched();
             Some(at_rest.readings_of(Stream::Test, 0))
         }
-        Subject::Measured(data) => data.baseline().map(|baseline| baseline.values),
+        Subject::Measured(data) => data.baseline().map(|baseline| baseline.values.into_vec()),
     }
 }
 

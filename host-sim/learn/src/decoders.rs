@@ -18,31 +18,44 @@ pub mod textbook;
 pub struct Baseline {
     /// Name of the decoder in tables and results.
     pub name: &'static str,
-    fit: fn(&Dataset) -> Option<Box<dyn Decoder>>,
+    fit: Fit,
 }
+
+/// Fits a decoder to some lines of a data set.
+type Fit = fn(&Dataset, &[usize]) -> Option<Box<dyn Decoder>>;
 
 impl Baseline {
     /// Fits the decoder to `training`; `None` if it cannot decode such readings to any of the outputs.
     pub fn fit(&self, training: &Dataset) -> Option<Box<dyn Decoder>> {
-        (self.fit)(training)
+        self.fit_to(training, &(0..training.frames()).collect::<Vec<_>>())
+    }
+
+    /// Fits the decoder to these `lines` of `dataset` as [`fit`](Self::fit) does.
+    pub fn fit_to(&self, dataset: &Dataset, lines: &[usize]) -> Option<Box<dyn Decoder>> {
+        (self.fit)(dataset, lines)
     }
 }
 
 /// The best linear decoder of each row-wire.
-pub const LINEAR: Baseline =
-    Baseline { name: linear::NAME, fit: |training| Some(Box::new(linear::fit(training))) };
+pub const LINEAR: Baseline = Baseline {
+    name: linear::NAME,
+    fit: |dataset, lines| Some(Box::new(linear::fit(dataset, lines))),
+};
 
 /// The centroid of the touch.
 pub const CENTROID: Baseline = Baseline {
     name: centroid::NAME,
-    fit: |training| Some(Box::new(centroid::Centroid::fit(training)?)),
+    fit: |dataset, lines| Some(Box::new(centroid::Centroid::fit(&dataset.subset(lines))?)),
 };
 
 /// Every baseline: `run`, `table1`, `trade`, selection and the report go through this list.
 pub const BASELINES: &[Baseline] = &[
     LINEAR,
     CENTROID,
-    Baseline { name: mean::NAME, fit: |training| Some(Box::new(mean::Mean::fit(training))) },
+    Baseline {
+        name: mean::NAME,
+        fit: |dataset, lines| Some(Box::new(mean::Mean::fit(&dataset.subset(lines)))),
+    },
 ];
 
 /// Decoder of one row-wire's readings.

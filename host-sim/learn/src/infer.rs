@@ -3,9 +3,13 @@
 //! Many lines are computed side by side, one in each lane of the processor's vectors. A lane goes through the device's
 //! operations in the device's order.
 
+use std::borrow::Cow;
+
 use taxel_core::blob::Front;
 use taxel_core::confidence::{Confidence, Sizes};
+use taxel_core::projection::Projection;
 use taxel_core::rbf::Network;
+use taxel_core::touch::Touch;
 use taxel_data::simd::LANES;
 use taxel_data::widest;
 
@@ -18,6 +22,8 @@ mod float32;
 mod fixed16;
 mod front;
 
+/// Lines below which each is decoded by itself: columns cost as much for one line as for all that they hold.
+const FEW_LINES: usize = 8;
 /// Lines that one thread takes at a time.
 const LINES_AT_ONCE: usize = 4 * LANES;
 
@@ -49,6 +55,13 @@ pub(crate) fn decode(fronts: &[Front<'_>], networks: &[Network<'_>], inputs: &[f
     }
     let steps = [width, outputs].map(|step| step.max(1));
     let mut values = vec![0.0; inputs.len() / steps[0] * outputs];
+    if inputs.len() < FEW_LINES * steps[0] {
+        for (inputs, values) in inputs.chunks_exact(steps[0]).zip(values.chunks_exact_mut(steps[1]))
+        {
+            parts.iter().for_each(|part| part.decode_line(inputs, values));
+        }
+        return values;
+    }
     parallel::fill(&mut values, LINES_AT_ONCE * steps[1], &|index, values| {
         let inputs = parallel::piece(inputs, LINES_AT_ONCE * steps[0], index);
         parts.iter().for_each(|part| part.decode(inputs, values, steps));
@@ -68,41 +81,54 @@ struct Part<'n> {
 impl Part<'_> {
     /// Number of the model's inputs that it sees.
     fn inputs(&self) -> usize {
-        match self.front {
-            Some(Front { touch: Some(touch), .. }) => touch.readings(),
-            Some(Front { projection: Some(projection), .. }) => projection.readings(),
-            _ => self.network.shape().inputs,
+        self.front.and_then(|front| readings(&front)).unwrap_or(self.network.shape().inputs)
+    }
+
+    /// Decodes one line of the model's `inputs` to its `outputs`, by the device's own code.
+    fn decode_line(&self, inputs: &[f64], outputs: &mut [f64]) {
+        let touch = self.front.and_then(|front| front.touch);
+        let projection = self.front.and_then(|front| front.projection);
+        let readings = &inputs[self.first_input..][..self.inputs()];
+        let mut given: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
+        let mut factor = 1.0;
+        if let Some(touch) = touch {
+            let mut made = vec![0.0; touch.inputs()];
+            let strength = touch.apply(&given, None, &mut made);
+            (given, factor) = (made, touch.factor(strength).unwrap_or(f32::NAN));
         }
+        if let Some(projection) = projection {
+            let mut features = vec![0.0; projection.features()];
+            projection.project(&given, &mut features);
+            given = features;
+        }
+        let (mut scaled, mut inferred) =
+            (vec![0.0; given.len()], vec![0.0; self.network.shape().outputs]);
+        let fits = self.network.infer(&given, &mut scaled, &mut inferred);
+        fits.expect("lengths of the network");
+        inferred.iter_mut().for_each(|output| *output *= factor);
+        let is_decoded = given.iter().chain(&inferred).all(|number| number.is_finite());
+        let places = outputs[self.first_output..].iter_mut().zip(inferred);
+        places.for_each(|(place, y)| *place = f64::from(if is_decoded { y } else { f32::NAN }));
     }
 
     /// Decodes its `inputs` to its `outputs`, in lines that start every so many (`steps`) of the model's.
     fn decode(&self, inputs: &[f64], outputs: &mut [f64], steps: [usize; 2]) {
         let (network, shape) = (self.network, self.network.shape());
-        let touch = self.front.and_then(|front| front.touch);
-        let projection = self.front.and_then(|front| front.projection);
-        let seen = self.inputs();
-        let mut given = Column::zeros(seen + usize::from(touch.is_some()));
-        let mut features = Column::zeros(projection.map_or(0, |it| it.features()));
+        let mut given = Given::new(self.front.as_ref(), self.inputs());
         let mut inferred = Column::zeros(shape.outputs);
         let mut scratch = fixed16::Scratch::new(shape);
         let [of_inputs, of_outputs] = steps.map(|step| step * LANES);
         for (inputs, outputs) in inputs.chunks(of_inputs).zip(outputs.chunks_mut(of_outputs)) {
-            take(&inputs[self.first_input..], steps[0], &mut given[..seen]);
+            given.take(&inputs[self.first_input..], steps[0]);
             widest!({
-                let strength = touch.map(|touch| front::apply(touch, &mut given));
-                let scaled = match projection {
-                    Some(projection) => {
-                        front::project(projection, &given, &mut features);
-                        &mut features
-                    }
-                    None => &mut given,
-                };
+                let strength = given.make();
+                let scaled = given.inputs();
                 let missing = poison(scaled);
                 match network {
                     Network::F32(it) => float32::infer(it, scaled, &mut inferred),
                     Network::Fixed16(it) => fixed16::infer(it, scaled, &mut scratch, &mut inferred),
                 }
-                if let (Some(touch), Some(strength)) = (touch, strength) {
+                if let Some((touch, strength)) = strength {
                     front::with_strength(touch, &strength, &mut inferred);
                 }
                 let overflow = poison(&inferred);
@@ -112,6 +138,78 @@ impl Part<'_> {
             give(&inferred, &mut outputs[self.first_output..], steps[1]);
         }
     }
+}
+
+/// Number of readings that something stands before a network for; `None` if the network is given them.
+fn readings(front: &Front<'_>) -> Option<usize> {
+    let of_touch = front.touch.map(|touch| touch.readings());
+    of_touch.or(front.projection.map(|projection| projection.readings()))
+}
+
+/// What a network is given of lines side by side.
+struct Given<'n> {
+    touch: Option<Touch<'n>>,
+    projection: Option<Projection<'n>>,
+    /// Readings, which become shape and strength.
+    readings: Vec<Column>,
+    features: Vec<Column>,
+}
+
+impl<'n> Given<'n> {
+    fn new(front: Option<&Front<'n>>, readings: usize) -> Self {
+        let touch = front.and_then(|front| front.touch);
+        let projection = front.and_then(|front| front.projection);
+        let features = Column::zeros(projection.map_or(0, |it| it.features()));
+        let readings = Column::zeros(readings + usize::from(touch.is_some()));
+        Self { touch, projection, readings, features }
+    }
+
+    /// Takes the readings of up to [`LANES`] lines, which start every `step` values.
+    fn take(&mut self, lines: &[f64], step: usize) {
+        let count = self.readings.len() - usize::from(self.touch.is_some());
+        take(lines, step, &mut self.readings[..count]);
+    }
+
+    /// Makes the inputs of the network, and the strength of each line's touch.
+    #[inline(always)]
+    fn make(&mut self) -> Option<(Touch<'n>, Column)> {
+        let strength = self.touch.map(|touch| (touch, front::apply(touch, &mut self.readings)));
+        if let Some(projection) = self.projection {
+            front::project(projection, &self.readings, &mut self.features);
+        }
+        strength
+    }
+
+    /// Inputs of the network, once they are made.
+    #[inline(always)]
+    fn inputs(&mut self) -> &mut [Column] {
+        if self.projection.is_some() { &mut self.features } else { &mut self.readings }
+    }
+}
+
+/// Inputs of the network behind `front` for `readings` (`frames × readings`), `frames × inputs`, and the strength of each
+/// frame's touch; none without it. Readings that the network is given are not copied.
+pub(crate) fn given<'r>(front: &Front<'_>, readings: &'r [f64]) -> (Cow<'r, [f64]>, Vec<f32>) {
+    let Some(width) = self::readings(front) else { return (readings.into(), vec![]) };
+    let inputs = front.inputs(width);
+    let of_piece = |lines: &[f64]| {
+        let mut values = vec![0.0; lines.len() / width * inputs];
+        let mut strengths = Vec::new();
+        let mut given = Given::new(Some(front), width);
+        let places = values.chunks_mut(LANES * inputs);
+        for (lines, places) in lines.chunks(LANES * width).zip(places) {
+            given.take(lines, width);
+            let made = widest!({ given.make() });
+            give(given.inputs(), places, inputs);
+            if let Some((_, strength)) = made {
+                strengths.extend_from_slice(&strength.0[..lines.len() / width]);
+            }
+        }
+        (values, strengths)
+    };
+    let pieces = parallel::pieces(readings, LINES_AT_ONCE * width, &of_piece);
+    let (values, strengths): (Vec<_>, Vec<_>) = pieces.into_iter().unzip();
+    (values.concat().into(), strengths.concat())
 }
 
 /// Deviations (`lines × outputs`) and novelty of every line of `inputs`, as a device computes them.

@@ -9,11 +9,14 @@ use taxel_core::blob::{
 use taxel_core::confidence::Confidence;
 use taxel_core::fill::Fill;
 use taxel_core::rbf::Network;
-use taxel_data::{Dataset, Table, columns, input};
+use taxel_data::{Dataset, columns, input};
 
 use crate::error::{Error, Result, not_packed};
 use crate::infer;
 use crate::train::{FittedFront, FittedNetwork, Trained};
+
+/// Frames that are decoded at once to measure their errors.
+const FRAMES_AT_ONCE: usize = 8192;
 
 /// Largest blob in bytes that is read: 256 MB.
 pub const MOST_BLOB_BYTES: u64 = 256_000_000;
@@ -78,8 +81,7 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
         units(&dataset.inputs.names)
     };
     let [full_scale, linear_rmse] = [&origin.full_scale, &origin.linear_rmse].map(|it| floats(it));
-    let decoded = infer::decode(&fronts, &views, &dataset.inputs.values);
-    let training_rmse = floats(&training_rmse(&decoded, &dataset.outputs));
+    let training_rmse = floats(&training_rmse(&fronts, &views, dataset));
     let parts = ModelParts {
         fronts: &fronts,
         confidence: None,
@@ -113,12 +115,17 @@ fn floats(values: &[f64]) -> Vec<u8> {
 }
 
 /// RMSE of each output on the frames that it was trained on; NaN for an output without a value.
-fn training_rmse(decoded: &[f64], truth: &Table) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0.0); truth.names.len()];
-    for (truth, decoded) in truth.lines().zip(decoded.chunks_exact(truth.names.len())) {
-        for ((sum, count), (truth, decoded)) in sums.iter_mut().zip(truth.iter().zip(decoded)) {
+fn training_rmse(fronts: &[Front<'_>], networks: &[Network<'_>], dataset: &Dataset) -> Vec<f64> {
+    let (inputs, outputs) = (&dataset.inputs, &dataset.outputs);
+    let mut sums = vec![(0.0, 0.0); outputs.names.len()];
+    let readings = inputs.values.chunks((FRAMES_AT_ONCE * inputs.names.len()).max(1));
+    let truth = outputs.values.chunks((FRAMES_AT_ONCE * sums.len()).max(1));
+    for (readings, truth) in readings.zip(truth) {
+        let decoded = infer::decode(fronts, networks, readings);
+        for (place, (truth, decoded)) in truth.iter().zip(decoded).enumerate() {
             let square = (truth - decoded).powi(2);
             if !square.is_nan() {
+                let (sum, count) = &mut sums[place % outputs.names.len()];
                 (*sum, *count) = (*sum + square, *count + 1.0);
             }
         }

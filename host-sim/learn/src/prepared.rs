@@ -9,11 +9,10 @@ use taxel_core::scale::CLAMP;
 use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
-use crate::infer::{assess_lines, decode, is_missing};
+use crate::infer::{assess_lines, decode, given, is_missing};
 use crate::packing::ModelBlob;
 use crate::parallel;
 use crate::relative::{ratios, reciprocals};
-use crate::train::{projection, touch};
 
 /// Frames that a thread fills at a time.
 const FRAMES_AT_ONCE: usize = 64;
@@ -112,7 +111,10 @@ impl<'b> PreparedModel<'b> {
     /// If the number of columns differs from the model's number of readings.
     pub fn decode_table(&self, readings: &Table) -> Table {
         assert_eq!(readings.names.len(), self.inputs(), "the model's inputs");
-        Table { names: self.output_names.clone(), values: self.decode_lines(&readings.values) }
+        Table {
+            names: self.output_names.clone(),
+            values: self.decode_lines(&readings.values).into(),
+        }
     }
 
     /// Decodes `readings` (`frames × inputs`) to outputs (`frames × outputs`), line after line.
@@ -130,7 +132,7 @@ impl<'b> PreparedModel<'b> {
             return vec![inputs.into_owned()];
         }
         let of_front = |front: &Front<'_>| {
-            let (given, strengths) = inputs_of(front, &inputs);
+            let (given, strengths) = given(front, &inputs);
             let mut given = given.into_owned();
             // A place without a touch is not decoded.
             if let (Some(touch), false) = (front.of_places(), strengths.is_empty()) {
@@ -233,22 +235,6 @@ impl<'b> PreparedModel<'b> {
     fn tables(&self, readings: &[f64]) -> impl Iterator<Item = (&[Network<'b>], Vec<f64>)> {
         let at_once = if self.fronts.is_empty() { self.networks.len() } else { 1 };
         self.networks.chunks(at_once).zip(self.inputs_of_networks(readings))
-    }
-}
-
-/// Inputs of the network behind `front` for `inputs` of the model, and the strength of each frame's touch; none without
-/// it.
-fn inputs_of<'r>(front: &Front<'_>, inputs: &'r [f64]) -> (Cow<'r, [f64]>, Vec<f32>) {
-    let (given, strengths) = match front.touch {
-        Some(touch) => {
-            let (given, strengths) = touch::inputs(touch, inputs);
-            (Cow::Owned(given), strengths)
-        }
-        None => (Cow::Borrowed(inputs), vec![]),
-    };
-    match front.projection {
-        Some(projection) => (Cow::Owned(projection::features(projection, &given)), strengths),
-        None => (given, strengths),
     }
 }
 

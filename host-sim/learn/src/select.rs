@@ -15,6 +15,9 @@ mod grid;
 pub use folds::{block_folds, number_folds, random_folds, smallest_training_part};
 pub use grid::{Candidates, Edge};
 
+/// Frames that baselines decode at once.
+const FRAMES_AT_ONCE: usize = 8192;
+
 /// Result of one candidate on the folds that it was not trained on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scored {
@@ -182,7 +185,8 @@ impl<'d> Judge<'d> {
         penalties: &[Option<f64>],
         options: &Options,
     ) -> Result<Vec<Vec<f64>>> {
-        let (training, test) = split(self.dataset, self.fold_of, fold);
+        let (held, kept) = split(self.fold_of, fold);
+        let [test, training] = [held, kept].map(|frames| self.dataset.subset(&frames));
         let inner = without(self.fold_of, fold);
         let mut all = vec![Trained::default(); spreads.len() * penalties.len()];
         for start in Start::all(&training, options)? {
@@ -190,7 +194,8 @@ impl<'d> Judge<'d> {
             let mut places = all.iter_mut();
             let mut add = |projection: Option<&Vec<f32>>, models: Vec<Vec<FittedNetwork>>| {
                 let models = places.by_ref().zip(models);
-                models.for_each(|(trained, networks)| trained.add(&start, projection, networks));
+                models
+                    .for_each(|(trained, networks)| trained.add(start.front(projection), networks));
             };
             for spread in spreads {
                 layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
@@ -268,16 +273,20 @@ fn baseline_squares(
     fold_of: &[usize],
     fold: usize,
 ) -> Option<Vec<f64>> {
-    let (training, test) = split(dataset, fold_of, fold);
-    let predicted = baseline.fit(&training)?.decode_all(&test.inputs.values, 1);
-    Some(test.outputs.squared_errors(&predicted.values))
+    let (held, kept) = split(fold_of, fold);
+    let decoder = baseline.fit_to(dataset, &kept)?;
+    let mut sums = vec![0.0; dataset.outputs.names.len()];
+    for lines in held.chunks(FRAMES_AT_ONCE) {
+        let test = dataset.subset(lines);
+        let predicted = decoder.decode_all(&test.inputs.values, 1);
+        test.outputs.add_squared_errors(&predicted.values, &mut sums);
+    }
+    Some(sums)
 }
 
-/// Training part and held-out part of a data set, for one fold.
-fn split(dataset: &Dataset, fold_of: &[usize], fold: usize) -> (Dataset, Dataset) {
-    let (held, kept): (Vec<usize>, Vec<usize>) =
-        (0..dataset.frames()).partition(|i| fold_of[*i] == fold);
-    (dataset.subset(&kept), dataset.subset(&held))
+/// Frames that are held out, and all others, for one fold.
+fn split(fold_of: &[usize], fold: usize) -> (Vec<usize>, Vec<usize>) {
+    (0..fold_of.len()).partition(|frame| fold_of[*frame] == fold)
 }
 
 /// Folds of the frames that are not in `fold`, numbered without a gap.
@@ -316,8 +325,8 @@ mod tests {
         }
         let names = |list: &[&str]| list.iter().map(|n| (*n).to_owned()).collect();
         Dataset {
-            inputs: Table { names: names(&["a", "b"]), values: inputs },
-            outputs: Table { names: names(outputs), values },
+            inputs: Table { names: names(&["a", "b"]), values: inputs.into() },
+            outputs: Table { names: names(outputs), values: values.into() },
             ..Dataset::empty(vec![], vec![], 1, 0)
         }
     }

@@ -4,17 +4,11 @@
 //! alone decides how work is cut into pieces, whose results are merged in order. The network is rounded
 //! once, to the numbers of its format, as a [`FittedNetwork`].
 
-use std::borrow::Cow;
-
-use nalgebra::DMatrix;
 use serde::Deserialize;
-use taxel_core::blob::Front;
 use taxel_core::rbf::Format;
-use taxel_core::touch::Kind;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
 use crate::error::Result;
-use crate::{infer, parallel};
 
 pub mod resolution;
 pub mod kmeans;
@@ -28,13 +22,18 @@ pub mod touch;
 pub mod memory;
 pub mod layers;
 pub mod refine;
+mod trained;
+mod start;
 
 pub use format::FittedNetwork;
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
 use samples::Ridge;
-pub use samples::{HiddenLayer, InputScale, Samples};
+pub use samples::{HiddenLayer, InputScale, Samples, Seen};
+pub use start::Start;
 pub use touch::{Features, FittedTouch, Group, Kinds, THRESHOLD};
+pub(crate) use trained::fit;
+pub use trained::{FittedFront, Trained};
 
 /// How output weights are computed. Both ways give the same weights, but for rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -285,43 +284,6 @@ impl Samples<'_> {
     }
 }
 
-/// Result of training on a data set.
-#[derive(Debug, Clone, Default)]
-pub struct Trained {
-    /// What stands before each network that sees whole frames; nothing for networks of rows.
-    pub fronts: Vec<FittedFront>,
-    /// Networks of the row-wires in order, or those that see whole frames.
-    pub networks: Vec<FittedNetwork>,
-}
-
-/// What stands before a network that sees whole frames, as the blob will hold it.
-#[derive(Debug, Clone)]
-pub struct FittedFront {
-    /// Number of outputs of the network: those that follow the outputs of the network before.
-    pub outputs: usize,
-    /// What makes shape and strength of readings; `None` for readings as they are.
-    pub touch: Option<FittedTouch>,
-    /// Number of inputs, before the projection.
-    pub inputs: usize,
-    /// Parameters of the [`projection`]; `None` if the network is given all inputs.
-    pub projection: Option<Vec<f32>>,
-}
-
-impl FittedFront {
-    /// As the blob holds it.
-    ///
-    /// # Panics
-    /// Never: its numbers are finite.
-    pub fn view(&self) -> Front<'_> {
-        let projection = self.projection.as_deref();
-        Front {
-            outputs: self.outputs,
-            touch: self.touch.as_ref().map(FittedTouch::view),
-            projection: projection.map(|parameters| projection::view(parameters, self.inputs)),
-        }
-    }
-}
-
 /// Trains one network for each row-wire of `dataset`, or one for each kind of its outputs that sees whole frames.
 ///
 /// # Errors
@@ -353,200 +315,10 @@ pub fn train_refined(
         }
         let options = start.fitting(&layers, options, refinement.map(|(settings, _)| settings))?;
         for networks in fit(&layers, &options, &[options.penalty], progress)? {
-            trained.add(&start, layers.projection.as_ref(), networks);
+            trained.add(start.front(layers.projection.as_ref()), networks);
         }
     }
     Ok(trained)
-}
-
-/// What training of outputs that share networks starts from: those of a [group](Group), or of all rows.
-#[derive(Debug, Clone)]
-pub struct Start<'d> {
-    /// The outputs, and what makes shape and strength of readings.
-    pub group: Group,
-    /// Frames to train on, as the group is trained on them.
-    pub frames: Cow<'d, Dataset>,
-    /// Index of each of these among the frames of the data set.
-    kept: Vec<usize>,
-    /// Parameters of the projection by regression.
-    pub projection: Option<Vec<f32>>,
-    /// Features of the frames that are places, as maps tell them that were fitted to others.
-    held_out: Option<DMatrix<f64>>,
-    /// Whether networks see whole frames.
-    whole_frames: bool,
-}
-
-impl<'d> Start<'d> {
-    /// Starts of all networks for the frames of `dataset`.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) for data without a projection, or training that takes more memory than is allowed.
-    pub fn all(dataset: &'d Dataset, options: &Options) -> Result<Vec<Self>> {
-        memory::check(dataset, options, None)?;
-        if options.projects(dataset) {
-            projection::check(dataset, options.features)?;
-        }
-        let kinds =
-            options.kinds.filter(|_| options.sees_frames(dataset)).unwrap_or(Kinds::AS_THEY_ARE);
-        let groups = Group::all(dataset, kinds);
-        let are_many = groups.len() > 1;
-        let start = |group: Group| {
-            let (frames, kept) = group.frames(dataset);
-            let mut held_out = None;
-            let projection = match &group.touch {
-                _ if !options.projects(&frames) => None,
-                Some(touch) => {
-                    let fitted = touch::projection(touch, &frames, dataset, options.features)?;
-                    held_out = fitted.held_out;
-                    Some(fitted.parameters)
-                }
-                None => {
-                    // Some of the outputs have fewer products than all of them.
-                    let possible = |wanted| projection::features_at_most(&frames, wanted);
-                    Some(projection::fit(&frames, options.features.map(possible))?)
-                }
-            };
-            let whole_frames = are_many || group.touch.is_some() || projection.is_some();
-            Ok(Self { group, frames, kept, projection, held_out, whole_frames })
-        };
-        groups.into_iter().map(start).collect()
-    }
-
-    /// This start with frames of its own.
-    pub fn into_owned(self) -> Start<'static> {
-        Start { frames: Cow::Owned(self.frames.into_owned()), ..self }
-    }
-
-    /// Layers with K-means centres.
-    pub fn layers(&self, options: &Options) -> Layers<'_> {
-        let seen = projection::seen(self.projection.as_deref(), &self.frames);
-        let of_row = |row: usize| {
-            let table = seen.row_table(row);
-            let samples = Samples::new(&table);
-            samples.layer(samples.centres(options, row), options)
-        };
-        let hidden = parallel::map(seen.rows, &of_row);
-        Layers { projection: self.projection.clone(), seen, hidden }
-    }
-
-    /// Options for fitting weights to these `layers`: with the usual penalty, if `options` give none. That of places is
-    /// chosen on frames that are held out.
-    ///
-    /// # Errors
-    /// As [`train`].
-    pub fn fitting(
-        &self,
-        layers: &Layers<'_>,
-        options: &Options,
-        refinement: Option<&Refinement>,
-    ) -> Result<Options> {
-        let penalty = match (options.penalty, &self.group.touch) {
-            (None, Some(touch)) if touch.kind() == Kind::Place => {
-                let mut seen =
-                    projection::seen(self.projection.as_deref(), &self.frames).into_owned();
-                // A map tells frames that it was fitted to better than others.
-                if let Some(told) = self.held_out.as_ref().filter(|it| it.nrows() == seen.frames())
-                {
-                    let lines = seen.inputs.values.chunks_exact_mut(seen.inputs.names.len());
-                    let places = lines.zip(told.row_iter());
-                    places.for_each(|(line, told)| {
-                        line.iter_mut().zip(&told).for_each(|(to, from)| *to = *from);
-                    });
-                }
-                Some(touch::best_penalty(&seen, &layers.hidden[0], options)?)
-            }
-            (given, _) => given.or(refinement.map(|settings| settings.ridge)),
-        };
-        Ok(Options { penalty, ..*options })
-    }
-
-    /// What stands before its network with this `projection`, if it sees whole frames.
-    pub fn front(&self, projection: Option<&Vec<f32>>) -> Option<FittedFront> {
-        self.whole_frames.then(|| FittedFront {
-            outputs: self.group.outputs.len(),
-            touch: self.group.touch.clone(),
-            inputs: self.frames.inputs.names.len(),
-            projection: projection.cloned(),
-        })
-    }
-
-    /// Layers that were refined on `examples` of the data set.
-    ///
-    /// # Errors
-    /// As [`refine`](refine::refine).
-    pub fn refine(
-        &self,
-        layers: &Layers<'_>,
-        options: &Options,
-        settings: &Refinement,
-        examples: Examples<'_>,
-        progress: &dyn Progress,
-    ) -> Result<Layers<'_>> {
-        let of =
-            |examples| refine::refine(&self.frames, layers, options, settings, examples, progress);
-        match examples {
-            Examples::Fresh(fresh) => {
-                of(Examples::Fresh(&touch::Fresh { fresh, group: &self.group }))
-            }
-            Examples::Folds(fold_of) => {
-                let folds: Vec<usize> = self.kept.iter().map(|frame| fold_of[*frame]).collect();
-                of(Examples::Folds(&folds))
-            }
-        }
-    }
-}
-
-impl Trained {
-    /// Adds `networks` that training from `start` ended with, and the `projection` in front of them.
-    pub fn add(
-        &mut self,
-        start: &Start<'_>,
-        projection: Option<&Vec<f32>>,
-        networks: Vec<FittedNetwork>,
-    ) {
-        self.fronts.extend(start.front(projection));
-        self.networks.extend(networks);
-    }
-
-    /// Decodes `inputs` (`frames × inputs`) to outputs (`frames × outputs`), as the packed model does.
-    pub fn decode(&self, inputs: &[f64]) -> Vec<f64> {
-        let fronts: Vec<Front<'_>> = self.fronts.iter().map(FittedFront::view).collect();
-        let networks: Vec<_> = self.networks.iter().map(FittedNetwork::network).collect();
-        infer::decode(&fronts, &networks, inputs)
-    }
-}
-
-/// Networks with these `layers`, and output weights that are fitted to the frames that they were found on, with each of
-/// `penalties` instead of the options' own: those of one model for each. They share the decomposition of the samples.
-///
-/// # Errors
-/// [`Error`](crate::Error) for data or layers that the format does not hold.
-pub(crate) fn fit(
-    layers: &Layers<'_>,
-    options: &Options,
-    penalties: &[Option<f64>],
-    progress: &dyn Progress,
-) -> Result<Vec<Vec<FittedNetwork>>> {
-    progress.stage("fit weights", layers.hidden.len());
-    let fit_rows = |options: &Options| {
-        let fitted = parallel::map(layers.hidden.len(), &|row| {
-            let table = layers.seen.row_table(row);
-            let fitted = Samples::new(&table).fit_each(&layers.hidden[row], options, penalties);
-            progress.step();
-            fitted
-        });
-        // One list of networks a row-wire, one network a penalty.
-        fitted.into_iter().collect::<Result<Vec<Vec<FittedNetwork>>>>()
-    };
-    let fitted = match fit_rows(options) {
-        Err(_) if options.or_f32 => {
-            progress.stage("fit weights in f32", layers.hidden.len());
-            fit_rows(&Options { format: Format::F32, ..*options })?
-        }
-        fitted => fitted?,
-    };
-    let mut rows: Vec<_> = fitted.into_iter().map(Vec::into_iter).collect();
-    Ok(penalties.iter().map(|_| rows.iter_mut().filter_map(Iterator::next).collect()).collect())
 }
 
 /// Squared distance ‖a − b‖².

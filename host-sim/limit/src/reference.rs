@@ -264,7 +264,7 @@ mod tests {
     /// Two outputs of some frames: the truth is off the posterior mean by one deviation, up and down.
     fn reference(effective: f64, off: f64) -> Reference {
         let names = ["r1e1_dz_mm", "r1e2_dz_mm"].map(String::from).to_vec();
-        let mut truth = Table { names, values: Vec::new() };
+        let mut truth = Table { names, values: Vec::new().into() };
         let mut posteriors = Vec::new();
         for i in 0..100 {
             let mean = vec![f64::from(i % 7), 2.0 - f64::from(i % 5)];

@@ -180,7 +180,7 @@ impl<'w> Synthesis<'w> {
                 synthesis.fill(workspace, piece * LANES, &mut [], outputs);
             },
         );
-        Table { names, values }
+        Table { names, values: values.into() }
     }
 
     /// Synthesises the baseline of the session that each of the first `frames` of `stream` belongs to: one line a

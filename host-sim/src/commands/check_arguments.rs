@@ -98,7 +98,7 @@ impl CheckArguments {
     ) -> Result<Option<Vec<f64>>> {
         let fields = FieldArguments::default();
         let baseline = self.untouched.baselines(metadata, path, (rest, 1), &fields, None)?;
-        Ok(baseline.map(|baseline| baseline.values))
+        Ok(baseline.map(|baseline| baseline.values.into_vec()))
     }
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
@@ -130,7 +130,7 @@ impl CheckArguments {
         let baseline_ohm = if metadata.relative_inputs && self.untouched.path().is_none() {
             // All frames are of one session, which does not drift.
             let session = Synthesis::new(&scene.world).drift(None);
-            Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values)
+            Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values.into_vec())
         } else {
             self.baseline_ohm(metadata, path, None)?
         };

@@ -123,7 +123,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
     let mut estimate = model.decode_table(&readings);
     let with_untold = estimate.values.clone();
-    estimate.values = truth.with_places(estimate.values);
+    estimate.values = truth.with_places(estimate.values.into_vec()).into();
     let measure = measure_of(metadata);
     // The mean is judged on the same pairs as the model, and computed from them.
     let pairs = truth.values.iter_mut().zip(&estimate.values);

@@ -102,7 +102,7 @@ impl HealthArguments {
             readings.lines().map(|line| line.iter().any(|reading| reading.is_nan())).collect();
         let filled = if self.no_fill { None } else { model.filled(&readings.values) };
         let counts = filled.map_or(vec![], |(values, counts)| {
-            readings.values = values;
+            readings.values = values.into();
             counts
         });
         let sum = |of: fn(&ColumnHealth) -> usize| columns.iter().map(of).sum();

@@ -75,7 +75,7 @@ impl BaselineArgument {
                         columns::some_names(&missing)
                     ));
                 }
-                Ok(Some(baseline.values))
+                Ok(Some(baseline.values.into_vec()))
             }
         }
     }
@@ -110,7 +110,7 @@ fn baseline<'n>(
 ) -> Result<Table> {
     let mut frames = usual_lines(file, names)?;
     judge(&mut frames, limits);
-    Ok(Table { values: frames.means(), names: frames.names })
+    Ok(Table { values: frames.means().into(), names: frames.names })
 }
 
 /// Columns called `names` of the lines of `file` that hold no outlier, which would move the mean.

@@ -162,7 +162,7 @@ impl UntouchedArguments {
         let names = || metadata.input_names.iter().map(String::from).collect();
         let or = ", or a log with columns that are zero while nothing touches it (--rest)";
         let baseline = self.baseline.values(metadata, (path, or), fields, limits)?;
-        Ok(baseline.map(|values| Table { names: names(), values }))
+        Ok(baseline.map(|values| Table { names: names(), values: values.into() }))
     }
 }
 

@@ -198,7 +198,7 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
         let truth: Vec<f64> = (0..4 * names.len()).map(|i| (i * i % 17) as f64).collect();
         let estimate = truth.iter().enumerate().map(|(i, truth)| truth + i as f64).collect();
         let [truth, estimate] =
-            [truth, estimate].map(|values| Values { names: names.clone(), values });
+            [truth, estimate].map(|values| Values { names: names.clone(), values: values.into() });
         let distribution = Distribution::new(&truth, &estimate, readings, Reference::Median);
         super::view_html(&view(&distribution, &result, &made()))
     };
@@ -212,7 +212,7 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
     assert!(page.contains("relative to the median") && page.contains("decoded: "));
     assert!(page.contains("<th scope=\"row\">contact depth (mm)</th>"), "unit once");
     let channels = Values { names: vec!["ch1".into()], ..readings };
-    let channels = Values { values: channels.values[..4].to_vec(), ..channels };
+    let channels = Values { values: channels.values[..4].to_vec().into(), ..channels };
     let page = of(&["fx_n", "fz_n"], &channels);
     assert!(is_drawable(&page) && !page.contains("Place in the"));
     assert!(page.contains("in its standard deviations") && page.contains(">ch1</text>"));

@@ -4,7 +4,7 @@ use crate::common::unrefined;
 use host_sim::experiment::Experiment;
 use host_sim::metrics::{self, Errors};
 use taxel_data::{Dataset, Silent, Stream};
-use taxel_learn::decoders::linear;
+use taxel_learn::decoders::LINEAR;
 use taxel_simulate::synthesise;
 
 fn row_4(scene: &str, noise_level: f64) -> Experiment {
@@ -24,7 +24,7 @@ fn network_and_linear(scene: &str, noise_level: f64) -> (Vec<Errors>, Vec<Errors
     let blob = scene.train(&Silent).unwrap();
     let measure = scene.measure();
     let network = metrics::judge(&blob.prepare(), &test, &measure);
-    let linear = metrics::judge(&linear::fit(&training), &test, &measure);
+    let linear = metrics::judge(LINEAR.fit(&training).unwrap().as_ref(), &test, &measure);
     (network.errors, linear.errors)
 }
 

@@ -158,8 +158,8 @@ fn made(shape: Shape, format: Format, frames: usize) -> Outcome<Model> {
             format.name()
         ));
     }
-    let frames = synthesis(Stream::Test, frames).0.inputs.values;
-    Ok(Model { shape, format, blob, frames, baseline: baseline.values })
+    let frames = synthesis(Stream::Test, frames).0.inputs.values.into_vec();
+    Ok(Model { shape, format, blob, frames, baseline: baseline.values.into_vec() })
 }
 
 /// Mean of each column, as a table of one line.

@@ -99,8 +99,10 @@ mod tests {
 
     #[test]
     fn coverage_counts_errors_within_their_own_deviations() {
-        let truth =
-            Table { names: vec!["r1e1_dz_mm".into(), "r1e2_dz_mm".into()], values: vec![0.0; 8] };
+        let truth = Table {
+            names: vec!["r1e1_dz_mm".into(), "r1e2_dz_mm".into()],
+            values: vec![0.0; 8].into(),
+        };
         // Errors of ½, 1½, 2½ deviations and so on.
         let estimates = [0.05, 0.3, -0.15, 0.9, 0.25, -1.5, f64::NAN, 0.1];
         let deviations = [0.1, 0.2, 0.1, 0.6, 0.1, 0.6, 0.1, 0.2];

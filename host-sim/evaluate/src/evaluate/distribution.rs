@@ -168,7 +168,10 @@ mod tests {
     use super::*;
 
     fn table(names: &[&str], values: Vec<f64>) -> Table {
-        Table { names: names.iter().map(|name| (*name).to_owned()).collect(), values }
+        Table {
+            names: names.iter().map(|name| (*name).to_owned()).collect(),
+            values: values.into(),
+        }
     }
 
     /// Two electrodes of which the second is off by n/100 mm in frame n, and one reading.

@@ -1,11 +1,12 @@
 //! Baseline: the best linear decoder of each row-wire, which a network must beat.
 
 use taxel_data::Dataset;
+use taxel_data::table::ranges;
 
 use super::{RowDecoder, Rows};
-use crate::train::least_squares::{Factor, Regressors};
-use crate::train::tasks::{Factors, Task};
-use crate::train::{INITIAL_COVARIANCE, InputScale};
+use crate::train::least_squares::Factor;
+use crate::train::tasks::{Factors, Task, Weighed};
+use crate::train::{INITIAL_COVARIANCE, InputScale, Samples};
 
 /// Name of the decoder in tables and results.
 pub const NAME: &str = "linear";
@@ -20,24 +21,40 @@ pub struct LinearRow {
     bias: Vec<f64>,
 }
 
-/// Fits the best linear decoder of every row of `training`.
-pub fn fit(training: &Dataset) -> Rows<LinearRow> {
-    Rows::fit(NAME, training, LinearRow::fit)
+/// Fits the best linear decoder of every row to these `lines` of `training`.
+pub fn fit(training: &Dataset, lines: &[usize]) -> Rows<LinearRow> {
+    Rows::fit(NAME, training, |table| LinearRow::fit(table, lines))
 }
 
 impl LinearRow {
-    /// Fits the best linear decoder of `table` in the sense of least squares, each output on the lines that have it.
-    pub fn fit(table: &Dataset) -> Self {
-        let (scale, inputs) = (InputScale::new(table), table.inputs.names.len());
-        let regressors = Regressors { centres: &[], inputs, decays: &[1.0], affine_tail: true };
-        let factor = |task: Task<'_>| {
-            let design = regressors.of(scale.apply(&task.table.inputs.values));
-            let outputs = task.columns.len();
-            (task.columns, Factor::new(&design, &task.targets, outputs, INITIAL_COVARIANCE))
+    /// Fits the best linear decoder of these `lines` of `table` in the sense of least squares, each output on the lines that
+    /// have it.
+    ///
+    /// # Panics
+    /// If there is no such line.
+    pub fn fit(table: &Dataset, lines: &[usize]) -> Self {
+        let (inputs, outputs) = (table.inputs.names.len(), table.outputs.names.len());
+        let readings = lines.iter().map(|line| table.inputs.line(*line));
+        let scale = InputScale::of_ranges(&ranges(readings, inputs));
+        let (samples, means) = (Samples::new(table), vec![0.0; outputs]);
+        let factor = |task: &Task| {
+            let write = |readings: &[f64], values: &mut [f64]| {
+                let scaled = scale.apply(readings);
+                let lines = values.chunks_exact_mut(inputs + 1).zip(scaled.chunks_exact(inputs));
+                for (values, scaled) in lines {
+                    values[..inputs].copy_from_slice(scaled);
+                    values[inputs] = 1.0;
+                }
+            };
+            let (regressors, write) = (inputs + 1, Box::new(write));
+            let (samples, means) = (&samples, &means[..]);
+            let samples = Weighed { samples, means, task, regressors, write };
+            let factor = Factor::new(&samples, &samples, task.columns.len(), INITIAL_COVARIANCE);
+            (task.columns.clone(), factor)
         };
-        let tasks = Task::all(table, &table.outputs);
-        let mut slope = Factors(tasks.into_iter().map(factor).collect()).weights();
-        let bias = slope.split_off(slope.len() - table.outputs.names.len());
+        let tasks = Task::all(&table.outputs, lines);
+        let mut slope = Factors(tasks.iter().map(factor).collect()).weights();
+        let bias = slope.split_off(slope.len() - outputs);
         Self { scale, inputs, slope, bias }
     }
 }

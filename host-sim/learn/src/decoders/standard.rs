@@ -35,8 +35,8 @@ impl StandardNetwork {
         let decay = [1.0 / (2.0 * spread * spread)];
         let this = Self {
             inputs: samples.inputs(),
+            centres: samples.scaled(),
             scale: samples.scale,
-            centres: samples.scaled,
             decay,
             weights: Vec::new(),
             outputs,

@@ -59,7 +59,7 @@ impl Textbook {
         let (scaled, outputs) = (self.scaled(&table.inputs.values), table.outputs.names.len());
         let regressors = self.regressors(&decay);
         let gaussians = regressors.of(&scaled);
-        let targets = &table.outputs.values;
+        let targets = &table.outputs.values[..];
         let factor = Factor::new(&gaussians, targets, outputs, initial_covariance);
         TextbookNetwork { hidden: Arc::clone(self), decay, weights: factor.weights(), outputs }
     }

@@ -143,7 +143,8 @@ fn what_comes_and_goes_is_named_and_counted_in_the_frames_that_it_strikes() {
     let each: Vec<String> = (1..=8).map(|row| format!("r{row}c1 intermittently open")).collect();
     let each: Vec<(&str, usize)> = each.iter().map(|name| (name.as_str(), 25)).collect();
     told(&apart, block, &each);
-    let twice = Table { values: [&sound.values[..], &sound.values].concat(), ..sound.clone() };
+    let twice =
+        Table { values: [&sound.values[..], &sound.values].concat().into(), ..sound.clone() };
     let breaks = struck(&twice, |line| line >= 150, 58..59, 1e6);
     told(&breaks, block, &[("r4c5 open", 250)]);
     let mut draw = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
@@ -166,7 +167,8 @@ fn without_a_fill_health_alone_is_told() {
 
 #[test]
 fn columns_without_wires_have_no_faults() {
-    let table = Table { names: vec!["a_ohm".into(), "b_ohm".into()], values: vec![f64::NAN; 40] };
+    let table =
+        Table { names: vec!["a_ohm".into(), "b_ohm".into()], values: vec![f64::NAN; 40].into() };
     assert!(diagnose(&table, Limits::USUAL, None).is_empty());
     let names = ["r1c1_ohm", "r1c2_ohm", "r2c1_ohm"].map(String::from);
     assert_eq!(Grid::new(&names), None);

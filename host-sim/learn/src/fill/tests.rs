@@ -55,7 +55,7 @@ fn filled_readings_are_as_near_as_noise_lets_them_be() {
 fn models_that_cannot_fill_are_refused_with_what_they_lack() {
     let (blob, fresh) = model();
     assert!(blob.parse().fill().is_some());
-    let few = Table { names: vec!["a".into()], values: vec![1.0, 2.0] };
+    let few = Table { names: vec!["a".into()], values: vec![1.0, 2.0].into() };
     let mut bad = fresh.clone();
     bad.values[0] = f64::INFINITY;
     let first =

@@ -54,7 +54,7 @@ impl Sensor {
         let (pressed, rest) = (self.presses.subset(&lines), &self.untouched);
         let with = |pressed: Table, rest: &Table| {
             let values = [&pressed.values[..], &rest.values[..untouched * rest.names.len()]];
-            Table { values: values.concat(), ..pressed }
+            Table { values: values.concat().into(), ..pressed }
         };
         let inputs = with(pressed.inputs, &rest.inputs);
         [drifted(&inputs, &self.gains), with(pressed.outputs, &rest.outputs)]

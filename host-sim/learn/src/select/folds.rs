@@ -60,7 +60,7 @@ mod tests {
     fn the_output_with_fewest_frames_tells_how_many_there_are_to_train_on() {
         let outputs = |y: f64| {
             let values = vec![1.0, y, 2.0, y, 3.0, 4.0, 5.0, 6.0];
-            Table { names: ["f", "y"].map(String::from).to_vec(), values }
+            Table { names: ["f", "y"].map(String::from).to_vec(), values: values.into() }
         };
         assert_eq!(smallest_training_part(&[2, 0, 2, 1], &outputs(7.0)), 2);
         assert_eq!(smallest_training_part(&[2, 0, 2, 1], &outputs(f64::NAN)), 1);

@@ -7,15 +7,13 @@
 use std::cell::OnceCell;
 
 use taxel_core::rbf::{self, Format, Network, NetworkError, Shape};
+use taxel_data::table::means;
 
-use taxel_data::{Dataset, Table};
-
-use super::least_squares::{Decomposed, Design, Factor, Weighed, weighed};
+use super::least_squares::{Decomposed, Factor};
 use super::samples::{Ridge, Samples};
-use super::tasks::{Factors, Task};
+use super::tasks::{Factors, Task, Weighed, Write};
 use super::{HiddenLayer, Options, Solver};
 use crate::error::{Error, Result, parameter_not_held};
-use crate::infer::infer;
 
 mod fixed16;
 mod float32;
@@ -53,25 +51,16 @@ impl FittedNetwork {
         }
     }
 
-    /// The network, if it decodes each output of `table` as well as the solution in f64 that it was rounded from, which
-    /// has so much squared error `left` of each.
+    /// The network, if it decodes each output as well as the solution in f64 that it was rounded from, which has so much
+    /// squared error `left` of each.
     ///
     /// # Errors
     /// [`Error`] if R² of an output is lower by more than [`MOST_LOST`], and its squared error larger by more
     /// than [`MOST_GROWTH`].
-    pub(super) fn unless_lost(
-        self,
-        table: &Dataset,
-        targets: &Targets,
-        left: &[f64],
-    ) -> Result<Self> {
-        let outputs = &table.outputs;
-        let weights = table.weights.as_deref();
-        let predicted = infer(&self.network(), &table.inputs.values);
-        let found = weighed_errors(table, &predicted);
-        let totals =
-            column_squares(&weighed(weights, &targets.deviations.values), targets.outputs());
-        let errors = found.into_iter().zip(left).zip(totals).zip(&targets.means);
+    pub(super) fn unless_lost(self, targets: &Targets<'_>, left: &[f64]) -> Result<Self> {
+        let outputs = &targets.samples.table.outputs;
+        let found = targets.samples.squared_errors(&self.network());
+        let errors = found.into_iter().zip(left).zip(targets.squares()).zip(&targets.means);
         for (output, ((((found, left), total), mean), count)) in
             errors.zip(outputs.counts()).enumerate()
         {
@@ -115,26 +104,38 @@ impl FittedNetwork {
     }
 }
 
-/// Deviations of the outputs from their means, to which weights are fitted.
+/// Outputs of samples, whose deviations from their means weights are fitted to. Outputs that are told as multiples of a
+/// touch's strength are divided by it.
 ///
 /// The means go into the bias. An offset would otherwise be spread over large weights that cancel, and
 /// cost digits.
-pub(super) struct Targets {
-    pub deviations: Table,
+pub(super) struct Targets<'s> {
+    samples: &'s Samples<'s>,
     pub means: Vec<f64>,
 }
 
-impl Targets {
-    pub fn new(outputs: &Table) -> Self {
-        let (mut deviations, means) = (outputs.clone(), outputs.means());
-        for line in deviations.values.chunks_exact_mut(means.len()) {
-            line.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
-        }
-        Self { deviations, means }
+impl<'s> Targets<'s> {
+    pub fn new(samples: &'s Samples<'s>) -> Self {
+        let lines = (0..samples.table.frames()).map(|line| samples.targets(line));
+        Self { means: means(lines, samples.table.outputs.names.len()), samples }
     }
 
     pub fn outputs(&self) -> usize {
         self.means.len()
+    }
+
+    /// Sum of the squared deviations of each output from its mean, times the squares of the weights; NaN is skipped.
+    fn squares(&self) -> Vec<f64> {
+        let mut sums = vec![0.0; self.outputs()];
+        for line in 0..self.samples.table.frames() {
+            let weight = self.samples.weight(line);
+            let targets = self.samples.targets(line).zip(&self.means);
+            let deviations = targets.map(|(value, mean)| value - mean);
+            let present = sums.iter_mut().zip(deviations).filter(|(_, d)| !d.is_nan());
+            present
+                .for_each(|(sum, deviation)| *sum += (deviation * weight) * (deviation * weight));
+        }
+        sums
     }
 }
 
@@ -151,7 +152,7 @@ struct Weights {
 impl Weights {
     /// Separates `regressors × outputs` weights: those of `centres`, of the inputs if there is a tail,
     /// and of 1.
-    fn split(mut weights: Vec<f64>, centres: usize, targets: &Targets) -> Self {
+    fn split(mut weights: Vec<f64>, centres: usize, targets: &Targets<'_>) -> Self {
         let outputs = targets.outputs();
         let mut bias = weights.split_off(weights.len() - outputs);
         bias.iter_mut().zip(&targets.means).for_each(|(bias, mean)| *bias += mean);
@@ -162,25 +163,24 @@ impl Weights {
 
 /// Gaussians of a network as a number format holds them: all that is rounded before weights are fitted.
 trait Held: Send + Sync {
-    /// Regressors that a device computes for the inputs of `table`, line after line.
-    fn design<'t>(&'t self, table: &'t Dataset) -> Box<dyn Design + 't>;
+    /// Number of regressors, and regressors that a device computes for lines of readings.
+    fn regressors(&self) -> (usize, Write<'_>);
 
     /// Network with the weights of `factors`, which were fitted to the deviations of `targets`.
     ///
     /// # Errors
     /// [`Error`] if the format does not hold the network.
-    fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork>;
+    fn network(&self, factors: &Factors, targets: &Targets<'_>) -> Result<FittedNetwork>;
 }
 
 /// Samples of a table that weights are fitted to.
 struct Fit<'s> {
-    table: &'s Dataset,
-    targets: &'s Targets,
+    targets: &'s Targets<'s>,
     solver: Solver,
     held: &'s dyn Held,
     /// Number of frames that the penalties on each output's weights are counted over.
     frames: &'s [usize],
-    tasks: Vec<Task<'s>>,
+    tasks: Vec<Task>,
     /// Decompositions of the tasks, which all penalties share.
     decomposed: Vec<OnceCell<Decomposed>>,
 }
@@ -188,39 +188,36 @@ struct Fit<'s> {
 impl<'s> Fit<'s> {
     fn new(
         held: &'s dyn Held,
-        table: &'s Dataset,
-        targets: &'s Targets,
+        targets: &'s Targets<'s>,
         solver: Solver,
         frames: &'s [usize],
     ) -> Self {
-        let tasks = Task::all(table, &targets.deviations);
+        let table = targets.samples.table;
+        let tasks = Task::all(&table.outputs, &(0..table.frames()).collect::<Vec<_>>());
         let decomposed = vec![OnceCell::new(); tasks.len()];
-        Self { table, targets, solver, held, frames, tasks, decomposed }
+        Self { targets, solver, held, frames, tasks, decomposed }
     }
 
     /// Factors of all samples, with these penalties on squared weights.
     fn factors(&self, ridge: Ridge) -> Factors {
-        let of_task = |(task, decomposed): (&Task<'_>, &OnceCell<Decomposed>)| {
+        let of_task = |(task, decomposed): (&Task, &OnceCell<Decomposed>)| {
             (task.columns.clone(), self.factor(task, decomposed, ridge))
         };
         Factors(self.tasks.iter().zip(&self.decomposed).map(of_task).collect())
     }
 
-    fn factor(&self, task: &Task<'_>, decomposed: &OnceCell<Decomposed>, ridge: Ridge) -> Factor {
-        let frames = self.frames[task.columns[0]];
-        let weights = task.table.weights.as_deref();
-        let (targets, outputs) = (&*weighed(weights, &task.targets), task.columns.len());
-        let design = self.held.design(&task.table);
-        let design: &dyn Design = match weights {
-            Some(weights) => &Weighed { design: &*design, weights },
-            None => &*design,
-        };
+    fn factor(&self, task: &Task, decomposed: &OnceCell<Decomposed>, ridge: Ridge) -> Factor {
+        let (frames, outputs) = (self.frames[task.columns[0]], task.columns.len());
+        let (regressors, write) = self.held.regressors();
+        let Targets { samples, means } = self.targets;
+        let samples = Weighed { samples, means, task, regressors, write };
         match self.solver {
             Solver::Qr => decomposed
-                .get_or_init(|| Decomposed::new(design, targets, outputs))
-                .factor_with(|it| ridge.root(frames, it, design.regressors())),
+                .get_or_init(|| Decomposed::new(&samples, &samples, outputs))
+                .factor_with(|it| ridge.root(frames, it, regressors)),
             Solver::Rls => {
-                Factor::by_recursion(design, targets, outputs, ridge.initial_covariance(frames))
+                let covariance = ridge.initial_covariance(frames);
+                Factor::by_recursion(&samples, &samples, outputs, covariance)
             }
         }
     }
@@ -229,31 +226,20 @@ impl<'s> Fit<'s> {
     fn network(&self, ridge: Ridge) -> Result<FittedNetwork> {
         let factors = self.factors(ridge);
         let network = self.held.network(&factors, self.targets)?;
-        network.unless_lost(self.table, self.targets, &self.left(&factors))
+        network.unless_lost(self.targets, &self.left(&factors))
     }
 
-    /// Squared error of each output that the solution of `factors` leaves.
+    /// Squared error of each output that the solution of `factors` leaves: the squares of the targets without those along
+    /// the regressors.
     fn left(&self, factors: &Factors) -> Vec<f64> {
-        // The squares of the targets without those along the regressors.
-        let squares = |values: &[f64]| column_squares(values, self.targets.outputs());
-        let weights = self.table.weights.as_deref();
-        let all = squares(&weighed(weights, &self.targets.deviations.values)).into_iter();
-        all.zip(squares(&factors.projection())).map(|(all, along)| (all - along).max(0.0)).collect()
+        let mut left = self.targets.squares();
+        let mut along = vec![0.0; left.len()];
+        for line in factors.projection().chunks_exact(left.len()) {
+            along.iter_mut().zip(line).for_each(|(sum, value)| *sum += value * value);
+        }
+        left.iter_mut().zip(along).for_each(|(left, along)| *left = (*left - along).max(0.0));
+        left
     }
-}
-
-/// Sum of the squared errors of each output of `table`, times the squares of its frames' weights, for `predicted` ones.
-pub(super) fn weighed_errors(table: &Dataset, predicted: &[f64]) -> Vec<f64> {
-    let (weights, outputs) = (table.weights.as_deref(), &table.outputs);
-    let values = weighed(weights, &outputs.values).into_owned();
-    let truth = Table { names: outputs.names.clone(), values };
-    truth.squared_errors(&weighed(weights, predicted))
-}
-
-/// Sum of the squares of each of so many columns; NaN is skipped.
-fn column_squares(values: &[f64], columns: usize) -> Vec<f64> {
-    let of = |column| values.iter().skip(column).step_by(columns).filter(|v| !v.is_nan());
-    (0..columns).map(|column| of(column).map(|v| v * v).sum()).collect()
 }
 
 /// Fits `samples` with the Gaussians of `layer`: one network for each of `ridges`. They share one
@@ -267,13 +253,11 @@ pub(super) fn fit(
     options: &Options,
     ridges: &[Ridge],
 ) -> Result<Vec<FittedNetwork>> {
-    let targets = Targets::new(&samples.table.outputs);
-    let (table, solver) = (samples.table, options.solver);
-    let frames = table.outputs.counts();
+    let (targets, frames) = (Targets::new(samples), samples.table.outputs.counts());
     let held: &dyn Held = match options.format {
         Format::F32 => &float32::Gaussians::new(samples, layer, options),
         Format::Fixed16 => &fixed16::Exponents::new(samples, layer, options)?,
     };
-    let fit = Fit::new(held, table, &targets, solver, &frames);
+    let fit = Fit::new(held, &targets, options.solver, &frames);
     ridges.iter().map(|ridge| fit.network(*ridge)).collect()
 }

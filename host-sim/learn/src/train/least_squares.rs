@@ -4,7 +4,6 @@
 //! arrives at the same weights sample by sample. Taking many samples at once ([`Decomposed`]) changes the order of
 //! rounding only.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::parallel;
@@ -31,36 +30,25 @@ pub trait Design: Sync {
     fn fill(&self, samples: Range<usize>, values: &mut [f64]);
 }
 
-/// Regressors of samples times a factor on each sample's error. Targets are multiplied [alike](weighed).
-pub(crate) struct Weighed<'w> {
-    pub design: &'w dyn Design,
-    pub weights: &'w [f64],
+/// Targets of a set of samples: what weights are fitted to.
+pub trait Targets: Sync {
+    /// Number of values: samples times outputs.
+    fn count(&self) -> usize;
+
+    /// Writes the targets of `samples` into `values` (`samples × outputs`, row-major), as
+    /// [`Design::fill`] writes regressors.
+    fn fill(&self, samples: Range<usize>, values: &mut [f64]);
 }
 
-impl Design for Weighed<'_> {
-    fn regressors(&self) -> usize {
-        self.design.regressors()
+impl<T: AsRef<[f64]> + Sync + ?Sized> Targets for T {
+    fn count(&self) -> usize {
+        self.as_ref().len()
     }
 
     fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
-        let weights = &self.weights[samples.clone()];
-        self.design.fill(samples, values);
-        weigh(weights, values);
+        let outputs = values.len() / samples.len().max(1);
+        values.copy_from_slice(&self.as_ref()[samples.start * outputs..samples.end * outputs]);
     }
-}
-
-/// Multiplies each line of `values` by its weight.
-fn weigh(weights: &[f64], values: &mut [f64]) {
-    let lines = values.chunks_exact_mut(values.len() / weights.len().max(1)).zip(weights);
-    lines.for_each(|(line, weight)| line.iter_mut().for_each(|value| *value *= weight));
-}
-
-/// `targets` times the factors on the samples' errors, if these have any.
-pub(crate) fn weighed<'t>(weights: Option<&[f64]>, targets: &'t [f64]) -> Cow<'t, [f64]> {
-    let Some(weights) = weights else { return targets.into() };
-    let mut targets = targets.to_vec();
-    weigh(weights, &mut targets);
-    targets.into()
 }
 
 /// Triangular factor of a fit: the weights W solve R·W = z, and RᵀR is the information matrix Σ h hᵀ +
@@ -93,9 +81,13 @@ impl Decomposed {
     ///
     /// # Panics
     /// If `outputs` is 0.
-    pub fn new(design: &(impl Design + ?Sized), targets: &[f64], outputs: usize) -> Self {
+    pub fn new(
+        design: &(impl Design + ?Sized),
+        targets: &(impl Targets + ?Sized),
+        outputs: usize,
+    ) -> Self {
         let regressors = design.regressors();
-        let samples = targets.len() / outputs;
+        let samples = targets.count() / outputs;
         let piece = piece(samples, regressors);
         let pieces = parallel::map(samples.div_ceil(piece), &|index| {
             let start = index * piece;
@@ -137,7 +129,7 @@ impl Factor {
     /// If `initial_covariance` is not positive and finite, or `outputs` is 0.
     pub fn new(
         design: &(impl Design + ?Sized),
-        targets: &[f64],
+        targets: &(impl Targets + ?Sized),
         outputs: usize,
         initial_covariance: f64,
     ) -> Self {
@@ -151,18 +143,22 @@ impl Factor {
     /// If `initial_covariance` is not positive and finite, or a sample cannot be used.
     pub fn by_recursion(
         design: &(impl Design + ?Sized),
-        targets: &[f64],
+        targets: &(impl Targets + ?Sized),
         outputs: usize,
         initial_covariance: f64,
     ) -> Self {
         let n = design.regressors();
         let mut rls = Rls::new([n, outputs], initial_covariance, 1.0).expect("a covariance");
-        let mut values = vec![0.0; FILLED * n];
-        for (piece, targets) in targets.chunks(FILLED * outputs).enumerate() {
-            let (first, count) = (piece * FILLED, targets.len() / outputs);
-            design.fill(first..first + count, &mut values[..count * n]);
-            for (h, target) in values.chunks_exact_mut(n).zip(targets.chunks_exact(outputs)) {
-                rls.update(h, &mut target.to_vec()).expect("numbers that f32 holds");
+        let (mut values, mut wanted) = (vec![0.0; FILLED * n], vec![0.0; FILLED * outputs]);
+        let samples = targets.count() / outputs;
+        for first in (0..samples).step_by(FILLED) {
+            let run = first..samples.min(first + FILLED);
+            let (values, wanted) =
+                (&mut values[..run.len() * n], &mut wanted[..run.len() * outputs]);
+            design.fill(run.clone(), values);
+            targets.fill(run, wanted);
+            for (h, target) in values.chunks_exact_mut(n).zip(wanted.chunks_exact_mut(outputs)) {
+                rls.update(h, target).expect("numbers that f32 holds");
             }
         }
         let Rls { root, projection, .. } = rls;
@@ -189,22 +185,24 @@ const FILLED: usize = 8;
 
 fn decompose(
     design: &(impl Design + ?Sized),
-    targets: &[f64],
+    targets: &(impl Targets + ?Sized),
     outputs: usize,
     samples: Range<usize>,
 ) -> Triangle {
     let n = design.regressors();
     let (mut triangle, mut new_rows) = (Triangle::new(n, outputs), NewRows::new(n, outputs));
-    let mut values = vec![0.0; FILLED * n];
+    let (mut values, mut wanted) = (vec![0.0; FILLED * n], vec![0.0; FILLED * outputs]);
     for first in samples.clone().step_by(ROWS_AT_ONCE) {
         let last = samples.end.min(first + ROWS_AT_ONCE);
         new_rows.clear();
         for start in (first..last).step_by(FILLED) {
             let run = start..last.min(start + FILLED);
-            let values = &mut values[..run.len() * n];
+            let (values, wanted) =
+                (&mut values[..run.len() * n], &mut wanted[..run.len() * outputs]);
             design.fill(run.clone(), values);
-            let targets = targets[run.start * outputs..].chunks_exact(outputs);
-            for (row, (values, targets)) in values.chunks_exact(n).zip(targets).enumerate() {
+            targets.fill(run, wanted);
+            let rows = values.chunks_exact(n).zip(wanted.chunks_exact(outputs));
+            for (row, (values, targets)) in rows.enumerate() {
                 new_rows.set(start - first + row, values, targets);
             }
         }

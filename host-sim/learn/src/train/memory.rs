@@ -4,10 +4,10 @@
 use taxel_data::error::in_words;
 use taxel_data::{BadValue, Dataset, require};
 
-use super::{Options, projection};
+use super::{Options, projection, touch};
 
-/// Copies of the samples that are held at once: as read, by row-wire, scaled, and as features.
-const COPIES: f64 = 4.0;
+/// Copies of what networks are given that are held at once: two, before and after refinement, and a scaled one.
+const COPIES: f64 = 3.0;
 /// Triangles of the weights that are held at once while these are fitted: a decomposition, the sum of several, and the
 /// factor that comes of it. Where a number format falls back to another one, there are two decompositions.
 const TRIANGLES: f64 = 4.0;
@@ -36,8 +36,13 @@ pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -
     let projected = if projects { (readings + all_outputs).powi(2) } else { 0.0 };
     // The linear decoder that every model is judged beside.
     let linear = (readings / rows + 1.0).powi(2) * TRIANGLES * F64;
-    // Where outputs are missing, each task has its own copy.
-    let samples = (COPIES + tasks - 1.0) * frames * (readings + all_outputs) * F64;
+    // The frames themselves, shared by all; another copy where outputs are missing, of one task after the other; and the
+    // examples that shapes are fitted to.
+    let copies = if tasks > 1.0 { 2.0 } else { 1.0 };
+    let examples = frames.min(touch::MOST_EXAMPLES as f64);
+    let of_rows = if networks > 1.0 { outputs } else { 0.0 };
+    let given = at_once * frames * (COPIES * inputs + of_rows);
+    let samples = ((copies * frames + 2.0 * examples) * (readings + all_outputs) + given) * F64;
     let most = [at_once * fit, at_once * of_refinement, MATRICES * projected * F64, linear];
     (samples + most.into_iter().fold(0.0, f64::max)) as u64
 }

@@ -14,12 +14,13 @@
 use std::borrow::Cow;
 
 use nalgebra::DMatrix;
+use taxel_core::blob::Front;
 use taxel_core::projection::Projection;
 use taxel_data::{Dataset, Table, require, widest};
 
 use super::principal;
 use crate::error::{Error, Result, no_regression};
-use crate::parallel;
+use crate::{infer, parallel};
 
 /// Frames whose products are summed before the sum is added to those of others.
 const FRAMES_AT_ONCE: usize = 1024;
@@ -124,37 +125,10 @@ pub fn view(parameters: &[f32], readings: usize) -> Projection<'_> {
         .expect("a projection of these readings")
 }
 
-/// What networks are given of the frames of `dataset`: these themselves, or what a projection of these `parameters` makes
-/// of them. That is one row, with the features as inputs, all scaled by the largest span of any.
-///
-/// # Panics
-/// If the projection is one of other readings.
-pub fn seen<'d>(parameters: Option<&[f32]>, dataset: &'d Dataset) -> Cow<'d, Dataset> {
-    let Some(parameters) = parameters else { return Cow::Borrowed(dataset) };
-    let projection = view(parameters, dataset.inputs.names.len());
-    let names = (1..=projection.features()).map(|feature| format!("feature{feature}")).collect();
-    let values = features(projection, &dataset.inputs.values);
-    Cow::Owned(Dataset {
-        inputs: Table { names, values },
-        outputs: dataset.outputs.clone(),
-        common_span: true,
-        weights: dataset.weights.clone(),
-        ..Dataset::empty(vec![], vec![], 1, 0)
-    })
-}
-
 /// Projects every line of `readings` as the device does: `lines × features`, in the outputs' unit.
 pub fn features(projection: Projection<'_>, readings: &[f64]) -> Vec<f64> {
-    let width = projection.readings();
-    let of_line = |line: &[f64]| {
-        let line: Vec<f32> = line.iter().map(|reading| *reading as f32).collect();
-        let mut features = vec![0.0; projection.features()];
-        projection.project(&line, &mut features);
-        features.into_iter().map(f64::from)
-    };
-    let of_piece =
-        |lines: &[f64]| -> Vec<f64> { lines.chunks_exact(width).flat_map(of_line).collect() };
-    parallel::pieces(readings, FRAMES_AT_ONCE * width, &of_piece).concat()
+    let front = Front { outputs: 0, touch: None, projection: Some(projection) };
+    infer::given(&front, readings).0.into_owned()
 }
 
 /// Frames of `dataset` with what the projection has to tell for outputs: the outputs, and where these are fewer than

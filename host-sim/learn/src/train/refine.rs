@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
 use super::layers::Layers;
+use super::touch::GroupFrames;
 use super::{Options, memory};
 use crate::error::Result;
 
@@ -114,7 +115,8 @@ impl Refinement {
     }
 }
 
-/// Refines the `layers` that training on `dataset` starts from, to those that it ends with.
+/// Refines the `layers` that training on `frames` starts from, to those that it ends with. Folds are those of their
+/// examples.
 ///
 /// The refined layers are the same on any number of threads.
 ///
@@ -124,17 +126,18 @@ impl Refinement {
 ///
 /// # Panics
 /// If folds are not given for every frame, or fresh frames have other columns than the data set.
-pub fn refine<'d>(
-    dataset: &'d Dataset,
-    layers: &Layers<'_>,
+pub fn refine(
+    frames: &GroupFrames,
+    layers: &Layers,
     options: &Options,
     settings: &Refinement,
     examples: Examples<'_>,
     progress: &dyn Progress,
-) -> Result<Layers<'d>> {
+) -> Result<Layers> {
+    let dataset = &frames.examples;
     settings.check(examples, dataset.frames())?;
     let pieces = settings.pieces(dataset.frames(), options.centres, examples);
-    memory::check(dataset, options, Some(pieces))?;
+    memory::check(&frames.all, options, Some(pieces))?;
     let sources = Sources::new(dataset, layers);
     let start = |layer| Descent::new(sources.start(layer), options, settings);
     let mut descents: Vec<Descent> = layers.hidden.iter().enumerate().map(start).collect();
@@ -176,7 +179,7 @@ pub fn refine<'d>(
         }
     }
     let found: Vec<_> = descents.iter().map(Descent::layer).collect();
-    sources.layers(dataset, &found, options.format)
+    sources.layers(frames, &found, options.format)
 }
 
 /// Most steps of progress that refinement of so many `networks` takes on folds. Descents that end sooner take fewer.

@@ -1,10 +1,14 @@
 //! Samples of one network, scaled as the device scales them, and what is fitted to them.
 
+use taxel_core::rbf::Network;
 use taxel_core::scale::{CLAMP, HALF_RANGE, UNITS};
 use taxel_data::{Dataset, Purpose, Random, Stream};
 
 use super::{Options, kmeans};
+use crate::infer::infer;
 
+/// Frames that are decoded at once to measure their errors.
+const FRAMES_AT_ONCE: usize = 8192;
 /// Frames for each regressor below which they are few.
 const FEW_FRAMES: usize = 50;
 /// Least error of a reading over its range, whatever few frames say.
@@ -33,9 +37,13 @@ pub struct InputScale {
 impl InputScale {
     /// Scale of a table's inputs, rounded to the numbers that the blob holds.
     pub fn new(table: &Dataset) -> Self {
+        Self::of_ranges(&table.input_ranges())
+    }
+
+    /// Scale of inputs with these `ranges`, in their units.
+    pub(crate) fn of_ranges(ranges: &[[f64; 2]]) -> Self {
         // Ranges of the readings in f32, as the device has them.
-        let ranges: Vec<[f32; 2]> =
-            table.input_ranges().iter().map(|range| range.map(|v| v as f32)).collect();
+        let ranges: Vec<[f32; 2]> = ranges.iter().map(|range| range.map(|v| v as f32)).collect();
         let per_span = |[low, high]: &[f32; 2]| {
             let per_span = 1.0 / (high - low);
             if per_span.is_finite() { f64::from(per_span) } else { 0.0 }
@@ -88,12 +96,10 @@ impl CentredScale {
         self.per_unit.iter().map(|per_unit| *per_unit == 0.0)
     }
 
-    /// Scales all inputs of `table` like the device does before its clamp, line after line.
-    pub fn units<'a>(&'a self, table: &'a Dataset) -> impl Iterator<Item = f32> + 'a {
-        table.inputs.lines().flat_map(|line| {
-            let ranges = self.midpoint.iter().zip(&self.per_unit);
-            line.iter().zip(ranges).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
-        })
+    /// Scales `readings` (`samples × inputs`) like the device does before its clamp.
+    pub fn units(&self, readings: &[f64]) -> impl Iterator<Item = f32> {
+        let ranges = self.midpoint.iter().zip(&self.per_unit).cycle();
+        readings.iter().zip(ranges).map(|(r, (middle, per_unit))| (*r as f32 - middle) * per_unit)
     }
 }
 
@@ -140,20 +146,90 @@ impl Ridge {
     }
 }
 
-/// Samples of one network, with their inputs scaled to [0, 1].
+/// Frames as networks see them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// What networks are given, and the outputs.
+    pub table: Dataset,
+    /// Strength of each frame's touch, if networks tell the outputs as multiples of it.
+    pub strengths: Option<Vec<f64>>,
+}
+
+impl From<Dataset> for Seen {
+    fn from(table: Dataset) -> Self {
+        Self { table, strengths: None }
+    }
+}
+
+impl Seen {
+    /// What the network of row number `row` (from 0) sees.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    #[must_use]
+    pub fn row(&self, row: usize) -> Self {
+        Self { table: self.table.row_table(row), strengths: self.strengths.clone() }
+    }
+}
+
+/// Samples of one network, and the scale of their inputs.
 #[derive(Debug, Clone)]
 pub struct Samples<'b> {
     pub(crate) scale: InputScale,
-    /// Scaled inputs, `samples × inputs`.
-    pub(crate) scaled: Vec<f64>,
     pub(crate) table: &'b Dataset,
+    strengths: Option<&'b [f64]>,
 }
 
 impl<'b> Samples<'b> {
-    /// Scales the inputs of `table` to [0, 1].
+    /// Samples of `table`, whose inputs are scaled to [0, 1].
     pub fn new(table: &'b Dataset) -> Self {
-        let scale = InputScale::new(table);
-        Self { scaled: scale.apply(&table.inputs.values), scale, table }
+        Self { scale: InputScale::new(table), table, strengths: None }
+    }
+
+    /// Samples that one network sees.
+    pub fn of(seen: &'b Seen) -> Self {
+        Self { strengths: seen.strengths.as_deref(), ..Self::new(&seen.table) }
+    }
+
+    /// What the network is to tell of output number `output` in line number `line`: NaN if it is missing.
+    pub(crate) fn target(&self, line: usize, output: usize) -> f64 {
+        let value = self.table.outputs.line(line)[output];
+        self.strengths.map_or(value, |strengths| value / strengths[line])
+    }
+
+    /// Targets of all outputs in line number `line`.
+    pub(super) fn targets(&self, line: usize) -> impl Iterator<Item = f64> {
+        (0..self.table.outputs.names.len()).map(move |output| self.target(line, output))
+    }
+
+    /// Factor on the errors of line number `line`.
+    pub(crate) fn weight(&self, line: usize) -> f64 {
+        self.table.weights.as_ref().map_or(1.0, |weights| weights[line])
+    }
+
+    /// Sum of the squared errors of each output as `network` tells it, times the squares of the weights; a missing output
+    /// is skipped.
+    pub(super) fn squared_errors(&self, network: &Network<'_>) -> Vec<f64> {
+        let outputs = self.table.outputs.names.len();
+        let mut sums = vec![0.0; outputs];
+        let pieces = self.table.inputs.values.chunks((FRAMES_AT_ONCE * self.inputs()).max(1));
+        for (first, piece) in (0..).step_by(FRAMES_AT_ONCE).zip(pieces) {
+            for (line, told) in (first..).zip(infer(network, piece).chunks_exact(outputs)) {
+                let weight = self.weight(line);
+                for ((sum, target), told) in sums.iter_mut().zip(self.targets(line)).zip(told) {
+                    if !target.is_nan() {
+                        let error = told * weight - target * weight;
+                        *sum += error * error;
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// Scaled inputs, `samples × inputs`.
+    pub(crate) fn scaled(&self) -> Vec<f64> {
+        self.scale.apply(&self.table.inputs.values)
     }
 
     pub(crate) fn inputs(&self) -> usize {
@@ -167,8 +243,8 @@ impl<'b> Samples<'b> {
     pub fn centres(&self, options: &Options, part: usize) -> Vec<f64> {
         let mut random =
             Random::new(options.seed, Stream::Training, Purpose::Centres, 0, part as u64);
-        let found =
-            kmeans::fit(&self.scaled, self.inputs(), options.centres, &options.search, &mut random);
+        let (points, search) = (self.scaled(), &options.search);
+        let found = kmeans::fit(&points, self.inputs(), options.centres, search, &mut random);
         found.centres.into_iter().map(|c| f64::from(c as f32)).collect()
     }
 

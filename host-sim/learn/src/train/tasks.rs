@@ -3,37 +3,78 @@
 //! Outputs that are missing in the same lines make a *task*. Its weights are fitted by themselves, for the regressors
 //! that all tasks share. Where nothing is missing, all outputs are one task with all lines.
 
-use std::borrow::Cow;
+use std::ops::Range;
 
 use taxel_data::error::quoted;
-use taxel_data::{BadValue, Dataset, Table, require};
+use taxel_data::{BadValue, Table, require};
 
-use super::least_squares::Factor;
+use super::least_squares::{Design, Factor, Targets};
+use super::samples::Samples;
 
-/// Task with its lines.
-pub(crate) struct Task<'t> {
+/// Outputs that are missing in the same lines.
+pub(crate) struct Task {
     pub columns: Vec<usize>,
     /// Lines that have these outputs.
-    pub table: Cow<'t, Dataset>,
-    /// What weights are fitted to, `lines × columns`.
-    pub targets: Cow<'t, [f64]>,
+    pub lines: Vec<usize>,
 }
 
-impl<'t> Task<'t> {
-    /// Tasks of `table`, with `targets` for its outputs: missing ones are missing there too.
-    pub fn all(table: &'t Dataset, targets: &'t Table) -> Vec<Self> {
+impl Task {
+    /// Tasks of `outputs`, on these `lines`.
+    pub fn all(outputs: &Table, lines: &[usize]) -> Vec<Self> {
         let of_columns = |columns: Vec<usize>| {
-            let lines = targets.lines_with(&columns);
-            if columns.len() == targets.names.len() && lines.len() == targets.len() {
-                let targets = Cow::Borrowed(targets.values.as_slice());
-                return Self { columns, table: Cow::Borrowed(table), targets };
-            }
-            let outputs = table.outputs.part(&lines, &columns);
-            let targets = Cow::Owned(targets.part(&lines, &columns).values);
-            let table = Cow::Owned(Dataset { outputs, ..table.subset(&lines) });
-            Self { columns, table, targets }
+            let has = |line: &usize| !outputs.line(*line)[columns[0]].is_nan();
+            let lines = lines.iter().copied().filter(has).collect();
+            Self { columns, lines }
         };
-        targets.missing_together().into_iter().map(of_columns).collect()
+        outputs.missing_together().into_iter().map(of_columns).collect()
+    }
+}
+
+/// Writes the regressors of lines of readings (`lines × inputs`) into a slice, line after line.
+pub(crate) type Write<'h> = Box<dyn Fn(&[f64], &mut [f64]) + Sync + 'h>;
+
+/// Samples of a task, each times the factor on its error.
+pub(crate) struct Weighed<'s> {
+    pub samples: &'s Samples<'s>,
+    /// What is subtracted from each output.
+    pub means: &'s [f64],
+    pub task: &'s Task,
+    /// Number of regressors, and what writes them.
+    pub regressors: usize,
+    pub write: Write<'s>,
+}
+
+impl Design for Weighed<'_> {
+    fn regressors(&self) -> usize {
+        self.regressors
+    }
+
+    fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
+        let (lines, inputs) = (&self.task.lines[samples], &self.samples.table.inputs);
+        let readings: Vec<f64> =
+            lines.iter().flat_map(|line| inputs.line(*line)).copied().collect();
+        (self.write)(&readings, values);
+        for (line, values) in lines.iter().zip(values.chunks_exact_mut(self.regressors)) {
+            let weight = self.samples.weight(*line);
+            values.iter_mut().for_each(|value| *value *= weight);
+        }
+    }
+}
+
+impl Targets for Weighed<'_> {
+    fn count(&self) -> usize {
+        self.task.lines.len() * self.task.columns.len()
+    }
+
+    fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
+        let columns = &self.task.columns;
+        let places = values.chunks_exact_mut(columns.len());
+        for (line, places) in self.task.lines[samples].iter().zip(places) {
+            let weight = self.samples.weight(*line);
+            for (place, column) in places.iter_mut().zip(columns) {
+                *place = (self.samples.target(*line, *column) - self.means[*column]) * weight;
+            }
+        }
     }
 }
 

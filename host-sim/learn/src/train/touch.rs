@@ -11,20 +11,24 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use serde::Deserialize;
+use taxel_core::blob::Front;
 use taxel_core::touch::{Kind, Touch};
 use taxel_data::{AtRest, Dataset, Table, columns, exp, normal_share_below};
 
-use super::FreshFrames;
-use crate::parallel;
+use super::samples::Seen;
+use super::{FreshFrames, projection};
+use crate::{infer, parallel};
 
 mod features;
 mod penalty;
 
-pub(super) use features::projection;
+pub(super) use features::{Places, projection as fit_projection};
 pub(super) use penalty::best as best_penalty;
 
 /// Frames that a thread takes at a time.
 const FRAMES_AT_ONCE: usize = 256;
+/// Most frames that regressions on shapes are fitted to, and refinement is measured on. Output weights are fitted to all.
+pub(super) const MOST_EXAMPLES: usize = 32_768;
 /// Name of the input that is the logarithm of the strength.
 const STRENGTH: &str = "strength";
 /// S₀ as a share of the typical strength: behind a threshold, below which nothing is left, and without one.
@@ -149,37 +153,75 @@ impl Group {
         if all.iter().all(|index| kinds.of(kind(index)) == Features::AsTheyAre) {
             return vec![Self { outputs: 0..names.len(), touch: None }];
         }
-        let runs = all.chunk_by(|a, b| kind(a) == kind(b));
+        let fit = |features| match features {
+            Features::AsTheyAre => None,
+            Features::Normalised { threshold } => Some(FittedTouch::fit(dataset, threshold)),
+        };
+        let places = fit(kinds.places);
+        let amounts =
+            if kinds.amounts == kinds.places { places.clone() } else { fit(kinds.amounts) };
         let of_run = |run: &[usize]| {
             let kind = kind(&run[0]);
-            let touch = match kinds.of(kind) {
-                Features::AsTheyAre => None,
-                Features::Normalised { threshold } => {
-                    Some(FittedTouch::fit(dataset, kind, threshold))
-                }
+            let touch = match kind {
+                Kind::Place => &places,
+                Kind::Amount => &amounts,
             };
+            let touch = touch.clone().map(|touch| FittedTouch { kind, ..touch });
             Self { outputs: run[0]..run[run.len() - 1] + 1, touch }
         };
-        runs.map(of_run).collect()
+        all.chunk_by(|a, b| kind(a) == kind(b)).map(of_run).collect()
     }
 
-    /// What is trained on for these outputs: the frames of `dataset` that have one of them, and their indices.
-    pub fn frames<'d>(&self, dataset: &'d Dataset) -> (Cow<'d, Dataset>, Vec<usize>) {
-        let count = dataset.outputs.names.len();
-        if self.touch.is_none() && self.outputs.len() == count {
-            return (Cow::Borrowed(dataset), (0..dataset.frames()).collect());
-        }
+    /// Frames of `dataset` that have one of these outputs, with these alone, and their indices.
+    fn frames(&self, dataset: &Dataset) -> (Dataset, Vec<usize>) {
         let outputs = dataset.outputs.columns(self.outputs.start, self.outputs.len());
-        let has_one = |line: &[f64]| line.iter().any(|output| !output.is_nan());
+        let is_all = self.touch.is_none() && self.outputs.len() == dataset.outputs.names.len();
+        let has_one = |line: &[f64]| is_all || line.iter().any(|output| !output.is_nan());
         let lines = outputs.lines().enumerate().filter(|(_, line)| has_one(line));
         let kept: Vec<usize> = lines.map(|(index, _)| index).collect();
-        let frames = Dataset { outputs, ..dataset.clone() }.subset(&kept);
-        let frames = match &self.touch {
-            Some(touch) => touch.apply(frames),
-            None => frames,
-        };
-        (Cow::Owned(frames), kept)
+        (Dataset { outputs, ..dataset.clone() }.subset(&kept), kept)
     }
+}
+
+/// Frames that the networks of a group of outputs are trained on.
+#[derive(Debug, Clone)]
+pub struct GroupFrames {
+    /// The outputs, and what makes shape and strength of readings.
+    pub group: Group,
+    /// Frames that have one of the outputs.
+    pub all: Dataset,
+    /// These as the group's network is given them before a projection: an even selection of them, where there are many
+    /// and readings do not stay as they are.
+    pub examples: Dataset,
+    /// Index of each of the examples among the frames of the data set.
+    pub kept: Vec<usize>,
+}
+
+impl GroupFrames {
+    /// Frames of `dataset` for these outputs.
+    pub fn new(group: Group, dataset: &Dataset) -> Self {
+        let (all, kept) = group.frames(dataset);
+        let Some(touch) = &group.touch else {
+            return Self { group, examples: all.clone(), all, kept };
+        };
+        let lines: Vec<usize> = (0..kept.len()).collect();
+        let examples = touch.apply(&all.subset(&examples_of(&lines)));
+        Self { group, all, examples, kept: examples_of(&kept) }
+    }
+
+    /// What networks behind a projection of these `parameters`, if any, see of all frames.
+    ///
+    /// # Panics
+    /// If the projection is one of other readings.
+    pub fn seen(&self, parameters: Option<&[f32]>) -> Seen {
+        seen(self.group.touch.as_ref(), parameters, &self.all)
+    }
+}
+
+/// An even selection of these `frames`, where there are many.
+fn examples_of(frames: &[usize]) -> Vec<usize> {
+    let step = frames.len().div_ceil(MOST_EXAMPLES).max(1);
+    frames.iter().copied().step_by(step).collect()
 }
 
 /// Fresh frames as a group of outputs is trained on them.
@@ -190,13 +232,14 @@ pub(super) struct Fresh<'f> {
 
 impl FreshFrames for Fresh<'_> {
     fn frames(&self, step: usize, count: usize) -> Dataset {
-        self.group.frames(&self.fresh.frames(step, count)).0.into_owned()
+        let (frames, _) = self.group.frames(&self.fresh.frames(step, count));
+        self.group.touch.as_ref().map_or_else(|| frames.clone(), |touch| touch.apply(&frames))
     }
 }
 
 impl FittedTouch {
-    /// Fits level, threshold and strengths to `dataset`, for outputs of this `kind`.
-    fn fit(dataset: &Dataset, kind: Kind, threshold: f64) -> Self {
+    /// Fits level, threshold and strengths to `dataset`.
+    fn fit(dataset: &Dataset, threshold: f64) -> Self {
         // An input may have no value at rest.
         let is_known = |rest: &AtRest| rest.level.iter().all(|level| level.is_finite());
         let known = dataset.at_rest.clone().filter(is_known);
@@ -206,17 +249,25 @@ impl FittedTouch {
             of_readings.flat_map(|(level, d)| [*level as f32, (threshold * d) as f32]).collect();
         let made = |[floor, logarithm_floor, least, most]: [f64; 4], side: f32| {
             let head = [floor, logarithm_floor, least, most].map(|it| it as f32);
-            Self { kind, block: [&head[..], &[side], &pairs].concat(), typical: 1.0 }
+            let block = [&head[..], &[side], &pairs].concat();
+            Self { kind: Kind::Amount, block, typical: 1.0 }
         };
         let smallest = f64::from(f32::MIN_POSITIVE) * 1e9;
         let either = made([smallest; 4], 0.0);
-        let (shapes, strengths) = inputs(either.view(), &dataset.inputs.values);
-        let side = one_side(&shapes, &strengths);
-        let strengths = inputs(made([smallest; 4], side).view(), &dataset.inputs.values).1;
-        let strengths = strengths.into_iter().map(f64::from);
-        let (sum, squares, most) = strengths.fold((0.0, 0.0, 0.0), |(sum, squares, most), s| {
-            (sum + s, squares + s * s, f64::max(most, s))
-        });
+        let changes = |lines: &[f64]| {
+            let (shapes, strengths) = either.shapes(lines);
+            changes(&shapes, &strengths)
+        };
+        let inputs = &dataset.inputs;
+        let size = FRAMES_AT_ONCE * inputs.names.len();
+        let side = one_side(&parallel::pieces(&inputs.values, size, &changes));
+        let of_side = made([smallest; 4], side);
+        let strengths = |lines: &[f64]| of_side.shapes(lines).1;
+        let strengths = parallel::pieces(&inputs.values, size, &strengths).into_iter().flatten();
+        let (sum, squares, most) =
+            strengths.map(f64::from).fold((0.0, 0.0, 0.0), |(sum, squares, most), s| {
+                (sum + s, squares + s * s, f64::max(most, s))
+            });
         let typical = f64::max(squares / sum, smallest);
         let has_threshold = pairs.iter().skip(1).step_by(2).any(|threshold| *threshold > 0.0);
         let floor = typical * FLOOR[usize::from(!has_threshold)];
@@ -225,9 +276,19 @@ impl FittedTouch {
         Self { typical, ..made([floor, logarithm_floor, least, (most + floor) * MOST], side) }
     }
 
+    /// Shape and strength of frames with these `readings`, as inputs of a network, and the strength of each.
+    fn shapes<'r>(&self, readings: &'r [f64]) -> (Cow<'r, [f64]>, Vec<f32>) {
+        infer::given(&Front { outputs: 0, touch: Some(self.view()), projection: None }, readings)
+    }
+
     /// Kind of the outputs.
     pub fn kind(&self) -> Kind {
         self.kind
+    }
+
+    /// Whether the shapes that it makes are those of the `other` one.
+    pub(super) fn makes_shapes_of(&self, other: &Self) -> bool {
+        self.block == other.block
     }
 
     /// As the blob holds it.
@@ -247,28 +308,49 @@ impl FittedTouch {
     }
 
     /// Frames with shape and strength as inputs, and with outputs and weights as the network's training needs them.
-    fn apply(&self, dataset: Dataset) -> Dataset {
-        let (values, strengths) = inputs(self.view(), &dataset.inputs.values);
-        let mut names = dataset.inputs.names.clone();
-        names.push(STRENGTH.into());
-        let mut outputs = dataset.outputs.clone();
-        let weights: Vec<f64> = match self.kind {
-            Kind::Place => strengths.iter().map(|s| self.weight(*s).sqrt()).collect(),
-            Kind::Amount => {
-                let strengths: Vec<f64> = strengths.into_iter().map(f64::from).collect();
-                let lines = outputs.values.chunks_exact_mut(outputs.names.len()).zip(&strengths);
-                lines.for_each(|(line, s)| line.iter_mut().for_each(|output| *output /= s));
-                strengths.iter().map(|s| s / self.typical).collect()
+    fn apply(&self, frames: &Dataset) -> Dataset {
+        let Seen { mut table, strengths } = seen(Some(self), None, frames);
+        if let Some(strengths) = strengths {
+            let lines = table.outputs.values.chunks_exact_mut(table.outputs.names.len());
+            for (line, strength) in lines.zip(&strengths) {
+                line.iter_mut().for_each(|output| *output /= strength);
             }
-        };
-        let inputs = Table { names, values };
-        Dataset { inputs, outputs, weights: Some(weights), relative_inputs: false, ..dataset }
+        }
+        table
     }
 }
 
-/// 1 or −1 if nearly all changes of frames with these `shapes` and strengths are up or down, and else 0. Noise at rest, which
-/// has either sign, hardly counts.
-fn one_side(shapes: &[f64], strengths: &[f32]) -> f32 {
+/// What networks see of `frames` behind a `touch` and a projection of these `parameters`, if there are any. Features are one
+/// row, all scaled by the largest span of any.
+///
+/// # Panics
+/// If the projection is one of other readings.
+pub fn seen(touch: Option<&FittedTouch>, parameters: Option<&[f32]>, frames: &Dataset) -> Seen {
+    let mut names = frames.inputs.names.clone();
+    names.extend(touch.map(|_| STRENGTH.into()));
+    let projection = parameters.map(|parameters| projection::view(parameters, names.len()));
+    let front = Front { outputs: 0, touch: touch.map(FittedTouch::view), projection };
+    let (Cow::Owned(values), strengths) = infer::given(&front, &frames.inputs.values) else {
+        return frames.clone().into();
+    };
+    let mut table = frames.clone();
+    if let Some(projection) = projection {
+        names = (1..=projection.features()).map(|feature| format!("feature{feature}")).collect();
+        (table.rows, table.common_span, table.at_rest) = (1, true, None);
+    }
+    (table.inputs, table.relative_inputs) = (Table { names, values: values.into() }, false);
+    let Some(touch) = touch else { return table.into() };
+    let amounts = strengths.iter().copied().map(f64::from).collect::<Vec<_>>();
+    let (weights, strengths) = match touch.kind {
+        Kind::Place => (strengths.iter().map(|s| touch.weight(*s).sqrt()).collect(), None),
+        Kind::Amount => (amounts.iter().map(|s| s / touch.typical).collect(), Some(amounts)),
+    };
+    table.weights = Some(weights);
+    Seen { table, strengths }
+}
+
+/// Sums of the changes up and down of frames with these `shapes` and strengths.
+fn changes(shapes: &[f64], strengths: &[f32]) -> [f64; 2] {
     let (mut up, mut down) = (0.0, 0.0);
     let inputs = shapes.len() / strengths.len().max(1);
     for (frame, strength) in shapes.chunks_exact(inputs.max(1)).zip(strengths) {
@@ -277,6 +359,13 @@ fn one_side(shapes: &[f64], strengths: &[f32]) -> f32 {
             if change > 0.0 { up += change } else { down -= change }
         }
     }
+    [up, down]
+}
+
+/// 1 or −1 if nearly all `changes`, in pieces, are up or down, and else 0. Noise at rest, which has either sign, hardly
+/// counts.
+fn one_side(changes: &[[f64; 2]]) -> f32 {
+    let [up, down] = [0, 1].map(|side| changes.iter().map(|of| of[side]).sum::<f64>());
     if down < OTHER_SIDE * (up + down) {
         1.0
     } else if up < OTHER_SIDE * (up + down) {
@@ -306,23 +395,4 @@ fn unknown_rest(inputs: &Table) -> AtRest {
     let count = means.len();
     let level = if 2 * near >= count { vec![0.0; count] } else { inputs.medians() };
     AtRest { level, deviation: vec![0.0; count] }
-}
-
-/// Inputs that a network is given for `frames` (`frames × readings`), `frames × inputs`, and the strength of each.
-pub fn inputs(touch: Touch<'_>, frames: &[f64]) -> (Vec<f64>, Vec<f32>) {
-    let readings = touch.readings();
-    let of_piece = |frames: &[f64]| {
-        let (mut line, mut made) = (vec![0.0; readings], vec![0.0; touch.inputs()]);
-        let mut values = Vec::with_capacity(frames.len() / readings * made.len());
-        let mut strengths = Vec::with_capacity(frames.len() / readings);
-        for frame in frames.chunks_exact(readings) {
-            line.iter_mut().zip(frame).for_each(|(place, reading)| *place = *reading as f32);
-            strengths.push(touch.apply(&line, None, &mut made));
-            values.extend(made.iter().map(|input| f64::from(*input)));
-        }
-        (values, strengths)
-    };
-    let pieces = parallel::pieces(frames, FRAMES_AT_ONCE * readings, &of_piece);
-    let (values, strengths): (Vec<_>, Vec<_>) = pieces.into_iter().unzip();
-    (values.concat(), strengths.concat())
 }

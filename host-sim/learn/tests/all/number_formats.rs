@@ -37,7 +37,7 @@ fn in_f64(training: &Dataset, centres: &[f64], options: &Options, test: &Dataset
     };
     let weights = Factor::new(
         &regressors.of(scale.apply(&training.inputs.values)),
-        &training.outputs.values,
+        &training.outputs.values[..],
         training.outputs.names.len(),
         options.initial_covariance(training.inputs.len()),
     )

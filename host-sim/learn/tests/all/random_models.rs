@@ -155,15 +155,18 @@ fn compare(
     let decoder = Decoder::<4>::load(blob.bytes()).unwrap();
     let (width, frames) = (shape.rows * shape.inputs, draw.0.below(200));
     let readings: Vec<f64> = (0..frames * width).map(|_| draw.reading()).collect();
-    let tables = blob.prepare().decode_lines(&readings);
+    let prepared = blob.prepare();
+    let tables = prepared.decode_lines(&readings);
     let mut counts = [0; 2];
     let lines = tables.chunks_exact(shape.rows * shape.outputs);
     assert_eq!(lines.len(), frames);
-    for (line, outputs) in readings.chunks_exact(width).zip(lines) {
-        let line: Vec<f32> = line.iter().map(|reading| *reading as f32).collect();
+    for (readings, outputs) in readings.chunks_exact(width).zip(lines) {
+        let line: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
         let expected = decoder.decode(Frame::from(&line[..])).unwrap().outputs;
-        for (found, expected) in outputs.iter().zip(expected) {
-            let is_same = found.to_bits() == f64::from(expected).to_bits();
+        let alone = prepared.decode_lines(readings);
+        for (found, expected) in outputs.iter().chain(&alone).zip(expected.iter().chain(&expected))
+        {
+            let is_same = found.to_bits() == f64::from(*expected).to_bits();
             assert!(is_same || found.is_nan() && expected.is_nan(), "{found} {expected} {shape:?}");
             counts[usize::from(expected.is_nan())] += 1;
         }

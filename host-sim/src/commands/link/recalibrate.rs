@@ -136,7 +136,7 @@ fn record_presses(
         };
         values.extend((0..names.len()).map(mean));
     }
-    Ok(Table { names, values })
+    Ok(Table { names, values: values.into() })
 }
 
 fn conclude(found: &Recalibrated, given: usize, common: &Common) -> Result<()> {

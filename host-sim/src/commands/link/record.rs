@@ -156,7 +156,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let lines: Vec<Vec<f64>> = scans.iter().map(values).collect();
     let missing = missing(lines.iter().flat_map(|line| &line[..outputs]), wanted)?;
     if wanted == Wanted::Readings {
-        note_faults(&Table { names: names.clone(), values: lines.concat() });
+        note_faults(&Table { names: names.clone(), values: lines.concat().into() });
     }
     let time = action.time.then_some("time_s");
     let first_us = scans.first().map_or(0, |scan| scan.start_us);

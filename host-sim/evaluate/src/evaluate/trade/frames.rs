@@ -43,7 +43,7 @@ pub(super) struct Inputs {
     /// Options for training these networks, but for their number of centres.
     pub options: Options,
     /// What training of each network, or of all networks of rows, starts from.
-    pub starts: Vec<Start<'static>>,
+    pub starts: Vec<Start>,
 }
 
 impl Inputs {
@@ -99,8 +99,7 @@ impl<'s> Frames<'s> {
         let inputs = |&each_row: &bool| {
             let mut options = options.for_each_row(each_row);
             let _ = set.choose(&mut options, &Silent);
-            let starts = Start::all(&set.frames, &options)?;
-            Ok(Inputs { options, starts: starts.into_iter().map(Start::into_owned).collect() })
+            Ok(Inputs { options, starts: Start::all(&set.frames, &options)? })
         };
         let inputs = each_row.iter().map(inputs).collect::<Result<_>>()?;
         let scan_ms = plan.device.scan_ms(wires, samples_averaged);

@@ -46,7 +46,7 @@ impl Judged {
             let added = ways.inputs.starts.iter().zip(&fitted).try_for_each(|(start, fitted)| {
                 let of_rows = fitted.networks.iter().map(|row| row[index].as_ref().cloned());
                 let networks = of_rows.collect::<std::result::Result<Vec<_>, _>>()?;
-                trained.add(start, fitted.projection.as_ref(), networks);
+                trained.add(start.front(fitted.projection.as_ref()), networks);
                 Ok(())
             });
             if let Err(cause) = added {
@@ -181,7 +181,7 @@ fn fit(
     let [refining, fitting] = parts(ways).map(|steps| Part::new(progress, steps, weight(*centres)));
     let of_start = |start| {
         // Layers are shared by all formats.
-        let start: &Start<'_> = start;
+        let start: &Start = start;
         let mut layers = start.layers(&own);
         let settings = Refinement::default();
         let examples = frames.set.examples();
@@ -191,8 +191,8 @@ fn fit(
         let options = start.fitting(&layers, &own, examples.is_some().then_some(&settings))?;
         let rows = layers.hidden.par_iter().enumerate();
         let fitted = rows.map(|(row, layer)| {
-            let table = layers.seen.row_table(row);
-            let samples = Samples::new(&table);
+            let seen = layers.seen.row(row);
+            let samples = Samples::of(&seen);
             let fit = |format| samples.fit_layer(layer, &Options { format, ..options });
             let fitted = formats().collect::<Vec<_>>().into_par_iter().map(fit).collect();
             fitting.step();

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::{Format, Shape};
 use taxel_learn::cost::{Cost, Design, FrontDesign, NetworkDesign};
-use taxel_learn::train::{Start, projection};
+use taxel_learn::train::Start;
 
 use super::choice::Offer;
 use super::frames::{Frames, Inputs};
@@ -62,13 +62,13 @@ impl<'f> Ways<'f> {
             inputs: of_row(&dataset.inputs.names),
             outputs: of_row(&dataset.outputs.names),
         };
-        let of_start = |start: &Start<'_>| {
+        let of_start = |start: &Start| {
             let front = start.front(start.projection.as_ref());
             let (rows, inputs) = match &front {
                 Some(front) => (1, front.view().inputs(dataset.inputs.names.len())),
                 None => (shape.rows, shape.inputs),
             };
-            let shape = Shape { inputs, centres, outputs: start.group.outputs.len() / rows };
+            let shape = Shape { inputs, centres, outputs: start.frames.group.outputs.len() / rows };
             let front = front.map(|front| FrontDesign::new(&front.view()));
             vec![NetworkDesign { format, shape, affine_tail: true, front }; rows]
         };
@@ -89,8 +89,8 @@ impl<'f> Ways<'f> {
 
 /// Number of distinct samples of each network's inputs, counted up to `most`: networks have no more centres.
 fn distinct_samples(inputs: &Inputs, most: usize) -> Vec<usize> {
-    let of_start = |start: &Start<'_>| {
-        let seen = projection::seen(start.projection.as_deref(), &start.frames);
+    let of_start = |start: &Start| {
+        let seen = start.frames.seen(start.projection.as_deref()).table;
         let of_row = seen.inputs.names.len() / seen.rows;
         let distinct = |row: usize| {
             let mut found: HashSet<Vec<u32>> = HashSet::new();

@@ -5,7 +5,6 @@
 //! of neighbouring centres are nearly alike, so they compensate for nearly all of it.
 
 use core::f64::consts::{LN_2, LOG2_E};
-use std::ops::Range;
 
 use taxel_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, EXPONENT_MARGIN,
@@ -13,13 +12,13 @@ use taxel_core::rbf::fixed16::{
 };
 use taxel_core::rbf::{Format, NetworkError, Shape};
 use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP, clamp_steps};
-use taxel_data::{BadValue, Dataset};
+use taxel_data::BadValue;
 
-use super::super::least_squares::{Design, Factor};
+use super::super::least_squares::Factor;
 use super::super::samples::CentredScale;
 use super::super::tasks::Factors;
 use super::super::{HiddenLayer, Options, Samples, squared_distance};
-use super::{FittedNetwork, Held, Targets};
+use super::{FittedNetwork, Held, Targets, Write};
 use crate::error::{Error, Result, parameter_not_held};
 
 /// One step of inputs, in spans of the training range.
@@ -182,35 +181,6 @@ fn pair(low: i32, high: i32) -> u32 {
     (low.cast_unsigned() & 0xFFFF) | high.cast_unsigned() << 16
 }
 
-/// Regressors as the device computes them: activations, inputs in half ranges, and 1.
-struct FixedDesign<'s> {
-    network: Network<'s>,
-    steps: Vec<i32>,
-    affine: bool,
-}
-
-impl Design for FixedDesign<'_> {
-    fn regressors(&self) -> usize {
-        let shape = self.network.shape();
-        shape.centres + if self.affine { shape.inputs } else { 0 } + 1
-    }
-
-    fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
-        let Shape { inputs, centres, .. } = self.network.shape();
-        let steps = self.steps[samples.start * inputs..samples.end * inputs].chunks_exact(inputs);
-        for (steps, row) in steps.zip(values.chunks_exact_mut(self.regressors())) {
-            let (activations, rest) = row.split_at_mut(centres);
-            let places = activations.chunks_mut(CENTRES_AT_ONCE);
-            for (places, found) in places.zip(self.network.activations(steps)) {
-                places.iter_mut().zip(found).for_each(|(place, q)| *place = f64::from(q) / ONE);
-            }
-            let (one, tail) = rest.split_last_mut().expect("at least the bias");
-            tail.iter_mut().zip(steps).for_each(|(place, x)| *place = f64::from(*x) / ONE);
-            *one = 1.0;
-        }
-    }
-}
-
 /// Weights rounded to integers.
 struct Rounded {
     outputs: usize,
@@ -252,16 +222,30 @@ impl Rounded {
 }
 
 impl Held for Exponents {
-    fn design<'t>(&'t self, table: &'t Dataset) -> Box<dyn Design + 't> {
+    /// Activations, inputs in half ranges, and 1, as the device computes them.
+    fn regressors(&self) -> (usize, Write<'_>) {
+        let Shape { inputs, centres, .. } = self.shape;
         let network = Network::try_new(self.shape, false, &self.without_weights);
-        Box::new(FixedDesign {
-            network: network.expect("checked when made"),
-            steps: self.scale.units(table).map(clamp_steps).collect(),
-            affine: self.affine_tail,
-        })
+        let network = network.expect("checked when made");
+        let count = centres + if self.affine_tail { inputs } else { 0 } + 1;
+        let write = move |readings: &[f64], values: &mut [f64]| {
+            let steps: Vec<i32> = self.scale.units(readings).map(clamp_steps).collect();
+            for (steps, row) in steps.chunks_exact(inputs).zip(values.chunks_exact_mut(count)) {
+                let (activations, rest) = row.split_at_mut(centres);
+                let places = activations.chunks_mut(CENTRES_AT_ONCE);
+                for (places, found) in places.zip(network.activations(steps)) {
+                    let numbers = places.iter_mut().zip(found);
+                    numbers.for_each(|(place, q)| *place = f64::from(q) / ONE);
+                }
+                let (one, tail) = rest.split_last_mut().expect("at least the bias");
+                tail.iter_mut().zip(steps).for_each(|(place, x)| *place = f64::from(*x) / ONE);
+                *one = 1.0;
+            }
+        };
+        (count, Box::new(write))
     }
 
-    fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork> {
+    fn network(&self, factors: &Factors, targets: &Targets<'_>) -> Result<FittedNetwork> {
         let rounded = round(factors, self, targets, self.affine_tail)?;
         let words = self.words(Some(&rounded));
         FittedNetwork::try_new(self.shape, Format::Fixed16, self.affine_tail, words)
@@ -272,7 +256,7 @@ impl Held for Exponents {
 fn round(
     factors: &Factors,
     exponents: &Exponents,
-    targets: &Targets,
+    targets: &Targets<'_>,
     affine: bool,
 ) -> Result<Rounded> {
     let Shape { inputs, centres, outputs } = exponents.shape;
@@ -331,7 +315,7 @@ fn rounded_solution(factor: &Factor, columns: &[usize], scale: &[f64]) -> Vec<f6
 }
 
 /// Finest scale of each output that its weights and, for every reading, its sum fit.
-fn scales(exponents: &Exponents, weights: &[f64], targets: &Targets, tail: usize) -> Vec<f64> {
+fn scales(exponents: &Exponents, weights: &[f64], targets: &Targets<'_>, tail: usize) -> Vec<f64> {
     let Shape { centres, outputs, .. } = exponents.shape;
     let norms = exponents.norms(&weights[..centres * outputs]);
     let column = |output: usize, from: usize, to: usize| {

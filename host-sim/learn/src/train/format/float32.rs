@@ -2,12 +2,11 @@
 
 use taxel_core::rbf::float32::Parameters;
 use taxel_core::rbf::{Format, Shape};
-use taxel_data::Dataset;
 
-use super::super::least_squares::{Design, Regressors};
+use super::super::least_squares::Regressors;
 use super::super::tasks::Factors;
 use super::super::{HiddenLayer, InputScale, Options, Samples};
-use super::{FittedNetwork, Held, Targets, Weights};
+use super::{FittedNetwork, Held, Targets, Weights, Write};
 use crate::error::Result;
 
 /// Gaussians as this format holds them.
@@ -28,23 +27,24 @@ impl Gaussians {
             affine_tail: options.affine_tail,
         }
     }
+}
 
-    fn regressors(&self) -> Regressors<'_> {
-        Regressors {
+impl Held for Gaussians {
+    fn regressors(&self) -> (usize, Write<'_>) {
+        let regressors = Regressors {
             centres: &self.centres,
             inputs: self.scale.minimum.len(),
             decays: std::slice::from_ref(&self.decay),
             affine_tail: self.affine_tail,
-        }
+        };
+        let gaussians = regressors.of(&[]);
+        let write = move |readings: &[f64], values: &mut [f64]| {
+            gaussians.write(&self.scale.apply(readings), values);
+        };
+        (regressors.count(), Box::new(write))
     }
-}
 
-impl Held for Gaussians {
-    fn design<'t>(&'t self, table: &'t Dataset) -> Box<dyn Design + 't> {
-        Box::new(self.regressors().of(self.scale.apply(&table.inputs.values)))
-    }
-
-    fn network(&self, factors: &Factors, targets: &Targets) -> Result<FittedNetwork> {
+    fn network(&self, factors: &Factors, targets: &Targets<'_>) -> Result<FittedNetwork> {
         let inputs = self.scale.minimum.len();
         let count = self.centres.len() / inputs;
         let weights = Weights::split(factors.weights(), count, targets);

@@ -81,10 +81,17 @@ impl Design for Gaussians<'_> {
     }
 
     fn fill(&self, samples: Range<usize>, values: &mut [f64]) {
+        let inputs = self.regressors.inputs;
+        self.write(&self.scaled[samples.start * inputs..samples.end * inputs], values);
+    }
+}
+
+impl Gaussians<'_> {
+    /// Writes the regressors of other samples, with these `scaled` inputs, into `values` (`samples × n`, row-major).
+    pub(crate) fn write(&self, scaled: &[f64], values: &mut [f64]) {
         let (inputs, n) = (self.regressors.inputs, self.regressors.count());
         let (lanes, decays) = (self.lanes.as_slice(), self.decays.as_slice());
         let centres = self.regressors.centres.len() / inputs;
-        let scaled = &self.scaled[samples.start * inputs..samples.end * inputs];
         widest!({
             for (x, row) in scaled.chunks_exact(inputs).zip(values.chunks_exact_mut(n)) {
                 let (activations, rest) = row.split_at_mut(centres);

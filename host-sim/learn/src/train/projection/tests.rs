@@ -4,6 +4,7 @@ use taxel_simulate::{World, synthesise};
 use super::*;
 use crate::decoders::RowDecoder;
 use crate::decoders::linear::LinearRow;
+use crate::train::touch::seen;
 use crate::train::{Features, Kinds, Options, train};
 
 /// Data set of readings r1…r6 in two rows of three; the outputs are known sums of them.
@@ -30,7 +31,7 @@ fn projection<'b>(dataset: &Dataset, parameters: &'b [f32]) -> Projection<'b> {
 fn features_carry_all_that_outputs_take_from_readings() {
     let data = known(400, 0.01);
     let parameters = fit(&data, None).unwrap();
-    let seen = seen(Some(&parameters), &data);
+    let seen = seen(None, Some(&parameters), &data).table;
     assert_eq!((seen.rows, seen.inputs.names.len(), seen.inputs.len()), (1, 3, 400));
     // Two sums decide all outputs: two features follow them to the noise, and the third is noise.
     let spans: Vec<f64> = seen.inputs.ranges().iter().map(|[low, high]| high - low).collect();
@@ -64,7 +65,7 @@ fn few_outputs_are_told_by_features_of_their_products() {
     let data = synthesise(&World::contact(), Stream::Training, 3000);
     let parameters = fit(&data, None).unwrap();
     assert_eq!(parameters.len(), USUAL_FEATURES * 145);
-    let seen = seen(Some(&parameters), &data);
+    let seen = seen(None, Some(&parameters), &data).table;
     let spans: Vec<f64> = seen.inputs.ranges().iter().map(|[low, high]| high - low).collect();
     assert!(spans.iter().all(|span| *span > 0.0), "{spans:?}");
     // One output has three powers, and there are no more features than that.
@@ -102,7 +103,7 @@ fn outputs_that_are_never_together_have_no_products() {
 #[test]
 fn products_are_those_of_standardised_outputs() {
     let names = ["a", "b"].map(String::from).to_vec();
-    let outputs = Table { names, values: vec![1.0, 10.0, 3.0, 10.0, 5.0, 40.0, 7.0, 0.0] };
+    let outputs = Table { names, values: vec![1.0, 10.0, 3.0, 10.0, 5.0, 40.0, 7.0, 0.0].into() };
     let data = Dataset { outputs, ..Dataset::empty(vec![], vec![], 1, 0) };
     let (targets, outputs) = (&with_targets(&data, 5).outputs, &data.outputs);
     // a, b, aa, ab, bb.
@@ -126,9 +127,9 @@ fn features_are_those_of_the_lines_that_have_an_output() {
         line[..2].fill(f64::NAN);
     }
     let left = |of: &Dataset| {
-        let seen = seen(Some(&fit(of, None).unwrap()), &data);
-        let table = seen.row_table(0);
-        let predicted = LinearRow::fit(&table).predict(&table.inputs.values);
+        let table = seen(None, Some(&fit(of, None).unwrap()), &data).table;
+        let lines: Vec<usize> = (0..table.frames()).collect();
+        let predicted = LinearRow::fit(&table, &lines).predict(&table.inputs.values);
         table.outputs.squared_errors(&predicted)
     };
     for (partly, all) in left(&partly).into_iter().zip(left(&data)) {

@@ -3,8 +3,6 @@
 //! Without a projection these are a row's readings, scaled. With one they are the features that it starts with,
 //! and then all readings: inputs are a mix of both. Features then change as a whole as easily as single parts do.
 
-use std::borrow::Cow;
-
 use taxel_core::projection::Projection;
 use taxel_core::rbf::Format;
 use taxel_data::Dataset;
@@ -16,6 +14,7 @@ use super::{turn, width};
 use crate::error::Result;
 use crate::parallel;
 use crate::train::layers::Layers;
+use crate::train::touch::GroupFrames;
 use crate::train::{HiddenLayer, InputScale, projection};
 
 /// Size of a reading as a source: so many times a typical part of the projection, for a reading of one standard
@@ -64,9 +63,9 @@ struct Projected {
 }
 
 impl Sources {
-    pub(super) fn new(dataset: &Dataset, layers: &Layers<'_>) -> Self {
+    pub(super) fn new(dataset: &Dataset, layers: &Layers) -> Self {
         let inputs = if let Some(parameters) = &layers.projection {
-            Inputs::Projected(Projected::new(dataset, parameters, &layers.seen))
+            Inputs::Projected(Projected::new(dataset, parameters, &layers.seen.table))
         } else {
             let scale = |row| InputScale::new(&dataset.row_table(row));
             Inputs::Rows((0..dataset.rows).map(scale).collect())
@@ -98,24 +97,24 @@ impl Sources {
         }
     }
 
-    /// Layers that the descents on `dataset` have come to: the hidden layer among mixed inputs, and the mix, of each
+    /// Layers that the descents for `frames` have come to: the hidden layer among mixed inputs, and the mix, of each
     /// network. They are rounded and widened as the `format` asks for.
     ///
     /// # Errors
     /// [`Error`](crate::Error) for a projection beyond f32.
-    pub(super) fn layers<'d>(
+    pub(super) fn layers(
         &self,
-        dataset: &'d Dataset,
+        frames: &GroupFrames,
         found: &[(HiddenLayer, &[f64])],
         format: Format,
-    ) -> Result<Layers<'d>> {
+    ) -> Result<Layers> {
         let mut layers = match (&self.inputs, found) {
             (Inputs::Projected(projected), [(layer, mix)]) => {
-                projected.layers(dataset, mix, layer)?
+                projected.layers(frames, mix, layer)?
             }
             _ => Layers {
                 projection: None,
-                seen: Cow::Borrowed(dataset),
+                seen: frames.seen(None),
                 hidden: found.iter().map(|(layer, _)| layer.clone()).collect(),
             },
         };
@@ -223,12 +222,7 @@ impl Projected {
     ///
     /// # Errors
     /// [`Error`](crate::Error) for a projection beyond f32.
-    fn layers<'d>(
-        &self,
-        dataset: &'d Dataset,
-        mix: &[f64],
-        layer: &HiddenLayer,
-    ) -> Result<Layers<'d>> {
+    fn layers(&self, frames: &GroupFrames, mix: &[f64], layer: &HiddenLayer) -> Result<Layers> {
         let n = self.features;
         let parts = self.parameters[n..].chunks_exact(n).zip(&self.readings);
         let mixed =
@@ -243,11 +237,10 @@ impl Projected {
         let parts: Vec<f64> = mixed.collect();
         let means: Vec<f64> = self.readings.iter().map(|(mean, _)| *mean).collect();
         let parameters = projection::about_means(&parts, &means)?;
-        let seen = projection::seen(Some(&parameters), dataset);
-        let turn = turn::evening(&seen.inputs.values, n);
+        let turn = turn::evening(&frames.seen(Some(&parameters)).table.inputs.values, n);
         let parameters = projection::about_means(&turn::turned(&parts, &turn, n), &means)?;
-        let seen = projection::seen(Some(&parameters), dataset);
-        let (lows, span) = scale_of(&seen);
+        let seen = frames.seen(Some(&parameters));
+        let (lows, span) = scale_of(&seen.table);
         let centres = turn::turned(&layer.centres, &turn, n);
         let scaled = centres
             .chunks_exact(n)
@@ -260,7 +253,7 @@ impl Projected {
 
 /// Low end of every feature's range, and their common span.
 fn scale_of(seen: &Dataset) -> (Vec<f64>, f64) {
-    let ranges = seen.row_table(0).input_ranges();
+    let ranges = seen.input_ranges();
     let span = ranges.first().map(|[low, high]| high - low);
     let span = span.filter(|span| *span > 0.0).unwrap_or(1.0);
     (ranges.into_iter().map(|[low, _]| low).collect(), span)

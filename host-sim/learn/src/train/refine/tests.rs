@@ -231,7 +231,7 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let taken = Taken(AtomicUsize::new(0));
         let start = Start::all(&training, &options).unwrap().remove(0);
         let layers = start.layers(&options);
-        let layers = refine(&training, &layers, &options, &quick(), examples, &taken).unwrap();
+        let layers = refine(&start.frames, &layers, &options, &quick(), examples, &taken).unwrap();
         let refined = start.fitting(&layers, &options, Some(&quick())).unwrap();
         let networks = fit(&layers, &refined, &[refined.penalty], &Silent).unwrap().remove(0);
         let refined = crate::train::Trained { fronts: vec![], networks };
@@ -270,11 +270,11 @@ fn settings_that_cannot_be_used_are_refused_by_name() {
     let training = Synthesis::new(&world).frames(Stream::Training, 50);
     let options = Options { centres: 4, ..Options::of_rows() };
     let start = Start::all(&training, &options).unwrap().remove(0);
-    let start = start.layers(&options);
+    let layers = start.layers(&options);
     let refused = |settings: Refinement, folds: usize, field: &str| {
         let fold_of: Vec<usize> = (0..50).map(|frame| frame % folds).collect();
         let examples = Examples::Folds(&fold_of);
-        let refused = refine(&training, &start, &options, &settings, examples, &Silent);
+        let refused = refine(&start.frames, &layers, &options, &settings, examples, &Silent);
         let message = refused.unwrap_err().to_string();
         assert!(message.starts_with(field), "{message}");
     };

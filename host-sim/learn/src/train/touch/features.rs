@@ -8,7 +8,7 @@ use taxel_data::{Dataset, columns};
 use super::super::projection::{
     Moments, USUAL_FEATURES, about_means, by_task, means, solved, strongest, with_targets,
 };
-use super::{FittedTouch, Kind};
+use super::{FittedTouch, Kind, examples_of};
 use crate::error::{Result, no_regression};
 
 /// Penalties on the map that are tried, each as a share of the mean variance of an input.
@@ -18,35 +18,35 @@ const PARTS: usize = 5;
 /// Spread of other features over that of places.
 const SHARE: f64 = 0.5;
 
-/// Projection of shape and strength to features.
+/// Where touches are, by their shape.
 #[derive(Debug, Clone)]
-pub struct Fitted {
-    /// f₀, then each input's part in every feature (`inputs × features`).
-    pub parameters: Vec<f32>,
-    /// First features, which are places, as maps tell them that were fitted to other frames (`frames × places`).
-    pub held_out: Option<DMatrix<f64>>,
+pub struct Places {
+    /// Linear map of shape and strength to places, one a column.
+    map: DMatrix<f64>,
+    /// Places of the examples that have them, by maps that were fitted to others (`frames × places`).
+    pub held_out: DMatrix<f64>,
 }
 
-/// Projection of shape and strength to features, for `frames` of a group of outputs of `dataset`: the places of the data
-/// set, if it has any; the outputs themselves, by [regression](super::super::projection::fit), but for places on a mat; and
-/// the strength.
+/// Projection of shape and strength to features, for `frames` of a group of outputs: the `places` of the data set, if it has
+/// any; the outputs themselves, by [regression](super::super::projection::fit), but for places on a mat; and the strength.
+/// It is f₀, then each input's part in every feature (`inputs × features`).
 ///
 /// # Errors
 /// [`Error`](crate::Error) for data without a regression, or with a projection beyond f32.
 pub fn projection(
-    touch: &FittedTouch,
+    kind: Kind,
     frames: &Dataset,
-    dataset: &Dataset,
+    places: Option<&Places>,
     features: Option<usize>,
-) -> Result<Fitted> {
+) -> Result<Vec<f32>> {
     let most = features.unwrap_or(USUAL_FEATURES).max(2);
     let inputs = frames.inputs.names.len();
-    let (map, held_out) = places(touch, dataset)?.unzip();
-    let is_mat = map.is_some() && cells(&dataset.inputs.names).is_some();
-    let of_places = map.as_ref().map_or(0, DMatrix::ncols);
+    let is_mat = places.is_some() && cells(&frames.inputs.names[..inputs - 1]).is_some();
+    let of_places = places.map_or(0, |places| places.map.ncols());
     let others = most.saturating_sub(of_places + 1);
-    let others = if touch.kind == Kind::Place && is_mat { 0 } else { others };
-    let mut blocks: Vec<DMatrix<f64>> = map.into_iter().collect();
+    let others = if kind == Kind::Place && is_mat { 0 } else { others };
+    let mut blocks: Vec<DMatrix<f64>> =
+        places.map(|places| places.map.clone()).into_iter().collect();
     if others > 0 {
         blocks.push(regressed(frames, others)?);
     }
@@ -61,8 +61,7 @@ pub fn projection(
     let mut parts = DMatrix::zeros(inputs, count);
     let mut columns = blocks.iter().flat_map(DMatrix::column_iter);
     parts.column_iter_mut().zip(&mut columns).for_each(|(mut to, from)| to.copy_from(&from));
-    let parameters = about_means(parts.transpose().as_slice(), &frames.inputs.means())?;
-    Ok(Fitted { parameters, held_out })
+    about_means(parts.transpose().as_slice(), &frames.inputs.means())
 }
 
 /// Largest standard deviation of the features with these parts.
@@ -72,32 +71,39 @@ fn spread(frames: &Dataset, parts: &DMatrix<f64>) -> f64 {
     features.column_iter().map(|column| column.variance().sqrt()).fold(0.0, f64::max)
 }
 
-/// Linear map of shapes to the places that `dataset` has as outputs, one a column, and what maps fitted to other frames
-/// make of those with places; `None` without any. It is a ridge regression towards the centroid, where inputs are cells of
-/// a mat: what data cannot tell stays as a centroid has it.
-fn places(touch: &FittedTouch, dataset: &Dataset) -> Result<Option<(DMatrix<f64>, DMatrix<f64>)>> {
-    let names = &dataset.outputs.names;
-    let of_places: Vec<usize> =
-        (0..names.len()).filter(|i| columns::is_place(&names[*i])).collect();
-    let lines = dataset.outputs.lines_with(&of_places);
-    if of_places.is_empty() || lines.is_empty() {
-        return Ok(None);
+impl Places {
+    /// Map of shapes that `touch` makes to the places that `dataset` has as outputs; `None` without any. It is a ridge
+    /// regression towards the centroid, where inputs are cells of a mat: what data cannot tell stays as a centroid has it.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for data without a regression.
+    pub fn fit(touch: &FittedTouch, dataset: &Dataset) -> Result<Option<Self>> {
+        let names = &dataset.outputs.names;
+        let is_place = |index: &usize| columns::is_place(&names[*index]);
+        let of_places: Vec<usize> = (0..names.len()).filter(is_place).collect();
+        if of_places.is_empty() {
+            return Ok(None);
+        }
+        let lines = examples_of(&dataset.outputs.lines_with(&of_places));
+        if lines.is_empty() {
+            return Ok(None);
+        }
+        let outputs = dataset.outputs.part(&lines, &of_places);
+        let touch = FittedTouch { kind: Kind::Place, ..touch.clone() };
+        let frames = touch.apply(&Dataset { outputs, ..dataset.subset(&lines) });
+        let cells = cells(&dataset.inputs.names);
+        let Regression { map, of_parts, .. } = regression(&frames, true, cells.as_ref())?;
+        let means = frames.inputs.means();
+        let mut held_out = DMatrix::zeros(frames.frames(), map.ncols());
+        for (part, map) in parts(frames.frames()).zip(&of_parts) {
+            let value = |line: usize, input: usize| {
+                frames.inputs.values[(part.start + line) * means.len() + input] - means[input]
+            };
+            let inputs = DMatrix::from_fn(part.len(), means.len(), value);
+            held_out.rows_mut(part.start, part.len()).copy_from(&(inputs * map));
+        }
+        Ok(Some(Self { map, held_out }))
     }
-    let outputs = dataset.outputs.part(&lines, &of_places);
-    let touch = FittedTouch { kind: Kind::Place, ..touch.clone() };
-    let frames = touch.apply(Dataset { outputs, ..dataset.subset(&lines) });
-    let cells = cells(&dataset.inputs.names);
-    let Regression { map, of_parts, .. } = regression(&frames, true, cells.as_ref())?;
-    let means = frames.inputs.means();
-    let mut held_out = DMatrix::zeros(frames.frames(), map.ncols());
-    for (part, map) in parts(frames.frames()).zip(&of_parts) {
-        let value = |line: usize, input: usize| {
-            frames.inputs.values[(part.start + line) * means.len() + input] - means[input]
-        };
-        let inputs = DMatrix::from_fn(part.len(), means.len(), value);
-        held_out.rows_mut(part.start, part.len()).copy_from(&(inputs * map));
-    }
-    Ok(Some((map, held_out)))
 }
 
 /// Directions of shape and strength that tell most of the outputs of `frames`, so many of them or fewer, one a column.

@@ -3,11 +3,9 @@
 use taxel_core::rbf::Format;
 use taxel_data::Dataset;
 
-use super::super::format::weighed_errors;
 use super::super::{HiddenLayer, Options, Samples};
 use super::features::parts;
 use crate::error::Result;
-use crate::infer::infer;
 
 /// Penalties that are tried, for each frame. The largest leaves hardly more than the affine tail.
 const PENALTIES: [f64; 5] = [1e-7, 1e-5, 1e-3, 1e-2, 1e-1];
@@ -27,8 +25,7 @@ pub fn best(seen: &Dataset, layer: &HiddenLayer, options: &Options) -> Result<f6
         let networks = Samples::new(&training).fit_each(layer, &options, &PENALTIES.map(Some))?;
         let held = seen.subset(&part.collect::<Vec<_>>());
         for (error, network) in errors.iter_mut().zip(&networks) {
-            let estimates = infer(&network.network(), &held.inputs.values);
-            *error += weighed_errors(&held, &estimates).iter().sum::<f64>();
+            *error += Samples::new(&held).squared_errors(&network.network()).iter().sum::<f64>();
         }
     }
     let least = (0..errors.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b]));
