@@ -5,8 +5,9 @@
 //! row, of the features behind a projection, or of the levels at rest that a touch's shape and strength are told by.
 //! Everything else stays as it was trained, and decoding costs the same.
 //!
-//! Shifts are in spans: the training range of a network's input, or the range of a reading in the presses. Errors are in
-//! training errors of each output.
+//! Shifts are in spans: the training range of a network's input, or the range of a reading in the presses; where it has a
+//! threshold, and some presses are untouched, four standard errors of their mean. Errors are in training errors of each
+//! output.
 //!
 //! 1. **Guess.** The level at rest is the mean of the presses whose outputs are 0, or else a quantile that hardly any touch
 //!    reaches. Inputs of a network are shifted so that their range meets that of training at one end, at the other or
@@ -31,7 +32,7 @@ use crate::packing::{ModelBlob, rebuild};
 use crate::parallel;
 use crate::prepared::PreparedModel;
 use crate::rls::Rls;
-use crate::train::FittedNetwork;
+use crate::train::{FittedNetwork, THRESHOLD};
 
 /// 1/σ: shifts are expected to be a quarter of a span from the guess.
 const PRIOR: f64 = 4.0;
@@ -284,9 +285,15 @@ impl<'m> Unit<'m> {
             let of_reading = |number: usize| {
                 let untouched = self.presses.iter().filter(|it| it.is_untouched);
                 let rest: Vec<f64> = untouched.map(|it| it.taken[number]).collect();
-                let rest = if rest.is_empty() { quantile(number, usual) } else { mean(&rest) };
-                let [low, high] = range(number);
-                (rest - f64::from(touch.block()[block_floats(number)]), high - low)
+                let ([low, high], [level, threshold]) =
+                    (range(number), touch.pairs()[number].map(f64::from));
+                // A mean at rest is as uncertain as noise leaves it, and may then move by so much.
+                let noise = threshold / THRESHOLD / (rest.len() as f64).sqrt();
+                match rest[..] {
+                    [] => (quantile(number, usual) - level, high - low),
+                    _ if noise > 0.0 => (mean(&rest) - level, PRIOR * noise),
+                    _ => (mean(&rest) - level, high - low),
+                }
             };
             return numbers.map(of_reading).unzip();
         }

@@ -120,7 +120,7 @@ fn places_and_forces_of_a_touch_are_recalibrated_too() {
     let options = Options { format: Format::Fixed16, centres: 32, ..options };
     let [old, fresh] =
         [&[1.0], &sensor.gains[..]].map(|gains| sensor.model(&options, gains, false));
-    for (count, untouched) in [(200, 10), (25, 3)] {
+    for (count, untouched, most) in [(200, 10, 1.06), (25, 3, 1.12)] {
         let [readings, outputs] = sensor.presses(count, untouched);
         let found = recalibrate(&old.prepare(), &readings, &outputs).unwrap();
         for output in 0..3 {
@@ -129,7 +129,7 @@ fn places_and_forces_of_a_touch_are_recalibrated_too() {
             };
             let (before, after) = (ratio(&old), ratio(&found.blob));
             println!("{count} presses, {untouched} untouched, output {output}: {after:.3}");
-            assert!(before > 3.0 && after <= 1.15, "{count} {output}: {before} {after}");
+            assert!(before > 3.0 && after <= most, "{count} {output}: {before} {after}");
         }
     }
 }
