@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use super::progress::Terminal;
 use crate::Result;
 use crate::evaluate::printed::{CELLS, NOISE_LEVELS, Nearness, SPREADS};
-use crate::evaluate::table1::{self, Comparison, Entry, NETWORK, Table1};
+use crate::evaluate::table1::{self, Comparison, NETWORK, Table1};
 use crate::metrics::{Definition, Errors};
+use crate::report::{Digits, Sections, TableOf};
 use clap::Args;
 use serde::Serialize;
 use taxel_data::output;
@@ -63,14 +64,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if common.json {
         return print::json(&Summary { subject: scene.name, seed: scene.world.seed, table });
     }
-    page_of(&table, &arguments.group).print()
+    print::Page::of(sections(&scene.name, &table, &arguments.group).text().trim_end()).print()
 }
 
-fn page_of(table: &Table1, group: &str) -> print::Page {
-    let mut page = print::Page::default();
-    page.line(format_args!(
-        "{group}: K = {}, {} training and {} test frames, weights by {}\n\
-         (in brackets: the standard network, K = N = {})",
+fn sections(subject: &str, table: &Table1, group: &str) -> Sections {
+    let mut sections = Sections::new(format!("Table 1, {subject}: {group}"));
+    sections.note(format!(
+        "K = {}, {} training and {} test frames, weights by {}. In brackets: the standard network, K = N = {}.",
         table.centres,
         table.training_frames,
         table.test_frames,
@@ -78,74 +78,69 @@ fn page_of(table: &Table1, group: &str) -> print::Page {
         table.standard_frames
     ));
     for definition in Definition::ALL {
-        let of = |errors: &[Errors]| {
-            errors.iter().find(|e| e.group == group).and_then(|e| definition.of(e))
-        };
-        if table.columns.iter().all(|column| of(column.errors(mean::NAME, None)).is_none()) {
-            continue;
-        }
-        page.line(format_args!("\n{}", definition.formula()));
-        let kind = table.noise_kind;
-        let levels = table.columns.iter().map(|c| format!("{:>20}", kind.in_words(c.noise_level)));
-        page.line(format_args!("{:<16}{}", "noise", levels.collect::<String>()));
-        for spread in table.columns[0].spreads() {
-            let cells = table.columns.iter().map(|column| {
-                let of_decoder = |name| of(column.errors(name, Some(spread)));
-                format!(
-                    "{:>9} {:>10}",
-                    number(definition, of_decoder(NETWORK)),
-                    format!("({})", number(definition, of_decoder(standard::NAME)))
-                )
-            });
-            page.line(format_args!("spread {spread:<9?}{}", cells.collect::<String>()));
-        }
-        for Entry { decoder, .. } in table.columns[0].baselines() {
-            let cells = table.columns.iter().map(|column| {
-                let value = of(column.errors(decoder, None));
-                format!("{:>9}{:11}", number(definition, value), "")
-            });
-            page.line(format_args!("{decoder:<16}{}", cells.collect::<String>().trim_end()));
-        }
+        errors(&mut sections, table, definition, group);
     }
-    page.line("");
     for column in &table.columns {
-        page.line(format_args!(
-            "noise {}: {}",
-            table.noise_kind.in_words(column.noise_level),
-            column.limit.note()
-        ));
+        let noise = table.noise_kind.in_words(column.noise_level);
+        sections.note(format!("Noise {noise}: {}", column.limit.note()));
     }
     if let Some(nearest) = table.nearest_formula() {
-        compare(&mut page, &table.comparison, nearest);
+        compare(&mut sections, &table.comparison, nearest);
     }
-    page
+    sections
+}
+
+/// Adds the errors by one definition, if it has any: of networks by spread, then of baselines.
+fn errors(sections: &mut Sections, table: &Table1, definition: Definition, group: &str) {
+    let of =
+        |errors: &[Errors]| errors.iter().find(|e| e.group == group).and_then(|e| definition.of(e));
+    if table.columns.iter().all(|column| of(column.errors(mean::NAME, None)).is_none()) {
+        return;
+    }
+    let spreads =
+        table.columns[0].spreads().map(|it| (format!("network, spread {it:?}"), NETWORK, Some(it)));
+    let baselines =
+        table.columns[0].baselines().map(|it| (it.decoder.clone(), it.decoder.as_str(), None));
+    let rows: Vec<_> = spreads.chain(baselines).collect();
+    let mut cells = TableOf::new(&rows, definition.formula()).names("decoder", |row| row.0.clone());
+    for column in &table.columns {
+        let noise = table.noise_kind.in_words(column.noise_level);
+        cells = cells.texts(&format!("{noise} noise"), "", |(_, decoder, spread)| {
+            let own = number(definition, of(column.errors(decoder, *spread)));
+            let standard = spread.map(|_| of(column.errors(standard::NAME, *spread)));
+            standard.map_or(own.clone(), |it| format!("{own} ({})", number(definition, it)))
+        });
+    }
+    sections.table(cells);
 }
 
 /// Adds the printed cells beside the computed ones, by the formula that is `nearest`, and how near every formula comes.
-fn compare(page: &mut print::Page, by_formula: &[Comparison], nearest: &Comparison) {
-    page.line(format_args!(
-        "\nAs the paper prints it, for z. It does not state its formula; nearest is {}, computed / printed, %:",
-        nearest.formula
-    ));
-    let levels = NOISE_LEVELS.map(|level| format!("{:>18}", NoiseKind::Relative.in_words(level)));
-    page.line(format_args!("{:<10}{}", "noise", levels.concat()));
+fn compare(sections: &mut Sections, by_formula: &[Comparison], nearest: &Comparison) {
+    let mut rows: Vec<(String, Vec<String>)> = vec![];
     for ((spread, line), printed) in SPREADS.iter().zip(&nearest.cells).zip(&CELLS) {
-        let pairs =
-            line.iter().zip(printed).map(|(a, b)| format!("{:>18}", format!("{a:.2} / {b:.2}")));
-        page.line(format_args!("spread {spread:?}{}", pairs.collect::<String>()));
+        let pairs = line.iter().zip(printed).map(|(a, b)| format!("{a:.2} / {b:.2}"));
+        rows.push((format!("spread {spread:?}"), pairs.collect()));
     }
-    let mean = nearest.mean_percent.map(|it| format!("{it:>18.2}"));
-    page.line(format_args!("{:<10}{}", "mean", mean.concat()));
-    page.line(format_args!("\n{:<26} {:>11} {:>12}", "formula", "gap, points", "correlation"));
-    let mut line = |name: &str, nearness: &Nearness| {
-        let correlation = nearness.correlation.map_or("-".into(), |it| format!("{it:.2}"));
-        page.line(format_args!("{name:<26} {:>11.2} {correlation:>12}", nearness.gap));
-    };
-    line("a constant", &Nearness::of_a_constant());
-    for it in by_formula {
-        line(&it.formula, &it.nearness);
+    rows.push(("mean".into(), nearest.mean_percent.iter().map(|it| format!("{it:.2}")).collect()));
+    let caption = format!(
+        "As the paper prints it, for z. It does not state its formula; nearest is {}: computed / printed, %.",
+        nearest.formula
+    );
+    let mut cells = TableOf::new(&rows, caption).names("decoder", |(name, _)| name.clone());
+    for (place, level) in NOISE_LEVELS.into_iter().enumerate() {
+        let noise = NoiseKind::Relative.in_words(level);
+        cells = cells.texts(&format!("{noise} noise"), "", |(_, line)| line[place].clone());
     }
-    page.line("gap: root of the mean square over all cells. docs/paper.md says what is open.\n");
+    sections.table(cells);
+    let constant = ("a constant".to_owned(), Nearness::of_a_constant());
+    let formulas = by_formula.iter().map(|it| (it.formula.clone(), it.nearness));
+    let rows: Vec<(String, Nearness)> = [constant].into_iter().chain(formulas).collect();
+    let caption = "How near each formula comes. Gap: root of the mean square over all cells, in points. docs/paper.md says what is open.";
+    let table = TableOf::new(&rows, caption)
+        .names("formula", |(name, _)| name.clone())
+        .numbers("gap", "", Digits::Decimals(2), |(_, it)| Some(it.gap))
+        .numbers("correlation", "", Digits::Decimals(2), |(_, it)| it.correlation);
+    sections.table(table);
 }
 
 fn number(definition: Definition, value: Option<f64>) -> String {
