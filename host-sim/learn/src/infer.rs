@@ -22,8 +22,9 @@ mod float32;
 mod fixed16;
 mod front;
 
-/// Lines below which each is decoded by itself: columns cost as much for one line as for all that they hold.
-const FEW_LINES: usize = 8;
+/// Lines below which each is decoded by itself: columns cost as much for one line as for all that they hold. In fixed16 that
+/// is what five single lines cost.
+const FEW_LINES: usize = 5;
 /// Lines that one thread takes at a time.
 const LINES_AT_ONCE: usize = 4 * LANES;
 
