@@ -45,7 +45,7 @@ pub fn fault(name: &str, reading: f64, limits: Option<Limits>) -> Option<Fault> 
 /// use taxel_data::table::Table;
 /// use taxel_learn::health::judge;
 /// let names = ["r1c1_ohm", "r1c2_ohm", "x_v"].map(String::from).to_vec();
-/// let mut readings = Table { names, values: vec![60.0, 0.02, 0.02, 60.0, 1e6, 1e6] };
+/// let mut readings = Table { names, values: vec![60.0, 0.02, 0.02, 60.0, 1e6, 1e6].into() };
 /// let faulty = judge(&mut readings, Some(Limits::USUAL));
 /// let [column] = &faulty[..] else { panic!("{faulty:?}") };
 /// assert_eq!((column.column.as_str(), column.shorted, column.open), ("r1c2_ohm", 1, 1));

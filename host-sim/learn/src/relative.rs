@@ -29,8 +29,8 @@ pub(crate) fn ratios<'l>(
 /// ```
 /// use taxel_data::table::Table;
 /// let names = vec!["ch1".to_owned(), "ch2".to_owned()];
-/// let readings = Table { names: names.clone(), values: vec![30.0, 8.0, 15.0, 4.0] };
-/// let baseline = Table { names, values: vec![60.0, 16.0] };
+/// let readings = Table { names: names.clone(), values: vec![30.0, 8.0, 15.0, 4.0].into() };
+/// let baseline = Table { names, values: vec![60.0, 16.0].into() };
 /// assert_eq!(taxel_learn::relative::inputs(&readings, &baseline).values, [0.5, 0.5, 0.25, 0.25]);
 /// ```
 pub fn inputs(readings: &Table, baselines: &Table) -> Table {
