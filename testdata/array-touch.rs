@@ -4,7 +4,7 @@
 // Outputs, row after row, with their units:
 //     y, y (36 times)
 #[allow(unused_imports)]
-use taxel_core::{blob, confidence, fill, projection, rbf, rbf::arrays, touch};
+use taxel_core::{blob, projection, rbf, rbf::arrays, reading_model, touch};
 
 /// Network of whole frames.
 #[rustfmt::skip]
@@ -310,8 +310,7 @@ pub static MODEL: taxel_core::Fixed<rbf::Network<'static>, 2, 18, 18, 73> = taxe
         (blob::Front { outputs: 18, touch: Some(touch::Touch::of_array(touch::Kind::Amount, &TOUCH_1)), projection: Some(projection::Projection::of_array(&PROJECTION_1)) }, rbf::Network::F32(NETWORK_1.network())),
     ]),
     relative_inputs: false,
-    confidence: None,
-    fill: None,
+    reading_model: None,
 }
 .checked();
 

@@ -4,7 +4,7 @@
 // Outputs, row after row, with their units:
 //     y, y (144 times)
 #[allow(unused_imports)]
-use taxel_core::{blob, confidence, fill, projection, rbf, rbf::arrays, touch};
+use taxel_core::{blob, projection, rbf, rbf::arrays, reading_model, touch};
 
 /// Network of rows 1, 3, 5, 7.
 #[rustfmt::skip]
@@ -137,8 +137,7 @@ pub static MODEL: taxel_core::Fixed<rbf::float32::Network<'static>, 8, 18, 18, 1
         NETWORK_1.network(),
     ]),
     relative_inputs: false,
-    confidence: None,
-    fill: None,
+    reading_model: None,
 }
 .checked();
 

@@ -26,7 +26,7 @@
 //     r4e5_dz_mm, mm
 //     r4e6_dz_mm, mm
 #[allow(unused_imports)]
-use taxel_core::{blob, confidence, fill, projection, rbf, rbf::arrays, touch};
+use taxel_core::{blob, projection, rbf, rbf::arrays, reading_model, touch};
 
 /// Network of row 1.
 #[rustfmt::skip]
@@ -102,8 +102,7 @@ pub static MODEL: taxel_core::Fixed<rbf::float32::Network<'static>, 1, 18, 6, 18
         NETWORK_0.network(),
     ]),
     relative_inputs: false,
-    confidence: None,
-    fill: None,
+    reading_model: None,
 }
 .checked();
 

@@ -91,7 +91,6 @@ pub fn message(error: &Error) -> String {
 fn advice(error: &Error) -> &'static str {
     use taxel_data::Error as Data;
     let of_field = |field: &str| match field {
-        "fill" => " (leave --fill or training.fill out)",
         "folds" => " (--folds or --fold-column, --no-refine)",
         "memory" => " (--centres)",
         "image" => " (--image)",

@@ -7,7 +7,7 @@
 mod routines;
 
 #[cfg(cortex_m4f)]
-pub(crate) use routines::{Inputs, density, fixed16, multiply, project, sqrt, touch};
+pub(crate) use routines::{Inputs, fixed16, multiply, project, sqrt, touch};
 
 /// Inputs a row of the paper's sensor; inner loops are made for this number, in assembly or compiled.
 pub(crate) const INPUTS: usize = 18;

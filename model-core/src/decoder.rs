@@ -1,7 +1,6 @@
 //! Decoding a frame to an estimate: the one entry point for a device.
 
 use crate::blob::{DecodeError, Front, MOST_FRONTS, Metadata, Model, ModelShape};
-use crate::confidence::Confidence;
 #[cfg(cortex_m4f)]
 use crate::cortex_m4;
 use crate::estimate::{Estimate, RowStatus};
@@ -15,7 +14,7 @@ use crate::touch::{Kind, Touch};
 pub const fn decoder_ram_bytes(rows: usize) -> usize {
     let of_rows = 24 * rows;
     let of_frames = 52 * MOST_FRONTS;
-    144 + if of_rows > of_frames { of_rows } else { of_frames }
+    136 + if of_rows > of_frames { of_rows } else { of_frames }
 }
 
 /// A frame to be decoded, and what is known of the sensor at rest.
@@ -204,16 +203,24 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         )
     }
 
-    /// Replaces missing readings of a frame (Ω) by those expected of the others, if the model can
-    /// ([`fill`](crate::fill)). Returns the number of readings that were filled. `scratch` is working space of
-    /// [`scratch_floats`](Self::scratch_floats).
-    pub fn fill(&self, readings_ohm: &mut [f32], scratch: &mut [f32]) -> usize {
-        self.model.fill().map_or(0, |fill| fill.fill(readings_ohm, scratch))
+    /// Replaces missing readings of a frame (Ω) by those expected of the others, by the model's
+    /// [reading model](crate::reading_model). Returns the number of readings that were filled; 0 if the model has none.
+    ///
+    /// A model with relative inputs takes the `reciprocals` of the baseline ([`Frame`]), which others ignore. `scratch` is
+    /// working space of [`scratch_floats`](Self::scratch_floats).
+    pub fn fill(
+        &self,
+        readings_ohm: &mut [f32],
+        reciprocals: &[f32],
+        scratch: &mut [f32],
+    ) -> usize {
+        let reciprocals = self.metadata().relative_inputs.then_some(reciprocals);
+        self.model.reading_model().map_or(0, |it| it.fill(readings_ohm, reciprocals, scratch))
     }
 
     /// Tells how far off the outputs of a frame may be, and how novel the frame is, by the model's
-    /// [confidence](crate::confidence). Returns its novelty in nats: above 0, it is unlike the frames of training. `None`
-    /// if the model has no confidence; nothing is written then.
+    /// [reading model](crate::reading_model). Returns its novelty in nats: above 0, it is unlike the frames of training.
+    /// `None` if the model does not tell it; nothing is written then.
     ///
     /// `deviation` takes a standard deviation for each of the `rows × outputs` outputs, in their units. If a reading
     /// of the frame is missing, all of them and the novelty are NaN.
@@ -228,31 +235,11 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         scratch: &mut [f32],
         deviation: &mut [f32],
     ) -> Result<Option<f32>, NetworkError> {
-        let Some(confidence) = self.model.confidence() else { return Ok(None) };
-        let relative = self.metadata().relative_inputs;
-        assess(&confidence, relative, frame, scratch, deviation).map(Some)
-    }
-}
-
-/// Assesses one frame as [`Decoder::assess_into`] does.
-///
-/// Not inlined on a device, for the same reason as [`decode_blob`].
-#[cfg_attr(cortex_m4f, inline(never))]
-pub fn assess(
-    confidence: &Confidence<'_>,
-    relative_inputs: bool,
-    frame: Frame<'_>,
-    scratch: &mut [f32],
-    deviation: &mut [f32],
-) -> Result<f32, NetworkError> {
-    check_length("frame", frame.readings_ohm, confidence.sizes().readings)?;
-    let readings = frame.readings_ohm.iter().copied();
-    if relative_inputs {
-        check_length("reciprocals", frame.reciprocals, confidence.sizes().readings)?;
-        let ratios = readings.zip(frame.reciprocals).map(|(r, of)| relative(r, *of));
-        confidence.assess(ratios, scratch, deviation)
-    } else {
-        confidence.assess(readings, scratch, deviation)
+        let reciprocals = self.metadata().relative_inputs.then_some(frame.reciprocals);
+        match self.model.reading_model() {
+            Some(it) => it.assess(frame.readings_ohm, reciprocals, scratch, deviation),
+            None => Ok(None),
+        }
     }
 }
 
@@ -413,9 +400,8 @@ fn divide(readings: &[f32], reciprocals: &[f32], ratios: &mut [f32]) {
 
 /// Number of floats of working space that decoding with `model` needs, assessing its outputs, and filling its readings.
 pub fn scratch_floats(model: &Model<'_>) -> usize {
-    let assessing = model.confidence().map_or(0, |it| it.sizes().scratch_floats());
-    let filling = model.fill().map_or(0, |it| it.scratch_floats());
-    decoding_floats(model).max(assessing).max(filling)
+    let of_readings = model.reading_model().map_or(0, |it| it.sizes().scratch_floats());
+    decoding_floats(model).max(of_readings)
 }
 
 /// Number of floats of working space that decoding with `model` needs.

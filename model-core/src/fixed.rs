@@ -1,11 +1,10 @@
 //! Models in arrays of fixed size, for programs that never change their model.
 
 use crate::blob::ModelShape;
-use crate::confidence::Confidence;
-use crate::decoder::{Frame, FrameDecoder, Networks, assess};
+use crate::decoder::{Frame, FrameDecoder, Networks};
 use crate::estimate::{Estimate, RowStatus};
-use crate::fill::Fill;
 use crate::infer::Infer;
+use crate::reading_model::ReadingModel;
 
 /// Model in arrays of fixed size: `ROWS` rows of `INPUTS` readings and `OUTPUTS` outputs.
 ///
@@ -34,8 +33,7 @@ use crate::infer::Infer;
 /// static MODEL: Fixed<Network<'static>, 1, 2, 1, 2> = Fixed {
 ///     networks: Networks::OfRows(&[NETWORK.network()]),
 ///     relative_inputs: false,
-///     confidence: None,
-///     fill: None,
+///     reading_model: None,
 /// }
 /// .checked();
 ///
@@ -58,10 +56,8 @@ pub struct Fixed<
     pub networks: Networks<'static, 'static, N>,
     /// Whether inputs are [relative](crate::relative) to the baseline.
     pub relative_inputs: bool,
-    /// What tells deviations and novelty.
-    pub confidence: Option<Confidence<'static>>,
-    /// What fills missing readings.
-    pub fill: Option<Fill<'static>>,
+    /// What fills missing readings, and may tell novelty and deviations.
+    pub reading_model: Option<ReadingModel<'static>>,
 }
 
 /// Estimate of a frame, in arrays of fixed size.
@@ -88,8 +84,7 @@ impl<N: Infer, const ROWS: usize, const INPUTS: usize, const OUTPUTS: usize, con
     /// static MODEL: Fixed<Network<'static>, 1, 2, 1, 2> = Fixed {
     ///     networks: Networks::OfRows(&[]), // "a row has no network"
     ///     relative_inputs: false,
-    ///     confidence: None,
-    ///     fill: None,
+    ///     reading_model: None,
     /// }
     /// .checked();
     /// # let _ = &MODEL;
@@ -108,15 +103,13 @@ impl<N: Infer, const ROWS: usize, const INPUTS: usize, const OUTPUTS: usize, con
             }
         }
         let mut scratch = self.decoder().scratch_floats();
-        if let Some(confidence) = &self.confidence {
-            let sizes = confidence.sizes();
-            assert!(sizes.readings == ROWS * INPUTS, "confidence in other readings");
-            assert!(sizes.outputs == ROWS * OUTPUTS, "confidence in other outputs");
-            scratch = larger(scratch, sizes.scratch_floats());
-        }
-        if let Some(fill) = &self.fill {
-            assert!(fill.readings() == ROWS * INPUTS, "a fill of other readings");
-            scratch = larger(scratch, fill.scratch_floats());
+        if let Some(model) = &self.reading_model {
+            let sizes = model.sizes();
+            assert!(sizes.readings == ROWS * INPUTS, "a reading model of other readings");
+            assert!(sizes.outputs == ROWS * OUTPUTS, "a reading model of other outputs");
+            if sizes.scratch_floats() > scratch {
+                scratch = sizes.scratch_floats();
+            }
         }
         assert!(scratch <= SCRATCH, "too little working space");
         self
@@ -146,7 +139,7 @@ impl<N: Infer, const ROWS: usize, const INPUTS: usize, const OUTPUTS: usize, con
     }
 
     /// Writes the standard deviation of each output, and returns the novelty of a frame in nats, as
-    /// [`Decoder::assess_into`](crate::Decoder::assess_into) does; NaN if the model has no confidence.
+    /// [`Decoder::assess_into`](crate::Decoder::assess_into) does; NaN if the model does not tell it.
     #[inline(always)]
     pub fn assess(
         &self,
@@ -154,23 +147,27 @@ impl<N: Infer, const ROWS: usize, const INPUTS: usize, const OUTPUTS: usize, con
         reciprocals: Option<&[[f32; INPUTS]; ROWS]>,
         deviation: &mut [[f32; OUTPUTS]; ROWS],
     ) -> f32 {
-        let Some(confidence) = &self.confidence else { return f32::NAN };
-        let (frame, deviation) = (frame(readings_ohm, reciprocals), deviation.as_flattened_mut());
-        let relative = self.relative_inputs;
-        let novelty = assess(confidence, relative, frame, &mut [0.0; SCRATCH], deviation);
-        novelty.unwrap_or(f32::NAN)
+        let Some(model) = &self.reading_model else { return f32::NAN };
+        let Frame { readings_ohm, reciprocals } = frame(readings_ohm, reciprocals);
+        let reciprocals = self.relative_inputs.then_some(reciprocals);
+        let (scratch, deviation) = (&mut [0.0; SCRATCH], deviation.as_flattened_mut());
+        let novelty = model.assess(readings_ohm, reciprocals, scratch, deviation);
+        novelty.ok().flatten().unwrap_or(f32::NAN)
     }
 
-    /// Replaces missing readings by those expected of the others, if the model can, and returns their number.
+    /// Replaces missing readings by those expected of the others, as [`Decoder::fill`](crate::Decoder::fill) does, and
+    /// returns their number.
     #[inline(always)]
-    pub fn fill(&self, readings_ohm: &mut [[f32; INPUTS]; ROWS]) -> usize {
-        let readings_ohm = readings_ohm.as_flattened_mut();
-        self.fill.map_or(0, |fill| fill.fill(readings_ohm, &mut [0.0; SCRATCH]))
+    pub fn fill(
+        &self,
+        readings_ohm: &mut [[f32; INPUTS]; ROWS],
+        reciprocals: Option<&[[f32; INPUTS]; ROWS]>,
+    ) -> usize {
+        let Some(model) = &self.reading_model else { return 0 };
+        let given = reciprocals.map_or(&[][..], |it| it.as_flattened());
+        let reciprocals = self.relative_inputs.then_some(given);
+        model.fill(readings_ohm.as_flattened_mut(), reciprocals, &mut [0.0; SCRATCH])
     }
-}
-
-const fn larger(a: usize, b: usize) -> usize {
-    if a > b { a } else { b }
 }
 
 fn frame<'f, const ROWS: usize, const INPUTS: usize>(

@@ -1,6 +1,6 @@
 //! Inference for resistive tactile sensors: from row–column resistances to deformation.
 //!
-//! Readings travel one way: frame (Ω, a slice) → [`health`] → ([`fill`] →) ([`relative`] →) ([`touch`] →) ([`projection`] →)
+//! Readings travel one way: frame (Ω, a slice) → [`health`] → ([`fill`](reading_model) →) ([`relative`] →) ([`touch`] →) ([`projection`] →)
 //! [`scale`] → [`rbf`] (and its affine tail) → [`Estimate`] (→ [`filter`]). The network's weights are read where the [`blob`] lies, in flash or in a
 //! file's buffer: nothing is copied, nothing is allocated, and no release code path of [`Decoder`] panics.
 //!
@@ -35,8 +35,7 @@ pub mod filter;
 pub mod rbf;
 pub mod touch;
 pub mod projection;
-pub mod confidence;
-pub mod fill;
+pub mod reading_model;
 pub mod blob;
 mod infer;
 mod decoder;

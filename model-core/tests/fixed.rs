@@ -2,9 +2,8 @@
 //! `firmware/tests/bit_for_bit.rs` and `cargo xtask c`.)
 
 use taxel_core::blob::Front;
-use taxel_core::confidence::{Confidence, Sizes};
-use taxel_core::fill::Fill;
 use taxel_core::rbf::{arrays::F32, float32::Network};
+use taxel_core::reading_model::{ReadingModel, Sizes};
 use taxel_core::touch::{Kind, Touch};
 use taxel_core::{Fixed, Networks};
 
@@ -23,7 +22,7 @@ type Model<const ROWS: usize, const SCRATCH: usize> = Fixed<Network<'static>, RO
 
 const fn model<const ROWS: usize, const SCRATCH: usize>() -> Model<ROWS, SCRATCH> {
     let networks = Networks::OfFrames(const { &[(FRONT, NETWORK.network())] });
-    Fixed { networks, relative_inputs: false, confidence: None, fill: None }
+    Fixed { networks, relative_inputs: false, reading_model: None }
 }
 
 #[test]
@@ -31,7 +30,7 @@ fn an_output_that_overflows_is_nan() {
     let decoded = model::<1, 4>().checked().decode(&[[55.0; 4]], None);
     assert!(decoded.outputs[0].iter().all(|y| y.is_nan()), "{decoded:?}");
     assert!(model::<1, 4>().assess(&[[55.0; 4]], None, &mut [[0.0; 2]]).is_nan());
-    assert_eq!(model::<1, 4>().fill(&mut [[f32::NAN; 4]]), 0);
+    assert_eq!(model::<1, 4>().fill(&mut [[f32::NAN; 4]], None), 0);
 }
 
 #[test]
@@ -48,24 +47,16 @@ fn sizes_that_do_not_fit_are_named() {
         &|| _ = Model { relative_inputs: true, ..model::<1, 7>() }.checked(),
         "too little working space",
     );
-    let sizes = |readings, outputs| Sizes { readings, directions: 1, components: 1, outputs };
+    let sizes = |readings, outputs| Sizes { readings, factors: 1, components: 1, outputs };
     for (sizes, cause) in [
-        (sizes(3, 2), "confidence in other readings"),
-        (sizes(4, 1), "confidence in other outputs"),
+        (sizes(3, 2), "a reading model of other readings"),
+        (sizes(4, 1), "a reading model of other outputs"),
         (sizes(4, 2), "too little working space"),
     ] {
         let block = vec![0.0; sizes.block_floats()].leak();
-        let confidence = Some(Confidence::of_array(sizes, block));
-        says(&|| _ = Model { confidence, ..model::<1, 4>() }.checked(), cause);
-    }
-    for (readings, factors, cause) in
-        [(3, 1, "a fill of other readings"), (4, 3, "too little working space")]
-    {
-        let fill =
-            Some(Fill::of_array(readings, factors, vec![0.0; readings * (2 + factors)].leak()));
-        says(&|| _ = Model { fill, ..model::<1, 4>() }.checked(), cause);
+        let reading_model = Some(ReadingModel::of_array(sizes, block));
+        says(&|| _ = Model { reading_model, ..model::<1, 4>() }.checked(), cause);
     }
     says(&|| _ = Touch::of_array(Kind::Place, &[0.0; 6]), "a touch of half a reading");
-    says(&|| _ = Fill::of_array(4, 1, &[0.0; 11]), "a fill of another length");
-    says(&|| _ = Confidence::of_array(sizes(4, 2), &[]), "a confidence of another length");
+    says(&|| _ = ReadingModel::of_array(sizes(4, 2), &[]), "a reading model of another length");
 }

@@ -6,11 +6,10 @@ mod table;
 
 mod blob_format;
 mod clamp;
-mod confidence;
 mod decoder;
 mod extremes;
-mod fill;
 mod fixed;
 mod projection;
+mod reading_model;
 mod touch;
 mod sections;

@@ -1,7 +1,7 @@
 //! Sections of the blob that a model may have besides its networks: their bytes, and what damage of them is called.
 
 use crate::common::{PROJECTION, close_with_crc, worked_bytes};
-use crate::{blob_format, confidence, fill, projection, touch};
+use crate::{blob_format, projection, reading_model, touch};
 use proptest::prelude::*;
 use taxel_core::blob::{DecodeError, Model};
 use taxel_core::rbf::{Network, NetworkError};
@@ -23,16 +23,15 @@ fn sample(blob: &[u8], header: &[u8], block: &[f32]) -> Sample {
     Sample { blob: AlignedBytes::copy_of(blob), start, floats }
 }
 
-/// A front of a projection, a confidence, a fill, and a front of a touch before two other networks.
-fn samples() -> [Sample; 4] {
+/// A front of a projection, a reading model, and a front of a touch before two other networks.
+fn samples() -> [Sample; 3] {
     let mut buffer = Aligned([0; 1024]);
     let of_projection = sample(projection::of_one_row(&mut buffer.0), &[4, 3, 0, 2], &PROJECTION);
-    let of_confidence = sample(&confidence::small(false), &[5, 1, 1], &confidence::BLOCK);
-    let blob = fill::blob(Some(fill::fill()), false).unwrap();
-    let of_fill = sample(&blob, &[7, 1], fill::BLOCK.as_flattened());
+    let blob = reading_model::blob(false, reading_model::full());
+    let of_readings = sample(&blob, &[8, 1, 1], &reading_model::BLOCK);
     let block = [&touch::TOUCH[..], &touch::CENTROID].concat();
     let of_touch = sample(&touch::three(-1.0, false), &[4, 1, 1, 2], &block);
-    [of_projection, of_confidence, of_fill, of_touch]
+    [of_projection, of_readings, of_touch]
 }
 
 impl Sample {
@@ -52,17 +51,18 @@ impl Sample {
 }
 
 #[test]
-fn a_confidence_has_the_specifications_worked_bytes() {
-    let [_, confidence, ..] = samples();
-    let bytes = worked_bytes("worked confidence");
-    assert_eq!(confidence.blob[confidence.start..][..bytes.len()], bytes);
+fn a_reading_model_has_the_specifications_worked_bytes() {
+    let [_, readings, _] = samples();
+    let bytes = worked_bytes("worked reading model");
+    assert_eq!(readings.blob[readings.start..][..bytes.len()], bytes);
 }
 
 #[test]
 fn every_damage_of_a_section_has_its_own_error() {
-    let [projection, confidence, fill, touch] = samples();
+    let [projection, readings, touch] = samples();
     let count = |what, expected, found| DecodeError::CountMismatch { what, expected, found };
     let malformed = |section| DecodeError::Malformed { section };
+    let of_readings = |expected, found| count("bytes of the reading model", expected, found);
     for (sample, place, byte, error) in [
         (&projection, 3, 1, count("bytes of a front", 20, 40)),
         (&projection, 3, 3, count("bytes of a front", 60, 40)),
@@ -70,41 +70,36 @@ fn every_damage_of_a_section_has_its_own_error() {
         (&touch, 2, 0, count("bytes of a front", 40, 100)),
         (&touch, 3, 0, count("bytes of a front", 52, 100)),
         (&touch, 1, 2, count("bytes of weights", 60, 44)),
-        (
-            &confidence,
-            confidence.floats - confidence.start - 1,
-            63,
-            count("bytes of confidence", 64, 63),
-        ),
-        // Two directions take 4·(1 + 2 + 1 + 3) bytes more; two components 4·(1 + 2 + 3 + 1).
-        (&confidence, 1, 2, count("bytes of confidence", 92, 64)),
-        (&confidence, 2, 2, count("bytes of confidence", 92, 64)),
-        (&confidence, 2, 0, count("bytes of confidence", 36, 64)),
-        (&confidence, 4, 1, malformed("padding")),
-        (&fill, 1, 2, count("bytes of fill", 64, 48)),
+        (&readings, readings.floats - readings.start - 1, 99, of_readings(100, 99)),
+        // A factor more takes 4·(1 + 4 + 1 + 5) bytes; a component more 4·(1 + 2 + 4 + 2).
+        (&readings, 1, 2, of_readings(144, 100)),
+        (&readings, 2, 2, of_readings(136, 100)),
+        (&readings, 2, 0, of_readings(52, 100)),
+        (&readings, 4, 1, malformed("padding")),
     ] {
         assert_eq!(sample.damaged(sample.start + place, &[byte]), error, "{place} {byte}");
     }
     // The number of networks stands behind magic, version, length, rows, inputs and outputs.
     assert_eq!(touch.damaged(12, &[2]), count("outputs of networks", 3, 2));
     // With a tag of no section that may follow, the section of a network is missed.
-    for tag in [0, 8, 200] {
-        assert_eq!(confidence.damaged(confidence.start, &[tag]), malformed("network section"));
+    for tag in [0, 5, 7, 200] {
+        let order = DecodeError::SectionOrder { expected: 1, found: tag };
+        assert_eq!(readings.damaged(readings.start, &[tag]), order);
     }
 }
 
 #[test]
 fn a_number_that_cannot_be_is_refused_by_its_section() {
-    let [projection, confidence, fill, touch] = samples();
+    let [projection, readings, touch] = samples();
     let not_finite = |what| NetworkError::NotFinite { what };
     let not_positive = |what| NetworkError::NotPositive { what };
+    let of_readings = |cause| DecodeError::ReadingModel { cause };
     for (sample, number, value, error) in [
         (&projection, 0, f32::NAN, DecodeError::Projection { cause: not_finite("projection") }),
         (&touch, 2, 0.0, DecodeError::Touch { cause: not_finite("touch") }),
         (&touch, 13, f32::NAN, DecodeError::Projection { cause: not_finite("projection") }),
-        (&confidence, 13, 2e38, DecodeError::Confidence { cause: not_finite("confidence") }),
-        (&confidence, 12, 0.0, DecodeError::Confidence { cause: not_positive("confidence") }),
-        (&fill, 8, 1.5, DecodeError::Fill { cause: not_positive("fill") }),
+        (&readings, 20, f32::INFINITY, of_readings(not_finite("reading model"))),
+        (&readings, 9, 1.5, of_readings(not_positive("reading model"))),
     ] {
         assert_eq!(sample.with(number, value), error, "number {number}");
     }
@@ -121,7 +116,7 @@ proptest! {
     /// marked; where readings are numbers, so is the novelty.
     #[test]
     fn hostile_bytes_under_a_valid_crc_never_panic(
-        which in 0..5_usize,
+        which in 0..4_usize,
         changes in prop::collection::vec((9_usize..500, any::<u8>()), 1..6),
         frame in prop::array::uniform4(any::<f32>()),
     ) {

@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use self_cell::self_cell;
 use taxel_core::{Decoder, Estimate, Frame, RowStatus, relative};
+use taxel_learn::reading_model::Extent;
 use taxel_learn::{ModelBlob, PreparedModel};
 
 /// Most rows of a model, as many as the blob format has numbers for.
@@ -135,13 +136,9 @@ impl Blob {
     }
 
     #[getter]
-    fn has_confidence(&self) -> bool {
-        self.ways().frames.model().confidence().is_some()
-    }
-
-    #[getter]
-    fn has_fill(&self) -> bool {
-        self.ways().frames.model().fill().is_some()
+    fn reading_model(&self) -> Option<&'static str> {
+        let model = self.ways().frames.model();
+        model.reading_model().map(|it| Extent::NAMES[usize::from(it.assesses())])
     }
 
     /// Decodes readings (frames × inputs) to outputs (frames × outputs).
@@ -155,13 +152,13 @@ impl Blob {
         let (inputs, outputs) = self.counts();
         let (readings, model) = (lines(&readings, inputs)?, self.model(baseline)?);
         let values = py.detach(|| {
-            let filled = model.filled(readings);
+            let filled = model.filled(readings, None);
             model.decode_lines(filled.as_ref().map_or(readings, |(filled, _)| filled))
         });
         two_dimensional(py, values, outputs)
     }
 
-    /// Standard deviations (frames × outputs) and novelty (frames), in nats; None without a confidence.
+    /// Standard deviations (frames × outputs) and novelty (frames), in nats; None without a full reading model.
     #[pyo3(signature = (readings, baseline=None))]
     #[expect(clippy::type_complexity, reason = "two arrays")]
     fn assess<'py>(
@@ -173,7 +170,7 @@ impl Blob {
         let (inputs, outputs) = self.counts();
         let (readings, model) = (lines(&readings, inputs)?, self.model(baseline)?);
         let assessed = py.detach(|| {
-            let filled = model.filled(readings);
+            let filled = model.filled(readings, None);
             model.assess(filled.as_ref().map_or(readings, |(filled, _)| filled))
         });
         let Some((deviations, novelty)) = assessed else { return Ok(None) };
@@ -202,8 +199,8 @@ impl Blob {
     }
 
     /// Decodes one frame as a device does, into `outputs` and `status`; missing readings in `readings` are filled if the model
-    /// can. Returns whether an input was clamped, the number of readings that were filled, and novelty (NaN without a
-    /// confidence); `deviations` are then written too.
+    /// can. Returns whether an input was clamped, the number of readings that were filled, and novelty (NaN if the model
+    /// does not tell it); `deviations` are then written too.
     fn decode_frame(
         &self,
         mut readings: PyReadwriteArray1<'_, f32>,
@@ -214,7 +211,7 @@ impl Blob {
     ) -> PyResult<(bool, usize, f32)> {
         let decoder = &self.ways().frames;
         let mut scratch = vec![0.0; decoder.scratch_floats()];
-        let filled = decoder.fill(readings.as_slice_mut()?, &mut scratch);
+        let filled = decoder.fill(readings.as_slice_mut()?, reciprocals.as_slice()?, &mut scratch);
         let frame =
             Frame { readings_ohm: readings.as_slice()?, reciprocals: reciprocals.as_slice()? };
         let status = status.as_slice_mut()?;

@@ -25,7 +25,7 @@ class Estimate:
 
     `outputs` in the units of the model's outputs, row after row, NaN where a row could not be decoded; `status` a number for
     each row (`taxel._decoder.STATUS`); `clamped` tells whether a reading lies far outside the training range; `filled` the
-    number of missing readings that were told from the others. `std` and `novelty` are None without a confidence.
+    number of missing readings that were told from the others. `std` and `novelty` are None without a full reading model.
     """
 
     outputs: np.ndarray
@@ -78,9 +78,9 @@ class Decoder:
         if values.dtype != np.float32 or values.shape != (outputs,) or not values.flags.c_contiguous:
             raise ValueError(f"out: give a contiguous array of {outputs} float32")
         status = np.empty(rows, np.uint8)
-        std = np.empty(outputs if self._blob.has_confidence else 0, np.float32)
+        std = np.empty(outputs if self._blob.reading_model == "full" else 0, np.float32)
         clamped, filled, novelty = self._blob.decode_frame(readings, self._reciprocals, values, status, std)
-        if not self._blob.has_confidence:
+        if self._blob.reading_model != "full":
             return Estimate(values, status, clamped, filled, None, None)
         return Estimate(values, status, clamped, filled, std, novelty)
 

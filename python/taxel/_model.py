@@ -76,10 +76,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         (`r1c1`, or numbers that fill a square).
     relative_inputs : bool
         Inputs are R/R₀. Lines of `fit` at which all outputs are zero are the baseline; `predict` takes one.
-    confidence : bool
-        Whether `predict` can tell standard deviations and novelty.
-    fill : bool
-        Whether missing readings (NaN) are told from the others of their line.
+    reading_model : {"fill", "full"} or None
+        Statistics of the readings: with "fill", missing ones (NaN) are told from the others of their line; with "full",
+        `predict` can tell standard deviations and novelty, too (docs/reading-model.md).
     random_state : int
         Seed of every random draw.
 
@@ -107,8 +106,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         features_kind: str | None = None,
         grid: tuple[int, int] | None = None,
         relative_inputs: bool = False,
-        confidence: bool = False,
-        fill: bool = False,
+        reading_model: str | None = None,
         random_state: int = 1,
     ):
         self.centres = centres
@@ -121,14 +119,13 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.features_kind = features_kind
         self.grid = grid
         self.relative_inputs = relative_inputs
-        self.confidence = confidence
-        self.fill = fill
+        self.reading_model = reading_model
         self.random_state = random_state
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, groups: ArrayLike | None = None) -> Model:
         """Trains on readings `X` (lines × features, Ω or whatever they are) and outputs `y` (lines × outputs, or lines).
 
-        `groups` has a number for each line: one group after the other is held out to refine and to tell confidence, instead
+        `groups` has a number for each line: one group after the other is held out to refine and to tell deviations, instead
         of five folds. Columns of a pandas DataFrame keep their names. A value far from all others in its column leaves its
         line out (`report_["outliers"]`).
         """
@@ -151,8 +148,8 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         if groups is not None:
             if len(groups) != len(lines):
                 raise ValueError(f"X has {len(lines)} lines and groups {len(groups)}")
-            if not (self.refine or self.confidence):
-                raise ValueError("groups has no effect without refine and confidence: leave it out")
+            if not (self.refine or self.reading_model == "full"):
+                raise ValueError("groups has no effect without refine or a full reading_model: leave it out")
             columns["group"] = np.unique(np.asarray(groups), return_inverse=True)[1].astype(float)
             arguments += ["--fold-column", "group"]
         arguments += option("--centres", min(self.centres, len(lines) - 1)) + option("--spread", self.spread)
@@ -160,10 +157,10 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         arguments += option("--no-refine", not self.refine) + option("--format", self.format)
         arguments += option("--each-row", self.each_row) + option("--features", self.features)
         arguments += option("--features-kind", self.features_kind)
-        arguments += option("--fill", self.fill) + option("--grid", grid)
+        arguments += option("--reading-model", self.reading_model) + option("--grid", grid)
         if self.relative_inputs:
             arguments += ["--relative-inputs", *option("--rest", [pattern(names_y)])]
-        arguments += option("--confidence", self.confidence) + option("--seed", self.random_state)
+        arguments += option("--seed", self.random_state)
         with folder() as path:
             blob = path / "model.bin"
             given = table("data.table", columns)
@@ -192,7 +189,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         """Outputs for readings `X` (lines × features), in their units: lines × outputs, or lines for one output.
 
         With `return_std` also their standard deviations, and with `return_novelty` the novelty of each line in nats (above
-        0, it is unlike the lines of training); both need `confidence`. `baseline` are readings of the untouched sensor, one
+        0, it is unlike the lines of training); both need a full `reading_model`. `baseline` are readings of the untouched sensor, one
         line or several, for a model with relative inputs.
         """
         given, rest = self._checked(X), self._baseline(baseline)
@@ -205,7 +202,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             return outputs
         assessed = self.blob_.assess(given, rest)
         if assessed is None:
-            raise ValueError("the model has no confidence: train it with confidence=True")
+            raise ValueError("the model tells no deviations: train it with reading_model='full'")
         std, novelty = assessed
         std = std[:, 0] if self._one_output else std
         return (outputs, *([std] if return_std else []), *([novelty] if return_novelty else []))
@@ -252,8 +249,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             centres=model.blob_.centres,
             format=model.blob_.formats[0],
             relative_inputs=model.blob_.relative_inputs,
-            confidence=model.blob_.has_confidence,
-            fill=model.blob_.has_fill,
+            reading_model=model.blob_.reading_model,
         )
         model.n_features_in_ = len(model.blob_.input_names)
         model._one_output = False
@@ -282,7 +278,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         if y is None:
             self._fitted()
         if HAS_SKLEARN and (y is not None or hasattr(self, "report_")):
-            missing = "allow-nan" if self.fill else True
+            missing = "allow-nan" if self.reading_model else True
             checks = {"dtype": np.float64, "order": "C", "ensure_all_finite": missing}
             try:
                 if y is None:
@@ -291,7 +287,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             except ValueError as error:
                 if "Input X contains NaN" not in str(error):
                     raise
-                raise ValueError("Input X contains NaN: missing readings take Model(fill=True)") from None
+                raise ValueError("Input X contains NaN: missing readings take Model(reading_model='fill')") from None
         if y is None and not hasattr(self, "report_"):
             return matrix(X, self.blob_.input_names)
         X = two_dimensional(X, "X")
@@ -332,7 +328,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = self.fill
+        tags.input_tags.allow_nan = self.reading_model is not None
         return tags
 
     def __getstate__(self) -> dict[str, Any]:

@@ -23,8 +23,7 @@ class Blob:
     centres: int
     formats: list[str]
     relative_inputs: bool
-    has_confidence: bool
-    has_fill: bool
+    reading_model: str | None
     def decode(
         self, readings: NDArray[np.float64], baseline: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]: ...

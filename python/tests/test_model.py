@@ -34,13 +34,13 @@ def frames():
     return taxel.synth("press", 600, stream="training", seed=3)
 
 
-@pytest.mark.parametrize("parameters", [{}, {"format": "fixed16", "confidence": True}])
+@pytest.mark.parametrize("parameters", [{}, {"format": "fixed16", "reading_model": "full"}])
 def test_the_blob_is_that_of_the_command_line(tmp_path, parameters):
     x, y = smooth()
     model = taxel.Model(12, refine=False, **parameters).fit(x, y)
     names = [*(f"x{i}" for i in (1, 2, 3)), "y1", "y2"]
     pandas.DataFrame(np.column_stack([x, y]), columns=names).to_csv(tmp_path / "data.csv", index=False)
-    options = ["--format", "fixed16", "--confidence"] if "format" in parameters else []
+    options = ["--format", "fixed16", "--reading-model", "full"] if "format" in parameters else []
     host_sim(
         *("train", tmp_path / "data.csv", "--inputs", "x1..x3", "--outputs", "y1,y2", "--no-refine"),
         *("--centres", 12, *options, "-o", tmp_path / "model.bin"),
@@ -112,7 +112,7 @@ def test_a_place_is_none_without_a_touch_and_counts_as_the_mean():
 def test_missing_readings_are_filled_by_a_model_that_can():
     x, y = smooth(1500, 4)
     x[:, 3] = x[:, 0] + 0.5 * x[:, 1] + RANDOM.normal(0, 0.05, len(x))
-    model = taxel.Model(16, refine=False, fill=True).fit(x, y)
+    model = taxel.Model(16, refine=False, reading_model="fill").fit(x, y)
     gaps = x[:200].copy()
     gaps[:, 3] = np.nan
     assert np.isfinite(model.predict(gaps)).all()
@@ -121,22 +121,22 @@ def test_missing_readings_are_filled_by_a_model_that_can():
         taxel.Model(8, refine=False).fit(x, y).predict(gaps)
 
 
-def test_deviations_and_novelty_need_a_confidence():
+def test_deviations_and_novelty_need_a_full_reading_model():
     x, y = smooth(1200)
-    model = taxel.Model(16, refine=False, confidence=True).fit(x, y)
+    model = taxel.Model(16, refine=False, reading_model="full").fit(x, y)
     outputs, std, novelty = model.predict(x, return_std=True, return_novelty=True)
     assert outputs.shape == std.shape == (1200, 2) and (std > 0).all()
     assert (novelty > 0).mean() < 0.05
     far = model.predict(x + 40, return_novelty=True)[1]
     assert (far > 0).all()
-    with pytest.raises(ValueError, match="confidence=True"):
+    with pytest.raises(ValueError, match="reading_model="):
         taxel.Model(8, refine=False).fit(x, y).predict(x, return_std=True)
 
 
 def test_groups_are_held_out_and_relative_inputs_take_a_baseline():
     x, y = smooth(600)
     groups = np.repeat([3, 8, 9], 200)
-    assert taxel.Model(8, confidence=True, refine=False).fit(x, y, groups=groups).blob_.has_confidence
+    assert taxel.Model(8, reading_model="full", refine=False).fit(x, y, groups=groups).blob_.reading_model == "full"
     rest = np.array([50.0, 52.0, 47.0])
     y[:60], x[:60] = 0, rest + RANDOM.normal(0, 0.02, (60, 3))
     model = taxel.Model(8, refine=False, relative_inputs=True, format="f32")

@@ -37,8 +37,8 @@ const PERIOD_US: u32 = 20_000;
 /// Least and most time in ms to erase a slot of 128 KiB, 32 bits at once (DS10693, table 45: typical and largest).
 const ERASE_MS: [u32; 2] = [1000, 2000];
 
-/// Trains a model with a confidence, and with what fills missing readings.
-const TRAIN_CONFIDENCE: [&str; 13] = [
+/// Trains a model with a full reading model.
+const TRAIN_CONFIDENCE: [&str; 12] = [
     "run",
     "--quiet",
     "--package",
@@ -49,8 +49,7 @@ const TRAIN_CONFIDENCE: [&str; 13] = [
     "--no-refine",
     "--centres=16",
     "--format=fixed16",
-    "--confidence",
-    "--fill",
+    "--reading-model=full",
     "--output",
 ];
 

@@ -5,9 +5,9 @@ use core::fmt::Arguments;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use taxel_core::blob::Model;
-use taxel_core::confidence::{Confidence, Sizes};
 use taxel_core::filter::{Settings, State};
 use taxel_core::rbf::{Format, Network};
+use taxel_core::reading_model::{ReadingModel, Sizes};
 use taxel_core::scale::{CLAMP, saturates};
 use taxel_core::{Decoder, Estimate, RowStatus};
 
@@ -205,40 +205,37 @@ fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
     Some([frames, clamped, otherwise])
 }
 
-/// Sizes of the confidence of a model of the small sensor.
-pub const ARRAY_CONFIDENCE: Sizes = Sizes {
+/// Sizes of the reading model of a model of the small sensor.
+pub const ARRAY_READINGS: Sizes = Sizes {
     readings: ARRAY_ROWS * COLS,
-    directions: 10,
+    factors: 10,
     components: 6,
     outputs: ARRAY_ROWS * OUTPUTS,
 };
 
-/// Fills `block` with the numbers of a confidence of these `sizes`, for readings about 60 Ω.
-pub fn write_confidence(sizes: Sizes, block: &mut [f32], numbers: &mut Numbers) {
-    let Sizes { readings, directions, components, outputs } = sizes;
+/// Fills `block` with the numbers of a reading model of these `sizes`, for readings about 60 Ω.
+pub fn write_reading_model(sizes: Sizes, block: &mut [f32], numbers: &mut Numbers) {
+    let Sizes { readings, factors, components, outputs } = sizes;
     let mut places = block.iter_mut();
     let mut put = |count: usize, middle: f32, reach: f32| {
         places.by_ref().take(count).for_each(|place| *place = middle + reach * numbers.draw());
     };
     put(readings, 60.0, 1.0);
     put(readings, 0.2, 0.02);
-    put(directions, 0.0, 0.0);
-    put(directions * readings, 0.0, 0.3);
+    put(factors, 0.0, 0.0);
+    put(factors * readings, 0.0, 0.28);
     for _ in 0..components {
         put(1, -3.0, 1.0);
         put(sizes.features(), 0.0, 2.0);
-        for row in 0..sizes.features() {
-            put(row, 0.0, 0.2);
-            put(1, 0.5, 0.3);
-        }
+        put(sizes.features() * sizes.features(), 0.0, 0.3);
     }
     put(components * outputs, 1.0, 0.9);
     put(outputs, 2.0, 0.5);
-    put(1, 8.0, 0.0);
+    put(1, 20.0, 0.0);
 }
 
-/// CRC-32 of all bits of the novelty and the deviations of frames, and how many frames are novel, how many of these too
-/// far off to tell, and how many have no novelty.
+/// CRC-32 of all bits of the novelty and the deviations of frames, and of what is filled of them, and how many frames are
+/// novel, how many of these too far off to tell, and how many have no novelty.
 struct Assessed {
     crc: u32,
     novel: usize,
@@ -257,20 +254,25 @@ impl Assessed {
     const NONE: Self = Self { crc: 0, novel: 0, far: 0, missing: 0 };
 }
 
-/// What [`MANY`] frames are by the confidence of the model in `blob`. `None` if the blob does not load, or has none.
+/// What [`MANY`] frames are by the reading model in `blob`, with some readings filled. `None` if the blob does not load, or has none.
 #[inline(never)]
 fn assessing_many(blob: &[u8]) -> Option<Assessed> {
     let decoder = Decoder::<ARRAY_ROWS>::load(blob).ok()?;
     let crc = QUICK_CRC;
     let (mut digest, mut assessed) = (crc.digest(), Assessed::NONE);
     let mut numbers = Numbers::new(4);
-    let mut scratch = [0.0; ARRAY_CONFIDENCE.scratch_floats()];
+    let mut scratch = [0.0; ARRAY_READINGS.scratch_floats()];
     for index in 0..MANY {
-        let frame = one_of_many::<ARRAY_ROWS>(index, &mut numbers);
-        let mut deviation = [0.0; ARRAY_CONFIDENCE.outputs];
-        let frame = frame.as_flattened().into();
-        let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).ok()??;
-        for value in deviation.into_iter().chain([novelty]) {
+        let mut frame = one_of_many::<ARRAY_ROWS>(index, &mut numbers);
+        let frame = frame.as_flattened_mut();
+        let mut deviation = [0.0; ARRAY_READINGS.outputs];
+        let given = (&*frame).into();
+        let novelty = decoder.assess_into(given, &mut scratch, &mut deviation).ok()??;
+        for place in frame.iter_mut().skip(index % 7).step_by(5 + index % 4).take(index % 3) {
+            *place = f32::NAN;
+        }
+        decoder.fill(frame, &[], &mut scratch);
+        for value in deviation.into_iter().chain([novelty]).chain(frame.iter().copied()) {
             digest.update(&value.to_bits().to_le_bytes());
         }
         assessed.count(novelty);
@@ -278,30 +280,30 @@ fn assessing_many(blob: &[u8]) -> Option<Assessed> {
     Some(Assessed { crc: digest.finalize(), ..assessed })
 }
 
-/// Most directions of the confidences that [`assessing_sizes`] makes.
-const MOST_DIRECTIONS: usize = 12;
-/// Sizes of these confidences.
-const fn few_outputs(directions: usize) -> Sizes {
-    Sizes { readings: COLS, directions, components: 5, outputs: 7 }
+/// Most factors of the reading models that [`assessing_sizes`] makes.
+const MOST_FACTORS: usize = 12;
+/// Sizes of these reading models.
+const fn few_outputs(factors: usize) -> Sizes {
+    Sizes { readings: COLS, factors, components: 5, outputs: 7 }
 }
 
-/// What frames of one row are by confidences of 1 to 12 directions. `None` if one is unsound.
+/// What frames of one row are by reading models of 1 to 12 factors. `None` if one is unsound.
 #[inline(never)]
 fn assessing_sizes() -> Option<Assessed> {
     let crc = QUICK_CRC;
     let (mut digest, mut assessed) = (crc.digest(), Assessed::NONE);
     let mut numbers = Numbers::new(7);
-    for directions in 1..=MOST_DIRECTIONS {
-        let sizes = few_outputs(directions);
-        let mut block = [0.0; few_outputs(MOST_DIRECTIONS).block_floats()];
+    for factors in 1..=MOST_FACTORS {
+        let sizes = few_outputs(factors);
+        let mut block = [0.0; few_outputs(MOST_FACTORS).block_floats()];
         let block = block.get_mut(..sizes.block_floats())?;
-        write_confidence(sizes, block, &mut numbers);
-        let confidence = Confidence::new(sizes, block).ok()?;
-        let mut scratch = [0.0; few_outputs(MOST_DIRECTIONS).scratch_floats()];
+        write_reading_model(sizes, block, &mut numbers);
+        let model = ReadingModel::new(sizes, block).ok()?;
+        let mut scratch = [0.0; few_outputs(MOST_FACTORS).scratch_floats()];
         for index in 0..MANY / 20 {
             let [row] = one_of_many::<1>(index, &mut numbers);
             let mut deviation = [0.0; few_outputs(1).outputs];
-            let novelty = confidence.assess(row.into_iter(), &mut scratch, &mut deviation).ok()?;
+            let novelty = model.assess(&row, None, &mut scratch, &mut deviation).ok()??;
             for value in deviation.into_iter().chain([novelty]) {
                 digest.update(&value.to_bits().to_le_bytes());
             }
@@ -327,7 +329,7 @@ const ARRAYS: [(&str, &str); 4] = [
 ];
 
 /// Says what every number format decodes of [`MANY`] frames, what a clamp finds, and what frames
-/// are by a confidence. `None` if one of the models in testdata, which `model` gives by name, does not load.
+/// are by a reading model. `None` if one of the models in testdata, which `model` gives by name, does not load.
 pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()> {
     for (format, file) in KERNELS {
         let crc = decoding_all::<ROWS>(model(file), MANY, one_of_many)?;
@@ -342,10 +344,10 @@ pub fn kernels<'m>(model: &dyn Fn(&str) -> &'m [u8], say: Say<'_>) -> Option<()>
         say(format_args!("array, {name}: {crc:08x}"));
     }
     let many = assessing_many(model("array-fixed16-confidence.bin"))?;
-    for (what, assessed) in [("assess_into", many), ("1 to 12 directions", assessing_sizes()?)] {
+    for (what, assessed) in [("assess_into", many), ("1 to 12 factors", assessing_sizes()?)] {
         let Assessed { crc, novel, far, missing } = assessed;
         say(format_args!(
-            "confidence, {what}: {crc:08x}, {novel} frames novel, {far} of them far, {missing} missing"
+            "reading model, {what}: {crc:08x}, {novel} frames novel, {far} of them far, {missing} missing"
         ));
     }
     let (crc, started) = filtering();

@@ -30,7 +30,7 @@ pub struct Work<'m, const ROWS: usize> {
     pub estimate: Estimate<'m>,
     /// State of the filter in time.
     pub filter: State<&'m mut [Track]>,
-    /// Standard deviations of the outputs, for a model with a confidence.
+    /// Standard deviations of the outputs, for a model that tells them.
     pub deviations: &'m mut [f32],
 }
 
@@ -49,7 +49,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
         if let Some(decoder) = decoder {
             if !health.is_good() {
-                decoder.fill(frame, self.scratch);
+                decoder.fill(frame, self.reciprocals, self.scratch);
             }
             let mut estimate = cut(&mut self.estimate, self.rows, self.outputs);
             let decoded = decoder.decode_into(
@@ -101,7 +101,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
     }
 
     /// Computes the confidence of the frame that was decoded last, unless nothing of it is `wanted`. Returns the frame's
-    /// novelty if the model has a confidence, and adds to the `flags` whether it is novel.
+    /// novelty if the model tells it, and adds to the `flags` whether it is novel.
     pub fn assess<P: Platform>(
         &mut self,
         frame_ohm: &[f32],

@@ -279,7 +279,7 @@ pub struct Configuration {
     pub report_every: u16,
 }
 
-/// What is sent of a model's [confidence](taxel_core::confidence) with the estimate of a scan. An answer to
+/// What is sent of a model's confidence, by its [reading model](taxel_core::reading_model), with the estimate of a scan. An answer to
 /// [`Request::Decode`] has all of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum ConfidenceSent {
@@ -332,11 +332,11 @@ pub struct EstimateReport<'a> {
     #[serde(borrow)]
     pub outputs: Floats<'a>,
     /// Novelty of the frame in nats: above 0, it is unlike the frames of training. NaN if a reading is missing, and the
-    /// largest number of f32 if the frame is too far off to tell. `None` if the model has no confidence, or it was not
+    /// largest number of f32 if the frame is too far off to tell. `None` if the model does not tell it, or it was not
     /// asked for.
     pub novelty: Option<f32>,
     /// Standard deviation of every output of this frame before it is filtered, in its unit; NaN if a reading is missing.
-    /// None at all if the model has no confidence, or they were not asked for.
+    /// None at all if the model does not tell them, or they were not asked for.
     #[serde(borrow)]
     pub deviation: Floats<'a>,
 }

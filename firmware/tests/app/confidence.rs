@@ -80,7 +80,7 @@ fn with_last(ohm: f32) -> TestFrame {
 #[test]
 fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
     for (is_relative, baseline_ohm) in [(false, f32::NAN), (true, 62.0)] {
-        let blob = blob_with_confidence(is_relative);
+        let blob = blob_with_readings(is_relative);
         let (mut session, board) = started(quiet(), &blob);
         let (found, flags) = decode(&mut session, &board, &frame_at_rest());
         let is_unknown = found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan());
@@ -106,7 +106,7 @@ fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
 
 #[test]
 fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
-    let (with, without) = (blob_with_confidence(false), blob(3, 4));
+    let (with, without) = (blob_with_readings(false), blob(3, 4));
     let frame = with_last(900.0);
     let all = || expected(&with, &frame, f32::NAN);
     let novelty = Sent { deviations: Vec::new(), ..all() };
@@ -129,15 +129,28 @@ fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
 }
 
 #[test]
-fn a_frame_with_a_faulty_reading_has_no_confidence_and_is_not_novel() {
-    let blob = blob_with_confidence(false);
-    let (mut session, board) = started(quiet(), &blob);
-    for bad in [f32::NAN, 0.0, f32::INFINITY, 2000.0, -60.0] {
-        let (found, flags) = decode(&mut session, &board, &with_last(bad));
-        assert_eq!(flags, EstimateReport::FAULTY_READING, "{bad}");
-        let Sent { novelty, deviations, .. } = found;
-        assert_eq!((novelty.is_some(), deviations.len()), (true, ROWS * OUTPUTS), "{bad}");
-        let mut all = novelty.into_iter().chain(deviations);
-        assert!(all.all(|value| f32::from_bits(value).is_nan()), "{bad}");
+fn a_faulty_reading_is_filled_before_a_frame_is_assessed_and_two_leave_it_unknown() {
+    for (is_relative, baseline_ohm) in [(false, f32::NAN), (true, 62.0)] {
+        let blob = blob_with_readings(is_relative);
+        let (mut session, board) = started(quiet(), &blob);
+        let readings_ohm = Floats::new(&[62.0; ROWS * COLS]);
+        tell(&mut session, &board, &Request::SetBaseline { readings_ohm });
+        let mut filled = with_last(f32::NAN);
+        let decoder = Decoder::<ROWS>::load(&blob).unwrap();
+        let reciprocals = [reciprocal(baseline_ohm); ROWS * COLS];
+        let mut scratch = vec![0.0; decoder.scratch_floats()];
+        assert_eq!(decoder.fill(filled.as_flattened_mut(), &reciprocals, &mut scratch), 1);
+        for bad in [f32::NAN, 0.0, f32::INFINITY, 2000.0, -60.0] {
+            let (found, flags) = decode(&mut session, &board, &with_last(bad));
+            assert_ne!(flags & EstimateReport::FAULTY_READING, 0, "{bad}");
+            assert_eq!(found, expected(&blob, &filled, baseline_ohm), "{bad}");
+            assert!(found.novelty.is_some_and(|it| f32::from_bits(it) < 0.0), "{found:?}");
+            let mut frame = with_last(bad);
+            frame[0][0] = bad;
+            let (found, flags) = decode(&mut session, &board, &frame);
+            assert_ne!(flags & EstimateReport::FAULTY_READING, 0, "{bad}");
+            assert!(found.novelty.is_some_and(|it| f32::from_bits(it).is_nan()), "{found:?}");
+            assert!(found.deviations.iter().all(|it| f32::from_bits(*it).is_nan()), "{found:?}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use taxel_core::Decoder;
 use taxel_core::blob::{Floats, Model, ModelParts, encode_to_vec};
-use taxel_core::fill::Fill;
+use taxel_core::reading_model::{ReadingModel, Sizes};
 use taxel_firmware::link::message::{EstimateReport, Refusal, Report, Request};
 
 use super::requests::{bits, decode, expected};
@@ -24,14 +24,15 @@ fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
 }
 
 #[test]
-fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
+fn a_model_with_a_reading_model_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
     let plain = blob(3, 4);
     let model = Model::decode(&plain).unwrap();
     let networks: Vec<_> = model.networks().collect();
     // Readings 60 to 65 Ω that all move together.
-    let block = [[60.0, 61.0, 62.0, 63.0, 64.0, 65.0], [10.0; 6], [0.4; 6]];
+    let block = [&[60.0, 61.0, 62.0, 63.0, 64.0, 65.0][..], &[10.0; 6], &[0.0], &[0.4; 6]].concat();
+    let sizes = Sizes { readings: 6, factors: 1, components: 0, outputs: ROWS * OUTPUTS };
     let parts = ModelParts {
-        fill: Fill::new(6, 1, block.as_flattened()).ok(),
+        reading_model: ReadingModel::new(sizes, &block).ok(),
         ..ModelParts::new(&networks, &[0; ROWS], *model.metadata())
     };
     let filling = encode_to_vec(&parts).unwrap();
@@ -43,7 +44,7 @@ fn a_model_with_a_fill_decodes_rows_with_a_faulty_reading_and_tells_of_it() {
     let mut filled = frame;
     filled[0][2] = f32::NAN;
     let decoder = Decoder::<ROWS>::load(&filling).unwrap();
-    assert_eq!(decoder.fill(filled.as_flattened_mut(), &mut [0.0; 8]), 1);
+    assert_eq!(decoder.fill(filled.as_flattened_mut(), &[], &mut [0.0; 9]), 1);
     assert!((filled[0][2] - 62.0).abs() < 0.01, "{filled:?}");
     assert_eq!(found, bits(expected(&plain, &filled).into_iter().flatten()));
     // Two of six are too many.

@@ -2,17 +2,17 @@
 
 use taxel_core::AlignedBytes;
 use taxel_core::blob::{Front, Metadata, ModelParts, ModelShape, encode_to_vec};
-use taxel_core::confidence::Confidence;
 use taxel_core::projection::Projection;
 use taxel_core::rbf::fixed16::{
     CENTRES_AT_ONCE, DECAY_FRACTION_BITS, EXPONENT_FRACTION_BITS, EXPONENT_MARGIN,
 };
 use taxel_core::rbf::float32::Parameters;
 use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
+use taxel_core::reading_model::ReadingModel;
 use taxel_core::scale::{HALF_RANGE, UNITS, UNITS_PER_STEP};
 use taxel_core::touch::{Kind, Touch};
 
-use crate::checks::{ARRAY_CONFIDENCE, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_confidence};
+use crate::checks::{ARRAY_READINGS, ARRAY_ROWS, COLS, Numbers, OUTPUTS, write_reading_model};
 
 /// Decay log₂e/(2σ²) for σ = 0.8.
 const DECAY_PER_SPAN_SQUARED: f64 = core::f64::consts::LOG2_E / (2.0 * 0.8 * 0.8);
@@ -28,7 +28,7 @@ pub const FILES: [(&str, Maker); 8] = [
     ("array-f32.bin", || of_array(Format::F32, 17, true)),
     ("array-fixed16.bin", || of_array(Format::Fixed16, 33, true)),
     ("array-fixed16-no-tail.bin", || of_array(Format::Fixed16, 16, false)),
-    ("array-fixed16-confidence.bin", of_confidence),
+    ("array-fixed16-confidence.bin", of_readings),
     ("array-touch.bin", of_touch),
 ];
 
@@ -199,16 +199,16 @@ fn pair(low: i32, high: i32) -> u32 {
     (low as u32 & 0xFFFF) | (high as u32) << 16
 }
 
-/// A small model of the small sensor, with a confidence.
-fn of_confidence() -> AlignedBytes {
+/// A small model of the small sensor, with a reading model.
+fn of_readings() -> AlignedBytes {
     let mut numbers = Numbers::new(8);
     let shape = row_shape(1);
     let words = words_of(Format::Fixed16, &mut numbers, shape, false);
     let network = network(Format::Fixed16, shape, false, &words);
-    let mut block = vec![0.0; ARRAY_CONFIDENCE.block_floats()];
-    write_confidence(ARRAY_CONFIDENCE, &mut block, &mut numbers);
-    let confidence = Confidence::new(ARRAY_CONFIDENCE, &block).unwrap();
-    encoded_with("confidence", &[], &[network], &[0; ARRAY_ROWS], Some(confidence))
+    let mut block = vec![0.0; ARRAY_READINGS.block_floats()];
+    write_reading_model(ARRAY_READINGS, &mut block, &mut numbers);
+    let reading_model = ReadingModel::new(ARRAY_READINGS, &block).unwrap();
+    encoded_with("reading model", &[], &[network], &[0; ARRAY_ROWS], Some(reading_model))
 }
 
 fn encoded(
@@ -225,7 +225,7 @@ fn encoded_with(
     fronts: &[Front<'_>],
     networks: &[Network<'_>],
     row_network: &[u8],
-    confidence: Option<Confidence<'_>>,
+    reading_model: Option<ReadingModel<'_>>,
 ) -> AlignedBytes {
     let shape = ModelShape { rows: row_network.len(), inputs: COLS, outputs: OUTPUTS };
     let unnamed = Metadata::unnamed(shape);
@@ -233,6 +233,6 @@ fn encoded_with(
     let (input_units, output_units) = (unnamed.input_names, unnamed.output_names);
     let metadata = Metadata { name, thickness_mm: 5.0, input_units, output_units, ..unnamed };
     let parts =
-        ModelParts { fronts, confidence, ..ModelParts::new(networks, row_network, metadata) };
+        ModelParts { fronts, reading_model, ..ModelParts::new(networks, row_network, metadata) };
     encode_to_vec(&parts).unwrap()
 }

@@ -24,6 +24,6 @@ pub use host::{
     request_bytes, run_until, send, statistics, tell, trial_steps, turn, undo, upload_step,
     upload_steps,
 };
-pub use models::{blob, blob_of_features, blob_with_confidence, crc_of};
+pub use models::{blob, blob_of_features, blob_with_readings, crc_of};
 pub use row_model::blob_of_a_row;
 pub use shape::{COLS, OUTPUTS, ROWS, TestFrame, frame_at_rest};

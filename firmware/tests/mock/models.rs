@@ -2,9 +2,9 @@
 
 use taxel_core::AlignedBytes;
 use taxel_core::blob::{Front, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
-use taxel_core::confidence::{Confidence, Sizes};
 use taxel_core::projection::Projection;
 use taxel_core::rbf::{Network, Shape};
+use taxel_core::reading_model::{ReadingModel, Sizes};
 
 use super::row_model::with_network;
 use super::shape::{COLS, OUTPUTS, ROWS};
@@ -15,39 +15,39 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     with_network(shape, seed, |network| blob_with(network, None, false))
 }
 
-/// The blob of [`blob`] with a confidence, for readings relative to the baseline if `relative_inputs`. Its one component
+/// The blob of [`blob`] with a reading model, for readings relative to the baseline if `relative_inputs`. Its one component
 /// is of frames near 62 Ω, or near the baseline.
-pub fn blob_with_confidence(relative_inputs: bool) -> AlignedBytes {
+pub fn blob_with_readings(relative_inputs: bool) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
     let block = [
         vec![middle; readings],
         vec![scale; readings],
-        vec![0.0],                            // start of the projection
-        vec![0.408_248_3; readings],          // direction: the mean
-        vec![-1.0, 0.0, 0.5, 1.0, 0.25, 0.5], // c, o and W
-        vec![0.01, 0.0625, 4.0, 0.25],        // variances
-        vec![2.0; outputs],                   // ratios
-        vec![5.0],                            // threshold
+        vec![0.0],                                  // start of the projection
+        vec![0.4; readings],                        // parts in a factor of all readings
+        vec![-1.0, 0.0, -0.5, 1.0, 0.25, 0.0, 0.5], // c, −o and W
+        vec![0.01, 0.0625, 4.0, 0.25],              // variances
+        vec![2.0; outputs],                         // ratios
+        vec![5.0],                                  // threshold
     ]
     .concat();
-    let sizes = Sizes { readings, directions: 1, components: 1, outputs };
-    let confidence = Confidence::new(sizes, &block).unwrap();
+    let sizes = Sizes { readings, factors: 1, components: 1, outputs };
+    let reading_model = ReadingModel::new(sizes, &block).ok();
     let blob = blob(3, 4);
     let model = Model::decode(&blob).unwrap();
-    blob_with(model.networks().next().unwrap(), Some(confidence), relative_inputs)
+    blob_with(model.networks().next().unwrap(), reading_model, relative_inputs)
 }
 
 fn blob_with(
     network: Network<'_>,
-    confidence: Option<Confidence<'_>>,
+    reading_model: Option<ReadingModel<'_>>,
     relative_inputs: bool,
 ) -> AlignedBytes {
     let shape = network.shape();
     let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
     let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
     let networks = [network];
-    let parts = ModelParts { confidence, ..ModelParts::new(&networks, &[0; ROWS], metadata) };
+    let parts = ModelParts { reading_model, ..ModelParts::new(&networks, &[0; ROWS], metadata) };
     encode_to_vec(&parts).unwrap()
 }
 

@@ -11,6 +11,7 @@ use taxel_core::blob::NoiseKind as BlobNoiseKind;
 use taxel_core::rbf::Format;
 use taxel_data::digest::digest;
 use taxel_data::{AtRest, BadValue, Dataset, Progress, Stream, input, require};
+use taxel_learn::reading_model::Extent;
 use taxel_learn::train::{Features, FreshFrames, Kinds, Solver, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
@@ -69,7 +70,6 @@ pub struct Experiment {
 /// Settings of a model's training.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a field of a scene's file")]
 pub struct Training {
     pub frames: usize,
     pub test_frames: usize,
@@ -99,12 +99,8 @@ pub struct Training {
     /// Whether centres, widths and the projection are refined after K-means.
     #[serde(default = "yes")]
     pub refine: bool,
-    /// Whether the model tells how far off its outputs may be, and how novel a frame is.
-    #[serde(default)]
-    pub confidence: bool,
-    /// Whether the model fills missing readings from the others of their frame.
-    #[serde(default)]
-    pub fill: bool,
+    /// What the model's statistics of readings tell: missing readings, and how novel a frame is and how far off outputs.
+    pub reading_model: Option<Extent>,
 }
 
 /// Way to train a model.

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{AtRest, Clock, Dataset, Rest, Table};
 use taxel_learn::outliers::Outliers;
+use taxel_learn::reading_model::Extent;
 use taxel_learn::{Options, Origin, relative};
 
 use crate::metrics::Measure;
 
 /// Measured frames, and how a model is trained on them.
 #[derive(Debug, Clone, PartialEq)]
-#[expect(clippy::struct_excessive_bools, reason = "each says one thing of its own")]
 pub struct Measurements {
     /// Name of the data, which names the output folder and the model.
     pub name: String,
@@ -48,8 +48,8 @@ pub struct Measurements {
     pub options: Options,
     /// Whether centres, widths and the projection are refined after K-means.
     pub refine: bool,
-    /// Whether the model tells how far off its outputs may be, and how novel a frame is.
-    pub confidence: bool,
+    /// What the model's statistics of readings tell.
+    pub reading_model: Option<Extent>,
 }
 
 /// When the frames of a data set were measured.

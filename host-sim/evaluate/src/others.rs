@@ -25,7 +25,7 @@ const MOST_NAMED: usize = 2;
 pub struct Others {
     /// Number of frames of each contact.
     pub frames: usize,
-    /// Share in per cent of the scene's own frames that the model finds novel; `None` without a confidence.
+    /// Share in per cent of the scene's own frames that the model finds novel; `None` of a model that does not tell.
     pub own_percent_novel: Option<f64>,
     pub contacts: Vec<OtherErrors>,
 }
@@ -38,7 +38,7 @@ pub struct OtherErrors {
     pub errors: Vec<Errors>,
     /// Errors of always predicting the mean of training.
     pub mean: Vec<Errors>,
-    /// Share of the frames in per cent that the model finds novel; `None` without a confidence.
+    /// Share of the frames in per cent that the model finds novel; `None` of a model that does not tell.
     pub percent_novel: Option<f64>,
 }
 

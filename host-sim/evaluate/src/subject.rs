@@ -146,7 +146,7 @@ impl Subject {
             Self::Scene(scene) => TrainingSet::of_scene(scene, Self::synthesis(scene, noise)),
             Self::Measured(data) => {
                 let mut set = TrainingSet::of_folds(&data.training, &data.fold_of, data.origin());
-                (set.refine, set.confidence) = (data.refine, data.confidence);
+                (set.refine, set.reading_model) = (data.refine, data.reading_model);
                 set
             }
         }

@@ -3,10 +3,9 @@
 use std::borrow::Cow;
 
 use taxel_data::{BadValue, Dataset, Progress, Stream};
-use taxel_learn::confidence::{self, Density, HeldOut};
 use taxel_learn::decoders::LINEAR;
-use taxel_learn::fill;
 use taxel_learn::kinds::{self, Choice};
+use taxel_learn::reading_model::{self, Extent, HeldOut, Statistics};
 use taxel_learn::select;
 use taxel_learn::train::{Examples, Refinement, resolution, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
@@ -22,10 +21,8 @@ pub struct TrainingSet<'s> {
     pub origin: Origin,
     /// Whether centres, widths and the projection are refined after K-means.
     pub refine: bool,
-    /// Whether the model tells how far off its outputs may be, and how novel a frame is.
-    pub confidence: bool,
-    /// Whether the model fills missing readings from the others.
-    pub fill: bool,
+    /// What the model's statistics of readings tell.
+    pub reading_model: Option<Extent>,
     more: More<'s>,
 }
 
@@ -45,17 +42,16 @@ impl<'s> TrainingSet<'s> {
             frames: Cow::Owned(experiment.dataset(&synthesis, Stream::Training, t.frames)),
             origin: experiment.origin(),
             refine: t.refine,
-            confidence: t.confidence,
-            fill: t.fill,
+            reading_model: t.reading_model,
             more: More::Scene(Box::new(MoreFrames { experiment, synthesis })),
         }
     }
 
-    /// Measured `frames`, with the fold of each, numbered from 0. It neither refines, nor adds a confidence, nor fills
-    /// missing readings, unless the fields ask for it.
+    /// Measured `frames`, with the fold of each, numbered from 0. It neither refines, nor adds a reading
+    /// model, unless the fields ask for it.
     pub fn of_folds(frames: &'s Dataset, fold_of: &'s [usize], origin: Origin) -> Self {
         let (frames, more) = (Cow::Borrowed(frames), More::Folds(fold_of));
-        Self { frames, origin, refine: false, confidence: false, fill: false, more }
+        Self { frames, origin, refine: false, reading_model: None, more }
     }
 
     /// What refinement measures the error on; `None` if it is not asked for.
@@ -89,30 +85,33 @@ impl<'s> TrainingSet<'s> {
         }
     }
 
-    /// Trains with `options` and packs the model, with a confidence and a fill if these are asked for.
+    /// Trains with `options` and packs the model, with a reading model if one is asked for.
     pub fn blob(&self, options: &Options, progress: &dyn Progress) -> Result<ModelBlob> {
-        if self.confidence {
-            resolution::check_squares(&self.frames)?;
-            confidence::check(self.frames.fewest_values(), self.frames.inputs.names.len())?;
-        }
-        if self.fill {
-            fill::check(&self.frames)?;
-        }
+        self.check()?;
         let mut options = *options;
         let _ = self.choose(&mut options, progress);
         let options = &options;
         let trained = self.train(options, progress)?;
         let origin = Origin { linear_rmse: self.linear_rmse(), ..self.origin.clone() };
         let blob = pack(&trained, &self.frames, &origin)?;
-        let blob =
-            if self.confidence { self.with_confidence(&blob, options, progress)? } else { blob };
-        if !self.fill {
-            return Ok(blob);
+        match self.reading_model {
+            Some(extent) => self.with_reading_model(&blob, extent, options, progress),
+            None => Ok(blob),
         }
-        progress.stage("fit fill", 1);
-        let blob = fill::add(&blob, &self.frames.inputs)?;
-        progress.step();
-        Ok(blob)
+    }
+
+    /// Checks before long work that the model can have the reading model that is asked for.
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for too few frames, or outputs whose squared errors are beyond f32.
+    pub fn check(&self) -> Result<()> {
+        if self.reading_model.is_some() {
+            reading_model::check(self.frames.fewest_values(), self.frames.inputs.names.len())?;
+        }
+        if self.reading_model == Some(Extent::Full) {
+            resolution::check_squares(&self.frames)?;
+        }
+        Ok(())
     }
 
     /// RMSE of the best linear decoder for each output, one fold after the other held out. Empty with a single fold, or if an
@@ -126,39 +125,36 @@ impl<'s> TrainingSet<'s> {
         if rmse.iter().all(|error| error.is_finite()) { rmse } else { vec![] }
     }
 
-    /// Adds a confidence to the model in `blob`, calibrated on frames that it was not trained on: as many other frames
-    /// of a scene, or one fold after the other of measured data.
-    fn with_confidence(
+    /// Adds a reading model to the model in `blob`. One that tells deviations is calibrated on frames that the model was not
+    /// trained on: as many other frames of a scene, or one fold after the other of measured data.
+    fn with_reading_model(
         &self,
         blob: &ModelBlob,
+        extent: Extent,
         options: &Options,
         progress: &dyn Progress,
     ) -> Result<ModelBlob> {
-        let settings = confidence::Settings { seed: options.seed, ..Default::default() };
         let mut held_out = HeldOut::default();
-        match &self.more {
-            More::Scene(more) => {
-                progress.stage("fit confidence", 1);
-                let density = Density::fit(&self.frames, &settings);
-                let (synthesis, frames) = (&more.synthesis, self.frames.frames());
-                let others = more.experiment.dataset(synthesis, Stream::Calibration, frames);
-                held_out.add(blob, &density, &others);
-                let blob = confidence::add(blob, &density, &held_out)?;
-                progress.step();
-                Ok(blob)
+        if let (More::Folds(fold_of), Extent::Full) = (&self.more, extent) {
+            let folds = fold_of.iter().max().map_or(0, |last| last + 1);
+            if folds < 2 {
+                let rule = "a reading model holds out one fold after the other; give at least 2";
+                return Err(BadValue::new("folds", folds, rule).into());
             }
-            More::Folds(fold_of) => {
-                let folds = fold_of.iter().max().map_or(0, |last| last + 1);
-                if folds < 2 {
-                    let rule = "a confidence holds out one fold after the other; give at least 2";
-                    return Err(BadValue::new("folds", folds, rule).into());
-                }
-                for fold in 0..folds {
-                    self.hold_out(fold, fold_of, options, &mut held_out, progress)?;
-                }
-                Ok(confidence::add(blob, &Density::fit(&self.frames, &settings), &held_out)?)
+            for fold in 0..folds {
+                self.hold_out(fold, fold_of, options, &mut held_out, progress)?;
             }
         }
+        progress.stage("fit reading model", 1);
+        let statistics = Statistics::fit(&self.frames.inputs, extent, options.seed)?;
+        if let (More::Scene(more), Extent::Full) = (&self.more, extent) {
+            let (synthesis, frames) = (&more.synthesis, self.frames.frames());
+            let others = more.experiment.dataset(synthesis, Stream::Calibration, frames);
+            held_out.add(blob, &statistics, &others);
+        }
+        let blob = reading_model::add(blob, &statistics, &held_out)?;
+        progress.step();
+        Ok(blob)
     }
 
     /// Trains on all folds but `fold`, and adds what the model makes of that one to `held_out`.
@@ -177,8 +173,8 @@ impl<'s> TrainingSet<'s> {
         let mut of_rest = TrainingSet::of_folds(&seen, &folds, self.origin.clone());
         of_rest.refine = self.refine;
         let blob = pack(&of_rest.train(options, progress)?, &seen, &self.origin)?;
-        let settings = confidence::Settings { seed: options.seed, ..Default::default() };
-        held_out.add(&blob, &Density::fit(&seen, &settings), &self.frames.subset(&held));
+        let statistics = Statistics::fit(&seen.inputs, Extent::Full, options.seed)?;
+        held_out.add(&blob, &statistics, &self.frames.subset(&held));
         Ok(())
     }
 }

@@ -137,7 +137,7 @@ impl Verdict {
         };
         let (centres, inputs) = (of_networks(|it| it.centres), of_networks(|it| it.inputs));
         self.with(Warning::few_frames(frames, centres, inputs))
-            .with(Warning::few_frames_for_confidence(frames, model.confidence().is_some()))
+            .with(Warning::few_frames_for_confidence(frames, model.reading_model()))
             .with(Warning::larger_than_slot(blob.bytes().len(), &Design::new(blob)))
     }
 

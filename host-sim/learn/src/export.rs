@@ -12,7 +12,6 @@ use crate::packing::ModelBlob;
 #[must_use]
 pub fn constant_bytes(blob: &ModelBlob) -> usize {
     let model = blob.parse();
-    let floats = model.confidence().map_or(0, |it| it.block().len())
-        + model.fill().map_or(0, |it| it.block().len());
+    let floats = model.reading_model().map_or(0, |it| it.block().len());
     Design::new(blob).parameter_bytes() + 4 * floats
 }

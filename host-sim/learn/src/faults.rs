@@ -4,7 +4,7 @@
 //!
 //! - **Health**: readings that are missing, shorted or open, in all frames or now and then. A wire is named if all of its
 //!   readings are so.
-//! - **What the others say**: a model with a [fill](taxel_core::fill) tells each reading from the others. One that is far
+//! - **What the others say**: a model with a [reading model](taxel_core::reading_model) tells each reading from the others. One that is far
 //!   off them, again and again, is noisy.
 //! - **Likeness**: two neighbours that touch read alike, where the other wires say that they should differ.
 
@@ -12,8 +12,8 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use serde::Serialize;
-use taxel_core::fill::{Fill, MOST_MISSING};
 use taxel_core::health::Limits;
+use taxel_core::reading_model::{MOST_MISSING, ReadingModel};
 use taxel_data::Table;
 
 use crate::parallel;
@@ -46,10 +46,10 @@ pub struct Found {
 
 /// Faults in `readings` as they were scanned (Ω), by [`windows`]. A model's `fill` tells noise and wires that touch;
 /// without one, health alone counts. None are told of columns that are no [`Grid`] of wires.
-pub fn diagnose(readings: &Table, limits: Limits, fill: Option<Fill<'_>>) -> Vec<Found> {
+pub fn diagnose(readings: &Table, limits: Limits, model: Option<ReadingModel<'_>>) -> Vec<Found> {
     let Some(grid) = Grid::new(&readings.names) else { return vec![] };
     let count = readings.names.len();
-    let expected = fill.filter(|fill| fill.readings() == count).map(Expected::new);
+    let expected = model.filter(|model| model.sizes().readings == count).map(Expected::new);
     let windows = windows(readings.len());
     let found = parallel::map(windows.len(), &|window| {
         let window = windows[window].clone();

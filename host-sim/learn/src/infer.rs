@@ -6,9 +6,9 @@
 use std::borrow::Cow;
 
 use taxel_core::blob::Front;
-use taxel_core::confidence::{Confidence, Sizes};
 use taxel_core::projection::Projection;
 use taxel_core::rbf::Network;
+use taxel_core::reading_model::{ReadingModel, Sizes};
 use taxel_core::touch::Touch;
 use taxel_data::simd::LANES;
 use taxel_data::widest;
@@ -214,16 +214,16 @@ pub(crate) fn given<'r>(front: &Front<'_>, readings: &'r [f64]) -> (Cow<'r, [f64
 }
 
 /// Deviations (`lines × outputs`) and novelty of every line of `inputs`, as a device computes them.
-pub(crate) fn assess_lines(confidence: Confidence<'_>, inputs: &[f64]) -> (Vec<f32>, Vec<f64>) {
-    let Sizes { readings, outputs, .. } = confidence.sizes();
+pub(crate) fn assess_lines(model: ReadingModel<'_>, inputs: &[f64]) -> (Vec<f32>, Vec<f64>) {
+    let Sizes { readings, outputs, .. } = model.sizes();
     let of_piece = |lines: &[f64]| {
-        let mut scratch = vec![0.0; confidence.sizes().scratch_floats()];
+        let mut scratch = vec![0.0; model.sizes().scratch_floats()];
         let mut deviations = vec![0.0; lines.len() / readings * outputs];
         let lines = lines.chunks_exact(readings).zip(deviations.chunks_exact_mut(outputs));
         let assess = |(line, deviation): (&[f64], &mut [f32])| {
-            let line = line.iter().map(|reading| *reading as f32);
-            let novelty = confidence.assess(line, &mut scratch, deviation);
-            f64::from(novelty.expect("lengths of the confidence"))
+            let line: Vec<f32> = line.iter().map(|reading| *reading as f32).collect();
+            let novelty = model.assess(&line, None, &mut scratch, deviation);
+            f64::from(novelty.expect("lengths of the model").expect("a model with components"))
         };
         let novelty: Vec<f64> = lines.map(assess).collect();
         (deviations, novelty)

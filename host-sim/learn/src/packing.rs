@@ -6,9 +6,8 @@ use taxel_core::AlignedBytes;
 use taxel_core::blob::{
     self, Columns, DecodeError, Floats, Front, Metadata, Model, ModelParts, NoiseKind,
 };
-use taxel_core::confidence::Confidence;
-use taxel_core::fill::Fill;
 use taxel_core::rbf::Network;
+use taxel_core::reading_model::ReadingModel;
 use taxel_data::{Dataset, columns, input};
 
 use crate::error::{Error, Result, not_packed};
@@ -84,9 +83,8 @@ pub fn pack(trained: &Trained, dataset: &Dataset, origin: &Origin) -> Result<Mod
     let training_rmse = floats(&training_rmse(&fronts, &views, dataset));
     let parts = ModelParts {
         fronts: &fronts,
-        confidence: None,
         linear_rmse: Floats(&linear_rmse),
-        fill: None,
+        reading_model: None,
         networks: &views,
         row_network: &row_network,
         metadata: Metadata {
@@ -164,26 +162,15 @@ impl ModelBlob {
         &self.bytes
     }
 
-    /// Blob of this model with the given confidence, or another one instead of its own.
+    /// Blob of this model with the given reading model, or none, instead of its own.
     ///
     /// # Errors
-    /// [`Error`] for a confidence of another model, or a blob that becomes too large.
-    pub fn with_confidence(&self, confidence: Confidence<'_>) -> Result<Self> {
+    /// [`Error`] for a reading model of another model, or a blob that becomes too large.
+    pub fn with_reading_model(&self, reading_model: Option<ReadingModel<'_>>) -> Result<Self> {
         let model = self.parse();
         let (fronts, networks): (Vec<_>, Vec<_>) =
             (model.fronts().collect(), model.networks().collect());
-        rebuild(&model, &fronts, &networks, Some(confidence), model.fill())
-    }
-
-    /// Blob of this model that fills missing readings by `fill`, instead of its own.
-    ///
-    /// # Errors
-    /// [`Error`] for a fill of another model, or a blob that becomes too large.
-    pub fn with_fill(&self, fill: Fill<'_>) -> Result<Self> {
-        let model = self.parse();
-        let (fronts, networks): (Vec<_>, Vec<_>) =
-            (model.fronts().collect(), model.networks().collect());
-        rebuild(&model, &fronts, &networks, model.confidence(), Some(fill))
+        rebuild(&model, &fronts, &networks, reading_model)
     }
 
     /// Mean width σ of all Gaussians, on inputs scaled to [0, 1], to four digits.
@@ -206,7 +193,7 @@ impl ModelBlob {
     }
 }
 
-/// Blob of `model` with these `fronts`, `networks`, confidence and fill instead of its own.
+/// Blob of `model` with these `fronts`, `networks` and reading model instead of its own.
 ///
 /// # Errors
 /// [`Error`] for parts that do not belong together, or a blob that becomes too large.
@@ -214,16 +201,14 @@ pub(crate) fn rebuild(
     model: &Model<'_>,
     fronts: &[Front<'_>],
     networks: &[Network<'_>],
-    confidence: Option<Confidence<'_>>,
-    fill: Option<Fill<'_>>,
+    reading_model: Option<ReadingModel<'_>>,
 ) -> Result<ModelBlob> {
     let of_row = |row| model.network_of_row(row).map(|network| network as u8);
     let row_network: Vec<u8> = (0..model.shape().rows).filter_map(of_row).collect();
     let parts = ModelParts {
         fronts,
-        confidence,
         linear_rmse: model.linear_rmse(),
-        fill,
+        reading_model,
         networks,
         row_network: &row_network,
         metadata: *model.metadata(),

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use taxel_core::blob::{Front, Model};
 use taxel_core::rbf::Network;
+use taxel_core::reading_model::ReadingModel;
 use taxel_core::scale::CLAMP;
 use taxel_data::Table;
 
@@ -147,38 +148,51 @@ impl<'b> PreparedModel<'b> {
     }
 
     /// Standard deviations of the outputs for `readings` (`frames × inputs`), `frames × outputs` in their units, and the
-    /// novelty of each frame in nats, above 0 for a novel one; `None` if the model has no confidence.
+    /// novelty of each frame in nats, above 0 for a novel one; `None` if the model tells neither.
     ///
     /// A missing reading makes all of its frame's NaN.
     pub fn assess(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
-        let confidence = self.model.confidence()?;
-        let (deviations, novelty) = assess_lines(confidence, &self.model_inputs(readings));
+        let model = self.model.reading_model().filter(ReadingModel::assesses)?;
+        let (deviations, novelty) = assess_lines(model, &self.model_inputs(readings));
         Some((deviations.into_iter().map(f64::from).collect(), novelty))
     }
 
     /// Readings (`frames × inputs`) with missing ones filled as a device fills them, and the number of readings filled in
-    /// each frame; `None` if the model has no [fill](taxel_core::fill).
-    pub fn filled(&self, readings: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
-        let fill = self.model.fill()?;
-        let of_piece = |frames: &[f64]| {
-            let (mut values, mut scratch) = (frames.to_vec(), vec![0.0; fill.scratch_floats()]);
-            let filled = |frame: &mut [f64]| {
-                if !frame.iter().any(|reading| is_missing(*reading)) {
+    /// each frame; `None` if the model has no [reading model](taxel_core::reading_model).
+    ///
+    /// A model with relative inputs takes `baselines`: one line for all frames, or a line for each; without them, its own.
+    pub fn filled(
+        &self,
+        readings: &[f64],
+        baselines: Option<&Table>,
+    ) -> Option<(Vec<f64>, Vec<usize>)> {
+        let model = self.model.reading_model()?;
+        let size = FRAMES_AT_ONCE * self.inputs();
+        let of_piece = |piece: usize| {
+            let mut values = parallel::piece(readings, size, piece).to_vec();
+            let mut scratch = vec![0.0; model.sizes().scratch_floats()];
+            let filled = |(frame, values): (usize, &mut [f64])| {
+                if !values.iter().any(|reading| is_missing(*reading)) {
                     return 0;
                 }
-                let mut ohm: Vec<f32> = frame.iter().map(|reading| *reading as f32).collect();
-                let count = fill.fill(&mut ohm, &mut scratch);
-                let missing = frame.iter_mut().zip(ohm).filter(|(it, _)| is_missing(**it));
+                let line = (piece * FRAMES_AT_ONCE + frame) * values.len();
+                let of_frame = baselines.map(|all| {
+                    let all = &all.values;
+                    reciprocals(all.get(line..line + values.len()).unwrap_or(all))
+                });
+                let own = self.reciprocals.as_ref().map(|own| of_frame.as_ref().unwrap_or(own));
+                let mut ohm: Vec<f32> = values.iter().map(|reading| *reading as f32).collect();
+                let count = model.fill(&mut ohm, own.map(|all| &all[..]), &mut scratch);
+                let missing = values.iter_mut().zip(ohm).filter(|(it, _)| is_missing(**it));
                 missing.for_each(|(reading, ohm)| *reading = f64::from(ohm));
                 count
             };
-            let counts: Vec<usize> = values.chunks_exact_mut(self.inputs()).map(filled).collect();
+            let frames = values.chunks_exact_mut(self.inputs()).enumerate();
+            let counts: Vec<usize> = frames.map(filled).collect();
             (values, counts)
         };
-        let (values, counts): (Vec<_>, Vec<_>) =
-            parallel::pieces(readings, FRAMES_AT_ONCE * self.inputs(), &of_piece)
-                .into_iter()
-                .unzip();
+        let pieces = parallel::map(readings.len().div_ceil(size), &of_piece);
+        let (values, counts): (Vec<_>, Vec<_>) = pieces.into_iter().unzip();
         Some((values.concat(), counts.concat()))
     }
 
@@ -251,7 +265,7 @@ impl FrameDecoder for PreparedModel<'_> {
     }
 
     fn decode(&self, (): &mut (), frames: Frames<'_>) -> Estimates {
-        // What a confidence tells is asked for apart (`assess`): tables of errors do not need it.
+        // Novelty and deviations are asked for apart (`assess`): tables of errors do not need them.
         Estimates::of_values(self.decode_lines(frames.readings))
     }
 }

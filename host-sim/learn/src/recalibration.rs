@@ -19,20 +19,23 @@
 //! 3. **Judge.** Guess and fit are repeated without a fifth of the presses, five times, and tell the error on presses
 //!    that they have not seen. A network whose Σ ln(1 + 3eₚ²) falls by less than a tenth keeps what it takes.
 //!
-//! docs/drift.md has what it reaches.
+//! A reading model moves along (`statistics.rs`). docs/drift.md has what it reaches.
 
 use taxel_core::blob::{Front, Model};
 use taxel_core::rbf::Network;
+use taxel_core::reading_model::ReadingModel;
 use taxel_core::touch::{Touch, block_floats};
 use taxel_data::{Table, columns};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, no_regression};
 use crate::infer::{decode, is_missing};
 use crate::packing::{ModelBlob, rebuild};
 use crate::parallel;
 use crate::prepared::PreparedModel;
 use crate::rls::Rls;
 use crate::train::{FittedNetwork, THRESHOLD};
+
+mod statistics;
 
 /// 1/σ: shifts are expected to be a quarter of a span from the guess.
 const PRIOR: f64 = 4.0;
@@ -80,10 +83,6 @@ pub fn check(model: &Model<'_>) -> Result<()> {
     let rows = model.shape().rows;
     let fault = if !model.whole_frames() && model.network_count() < rows {
         "rows share a network, while their channels drift apart: train one with a network for each row"
-    } else if model.confidence().is_some() {
-        "its confidence is of the sensor as it was: train one without --confidence"
-    } else if model.fill().is_some() {
-        "its fill of missing readings is of the sensor as it was: train one without --fill"
     } else if training_errors(model).iter().all(|error| *error <= 0.0) {
         "it tells no training errors: `train` writes them"
     } else {
@@ -136,8 +135,19 @@ pub fn recalibrate(
     let [error_before, error_after] = [0, 1].map(|which| {
         mean(&fits.iter().map(|(_, squares)| squares[which]).collect::<Vec<_>>()).sqrt()
     });
+    let own = model.model().reading_model();
+    let block = match own {
+        Some(own) => {
+            let inputs = model.model_inputs(&readings.values);
+            let shifts: Vec<_> = fits.into_iter().map(|(shift, _)| shift).collect();
+            statistics::moved(model.model(), own, &inputs, &shifts, error_after)?
+        }
+        None => vec![],
+    };
+    let reading_model = own.map(|own| ReadingModel::new(own.sizes(), &block)).transpose();
+    let reading_model = reading_model.map_err(|_| no_regression())?;
     Ok(Recalibrated {
-        blob: rebuild(model.model(), &fronts, &networks, None, None)?,
+        blob: rebuild(model.model(), &fronts, &networks, reading_model)?,
         presses: units.iter().map(|unit| unit.presses.len()).min().unwrap_or(0),
         error_before,
         error_after,

@@ -9,6 +9,7 @@ use taxel_data::clock::neighbours_alike;
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::Grid;
 use taxel_data::{DataFile, Dataset, Rest, Table};
+use taxel_learn::reading_model::Extent;
 use taxel_learn::select;
 
 use super::arguments::refuse_given;
@@ -67,8 +68,8 @@ pub struct HowToTrain {
     pub relative_inputs: bool,
     /// Whether training is refined.
     pub refine: bool,
-    /// Whether the model is to have a confidence.
-    pub confidence: bool,
+    /// What the model's statistics of readings are to tell.
+    pub reading_model: Option<Extent>,
 }
 
 /// Frames that a model is judged by.
@@ -131,8 +132,8 @@ impl DataArguments {
         ];
         refuse_given(of_folds, |option| {
             format!(
-                "{option} has no effect without refinement, --select or --confidence: leave it out, or leave out \
-                 --no-refine"
+                "{option} has no effect without refinement, --select or --reading-model full: leave it out, or leave \
+                 out --no-refine"
             )
         })
     }

@@ -30,7 +30,7 @@ use super::{Common, print, stderr};
 /// Decode readings from a data file, one line of estimates a line.
 ///
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
-/// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --fill tells
+/// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --reading-model tells
 /// missing readings from the others instead.
 /// Estimates are written with the digits that tell an f32 from its neighbours.
 ///
@@ -55,8 +55,8 @@ pub struct Arguments {
     /// Columns of the readings' file that are written too, as they stand there, in front of the estimates: the time, say.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     keep: Vec<String>,
-    /// Also write a column NAME_deviation for each output NAME, and novelty_nats, of a model with a confidence: 68 % of
-    /// errors are within one deviation, and above 0 a frame is novel (docs/confidence.md).
+    /// Also write a column NAME_deviation for each output NAME, and novelty_nats, of a model trained with --reading-model full: 68 % of
+    /// errors are within one deviation, and above 0 a frame is novel (docs/reading-model.md).
     #[arg(long)]
     confidence: bool,
     #[command(flatten)]
@@ -112,7 +112,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scanned = is_recording(&arguments.output)
         .then(|| Ok::<_, Error>((clock_us(&file)?, readings.values.clone())))
         .transpose()?;
-    let mut health = arguments.health.apply(&model, &mut readings)?;
+    let mut health = arguments.health.apply(&model, &mut readings, baselines.as_ref())?;
     let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
     remark_on_range(&model, &readings);
     let mut estimate = model.decode_table(&readings);
@@ -126,7 +126,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let assessed = arguments.confidence.then(|| model.assess(&readings.values));
     let assessed = match assessed {
         Some(None) => {
-            let message = "it has no confidence: train it with --confidence".into();
+            let message = "it tells no confidence: train it with --reading-model full".into();
             return Err(Error::Unfit { path: arguments.model.clone(), message });
         }
         Some(assessed) => assessed,

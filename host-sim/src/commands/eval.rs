@@ -32,7 +32,7 @@ use super::{Common, command_line, print};
 
 /// Evaluate a model on a CSV file of readings and true outputs.
 ///
-/// Readings that a device would not believe count as missing. A model trained with --fill tells them from the others;
+/// Readings that a device would not believe count as missing. A model trained with --reading-model tells them from the others;
 /// --without shows what that costs.
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -84,9 +84,9 @@ struct Summary {
     by_load: Vec<LoadErrors>,
     /// Errors and readings at rest by time; `None` if lines are in no order of time.
     over_time: Option<OverTime>,
-    /// What the intervals of a model with a confidence cover; empty without one.
+    /// What the intervals of a model that tells deviations cover; empty without one.
     coverage: Vec<Coverage>,
-    /// Share of the frames without missing readings that a model with a confidence finds novel.
+    /// Share of the frames without missing readings that a model finds novel.
     percent_novel: Option<f64>,
 }
 
@@ -116,7 +116,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let of_lines = (rest.as_ref(), file.lines());
     let baselines =
         arguments.untouched.baselines(metadata, &arguments.model, of_lines, fields, limits)?;
-    let mut health = arguments.health.apply(&model, &mut readings)?;
+    let mut health = arguments.health.apply(&model, &mut readings, baselines.as_ref())?;
     let lines_at_rest = rest.as_ref().and_then(|rest| rest.lines.clone());
     let at_rest =
         rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &Spread::of(&readings)));
@@ -140,7 +140,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         });
     }
     let assessed = model.assess(&readings.values);
-    let ratios_95 = model.model().confidence().map_or(&[][..], |it| it.ratios_95());
+    let ratios_95 = model.model().reading_model().map_or(&[][..], |it| it.ratios_95());
     let percent_novel = assessed.as_ref().map(|(_, novelty)| percent_novel(novelty));
     // A frame counts if any of its values does; what could not be decoded is missing in both.
     let frames_evaluated =
@@ -242,7 +242,7 @@ fn nothing_counts(relative_inputs: bool) -> &'static str {
         "no line has both the model's inputs and a true output: fill readings in, or train without those that have no \
          baseline (--inputs)"
     } else {
-        "no line has both the model's readings and a true output: fill them in, or see --limits, and train --fill"
+        "no line has both the model's readings and a true output: fill them in, or see --limits, and train --reading-model"
     }
 }
 

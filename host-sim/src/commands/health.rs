@@ -4,8 +4,8 @@ use super::stderr;
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use taxel_core::fill::MOST_MISSING;
 use taxel_core::health::Limits;
+use taxel_core::reading_model::MOST_MISSING;
 use taxel_data::{Table, columns};
 use taxel_learn::PreparedModel;
 use taxel_learn::faults::{FEWEST_FOR_NOISE, Found, Grid, diagnose, stand_still};
@@ -24,7 +24,7 @@ pub struct HealthArguments {
     /// Columns whose readings are taken for missing in every line.
     #[arg(long, value_name = "GLOB,…")]
     without: Option<String>,
-    /// Leave missing readings missing, also if the model can fill them from the others (train --fill).
+    /// Leave missing readings missing, also if the model can fill them from the others (train --reading-model).
     #[arg(long)]
     no_fill: bool,
 }
@@ -72,11 +72,21 @@ impl HealthArguments {
         self.limits.0
     }
 
-    /// Makes faulty ones of the `readings` in the data file missing, notes them on stderr, and lets the `model` fill them.
-    pub fn apply(&self, model: &PreparedModel<'_>, readings: &mut Table) -> Result<Health> {
+    /// Makes faulty ones of the `readings` in the data file missing, notes them on stderr, and lets the `model` fill them,
+    /// with the `baselines` of its frames if its inputs are relative.
+    pub fn apply(
+        &self,
+        model: &PreparedModel<'_>,
+        readings: &mut Table,
+        baselines: Option<&Table>,
+    ) -> Result<Health> {
         let lines = readings.len();
         let faults = match self.limits.0 {
-            Some(limits) => diagnose(readings, limits, model.model().fill()),
+            Some(limits) => diagnose(
+                readings,
+                limits,
+                model.model().reading_model().filter(|_| baselines.is_none()),
+            ),
             None => vec![],
         };
         if lines >= FEWEST_FOR_NOISE && stand_still(&readings.values, readings.names.len()) {
@@ -100,7 +110,7 @@ impl HealthArguments {
         }
         let is_faulty =
             readings.lines().map(|line| line.iter().any(|reading| reading.is_nan())).collect();
-        let filled = if self.no_fill { None } else { model.filled(&readings.values) };
+        let filled = if self.no_fill { None } else { model.filled(&readings.values, baselines) };
         let counts = filled.map_or(vec![], |(values, counts)| {
             readings.values = values.into();
             counts
@@ -123,7 +133,7 @@ impl HealthArguments {
             ));
         }
         let faulty = health.is_faulty.iter().filter(|is_faulty| **is_faulty).count();
-        if faulty > health.frames_filled && model.model().fill().is_some() {
+        if faulty > health.frames_filled && model.model().reading_model().is_some() {
             let why = if self.no_fill {
                 "by --no-fill".to_owned()
             } else {

@@ -38,10 +38,8 @@ struct Summary {
     relative_inputs: bool,
     /// Features that all readings are projected to, for one network of all rows; 0 without a projection.
     projected_features: usize,
-    /// What tells deviations and novelty; `None` for a model without a confidence.
-    confidence: Option<ConfidenceSummary>,
-    /// What fills missing readings; `None` for a model that does not.
-    fill: Option<FillSummary>,
+    /// Statistics of readings; `None` for a model without them.
+    reading_model: Option<ReadingModelSummary>,
     networks: Vec<NetworkSummary>,
     noise_kind: String,
     noise_level: f32,
@@ -75,14 +73,9 @@ struct ScanSummary {
 
 /// Size of what fills missing readings.
 #[derive(Serialize)]
-struct FillSummary {
+struct ReadingModelSummary {
     factors: usize,
-    bytes: usize,
-}
-
-#[derive(Serialize)]
-struct ConfidenceSummary {
-    directions: usize,
+    /// Components that tell novelty and deviations; 0 without.
     components: usize,
     bytes: usize,
 }
@@ -141,14 +134,11 @@ fn summarise(blob: &ModelBlob) -> Summary {
         rows: shape.rows,
         inputs_per_row: shape.inputs,
         outputs_per_row: shape.outputs,
-        confidence: model.confidence().map(|it| ConfidenceSummary {
-            directions: it.sizes().directions,
+        reading_model: model.reading_model().map(|it| ReadingModelSummary {
+            factors: it.sizes().factors,
             components: it.sizes().components,
             bytes: 4 * it.block().len(),
         }),
-        fill: model
-            .fill()
-            .map(|it| FillSummary { factors: it.factors(), bytes: 4 * it.block().len() }),
         relative_inputs: metadata.relative_inputs,
         projected_features: model
             .fronts()
@@ -252,14 +242,14 @@ fn page_of(s: &Summary) -> print::Page {
         let (readings, features) = (s.rows * s.inputs_per_row, s.projected_features);
         line("projection", format!("{readings} readings → {features} features for all rows"));
     }
-    if let Some(ConfidenceSummary { directions, components, bytes }) = s.confidence {
-        line(
-            "confidence",
-            format!("{components} components in {directions} directions, {bytes} bytes"),
-        );
-    }
-    if let Some(FillSummary { factors, bytes }) = s.fill {
-        line("fill", format!("missing readings by {factors} factors, {bytes} bytes"));
+    if let Some(ReadingModelSummary { factors, components, bytes }) = s.reading_model {
+        let more = if components == 0 {
+            String::new()
+        } else {
+            format!(", novelty and deviations by {components} components")
+        };
+        let what = format!("fills missing readings by {factors} factors{more}, {bytes} bytes");
+        line("reading model", what);
     }
     let networks: Vec<String> = s.networks.iter().map(NetworkSummary::line).collect();
     let mut index = 0;

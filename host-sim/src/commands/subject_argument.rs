@@ -6,6 +6,7 @@ use crate::experiment::{Experiment, names_a_scene};
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::Args;
+use taxel_learn::reading_model::Extent;
 
 use super::Common;
 use super::data_argument::{DataArguments, HowToTrain, JudgedBy};
@@ -52,7 +53,7 @@ impl SubjectArgument {
         let source = self.source.as_deref().unwrap_or(DEFAULT_SCENE);
         let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
         let sizes = Sizes { frames: None, centres };
-        let subject = self.options.load(source, common, judged, false, sizes)?;
+        let subject = self.options.load(source, common, judged, None, sizes)?;
         match &subject {
             Subject::Scene(_) if self.test.is_some() => {
                 let message =
@@ -87,14 +88,14 @@ impl SubjectArgument {
 }
 
 impl SubjectOptions {
-    /// Loads the scene or CSV file called `source`. `confidence` asks for one, whatever a scene says; `sizes` are instead
+    /// Loads the scene or CSV file called `source`. `reading_model` asks for one that tells at least that much, whatever a scene says; `sizes` are instead
     /// of the scene's.
     pub fn load(
         &self,
         source: &str,
         common: &Common,
         judged: JudgedBy<'_>,
-        confidence: bool,
+        reading_model: Option<Extent>,
         sizes: Sizes,
     ) -> Result<Subject> {
         if names_a_scene(source) {
@@ -105,7 +106,7 @@ impl SubjectOptions {
             self.relative_inputs.apply(&mut scene);
             self.noise.apply(&mut scene)?;
             scene.training.refine = self.refine.over(scene.training.refine);
-            scene.training.confidence |= confidence;
+            scene.training.reading_model = scene.training.reading_model.max(reading_model);
             return Ok(Subject::Scene(Box::new(scene)));
         }
         if self.noise.is_given() {
@@ -116,7 +117,7 @@ impl SubjectOptions {
             seed: common.seed.unwrap_or(1),
             relative_inputs: self.relative_inputs.relative_inputs,
             refine: self.refine.over(true),
-            confidence,
+            reading_model,
         };
         let data = self.data.load(Path::new(source), how, judged)?;
         Ok(Subject::Measured(Box::new(data)))

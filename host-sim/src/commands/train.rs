@@ -10,12 +10,13 @@ use crate::metrics::{self, Errors, NETWORK};
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use serde::Serialize;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{columns, output};
-use taxel_learn::fill;
 use taxel_learn::kinds::Choice;
 use taxel_learn::outliers::Outliers;
+use taxel_learn::reading_model::Extent;
 use taxel_learn::select::Selection;
 use taxel_learn::train::Solver;
 
@@ -55,16 +56,13 @@ pub struct Arguments {
     /// an edge of default spreads and penalties are looked beyond; other edges are named.
     #[arg(long)]
     select: bool,
-    /// Let the model tell how far off each output may be, and how novel a frame is (docs/confidence.md). Estimates stay
-    /// the same. On a CSV file, it trains once more for every fold; give folds of whole places or days (--fold-column),
-    /// because frames of one resemble each other.
-    #[arg(long)]
-    confidence: bool,
-    /// Let the model fill missing readings from the others of their frame, so that a broken wire costs accuracy, but no
-    /// frames (docs/reliability.md). It takes 10 kB more for 144 readings, and ten frames of training for each reading.
-    /// Where more than a quarter of a frame is missing, nothing is filled.
-    #[arg(long)]
-    fill: bool,
+    /// Give the model statistics of its readings (docs/reading-model.md): with fill, it tells missing readings from the others
+    /// of their frame, so that a broken wire costs accuracy, but no frames. With full, it also tells how far off each output
+    /// may be, and how novel a frame is; on a CSV file, that trains once more for every fold: give folds of whole places or
+    /// days (--fold-column), because frames of one resemble each other. Estimates of whole frames stay the same. For 144
+    /// readings, fill takes 7 kB, and full 27 kB. Either takes ten frames of training for each reading.
+    #[arg(long, value_name = "EXTENT", value_parser = PossibleValuesParser::new(Extent::NAMES))]
+    reading_model: Option<String>,
     /// Frames to synthesise from a scene, instead of the scene's number.
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
@@ -73,7 +71,6 @@ pub struct Arguments {
 }
 
 #[derive(Serialize)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a field of the JSON")]
 struct Summary {
     subject: String,
     seed: u64,
@@ -94,10 +91,9 @@ struct Summary {
     relative_inputs: bool,
     /// Features that training chose, and what it tried; `None` where there was no choice.
     features: Option<Choice>,
-    /// Whether the model tells deviations and novelty.
-    confidence: bool,
-    /// Whether the model fills missing readings from the others.
-    fill: bool,
+    /// What the model's statistics of readings tell: `fill` missing readings, `full` deviations and novelty, too; `None`
+    /// without any.
+    reading_model: Option<&'static str>,
     /// Number formats of the networks, in their order.
     formats: Vec<&'static str>,
     outputs: Vec<ModelOutput>,
@@ -123,11 +119,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut subject = load(arguments, common)?;
     refused_readings::note_scene(&subject);
     let mut options = arguments.model.over(&mut subject);
-    let mut set = subject.training_set(None);
-    set.fill |= arguments.fill;
-    if set.fill {
-        fill::check(&set.frames)?;
-    }
+    let set = subject.training_set(None);
+    set.check()?;
     if arguments.select && options.projects(&set.frames) {
         let message = "--select chooses for networks that are given readings: add --each-row, or leave it out";
         return Err(Error::Usage(message.into()));
@@ -154,8 +147,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         refined: set.refine,
         relative_inputs: set.frames.relative_inputs,
         features,
-        confidence: model.confidence().is_some(),
-        fill: model.fill().is_some(),
+        reading_model: model.reading_model().map(|it| Extent::NAMES[usize::from(it.assesses())]),
         formats: model.networks().map(|n| n.format().name()).collect(),
         outputs: model_outputs::of(&model),
         worth: Worth::new(&subject, &set, &blob, selection.as_ref()),
@@ -180,8 +172,8 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
     }
     let centres = arguments.network.centres.iter().min().copied();
     let sizes = Sizes { frames: arguments.frames, centres };
-    let (judged, confidence) = (JudgedBy::None, arguments.confidence);
-    let subject = options.load(&arguments.source, common, judged, confidence, sizes)?;
+    let extent = arguments.reading_model.as_deref().and_then(Extent::of_name);
+    let subject = options.load(&arguments.source, common, JudgedBy::None, extent, sizes)?;
     match &subject {
         Subject::Scene(_) if options.data.folds().is_some() && !arguments.select => {
             let message = "--folds holds out frames of a CSV file, or with --select; a scene has fresh frames: leave it out";
@@ -190,7 +182,9 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
         Subject::Measured(_) if arguments.frames.is_some() => {
             return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
         }
-        Subject::Measured(data) if !(data.refine || data.confidence || arguments.select) => {
+        Subject::Measured(data)
+            if !(data.refine || extent == Some(Extent::Full) || arguments.select) =>
+        {
             options.data.refuse_folds()?;
         }
         Subject::Measured(data) if data.training.relative_inputs => {
@@ -231,7 +225,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         }
     }
     page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}{}{}, {} frames{}{}{}{}",
+        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}{}{}, {} frames{}{}{}",
         summary.file.display(),
         summary.blob_bytes,
         summary.model_crc,
@@ -243,8 +237,7 @@ fn page_of(summary: &Summary, asked: usize) -> print::Page {
         summary.training_frames,
         if summary.solver == Solver::Rls.name() { ", weights by recursion" } else { "" },
         if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
-        if summary.confidence { ", with confidence" } else { "" },
-        if summary.fill { ", fills missing readings" } else { "" }
+        summary.reading_model.map_or(String::new(), |it| format!(", reading model {it}"))
     ));
     if summary.centres < asked {
         page.line(format_args!(

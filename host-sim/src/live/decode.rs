@@ -74,7 +74,7 @@ impl<'b> FrameByFrame<'b> {
         for reading in readings.iter_mut().filter(|reading| is_faulty(reading)) {
             (*reading, any_faulty) = (f32::NAN, true);
         }
-        self.decoder.fill(&mut readings, &mut self.scratch);
+        self.decoder.fill(&mut readings, &self.reciprocals, &mut self.scratch);
         let frame = Frame { readings_ohm: &readings, reciprocals: &self.reciprocals };
         let mut outputs = vec![f32::NAN; shape.rows * shape.outputs];
         let mut status = vec![RowStatus::MissingReading; shape.rows];

@@ -6,6 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use taxel_data::{Dataset, Silent, Stream};
+use taxel_learn::reading_model::Extent;
 use taxel_learn::{ModelBlob, Options};
 use taxel_limit::Limit;
 use taxel_recording::{Frame, Layout};
@@ -49,8 +50,8 @@ const JUDGED: Duration = Duration::from_millis(500);
 /// Frames whose mean is the baseline.
 const AT_REST: usize = 64;
 
-/// A small model for `scene`, trained in seconds: of the whole array, without refinement, with confidence and fill where the
-/// scene allows them.
+/// A small model for `scene`, trained in seconds: of the whole array, without refinement, with a full reading model where the
+/// scene allows it.
 ///
 /// # Errors
 /// If the scene cannot be trained on.
@@ -62,10 +63,10 @@ pub fn small_model(scene: &Experiment) -> Result<ModelBlob> {
     let usual = subject.options();
     let options = Options { centres: usual.centres.min(CENTRES), ..usual.for_each_row(each_row) };
     let mut training: TrainingSet<'_> = subject.training_set(None);
-    (training.refine, training.confidence, training.fill) = (false, true, true);
+    (training.refine, training.reading_model) = (false, Some(Extent::Full));
     let full = training.blob(&options, &Silent);
     full.or_else(|_| {
-        (training.confidence, training.fill) = (false, false);
+        training.reading_model = None;
         training.blob(&options, &Silent)
     })
 }

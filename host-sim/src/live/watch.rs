@@ -31,7 +31,7 @@ const WINDOW: Duration = Duration::from_secs(10);
 const SCALE_MM: f32 = 1.0;
 /// What goes with what is watched.
 pub struct Watched<'b> {
-    /// Model that decodes, if it is known: for its fill, and for recordings.
+    /// Model that decodes, if it is known: for its reading model, and for recordings.
     pub blob: Option<&'b ModelBlob>,
     /// Text of the scene, for recordings.
     pub scene: Option<String>,
@@ -133,7 +133,9 @@ impl<'w, 'b> Watch<'w, 'b> {
         if self.told.elapsed() > STATUS {
             let model = self.watched.blob.map(ModelBlob::parse);
             self.flush_recording();
-            self.wires.judge(model.as_ref().and_then(taxel_core::blob::Model::fill));
+            // Statistics of ratios to a baseline tell nothing of readings in ohm.
+            let model = model.as_ref().filter(|model| !model.metadata().relative_inputs);
+            self.wires.judge(model.and_then(taxel_core::blob::Model::reading_model));
             self.tell();
         }
         Ok(())

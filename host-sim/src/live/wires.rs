@@ -35,11 +35,11 @@ impl Wires {
         self.frames.push_back(readings.to_vec());
     }
 
-    /// Judges the frames that are kept, by the model's fill too if there is one.
-    pub fn judge(&mut self, fill: Option<taxel_core::fill::Fill<'_>>) {
+    /// Judges the frames that are kept, by a reading model too if there is one.
+    pub fn judge(&mut self, model: Option<taxel_core::reading_model::ReadingModel<'_>>) {
         let Some(limits) = self.limits else { return };
         let values = self.frames.iter().flatten().map(|reading| f64::from(*reading)).collect();
-        self.faults = diagnose(&Table { names: self.names.clone(), values }, limits, fill);
+        self.faults = diagnose(&Table { names: self.names.clone(), values }, limits, model);
     }
 
     /// Faults for the page.

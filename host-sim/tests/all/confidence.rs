@@ -1,4 +1,4 @@
-//! Confidence from the command line: training, evaluation, and what is refused.
+//! Full reading models from the command line: training, evaluation, and what is refused.
 
 use crate::common::{Folder, small_scene};
 
@@ -7,16 +7,19 @@ fn json(text: &str) -> serde_json::Value {
 }
 
 #[test]
-fn a_model_with_a_confidence_is_judged_by_it_and_writes_it_beside_the_outputs() {
+fn a_full_reading_model_is_judged_and_writes_it_beside_the_outputs() {
     let folder = Folder::new("confidence");
     folder.write("scene.toml", small_scene());
-    folder.succeed(&["train", "scene.toml", "--confidence", "-o", "model.bin"]);
+    folder.succeed(&["train", "scene.toml", "--reading-model", "full", "-o", "model.bin"]);
     folder.succeed(&["train", "scene.toml", "-o", "without.bin"]);
     // A scene may ask for it.
-    folder.write("asks.toml", small_scene().replace("[training]", "[training]\nconfidence = true"));
+    folder.write(
+        "asks.toml",
+        small_scene().replace("[training]", "[training]\nreading_model = \"full\""),
+    );
     folder.succeed(&["train", "asks.toml", "-n", "600", "-o", "asked.bin"]);
     let inspected = folder.succeed(&["inspect", "asked.bin"]);
-    assert!(inspected.contains("confidence"), "{inspected}");
+    assert!(inspected.contains("novelty and deviations by"), "{inspected}");
     folder.succeed(&["synth", "scene.toml", "-n", "300", "--seed", "9", "-o", "test.csv"]);
     let evaluated = json(&folder.succeed(&["eval", "model.bin", "test.csv", "--json"]));
     assert_eq!(evaluated["coverage"].as_array().unwrap().len(), 3);
@@ -28,7 +31,6 @@ fn a_model_with_a_confidence_is_judged_by_it_and_writes_it_beside_the_outputs() 
         without["coverage"].as_array().unwrap().is_empty() && without["percent_novel"].is_null()
     );
     assert_eq!(without["decoders"], evaluated["decoders"]);
-    assert!(folder.succeed(&["inspect", "model.bin"]).contains("confidence"));
 
     // Deviations and novelty stand beside the outputs.
     let plain = ["decode", "model.bin", "test.csv", "-o", "plain.csv"];

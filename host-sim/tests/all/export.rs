@@ -39,7 +39,7 @@ fn a_source_in_rust_has_functions_for_the_parts_of_its_model_alone() {
     let functions = ["pub fn decode(", "pub fn assess(", "pub fn fill("];
     for (options, has) in [
         (&["--each-row", "--relative-inputs"][..], [true, false, false]),
-        (&["--confidence", "--fill"], [true; 3]),
+        (&["--reading-model", "full"], [true; 3]),
     ] {
         folder.succeed(&[&["train", "scene.toml", "-o", "m.bin"], options].concat());
         let said = folder.succeed(&["export", "m.bin", "--rust", "m.rs"]);
@@ -62,7 +62,7 @@ fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
     let export = ["export", &blob, "--c", "lib/mat", "--name", "mat"];
     let said = folder.succeed(&export);
     assert!(
-        said.contains("lib/mat: 2 rows, 1 network, 6160 bytes of weights, CRC-32 1ea39f00"),
+        said.contains("lib/mat: 2 rows, 1 network, 7480 bytes of weights, CRC-32 67f65bbc"),
         "{said}"
     );
     assert_eq!(folder.names(), ["lib"]);

@@ -16,7 +16,7 @@ fn prepared(name: &str) -> Folder {
             let train = ["train", "press", "-n", "1500", "--centres", "16", "--no-refine"];
             folder.succeed(&[&train[..], &["-o", file], fill].concat());
         };
-        train("fills.bin", &["--fill"]);
+        train("fills.bin", &["--reading-model", "fill"]);
         train("plain.bin", &[]);
         folder.succeed(&["synth", "press", "-n", "200", "--seed", "5", "-o", "sound.csv"]);
         FILES.map(|file| std::fs::read(folder.path(file)).unwrap())
@@ -77,7 +77,10 @@ fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
         assert!(said.contains("r4c5") && !said.contains("filled"), "{said}");
         assert!(column(&folder, "e.csv", "r4e1_dz_mm").iter().all(String::is_empty));
         let refused = folder.fail(&["eval", "plain.bin", "faulty.csv"], 2);
-        assert!(refused.contains("no line has") && refused.contains("--fill"), "{refused}");
+        assert!(
+            refused.contains("no line has") && refused.contains("--reading-model"),
+            "{refused}"
+        );
     }
     let whole = folder.notes(&["decode", "fills.bin", "sound.csv", "-o", "e.csv"]);
     assert_eq!(whole, "");

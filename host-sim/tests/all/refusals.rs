@@ -141,8 +141,12 @@ fn a_column_that_f32_does_not_hold_is_named() {
     let wide = train(columns(|a| a, |y| y), &["--format", "fixed16", "--spread", "1e6"]);
     refused(&folder, &wide, &["spread = 1000000", "give a smaller spread"]);
     for scale in [|y| y * 1e-27, |y| y * 1e29] {
-        let squares = train(columns(|a| a, scale), &["--confidence"]);
-        refused(&folder, &squares, &["column \"y\"", "from 1e-15 to 1e15", "leave the confidence"]);
+        let squares = train(columns(|a| a, scale), &["--reading-model", "full"]);
+        refused(
+            &folder,
+            &squares,
+            &["column \"y\"", "from 1e-15 to 1e15", "leave the reading model"],
+        );
     }
     // At any scale in between, nothing is lost, and `train` says how good the model is.
     for content in [columns(|a| a * 1e-27, |y| y * 1e29), columns(|a| a * 1e30, |y| y * 1e-27)] {

@@ -8,12 +8,11 @@ use super::format::{
 use super::front::{Front, MOST_FRONTS};
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use super::sections::{
-    check_count, cut_fill, take, take_block, take_confidence, take_linear, take_relative_inputs,
+    check_count, cut_reading_model, take, take_block, take_linear, take_relative_inputs,
 };
 use crate::checksum::CRC_32;
-use crate::confidence::{Confidence, Sizes};
-use crate::fill::Fill;
 use crate::rbf::{Cut, Format, Network, NetworkError, Shape, fixed16, float32};
+use crate::reading_model::ReadingModel;
 use crate::scale::UNITS;
 
 /// A model, borrowed from a blob whose every byte and value has been checked.
@@ -25,12 +24,9 @@ pub struct Model<'a> {
     metadata: Metadata<'a>,
     /// Whether networks see whole frames, each behind a front.
     whole_frames: bool,
-    confidence: Option<&'a [f32]>,
-    /// Directions and components of the confidence.
-    confidence_sizes: [u16; 2],
     networks: u8,
-    /// The sections of the linear decoder's errors and of the fill, if there are any, and those of the networks: nothing else
-    /// is kept of the first two, to save RAM.
+    /// The sections of the linear decoder's errors and of the reading model, if there are any, and those of the networks:
+    /// nothing else is kept of the first two, to save RAM.
     last_sections: &'a [u8],
 }
 
@@ -62,19 +58,15 @@ impl<'a> Model<'a> {
         let (section, rest) = take::<MetadataSection>(rest, "metadata")?;
         let (relative_inputs, rest) = take_relative_inputs(rest);
         let metadata = checked_metadata(&section, relative_inputs, shape)?;
-        let (confidence, rest) = take_confidence(rest, shape)?;
         let last_sections = rest;
         let (linear_rmse, rest) = take_linear(last_sections, shape)?;
         if !linear_rmse.iter().all(in_range) {
             return Err(DecodeError::InvalidMetadata { field: "linear error" });
         }
-        let (fill, network_sections) = cut_fill(rest, shape)?;
-        if let Some(fill) = fill {
-            if relative_inputs {
-                return Err(DecodeError::Malformed { section: "fill of relative inputs" });
-            }
-            Fill::new(fill.readings(), fill.factors(), fill.block())
-                .map_err(|cause| DecodeError::Fill { cause })?;
+        let (reading_model, network_sections) = cut_reading_model(rest, shape)?;
+        if let Some(model) = reading_model {
+            ReadingModel::new(model.sizes(), model.block())
+                .map_err(|cause| DecodeError::ReadingModel { cause })?;
         }
 
         let model = Self {
@@ -83,10 +75,6 @@ impl<'a> Model<'a> {
             row_network,
             metadata,
             whole_frames: network_sections.first() == Some(&TAG_FRONT),
-            confidence: confidence.map(|it| it.block()),
-            // As in the blob.
-            confidence_sizes: confidence
-                .map_or([0; 2], |it| [it.sizes().directions as u16, it.sizes().components as u16]),
             networks,
             last_sections,
         };
@@ -169,18 +157,14 @@ impl<'a> Model<'a> {
         of_frames.into_iter().flatten().map(|part| part.front)
     }
 
-    /// The model's confidence in its outputs; `None` if it has none.
-    pub fn confidence(&self) -> Option<Confidence<'a>> {
-        let ModelShape { rows, inputs, outputs } = self.shape;
-        let [directions, components] = self.confidence_sizes.map(usize::from);
-        let (readings, outputs) = (rows.wrapping_mul(inputs), rows.wrapping_mul(outputs));
-        let sizes = Sizes { readings, directions, components, outputs };
-        self.confidence.map(|block| Confidence::of_checked(sizes, block))
+    /// Statistics of the readings, which fill missing ones and may tell novelty and deviations; `None` if the model has none.
+    pub fn reading_model(&self) -> Option<ReadingModel<'a>> {
+        self.cut_reading_model().0
     }
 
-    /// What fills missing readings from the others; `None` if a missing reading stays missing.
-    pub fn fill(&self) -> Option<Fill<'a>> {
-        self.cut_fill().0
+    /// Whether the model tells novelty and deviations.
+    pub fn assesses(&self) -> bool {
+        self.reading_model().is_some_and(|it| it.assesses())
     }
 
     /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if the
@@ -189,16 +173,16 @@ impl<'a> Model<'a> {
         take_linear(self.last_sections, self.shape).map_or(Floats(&[]), |(rmse, _)| rmse)
     }
 
-    /// The fill, and the sections of the networks.
-    fn cut_fill(&self) -> (Option<Fill<'a>>, &'a [u8]) {
+    /// The reading model, and the sections of the networks.
+    fn cut_reading_model(&self) -> (Option<ReadingModel<'a>>, &'a [u8]) {
         let rest =
             take_linear(self.last_sections, self.shape).map_or(self.last_sections, |it| it.1);
-        cut_fill(rest, self.shape).unwrap_or_default()
+        cut_reading_model(rest, self.shape).unwrap_or_default()
     }
 
     /// Networks in the order of the blob, with what stands before each.
     pub(crate) fn parts(&self) -> impl Iterator<Item = Part<'a>> {
-        let (model, mut rest) = (*self, self.cut_fill().1);
+        let (model, mut rest) = (*self, self.cut_reading_model().1);
         (0..self.networks).map_while(move |index| {
             let (part, after) = model.take_part(rest, index).ok()?;
             rest = after;

@@ -7,29 +7,26 @@ use super::aligned::AlignedBytes;
 use super::decode::Model;
 use super::error::EncodeError;
 use super::format::{
-    CRC_BYTES, ConfidenceHeader, FLOAT_ALIGNMENT, FORMAT_VERSION, FillHeader, LinearSection, MAGIC,
-    MetadataSection, Prefix, RbfHeader, ShapeField, TAG_CONFIDENCE, TAG_FILL, TAG_LINEAR,
-    TAG_METADATA, TAG_RELATIVE_INPUTS,
+    CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, LinearSection, MAGIC, MetadataSection, Prefix,
+    RbfHeader, ReadingModelHeader, ShapeField, TAG_LINEAR, TAG_METADATA, TAG_READING_MODEL,
+    TAG_RELATIVE_INPUTS,
 };
 use super::front::Front;
 use super::metadata::{Floats, Metadata};
 use crate::checksum::CRC_32;
-use crate::confidence::Confidence;
-use crate::fill::Fill;
 use crate::rbf::Network;
+use crate::reading_model::ReadingModel;
 
 /// Contents of a blob: what [`encode`] writes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParts<'a> {
     /// What stands before each network that sees whole frames; nothing for networks of rows.
     pub fronts: &'a [Front<'a>],
-    /// Confidence in the outputs.
-    pub confidence: Option<Confidence<'a>>,
     /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if it
     /// is not known.
     pub linear_rmse: Floats<'a>,
-    /// What fills missing readings from the others; only for readings as they are.
-    pub fill: Option<Fill<'a>>,
+    /// Statistics of the readings.
+    pub reading_model: Option<ReadingModel<'a>>,
     /// The networks; all have the same number of inputs and of outputs.
     pub networks: &'a [Network<'a>],
     /// Index into `networks` for each row.
@@ -41,8 +38,8 @@ pub struct ModelParts<'a> {
 impl<'a> ModelParts<'a> {
     /// Networks that decode rows from their readings, and nothing else. Each row has an index into `networks`.
     pub fn new(networks: &'a [Network<'a>], row_network: &'a [u8], metadata: Metadata<'a>) -> Self {
-        let (fronts, linear_rmse, confidence, fill) = (&[], Floats(&[]), None, None);
-        Self { fronts, confidence, linear_rmse, fill, networks, row_network, metadata }
+        let (fronts, linear_rmse, reading_model) = (&[], Floats(&[]), None);
+        Self { fronts, linear_rmse, reading_model, networks, row_network, metadata }
     }
 }
 
@@ -61,8 +58,8 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     let numbers = errors + m.full_scale.0.len() + parts.row_network.len();
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
     let fronts = parts.fronts.iter().flat_map(Front::block).map(<[u32]>::len);
-    let floats = [parts.confidence.map(|it| it.block()), parts.fill.map(|it| it.block())];
-    let blocks = floats.iter().flatten().map(|it| it.len()).chain(fronts);
+    let floats = parts.reading_model.map(|it| it.block().len());
+    let blocks = floats.into_iter().chain(fronts);
     let blocks: usize = blocks.map(|words| SECTION_FIELDS + words * 4).sum();
     FIXED_FIELDS + text + numbers + blocks + weights
 }
@@ -111,20 +108,14 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     if m.relative_inputs {
         writer.put(&TAG_RELATIVE_INPUTS)?;
     }
-    if let Some(confidence) = parts.confidence {
-        let sizes = confidence.sizes();
-        let directions = fit("number of directions", sizes.directions, u16::MAX)?;
-        let components = fit("number of components", sizes.components, u16::MAX)?;
-        writer.put(&ConfidenceHeader { tag: TAG_CONFIDENCE, directions, components })?;
-        writer.put_block(&[bytemuck::cast_slice(confidence.block())])?;
-    }
     if !parts.linear_rmse.0.is_empty() {
         writer.put(&LinearSection { tag: TAG_LINEAR, rmse: parts.linear_rmse.0 })?;
     }
-    if let Some(fill) = parts.fill {
-        let factors = fit("number of factors", fill.factors(), u16::MAX)?;
-        writer.put(&FillHeader { tag: TAG_FILL, factors })?;
-        writer.put_block(&[bytemuck::cast_slice(fill.block())])?;
+    if let Some(model) = parts.reading_model {
+        let factors = fit("number of factors", model.sizes().factors, u16::MAX)?;
+        let components = fit("number of components", model.sizes().components, u16::MAX)?;
+        writer.put(&ReadingModelHeader { tag: TAG_READING_MODEL, factors, components })?;
+        writer.put_block(&[bytemuck::cast_slice(model.block())])?;
     }
     for (index, network) in parts.networks.iter().enumerate() {
         if let Some(front) = parts.fronts.get(index) {

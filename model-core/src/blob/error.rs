@@ -104,16 +104,10 @@ pub enum DecodeError {
         /// What is wrong with the projection.
         cause: NetworkError,
     },
-    /// The confidence's parameters are not valid.
-    #[error("confidence: {cause}")]
-    Confidence {
-        /// What is wrong with the confidence.
-        cause: NetworkError,
-    },
-    /// The fill's parameters are not valid.
-    #[error("fill: {cause}")]
-    Fill {
-        /// What is wrong with the fill.
+    /// The reading model's parameters are not valid.
+    #[error("reading model: {cause}")]
+    ReadingModel {
+        /// What is wrong with the reading model.
         cause: NetworkError,
     },
     /// The parameters of a network are not valid.

@@ -24,9 +24,8 @@ pub(super) const TAG_METADATA: u8 = 0;
 /// Tag of a section without fields: the model's inputs are relative to the baseline.
 pub(super) const TAG_RELATIVE_INPUTS: u8 = 3;
 pub(super) const TAG_FRONT: u8 = 4;
-pub(super) const TAG_CONFIDENCE: u8 = 5;
 pub(super) const TAG_LINEAR: u8 = 6;
-pub(super) const TAG_FILL: u8 = 7;
+pub(super) const TAG_READING_MODEL: u8 = 8;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -108,22 +107,14 @@ pub(super) struct FrontHeader {
     pub features: u16,
 }
 
-/// Header of the confidence's section; padding and its floats follow.
+/// Header of the reading model's section; padding and its floats follow.
 #[derive(Serialize, Deserialize)]
-pub(super) struct ConfidenceHeader {
-    pub tag: u8,
-    /// Number of directions that readings are projected to.
-    pub directions: u16,
-    /// Number of components of the mixture.
-    pub components: u16,
-}
-
-/// Header of the fill's section; padding and its floats follow.
-#[derive(Serialize, Deserialize)]
-pub(super) struct FillHeader {
+pub(super) struct ReadingModelHeader {
     pub tag: u8,
     /// Number of factors.
     pub factors: u16,
+    /// Number of components of the mixture; 0 of a model that fills missing readings, and no more.
+    pub components: u16,
 }
 
 #[cfg(test)]
@@ -132,9 +123,7 @@ mod tests {
 
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
-        let others = [TAG_METADATA, TAG_FRONT, TAG_RELATIVE_INPUTS];
-        let more = [TAG_CONFIDENCE, TAG_FILL, TAG_LINEAR];
-        for tag in others.into_iter().chain(more) {
+        for tag in [TAG_METADATA, TAG_FRONT, TAG_RELATIVE_INPUTS, TAG_LINEAR, TAG_READING_MODEL] {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

@@ -2,12 +2,11 @@
 
 use super::error::DecodeError;
 use super::format::{
-    ConfidenceHeader, FLOAT_ALIGNMENT, FillHeader, LinearSection, TAG_CONFIDENCE, TAG_FILL,
-    TAG_LINEAR, TAG_RELATIVE_INPUTS,
+    FLOAT_ALIGNMENT, LinearSection, ReadingModelHeader, TAG_LINEAR, TAG_READING_MODEL,
+    TAG_RELATIVE_INPUTS,
 };
 use super::metadata::{Floats, ModelShape};
-use crate::confidence::{Confidence, Sizes};
-use crate::fill::{self, Fill};
+use crate::reading_model::{ReadingModel, Sizes};
 
 /// Takes the postcard fields `T` of a `section` from the front of `bytes`.
 pub(super) fn take<'a, T: serde::Deserialize<'a>>(
@@ -42,20 +41,6 @@ pub(super) fn take_block<'a>(
     take::<&[u8]>(rest, section)
 }
 
-/// Cuts padding, length and a block of so many `floats` from the front of `bytes`. `what` names its bytes.
-fn take_floats<'a>(
-    bytes: &'a [u8],
-    section: &'static str,
-    what: &'static str,
-    floats: usize,
-) -> Result<(&'a [f32], &'a [u8]), DecodeError> {
-    let (block, rest) = take_block(bytes, section)?;
-    check_count(what, floats.saturating_mul(4), block.len())?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-    Ok((block, rest))
-}
-
 /// Cuts the section of relative inputs from the front of `bytes`; returns whether there is one.
 pub(super) fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
     match bytes.split_first() {
@@ -78,41 +63,25 @@ pub(super) fn take_linear(
     Ok((Floats(section.rmse), rest))
 }
 
-/// Cuts the confidence from the front of `bytes` if there is one, and checks it.
-pub(super) fn take_confidence(
+/// Cuts the reading model from the front of `bytes` if there is one; checks its length, but no values.
+pub(super) fn cut_reading_model(
     bytes: &[u8],
     shape: ModelShape,
-) -> Result<(Option<Confidence<'_>>, &[u8]), DecodeError> {
-    const SECTION: &str = "confidence section";
-    if bytes.first() != Some(&TAG_CONFIDENCE) {
+) -> Result<(Option<ReadingModel<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "reading model section";
+    if bytes.first() != Some(&TAG_READING_MODEL) {
         return Ok((None, bytes));
     }
-    let (header, rest) = take::<ConfidenceHeader>(bytes, SECTION)?;
+    let (header, rest) = take::<ReadingModelHeader>(bytes, SECTION)?;
     let sizes = Sizes {
-        readings: shape.rows * shape.inputs,
-        directions: header.directions.into(),
+        readings: shape.rows.saturating_mul(shape.inputs),
+        factors: header.factors.into(),
         components: header.components.into(),
-        outputs: shape.rows * shape.outputs,
+        outputs: shape.rows.saturating_mul(shape.outputs),
     };
-    let floats = sizes.block_floats();
-    let (block, rest) = take_floats(rest, SECTION, "bytes of confidence", floats)?;
-    let confidence =
-        Confidence::new(sizes, block).map_err(|cause| DecodeError::Confidence { cause })?;
-    Ok((Some(confidence), rest))
-}
-
-/// Cuts the fill from the front of `bytes` if there is one; checks its length, but no values.
-pub(super) fn cut_fill(
-    bytes: &[u8],
-    shape: ModelShape,
-) -> Result<(Option<Fill<'_>>, &[u8]), DecodeError> {
-    const SECTION: &str = "fill section";
-    if bytes.first() != Some(&TAG_FILL) {
-        return Ok((None, bytes));
-    }
-    let (header, rest) = take::<FillHeader>(bytes, SECTION)?;
-    let (readings, factors) = (shape.rows.saturating_mul(shape.inputs), header.factors.into());
-    let floats = fill::block_floats(readings, factors);
-    let (block, rest) = take_floats(rest, SECTION, "bytes of fill", floats)?;
-    Ok((Some(Fill::of_checked(readings, factors, block)), rest))
+    let (block, rest) = take_block(rest, SECTION)?;
+    check_count("bytes of the reading model", sizes.block_floats().saturating_mul(4), block.len())?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    Ok((Some(ReadingModel::of_checked(sizes, block)), rest))
 }

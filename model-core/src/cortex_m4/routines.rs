@@ -9,7 +9,6 @@ use super::Block;
 core::arch::global_asm!(
     include_str!("common.s"),
     include_str!("fixed16.s"),
-    include_str!("mixture.s"),
     include_str!("projection.s"),
     include_str!("touch.s"),
     options(raw)
@@ -72,7 +71,6 @@ unsafe extern "C" {
         side: f32,
         whole_changes: bool,
     ) -> f32;
-    fn taxel_density(component: *const f32, features: *const f32, count: usize, floor: f32) -> f32;
 }
 
 /// Whether an input was clamped, NaN or infinite, from the floating-point status after a routine. The conversion of
@@ -140,19 +138,6 @@ pub(crate) unsafe fn touch(
     let reciprocals = reciprocals.map_or(core::ptr::null(), <[f32]>::as_ptr);
     // SAFETY: the caller has checked the lengths.
     unsafe { taxel_touch(readings.as_ptr(), pairs, shape, count, reciprocals, floor, side, whole) }
-}
-
-/// Density of a mixture's component at `features`, as
-/// [`Confidence`](crate::confidence::Confidence) computes it; below `floor` it may be any number that is.
-///
-/// # Safety
-/// The caller must check that there are features, and that `component` has 1 + n + n · (n + 1) / 2 numbers for n features.
-#[inline(always)]
-pub(crate) unsafe fn density(component: &[f32], features: &[f32], floor: f32) -> f32 {
-    let count = features.len();
-    debug_assert!(count > 0 && component.len() == 1 + count + count * (count + 1) / 2);
-    // SAFETY: the caller has checked the lengths.
-    unsafe { taxel_density(component.as_ptr(), features.as_ptr(), count, floor) }
 }
 
 /// Square root of a number that is not negative, rounded correctly.

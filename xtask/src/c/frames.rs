@@ -103,8 +103,8 @@ fn group_bytes(
             put(&mut bytes, &[novelty]);
             put(&mut bytes, &deviations);
         }
-        if model.fill().is_some() {
-            let filled = decoder.fill(&mut readings, &mut scratch) as u32;
+        if model.reading_model().is_some() {
+            let filled = decoder.fill(&mut readings, &reciprocals, &mut scratch) as u32;
             bytes.extend(filled.to_le_bytes());
             // Which of all NaN comes out is the processor's choice.
             readings.iter_mut().filter(|it| it.is_nan()).for_each(|it| *it = f32::NAN);

@@ -6,9 +6,9 @@ use taxel_data::dataset::{AtRest, Dataset};
 use taxel_data::progress::Silent;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
-use taxel_learn::confidence::{self, Density, HeldOut, Settings};
+use taxel_learn::reading_model::{self, Extent, HeldOut, Statistics};
 use taxel_learn::train::{Features, Kinds, THRESHOLD, train};
-use taxel_learn::{ModelBlob, Options, Origin, fill, pack, relative};
+use taxel_learn::{ModelBlob, Options, Origin, pack, relative};
 use taxel_simulate::{Synthesis, World};
 
 use crate::process::Outcome;
@@ -27,14 +27,15 @@ const FEATURES_OF_PLACE: usize = 5;
 /// Shape of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
-    /// The paper's sensor: a network a row, 18 readings to 18 outputs, with a fill.
+    /// The paper's sensor: a network a row, 18 readings to 18 outputs, which fills missing readings.
     Rows,
-    /// All of it by one network behind a projection, with a confidence and a fill.
+    /// All of it by one network behind a projection, with a full reading model.
     Array,
-    /// A mat of 4 × 7 cells: a network a row without affine tail, inputs relative to the baseline, a confidence.
+    /// A mat of 4 × 7 cells: a network a row without affine tail, inputs relative to the baseline, a full reading
+    /// model.
     Mat,
     /// Place, depth and force of a contact on 4 × 4 cells, by two networks behind shape and strength of the touch: the first
-    /// has a projection. In f32 inputs are relative to the baseline. In fixed16 they are not, and every other reading
+    /// has a projection. It fills missing readings. In f32 inputs are relative to the baseline. In fixed16 they are not, and every other reading
     /// moves the other way.
     Touch,
 }
@@ -140,16 +141,15 @@ fn made(shape: Shape, format: Format, frames: usize) -> Outcome<Model> {
         trained.fronts[0] = projected.fronts.remove(0);
         trained.networks[0] = projected.networks.remove(0);
     }
-    let mut blob = pack(&trained, &dataset, &origin).map_err(failed)?;
-    if matches!(shape, Shape::Array | Shape::Mat) {
-        let density = Density::fit(&dataset, &Settings::default());
-        let mut others = HeldOut::default();
-        others.add(&blob, &density, &held_out);
-        blob = confidence::add(&blob, &density, &others).map_err(failed)?;
+    let blob = pack(&trained, &dataset, &origin).map_err(failed)?;
+    let is_full = matches!(shape, Shape::Array | Shape::Mat);
+    let extent = if is_full { Extent::Full } else { Extent::Fill };
+    let statistics = Statistics::fit(&dataset.inputs, extent, 1).map_err(failed)?;
+    let mut others = HeldOut::default();
+    if is_full {
+        others.add(&blob, &statistics, &held_out);
     }
-    if matches!(shape, Shape::Rows | Shape::Array) {
-        blob = fill::add(&blob, &dataset.inputs).map_err(failed)?;
-    }
+    let blob = reading_model::add(&blob, &statistics, &others).map_err(failed)?;
     let is_as_asked = blob.parse().networks().all(|network| network.format() == format);
     if !is_as_asked {
         return Err(format!(

@@ -24,10 +24,12 @@ pub fn compare(models: &[Model], folder: &Path) -> Outcome {
         fs::write(&file, rust::source(&parsed)).map_err(failed)?;
         let module = name.replace('-', "_");
         let given = if parsed.metadata().relative_inputs { "r, b" } else { "r" };
-        let assess = parsed.confidence().map_or("None".into(), |_| {
-            format!("Some(|r, b, d| {{ let _ = b; {module}::assess({given}, d) }})")
-        });
-        let fill = parsed.fill().map_or("None".into(), |_| format!("Some({module}::fill)"));
+        let call = |has: bool, function: &str, (all, more): (&str, &str)| {
+            let call = format!("{{ let _ = b; {module}::{function}({given}{more}) }}");
+            if has { format!("Some(|{all}| {call})") } else { "None".into() }
+        };
+        let assess = call(parsed.assesses(), "assess", ("r, b, d", ", d"));
+        let fill = call(parsed.reading_model().is_some(), "fill", ("r, b", ""));
         // Writing to a string cannot fail.
         let _ = writeln!(source, "mod {module} {{ include!({:?}); }}", file.display().to_string());
         let _ = writeln!(

@@ -1,5 +1,6 @@
 use taxel_data::{Dataset, Silent};
 use taxel_learn::decoders::mean::Mean;
+use taxel_learn::reading_model::Extent;
 
 use super::*;
 use crate::experiment::Experiment;
@@ -33,7 +34,7 @@ fn contacts_that_are_much_worse_by_either_measure_are_warned_of_with_what_to_do(
     let by_rmse = warning(&[("edge", 0.0601, 0.97, None)]).unwrap();
     let told = "edge (dz_mm 0.060 mm with R² 0.97 instead of 0.040 with 0.96)";
     assert!(
-        by_rmse.contains(told) && by_rmse.ends_with("notice them (train --confidence)"),
+        by_rmse.contains(told) && by_rmse.ends_with("notice them (train --reading-model full)"),
         "{by_rmse}"
     );
     assert!(warning(&[("small", 0.03, 0.90, None)]).unwrap().contains("small (dz_mm 0.030 mm"));
@@ -60,7 +61,7 @@ fn press() -> Experiment {
     let mut scene = Experiment::load("press").unwrap();
     scene.world.read_rows = vec![3, 4];
     (scene.training.frames, scene.training.centres, scene.training.refine) = (2000, 16, false);
-    scene.training.confidence = true;
+    scene.training.reading_model = Some(Extent::Full);
     scene
 }
 
@@ -98,11 +99,11 @@ fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
     let of = |name: &str| found.contacts.iter().find(|it| it.name == name).unwrap();
     assert!(of("smaller radii").mean[2].rmse < 0.8 * of("larger radii").mean[2].rmse);
     assert!(of("smaller radii").errors[2].r_squared < Some(0.7));
-    // Long tails are more novel than what was trained on, of which half a percent is.
+    // Wider contacts are more novel than what was trained on, of which half a percent is.
     let own_novel = found.own_percent_novel.unwrap();
     assert!(own_novel < 2.0, "{own_novel} %");
     assert!(found.contacts.iter().all(|it| it.percent_novel.is_some()));
-    assert!(of("two contacts").percent_novel > Some(own_novel));
+    assert!(of("larger radii").percent_novel > Some(4.0 * own_novel));
 }
 
 #[test]

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use taxel_core::rbf::Format;
 use taxel_data::Silent;
 use taxel_learn::cost::{Cost, DecoderRam, Design};
+use taxel_learn::reading_model::Extent;
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::World;
 
@@ -201,7 +202,7 @@ struct TrainingFile {
     each_row: Option<bool>,
     features: Option<usize>,
     refine: Option<bool>,
-    confidence: Option<bool>,
+    reading_model: Option<Extent>,
 }
 
 /// Measurements, trained on as the fields in `text` say.
@@ -223,6 +224,6 @@ pub fn measured(data: &Measurements, text: &str) -> std::result::Result<Measurem
     options.each_row = t.each_row.unwrap_or(options.each_row);
     options.features = t.features.or(options.features);
     data.refine = t.refine.unwrap_or(data.refine);
-    data.confidence = t.confidence.unwrap_or(data.confidence);
+    data.reading_model = t.reading_model.or(data.reading_model);
     Ok(data)
 }

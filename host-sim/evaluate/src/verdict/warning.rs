@@ -3,6 +3,7 @@
 use serde::Serialize;
 use taxel_core::blob::Model;
 use taxel_core::rbf::Format;
+use taxel_core::reading_model::ReadingModel;
 use taxel_data::Table;
 use taxel_data::error::cut;
 use taxel_firmware::capacity::Capacity;
@@ -24,7 +25,7 @@ pub const FRAMES_A_WEIGHT: usize = 10;
 /// Number of frames to judge by below which a warning is due.
 pub const FEW_TEST_FRAMES: usize = 30;
 
-/// Number of training frames below which a confidence covers noticeably more or fewer errors than it says.
+/// Number of training frames below which intervals cover noticeably more or fewer errors than it says.
 pub const FRAMES_FOR_CONFIDENCE: usize = 300;
 
 /// Share of readings outside the training range above which a warning is due.
@@ -127,11 +128,14 @@ impl Warning {
     }
 
     /// Confidence of fewer than 300 training `frames`.
-    pub fn few_frames_for_confidence(frames: usize, has_confidence: bool) -> Option<Self> {
-        let due = has_confidence && frames < FRAMES_FOR_CONFIDENCE;
+    pub fn few_frames_for_confidence(
+        frames: usize,
+        model: Option<ReadingModel<'_>>,
+    ) -> Option<Self> {
+        let due = frames < FRAMES_FOR_CONFIDENCE && model.is_some_and(|it| it.assesses());
         Self::when(due, "few-frames-for-confidence", || {
             format!(
-                "{frames} training frames are few for a confidence, whose intervals may cover far more or fewer errors \
+                "{frames} training frames are few for a reading model, whose intervals may cover far more or fewer errors \
                  than they say: give {FRAMES_FOR_CONFIDENCE} or more"
             )
         })
@@ -156,7 +160,7 @@ impl Warning {
             let advice = if has_novelty {
                 "; train on a mix (docs/contact.md), and believe no estimate that is novel"
             } else {
-                "; train on a mix (docs/contact.md), or let a confidence notice them (train --confidence)"
+                "; train on a mix (docs/contact.md), or let a reading model notice them (train --reading-model full)"
             };
             format!(
                 "contacts unlike those of training are decoded worse: {}{more}{advice}",

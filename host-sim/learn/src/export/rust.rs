@@ -21,7 +21,7 @@ const NONE: &str = "None";
 /// Rust source of a `model`: statics of all its numbers, a [`Fixed`](taxel_core::Fixed) of them, and functions that call it,
 /// with the bits that [`Decoder`](taxel_core::Decoder) gives.
 ///
-/// There is a function `decode`; `assess` of a model with a confidence, and `fill` of one that fills missing readings. Numbers
+/// There is a function `decode`; `fill` of a model with a reading model, and `assess` if that tells novelty and deviations. Numbers
 /// are written with the digits that tell them from their neighbours in f32.
 #[must_use]
 pub fn source(model: &Model<'_>) -> String {
@@ -60,7 +60,7 @@ fn header(model: &Model<'_>) -> String {
          // Readings, row after row, with their units:\n{}\
          // Outputs, row after row, with their units:\n{}\
          #[allow(unused_imports)]\n\
-         use taxel_core::{{blob, confidence, fill, projection, rbf, rbf::arrays, touch}};\n",
+         use taxel_core::{{blob, projection, rbf, rbf::arrays, reading_model, touch}};\n",
         metadata.name,
         model.crc(),
         columns(metadata.input_names, metadata.input_units),
@@ -173,16 +173,12 @@ fn front(index: usize, front: &Front<'_>) -> (String, String) {
 
 /// Static of the whole model, whose networks are these expressions of this `kind`, and statics of its other parts.
 fn fixed(model: &Model<'_>, networks: &[String], kind: &str) -> String {
-    let (mut items, [mut confidence, mut fill]) = (String::new(), [NONE, NONE].map(String::from));
-    if let Some(it) = model.confidence() {
-        items += &flat("Block of `Confidence::new`", "CONFIDENCE", it.block());
-        let sizes = format!("confidence::{:?}", it.sizes());
-        confidence = format!("Some(confidence::Confidence::of_array({sizes}, &CONFIDENCE))");
-    }
-    if let Some(it) = model.fill() {
-        items += &flat("Block of `Fill::new`", "FILL", it.block());
-        let sizes = format!("{}, {}", it.readings(), it.factors());
-        fill = format!("Some(fill::Fill::of_array({sizes}, &FILL))");
+    let (mut items, mut reading_model) = (String::new(), NONE.to_owned());
+    if let Some(it) = model.reading_model() {
+        items += &flat("Block of `ReadingModel::new`", "READING_MODEL", it.block());
+        let sizes = format!("reading_model::{:?}", it.sizes());
+        reading_model =
+            format!("Some(reading_model::ReadingModel::of_array({sizes}, &READING_MODEL))");
     }
     let mut listed = Vec::new();
     for (index, of_frames) in model.fronts().enumerate() {
@@ -201,8 +197,7 @@ fn fixed(model: &Model<'_>, networks: &[String], kind: &str) -> String {
         "taxel_core::Fixed {{\n\
          \x20   networks: taxel_core::Networks::{}(&[\n{}    ]),\n\
          \x20   relative_inputs: {relative},\n\
-         \x20   confidence: {confidence},\n\
-         \x20   fill: {fill},\n\
+         \x20   reading_model: {reading_model},\n\
          }}\n.checked()",
         if is_array { "OfFrames" } else { "OfRows" },
         listed.concat(),
@@ -228,7 +223,7 @@ fn functions(model: &Model<'_>) -> String {
          \x20   MODEL.decode(readings, {given})\n\
          }}\n"
     );
-    let assess = model.confidence().map(|_| {
+    let assess = model.assesses().then(|| {
         format!(
             "\n/// Writes the deviation of each output of a frame, and returns its novelty in nats: above 0, it is unlike the\n\
              /// frames of training.{doc}\n\
@@ -238,12 +233,12 @@ fn functions(model: &Model<'_>) -> String {
              }}\n"
         )
     });
-    let fill = model.fill().map(|_| {
+    let fill = model.reading_model().map(|_| {
         format!(
-            "\n/// Replaces missing readings by those expected of the others, and returns their number.\n\
+            "\n/// Replaces missing readings by those expected of the others, and returns their number.{doc}\n\
              #[allow(dead_code)]\n\
-             pub fn fill(readings: &mut {readings}) -> usize {{\n\
-             \x20   MODEL.fill(readings)\n\
+             pub fn fill(readings: &mut {readings}{more}) -> usize {{\n\
+             \x20   MODEL.fill(readings, {given})\n\
              }}\n"
         )
     });

@@ -1,7 +1,7 @@
-//! What a frame's other readings tell of each, by a model's fill, whatever the noise.
+//! What a frame's other readings tell of each, by a reading model, whatever the noise.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use taxel_core::fill::Fill;
+use taxel_core::reading_model::{ReadingModel, Sizes};
 
 use super::FEWEST_FOR_NOISE;
 
@@ -15,7 +15,7 @@ const ROUNDS: usize = 6;
 /// Largest variance along a factor, in that of noise.
 const MOST_VARIANCE: f64 = 1e7;
 
-/// Factors of a fill, in f64, and their parts.
+/// Factors of a reading model, in f64, and their parts.
 #[derive(Debug)]
 pub struct Expected {
     mean: Vec<f64>,
@@ -41,10 +41,10 @@ impl Solver {
 }
 
 impl Expected {
-    pub fn new(fill: Fill<'_>) -> Self {
-        let channels: Vec<_> = fill.channels().collect();
-        let mut parts =
-            DMatrix::from_fn(fill.readings(), fill.factors(), |i, f| f64::from(channels[i].2[f]));
+    pub fn new(model: ReadingModel<'_>) -> Self {
+        let channels: Vec<_> = model.channels().collect();
+        let Sizes { readings, factors, .. } = model.sizes();
+        let mut parts = DMatrix::from_fn(readings, factors, |i, f| f64::from(channels[i].2[f]));
         // The block has parts of the inverse covariance. Their squares sum up to 1 − 1/λ, with λ the variance.
         for mut column in parts.column_iter_mut() {
             let variance = (1.0 / (1.0 - column.norm_squared()).max(1.0 / MOST_VARIANCE)).max(1.0);

@@ -6,25 +6,24 @@ use taxel_simulate::timetable::Timetable;
 use taxel_simulate::{Synthesis, World, synthesise};
 
 use super::*;
-use crate::fill;
+use crate::reading_model::factors::Factors;
 
-/// Readings of a whole sensor, and a fill fitted to other ones.
-fn sensor() -> (Table, Vec<f32>) {
+/// Readings of a whole sensor, and factors fitted to other ones.
+fn sensor() -> (Table, Factors) {
     let world = World::press();
     let training = synthesise(&world, Stream::Training, 2000).inputs;
-    (synthesise(&world, Stream::Test, 200).inputs, fill::fit(&training, 16).unwrap())
+    (synthesise(&world, Stream::Test, 200).inputs, Factors::fit(&training, 11).unwrap())
 }
 
-fn named(readings: &Table, block: &[f32]) -> Vec<String> {
-    let found = told(readings, Some(block));
+fn named(readings: &Table, factors: &Factors) -> Vec<String> {
+    let found = told(readings, Some(factors));
     assert!(found.iter().all(|(_, frames)| frames % WINDOW == 0));
     found.into_iter().map(|(fault, _)| fault).collect()
 }
 
 /// Names of faults, and in how many frames they are.
-fn told(readings: &Table, block: Option<&[f32]>) -> Vec<(String, usize)> {
-    let fill = block.map(|block| Fill::new(144, 16, block).unwrap());
-    let found = diagnose(readings, Limits::USUAL, fill);
+fn told(readings: &Table, factors: Option<&Factors>) -> Vec<(String, usize)> {
+    let found = diagnose(readings, Limits::USUAL, factors.map(Factors::model));
     found.iter().map(|found| (found.fault.to_string(), found.frames)).collect()
 }
 
@@ -45,22 +44,22 @@ fn struck(table: &Table, when: fn(usize) -> bool, readings: Range<usize>, ohm: f
 
 #[test]
 fn every_kind_of_fault_is_named_and_sound_frames_have_none() {
-    let (sound, block) = sensor();
-    assert_eq!(named(&sound, &block), [""; 0]);
+    let (sound, factors) = sensor();
+    assert_eq!(named(&sound, &factors), [""; 0]);
     let row = |ohm: f64| struck(&sound, |_| true, 54..72, ohm);
-    assert_eq!(named(&row(f64::INFINITY), &block), ["row-wire 4 open"]);
-    assert_eq!(named(&row(f64::NAN), &block), ["row-wire 4 missing"]);
+    assert_eq!(named(&row(f64::INFINITY), &factors), ["row-wire 4 open"]);
+    assert_eq!(named(&row(f64::NAN), &factors), ["row-wire 4 missing"]);
     let column =
         with(&sound, |_, frame| frame.iter_mut().skip(4).step_by(18).for_each(|r| *r = 0.0));
-    assert_eq!(named(&column, &block), ["column-wire 5 shorted"]);
+    assert_eq!(named(&column, &factors), ["column-wire 5 shorted"]);
     let single = struck(&sound, |_| true, 58..59, 0.02);
-    assert_eq!(named(&single, &block), ["r4c5 shorted"]);
+    assert_eq!(named(&single, &factors), ["r4c5 shorted"]);
     let ground = with(&sound, |_, frame| {
         frame.iter_mut().enumerate().for_each(|(at, r)| *r = if at / 18 == 6 { 1e9 } else { 0.0 });
     });
-    assert_eq!(named(&ground, &block), ["row-wire 7 shorted to ground"]);
+    assert_eq!(named(&ground, &factors), ["row-wire 7 shorted to ground"]);
     let none = with(&sound, |_, frame| frame.fill(f64::INFINITY));
-    assert_eq!(named(&none, &block), ["all readings open"]);
+    assert_eq!(named(&none, &factors), ["all readings open"]);
     let touching = |pairs: &[[usize; 2]]| {
         with(&sound, |_, frame| {
             pairs.iter().for_each(|[a, b]| {
@@ -70,23 +69,23 @@ fn every_kind_of_fault_is_named_and_sound_frames_have_none() {
         })
     };
     let columns = touching(&[8, 26, 44, 62, 80, 98, 116, 134].map(|at| [at, at + 1]));
-    assert_eq!(named(&columns, &block), ["column-wires 9 and 10 shorted together"]);
+    assert_eq!(named(&columns, &factors), ["column-wires 9 and 10 shorted together"]);
     let rows: Vec<_> = (90..108).map(|at| [at, at + 18]).collect();
-    assert_eq!(named(&touching(&rows), &block), ["row-wires 6 and 7 shorted together"]);
+    assert_eq!(named(&touching(&rows), &factors), ["row-wires 6 and 7 shorted together"]);
     let mut draw = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
     let draws: Vec<f64> = (0..200).map(|_| draw.normal()).collect();
     let noisy = with(&sound, |line, frame| frame[100] *= 1.0 + 0.5 * draws[line]);
-    assert_eq!(named(&noisy, &block), ["r6c11 noisy"]);
+    assert_eq!(named(&noisy, &factors), ["r6c11 noisy"]);
 }
 
 #[test]
 fn few_frames_of_a_sound_sensor_have_no_faults() {
-    let (_, block) = sensor();
+    let (_, factors) = sensor();
     for frames in [5, 6, 9, 12, 49, 50, 205, 207, 399] {
         for seed in 0..3 {
             let world = World { seed: 30 + seed, ..World::press() };
             let sound = synthesise(&world, Stream::Test, frames).inputs;
-            assert_eq!(told(&sound, Some(&block)), [], "{frames} frames of seed {seed}");
+            assert_eq!(told(&sound, Some(&factors)), [], "{frames} frames of seed {seed}");
         }
     }
 }
@@ -94,7 +93,7 @@ fn few_frames_of_a_sound_sensor_have_no_faults() {
 /// Contacts that slide and press as slowly as the live view's: a window has a single touch, in which the model errs alike.
 #[test]
 fn slow_touches_of_a_sound_sensor_have_no_faults() {
-    let (_, block) = sensor();
+    let (_, factors) = sensor();
     let path = Path {
         speed_mm_per_s: [4.0, 12.0],
         press_rate_hz: [0.25, 0.5],
@@ -104,7 +103,7 @@ fn slow_touches_of_a_sound_sensor_have_no_faults() {
     let timetable = Timetable::instants((0..1200).map(|at| f64::from(at) / 100.0).collect());
     let world = World::press();
     let slow = Synthesis::new(&world).along(path, timetable).frames(Stream::Test, 10 * 1200);
-    assert_eq!(told(&slow.inputs, Some(&block)), []);
+    assert_eq!(told(&slow.inputs, Some(&factors)), []);
 }
 
 #[test]
@@ -120,44 +119,44 @@ fn every_window_has_frames_enough_and_all_frames_are_in_one() {
 
 #[test]
 fn what_comes_and_goes_is_named_and_counted_in_the_frames_that_it_strikes() {
-    let (sound, block) = sensor();
-    let (block, none) = (Some(&block[..]), None);
-    let told = |readings: &Table, block: Option<&[f32]>, expected: &[(&str, usize)]| {
-        let found = told(readings, block);
+    let (sound, factors) = sensor();
+    let (factors, none) = (Some(&factors), None);
+    let told = |readings: &Table, factors: Option<&Factors>, expected: &[(&str, usize)]| {
+        let found = told(readings, factors);
         let found: Vec<_> = found.iter().map(|(name, frames)| (name.as_str(), *frames)).collect();
         assert_eq!(found, expected);
     };
-    for fill in [block, none] {
+    for model in [factors, none] {
         let single = |ohm| struck(&sound, |line| line % 8 == 0, 58..59, ohm);
-        told(&single(1e6), fill, &[("r4c5 intermittently open", 25)]);
-        told(&single(0.02), fill, &[("r4c5 intermittently shorted", 25)]);
-        told(&single(f64::NAN), fill, &[("r4c5 intermittently missing", 25)]);
+        told(&single(1e6), model, &[("r4c5 intermittently open", 25)]);
+        told(&single(0.02), model, &[("r4c5 intermittently shorted", 25)]);
+        told(&single(f64::NAN), model, &[("r4c5 intermittently missing", 25)]);
         let row = struck(&sound, |line| line % 5 == 0, 54..72, f64::INFINITY);
-        told(&row, fill, &[("row-wire 4 intermittently open", 40)]);
+        told(&row, model, &[("row-wire 4 intermittently open", 40)]);
         // It breaks for good, and lasts in most of the frames.
         let breaks = struck(&sound, |line| line >= 8, 58..59, 1e6);
-        told(&breaks, fill, &[("r4c5 open", 192)]);
+        told(&breaks, model, &[("r4c5 open", 192)]);
     }
     // All readings of a column are open in an eighth of the frames, but never together.
     let apart = with(&sound, |line, frame| frame[line % 8 * 18] = 1e6);
     let each: Vec<String> = (1..=8).map(|row| format!("r{row}c1 intermittently open")).collect();
     let each: Vec<(&str, usize)> = each.iter().map(|name| (name.as_str(), 25)).collect();
-    told(&apart, block, &each);
+    told(&apart, factors, &each);
     let twice =
         Table { values: [&sound.values[..], &sound.values].concat().into(), ..sound.clone() };
     let breaks = struck(&twice, |line| line >= 150, 58..59, 1e6);
-    told(&breaks, block, &[("r4c5 open", 250)]);
+    told(&breaks, factors, &[("r4c5 open", 250)]);
     let mut draw = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
     let draws: Vec<f64> = (0..200).map(|_| draw.normal()).collect();
     let noisy = with(&sound, |line, frame| frame[100] *= (1.0 + draws[line]).max(0.0));
-    told(&noisy, block, &[("r6c11 noisy", 200)]);
+    told(&noisy, factors, &[("r6c11 noisy", 200)]);
     let shorted = noisy.lines().filter(|frame| frame[100] < 5.0).count();
     assert!(shorted > 20);
     told(&noisy, none, &[("r6c11 intermittently shorted", shorted)]);
 }
 
 #[test]
-fn without_a_fill_health_alone_is_told() {
+fn without_a_reading_model_health_alone_is_told() {
     let (sound, _) = sensor();
     let open = with(&sound, |_, frame| frame[..18].fill(f64::INFINITY));
     let found = diagnose(&open, Limits::USUAL, None);

@@ -14,7 +14,7 @@ pub const MOST_ROUNDING: f64 = 0.05;
 pub const LEAST_RANGE: f64 = 1e-28;
 /// Largest magnitude of a value: its square, and sums of squares, stay far inside f64, and ranges stay inside f32.
 pub const LARGEST: f64 = 1e30;
-/// Least and largest range of an output whose deviations a confidence tells: it holds their squares.
+/// Least and largest range of an output whose deviations a reading model tells: it holds their squares.
 pub const RANGE_OF_SQUARES: [f64; 2] = [1e-15, 1e15];
 /// Range, relative to the values, that rounding in f64 explains: such a column does not change.
 const CONSTANT: f64 = 4.0 * f64::EPSILON;
@@ -48,7 +48,7 @@ pub fn check(dataset: &Dataset) -> Result<()> {
     Ok(())
 }
 
-/// Checks that f32 holds the squares of all outputs of `dataset` that change, as a confidence needs them.
+/// Checks that f32 holds the squares of all outputs of `dataset` that change, as a full reading model needs them.
 ///
 /// # Errors
 /// [`Error`] for the first output whose squares it does not hold.
@@ -59,8 +59,8 @@ pub fn check_squares(dataset: &Dataset) -> Result<()> {
         let span = range[1] - range[0];
         if span > 0.0 && !(least..=most).contains(&span) {
             let why = format!(
-                "a confidence, which holds squares in f32, needs a range from {least:e} to {most:e}: multiply it by {}, \
-                 or leave the confidence out",
+                "a full reading model, which holds squares in f32, needs a range from {least:e} to {most:e}: multiply it by {}, \
+                 or leave the reading model out",
                 factor(span)
             );
             return Err(column(name, range, &why));

@@ -30,7 +30,7 @@ pub(super) struct Expected {
     readings_ohm: Vec<f32>,
     outputs: Vec<f32>,
     per_frame: [usize; 2],
-    /// Novelty and deviations of every frame; none without a confidence.
+    /// Novelty and deviations of every frame; none of a model that tells neither.
     confidence: Vec<(f32, Vec<f32>)>,
     /// Baseline that the device needs, in Ω.
     baseline_ohm: Option<Vec<f32>>,
@@ -132,7 +132,7 @@ impl Expected {
     }
 }
 
-/// Novelty and deviations of all frames by `model`, if it has a confidence.
+/// Novelty and deviations of all frames by `model`, if it tells them.
 fn confidence(
     model: &Model<'_>,
     readings_ohm: &[f32],

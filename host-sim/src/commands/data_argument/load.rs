@@ -104,7 +104,7 @@ impl DataArguments {
             rest,
             options: Options { seed: how.seed, centres, ..usual },
             refine: how.refine,
-            confidence: how.confidence,
+            reading_model: how.reading_model,
         };
         let constant = measurements.constant_inputs();
         data_notes::print_constant(&constant, path);

@@ -45,7 +45,7 @@ pub struct RecordArguments {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "model", conflicts_with = "readings", value_parser = value_parser!(u16).range(1..))]
     report_every: u16,
     /// What is saved of the MODEL's confidence: columns NAME_deviation for each output, and novelty_nats
-    /// (docs/confidence.md).
+    /// (docs/reading-model.md).
     #[arg(long, value_enum, value_name = "WHAT", default_value = "nothing", requires = "model")]
     confidence: Confidence,
     /// CSV file to write; or a recording (.mcap), with readings and estimates, which is written while they come and survives a
@@ -233,7 +233,7 @@ fn confidence_names(
     if wanted == Confidence::Nothing {
         return Ok(Vec::new());
     }
-    if model.confidence().is_none() {
+    if !model.assesses() {
         return Err(Error::Usage(
             "--confidence: MODEL has none; leave the option out, or train one that has".into(),
         ));

@@ -18,7 +18,7 @@ pub struct ConfigureArguments {
     /// Reports that are sent of each scan.
     #[arg(long, value_enum, value_name = "WHAT")]
     send: Option<Wanted>,
-    /// What is computed and sent of the model's confidence with each estimate (docs/confidence.md).
+    /// What is computed and sent of the model's confidence with each estimate (docs/reading-model.md).
     #[arg(long, value_enum, value_name = "WHAT")]
     confidence: Option<Confidence>,
     /// Reading below which a short circuit is assumed.

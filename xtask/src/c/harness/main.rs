@@ -34,7 +34,7 @@ type Rows<const COUNT: usize, const ROWS: usize> = [[f32; COUNT]; ROWS];
 struct Model<const R: usize, const I: usize, const O: usize> {
     decode: fn(&Rows<I, R>, &Rows<I, R>) -> Decoded<R, O>,
     assess: Option<fn(&Rows<I, R>, &Rows<I, R>, &mut Rows<O, R>) -> f32>,
-    fill: Option<fn(&mut Rows<I, R>) -> usize>,
+    fill: Option<fn(&mut Rows<I, R>, &Rows<I, R>) -> usize>,
 }
 
 fn compare<const R: usize, const I: usize, const O: usize>(
@@ -62,7 +62,7 @@ fn compare<const R: usize, const I: usize, const O: usize>(
                 same &= file.same(&[novelty]) & file.same(deviations.as_flattened());
             }
             if let Some(fill) = model.fill {
-                same &= fill(&mut readings) as u32 == file.word();
+                same &= fill(&mut readings, &reciprocals) as u32 == file.word();
                 // Which of all NaN comes out is the processor's choice.
                 let usual = |value: f32| if value.is_nan() { f32::NAN } else { value };
                 same &= file.same(readings.map(|row| row.map(usual)).as_flattened());

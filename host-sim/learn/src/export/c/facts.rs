@@ -38,8 +38,7 @@ impl<'b> Facts<'b> {
         let (shape, model) = (self.model.shape(), &self.model);
         let baseline =
             if model.metadata().relative_inputs { 4 * shape.rows * shape.inputs } else { 0 };
-        let deviations =
-            if model.confidence().is_some() { 4 * shape.rows * shape.outputs } else { 0 };
+        let deviations = if model.assesses() { 4 * shape.rows * shape.outputs } else { 0 };
         self.arrays_bytes() + baseline + deviations
     }
 
@@ -79,8 +78,8 @@ impl<'b> Facts<'b> {
         values.set("OUTPUTS", shape.rows * shape.outputs);
         values.set("SCRATCH", scratch_floats(model));
         values.set("RELATIVE", has(relative));
-        values.set("CONFIDENCE", has(model.confidence().is_some()));
-        values.set("FILL", has(model.fill().is_some()));
+        values.set("CONFIDENCE", has(model.assesses()));
+        values.set("FILL", has(model.reading_model().is_some()));
         values.set("BUT_BASELINE", said(relative, " but the baseline"));
         values.set("AND_BASELINE", said(relative, ", baseline"));
         values.set("FORGETS", said(relative, " It forgets the baseline."));
@@ -100,7 +99,7 @@ impl<'b> Facts<'b> {
         values.set("ROW_OUTPUTS", shape.outputs);
         values.set("RAM_BYTES", self.ram_bytes());
         values.set("TEST_BYTES", self.arrays_bytes());
-        values.set("AND_DEVIATIONS", said(model.confidence().is_some(), ", deviations"));
+        values.set("AND_DEVIATIONS", said(model.assesses(), ", deviations"));
         values.set("CYCLES", self.cost.cycles);
         let listed = |names, units| columns(names, units, " *     ", comment);
         values.set(

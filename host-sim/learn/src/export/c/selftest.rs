@@ -45,7 +45,7 @@ pub fn arrays(model: &Model<'_>) -> Result<String> {
         novelty.extend(novel.map(|it| word(it.to_bits())));
         deviations.push(bits(&deviation));
         let mut frame = frame.clone();
-        decoder.fill(&mut frame, &mut scratch);
+        decoder.fill(&mut frame, &reciprocals, &mut scratch);
         filled.push(bits(&frame));
     }
     let readings: Vec<Vec<String>> = frames.iter().map(|frame| bits(frame)).collect();
@@ -54,11 +54,11 @@ pub fn arrays(model: &Model<'_>) -> Result<String> {
     text += &table("uint32_t", "test_outputs", &outputs);
     text += &table("uint8_t", "test_status", &status);
     text += &array("uint8_t", "test_clamped", clamped);
-    if model.confidence().is_some() {
+    if !novelty.is_empty() {
         text += &table("uint32_t", "test_deviations", &deviations);
         text += &array("uint32_t", "test_novelty", novelty);
     }
-    if model.fill().is_some() {
+    if model.reading_model().is_some() {
         text += &table("uint32_t", "test_filled", &filled);
     }
     if model.metadata().relative_inputs {
@@ -146,7 +146,7 @@ fn of_array(model: &Model<'_>, start: usize) -> Vec<f32> {
         return of_rows(model, start);
     };
     let (features, count) = (projection.features(), projection.readings());
-    let mean = model.fill().map(|it| it.block()).or(model.confidence().map(|it| it.block()));
+    let mean = model.reading_model().map(|it| it.block());
     let mut readings: Vec<f64> = match mean {
         Some(block) => block[..count].iter().copied().map(f64::from).collect(),
         None => vec![0.0; count],

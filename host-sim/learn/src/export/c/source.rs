@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use taxel_core::blob::{Front, Model};
 use taxel_core::exp::{EXP_COEFFICIENTS, LN_2_PARTS};
 use taxel_core::rbf::{Format, Network, fixed16, float32};
+use taxel_core::reading_model::ReadingModel;
 use taxel_core::touch::Kind;
 
 use super::name::Name;
@@ -20,15 +21,14 @@ const FLOAT32: &str = include_str!("source/float32.c");
 const FIXED16: &str = include_str!("source/fixed16.c");
 const PART: &str = include_str!("source/part.c");
 const DECODE: &str = include_str!("source/decode.c");
-const CONFIDENCE: &str = include_str!("source/confidence.c");
-const FILL: &str = include_str!("source/fill.c");
+const READING_MODEL: &str = include_str!("source/reading_model.c");
 const END: &str = include_str!("source/end.c");
 
 /// Flags of a model, by which parts of templates are chosen.
 pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
     let is_f32 = model.networks().any(|network| network.format() == Format::F32);
-    let (array, confidence) = (model.whole_frames(), model.confidence().is_some());
-    let fill = model.fill().is_some();
+    let array = model.whole_frames();
+    let (fill, assess) = (model.reading_model().is_some(), model.assesses());
     let affine = model.networks().any(|network| network.has_affine_tail());
     let touches = model.fronts().any(|front| front.touch.is_some());
     let flags = [
@@ -36,13 +36,14 @@ pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
         ("rows", !array),
         ("array", array),
         ("relative", model.metadata().relative_inputs),
-        ("confidence", confidence),
+        ("assess", assess),
         ("fill", fill),
         ("touches", touches),
-        ("bits", confidence || touches),
-        ("project", confidence || model.fronts().any(|front| front.projection.is_some())),
-        ("root", confidence || fill),
-        ("exp", confidence || is_f32),
+        ("bits", assess || touches),
+        ("reading", fill || touches),
+        ("project", fill || model.fronts().any(|front| front.projection.is_some())),
+        ("root", fill),
+        ("exp", assess || is_f32),
     ];
     those_set(&flags)
 }
@@ -147,16 +148,9 @@ pub fn code(model: &Model<'_>, name: &Name, flags: &[&str], facts: &mut Values) 
     facts.set("PARTS", calls);
     let text = |template| fill(template, name, flags, facts);
     code += &text(DECODE);
-    if flags.contains(&"confidence") {
-        code += &confidence(model);
-        code += &text(CONFIDENCE);
-    }
-    if let Some(fill) = model.fill() {
-        let (readings, block) = (fill.readings(), fill.block());
-        code += &floats("fill_mean", &block[..readings]);
-        code += &floats("fill_scale", &block[readings..2 * readings]);
-        code += &floats("fill_parts", &block[2 * readings..]);
-        code += &text(FILL);
+    if let Some(reading_model) = model.reading_model() {
+        code += &numbers(reading_model);
+        code += &text(READING_MODEL);
     }
     Ok(code + &text(END))
 }
@@ -169,11 +163,9 @@ fn sizes(model: &Model<'_>) -> String {
         ("READINGS", shape.rows * shape.inputs),
         ("OUTPUTS", shape.rows * shape.outputs),
     ];
-    if let Some(confidence) = model.confidence() {
-        let of = confidence.sizes();
-        sizes.extend([("DIRECTIONS", of.directions), ("COMPONENTS", of.components)]);
+    if let Some(of) = model.reading_model().map(|it| it.sizes()) {
+        sizes.extend([("FACTORS", of.factors), ("COMPONENTS", of.components)]);
     }
-    sizes.extend(model.fill().map(|fill| ("FACTORS", fill.factors())));
     macros(&sizes)
 }
 
@@ -299,25 +291,23 @@ fn write_floats(arrays: &[(&str, &[f32])], of: &dyn Fn(&str) -> String, tables: 
     }
 }
 
-/// Tables of the confidence, as its block has them one after the other.
-fn confidence(model: &Model<'_>) -> String {
-    let Some(confidence) = model.confidence() else { return String::new() };
-    let (sizes, block) = (confidence.sizes(), confidence.block());
-    let features = sizes.features();
-    let component = 1 + features + features * (features + 1) / 2;
-    let mut rest = block;
+/// Tables of a reading model, as its block has them one after the other.
+fn numbers(model: ReadingModel<'_>) -> String {
+    let (sizes, mut rest) = (model.sizes(), model.block());
     let mut text = String::new();
     for (name, length) in [
         ("reading_mean", sizes.readings),
         ("reading_scale", sizes.readings),
-        ("directions", (1 + sizes.readings) * sizes.directions),
-        ("mixture", sizes.components * component),
+        ("reading_parts", (1 + sizes.readings) * sizes.factors),
+        ("mixture", sizes.components * sizes.component_floats()),
         ("variances", sizes.components * sizes.outputs),
     ] {
         let (values, after) = rest.split_at(length);
-        text += &floats(name, values);
+        if !values.is_empty() {
+            text += &floats(name, values);
+        }
         rest = after;
     }
-    let threshold = block.last().copied().unwrap_or_default();
-    format!("{text}#define NOVELTY_THRESHOLD {}\n\n", float(threshold))
+    let threshold = rest.last().map(|it| format!("#define NOVELTY_THRESHOLD {}\n\n", float(*it)));
+    text + &threshold.unwrap_or_default()
 }

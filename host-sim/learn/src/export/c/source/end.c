@@ -28,7 +28,7 @@ int taxel_model_selftest(void)
         differs = taxel_model_decode(readings, outputs, status, scratch) != test_clamped[test];
         differs |= memcmp(outputs, test_outputs[test], sizeof outputs) != 0;
         differs |= memcmp(status, test_status[test], sizeof status) != 0;
-//@if confidence
+//@if assess
         differs |= bits_of(taxel_model_assess(readings, outputs, scratch)) != test_novelty[test];
         differs |= memcmp(outputs, test_deviations[test], sizeof outputs) != 0;
 //@end

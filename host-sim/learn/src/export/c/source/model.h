@@ -54,7 +54,7 @@ int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, f
 int taxel_model_set_baseline(const float *baseline);
 
 //@end
-//@if confidence
+//@if assess
 /* Tells how far off the outputs of a frame may be: a standard deviation of each, in its unit, to `deviations`
  * [TAXEL_MODEL_OUTPUTS]. Returns the novelty of the frame in nats: above 0, it is unlike the frames of training. All are NaN
  * if a reading is missing. `scratch` is that of taxel_model_decode.

@@ -27,7 +27,7 @@ static float relative(const float *readings, unsigned index)
 }
 
 //@end
-//@if bits
+//@if reading
 //@if relative
 #define READING(i) relative(readings, i)
 //@end

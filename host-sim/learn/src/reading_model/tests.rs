@@ -8,15 +8,15 @@ use super::*;
 use crate::packing::{Origin, pack};
 use crate::train::{Options, train};
 
-/// The model of `blob` with a confidence.
+/// The model of `blob` with a reading model.
 fn fitted(world: &World, training: &Dataset, blob: &ModelBlob) -> ModelBlob {
-    let density = Density::fit(training, &Settings { components: 8, ..Settings::default() });
+    let statistics = Statistics::fit(&training.inputs, Extent::Full, 1).unwrap();
     let mut held_out = HeldOut::default();
-    held_out.add(blob, &density, &synthesise(world, Stream::Calibration, 4000));
-    add(blob, &density, &held_out).unwrap()
+    held_out.add(blob, &statistics, &synthesise(world, Stream::Calibration, 4000));
+    add(blob, &statistics, &held_out).unwrap()
 }
 
-/// A model of row 4 with a confidence, and what it was fitted to.
+/// A model of row 4 without a reading model and with one, and what it was fitted to.
 fn row_4() -> &'static (World, Dataset, ModelBlob, ModelBlob) {
     static FITTED: OnceLock<(World, Dataset, ModelBlob, ModelBlob)> = OnceLock::new();
     FITTED.get_or_init(|| {
@@ -37,7 +37,7 @@ fn intervals_cover_the_errors_of_frames_that_nothing_was_fitted_to() {
     let model = blob.prepare();
     let decoded = model.decode_table(&test.inputs).values;
     let (deviations, novelty) = model.assess(&test.inputs.values).unwrap();
-    let ratios = blob.parse().confidence().unwrap().ratios_95();
+    let ratios = blob.parse().reading_model().unwrap().ratios_95();
     for (output, ratio) in ratios.iter().enumerate() {
         let share = |ratio: f64| {
             let within = (output..decoded.len()).step_by(18).filter(|at| {
@@ -71,7 +71,7 @@ fn frames_that_the_sensor_cannot_give_are_novel() {
 }
 
 #[test]
-fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
+fn a_reading_model_changes_no_estimate_and_a_device_finds_the_same_bits() {
     let (world, training, without, with) = row_4();
     let test = synthesise(world, Stream::Test, 50);
     let prepared = with.prepare();
@@ -91,7 +91,7 @@ fn a_confidence_changes_no_estimate_and_a_device_finds_the_same_bits() {
     assert_eq!(fitted(world, training, without).bytes(), with.bytes());
 }
 
-/// A model of measured data without noise on its one output, with a confidence calibrated on the second half of the
+/// A model of measured data without noise on its one output, with a reading model calibrated on the second half of the
 /// lines; tells the share of these that it finds novel.
 fn share_novel(readings: usize, reading: impl Fn(usize, usize) -> f64) -> f64 {
     let names = |kind: &str, count: usize| (0..count).map(|i| format!("{kind}{i}")).collect();
@@ -110,10 +110,10 @@ fn share_novel(readings: usize, reading: impl Fn(usize, usize) -> f64) -> f64 {
     let options = Options { centres: 4, ..Options::of_rows() };
     let trained = train(&seen, &options, &Silent).unwrap();
     let blob = pack(&trained, &seen, &Origin::of_data("data", 0, 1, &seen)).unwrap();
-    let density = Density::fit(&seen, &Settings::default());
+    let statistics = Statistics::fit(&seen.inputs, Extent::Full, 1).unwrap();
     let mut held_out = HeldOut::default();
-    held_out.add(&blob, &density, &others);
-    let blob = add(&blob, &density, &held_out).unwrap();
+    held_out.add(&blob, &statistics, &others);
+    let blob = add(&blob, &statistics, &held_out).unwrap();
     let model = blob.prepare();
     let (deviations, novelty) = model.assess(&others.inputs.values).unwrap();
     assert!(deviations.iter().all(|d| d.is_finite()) && novelty.iter().all(|n| n.is_finite()));
@@ -121,7 +121,7 @@ fn share_novel(readings: usize, reading: impl Fn(usize, usize) -> f64) -> f64 {
 }
 
 #[test]
-fn novelty_holds_where_directions_leave_out_nothing_but_rounding() {
+fn novelty_holds_where_factors_leave_nothing_but_rounding() {
     let normal = |frame: usize, i: usize| {
         Random::new(5, Stream::Training, Purpose::Noise, frame as u64, i as u64).normal()
     };
@@ -147,14 +147,14 @@ fn a_quantile_of_few_values_covers_its_share() {
 #[test]
 fn deviations_of_an_output_are_those_of_the_frames_that_have_it() {
     let (world, training, blob, _) = row_4();
-    let density = Density::fit(training, &Settings { components: 8, ..Settings::default() });
+    let statistics = Statistics::fit(&training.inputs, Extent::Full, 1).unwrap();
     let calibration = synthesise(world, Stream::Calibration, 4000);
     let mut partly = calibration.clone();
     partly.outputs.values.iter_mut().step_by(36).for_each(|value| *value = f64::NAN);
     let deviations = |calibration: &Dataset| {
         let mut held_out = HeldOut::default();
-        held_out.add(blob, &density, calibration);
-        let with = add(blob, &density, &held_out).unwrap();
+        held_out.add(blob, &statistics, calibration);
+        let with = add(blob, &statistics, &held_out).unwrap();
         with.prepare().assess(&training.inputs.values).unwrap().0
     };
     let (all, partly) = (deviations(&calibration), deviations(&partly));
@@ -163,4 +163,59 @@ fn deviations_of_an_output_are_those_of_the_frames_that_have_it() {
         let most = if place % 18 == 0 { 0.25 } else { 0.0 };
         assert!((partly / all - 1.0).abs() <= most, "{place}: {partly} {all}");
     }
+}
+
+/// Model of two rows that fills missing readings, and frames that it was not trained on.
+fn model() -> &'static (ModelBlob, Table) {
+    static MODEL: OnceLock<(ModelBlob, Table)> = OnceLock::new();
+    MODEL.get_or_init(|| {
+        let world = World { read_rows: vec![3, 4], ..World::press() };
+        let frames = synthesise(&world, Stream::Training, 1500);
+        let options = Options { centres: 8, ..Options::of_rows() };
+        let trained = train(&frames, &options, &Silent).unwrap();
+        let blob = pack(&trained, &frames, &Origin::of_data("rows", 0, 1, &frames)).unwrap();
+        let statistics = Statistics::fit(&frames.inputs, Extent::Fill, 1).unwrap();
+        let blob = add(&blob, &statistics, &HeldOut::default()).unwrap();
+        (blob, synthesise(&world, Stream::Test, 400).inputs)
+    })
+}
+
+#[test]
+fn filled_readings_are_as_near_as_noise_lets_them_be() {
+    let (blob, fresh) = model();
+    let model = blob.prepare();
+    let deviations = fresh.deviations();
+    for missing in [vec![4], (0..36).step_by(18).map(|row| row + 9).collect::<Vec<_>>()] {
+        let mut faulty = fresh.clone();
+        for line in faulty.values.chunks_exact_mut(36) {
+            missing.iter().for_each(|at| line[*at] = f64::NAN);
+        }
+        let (filled, counts) = model.filled(&faulty.values, None).unwrap();
+        assert!(counts.iter().all(|count| *count == missing.len()));
+        let errors = filled.iter().zip(&fresh.values).enumerate();
+        for at in &missing {
+            let of = errors.clone().skip(*at).step_by(36).map(|(_, (a, b))| (a - b).powi(2));
+            let error = (of.sum::<f64>() / fresh.len() as f64).sqrt();
+            // The noise alone is 0.5 % of 57 Ω, which is 0.29 Ω; the mean would be off by the deviation.
+            assert!((0.2..0.4).contains(&error), "{at}: {error} Ω");
+            assert!(error < 0.7 * deviations[*at], "{at}: {error} Ω of {}", deviations[*at]);
+        }
+        let untouched = filled.iter().zip(&faulty.values).filter(|(_, b)| !b.is_nan());
+        untouched.for_each(|(a, b)| assert_eq!(a.to_bits(), b.to_bits()));
+    }
+    // A row is half of the readings: too much.
+    let mut faulty = fresh.clone();
+    faulty.values.chunks_exact_mut(36).for_each(|line| line[..18].fill(f64::NAN));
+    let (_, counts) = model.filled(&faulty.values, None).unwrap();
+    assert!(counts.iter().all(|count| *count == 0));
+}
+
+#[test]
+fn readings_that_are_too_few_or_no_numbers_are_refused_by_name() {
+    let says = |refused: Result<()>| refused.unwrap_err().to_string();
+    assert!(says(check(359, 36)).contains("frames = 359: a reading model takes at least 360"));
+    assert!(check(360, 36).is_ok() && check(20, 1).is_ok() && check(19, 1).is_err());
+    let mut bad = model().1.clone();
+    bad.values[0] = f64::INFINITY;
+    assert!(says(Statistics::fit(&bad, Extent::Fill, 1).map(drop)).contains("are no numbers"));
 }

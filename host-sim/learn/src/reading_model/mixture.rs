@@ -74,6 +74,13 @@ impl Sums {
 }
 
 impl Component {
+    /// Numbers of the component in a blob: c, −o, and W column after column.
+    pub fn numbers(&self) -> impl Iterator<Item = f32> {
+        let offsets = self.offsets.iter().map(|offset| -offset);
+        let numbers = [self.constant].into_iter().chain(offsets);
+        numbers.chain(self.whitening.iter().copied()).map(|number| number as f32)
+    }
+
     /// ln π·N(f | μ, Σ).
     fn log_density(&self, point: &DVector<f64>) -> f64 {
         let mut distance = 0.0;

@@ -1,79 +1,72 @@
-//! Filling of missing readings: fitting of what [`taxel_core::fill`] fills them by.
+//! Factors that readings have in common, by maximum likelihood.
 //!
-//! Factor analysis by maximum likelihood: readings are a few common factors and noise of each reading's own. Given the
-//! noise, the factors are principal components of readings in units of it; given the factors, noise is what they leave
-//! of each variance (Lawley and Maxwell, *Factor analysis as a statistical method*, 1971).
+//! Readings are a few common factors and noise of each reading's own. Given the noise, the factors are principal components
+//! of readings in units of it; given the factors, noise is what they leave of each variance (Lawley and Maxwell, *Factor
+//! analysis as a statistical method*, 1971).
 
 use nalgebra::DMatrix;
-use taxel_core::fill::Fill;
-use taxel_data::{Dataset, Table};
+use taxel_core::reading_model::{ReadingModel, Sizes};
+use taxel_data::Table;
 
 use crate::error::{Error, Result};
-use crate::packing::ModelBlob;
 use crate::parallel;
-use crate::train::principal;
-use crate::train::projection;
+use crate::train::{principal, projection};
 
-/// Number of factors, where there are enough readings.
-const FACTORS: usize = 16;
-/// Least number of frames for each reading. With fewer, what is fitted is chance: sound wires then look as if they touched.
-const FRAMES_A_READING: usize = 10;
-/// Rounds of the fit.
+/// Most rounds of the fit.
 const ROUNDS: usize = 30;
+/// Change of any reading's noise, relative to its variance, below which rounds stop.
+const ENOUGH: f64 = 1e-4;
 /// Least variance of a reading's own noise, relative to the reading's variance.
 const NOISE_FLOOR: f64 = 1e-6;
-/// Least number of readings of which some can be told from the others.
-const LEAST_READINGS: usize = 4;
-/// Frames whose products are summed before the sum is added to those of others.
+/// Largest sum of the squares of a reading's parts, which is below 1 in f32, too.
+const MOST_COMMON: f64 = 1.0 - 1e-6;
+/// Frames that a thread takes at a time.
 const FRAMES_AT_ONCE: usize = 1024;
 
-/// Checks before long work that a model which is trained on `frames` can fill missing readings.
-///
-/// # Errors
-/// [`Error`] for readings relative to the baseline, or fewer than four; or for fewer than ten frames a reading.
-pub fn check(frames: &Dataset) -> Result<()> {
-    check_readings(frames.relative_inputs, &frames.inputs)
+/// Factors of a table of readings: the numbers of a [`ReadingModel`] that fills missing readings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Factors {
+    sizes: Sizes,
+    pub block: Vec<f32>,
 }
 
-fn check_readings(are_relative: bool, readings: &Table) -> Result<()> {
-    let (frames, count) = (readings.len(), readings.names.len());
-    if are_relative {
-        return Err(no_fill("its inputs are relative to the baseline"));
+impl Factors {
+    /// Fits so many `factors` to `readings`.
+    ///
+    /// # Errors
+    /// [`Error::Unfit`] for readings that are no numbers.
+    pub fn fit(readings: &Table, factors: usize) -> Result<Self> {
+        let no_numbers = || Error::unfit("readings are no numbers (reading model)");
+        let sizes = Sizes { readings: readings.names.len(), factors, components: 0, outputs: 1 };
+        let block = fit(readings, factors).ok_or_else(no_numbers)?;
+        ReadingModel::new(sizes, &block).map_err(|_| no_numbers())?;
+        Ok(Self { sizes, block })
     }
-    if count < LEAST_READINGS {
-        return Err(no_fill("it has fewer than four readings"));
+
+    /// Reading model of the factors, without components.
+    pub fn model(&self) -> ReadingModel<'_> {
+        ReadingModel::of_array(self.sizes, &self.block)
     }
-    let least = FRAMES_A_READING * count;
-    if frames >= least {
-        return Ok(());
+
+    /// Features of every line of `readings`, `lines × features`: the bits that a device computes.
+    pub fn features(&self, readings: &[f64]) -> Vec<f64> {
+        let size = self.sizes.readings;
+        let of_piece = |frames: &[f64]| {
+            let (mut z, mut features) = (vec![0.0; size], vec![0.0; self.sizes.features()]);
+            let mut all = Vec::new();
+            for frame in frames.chunks_exact(size) {
+                let frame: Vec<f32> = frame.iter().map(|reading| *reading as f32).collect();
+                self.model().features(&frame, None, &mut z, &mut features);
+                all.extend(features.iter().map(|feature| f64::from(*feature)));
+            }
+            all
+        };
+        parallel::pieces(readings, FRAMES_AT_ONCE * size, &of_piece).concat()
     }
-    Err(Error::unfit(format!(
-        "{frames} frames are too few to learn how to fill {count} missing readings (fill): give {least} or more, or leave \
-         the fill out"
-    )))
 }
 
-fn no_fill(why: &str) -> Error {
-    Error::unfit_for("fill", format!("the model cannot fill missing readings: {why}"))
-}
-
-/// Adds to the model in `blob` a fill of missing readings, fitted to `readings`.
-///
-/// # Errors
-/// [`Error`] for a model that takes readings relative to the baseline, or has fewer than four; for readings that are no
-/// numbers, or too few frames; and for a model beyond what the format holds.
-pub fn add(blob: &ModelBlob, readings: &Table) -> Result<ModelBlob> {
-    let count = readings.names.len();
-    check_readings(blob.parse().metadata().relative_inputs, readings)?;
-    let factors = FACTORS.min(count / 2);
-    let no_numbers = || no_fill("readings are no numbers");
-    let block = fit(readings, factors).ok_or_else(no_numbers)?;
-    let fill = Fill::new(count, factors, &block).map_err(|_| no_numbers())?;
-    blob.with_fill(fill)
-}
-
-/// Numbers of a fill, in the order of [`Fill::new`]; `None` for readings that are no numbers.
-pub(crate) fn fit(readings: &Table, factors: usize) -> Option<Vec<f32>> {
+/// Numbers of a reading model without components, in the order of [`ReadingModel::new`].
+fn fit(readings: &Table, factors: usize) -> Option<Vec<f32>> {
     let count = readings.names.len();
     let means = readings.means();
     let deviations = readings.deviations();
@@ -99,18 +92,28 @@ pub(crate) fn fit(readings: &Table, factors: usize) -> Option<Vec<f32>> {
         inverse.diagonal().iter().map(|d| (1.0 / d).clamp(NOISE_FLOOR, 1.0)).collect();
     for _ in 0..ROUNDS {
         let loadings = loadings(&correlations, &noise, factors).0;
+        let mut change = 0.0_f64;
         for (i, noise) in noise.iter_mut().enumerate() {
             let common: f64 = loadings.row(i).iter().map(|l| l * l).sum::<f64>() * *noise;
-            *noise = (1.0 - common).clamp(NOISE_FLOOR, 1.0);
+            let next = (1.0 - common).clamp(NOISE_FLOOR, 1.0);
+            change = change.max((next - *noise).abs());
+            *noise = next;
+        }
+        if change < ENOUGH {
+            break;
         }
     }
     let (loadings, variances) = loadings(&correlations, &noise, factors);
     let mut block: Vec<f32> = means.iter().map(|mean| *mean as f32).collect();
     let scale = |i: usize| if usable(i) { 1.0 / (deviations[i] * noise[i].sqrt()) } else { 0.0 };
     block.extend((0..count).map(|i| scale(i) as f32));
+    block.extend(vec![0.0; factors]);
     for i in 0..count {
-        let parts = loadings.row(i);
-        block.extend(parts.iter().zip(&variances).map(|(part, v)| (part / v.sqrt()) as f32));
+        let row = loadings.row(i);
+        let parts: Vec<f64> = row.iter().zip(&variances).map(|(part, v)| part / v.sqrt()).collect();
+        let common: f64 = parts.iter().map(|part| part * part).sum();
+        let within = (MOST_COMMON / common).min(1.0).sqrt();
+        block.extend(parts.iter().map(|part| (part * within) as f32));
     }
     Some(block)
 }
@@ -151,6 +154,3 @@ fn products(readings: &Table, means: &[f64]) -> Vec<f64> {
     };
     projection::sum(&parallel::pieces(&readings.values, FRAMES_AT_ONCE * count, &of_piece))
 }
-
-#[cfg(test)]
-mod tests;
