@@ -35,7 +35,7 @@ mod sections;
 pub use figures::{FOLDER as FIGURES, Page};
 pub use limit::{sections as of_limit, several as of_limits};
 pub use points::{result_text, sections as of_points};
-pub use sections::{Digits, Sections, TableOf};
+pub use sections::{Digits, Sections, TableOf, wrapped};
 pub use trade::sections as of_trade;
 pub use view::{Made, View, in_words};
 

@@ -428,6 +428,7 @@ fn row_of(triangle_rows: &[f32], row: usize) -> &[f32] {
 fn product(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
 }
+
 /// Solves the equations of a positive definite `matrix`, given by its lower triangle, for the right-hand side in `x`, by
 /// Cholesky's decomposition. Returns whether the matrix is positive definite in f32.
 fn solve(matrix: &mut [f32], x: &mut [f32]) -> bool {

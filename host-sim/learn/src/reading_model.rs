@@ -90,7 +90,7 @@ impl Statistics {
         Ok(Self { factors, mixture })
     }
 
-    /// Number of features of a frame, and these and the components' probabilities of every frame of `inputs`, with −ln p.
+    /// Probabilities of the components, and ln p, of every frame of `inputs`.
     fn assess(&self, mixture: &Mixture, inputs: &[f64]) -> Vec<(Vec<f64>, f64)> {
         let points = self.factors.features(inputs);
         let of_point = |point: &[f64]| mixture.probabilities(&point.to_vec().into());

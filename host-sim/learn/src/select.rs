@@ -6,7 +6,7 @@ use taxel_data::{BadValue, Dataset, Progress, Silent};
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
 use crate::parallel;
-use crate::train::refine::LEAST_FOLDS;
+use crate::train::refine::{LEAST_FOLDS, refine};
 use crate::train::{self, Examples, FittedNetwork, Options, Refinement, Start, Trained};
 
 mod folds;
@@ -213,7 +213,8 @@ impl<'d> Judge<'d> {
                     // Where centres move to depends on the penalty.
                     let options = Options { penalty: *penalty, ..*options };
                     let examples = Examples::Folds(&inner);
-                    let layers = start.refine(&layers, &options, settings, examples, &Silent)?;
+                    let layers =
+                        refine(&start.frames, &layers, &options, settings, examples, &Silent)?;
                     let options = start.fitting(&layers, &options, Some(settings))?;
                     let models = train::fit(&layers, &options, &[options.penalty], &Silent)?;
                     add(layers.projection.as_ref(), models);

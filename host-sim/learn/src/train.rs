@@ -311,7 +311,7 @@ pub fn train_refined(
     for start in Start::all(dataset, options)? {
         let mut layers = start.layers(options);
         if let Some((settings, examples)) = refinement {
-            layers = start.refine(&layers, options, settings, examples, progress)?;
+            layers = refine::refine(&start.frames, &layers, options, settings, examples, progress)?;
         }
         let options = start.fitting(&layers, options, refinement.map(|(settings, _)| settings))?;
         for networks in fit(&layers, &options, &[options.penalty], progress)? {

@@ -30,8 +30,8 @@ use super::{Common, print, stderr};
 /// Decode readings from a data file, one line of estimates a line.
 ///
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
-/// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --reading-model tells
-/// missing readings from the others instead.
+/// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --reading-model
+/// tells missing readings from the others instead.
 /// Estimates are written with the digits that tell an f32 from its neighbours.
 ///
 /// The last column, `status`, is the sum of a device's flags (docs/link.md): 0 for a sound frame, 2 a faulty reading,
@@ -55,8 +55,8 @@ pub struct Arguments {
     /// Columns of the readings' file that are written too, as they stand there, in front of the estimates: the time, say.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     keep: Vec<String>,
-    /// Also write a column NAME_deviation for each output NAME, and novelty_nats, of a model trained with --reading-model full: 68 % of
-    /// errors are within one deviation, and above 0 a frame is novel (docs/reading-model.md).
+    /// Also write a column NAME_deviation for each output NAME, and novelty_nats, of a model trained with --reading-model
+    /// full: 68 % of errors are within one deviation, and above 0 a frame is novel (docs/reading-model.md).
     #[arg(long)]
     confidence: bool,
     #[command(flatten)]

@@ -10,6 +10,7 @@ use std::time::Instant;
 use crate::by_load::LoadErrors;
 use crate::metrics::{self, DecoderErrors, Definition, Errors, NETWORK};
 use crate::others::Others;
+use crate::report;
 use crate::verdict::Verdict;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -167,18 +168,7 @@ pub fn verdict(page: &mut Page, judged_on: Option<&str>, verdict: &Verdict) {
 
 /// Adds text in lines of at most 110 characters.
 pub fn wrapped(page: &mut Page, text: &str) {
-    let mut line = String::new();
-    for word in text.split(' ') {
-        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > 110 {
-            page.line(&line);
-            line.clear();
-        }
-        if !line.is_empty() {
-            line.push(' ');
-        }
-        line += word;
-    }
-    page.line(&line);
+    page.line(report::wrapped(text, 110).trim_end());
 }
 
 /// Adds a table of RMSE by the depth or force of the contact, if there is one; of the centroid below the model's.

@@ -266,8 +266,10 @@ impl Sections {
                     };
                     facts.iter().map(fact).collect()
                 }
-                Section::Table(table) => format!("{}\n{}", wrapped(&table.caption), table.text()),
-                Section::Note(note) => wrapped(note),
+                Section::Table(table) => {
+                    format!("{}\n{}", wrapped(&table.caption, WIDTH), table.text())
+                }
+                Section::Note(note) => wrapped(note, WIDTH),
             };
             text += "\n";
             text += &part;
@@ -327,21 +329,20 @@ impl Numbers {
     }
 }
 
-/// Text in lines of at most [`WIDTH`] characters.
-pub fn wrapped(text: &str) -> String {
-    let mut lines = vec![String::new()];
+/// Text in lines of at most so many characters.
+pub fn wrapped(text: &str, most: usize) -> String {
+    let (mut lines, mut line) = (String::new(), String::new());
     for word in text.split(' ') {
-        let line = lines.last_mut().expect("never empty");
-        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > WIDTH {
-            lines.push(word.into());
-            continue;
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > most {
+            lines.extend([&line, "\n"]);
+            line.clear();
         }
         if !line.is_empty() {
             line.push(' ');
         }
-        line.push_str(word);
+        line += word;
     }
-    lines.join("\n") + "\n"
+    lines + &line + "\n"
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ fn assess_by(block: &[f32], readings: [f32; 3]) -> (f32, [f32; 2]) {
     (novelty.unwrap(), deviation)
 }
 
-/// The same in f64, from the definition.
+/// Novelty and deviations, in f64 from the definition.
 fn expected(readings: [f64; 3]) -> (f64, [f64; 2]) {
     let z = [readings[0] - 10.0, 0.5 * (readings[1] - 20.0), 2.0 * (readings[2] - 30.0)];
     let score = (z[0] + z[1]) * 0.7;

@@ -25,7 +25,7 @@ pub const FRAMES_A_WEIGHT: usize = 10;
 /// Number of frames to judge by below which a warning is due.
 pub const FEW_TEST_FRAMES: usize = 30;
 
-/// Number of training frames below which intervals cover noticeably more or fewer errors than it says.
+/// Number of training frames below which intervals cover noticeably more or fewer errors than they say.
 pub const FRAMES_FOR_CONFIDENCE: usize = 300;
 
 /// Share of readings outside the training range above which a warning is due.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
 use super::layers::Layers;
-use super::touch::GroupFrames;
+use super::touch::{self, GroupFrames};
 use super::{Options, memory};
 use crate::error::Result;
 
@@ -115,8 +115,8 @@ impl Refinement {
     }
 }
 
-/// Refines the `layers` that training on `frames` starts from, to those that it ends with. Folds are those of their
-/// examples.
+/// Refines the `layers` that training on `frames` starts from, to those that it ends with. Folds and fresh frames are those of
+/// the data set that these are of.
 ///
 /// The refined layers are the same on any number of threads.
 ///
@@ -135,6 +135,17 @@ pub fn refine(
     progress: &dyn Progress,
 ) -> Result<Layers> {
     let dataset = &frames.examples;
+    let (fresh_of_group, folds_of_group): (touch::Fresh<'_>, Vec<usize>);
+    let examples = match examples {
+        Examples::Fresh(fresh) => {
+            fresh_of_group = touch::Fresh { fresh, group: &frames.group };
+            Examples::Fresh(&fresh_of_group)
+        }
+        Examples::Folds(fold_of) => {
+            folds_of_group = frames.kept.iter().map(|frame| fold_of[*frame]).collect();
+            Examples::Folds(&folds_of_group)
+        }
+    };
     settings.check(examples, dataset.frames())?;
     let pieces = settings.pieces(dataset.frames(), options.centres, examples);
     memory::check(&frames.all, options, Some(pieces))?;

@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 use taxel_core::touch::Kind;
-use taxel_data::{Dataset, Progress};
+use taxel_data::Dataset;
 
 use super::layers::Layers;
-use super::refine::{self, Examples, Refinement};
+use super::refine::Refinement;
 use super::samples::Samples;
 use super::touch::{self, FittedTouch, Group, GroupFrames, Kinds, Places};
 use super::trained::FittedFront;
@@ -122,30 +122,5 @@ impl Start {
             inputs: examples.inputs.names.len(),
             projection: projection.cloned(),
         })
-    }
-
-    /// Layers that were refined on `examples` of the data set.
-    ///
-    /// # Errors
-    /// As [`refine`](refine::refine).
-    pub fn refine(
-        &self,
-        layers: &Layers,
-        options: &Options,
-        settings: &Refinement,
-        examples: Examples<'_>,
-        progress: &dyn Progress,
-    ) -> Result<Layers> {
-        let frames = &self.frames;
-        let of = |examples| refine::refine(frames, layers, options, settings, examples, progress);
-        match examples {
-            Examples::Fresh(fresh) => {
-                of(Examples::Fresh(&touch::Fresh { fresh, group: &frames.group }))
-            }
-            Examples::Folds(fold_of) => {
-                let folds: Vec<usize> = frames.kept.iter().map(|frame| fold_of[*frame]).collect();
-                of(Examples::Folds(&folds))
-            }
-        }
     }
 }

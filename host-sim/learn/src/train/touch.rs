@@ -233,7 +233,10 @@ pub(super) struct Fresh<'f> {
 impl FreshFrames for Fresh<'_> {
     fn frames(&self, step: usize, count: usize) -> Dataset {
         let (frames, _) = self.group.frames(&self.fresh.frames(step, count));
-        self.group.touch.as_ref().map_or_else(|| frames.clone(), |touch| touch.apply(&frames))
+        match &self.group.touch {
+            Some(touch) => touch.apply(&frames),
+            None => frames,
+        }
     }
 }
 

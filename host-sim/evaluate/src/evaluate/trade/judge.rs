@@ -186,7 +186,7 @@ fn fit(
         let settings = Refinement::default();
         let examples = frames.set.examples();
         if let Some(examples) = examples {
-            layers = start.refine(&layers, &own, &settings, examples, &refining)?;
+            layers = refine::refine(&start.frames, &layers, &own, &settings, examples, &refining)?;
         }
         let options = start.fitting(&layers, &own, examples.is_some().then_some(&settings))?;
         let rows = layers.hidden.par_iter().enumerate();
