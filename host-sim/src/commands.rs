@@ -11,7 +11,6 @@ mod decoder_arguments;
 mod command_line;
 mod model_outputs;
 pub mod scene_argument;
-pub mod coverage_page;
 mod data_notes;
 mod refused_readings;
 mod recordings;

@@ -4,7 +4,6 @@
 //! one page serves light and dark.
 
 use taxel_data::output::Inner;
-use taxel_evaluate::run::RunResult;
 
 pub mod format;
 pub mod ticks;
@@ -15,45 +14,36 @@ pub mod chart;
 mod figures;
 mod colour;
 mod voronoi;
-mod view;
 mod face;
 mod face_map;
 mod plot;
 mod errors;
 mod frames;
 mod sketch;
-mod tables;
-mod sweep;
+mod noise;
 mod over_time;
+mod sections;
 mod moving;
-mod html;
+mod table1;
+mod judged;
+mod run;
 mod trade;
 mod limit;
 mod points;
-mod sections;
 
+pub use errors::Pictures;
 pub use figures::{FOLDER as FIGURES, Page};
+pub use judged::{Judged, errors_of, sections as of_judged, worth};
 pub use limit::{sections as of_limit, several as of_limits};
 pub use points::{result_text, sections as of_points};
-pub use sections::{Digits, Sections, TableOf, wrapped};
+pub use run::{in_words, judged as of_run};
+pub use sections::{Digits, Section, Sections, TableOf, wrapped};
+pub use table1::sections as of_table1;
 pub use trade::sections as of_trade;
-pub use view::{Made, View, in_words};
-
-use figures::Figures;
 
 /// Files of figures of these names.
 pub const fn figures_named(names: &'static [&'static str]) -> Inner {
     Inner { folder: FIGURES, names, endings: &["svg", "csv"] }
-}
-
-/// Page for `result`: no script, nothing that is loaded, the same bytes for the same result.
-pub fn html(result: &RunResult, made: &Made) -> Page {
-    html::page(&View::of_run(result, made), Figures::in_files(""))
-}
-
-/// Page for a model, whatever its result is from: as [`html`], without files beside it.
-pub fn view_html(view: &View<'_>) -> String {
-    html::page(view, Figures::default()).html
 }
 
 #[cfg(test)]

@@ -195,77 +195,92 @@ pub fn judge(decoder: &dyn Decoder, test: &Dataset, measure: &Measure) -> Decode
     DecoderErrors { decoder: decoder.name().into(), errors }
 }
 
-/// Definition of error, for tables that show one after the other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Definition {
-    /// Root mean square error: [`Errors::rmse`].
-    Rmse,
-    /// Relative L2 error: [`Errors::relative_l2_percent`].
-    RelativeL2Percent,
-    /// Error of full scale: [`Errors::full_scale_percent`].
-    FullScalePercent,
-    /// Positional error: [`Errors::positional_percent`].
-    PositionalPercent,
-    /// Coefficient of determination: [`Errors::r_squared`].
-    RSquared,
-    /// Mean relative error: [`Errors::mean_relative_percent`].
-    MeanRelativePercent,
-    /// Ratio of the RMSE to the limit: [`Errors::ratio_to_limit`].
-    RatioToLimit,
+/// Definition of error, as tables, their legends and files know it.
+#[derive(Debug, Clone, Copy)]
+pub struct Definition {
+    /// Name in CSV and JSON, with the unit.
+    pub name: &'static str,
+    /// Heading of a column, and its unit; empty for none, or for that of the output.
+    pub heading: &'static str,
+    pub unit: &'static str,
+    /// Decimals to show; `None` for three digits.
+    pub decimals: Option<usize>,
+    /// What it is, in symbols: error e, truth Δ.
+    pub formula: &'static str,
+    value: fn(&Errors) -> Option<f64>,
+    /// Standard error of the value, where it is known.
+    pub standard_error: fn(&Errors) -> Option<f64>,
 }
 
 impl Definition {
-    /// All definitions.
+    /// All definitions: first what matters most, since narrow windows show that.
     pub const ALL: [Self; 7] = [
-        Self::Rmse,
-        Self::RelativeL2Percent,
-        Self::FullScalePercent,
-        Self::PositionalPercent,
-        Self::RSquared,
-        Self::MeanRelativePercent,
-        Self::RatioToLimit,
+        Self::new("rmse", "RMSE", "", None, "√mean(e²), in the output’s unit", |it| {
+            Some(it.rmse)
+        }),
+        Self {
+            standard_error: |it| it.ratio_standard_error,
+            ..Self::new(
+                "ratio_to_limit",
+                "× limit",
+                "",
+                Some(2),
+                "RMSE/least possible RMSE",
+                |it| it.ratio_to_limit,
+            )
+        },
+        Self::new("r_squared", "R²", "", Some(3), "1 − Σe²/Σ(Δ − mean Δ)²", |it| {
+            it.r_squared
+        }),
+        Self::new(
+            "full_scale_percent",
+            "%FS",
+            "",
+            Some(2),
+            "mean|e|/full scale, in per cent of what the scene allows or a measured column spans",
+            |it| it.full_scale_percent,
+        ),
+        Self::new("relative_l2_percent", "relative L2", "%", Some(2), "‖e‖/‖Δ‖", |it| {
+            it.relative_l2_percent
+        }),
+        Self::new(
+            "positional_percent",
+            "positional",
+            "%",
+            Some(2),
+            "mean|e|/(H − Δz) with the sensor’s thickness H",
+            |it| it.positional_percent,
+        ),
+        Self::new(
+            "mean_relative_percent",
+            "mean relative",
+            "%",
+            Some(2),
+            "mean(|e|/|Δ|) where |Δ| > 10 % of full scale",
+            |it| it.mean_relative_percent,
+        ),
     ];
 
-    /// Name of the definition in CSV and JSON.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rmse => "rmse",
-            Self::RelativeL2Percent => "relative_l2_percent",
-            Self::FullScalePercent => "full_scale_percent",
-            Self::PositionalPercent => "positional_percent",
-            Self::RSquared => "r_squared",
-            Self::MeanRelativePercent => "mean_relative_percent",
-            Self::RatioToLimit => "ratio_to_limit",
-        }
-    }
-
-    /// Formula of the definition, for captions.
-    pub fn formula(self) -> &'static str {
-        match self {
-            Self::Rmse => "RMSE = √mean(e²), in the output's unit",
-            Self::RelativeL2Percent => "relative L2 = ‖e‖/‖Δ‖, %",
-            Self::FullScalePercent => "%FS = mean|e|/full scale, %",
-            Self::PositionalPercent => "positional = mean|e|/(H − Δz), %",
-            Self::RSquared => "R² = 1 − Σe²/Σ(Δ − mean Δ)²",
-            Self::MeanRelativePercent => {
-                "mean relative = mean(|e|/|Δ|) where |Δ| > 10 % of full scale, %"
-            }
-            Self::RatioToLimit => "× limit = RMSE/least possible RMSE, on the frames of the limit",
-        }
+    const fn new(
+        name: &'static str,
+        heading: &'static str,
+        unit: &'static str,
+        decimals: Option<usize>,
+        formula: &'static str,
+        value: fn(&Errors) -> Option<f64>,
+    ) -> Self {
+        Self { name, heading, unit, decimals, formula, value, standard_error: |_| None }
     }
 
     /// Error by this definition, where it is defined.
-    pub fn of(self, errors: &Errors) -> Option<f64> {
-        match self {
-            Self::Rmse => Some(errors.rmse),
-            Self::RelativeL2Percent => errors.relative_l2_percent,
-            Self::FullScalePercent => errors.full_scale_percent,
-            Self::PositionalPercent => errors.positional_percent,
-            Self::RSquared => errors.r_squared,
-            Self::MeanRelativePercent => errors.mean_relative_percent,
-            Self::RatioToLimit => errors.ratio_to_limit,
-        }
+    pub fn of(&self, errors: &Errors) -> Option<f64> {
+        (self.value)(errors)
+    }
+
+    /// Heading, unit and formula, for captions.
+    pub fn in_words(&self) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
+        format!("{}{unit} = {}", self.heading, self.formula)
     }
 }
 

@@ -10,8 +10,8 @@ use crate::measurements::{Log, Spread};
 use crate::metrics::{self, DecoderErrors, Errors, GroupRmse, LimitSummary, Measure, NETWORK};
 use crate::others::percent_novel;
 use crate::over_time::{self, Decoded, OverTime, RestOverTime};
-use crate::report::format::{grouped, significant};
-use crate::report::{self, Made, View};
+use crate::report::format::grouped;
+use crate::report::{self, Judged, Pictures, Sections};
 use crate::verdict::{Verdict, Warning};
 use crate::{Error, Result};
 use clap::Args;
@@ -23,7 +23,6 @@ use taxel_learn::ModelBlob;
 use taxel_learn::decoders::{CENTROID, centroid, mean};
 use taxel_limit::Refusal;
 
-use super::coverage_page;
 use super::data_file::{DataFileArguments, TimeArgument};
 use super::health::{Health, HealthArguments};
 use super::readings::{model_inputs, related, table_of};
@@ -176,14 +175,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         by_load: by_load(&truth, &with_untold, of_centroid.as_deref(), &measure),
         over_time,
     };
+    let reference = if metadata.relative_inputs { Reference::Relative } else { Reference::Median };
+    let distribution = arguments
+        .html
+        .is_some()
+        .then(|| Distribution::new(&truth, &estimate, &readings, reference));
+    let more = (distribution.as_ref(), without_reading);
+    let sections = sections_of(arguments, (&blob, &file), &summary, more)?;
     if let Some(html) = &arguments.html {
-        let reference =
-            if metadata.relative_inputs { Reference::Relative } else { Reference::Median };
-        let distribution = Distribution::new(&truth, &estimate, &readings, reference);
-        let page = page_of(arguments, (&blob, &file), &summary, (&distribution, without_reading))?;
-        output::write_bytes(html, page.as_bytes())?;
+        let page = sections.page(&command_line::of_this_process("eval", &[], None));
+        output::write_bytes(html, page.html.as_bytes())?;
     }
-    print::result(common, &summary, || text_of(&summary))
+    print::result(common, &summary, || print::Page::of(sections.text().trim_end()))
 }
 
 /// The model's `errors`, and those of decoders that are fitted to the lines of `truth`: the centroid and the mean.
@@ -261,49 +264,13 @@ fn knows(metadata: &Metadata<'_>, file: &DataFile) -> Result<bool> {
     Ok(metadata.training_frames as usize > others + others / ONE_IN)
 }
 
-/// Result for people.
-fn text_of(summary: &Summary) -> print::Page {
-    let mut page = print::Page::default();
-    page.line(format_args!("{} frames of {}", summary.frames, summary.data_file.display()));
-    if summary.values_evaluated < summary.values {
-        page.line(format_args!(
-            "{} of {} values count; the others, or readings they need, are missing",
-            summary.values_evaluated, summary.values
-        ));
-    }
-    let decoders: Vec<(&str, &[Errors])> =
-        summary.decoders.iter().map(|it| (it.decoder.as_str(), it.errors.as_slice())).collect();
-    print::errors(&mut page, &decoders);
-    print::errors_legend(&mut page);
-    let linear = &summary.linear_at_training;
-    if !linear.is_empty() {
-        let of = |it: &GroupRmse| {
-            format!("{} {} {}", it.group, significant(it.rmse, 3), it.unit).trim_end().to_owned()
-        };
-        page.line(format_args!(
-            "Best linear decoder in training, on frames that it was not fitted to, RMSE: {}.",
-            linear.iter().map(of).collect::<Vec<_>>().join(", ")
-        ));
-    }
-    page.line(LimitSummary::new(&Err(Refusal::Measured)).note());
-    print::by_load(&mut page, &summary.by_load);
-    if let Some(percent) = summary.percent_novel {
-        page.line("");
-        page.line("Errors that the model's intervals of 68.3 % and 95 % cover:");
-        coverage_page::add(&mut page, &summary.coverage);
-        page.line(format_args!("{percent:.2} % of the frames are novel: unlike those of training"));
-    }
-    print::verdict(&mut page, None, &summary.verdict);
-    page
-}
-
-/// Page of the evaluation.
-fn page_of(
+/// Result for people; with figures of a `distribution`.
+fn sections_of(
     arguments: &Arguments,
     (blob, file): (&ModelBlob, &DataFile),
     summary: &Summary,
-    (distribution, without_reading): (&Distribution, usize),
-) -> Result<String> {
+    (distribution, without_reading): (Option<&Distribution>, usize),
+) -> Result<Sections> {
     let limit = LimitSummary::new(&Err(Refusal::Measured));
     let model = blob.parse();
     let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -326,7 +293,7 @@ fn page_of(
         (health.readings_open, "open"),
         (health.readings_filled, "of these filled from the others"),
     ]);
-    let facts = vec![
+    let details = vec![
         ("Data", format!("{data_file}: {} frames", grouped(frames))),
         (
             "Values",
@@ -349,24 +316,30 @@ fn page_of(
         ("Faulty readings", readings.join("; ")),
         ("Inputs that tell nothing", report::in_words(&unused)),
     ];
-    let facts = facts.into_iter().filter(|(_, fact)| !fact.is_empty()).collect();
-    let view = View {
+    let judged = Judged {
         title: format!("{model_file} on {data_file}"),
-        facts,
+        details,
         verdict: &summary.verdict,
         device: &DeviceCost::new(blob),
         decoders: &summary.decoders,
         linear_at_training: &summary.linear_at_training,
         limit: &limit,
         by_load: &summary.by_load,
+        by_row: &[],
         others: None,
         over_time: summary.over_time.as_ref(),
         moving: None,
-        distribution,
+        coverage: &summary.coverage,
+        percent_novel: summary.percent_novel,
         frames: summary.frames_evaluated,
-        sensor: None,
+        pictures: distribution.map(|distribution| Pictures {
+            distribution,
+            frames: summary.frames_evaluated,
+            sensor: None,
+        }),
         table1: None,
-        made: &Made { command: command_line::of_this_process("eval", &[], None), files: vec![] },
     };
-    Ok(report::view_html(&view))
+    let mut sections = report::of_judged(&judged);
+    sections.is_alone = true;
+    Ok(sections)
 }

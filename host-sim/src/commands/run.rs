@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::progress::Terminal;
 use crate::Result;
-use crate::evaluate::moving_contacts::MovingContacts;
 use crate::evaluate::table1::Table1;
-use crate::report::{self, Made};
+use crate::report::{self, Sections};
 use crate::run::{self, RunResult};
 use crate::subject::Subject;
 use clap::Args;
@@ -85,11 +84,18 @@ fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common
     let (result, blob) = run::run(subject, options, &Terminal::new())?;
     let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
     note_format(&blob.parse(), options, result.device_cost.cycles);
-    let files = write_files(folder, &result, &blob, command)?;
+    let mut sections = report::of_judged(&report::of_run(&result));
+    let files = write_files(folder, &result, &blob, (&mut sections, &command))?;
     if common.json {
         return print::json(&result);
     }
-    page_of(&result, folder, &files).print()?;
+    let mut page = print::Page::of_sections(&sections);
+    page.line(format_args!("written to {}: {}", folder.display(), files.join(", ")));
+    page.line(format_args!("Next: open {}", folder.join("report.html").display()));
+    if result.scene.is_some() && result.subject == "press" {
+        page.line("The paper's own scene is `run paper`, and its Table 1 `table1`.");
+    }
+    page.print()?;
     stderr::remark(format_args!("done in {:.1} s", started.elapsed().as_secs_f64()));
     Ok(())
 }
@@ -98,121 +104,18 @@ fn write_files(
     folder: &Path,
     result: &RunResult,
     blob: &ModelBlob,
-    command: String,
+    (sections, command): (&mut Sections, &str),
 ) -> Result<Vec<&'static str>> {
     let metrics = print::json_text(result)?;
     let table = result.table1.as_ref().map(Table1::to_csv);
     let mut files = vec![("model.bin", blob.bytes()), ("metrics.json", metrics.as_bytes())];
     files.extend(table.as_ref().map(|table| ("table1.csv", table.as_bytes())));
     let mut names: Vec<&'static str> = files.iter().map(|(name, _)| *name).collect();
-    let made = Made { command, files: names.iter().map(|name| (*name).to_owned()).collect() };
-    let page = report::html(result, &made);
+    sections.files = names.iter().map(|name| (*name).to_owned()).collect();
+    let page = sections.page(command);
     let figures = page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes()));
     let page = [("report.html", page.html.as_bytes())];
     FILES.write(folder, &files.into_iter().chain(page).chain(figures).collect::<Vec<_>>())?;
     names.extend(["report.html", "figures/"]);
     Ok(names)
-}
-
-/// Adds the errors on contacts that move.
-fn moving_page(page: &mut print::Page, moving: &MovingContacts) {
-    let Some(times) = moving.ways.first().map(|way| way.times) else { return };
-    page.line("");
-    print::wrapped(
-        page,
-        &format!(
-            "As a robot meets it, on {}: newest finished estimate against the truth at that moment. The board finishes an \
-             estimate {:.2} ms after the start of its scan, so that it is {:.2} ms old when it is used, on average.",
-            moving.path.in_words(),
-            times.frame_ms,
-            times.age_ms.unwrap_or_default()
-        ),
-    );
-    let ways = moving.ways.iter();
-    let ways = ways
-        .map(|way| (if way.filter.is_some() { "filtered" } else { "network" }, &way.errors[..]));
-    let decoders = moving.decoders.iter().map(|it| (it.decoder.as_str(), &it.errors[..]));
-    print::errors(page, &ways.chain(decoders).collect::<Vec<_>>());
-    for filter in moving.ways.iter().filter_map(|way| way.filter) {
-        page.line(format_args!(
-            "the filter: host-sim link PORT configure --filter-ms {} --lead-ms {} (docs/filter.md)",
-            filter.time_constant_ms, filter.lead_ms
-        ));
-    }
-}
-
-fn page_of(result: &RunResult, folder: &Path, files: &[&str]) -> print::Page {
-    let mut page = print::Page::default();
-    let model = &result.model;
-    let from = match (&result.scene, &result.data) {
-        (Some(scene), _) => format!(
-            "{} noise {}{}, {} training and {} test frames",
-            scene.noise_kind.name(),
-            scene.noise_kind.in_words(scene.noise_level),
-            match scene.gain_drift {
-                0.0 => String::new(),
-                gain => format!(", gain drift ±{} %", gain * 100.0),
-            },
-            model.training_frames,
-            model.test_frames
-        ),
-        (None, data) => format!(
-            "{} training frames, {} test frames: {}",
-            model.training_frames,
-            model.test_frames,
-            data.as_ref().map_or("", |data| data.test_choice.as_str())
-        ),
-    };
-    page.line(format_args!("{}: {from}, seed {}", result.subject, result.seed));
-    let [inputs, outputs] = model.ends("->");
-    page.line(format_args!(
-        "model: {} network{}, {inputs} -> K = {} -> {outputs}, spread {}{}, {} bytes, CRC-32 {}",
-        model.networks,
-        if model.networks == 1 { "" } else { "s" },
-        model.centres,
-        model.spread,
-        if model.refined { " (refined)" } else { "" },
-        model.blob_bytes,
-        model.model_crc
-    ));
-    page.line(format_args!(
-        "a frame on a Cortex-M4F: {} instructions, {} cycles",
-        model.frame_cost.instructions, model.frame_cost.cycles
-    ));
-    if let Some(choice) = &result.features {
-        print::wrapped(&mut page, &choice.to_string());
-    }
-    page.line("");
-    let decoders: Vec<_> =
-        result.decoders.iter().map(|d| (d.decoder.as_str(), d.errors.as_slice())).collect();
-    print::errors(&mut page, &decoders);
-    print::errors_legend(&mut page);
-    print::wrapped(&mut page, &result.limit.note());
-    if let Some(moving) = &result.moving {
-        moving_page(&mut page, moving);
-    }
-    print::by_load(&mut page, &result.by_load);
-    if let Some(others) = &result.others {
-        print::others(&mut page, others, &result.decoders);
-    }
-    if !result.by_row.is_empty() {
-        let wires = result.by_row.iter().map(|row| row.row_wire.to_string());
-        let wires: Vec<String> = wires.collect();
-        page.line(format_args!("\nnetwork RMSE by row-wire ({}):", wires.join(", ")));
-    }
-    for group in result.by_row.first().map_or(&[][..], |row| &row.errors) {
-        let of_row = |errors: &run::RowErrors| {
-            let found = errors.errors.iter().find(|e| e.group == group.group);
-            found.map_or(String::new(), |e| format!(" {:.4}", e.rmse))
-        };
-        let rows: String = result.by_row.iter().map(of_row).collect();
-        page.line(format_args!("  {:<7}{rows} {}", group.group, group.unit));
-    }
-    page.line(format_args!("\nwritten to {}: {}", folder.display(), files.join(", ")));
-    print::verdict(&mut page, None, &result.verdict);
-    page.line(format_args!("\nNext: open {}", folder.join("report.html").display()));
-    if result.scene.is_some() && result.subject == "press" {
-        page.line("The paper's own scene is `run paper`, and its Table 1 `table1`.");
-    }
-    page
 }

@@ -6,7 +6,9 @@ use super::progress::Terminal;
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::worth::Worth;
 use crate::measurements::Measurements;
-use crate::metrics::{self, Errors, NETWORK};
+use crate::metrics::{self, NETWORK};
+use crate::report::format::symbol;
+use crate::report::{self, Digits, Sections, TableOf};
 use crate::subject::Subject;
 use crate::{Error, Result};
 use clap::Args;
@@ -17,7 +19,7 @@ use taxel_data::{columns, output};
 use taxel_learn::kinds::Choice;
 use taxel_learn::outliers::Outliers;
 use taxel_learn::reading_model::Extent;
-use taxel_learn::select::Selection;
+use taxel_learn::select::{Scored, Selection};
 use taxel_learn::train::Solver;
 
 use super::data_argument::JudgedBy;
@@ -160,7 +162,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             .map(Measurements::constant_inputs)
             .unwrap_or_default(),
     };
-    print::result(common, &summary, || page_of(&summary, options.centres))
+    print::result(common, &summary, || {
+        print::Page::of_sections(&sections_of(&summary, options.centres))
+    })
 }
 
 /// Scene or CSV file that is trained on: all frames of a file, or so many of a scene.
@@ -195,63 +199,82 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
     Ok(subject)
 }
 
-fn page_of(summary: &Summary, asked: usize) -> print::Page {
-    let mut page = print::Page::default();
+fn sections_of(summary: &Summary, asked: usize) -> Sections {
+    let mut sections = Sections::new(format!("Model of {}", summary.subject));
     if let Some(selection) = &summary.selection {
-        let outputs: Vec<String> = summary.outputs.iter().map(|it| it.name.clone()).collect();
-        let groups = columns::groups(&outputs);
-        let names: Vec<&str> = groups.iter().map(|(group, _)| *group).collect();
-        page.line(format_args!("cross-validated RMSE of {}:", names.join(", ")));
-        page.line("(score: mean over the outputs of RMSE/standard deviation; 1 is the mean's)");
-        let pooled = |rmse: &[f64]| {
-            let errors = metrics::pooled(&groups, rmse);
-            errors.iter().map(|error| format!("{error:.4}")).collect::<Vec<_>>().join(" ")
-        };
-        let settings = selection.scored.iter().map(choice::settings).collect::<Vec<_>>();
-        let width = settings.iter().map(String::len).max().unwrap_or(0);
-        for (i, (scored, settings)) in selection.scored.iter().zip(&settings).enumerate() {
-            let mark = if i == selection.chosen { "  <- chosen" } else { "" };
-            let (score, errors) = (scored.score, pooled(&scored.rmse));
-            page.line(format_args!("  {settings:<width$} score {score:.4}: {errors}{mark}"));
-        }
-        for baseline in &selection.baselines {
-            let label = format!("{}:", baseline.decoder);
-            let (score, errors) = (baseline.score, pooled(&baseline.rmse));
-            page.line(format_args!("  {label:<width$} score {score:.4}: {errors}"));
-        }
-        if let Some(better) = selection.better_baseline() {
-            let name = better.decoder;
-            page.line(format_args!("  not worth its cost: the baseline {name} has a lower score"));
-        }
+        scores(&mut sections, selection, &summary.outputs);
     }
-    page.line(format_args!(
-        "{}: {} bytes, CRC-32 {}, {}, K = {}, spread = {}{}{}, {} frames{}{}{}",
-        summary.file.display(),
-        summary.blob_bytes,
-        summary.model_crc,
-        summary.formats.first().unwrap_or(&""),
-        summary.centres,
-        summary.spread,
-        if summary.refined { " (refined)" } else { "" },
-        summary.penalty.map_or(String::new(), |p| format!(", penalty = {}", choice::short(p))),
-        summary.training_frames,
-        if summary.solver == Solver::Rls.name() { ", weights by recursion" } else { "" },
-        if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
-        summary.reading_model.map_or(String::new(), |it| format!(", reading model {it}"))
-    ));
-    if summary.centres < asked {
-        page.line(format_args!(
-            "  ({asked} centres were asked for; the data has fewer distinct samples)"
-        ));
+    let few = if summary.centres < asked {
+        format!("; {asked} were asked for, but the data has fewer distinct samples")
+    } else {
+        String::new()
+    };
+    let penalty =
+        summary.penalty.map_or(String::new(), |it| format!(", penalty {}", choice::short(it)));
+    sections.details(vec![
+        (
+            "Blob",
+            format!(
+                "{}, {} bytes, CRC-32 {}",
+                summary.file.display(),
+                summary.blob_bytes,
+                summary.model_crc
+            ),
+        ),
+        (
+            "Network",
+            format!(
+                "{}, K = {}{few}, spread {}{}{penalty}{}{}",
+                summary.formats.first().unwrap_or(&""),
+                summary.centres,
+                summary.spread,
+                if summary.refined { " (refined)" } else { "" },
+                if summary.solver == Solver::Rls.name() { ", weights by recursion" } else { "" },
+                if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
+            ),
+        ),
+        ("Frames", summary.training_frames.to_string()),
+        ("Chosen", summary.features.as_ref().map_or(String::new(), ToString::to_string)),
+        ("Reading model", summary.reading_model.unwrap_or_default().into()),
+    ]);
+    let Worth { judged_on, verdict, decoders } = &summary.worth;
+    let words = judged_on.words();
+    report::errors_of(&mut sections, decoders, &words.replacen("On", "on", 1));
+    report::worth(&mut sections, verdict, metrics::of_decoder(decoders, NETWORK));
+    sections.lead = format!("{words}: {}", sections.lead);
+    sections
+}
+
+/// Adds the scores of cross-validation.
+fn scores(sections: &mut Sections, selection: &Selection, outputs: &[ModelOutput]) {
+    type Row<'r> = (String, Option<&'r Scored>, f64, Vec<f64>);
+    let outputs: Vec<String> = outputs.iter().map(|it| it.name.clone()).collect();
+    let groups = columns::groups(&outputs);
+    let scored = selection.scored.iter().enumerate().map(|(i, it)| {
+        let mark = if i == selection.chosen { "chosen" } else { "" };
+        (mark.to_owned(), Some(it), it.score, metrics::pooled(&groups, &it.rmse))
+    });
+    let baselines = selection
+        .baselines
+        .iter()
+        .map(|it| (it.decoder.to_owned(), None, it.score, metrics::pooled(&groups, &it.rmse)));
+    let rows: Vec<Row<'_>> = scored.chain(baselines).collect();
+    let text = |value: Option<String>| value.unwrap_or("–".into());
+    let caption = "Cross-validation: RMSE on folds that were held out. Score: mean over the outputs of RMSE/standard deviation, \
+                   which is 1 for always predicting the mean.";
+    let mut table = TableOf::new(&rows, caption)
+        .names("", |row| row.0.clone())
+        .names("K", |row| text(row.1.map(|it| it.centres.to_string())))
+        .names("spread", |row| text(row.1.map(|it| it.spread.to_string())))
+        .names("penalty", |row| text(row.1.and_then(|it| it.penalty).map(choice::short)))
+        .numbers("score", "", Digits::Decimals(4), |row| Some(row.2));
+    for (place, (group, _)) in groups.iter().enumerate() {
+        let (heading, unit) = (symbol(group), columns::unit_of(group));
+        table = table.numbers(&heading, unit, Digits::Significant(4), |row| Some(row.3[place]));
     }
-    if let Some(choice) = &summary.features {
-        print::wrapped(&mut page, &choice.to_string());
+    sections.table(table);
+    if let Some(better) = selection.better_baseline() {
+        let name = better.decoder;
+        sections.note(format!("Not worth its cost: the baseline {name} has a lower score."));
     }
-    let Worth { judged_on, verdict, .. } = &summary.worth;
-    print::verdict(&mut page, Some(judged_on.words()), verdict);
-    let network = metrics::of_decoder(&summary.worth.decoders, NETWORK);
-    let of = |errors: &Errors| format!("{} {}", errors.group, print::r_squared(errors));
-    let r_squared: Vec<String> = network.iter().map(of).collect();
-    print::wrapped(&mut page, &format!("R² there: {}", r_squared.join(", ")));
-    page
 }

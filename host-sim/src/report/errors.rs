@@ -6,10 +6,20 @@ use super::face_map::{Map, Values};
 use super::figures::{Figure, Panel};
 use super::format::{grouped, percent, symbol, with_unit};
 use super::plot;
-use super::view::View;
+use taxel_evaluate::evaluate::distribution::Distribution;
+use taxel_evaluate::run::SensorSketch;
+
+/// What pictures of errors show.
+#[derive(Debug, Clone, Copy)]
+pub struct Pictures<'a> {
+    pub distribution: &'a Distribution,
+    /// Number of frames that were decoded.
+    pub frames: usize,
+    pub sensor: Option<&'a SensorSketch>,
+}
 
 /// Figure of decoded against true outputs, one panel a group.
-pub fn density(view: &View<'_>) -> Figure {
+pub fn density(view: &Pictures<'_>) -> Figure {
     let groups = &view.distribution.groups;
     let panels: Vec<Panel> = groups.iter().map(plot::density).collect();
     let outside: usize = groups.iter().map(|group| group.density.outside).sum();
@@ -29,7 +39,7 @@ pub fn density(view: &View<'_>) -> Figure {
 }
 
 /// Figure of the sizes of errors, one panel a group.
-pub fn histogram(view: &View<'_>) -> Figure {
+pub fn histogram(view: &Pictures<'_>) -> Figure {
     let groups = &view.distribution.groups;
     let panels: Vec<Panel> = groups.iter().map(plot::histogram).collect();
     let (beyond, count) = groups.iter().fold((0, 0), |(beyond, count), group| {
@@ -52,7 +62,7 @@ pub fn histogram(view: &View<'_>) -> Figure {
 }
 
 /// Figure of RMSE by electrode, one map a group.
-pub fn by_electrode(view: &View<'_>, face: &Face) -> Figure {
+pub fn by_electrode(view: &Pictures<'_>, face: &Face) -> Figure {
     let rmse: Vec<f64> = view.distribution.outputs.iter().map(|output| output.rmse).collect();
     let map = |group: &taxel_evaluate::evaluate::distribution::GroupDistribution| {
         let values = face.values(view.distribution, &group.group, &rmse);

@@ -2,14 +2,13 @@
 
 use super::colour::ColourScale;
 use super::data::{Data, number};
-use super::errors::BAR_PX;
+use super::errors::{BAR_PX, Pictures};
 use super::face::Face;
 use super::face_map::{Map, Values};
 use super::figures::{Figure, Panel, Step};
 use super::format::{fixed, significant, symbol, with_unit};
 use super::svg::{Anchor, TEXT_PX};
 use super::ticks;
-use super::view::View;
 use taxel_evaluate::evaluate::distribution::{Rank, RelativeTo, ShownFrame};
 
 /// Columns that are a place on the face.
@@ -26,7 +25,7 @@ pub fn name(frame: &ShownFrame) -> String {
 }
 
 /// Words about a frame for captions: its number, its rank, and its error.
-fn described(view: &View<'_>, frame: &ShownFrame) -> String {
+fn described(view: &Pictures<'_>, frame: &ShownFrame) -> String {
     let rank = match frame.rank {
         Rank::Median => "The frame of median error".into(),
         Rank::Worst => "The frame with the largest error".into(),
@@ -46,7 +45,7 @@ pub const ORDER: &str = "Frames are ordered by the root mean square of their err
                          different quantities are divided by their standard deviations first.";
 
 /// Figure of the readings of all shown frames.
-pub fn readings(view: &View<'_>) -> Option<Figure> {
+pub fn readings(view: &Pictures<'_>) -> Option<Figure> {
     let shown = &view.distribution.readings;
     let (label, words) = match shown.relative_to {
         RelativeTo::Rest => {
@@ -86,7 +85,7 @@ pub fn readings(view: &View<'_>) -> Option<Figure> {
 }
 
 /// Figure of readings whose names tell no wires: bars in the order of the columns.
-fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
+fn channels(view: &Pictures<'_>, label: &str, words: &str) -> Option<Figure> {
     use super::axes::Axis;
     use super::chart::{Chart, Mark, Series};
     let shown = &view.distribution.readings;
@@ -127,7 +126,7 @@ fn channels(view: &View<'_>, label: &str, words: &str) -> Option<Figure> {
 }
 
 /// Frames to step through: of all ranks, or of a sensor with many electrodes those that matter most.
-fn steps<'v>(view: &'v View<'_>, face: &Face) -> Vec<&'v ShownFrame> {
+fn steps<'v>(view: &'v Pictures<'_>, face: &Face) -> Vec<&'v ShownFrame> {
     /// Cells of all maps at most: more would make the page large.
     const MOST_CELLS: usize = 6000;
     const BY_WORTH: [u8; 13] = [50, 95, 100, 0, 90, 99, 80, 20, 70, 30, 60, 40, 10];
@@ -137,7 +136,7 @@ fn steps<'v>(view: &'v View<'_>, face: &Face) -> Vec<&'v ShownFrame> {
 }
 
 /// Figure of maps of frames of all ranks, to step through: true, decoded and their difference, of one group of outputs.
-pub fn maps(view: &View<'_>, face: &Face) -> Option<Figure> {
+pub fn maps(view: &Pictures<'_>, face: &Face) -> Option<Figure> {
     let (group, frames) = (view.distribution.main_group()?, steps(view, face));
     let (symbol, unit) = (symbol(&group.group), &group.unit);
     let of_line = |line: &[f64]| face.values(view.distribution, &group.group, line);
@@ -175,7 +174,7 @@ pub fn maps(view: &View<'_>, face: &Face) -> Option<Figure> {
 }
 
 /// Figure of x and y of all shown frames as arrows, true and decoded. `None` if they are not decoded both.
-pub fn arrows(view: &View<'_>, face: &Face) -> Option<Figure> {
+pub fn arrows(view: &Pictures<'_>, face: &Face) -> Option<Figure> {
     let groups = &view.distribution.groups;
     let [x, y] = [["dx_mm", "dy_mm"], ["fx_n", "fy_n"]]
         .into_iter()
@@ -211,7 +210,7 @@ pub fn arrows(view: &View<'_>, face: &Face) -> Option<Figure> {
 }
 
 /// Figure of true and decoded places in the shown frames. `None` for outputs without a place.
-pub fn places(view: &View<'_>) -> Option<Figure> {
+pub fn places(view: &Pictures<'_>) -> Option<Figure> {
     let outputs = &view.distribution.outputs;
     let column = |name: &str| outputs.iter().position(|output| output.name == name);
     let [x, y] = PLACES.into_iter().find_map(|[x, y]| Some([column(x)?, column(y)?]))?;

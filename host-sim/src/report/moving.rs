@@ -1,23 +1,21 @@
 //! Section on contacts that move: a trajectory, and errors as a robot meets them.
 
-use std::fmt::Write as _;
-
 use taxel_data::columns;
 use taxel_evaluate::evaluate::moving_contacts::MovingContacts;
+use taxel_evaluate::metrics::{Errors, NETWORK};
 
 use super::axes::Axis;
 use super::chart::{Chart, Mark, Series};
 use super::figures::Figure;
-use super::format::{UNDEFINED, fixed, significant, symbol, with_unit};
-use super::svg::escape;
-use super::tables::short_name;
+use super::format::{fixed, symbol, with_unit};
+use super::sections::{Digits, Sections, TableOf};
 use super::ticks;
 
 const WIDE: [f64; 2] = [920.0, 320.0];
 const NARROW: [f64; 2] = [360.0, 280.0];
 
 /// Figure of one output over a trajectory.
-pub fn trajectory(moving: &MovingContacts) -> Figure {
+fn trajectory(moving: &MovingContacts) -> Figure {
     let shown = &moving.shown;
     let group = columns::group_of(&shown.output);
     let name = match shown.output.strip_suffix(group) {
@@ -54,40 +52,39 @@ pub fn trajectory(moving: &MovingContacts) -> Figure {
     )
 }
 
-/// Table of errors with and without a filter and of the baselines, beside the age of an estimate.
-pub fn table(moving: &MovingContacts) -> String {
-    let groups = moving.ways.first().map_or(&[][..], |way| &way.errors);
-    let mut html =
-        String::from("<table>\n<thead><tr><th>Decoder</th><th class=\"number\">Age, ms</th>");
-    for group in groups {
-        let name = escape(&with_unit(&symbol(&group.group), &group.unit));
-        let _ =
-            write!(html, "<th class=\"number\">RMSE of {name}</th><th class=\"number\">R²</th>");
-    }
-    html += "</tr></thead>\n<tbody>\n";
+/// Adds errors with and without a filter and of the baselines, beside the age of an estimate, and a trajectory.
+pub fn add(sections: &mut Sections, moving: &MovingContacts) {
     let ways = moving.ways.iter().map(|way| {
-        let name = way.filter.map_or("Network".to_owned(), |filter| {
+        let name = way.filter.map_or(NETWORK.to_owned(), |filter| {
             let [tau, lead] = [filter.time_constant_ms, filter.lead_ms].map(|ms| fixed(ms, 1));
-            format!("Network, filter of {tau} ms, {lead} ms ahead")
+            format!("{NETWORK}, filter of {tau} ms, {lead} ms ahead")
         });
-        let age = way.times.age_ms.map_or(UNDEFINED.into(), |ms| fixed(ms, 2));
-        (name, age, &way.errors)
+        (name, way.times.age_ms, &way.errors[..])
     });
-    let baselines = moving
-        .decoders
-        .iter()
-        .map(|it| (short_name(it).to_owned(), UNDEFINED.to_owned(), &it.errors));
-    for (name, age, errors) in ways.chain(baselines) {
-        let _ = write!(html, "<tr><td>{}</td><td class=\"number\">{age}</td>", escape(&name));
-        for errors in errors {
-            let r_squared = errors.r_squared.map_or(UNDEFINED.into(), |it| fixed(it, 3));
-            let rmse = significant(errors.rmse, 3);
-            let _ = write!(
-                html,
-                "<td class=\"number\">{rmse}</td><td class=\"number\">{r_squared}</td>"
-            );
-        }
-        html += "</tr>\n";
+    let baselines = moving.decoders.iter().map(|it| (it.decoder.clone(), None, &it.errors[..]));
+    let rows: Vec<(String, Option<f64>, &[Errors])> = ways.chain(baselines).collect();
+    let caption = format!(
+        "RMSE and R² as a robot meets them, on {}: the newest finished estimate against the truth at that moment, every ms, \
+         read by the board. Age: mean time from the middle of a scan until its estimate is used.",
+        moving.path.in_words()
+    );
+    let mut table = TableOf::new(&rows, caption)
+        .names("decoder", |(name, ..)| name.clone())
+        .numbers("age", "ms", Digits::Decimals(2), |(_, age, _)| *age);
+    for group in rows.first().map_or(&[][..], |(.., errors)| errors) {
+        let of = |errors: &[Errors]| errors.iter().find(|it| it.group == group.group).cloned();
+        table = table
+            .numbers(&symbol(&group.group), &group.unit, Digits::Significant(3), |(.., errors)| {
+                Some(of(errors)?.rmse)
+            })
+            .numbers("R²", "", Digits::Decimals(3), |(.., errors)| of(errors)?.r_squared);
     }
-    html + "</tbody>\n</table>\n"
+    sections.table(table);
+    for filter in moving.ways.iter().filter_map(|way| way.filter) {
+        sections.note(format!(
+            "The filter on a device: `host-sim link PORT configure --filter-ms {} --lead-ms {}` (docs/filter.md).",
+            filter.time_constant_ms, filter.lead_ms
+        ));
+    }
+    sections.figure(trajectory(moving));
 }

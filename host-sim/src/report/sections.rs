@@ -2,25 +2,35 @@
 //!
 //! A result is a list of [`Section`]s: facts, tables, figures and notes. A [`Table`] has a column for each quantity, with
 //! its heading, its unit and its digits. Text and page are made of the same sections, so that neither can say anything
-//! else than the other.
+//! else than the other. A page begins with the lead, and text ends with it, where a terminal shows it.
 
 use std::fmt::Write as _;
 
 use super::figures::{Figure, Figures, Page, link};
-use super::format::{UNDEFINED, fixed, significant, with_unit};
-use super::html::document;
+use super::format::{UNDEFINED, fixed, significant, unbroken, with_unit};
 use super::svg::escape;
-use super::tables::numbers;
+use taxel_evaluate::metrics::Definition;
 
 /// Characters in a line of text, at most.
 const WIDTH: usize = 120;
 /// Space between columns of text.
 const GAP: &str = "  ";
+/// Headings from which a page lists them.
+const FEW_HEADINGS: usize = 4;
+/// Sizes beyond which a number is written in powers of ten.
+const TINY: f64 = 1e-6;
+const HUGE: f64 = 1e6;
 
 /// Result as people read it.
 #[derive(Debug, Default)]
 pub struct Sections {
     pub title: String,
+    /// What the result means, in a few sentences; empty for none.
+    pub lead: String,
+    /// What to beware of.
+    pub warnings: Vec<String>,
+    /// Whether the page is one file, without those of its figures beside it.
+    pub is_alone: bool,
     /// What names of figures' files begin with.
     pub prefix: String,
     /// Files beside the page that have the numbers.
@@ -35,6 +45,8 @@ pub enum Section {
     Heading(String),
     /// Numbers that are read first, each with its label and its unit.
     Facts(Vec<Fact>),
+    /// How a result was made: names, and what they are.
+    Details(Vec<(&'static str, String)>),
     Table(Table),
     /// Figure, which text goes without.
     Figure(Figure),
@@ -81,10 +93,19 @@ pub enum Digits {
 }
 
 impl Digits {
+    /// Digits of errors by a definition.
+    pub fn of(definition: &Definition) -> Self {
+        definition.decimals.map_or(Self::Significant(3), Self::Decimals)
+    }
+
     /// Text of a number; a dash for one that is missing.
     pub fn text(self, value: Option<f64>) -> String {
         match (value, self) {
             (None, _) => UNDEFINED.into(),
+            (Some(value), _) if value.is_finite() && value.abs() >= HUGE => format!("{value:.1e}"),
+            (Some(value), Self::Significant(_)) if value != 0.0 && value.abs() < TINY => {
+                format!("{value:.1e}")
+            }
             (Some(value), Self::Decimals(decimals)) => fixed(value, decimals),
             (Some(value), Self::Significant(digits)) => significant(value, digits),
         }
@@ -153,7 +174,7 @@ impl<'r, R> TableOf<'r, R> {
         self.table.text()
     }
 
-    /// Table without its rows.
+    /// Section of the table.
     pub fn section(self) -> Section {
         Section::Table(self.table)
     }
@@ -197,7 +218,8 @@ impl Table {
     fn html(&self, number: usize) -> String {
         let tag = |column: &Column, tag: &str, text: &str| {
             let text = escape(text);
-            if column.is_name { format!("<{tag}>{text}</{tag}>") } else { numbers(tag, [text]) }
+            let class = if column.is_name { "" } else { " class=\"number\"" };
+            format!("<{tag}{class}>{text}</{tag}>")
         };
         let heads = self.columns.iter().map(|column| tag(column, "th", &column.heading));
         let mut html = format!(
@@ -250,6 +272,19 @@ impl Sections {
         self.sections.push(Section::Figure(figure));
     }
 
+    /// Adds these details, but for those that are empty.
+    pub fn details(&mut self, mut details: Vec<(&'static str, String)>) {
+        details.retain(|(_, text)| !text.is_empty());
+        self.sections.push(Section::Details(details));
+    }
+
+    /// Adds sections that a page shows when a reader asks for them, unless there are none.
+    pub fn folded(&mut self, summary: impl Into<String>, sections: Vec<Section>) {
+        if !sections.is_empty() {
+            self.sections.push(Section::Folded(summary.into(), sections));
+        }
+    }
+
     /// Text for a terminal.
     pub fn text(&self) -> String {
         let mut text = format!("{}\n", self.title);
@@ -269,41 +304,96 @@ impl Sections {
                 Section::Table(table) => {
                     format!("{}\n{}", wrapped(&table.caption, WIDTH), table.text())
                 }
+                Section::Details(details) => {
+                    let line =
+                        |(name, text): &(_, String)| wrapped(&format!("{name}: {text}"), WIDTH);
+                    details.iter().map(line).collect()
+                }
                 Section::Note(note) => wrapped(note, WIDTH),
             };
             text += "\n";
             text += &part;
         }
-        text
+        if !self.lead.is_empty() {
+            text += "\n";
+            text += &wrapped(&self.lead, WIDTH);
+        }
+        let warning = |text: &String| wrapped(&format!("warning: {text}"), WIDTH);
+        text + &self.warnings.iter().map(warning).collect::<String>()
     }
 
     /// Page with the files of its figures, and the `command` that made it.
     pub fn page(&self, command: &str) -> Page {
         let mut html = format!("<h1>{}</h1>\n", escape(&self.title));
-        let mut numbers = Numbers { figures: Figures::in_files(&self.prefix), tables: 0 };
-        for section in &self.sections {
-            html += &numbers.html(section);
+        if !self.lead.is_empty() {
+            let _ = writeln!(html, "<p class=\"verdict\">{}</p>", paragraph(&self.lead));
+        }
+        if !self.warnings.is_empty() {
+            let line = |text: &String| format!("<li>{}</li>\n", paragraph(text));
+            let lines: String = self.warnings.iter().map(line).collect();
+            let _ = writeln!(html, "<ul class=\"warnings\">\n{lines}</ul>");
+        }
+        let figures =
+            if self.is_alone { Figures::default() } else { Figures::in_files(&self.prefix) };
+        let mut numbers = Numbers { figures, tables: 0, headings: vec![] };
+        let body: String = self.sections.iter().map(|section| numbers.html(section)).collect();
+        let (top, body) = body.split_at(body.find("<h2").unwrap_or(0));
+        html += top;
+        if numbers.headings.len() >= FEW_HEADINGS {
+            let links = numbers.headings.iter().enumerate();
+            let links = links.map(|(i, text)| format!("<a href=\"#heading-{}\">{text}</a>", i + 1));
+            let links = links.collect::<Vec<_>>().join(" ");
+            let _ = writeln!(html, "<nav aria-label=\"Contents\">{links}</nav>");
         }
         let files: Vec<String> = self.files.iter().map(|file| link(file, file)).collect();
         let files =
             if files.is_empty() { String::new() } else { format!(": {}", files.join(", ")) };
-        let command = escape(command);
-        let _ = writeln!(html, "<p class=\"note\">Made by <code>{command}</code>{files}</p>");
+        let (command, version) = (escape(command), env!("CARGO_PKG_VERSION"));
+        let made = format!(
+            "<p class=\"note\">Made by <code>{command}</code> (version {version}){files}</p>\n"
+        );
         let title = format!("Taxel: {}", self.title);
-        Page { html: document(&title, &html), figures: numbers.figures.files }
+        Page { html: document(&title, &(html + body + &made)), figures: numbers.figures.files }
     }
+}
+
+/// Page with this title around `body`, which is HTML: no script, no file beside it.
+fn document(title: &str, body: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en-GB\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n\
+         <style>\n{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
+        escape(title),
+        include_str!("style.css")
+    )
+}
+
+/// Text as HTML: what stands between backticks is code.
+fn paragraph(text: &str) -> String {
+    let text = escape(&unbroken(text));
+    let part = |(i, part): (usize, &str)| match i % 2 {
+        0 => part.to_owned(),
+        _ => format!("<code>{part}</code>"),
+    };
+    text.split('`').enumerate().map(part).collect()
 }
 
 /// Numbers of figures and tables, as they come.
 struct Numbers {
     figures: Figures,
     tables: usize,
+    /// Headings as HTML.
+    headings: Vec<String>,
 }
 
 impl Numbers {
     fn html(&mut self, section: &Section) -> String {
         match section {
-            Section::Heading(text) => format!("<h2>{}</h2>\n", escape(text)),
+            Section::Heading(text) => {
+                self.headings.push(escape(text));
+                format!("<h2 id=\"heading-{}\">{}</h2>\n", self.headings.len(), escape(text))
+            }
             Section::Facts(facts) => {
                 let fact = |Fact { label, value, unit }: &Fact| {
                     let [label, value, unit] = [label, value, unit].map(|it| escape(it));
@@ -318,7 +408,14 @@ impl Numbers {
                 table.html(self.tables)
             }
             Section::Figure(figure) => self.figures.html(figure),
-            Section::Note(note) => format!("<p class=\"note\">{}</p>\n", escape(note)),
+            Section::Details(details) => {
+                let line = |(name, text): &(_, String)| {
+                    format!("<div><dt>{name}</dt><dd>{}</dd></div>\n", paragraph(text))
+                };
+                let lines: String = details.iter().map(line).collect();
+                format!("<dl class=\"facts\">\n{lines}</dl>\n")
+            }
+            Section::Note(note) => format!("<p class=\"note\">{}</p>\n", paragraph(note)),
             Section::Folded(summary, sections) => {
                 let inner: String = sections.iter().map(|section| self.html(section)).collect();
                 let summary = escape(summary);

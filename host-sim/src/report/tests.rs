@@ -11,15 +11,19 @@ use taxel_evaluate::run::{RunResult, run};
 use taxel_evaluate::subject::Subject;
 use taxel_evaluate::verdict::{Verdict, Warning};
 
-use super::{Made, View};
+use super::{Judged, Page, Pictures, Sections};
 
-fn made() -> Made {
+fn sections(result: &RunResult) -> Sections {
     let files = ["model.bin", "metrics.json"].map(String::from).to_vec();
-    Made { command: "host-sim run 'by <hand>.toml' --seed 7".into(), files }
+    Sections { files, ..super::of_judged(&super::of_run(result)) }
+}
+
+fn page(result: &RunResult) -> Page {
+    sections(result).page("host-sim run 'by <hand>.toml' --seed 7")
 }
 
 fn html(result: &RunResult) -> String {
-    super::html(result, &made()).html
+    page(result).html
 }
 
 /// Electrodes of the three row-wires that are read.
@@ -91,19 +95,21 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
     let page = html(&result);
     assert_eq!(page, html(&result));
     assert!(is_drawable(&page));
-    // Density, histogram, by electrode; readings, frames, arrows; sensor; noise.
-    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (8, 2));
+    // Frames; density, histogram; by electrode; readings, arrows, sensor; noise.
+    assert_eq!(figures(&page), 8);
+    // Errors, by row-wire, other contacts.
+    assert_eq!(page.matches("<figure id=\"table-").count(), 3);
     for text in [
         "seed 7",
         "K = 9",
-        "12\u{202f}345 bytes",
+        "12\u{202f}345\u{a0}bytes",
         "deadbeef",
         &format!("number {} (from 0)", result.distribution.frames[0].frame),
         "It is a &lt;good&gt; model of Δz.",
-        "<li>Few frames for Δz.</li>",
+        "<li>Few frames for Δz. (few-frames)</li>",
         "200\u{a0}<span>µs</span>",
-        "14\u{202f}345\u{a0}<span>B</span>",
-        "fits a slot of 131\u{202f}072\u{a0}B",
+        "14\u{202f}345\u{a0}bytes",
+        "fits a slot of 131\u{202f}072\u{a0}bytes",
         "host-sim run &#39;by &lt;hand&gt;.toml&#39; --seed 7",
         "<a href=\"model.bin\">model.bin</a>",
         env!("CARGO_PKG_VERSION"),
@@ -125,7 +131,7 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
 #[test]
 fn every_figure_is_a_picture_and_a_table_of_its_values() {
     let result = result();
-    let page = super::html(&result, &made());
+    let page = page(&result);
     let links =
         page.html.split("href=\"figures/").skip(1).map(|rest| rest.split('"').next().unwrap());
     let links: Vec<String> = links.map(|name| format!("figures/{name}")).collect();
@@ -183,11 +189,6 @@ fn a_missing_value_is_drawn_nowhere() {
     assert_eq!(page.matches(": missing ").count(), 4);
 }
 
-/// View of outputs and readings of a file, without a scene.
-fn view<'a>(distribution: &'a Distribution, result: &'a RunResult, made: &'a Made) -> View<'a> {
-    View { distribution, sensor: None, table1: None, ..View::of_run(result, made) }
-}
-
 #[test]
 fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
     let names = ["r2c1_ohm", "r2c2_ohm", "r3c1_ohm", "r3c2_ohm"].map(String::from).to_vec();
@@ -200,7 +201,9 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
         let [truth, estimate] =
             [truth, estimate].map(|values| Values { names: names.clone(), values: values.into() });
         let distribution = Distribution::new(&truth, &estimate, readings, Reference::Median);
-        super::view_html(&view(&distribution, &result, &made()))
+        let pictures = Some(Pictures { distribution: &distribution, frames: 4, sensor: None });
+        let judged = Judged { pictures, table1: None, ..super::of_run(&result) };
+        super::of_judged(&judged).page("").html
     };
     let page = of(&["contact_x_mm", "contact_y_mm", "contact_depth_mm"], &readings);
     assert!(is_drawable(&page));
@@ -210,7 +213,7 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
         "of four frames, the worst is at 95 %, too"
     );
     assert!(page.contains("relative to the median") && page.contains("decoded: "));
-    assert!(page.contains("<th scope=\"row\">contact depth (mm)</th>"), "unit once");
+    assert!(page.contains("<td>contact depth (mm)</td>"), "unit once");
     let channels = Values { names: vec!["ch1".into()], ..readings };
     let channels = Values { values: channels.values[..4].to_vec().into(), ..channels };
     let page = of(&["fx_n", "fz_n"], &channels);
@@ -218,6 +221,7 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
     assert!(page.contains("in its standard deviations") && page.contains(">ch1</text>"));
     assert_eq!(page.matches("<title>Map of").count(), 0);
 }
+
 #[test]
 fn names_are_escaped() {
     let mut result = result();

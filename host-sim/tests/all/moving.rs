@@ -22,7 +22,7 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     let text = folder.succeed(&["run", "small.toml"]);
     assert!(
         text.contains(
-            "As a robot meets it, on 4 contacts that slide at 50 mm/s and press 3 times a second"
+            "as a robot meets them, on 4 contacts that slide at 50 mm/s and press 3 times a second"
         ),
         "{text}"
     );

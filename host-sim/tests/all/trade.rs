@@ -200,7 +200,7 @@ fn the_files_and_the_table_tell_every_point() {
     assert_eq!(picture.lines().filter(|line| line.starts_with("Pareto front,")).count(), front);
     assert!(html.contains("<td>chosen</td><td>fixed16") && html.contains(">chosen: K"));
     assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
-    assert!(html.contains("at most 9\u{202f}000 cycles at zero wait"), "the bound");
+    assert!(html.contains("at most 9\u{202f}000\u{a0}cycles at zero wait"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());
     // Measurements are kept where no point is chosen, and another run's choice is not left beside them.

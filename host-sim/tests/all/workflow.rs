@@ -53,7 +53,7 @@ fn a_csv_file_trains_decodes_and_evaluates() {
         let ratio = group["rmse"].as_f64().unwrap() / fresh["rmse"].as_f64().unwrap();
         assert!((0.8..1.25).contains(&ratio), "{group} {fresh}");
     }
-    assert!(page.contains("Linear in training"));
+    assert!(page.contains("RMSE of the best linear decoder in training"));
 }
 
 #[test]

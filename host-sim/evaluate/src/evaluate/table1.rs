@@ -341,7 +341,7 @@ impl Table1 {
                     for definition in Definition::ALL {
                         let value = definition.of(group);
                         let value = value.map_or(String::new(), |v| v.to_string());
-                        let (level, name) = (column.noise_level, definition.name());
+                        let (level, name) = (column.noise_level, definition.name);
                         // Writing to a string cannot fail.
                         let _ = writeln!(
                             csv,
@@ -414,8 +414,7 @@ mod tests {
                 let pairs = errors_of(NETWORK, Some(spread)).into_iter();
                 for (network, mean) in pairs.zip(errors_of(mean::NAME, None)) {
                     // R² is the RMSE again, on a scale where the mean is 0.
-                    for definition in Definition::ALL.iter().filter(|d| **d != Definition::RSquared)
-                    {
+                    for definition in Definition::ALL.iter().filter(|d| d.name != "r_squared") {
                         let pair = (definition.of(&network), definition.of(&mean));
                         let (Some(network), Some(mean)) = pair else { continue };
                         worst = worst.max(network / mean);

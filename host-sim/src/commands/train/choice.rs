@@ -7,7 +7,7 @@ use crate::training_set::TrainingSet;
 use taxel_data::Table;
 use taxel_learn::Options;
 use taxel_learn::kinds::Choice;
-use taxel_learn::select::{self, Candidates, Edge, Scored, Selection};
+use taxel_learn::select::{self, Candidates, Edge, Selection};
 use taxel_learn::train::Refinement;
 
 use super::Arguments;
@@ -102,13 +102,6 @@ fn candidates(
         most_spreads: most_steps(usual_spreads),
         most_penalties: most_steps(usual_penalties),
     }
-}
-
-/// A candidate's settings, for people.
-pub fn settings(scored: &Scored) -> String {
-    let Scored { centres, spread, penalty, .. } = scored;
-    let penalty = penalty.map_or(String::new(), |value| format!(" penalty = {}", short(value)));
-    format!("K = {centres:<4} spread = {spread:<5}{penalty}")
 }
 
 /// A penalty with as many digits as matter.

@@ -8,9 +8,9 @@ use super::chart::{Chart, Mark, Series};
 use super::figures::Figure;
 use super::format::{noise, symbol, with_unit};
 use super::svg::Shape;
-use super::tables::rmse;
 use super::ticks;
 use taxel_evaluate::evaluate::table1::{Column, NETWORK, Table1};
+use taxel_evaluate::metrics::rmse_of;
 
 const WIDE: [f64; 2] = [920.0, 340.0];
 const NARROW: [f64; 2] = [360.0, 270.0];
@@ -18,7 +18,8 @@ const NARROW: [f64; 2] = [360.0, 270.0];
 /// Least RMSE of a decoder over its spreads, or its only one; NaN without a finite one.
 fn best(column: &Column, decoder: &str, group: &str) -> f64 {
     let entries = column.decoders.iter().filter(|entry| entry.decoder == decoder);
-    let finite = entries.map(|entry| rmse(&entry.errors, group)).filter(|rmse| rmse.is_finite());
+    let finite =
+        entries.filter_map(|entry| rmse_of(&entry.errors, group)).filter(|rmse| rmse.is_finite());
     finite.min_by(f64::total_cmp).unwrap_or(f64::NAN)
 }
 
