@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::experiment::names_a_scene;
+use crate::report::Sections;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_core::blob::Metadata;
@@ -148,7 +149,7 @@ impl CheckArguments {
 
 /// Prints the findings. Wrong answers are a failure.
 pub fn conclude(findings: &Findings, common: &Common) -> Result<()> {
-    print::result(common, findings, || page_of(findings))?;
+    print::result(common, findings, || print::Page::of_sections(&sections_of(findings)))?;
     if findings.all_good() {
         Ok(())
     } else {
@@ -163,58 +164,68 @@ pub fn conclude(findings: &Findings, common: &Common) -> Result<()> {
     }
 }
 
-fn page_of(f: &Findings) -> print::Page {
-    let mut page = print::Page::default();
+fn sections_of(f: &Findings) -> Sections {
+    let mut result = Sections::new("The device beside the host");
     let d = &f.device;
-    page.line(format_args!(
-        "{:<17} {}, firmware {}, room for {} × {} wires",
-        "device", d.board, d.firmware, d.rows, d.columns
-    ));
+    result.line(
+        "device",
+        format!("{}, firmware {}, room for {} × {} wires", d.board, d.firmware, d.rows, d.columns),
+    );
     if let Some(m) = &d.model {
-        page.line(format_args!(
-            "{:<17} {} × {} readings to {} × {} outputs, weights in {}",
+        result.line(
             "model",
-            m.rows,
-            m.inputs,
-            m.rows,
-            m.outputs,
-            if m.in_ram { "RAM" } else { "flash" }
-        ));
+            format!(
+                "{} × {} readings to {} × {} outputs, weights in {}",
+                m.rows,
+                m.inputs,
+                m.rows,
+                m.outputs,
+                if m.in_ram { "RAM" } else { "flash" }
+            ),
+        );
     }
-    page.line(format_args!(
-        "{:<17} {} of {} bit-identical to the host's, {:.0} a second",
-        "frames", f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s
-    ));
-    page.line(format_args!(
-        "{:<17} {} requests sent again, {} damaged reports",
-        "line", f.repeated, f.damaged
-    ));
+    result.line(
+        "frames",
+        format!(
+            "{} of {} bit-identical to the host's, {:.0} a second",
+            f.frames.bit_identical, f.frames.frames, f.frames.frames_per_s
+        ),
+    );
+    result
+        .line("line", format!("{} requests sent again, {} damaged reports", f.repeated, f.damaged));
     let s = &f.statistics;
-    page.line(format_args!(
-        "{:<17} {} requests, {} bad packets, {} lost reports",
-        "since its start", s.requests, s.bad_packets, s.lost_reports
-    ));
-    memory_lines(&mut page, &d.memory);
-    page
+    result.line(
+        "since its start",
+        format!(
+            "{} requests, {} bad packets, {} lost reports",
+            s.requests, s.bad_packets, s.lost_reports
+        ),
+    );
+    memory_lines(&mut result, &d.memory);
+    result
 }
 
 /// Adds lines about the use of a device's memory.
-pub fn memory_lines(page: &mut print::Page, m: &Memory) {
-    page.line(format_args!(
-        "{:<17} {} bytes without the model: vector table {}, code {}, constants {}, start values {}",
+pub fn memory_lines(result: &mut Sections, m: &Memory) {
+    result.line(
         "flash",
-        m.flash_bytes(),
-        m.vector_table,
-        m.text,
-        m.rodata,
-        m.data
-    ));
-    page.line(format_args!(
-        "{:<17} {} bytes: variables {}, stack {} at its deepest (of {} reserved)",
+        format!(
+            "{} bytes without the model: vector table {}, code {}, constants {}, start values {}",
+            m.flash_bytes(),
+            m.vector_table,
+            m.text,
+            m.rodata,
+            m.data
+        ),
+    );
+    result.line(
         "RAM",
-        m.ram_bytes(),
-        m.ram_bytes() - m.stack_high_water,
-        m.stack_high_water,
-        m.stack_reserved
-    ));
+        format!(
+            "{} bytes: variables {}, stack {} at its deepest (of {} reserved)",
+            m.ram_bytes(),
+            m.ram_bytes() - m.stack_high_water,
+            m.stack_high_water,
+            m.stack_reserved
+        ),
+    );
 }

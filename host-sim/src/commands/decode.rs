@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use crate::live::replay::times_s;
 use crate::live::sheet;
+use crate::report::Sections;
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
-use serde::Serialize;
 use taxel_core::filter::State;
 use taxel_data::Clock;
 use taxel_data::csv_file::{self, Column};
@@ -71,20 +71,6 @@ pub struct Arguments {
     file: DataFileArguments,
 }
 
-#[derive(Serialize)]
-struct Summary {
-    model_crc: String,
-    frames: usize,
-    /// Number of frames with a reading that is missing, and was not filled.
-    frames_with_missing_readings: usize,
-    /// Number of frames with a reading that was clamped.
-    frames_clamped: usize,
-    health: Health,
-    /// Number of novel frames, if confidence was asked for.
-    frames_novel: Option<usize>,
-    file: PathBuf,
-}
-
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.untouched.path().unwrap_or(&arguments.readings);
     let read = [&*arguments.model, &arguments.readings, baseline];
@@ -143,32 +129,22 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let inputs = model.model_inputs(&readings.values);
     let frames = inputs.chunks_exact(readings.names.len());
     let incomplete = frames.filter(|frame| frame.iter().any(|v| is_missing(*v))).count();
-    let summary = Summary {
-        model_crc: format!("{:08x}", model.model().crc()),
-        frames: estimate.len(),
-        frames_with_missing_readings: incomplete,
-        frames_clamped: flags.iter().filter(|flags| *flags & EstimateReport::CLAMPED != 0).count(),
-        health,
-        frames_novel: assessed.map(|(_, frames)| novel(&frames)),
-        file: arguments.output.clone(),
+    let clamped = flags.iter().filter(|flags| *flags & EstimateReport::CLAMPED != 0).count();
+    let lost = if model.model().whole_frames() {
+        "frames with a missing reading, and without outputs"
+    } else {
+        "frames with a missing reading, and without outputs of its row-wire"
     };
-    if common.json {
-        return print::json(&summary);
-    }
-    let mut page = print::Page::default();
-    page.line(format_args!("{} frames decoded into {}", summary.frames, summary.file.display()));
-    if let Some(novel) = summary.frames_novel {
-        page.line(format_args!("{novel} of them are novel: unlike the frames of training"));
-    }
-    if incomplete > 0 {
-        let lost = if model.model().whole_frames() {
-            "all outputs are empty there"
-        } else {
-            "the outputs of its row-wire are empty"
-        };
-        page.line(format_args!("{incomplete} of them miss a reading: {lost}"));
-    }
-    page.print()
+    let mut result = Sections::new("Decoded frames");
+    result.fact("model_crc", "CRC-32 of the model", "", format!("{:08x}", model.model().crc()));
+    result.fact("frames", "frames", "", estimate.len());
+    result.fact("frames_with_missing_readings", lost, "", incomplete);
+    result.fact("frames_clamped", "frames with a clamped reading", "", clamped);
+    result.value("health", &health);
+    let novel = assessed.map(|(_, frames)| novel(&frames));
+    result.fact("frames_novel", "novel frames, unlike those of training", "", novel);
+    result.fact("file", "file", "", arguments.output.display().to_string());
+    print::sections(common, &result)
 }
 
 /// Column of novelty, and what follows an output's name in the name of its deviation.

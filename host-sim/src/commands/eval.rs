@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::by_load::{LoadErrors, by_load};
-use crate::evaluate::confidence::{Coverage, coverage};
+use crate::by_load::by_load;
+use crate::evaluate::confidence::coverage;
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
 use crate::measurements::{Log, Spread};
-use crate::metrics::{self, DecoderErrors, Errors, GroupRmse, LimitSummary, Measure, NETWORK};
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure, NETWORK};
 use crate::others::percent_novel;
 use crate::over_time::{self, Decoded, OverTime, RestOverTime};
 use crate::report::format::grouped;
@@ -15,7 +15,6 @@ use crate::report::{self, Judged, Pictures, Sections};
 use crate::verdict::{Verdict, Warning};
 use crate::{Error, Result};
 use clap::Args;
-use serde::Serialize;
 use taxel_core::blob::Metadata;
 use taxel_data::dataset::UnusedInputs;
 use taxel_data::{AtRest, Clock, DataFile, Dataset, Table, output};
@@ -57,45 +56,10 @@ pub struct Arguments {
     file: DataFileArguments,
 }
 
-#[derive(Serialize)]
-struct Summary {
-    model_file: PathBuf,
-    model_crc: String,
-    data_file: PathBuf,
-    /// What the model is worth, in words.
-    verdict: Verdict,
-    frames: usize,
-    /// Number of frames with a value that counts.
-    frames_evaluated: usize,
-    /// Number of true outputs in the file.
-    values: usize,
-    /// Number of these that count: neither they nor a reading they need is missing.
-    values_evaluated: usize,
-    /// Faulty readings, and how many of them were filled.
-    health: Health,
-    /// Errors of the model, and of always predicting the mean of these outputs; between them those of the centroid, fitted to
-    /// these lines, where it is known what they are at rest.
-    decoders: Vec<DecoderErrors>,
-    /// RMSE of the best linear decoder on frames of the model's training that it was not fitted to; empty if the model does
-    /// not tell it.
-    linear_at_training: Vec<GroupRmse>,
-    /// Errors by the depth of the contact, or of places by the force; empty for other outputs.
-    by_load: Vec<LoadErrors>,
-    /// Errors and readings at rest by time; `None` if lines are in no order of time.
-    over_time: Option<OverTime>,
-    /// What the intervals of a model that tells deviations cover; empty without one.
-    coverage: Vec<Coverage>,
-    /// Share of the frames without missing readings that a model finds novel.
-    percent_novel: Option<f64>,
-}
-
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(html) = &arguments.html {
-        let inputs: Vec<&Path> = [arguments.model.as_path(), arguments.data.as_path()]
-            .into_iter()
-            .chain(arguments.untouched.path())
-            .collect();
-        print::check_output(html, &inputs)?;
+        let untouched = arguments.untouched.path().unwrap_or(&arguments.data);
+        print::check_output(html, &[&*arguments.model, &arguments.data, untouched])?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
     let model = blob.prepare();
@@ -144,49 +108,55 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     // A frame counts if any of its values does; what could not be decoded is missing in both.
     let frames_evaluated =
         truth.lines().filter(|line| line.iter().any(|value| !value.is_nan())).count();
-    let names: Vec<&str> =
-        metadata.input_names.iter().chain(metadata.output_names.iter()).collect();
-    let same_file = metadata.scene_digest == file.digest(&names)? && knows(metadata, &file)?;
     let values_evaluated = errors.iter().map(|group| group.count).sum();
     let at_rest = over_time.as_ref().and_then(|log| log.rest.as_ref());
     let of_centroid = centroid_of(&readings, &truth, lines_at_rest.as_deref());
     let decoders = decoders_of(&truth, errors, of_centroid.as_deref(), &measure);
     let verdict = verdict_of(&decoders)
         .of_frames(None, frames_evaluated)
-        .with(Warning::trained_on(same_file))
+        .with(Warning::trained_on(knows(metadata, &file)?))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
         .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift));
-    let summary = Summary {
-        model_file: arguments.model.clone(),
-        model_crc: format!("{:08x}", model.model().crc()),
-        data_file: arguments.data.clone(),
-        verdict,
-        decoders,
-        linear_at_training: metrics::linear_at_training(&parsed),
-        coverage: assessed.map_or(vec![], |(deviations, _)| {
-            coverage(&truth, &estimate.values, &deviations, ratios_95)
-        }),
-        percent_novel,
-        frames: readings.len(),
-        frames_evaluated,
-        values: truth.values.len(),
-        values_evaluated,
-        health,
-        by_load: by_load(&truth, &with_untold, of_centroid.as_deref(), &measure),
-        over_time,
-    };
+    let coverage = assessed.map_or(vec![], |(deviations, _)| {
+        coverage(&truth, &estimate.values, &deviations, ratios_95)
+    });
+    let by_load = by_load(&truth, &with_untold, of_centroid.as_deref(), &measure);
+    let linear_at_training = metrics::linear_at_training(&parsed);
     let reference = if metadata.relative_inputs { Reference::Relative } else { Reference::Median };
     let distribution = arguments
         .html
         .is_some()
         .then(|| Distribution::new(&truth, &estimate, &readings, reference));
-    let more = (distribution.as_ref(), without_reading);
-    let sections = sections_of(arguments, (&blob, &file), &summary, more)?;
+    let counts = [frames_evaluated, without_reading, values_evaluated, truth.values.len()];
+    let made = made(arguments, (&blob, &file), &health, counts)?;
+    let judged = Judged {
+        verdict: &verdict,
+        device: &DeviceCost::new(&blob),
+        decoders: &decoders,
+        linear_at_training: &linear_at_training,
+        limit: &LimitSummary::new(&Err(Refusal::Measured)),
+        by_load: &by_load,
+        by_row: &[],
+        others: None,
+        over_time: over_time.as_ref(),
+        moving: None,
+        coverage: &coverage,
+        percent_novel,
+        frames: frames_evaluated,
+        pictures: distribution.as_ref().map(|distribution| Pictures {
+            distribution,
+            frames: frames_evaluated,
+            sensor: None,
+        }),
+        table1: None,
+    };
+    let mut sections = report::of_judged(&judged, made);
     if let Some(html) = &arguments.html {
+        sections.is_alone = true;
         let page = sections.page(&command_line::of_this_process("eval", &[], None));
         output::write_bytes(html, page.html.as_bytes())?;
     }
-    print::result(common, &summary, || print::Page::of(sections.text().trim_end()))
+    print::sections(common, &sections)
 }
 
 /// The model's `errors`, and those of decoders that are fitted to the lines of `truth`: the centroid and the mean.
@@ -254,6 +224,11 @@ fn nothing_counts(relative_inputs: bool) -> &'static str {
 fn knows(metadata: &Metadata<'_>, file: &DataFile) -> Result<bool> {
     /// Outliers and rounded shares make a difference of one line in so many.
     const ONE_IN: usize = 100;
+    let names: Vec<&str> =
+        metadata.input_names.iter().chain(metadata.output_names.iter()).collect();
+    if metadata.scene_digest != file.digest(&names)? {
+        return Ok(false);
+    }
     let inputs = file.columns(metadata.input_names.iter())?;
     let outputs = file.columns(metadata.output_names.iter())?;
     let usable = |line: &&[f64]| {
@@ -264,82 +239,44 @@ fn knows(metadata: &Metadata<'_>, file: &DataFile) -> Result<bool> {
     Ok(metadata.training_frames as usize > others + others / ONE_IN)
 }
 
-/// Result for people; with figures of a `distribution`.
-fn sections_of(
+/// What was judged, and by what. `counts` are of frames that count and that lack a reading, of true outputs that count and of
+/// all.
+fn made(
     arguments: &Arguments,
     (blob, file): (&ModelBlob, &DataFile),
-    summary: &Summary,
-    (distribution, without_reading): (Option<&Distribution>, usize),
+    health: &Health,
+    counts: [usize; 4],
 ) -> Result<Sections> {
-    let limit = LimitSummary::new(&Err(Refusal::Measured));
-    let model = blob.parse();
+    let [frames_evaluated, without_reading, values_evaluated, values] = counts;
+    let (model, frames) = (blob.parse(), file.lines());
+    let metadata = model.metadata();
     let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let [model_file, data_file] = [&arguments.model, &arguments.data].map(|path| name_of(path));
-    let unused = UnusedInputs::among(file, file.columns(model.metadata().input_names.iter())?);
-    let (frames, health) = (summary.frames, &summary.health);
-    let without_output = frames - summary.frames_evaluated - without_reading;
-    let counted = |counts: &[(usize, &str)]| {
-        let counts = counts.iter().filter(|(count, _)| *count > 0);
-        counts.map(|(count, what)| format!("{} {what}", grouped(*count))).collect::<Vec<_>>()
-    };
-    let lines = counted(&[
+    let [of_model, of_data] = [&arguments.model, &arguments.data].map(|path| name_of(path));
+    let mut made = Sections::new(format!("{of_model} on {of_data}"));
+    made.fact("model_file", "Model", "", arguments.model.display().to_string());
+    made.fact("model_crc", "CRC-32", "", format!("{:08x}", model.crc()));
+    let training = grouped(metadata.training_frames as usize);
+    made.line("Trained on", format!("“{}”, {training} frames", metadata.name));
+    made.fact("data_file", "Data", "", arguments.data.display().to_string());
+    made.fact("frames", "Frames", "", frames);
+    made.fact("frames_evaluated", "Frames that count", "", frames_evaluated);
+    made.fact("values", "True outputs", "", values);
+    made.fact("values_evaluated", "True outputs that count", "", values_evaluated);
+    made.value("health", health);
+    let lines = [
         (without_reading, "lack a reading"),
-        (without_output, "lack all outputs"),
+        (frames - frames_evaluated - without_reading, "lack all outputs"),
         (file.lines_left_out().count(), "are not chosen by the options"),
-    ]);
-    let readings = counted(&[
+    ];
+    made.line("Lines left out", report::reasons(&lines));
+    let readings = [
         (health.readings_missing, "missing"),
         (health.readings_shorted, "shorted"),
         (health.readings_open, "open"),
         (health.readings_filled, "of these filled from the others"),
-    ]);
-    let details = vec![
-        ("Data", format!("{data_file}: {} frames", grouped(frames))),
-        (
-            "Values",
-            format!(
-                "{} of {} true outputs count",
-                grouped(summary.values_evaluated),
-                grouped(summary.values)
-            ),
-        ),
-        (
-            "Model",
-            format!(
-                "{model_file}, trained on “{}”, {} frames",
-                model.metadata().name,
-                grouped(model.metadata().training_frames as usize)
-            ),
-        ),
-        ("Blob", format!("{} bytes, CRC-32 {:08x}", grouped(blob.bytes().len()), model.crc())),
-        ("Lines left out", lines.join("; ")),
-        ("Faulty readings", readings.join("; ")),
-        ("Inputs that tell nothing", report::in_words(&unused)),
     ];
-    let judged = Judged {
-        title: format!("{model_file} on {data_file}"),
-        details,
-        verdict: &summary.verdict,
-        device: &DeviceCost::new(blob),
-        decoders: &summary.decoders,
-        linear_at_training: &summary.linear_at_training,
-        limit: &limit,
-        by_load: &summary.by_load,
-        by_row: &[],
-        others: None,
-        over_time: summary.over_time.as_ref(),
-        moving: None,
-        coverage: &summary.coverage,
-        percent_novel: summary.percent_novel,
-        frames: summary.frames_evaluated,
-        pictures: distribution.map(|distribution| Pictures {
-            distribution,
-            frames: summary.frames_evaluated,
-            sensor: None,
-        }),
-        table1: None,
-    };
-    let mut sections = report::of_judged(&judged);
-    sections.is_alone = true;
-    Ok(sections)
+    made.line("Faulty readings", report::reasons(&readings));
+    let unused = UnusedInputs::among(file, file.columns(metadata.input_names.iter())?);
+    made.line("Inputs that tell nothing", report::in_words(&unused));
+    Ok(made)
 }

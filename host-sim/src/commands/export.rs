@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::report::Sections;
 use crate::{Error, Result};
 use clap::{ArgGroup, Args};
-use serde::Serialize;
 use taxel_data::output::write_bytes;
 use taxel_learn::ModelBlob;
 use taxel_learn::export::c::{self, Name};
@@ -39,19 +39,6 @@ pub struct Arguments {
     rust: Option<PathBuf>,
 }
 
-#[derive(Serialize)]
-struct Summary {
-    subject: String,
-    model_crc: String,
-    rows: usize,
-    /// Networks; rows may share them.
-    networks: usize,
-    /// Bytes that the model's numbers take in flash.
-    weight_bytes: usize,
-    /// File or folder that was written.
-    file: PathBuf,
-}
-
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let read = || ModelBlob::read(&arguments.model);
     let (written, blob);
@@ -66,24 +53,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         c::write(&blob, &arguments.name, folder)?;
     }
     let model = blob.parse();
-    let summary = Summary {
-        subject: model.metadata().name.into(),
-        model_crc: format!("{:08x}", model.crc()),
-        rows: model.shape().rows,
-        networks: model.network_count(),
-        weight_bytes: constant_bytes(&blob),
-        file: written.clone(),
-    };
-    print::result(common, &summary, || {
-        print::Page::of(format_args!(
-            "{}: {} row{}, {} network{}, {} bytes of weights, CRC-32 {}",
-            summary.file.display(),
-            summary.rows,
-            if summary.rows == 1 { "" } else { "s" },
-            summary.networks,
-            if summary.networks == 1 { "" } else { "s" },
-            summary.weight_bytes,
-            summary.model_crc
-        ))
-    })
+    let mut result = Sections::new("Model as source code");
+    result.fact("subject", "trained on", "", model.metadata().name);
+    result.fact("model_crc", "CRC-32", "", format!("{:08x}", model.crc()));
+    result.fact("rows", "rows", "", model.shape().rows);
+    result.fact("networks", "networks", "", model.network_count());
+    result.fact("weight_bytes", "numbers", "bytes", constant_bytes(&blob));
+    result.fact("file", "written to", "", written.display().to_string());
+    print::sections(common, &result)
 }

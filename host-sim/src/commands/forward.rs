@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use crate::Result;
 use crate::experiment::Experiment;
+use crate::report::Sections;
 use clap::Args;
-use serde::Serialize;
 use taxel_data::{DataFile, csv_file};
 use taxel_simulate::forward::forward;
 
@@ -24,14 +24,6 @@ pub struct Arguments {
     output: PathBuf,
 }
 
-#[derive(Serialize)]
-struct Summary {
-    subject: String,
-    frames: usize,
-    readings: usize,
-    file: PathBuf,
-}
-
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scene = Experiment::load_open(&arguments.scene)?;
     let file = DataFile::read(&arguments.deformation)?;
@@ -40,18 +32,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let names = scene.world.reading_names();
     let lines = readings.chunks_exact(names.len()).map(|line| line.iter().copied());
     csv_file::write(&arguments.output, names.iter().map(String::as_str), lines)?;
-    let summary = Summary {
-        subject: scene.name.clone(),
-        frames: file.lines(),
-        readings: names.len(),
-        file: arguments.output.clone(),
-    };
-    print::result(common, &summary, || {
-        print::Page::of(format_args!(
-            "{} frames of {} readings in {}",
-            summary.frames,
-            summary.readings,
-            summary.file.display()
-        ))
-    })
+    let mut result = Sections::new("Readings of the ideal sensor");
+    result.fact("subject", "scene", "", &scene.name);
+    result.fact("frames", "frames", "", file.lines());
+    result.fact("readings", "readings of a frame", "", names.len());
+    result.fact("file", "file", "", arguments.output.display().to_string());
+    print::sections(common, &result)
 }

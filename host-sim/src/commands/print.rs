@@ -85,38 +85,38 @@ pub fn begin(command: &str) {
     *BEGUN.lock().unwrap_or_else(PoisonError::into_inner) = (command.into(), Some(Instant::now()));
 }
 
-/// Result of a command with what all of them say (docs/json.md).
-#[derive(Serialize)]
-struct Document<'r, R> {
-    version: &'static str,
-    command: &'r str,
-    /// Time since the command began; `None` in files, which are the same whenever they are written.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    seconds: Option<f64>,
-    #[serde(flatten)]
-    result: &'r R,
-}
-
-/// Result as JSON for a file.
+/// Result as JSON for a file, which is the same whenever it is written.
 pub fn json_text(result: &impl Serialize) -> Result<String> {
-    document(result, false)
+    Ok(document(&object(result)?, false))
 }
 
-fn document(result: &impl Serialize, timed: bool) -> Result<String> {
+fn object(result: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(result);
+    text.map_err(|cause| Error::failed(format!("cannot write JSON: {cause}")))
+}
+
+/// Object of a result with what all commands say (docs/json.md): the time since the command began only if it is `timed`.
+fn document(object: &str, timed: bool) -> String {
     let (command, begun) = BEGUN.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    let document = Document {
-        version: env!("CARGO_PKG_VERSION"),
-        command: &command,
-        seconds: begun.filter(|_| timed).map(|begun| begun.elapsed().as_secs_f64()),
-        result,
-    };
-    let text = serde_json::to_string_pretty(&document);
-    Ok(text.map_err(|cause| Error::failed(format!("cannot write JSON: {cause}")))? + "\n")
+    let version = env!("CARGO_PKG_VERSION");
+    let seconds = begun.filter(|_| timed).map(|begun| begun.elapsed().as_secs_f64());
+    let seconds = seconds.map_or(String::new(), |it| format!("\n  \"seconds\": {it},"));
+    let head = format!("{{\n  \"version\": \"{version}\",\n  \"command\": \"{command}\",{seconds}");
+    object.replacen('{', &head, 1) + "\n"
 }
 
 /// Prints the result of the command as JSON.
 pub fn json(result: &impl Serialize) -> Result<()> {
-    show(&document(result, true)?)
+    show(&document(&object(result)?, true))
+}
+
+/// Prints the result of the command: as JSON if that was asked for, else as text.
+pub fn sections(common: &Common, sections: &Sections) -> Result<()> {
+    if common.json {
+        show(&document(&sections.json(), true))
+    } else {
+        Page::of_sections(sections).print()
+    }
 }
 
 /// Prints the result of the command: as JSON if that was asked for, else as a page.

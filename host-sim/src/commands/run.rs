@@ -84,7 +84,7 @@ fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common
     let (result, blob) = run::run(subject, options, &Terminal::new())?;
     let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
     note_format(&blob.parse(), options, result.device_cost.cycles);
-    let mut sections = report::of_judged(&report::of_run(&result));
+    let mut sections = report::of_run(&result);
     let files = write_files(folder, &result, &blob, (&mut sections, &command))?;
     if common.json {
         return print::json(&result);

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
-use serde::Serialize;
 use taxel_data::random::Stream;
 use taxel_data::{Dataset, csv_file};
 use taxel_recording::{Extras, Frame};
@@ -19,6 +18,7 @@ use crate::evaluate::trade::{Device, Wires};
 use crate::experiment::Experiment;
 use crate::live::replay::USUAL_RATE;
 use crate::live::sheet;
+use crate::report::Sections;
 
 /// Synthesise frames of a scene as CSV: noisy readings, true outputs.
 ///
@@ -63,16 +63,6 @@ pub struct Arguments {
 
 /// Time between the end of a trajectory and the start of the next one in s.
 const PAUSE_S: f64 = 1.0;
-
-#[derive(Serialize)]
-struct Summary {
-    subject: String,
-    frames: usize,
-    readings: usize,
-    outputs: usize,
-    seed: u64,
-    file: PathBuf,
-}
 
 impl Arguments {
     /// Times of the scans of a trajectory, if the frames follow one another in time.
@@ -206,24 +196,12 @@ fn conclude(
     if let Some(warning) = Warning::not_positive(&dataset.inputs) {
         stderr::remark(warning);
     }
-    let summary = Summary {
-        subject: scene.name.clone(),
-        frames: dataset.frames(),
-        readings: dataset.inputs.names.len(),
-        outputs: dataset.outputs.names.len(),
-        seed: scene.world.seed,
-        file: arguments.output.clone(),
-    };
-    if common.json {
-        return print::json(&summary);
-    }
-    let mut page = print::Page::default();
-    page.line(format_args!(
-        "{} frames of {} readings and {} outputs in {}",
-        summary.frames,
-        summary.readings,
-        summary.outputs,
-        summary.file.display()
-    ));
-    page.print()
+    let mut result = Sections::new("Synthesised frames");
+    result.fact("subject", "scene", "", &scene.name);
+    result.fact("frames", "frames", "", dataset.frames());
+    result.fact("readings", "readings of a frame", "", dataset.inputs.names.len());
+    result.fact("outputs", "outputs of a frame", "", dataset.outputs.names.len());
+    result.fact("seed", "seed", "", scene.world.seed);
+    result.fact("file", "file", "", arguments.output.display().to_string());
+    print::sections(common, &result)
 }

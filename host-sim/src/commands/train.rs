@@ -10,17 +10,15 @@ use crate::metrics::{self, NETWORK};
 use crate::report::format::symbol;
 use crate::report::{self, Digits, Sections, TableOf};
 use crate::subject::Subject;
+use crate::training_set::TrainingSet;
 use crate::{Error, Result};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use serde::Serialize;
-use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{columns, output};
 use taxel_learn::kinds::Choice;
-use taxel_learn::outliers::Outliers;
 use taxel_learn::reading_model::Extent;
 use taxel_learn::select::{Scored, Selection};
-use taxel_learn::train::Solver;
+use taxel_learn::{ModelBlob, Options};
 
 use super::data_argument::JudgedBy;
 use super::model_argument::{ModelArguments, NetworkArguments, note_format};
@@ -72,47 +70,6 @@ pub struct Arguments {
     subject: SubjectOptions,
 }
 
-#[derive(Serialize)]
-struct Summary {
-    subject: String,
-    seed: u64,
-    file: PathBuf,
-    blob_bytes: usize,
-    model_crc: String,
-    training_frames: usize,
-    centres: usize,
-    /// Width σ on scaled inputs; after refinement the mean over the networks.
-    spread: f64,
-    /// Penalty on squared weights, for each frame; `None` for the usual one.
-    penalty: Option<f64>,
-    /// How output weights were computed: `qr` or `rls`.
-    solver: &'static str,
-    /// Whether centres, widths and the projection were refined after K-means.
-    refined: bool,
-    /// Whether inputs are readings relative to the baseline.
-    relative_inputs: bool,
-    /// Features that training chose, and what it tried; `None` where there was no choice.
-    features: Option<Choice>,
-    /// What the model's statistics of readings tell: `fill` missing readings, `full` deviations and novelty, too; `None`
-    /// without any.
-    reading_model: Option<&'static str>,
-    /// Number formats of the networks, in their order.
-    formats: Vec<&'static str>,
-    outputs: Vec<ModelOutput>,
-    selection: Option<Selection>,
-    /// What the model is worth, beside the baselines.
-    #[serde(flatten)]
-    worth: Worth,
-    /// Values far from all others in their column; `None` for a scene.
-    outliers: Option<Outliers>,
-    /// Lines that lack a value; `None` for a scene.
-    lines_left_out: Option<LeftOut>,
-    /// Inputs that can tell nothing, and are left out; `None` for a scene.
-    unused_inputs: Option<UnusedInputs>,
-    /// Inputs that are left in and never change in training; a network cannot use them.
-    constant_inputs: Vec<String>,
-}
-
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let source = Path::new(&arguments.source);
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
@@ -133,38 +90,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let blob = set.blob(&options, &progress)?;
     output::write_bytes(&arguments.output, blob.bytes())?;
 
-    let model = blob.parse();
-    note_format(&model, &options, DeviceCost::new(&blob).cycles);
-    let summary = Summary {
-        subject: subject.name().into(),
-        seed: set.origin.seed,
-        file: arguments.output.clone(),
-        blob_bytes: blob.bytes().len(),
-        model_crc: format!("{:08x}", model.crc()),
-        training_frames: set.frames.frames(),
-        centres: model.networks().map(|n| n.shape().centres).max().unwrap_or(0),
-        spread: if set.refine { blob.spread() } else { options.spread },
-        penalty: options.penalty,
-        solver: options.solver.name(),
-        refined: set.refine,
-        relative_inputs: set.frames.relative_inputs,
-        features,
-        reading_model: model.reading_model().map(|it| Extent::NAMES[usize::from(it.assesses())]),
-        formats: model.networks().map(|n| n.format().name()).collect(),
-        outputs: model_outputs::of(&model),
-        worth: Worth::new(&subject, &set, &blob, selection.as_ref()),
-        selection,
-        outliers: subject.measurements().map(|data| data.outliers.clone()),
-        lines_left_out: subject.measurements().map(|data| data.left_out.clone()),
-        unused_inputs: subject.measurements().map(|data| data.unused.clone()),
-        constant_inputs: subject
-            .measurements()
-            .map(Measurements::constant_inputs)
-            .unwrap_or_default(),
-    };
-    print::result(common, &summary, || {
-        print::Page::of_sections(&sections_of(&summary, options.centres))
-    })
+    note_format(&blob.parse(), &options, DeviceCost::new(&blob).cycles);
+    let trained = Trained { subject: &subject, set: &set, options: &options, blob: &blob };
+    print::sections(
+        common,
+        &trained.sections(&arguments.output, features.as_ref(), selection.as_ref()),
+    )
 }
 
 /// Scene or CSV file that is trained on: all frames of a file, or so many of a scene.
@@ -199,50 +130,74 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
     Ok(subject)
 }
 
-fn sections_of(summary: &Summary, asked: usize) -> Sections {
-    let mut sections = Sections::new(format!("Model of {}", summary.subject));
-    if let Some(selection) = &summary.selection {
-        scores(&mut sections, selection, &summary.outputs);
+/// Model that was trained, and what it was trained on.
+struct Trained<'a> {
+    subject: &'a Subject,
+    set: &'a TrainingSet<'a>,
+    options: &'a Options,
+    blob: &'a ModelBlob,
+}
+
+impl Trained<'_> {
+    /// What is worth to know of it; `features` and settings in `selection` were chosen before.
+    fn sections(
+        &self,
+        file: &Path,
+        features: Option<&Choice>,
+        selection: Option<&Selection>,
+    ) -> Sections {
+        let Self { subject, set, options, blob } = *self;
+        let (model, measured) = (blob.parse(), subject.measurements());
+        let worth = Worth::new(subject, set, blob, selection);
+        let outputs = model_outputs::of(&model);
+        let mut result = Sections::new(format!("Model of {}", subject.name()));
+        result.value("subject", subject.name());
+        if let Some(selection) = selection {
+            scores(&mut result, selection, &outputs);
+        }
+        result.fact("file", "file", "", file.display().to_string());
+        result.fact("blob_bytes", "size", "bytes", blob.bytes().len());
+        result.fact("model_crc", "CRC-32", "", format!("{:08x}", model.crc()));
+        let formats: Vec<&str> = model.networks().map(|it| it.format().name()).collect();
+        result.value("formats", &formats);
+        result.line("format", formats.first().copied().unwrap_or_default());
+        let centres = model.networks().map(|it| it.shape().centres).max().unwrap_or(0);
+        result.fact("centres", "centres K", "", centres);
+        if centres < options.centres {
+            let asked = options.centres;
+            result
+                .line("asked for", format!("{asked} centres; the data has fewer distinct samples"));
+        }
+        let spread = if set.refine { blob.spread() } else { options.spread };
+        result.fact("spread", "spread", "", spread);
+        result.fact("refined", "refined", "", set.refine);
+        result.fact("penalty", "penalty", "", options.penalty);
+        result.fact("solver", "weights by", "", options.solver.name());
+        result.fact("training_frames", "training frames", "", set.frames.frames());
+        result.fact("seed", "seed", "", set.origin.seed);
+        let relative = set.frames.relative_inputs;
+        result.fact("relative_inputs", "readings relative to the baseline", "", relative);
+        let extent = model.reading_model().map(|it| Extent::NAMES[usize::from(it.assesses())]);
+        result.fact("reading_model", "reading model", "", extent);
+        result.value("features", &features);
+        result.line("chosen", features.map_or(String::new(), ToString::to_string));
+        result.value("outputs", &outputs);
+        result.value("selection", &selection);
+        result.value("outliers", &measured.map(|data| &data.outliers));
+        result.value("lines_left_out", &measured.map(|data| &data.left_out));
+        result.value("unused_inputs", &measured.map(|data| &data.unused));
+        let constant = measured.map(Measurements::constant_inputs).unwrap_or_default();
+        result.value("constant_inputs", &constant);
+        let Worth { judged_on, verdict, decoders } = &worth;
+        result.value("judged_on", judged_on);
+        result.value("decoders", decoders);
+        result.value("verdict", verdict);
+        let words = judged_on.words();
+        report::errors_of(&mut result, decoders, &words.replacen("On", "on", 1));
+        report::worth(&mut result, verdict, metrics::of_decoder(decoders, NETWORK));
+        result.lead = format!("{words}: {}", result.lead);
+        result
     }
-    let few = if summary.centres < asked {
-        format!("; {asked} were asked for, but the data has fewer distinct samples")
-    } else {
-        String::new()
-    };
-    let penalty =
-        summary.penalty.map_or(String::new(), |it| format!(", penalty {}", choice::short(it)));
-    sections.details(vec![
-        (
-            "Blob",
-            format!(
-                "{}, {} bytes, CRC-32 {}",
-                summary.file.display(),
-                summary.blob_bytes,
-                summary.model_crc
-            ),
-        ),
-        (
-            "Network",
-            format!(
-                "{}, K = {}{few}, spread {}{}{penalty}{}{}",
-                summary.formats.first().unwrap_or(&""),
-                summary.centres,
-                summary.spread,
-                if summary.refined { " (refined)" } else { "" },
-                if summary.solver == Solver::Rls.name() { ", weights by recursion" } else { "" },
-                if summary.relative_inputs { ", inputs relative to the baseline" } else { "" },
-            ),
-        ),
-        ("Frames", summary.training_frames.to_string()),
-        ("Chosen", summary.features.as_ref().map_or(String::new(), ToString::to_string)),
-        ("Reading model", summary.reading_model.unwrap_or_default().into()),
-    ]);
-    let Worth { judged_on, verdict, decoders } = &summary.worth;
-    let words = judged_on.words();
-    report::errors_of(&mut sections, decoders, &words.replacen("On", "on", 1));
-    report::worth(&mut sections, verdict, metrics::of_decoder(decoders, NETWORK));
-    sections.lead = format!("{words}: {}", sections.lead);
-    sections
 }
 
 /// Adds the scores of cross-validation.

@@ -28,9 +28,6 @@ const MOST_OUTPUTS: usize = 24;
 /// Model and its errors on frames that it was not trained on. What only a scene knows may be missing.
 #[derive(Debug, Clone)]
 pub struct Judged<'a> {
-    pub title: String,
-    /// How data and model were made.
-    pub details: Vec<(&'static str, String)>,
     pub verdict: &'a Verdict,
     pub device: &'a DeviceCost,
     /// Errors of the model, and of decoders beside it.
@@ -58,9 +55,16 @@ pub struct Judged<'a> {
     pub table1: Option<&'a Table1>,
 }
 
-/// Sections of a model that was judged.
-pub fn sections(judged: &Judged<'_>) -> Sections {
-    let mut sections = Sections::new(&judged.title);
+/// Sections of a model that was judged, with those on how it was `made`, whose title they have.
+pub fn sections(judged: &Judged<'_>, made: Sections) -> Sections {
+    let mut sections = Sections::new(&made.title);
+    sections.value("verdict", judged.verdict);
+    sections.value("decoders", judged.decoders);
+    sections.value("linear_at_training", judged.linear_at_training);
+    sections.value("by_load", judged.by_load);
+    sections.value("over_time", &judged.over_time);
+    sections.value("coverage", judged.coverage);
+    sections.value("percent_novel", &judged.percent_novel);
     worth(&mut sections, judged.verdict, groups(judged));
     sections.sections.push(Section::Facts(facts(judged)));
     let pictures = judged.pictures.as_ref();
@@ -103,7 +107,8 @@ pub fn sections(judged: &Judged<'_>) -> Sections {
         moving::add(&mut sections, contacts);
     }
     sections.heading("How it was made, and what it costs");
-    sections.details([&judged.details[..], &cost(judged.device)].concat());
+    sections.extend(made);
+    cost(&mut sections, judged.device);
     if let Some(pictures) = drawn {
         let arrows = face.as_ref().and_then(|face| frames::arrows(pictures, face));
         let figures = frames::readings(pictures).into_iter().chain(arrows);
@@ -330,30 +335,19 @@ fn outputs(pictures: &Pictures<'_>) -> Section {
     table.section()
 }
 
-/// What decoding costs a device.
-fn cost(device: &DeviceCost) -> Vec<(&'static str, String)> {
+/// Adds what decoding costs a device.
+fn cost(sections: &mut Sections, device: &DeviceCost) {
     let weights = if device.weights_in_ram { device.blob_bytes } else { 0 };
     let of_ram = match weights {
         0 => "weights stay in flash".to_owned(),
         bytes => format!("{} of them weights", grouped(bytes)),
     };
+    let [cycles, ram, blob, slot] =
+        [device.cycles as usize, device.ram_bytes + weights, device.blob_bytes, device.slot_bytes]
+            .map(grouped);
     let fits = if device.fits_slot { "fits" } else { "does not fit" };
-    vec![
-        (
-            "Decoding",
-            format!(
-                "{} cycles of a Cortex-M4F whose memory never waits, as docs/cycles.md predicts them",
-                grouped(device.cycles as usize)
-            ),
-        ),
-        ("RAM", format!("{} bytes, {of_ram}", grouped(device.ram_bytes + weights))),
-        (
-            "Flash",
-            format!(
-                "{} bytes: the blob {fits} a slot of {} bytes",
-                grouped(device.blob_bytes),
-                grouped(device.slot_bytes)
-            ),
-        ),
-    ]
+    let processor = "a Cortex-M4F whose memory never waits, as docs/cycles.md predicts them";
+    sections.line("Decoding", format!("{cycles} cycles of {processor}"));
+    sections.line("RAM", format!("{ram} bytes, {of_ram}"));
+    sections.line("Flash", format!("{blob} bytes: the blob {fits} a slot of {slot} bytes"));
 }

@@ -2,21 +2,24 @@
 
 use taxel_data::columns;
 use taxel_data::dataset::UnusedInputs;
-use taxel_evaluate::run::{DataSummary, RunResult};
+use taxel_evaluate::run::RunResult;
 
 use super::errors::Pictures;
-use super::format::{grouped, noise, percent, significant};
-use super::judged::Judged;
+use super::format::{counted, grouped, noise, percent, significant};
+use super::judged::{self, Judged};
+use super::sections::Sections;
+
+/// Sections of a run.
+pub fn sections(result: &RunResult) -> Sections {
+    judged::sections(&of_run(result), made(result))
+}
 
 /// Model of a run, and its errors.
-pub fn judged(result: &RunResult) -> Judged<'_> {
+pub fn of_run(result: &RunResult) -> Judged<'_> {
     let scene = result.scene.as_ref();
-    let kind = if scene.is_some() { "Scene" } else { "Data" };
     let frames = result.model.test_frames;
     let sensor = scene.and_then(|scene| scene.sensor.as_ref());
     Judged {
-        title: format!("{kind} “{}”", result.subject),
-        details: details(result),
         verdict: &result.verdict,
         device: &result.device_cost,
         decoders: &result.decoders,
@@ -35,7 +38,8 @@ pub fn judged(result: &RunResult) -> Judged<'_> {
     }
 }
 
-fn details(result: &RunResult) -> Vec<(&'static str, String)> {
+/// How data and model were made.
+fn made(result: &RunResult) -> Sections {
     let (scene, model) = (&result.scene, &result.model);
     let noise = scene.as_ref().map(|it| {
         format!("{} noise of {}", it.noise_kind.name(), noise(it.noise_kind, it.noise_level))
@@ -48,51 +52,41 @@ fn details(result: &RunResult) -> Vec<(&'static str, String)> {
     let kind = if scene.is_some() { "Scene" } else { "Data" };
     let others = result.data.as_ref().map_or("new ones", |data| data.test_choice.as_str());
     let refined = if model.refined { " (refined)" } else { "" };
-    let plural = if model.networks == 1 { "" } else { "s" };
-    let mut facts = vec![
-        (kind, format!("{}, digest {}, seed {}", result.subject, result.scene_digest, result.seed)),
-        ("Readings", format!("{}{drift}", noise.as_deref().unwrap_or("as measured"))),
-        (
-            "Frames",
-            format!(
-                "{} to train on, {} ({others}) to test",
-                grouped(model.training_frames),
-                grouped(model.test_frames)
-            ),
-        ),
-        (
-            "Model",
-            format!(
-                "{} network{plural}: {inputs} → K = {} → {outputs}; spread {}{refined}",
-                model.networks,
-                model.centres,
-                significant(model.spread, 3)
-            ),
-        ),
-        ("Blob", format!("{} bytes, CRC-32 {}", grouped(model.blob_bytes), model.model_crc)),
-    ];
-    facts.extend(result.features.iter().map(|choice| ("Chosen", choice.to_string())));
-    facts.extend(result.data.iter().flat_map(left_out));
-    facts
+    let spread = significant(model.spread, 3);
+    let networks = counted(model.networks, "network");
+    let [training, test] = [model.training_frames, model.test_frames].map(grouped);
+    let mut made = Sections::new(format!("{kind} “{}”", result.subject));
+    made.line(
+        kind,
+        format!("{}, digest {}, seed {}", result.subject, result.scene_digest, result.seed),
+    );
+    made.line("Readings", format!("{}{drift}", noise.as_deref().unwrap_or("as measured")));
+    made.line("Frames", format!("{training} to train on, {test} ({others}) to test"));
+    let shape = format!("{inputs} → K = {} → {outputs}", model.centres);
+    made.line("Model", format!("{networks}: {shape}; spread {spread}{refined}"));
+    let blob = grouped(model.blob_bytes);
+    made.line("Blob", format!("{blob} bytes, CRC-32 {}", model.model_crc));
+    made.line("Chosen", result.features.as_ref().map_or(String::new(), ToString::to_string));
+    if let Some(data) = &result.data {
+        let missing = &data.lines_left_out;
+        let outliers = if data.outliers.left_out { data.outliers.lines } else { 0 };
+        let lines = [
+            (missing.without_reading, "lack a reading"),
+            (missing.without_output, "lack all outputs"),
+            (outliers, "hold a value far from all others"),
+        ];
+        made.line("Lines left out", reasons(&lines));
+        made.line("Inputs left out", in_words(&data.unused_inputs));
+        made.line("Constant inputs", columns::some_names(&data.constant_inputs));
+    }
+    made
 }
 
-/// Lines and inputs of a data file that a model was not trained on.
-fn left_out(data: &DataSummary) -> [(&'static str, String); 3] {
-    let (missing, unused) = (&data.lines_left_out, &data.unused_inputs);
-    let outliers = if data.outliers.left_out { data.outliers.lines } else { 0 };
-    let lines = [
-        (missing.without_reading, "lack a reading"),
-        (missing.without_output, "lack all outputs"),
-        (outliers, "hold a value far from all others"),
-    ];
-    let lines = lines.iter().filter(|(count, _)| *count > 0);
-    let lines: Vec<String> =
-        lines.map(|(count, why)| format!("{} {why}", grouped(*count))).collect();
-    [
-        ("Lines left out", lines.join("; ")),
-        ("Inputs left out", in_words(unused)),
-        ("Constant inputs", columns::some_names(&data.constant_inputs)),
-    ]
+/// Counts that are not 0, with what they count.
+pub fn reasons(counts: &[(usize, &str)]) -> String {
+    let counts = counts.iter().filter(|(count, _)| *count > 0);
+    let counts = counts.map(|(count, what)| format!("{} {what}", grouped(*count)));
+    counts.collect::<Vec<_>>().join("; ")
 }
 
 /// Inputs that can tell nothing, and why; empty if there are none.

@@ -1,11 +1,15 @@
-//! Sections: a result is declared once, and shown as text and as a page.
+//! Sections: a result is declared once, and shown as text, as a page and as JSON.
 //!
 //! A result is a list of [`Section`]s: facts, tables, figures and notes. A [`Table`] has a column for each quantity, with
 //! its heading, its unit and its digits. Text and page are made of the same sections, so that neither can say anything
-//! else than the other. A page begins with the lead, and text ends with it, where a terminal shows it.
+//! else than the other. A page begins with the lead, and text ends with it, where a terminal shows it. What programs read of a
+//! result are its values, by their keys.
 
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
+use super::data::number;
 use super::figures::{Figure, Figures, Page, link};
 use super::format::{UNDEFINED, fixed, significant, unbroken, with_unit};
 use super::svg::escape;
@@ -18,7 +22,7 @@ const GAP: &str = "  ";
 /// Headings from which a page lists them.
 const FEW_HEADINGS: usize = 4;
 /// Sizes beyond which a number is written in powers of ten.
-const TINY: f64 = 1e-6;
+const TINY: f64 = 1e-4;
 const HUGE: f64 = 1e6;
 
 /// Result as people read it.
@@ -36,6 +40,8 @@ pub struct Sections {
     /// Files beside the page that have the numbers.
     pub files: Vec<String>,
     pub sections: Vec<Section>,
+    /// What programs read: keys, and their values in JSON.
+    values: Vec<(&'static str, String)>,
 }
 
 /// Part of a result.
@@ -103,8 +109,8 @@ impl Digits {
         match (value, self) {
             (None, _) => UNDEFINED.into(),
             (Some(value), _) if value.is_finite() && value.abs() >= HUGE => format!("{value:.1e}"),
-            (Some(value), Self::Significant(_)) if value != 0.0 && value.abs() < TINY => {
-                format!("{value:.1e}")
+            (Some(value), Self::Significant(digits)) if value != 0.0 && value.abs() < TINY => {
+                format!("{value:.*e}", digits - 1)
             }
             (Some(value), Self::Decimals(decimals)) => fixed(value, decimals),
             (Some(value), Self::Significant(digits)) => significant(value, digits),
@@ -272,17 +278,67 @@ impl Sections {
         self.sections.push(Section::Figure(figure));
     }
 
-    /// Adds these details, but for those that are empty.
-    pub fn details(&mut self, mut details: Vec<(&'static str, String)>) {
-        details.retain(|(_, text)| !text.is_empty());
-        self.sections.push(Section::Details(details));
-    }
-
     /// Adds sections that a page shows when a reader asks for them, unless there are none.
     pub fn folded(&mut self, summary: impl Into<String>, sections: Vec<Section>) {
         if !sections.is_empty() {
             self.sections.push(Section::Folded(summary.into(), sections));
         }
+    }
+
+    /// Adds what `others` have, but for their title and their lead.
+    pub fn extend(&mut self, others: Self) {
+        self.sections.extend(others.sections);
+        self.values.extend(others.values);
+    }
+
+    /// Adds a value that programs read, and text does not show.
+    ///
+    /// # Panics
+    /// If the value is a map whose keys are no text.
+    pub fn value(&mut self, key: &'static str, value: &(impl Serialize + ?Sized)) {
+        let json = serde_json::to_string_pretty(value).expect("keys are text");
+        self.values.push((key, json.replace('\n', "\n  ")));
+    }
+
+    /// Adds a line that people read, and JSON does not have; none for an empty text.
+    pub fn line(&mut self, label: &'static str, text: impl Into<String>) {
+        let text = text.into();
+        match self.sections.last_mut() {
+            _ if text.is_empty() => {}
+            Some(Section::Details(details)) => details.push((label, text)),
+            _ => self.sections.push(Section::Details(vec![(label, text)])),
+        }
+    }
+
+    /// Adds a value that both read. Text has no line for one that is missing.
+    pub fn fact(
+        &mut self,
+        key: &'static str,
+        label: &'static str,
+        unit: &str,
+        value: impl Serialize,
+    ) {
+        self.value(key, &value);
+        let (_, json) = &self.values[self.values.len() - 1];
+        let text = match json.as_str() {
+            "null" | "[]" => return,
+            "true" => "yes".into(),
+            "false" => "no".into(),
+            _ if json.starts_with('"') => serde_json::from_str(json).unwrap_or_default(),
+            _ if json.contains(['.', 'e']) => {
+                let rounded =
+                    json.parse().map_or(json.clone(), |value: f64| format!("{value:.3e}"));
+                rounded.parse().map_or(rounded, number)
+            }
+            _ => json.clone(),
+        };
+        self.line(label, format!("{text} {unit}").trim_end());
+    }
+
+    /// Object of all values in JSON.
+    pub fn json(&self) -> String {
+        let members = self.values.iter().map(|(key, value)| format!("\n  \"{key}\": {value}"));
+        format!("{{{}\n}}", members.collect::<Vec<_>>().join(","))
     }
 
     /// Text for a terminal.

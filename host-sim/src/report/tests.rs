@@ -14,8 +14,9 @@ use taxel_evaluate::verdict::{Verdict, Warning};
 use super::{Judged, Page, Pictures, Sections};
 
 fn sections(result: &RunResult) -> Sections {
-    let files = ["model.bin", "metrics.json"].map(String::from).to_vec();
-    Sections { files, ..super::of_judged(&super::of_run(result)) }
+    let mut sections = super::of_run(result);
+    sections.files = ["model.bin", "metrics.json"].map(String::from).to_vec();
+    sections
 }
 
 fn page(result: &RunResult) -> Page {
@@ -202,8 +203,8 @@ fn outputs_of_no_electrode_have_a_table_and_places_are_drawn() {
             [truth, estimate].map(|values| Values { names: names.clone(), values: values.into() });
         let distribution = Distribution::new(&truth, &estimate, readings, Reference::Median);
         let pictures = Some(Pictures { distribution: &distribution, frames: 4, sensor: None });
-        let judged = Judged { pictures, table1: None, ..super::of_run(&result) };
-        super::of_judged(&judged).page("").html
+        let judged = Judged { pictures, table1: None, ..super::run::of_run(&result) };
+        super::of_judged(&judged, Sections::default()).page("").html
     };
     let page = of(&["contact_x_mm", "contact_y_mm", "contact_depth_mm"], &readings);
     assert!(is_drawable(&page));

@@ -210,7 +210,7 @@ pub mod serial_port {
         folder.succeed(&[&synth[..], &["-o", "presses.csv"]].concat());
         let recalibrate = ["link", &port, "recalibrate", "old.bin", "presses.csv", "-o", "new.bin"];
         let page = folder.succeed(&recalibrate);
-        assert!(page.contains("60 used, 0 unusable"), "{page}");
+        assert!(page.contains("presses that were used: 60"), "{page}");
         let said = folder.fail(&recalibrate, 2);
         assert!(said.contains("the device has another model"), "{said}");
         let is_old = format!("CRC-32 {:08x}", old.parse().crc());
@@ -310,8 +310,8 @@ pub mod serial_port {
         let page = folder.succeed(&["link", &port, "identify"]);
         assert!(page.contains("virtual, firmware"), "{page}");
         assert!(page.contains(&format!("CRC-32 {:08x}, slot 0", old.parse().crc())), "{page}");
-        assert!(page.contains("model             \"press\", "), "{page}");
-        assert!(page.contains("scanning          paused"), "{page}");
+        assert!(page.contains("model: \"press\", "), "{page}");
+        assert!(page.contains("scanning: paused"), "{page}");
 
         // Recording under another model's names is refused, before anything is written.
         let wrong = folder.run(&["link", &port, "record", new_file, "-o", "estimate.csv"]);

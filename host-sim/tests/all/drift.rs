@@ -19,8 +19,10 @@ fn a_user_trains_on_a_csv_file_and_decodes_a_drifted_sensor_with_its_own_baselin
     let trained = folder.succeed(&[&train[..], &relative[..]].concat());
     assert!(trained.contains("\"relative_inputs\": true"), "{trained}");
     let inspected = folder.succeed(&["inspect", "relative.bin"]);
-    assert!(inspected.contains("relative to the baseline"), "{inspected}");
-    assert!(!folder.succeed(&["inspect", "readings.bin"]).contains("relative to the baseline"));
+    assert!(inspected.contains("relative to the baseline: yes"), "{inspected}");
+    assert!(
+        !folder.succeed(&["inspect", "readings.bin"]).contains("relative to the baseline: yes")
+    );
 
     let rmse = |arguments: &[&str]| {
         let result = folder.succeed(&[&["eval", "--json"], arguments].concat());

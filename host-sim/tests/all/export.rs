@@ -43,7 +43,7 @@ fn a_source_in_rust_has_functions_for_the_parts_of_its_model_alone() {
     ] {
         folder.succeed(&[&["train", "scene.toml", "-o", "m.bin"], options].concat());
         let said = folder.succeed(&["export", "m.bin", "--rust", "m.rs"]);
-        assert!(said.contains("m.rs: 2 rows, "), "{said}");
+        assert!(said.contains("rows: 2\n") && said.ends_with("m.rs\n"), "{said}");
         let source = fs::read_to_string(folder.path("m.rs")).unwrap();
         assert_eq!(functions.map(|function| source.contains(function)), has);
         assert_eq!(source.contains("reciprocals: &[["), options.contains(&"--relative-inputs"));
@@ -61,10 +61,7 @@ fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
     let blob = in_testdata("array-fixed16-confidence.bin");
     let export = ["export", &blob, "--c", "lib/mat", "--name", "mat"];
     let said = folder.succeed(&export);
-    assert!(
-        said.contains("lib/mat: 2 rows, 1 network, 7480 bytes of weights, CRC-32 67f65bbc"),
-        "{said}"
-    );
+    assert!(said.contains("numbers: 7480 bytes\n") && said.contains(": 67f65bbc\n"), "{said}");
     assert_eq!(folder.names(), ["lib"]);
     let files = [
         "CMakeLists.txt",

@@ -224,10 +224,10 @@ fn what_a_dead_host_has_left_is_seen_and_ends_with_the_next_ones_work() {
     let recording = ["record", "-n", "50000", "-o", "x.csv", "--period-us", "1000"];
     assert!(rig.end_at(&recording, 2, End::Kill).1);
     let page = rig.folder.succeed(&["link", &rig.port, "identify"]);
-    assert!(page.contains("scanning          paused"), "{page}");
+    assert!(page.contains("scanning: paused"), "{page}");
     rig.folder.succeed(&["link", &rig.port, "record", "-n", "3", "-o", "x.csv"]);
     let page = rig.folder.succeed(&["link", &rig.port, "identify"]);
-    assert!(page.contains("scanning          a frame every 5 ms\n"), "{page}");
+    assert!(page.contains("scanning: a frame every 5 ms\n"), "{page}");
 }
 
 /// Device that answers as little as a recording needs, and then sends `frames`: each its number, the time of its
@@ -314,5 +314,5 @@ fn a_frame_of_another_length_is_refused_and_a_number_may_wrap_around() {
 
     let port = liar(&[(u32::MAX - 1, 10, 144), (u32::MAX, 20, 144), (1, 40, 144)]);
     let page = folder.succeed(&["link", &port, "record", "-n", "3", "-o", "x.csv"]);
-    assert!(page.contains("3 frames in x.csv, 1 lost"), "{page}");
+    assert!(page.contains("frames: 3\n") && page.contains("lost on the line: 1\n"), "{page}");
 }

@@ -82,10 +82,10 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
 
     folder.write("constants.toml", "drive_v = 0.21\nseries_ohm = 0.05\n");
     let page = link(&["constants", "constants.toml"]);
-    assert!(page.contains("drive 0.21000 V of 3.3000 V") && page.contains("0.050"), "{page}");
+    assert!(page.contains("drive: 0.21000 V of 3.3000 V") && page.contains("0.050"), "{page}");
     let configure = ["configure", "--period-us", "20000", "--send", "both"];
     let page = link(&[&configure[..], &["--contact-threshold", "0.05"]].concat());
-    assert!(page.contains("configuration     kept"), "{page}");
+    assert!(page.contains("configuration: kept"), "{page}");
     link(&["baseline", "-n", "5", "--period-us", "1000", "-o", "rest.csv"]);
     Device::new(taxel_rig::device::serial::open(&port, 921_600).unwrap())
         .unwrap()
@@ -96,16 +96,16 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
         "a scan every 20000 µs",
         "readings yes, estimates yes",
         "contact from 0.05",
-        "constants         kept",
-        "drive 0.21000 V of 3.3000 V",
+        "constants: kept",
+        "drive: 0.21000 V of 3.3000 V",
         "kept: mean of 5 frames of 8 × 18 readings",
     ] {
         assert!(page.contains(said), "{said}: {page}");
     }
 
     let page = link(&["settings", "--forget", "all"]);
-    assert!(page.contains("configuration     none is kept"), "{page}");
-    assert!(page.contains("baseline          none is kept"), "{page}");
+    assert!(page.contains("configuration: none is kept"), "{page}");
+    assert!(page.contains("baseline: none is kept"), "{page}");
 
     folder.write("other.toml", "feedback_ohm = [1.0, 2.0]\n");
     for (arguments, text) in [

@@ -155,7 +155,7 @@ fn a_device_is_shown_under_the_names_that_its_checksums_tell_and_recorded_and_ze
     assert_eq!((status, said.as_str()), (200, "zeroed by the mean of 24 frames"));
     page.end();
     let said = folder.succeed(&["decode", "press.bin", "recording-1.mcap", "-o", "estimate.csv"]);
-    assert!(said.contains("frames decoded"), "{said}");
+    assert!(said.contains("Decoded frames"), "{said}");
     // The device's own estimates are in the recording, to the bit.
     let reader = taxel_recording::Reader::open(&folder.path("recording-1.mcap")).unwrap();
     let text = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();

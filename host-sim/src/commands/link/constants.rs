@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::report::Sections;
 use crate::{Error, Result};
 use clap::Args;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use taxel_data::input;
 use taxel_firmware::link::message::Setting;
 use taxel_rig::device::{CircuitConstants, Device};
@@ -48,23 +49,15 @@ impl Numbers {
     }
 }
 
-#[derive(Serialize)]
-struct Outcome<'o> {
-    constants: &'o CircuitConstants,
-}
-
 pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> Result<()> {
     let constants = read_constants(&arguments.file, &device.constants()?)?;
     device.set_constants(&constants)?;
     device.keep(Setting::Constants)?;
     let constants = device.constants()?;
-    if common.json {
-        return print::json(&Outcome { constants: &constants });
-    }
-    let mut page = print::Page::default();
-    page.line(format_args!("{:<17} kept over restarts", "constants"));
-    constants_lines(&mut page, &constants);
-    page.print()
+    let mut result = Sections::new("Constants of the circuit, kept over restarts");
+    result.value("constants", &constants);
+    constants_lines(&mut result, &constants);
+    print::sections(common, &result)
 }
 
 /// Constants of a file, in place of those `before`.

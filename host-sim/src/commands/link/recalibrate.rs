@@ -3,9 +3,9 @@
 use std::io::{BufRead, Write as _};
 use std::path::PathBuf;
 
+use crate::report::Sections;
 use crate::{Error, Result};
 use clap::Args;
-use serde::Serialize;
 use taxel_core::blob::Model;
 use taxel_core::health::Limits;
 use taxel_data::{DataFile, Table, columns, output};
@@ -35,17 +35,6 @@ pub struct Arguments {
     baseline: BaselineArgument,
     #[command(flatten)]
     scan: ScanArguments,
-}
-
-#[derive(Serialize)]
-struct Summary {
-    presses: usize,
-    presses_unusable: usize,
-    /// Root mean square errors on presses that the fit has not seen, in training errors of each output.
-    error_before: f64,
-    error_after: f64,
-    /// CRC-32 of the model that is active now, in hexadecimal.
-    model_crc: String,
 }
 
 pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> Result<()> {
@@ -140,30 +129,18 @@ fn record_presses(
 }
 
 fn conclude(found: &Recalibrated, given: usize, common: &Common) -> Result<()> {
-    let summary = Summary {
-        presses: found.presses,
-        presses_unusable: given - found.presses,
-        error_before: found.error_before,
-        error_after: found.error_after,
-        model_crc: format!("{:08x}", found.blob.parse().crc()),
-    };
-    if common.json {
-        return print::json(&summary);
-    }
-    let mut page = print::Page::default();
-    page.line(format_args!(
-        "The model is mended: {} is active, also after a restart. `undo` returns to the previous one.",
-        summary.model_crc
-    ));
-    page.line(format_args!(
-        "{:<17} {} used, {} unusable (a reading missing)",
-        "presses", summary.presses, summary.presses_unusable
-    ));
-    page.line(format_args!(
-        "{:<17} {:.2} times that of training before, {:.2} times after, on presses that were not learned from",
-        "error", summary.error_before, summary.error_after
-    ));
-    page.print()
+    let mut result = Sections::new("Recalibration");
+    result.fact("presses", "presses that were used", "", found.presses);
+    result.fact("presses_unusable", "presses that miss a reading", "", given - found.presses);
+    let unit = "× that of training";
+    result.fact("error_before", "error of held-out presses before", unit, found.error_before);
+    result.fact("error_after", "error of held-out presses after", unit, found.error_after);
+    result.value("model_crc", &format!("{:08x}", found.blob.parse().crc()));
+    result.lead = format!(
+        "The model is mended: {:08x} is active, also after a restart. `undo` returns to the previous one.",
+        found.blob.parse().crc()
+    );
+    print::sections(common, &result)
 }
 
 /// Asks for the press with this number, and waits for a line on stdin.

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use crate::live::recorder::{Beside, Recorder};
 use crate::live::sheet;
+use crate::report::Sections;
 use crate::{Error, Result};
 use clap::{Args, value_parser};
-use serde::Serialize;
 use taxel_core::blob::Model;
 use taxel_data::{Table, csv_file};
 use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request, Setting};
@@ -64,23 +64,6 @@ pub struct BaselineArguments {
     /// CSV file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-}
-
-#[derive(Serialize)]
-struct Saved {
-    frames: usize,
-    /// Frames a second that the device scanned: fewer than it was asked for if it misses some. `None` for a baseline.
-    frames_per_s: Option<f64>,
-    /// Time from scan to scan that was asked for.
-    #[serde(skip)]
-    asked_period_us: u32,
-    /// Frame numbers missing between the first frame and the last: lost on the line.
-    frames_lost: u32,
-    /// Readings or outputs that are empty.
-    values_missing: usize,
-    /// Frames that are unlike those of training, as far as the device was to tell.
-    frames_novel: usize,
-    file: PathBuf,
 }
 
 /// Share of the frames that were asked for below which the device misses some.
@@ -177,18 +160,8 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let estimates = scans.iter().filter_map(|scan| scan.estimate.as_ref());
     let is_novel = |it: &&ScanEstimate| it.flags & EstimateReport::NOVEL != 0;
     let frames_novel = estimates.filter(is_novel).count();
-    let file = action.output.clone();
-    let (frames, values_missing) = (scans.len(), missing);
-    let saved = Saved {
-        frames,
-        frames_per_s,
-        asked_period_us: action.scan.period_us(),
-        frames_lost,
-        values_missing,
-        frames_novel,
-        file,
-    };
-    saved.print(common)
+    let saved = Saved { frames: scans.len(), frames_per_s, frames_lost, missing, frames_novel };
+    saved.print((&action.output, action.scan.period_us()), common)
 }
 
 /// A recording of what a device sends: of the model in `blob`, or of all its readings, called `names`.
@@ -275,47 +248,46 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
     device.keep(Setting::Baseline)?;
     let lines = std::iter::once(readings.iter().copied());
     csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
-    let file = action.output.clone();
     let saved = Saved {
         frames: frames.into(),
         frames_per_s: None,
-        asked_period_us: action.scan.period_us(),
         frames_lost: 0,
-        values_missing,
+        missing: values_missing,
         frames_novel: 0,
-        file,
     };
-    saved.print(common)
+    saved.print((&action.output, action.scan.period_us()), common)
+}
+
+/// Frames that were saved.
+struct Saved {
+    frames: usize,
+    /// Frames a second that the device scanned: fewer than it was asked for if it misses some. `None` for a baseline.
+    frames_per_s: Option<f64>,
+    /// Frame numbers missing between the first frame and the last: lost on the line.
+    frames_lost: u32,
+    /// Readings or outputs that are empty.
+    missing: usize,
+    /// Frames that are unlike those of training, as far as the device was to tell.
+    frames_novel: usize,
 }
 
 impl Saved {
-    fn print(&self, common: &Common) -> Result<()> {
-        if common.json {
-            return print::json(self);
+    /// Prints what is in a `file`, of frames that were asked for every `period_us`.
+    fn print(&self, (file, period_us): (&Path, u32), common: &Common) -> Result<()> {
+        let mut result = Sections::new("Frames of the device");
+        result.fact("frames", "frames", "", self.frames);
+        result.fact("frames_per_s", "scanned", "frames a second", self.frames_per_s);
+        result.fact("frames_lost", "frames lost on the line", "", self.frames_lost);
+        result.fact("values_missing", "missing values", "", self.missing);
+        result.fact("frames_novel", "frames unlike those of training", "", self.frames_novel);
+        result.fact("file", "file", "", file.display().to_string());
+        let asked = 1e6 / f64::from(period_us.max(1));
+        if self.frames_per_s.is_some_and(|rate| rate < MISSED * asked) {
+            result.warnings.push(format!(
+                "{asked:.1} frames a second were asked for: scanning and decoding take longer than --period-us {period_us}, at \
+                 least in every 16th frame"
+            ));
         }
-        let mut page = print::Page::default();
-        page.line(format_args!(
-            "{} frames in {}, {} lost on the line, {} values missing",
-            self.frames,
-            self.file.display(),
-            self.frames_lost,
-            self.values_missing
-        ));
-        if let Some(rate) = self.frames_per_s {
-            let asked = 1e6 / f64::from(self.asked_period_us.max(1));
-            page.line(if rate < MISSED * asked {
-                format!(
-                    "{rate:.1} frames a second were scanned, of the {asked:.1} asked for: scanning and decoding take longer than \
-                     --period-us {}, at least in every 16th frame",
-                    self.asked_period_us
-                )
-            } else {
-                format!("{rate:.1} frames a second were scanned")
-            });
-        }
-        if self.frames_novel > 0 {
-            page.line(format_args!("{} frames were unlike those of training", self.frames_novel));
-        }
-        page.print()
+        print::sections(common, &result)
     }
 }

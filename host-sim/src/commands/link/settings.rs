@@ -1,9 +1,9 @@
 //! Actions `configure` and `settings`: what a device keeps over restarts.
 
 use crate::Result;
+use crate::report::Sections;
 use clap::{Args, ValueEnum, value_parser};
-use serde::Serialize;
-use taxel_firmware::link::message::{ConfidenceSent, Configuration, Kept, Setting};
+use taxel_firmware::link::message::{ConfidenceSent, Configuration, Setting};
 use taxel_rig::device::{CircuitConstants, Device};
 
 use super::super::filter_arguments::milliseconds;
@@ -74,14 +74,6 @@ enum Forget {
     All,
 }
 
-#[derive(Serialize)]
-struct Settings {
-    configuration: Configuration,
-    /// Active constants of the circuit; none if the device has no such circuit.
-    constants: Option<CircuitConstants>,
-    kept: Kept,
-}
-
 pub fn configure(device: &mut Device, action: &ConfigureArguments, common: &Common) -> Result<()> {
     // What another host has left behind is not kept.
     let configuration = action.changed(device.resume()?);
@@ -110,23 +102,24 @@ fn show(device: &mut Device, common: &Common) -> Result<()> {
         Err(taxel_rig::Error::Refused(_)) => None,
         constants => Some(constants?),
     };
-    let settings =
-        Settings { configuration: device.configuration()?, constants, kept: device.kept()? };
-    if common.json {
-        return print::json(&settings);
-    }
-    let mut page = print::Page::default();
-    let (c, kept) = (&settings.configuration, &settings.kept);
+    let (c, kept) = (device.configuration()?, device.kept()?);
+    let mut result = Sections::new("Settings of the device");
+    result.value("configuration", &c);
+    result.value("constants", &constants);
+    result.value("kept", &kept);
     let whether = match kept.configuration {
-        Some(kept) if kept == *c => "kept",
+        Some(kept) if kept == c => "kept",
         Some(_) => "another one is kept",
         None => "none is kept",
     };
-    page.line(format_args!("{:<17} {whether}", "configuration"));
-    page.line(format_args!(
-        "{:<17} a scan every {} µs, {} µs settling, {} samples a reading",
-        "", c.frame_period_us, c.scan.settling_us, c.scan.oversampling
-    ));
+    result.line("configuration", whether);
+    result.line(
+        "scans",
+        format!(
+            "a scan every {} µs, {} µs settling, {} samples a reading",
+            c.frame_period_us, c.scan.settling_us, c.scan.oversampling
+        ),
+    );
     let filter = if c.filter().is_on() {
         let [time_constant_ms, lead_ms] =
             [c.filter_time_constant_us, c.filter_lead_us].map(|us| f64::from(us) / 1e3);
@@ -134,56 +127,60 @@ fn show(device: &mut Device, common: &Common) -> Result<()> {
     } else {
         "nothing".into()
     };
-    page.line(format_args!("{:<17} {filter}", "filtered in time"));
+    result.line("filtered in time", filter);
     let yes = |sent: bool| if sent { "yes" } else { "no" };
-    page.line(format_args!(
-        "{:<17} readings {}, estimates {}{}, of confidence {}",
+    result.line(
         "sent of each scan",
-        yes(c.send_readings),
-        yes(c.send_estimates),
-        if c.report_every > 1 { format!(" (one of {})", c.report_every) } else { String::new() },
-        match c.confidence {
-            ConfidenceSent::Nothing => "nothing",
-            ConfidenceSent::Novelty => "novelty",
-            ConfidenceSent::Deviations => "novelty and deviations",
-        }
-    ));
-    page.line(format_args!(
-        "{:<17} shorted below {} Ω, open above {} Ω, contact from {}",
-        "limits", c.shorted_below_ohm, c.open_above_ohm, c.contact_threshold
-    ));
-    if let Some(constants) = &settings.constants {
+        format!(
+            "readings {}, estimates {}{}, of confidence {}",
+            yes(c.send_readings),
+            yes(c.send_estimates),
+            if c.report_every > 1 {
+                format!(" (one of {})", c.report_every)
+            } else {
+                String::new()
+            },
+            match c.confidence {
+                ConfidenceSent::Nothing => "nothing",
+                ConfidenceSent::Novelty => "novelty",
+                ConfidenceSent::Deviations => "novelty and deviations",
+            }
+        ),
+    );
+    result.line(
+        "limits",
+        format!(
+            "shorted below {} Ω, open above {} Ω, contact from {}",
+            c.shorted_below_ohm, c.open_above_ohm, c.contact_threshold
+        ),
+    );
+    if let Some(constants) = &constants {
         let whether = if kept.constants { "kept" } else { "none are kept" };
-        page.line(format_args!("{:<17} {whether}", "constants"));
-        constants_lines(&mut page, constants);
+        result.line("constants", whether);
+        constants_lines(&mut result, constants);
     }
     match &kept.baseline {
-        Some(b) => page.line(format_args!(
-            "{:<17} kept: mean of {} frames of {} × {} readings",
-            "baseline", b.frames, b.rows, b.columns
-        )),
-        None => page.line(format_args!("{:<17} none is kept", "baseline")),
+        Some(b) => result.line(
+            "baseline",
+            format!("kept: mean of {} frames of {} × {} readings", b.frames, b.rows, b.columns),
+        ),
+        None => result.line("baseline", "none is kept"),
     }
-    page.line(format_args!("{:<17} {} until the next restart", "writes left", kept.writes_left));
-    page.print()
+    result.line("writes left", format!("{} until the next restart", kept.writes_left));
+    print::sections(common, &result)
 }
 
 /// Adds the circuit's constants.
-pub fn constants_lines(page: &mut print::Page, constants: &CircuitConstants) {
-    page.line(format_args!(
-        "{:<17} drive {:.5} V of {:.4} V",
-        "", constants.drive_v, constants.reference_v
-    ));
+pub fn constants_lines(result: &mut Sections, constants: &CircuitConstants) {
+    let CircuitConstants { drive_v, reference_v, .. } = constants;
+    result.line("drive", format!("{drive_v:.5} V of {reference_v:.4} V"));
     let lists = [
         ("row source, Ω", &constants.row_source_ohm, 4),
         ("feedback, Ω", &constants.feedback_ohm, 2),
         ("series, Ω", &constants.series_ohm, 3),
     ];
     for (name, ohm, digits) in lists {
-        for (i, part) in ohm.chunks(9).enumerate() {
-            let name = if i == 0 { name } else { "" };
-            let numbers: Vec<String> = part.iter().map(|ohm| format!("{ohm:.digits$}")).collect();
-            page.line(format_args!("{name:<17} {}", numbers.join(" ")));
-        }
+        let numbers: Vec<String> = ohm.iter().map(|ohm| format!("{ohm:.digits$}")).collect();
+        result.line(name, numbers.join(" "));
     }
 }
