@@ -19,6 +19,6 @@ pub mod commands;
 pub mod program;
 
 pub use taxel_evaluate::{
-    Error, Result, by_load, error, evaluate, experiment, measurements, metrics, others, over_time,
-    run, subject, sweep, training_set, verdict,
+    Error, Result, by_load, device, error, evaluate, experiment, measurements, metrics, others,
+    over_time, run, subject, sweep, trade, training_set, verdict,
 };

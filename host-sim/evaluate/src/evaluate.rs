@@ -7,5 +7,4 @@ pub mod limit;
 pub mod confidence;
 pub mod printed;
 pub mod table1;
-pub mod trade;
 pub mod moving_contacts;

@@ -16,11 +16,14 @@ pub mod over_time;
 pub mod verdict;
 pub mod experiment;
 pub mod moving;
+pub mod device;
+pub mod touches;
 pub mod training_set;
 pub mod subject;
 pub mod others;
 pub mod evaluate;
 pub mod run;
 pub mod sweep;
+pub mod trade;
 
 pub use error::{Error, Result};

@@ -181,6 +181,11 @@ impl Split {
 }
 
 impl Measurements {
+    /// These measurements without the name of their file, which is in the blob: no result of a plan depends on it.
+    pub fn unnamed(&self) -> Arc<Self> {
+        Arc::new(Self { name: "data".into(), ..self.clone() })
+    }
+
     /// Origin of the frames, for the model's metadata.
     pub fn origin(&self) -> Origin {
         Origin::of_data(&self.name, self.digest, self.options.seed, &self.training)

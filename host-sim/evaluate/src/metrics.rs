@@ -1,6 +1,8 @@
 //! Errors of estimates, by every definition in use. No figure stands alone: the definitions differ by
 //! more than the decoders do, so all of them are always given.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use taxel_core::blob::Model;
 use taxel_data::{Dataset, Table, columns};
@@ -297,6 +299,61 @@ pub fn by_group(truth: &Table, estimate: &[f64], measure: &Measure) -> Vec<Error
         .iter()
         .map(|(group, members)| of_columns(group, members, truth, estimate, measure))
         .collect()
+}
+
+/// Parts that successive frames have in the RMSE of a group, by its name: the mean square of a block over twice the RMSE. The
+/// standard error of their mean is that of the RMSE, and the one of their differences that of a difference between decoders
+/// of the same frames.
+pub type Blocks = BTreeMap<String, Vec<f64>>;
+
+/// Number of blocks of frames.
+const BLOCKS: usize = 50;
+
+/// Errors as [`by_group`] has them, with the parts of blocks of frames in them. [`ALL`] has those of its groups, by their
+/// shares.
+pub fn with_blocks(truth: &Table, estimate: &[f64], measure: &Measure) -> (Vec<Errors>, Blocks) {
+    let errors = by_group(truth, estimate, measure);
+    let estimate = truth.with_places(estimate.to_vec());
+    let (frames, columns) = (truth.len(), truth.names.len());
+    let length = frames.div_ceil(BLOCKS).max(1);
+    let mut blocks = Blocks::new();
+    for (errors, (group, members)) in errors.iter().zip(columns::groups(&truth.names)) {
+        let squares = truth.values.chunks(length * columns).zip(estimate.chunks(length * columns));
+        let squares = squares.map(|(truth, estimate)| {
+            let lines = truth.chunks_exact(columns).zip(estimate.chunks_exact(columns));
+            let errors = lines.flat_map(|(truth, estimate)| {
+                members.iter().map(|column| (estimate[*column] - truth[*column]).powi(2))
+            });
+            errors.filter(|square| !square.is_nan()).sum::<f64>()
+        });
+        let squares: Vec<f64> = squares.collect();
+        // A block with fewer values, or with none, has as much less of a part.
+        let mean = errors.count as f64 / squares.len().max(1) as f64;
+        let part = |square: f64| square / mean / (2.0 * errors.rmse);
+        blocks.insert(group.into(), squares.into_iter().map(part).collect());
+    }
+    let shares = errors.iter().filter_map(|errors| {
+        let deviation = errors.rmse / (1.0 - errors.r_squared?).sqrt();
+        Some((&blocks[&errors.group], deviation))
+    });
+    let shares: Vec<(&Vec<f64>, f64)> = shares.collect();
+    if let (true, [(first, _), ..]) = (errors.len() > 1, shares.as_slice()) {
+        let of_block = |block: usize| {
+            shares.iter().map(|(of, deviation)| of[block] / deviation).sum::<f64>()
+                / shares.len() as f64
+        };
+        let all = (0..first.len()).map(of_block).collect();
+        blocks.insert(ALL.into(), all);
+    }
+    (errors, blocks)
+}
+
+/// Standard error of the mean of `parts`, which are those of blocks; 0 where there are not two.
+pub fn standard_error(parts: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
+    let count = parts.len() as f64;
+    let mean = parts.clone().sum::<f64>() / count;
+    let squares: f64 = parts.map(|part| (part - mean).powi(2)).sum();
+    if count > 1.0 { (squares / (count - 1.0) / count).sqrt() } else { 0.0 }
 }
 
 #[derive(Default)]

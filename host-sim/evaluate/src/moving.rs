@@ -14,7 +14,7 @@ use taxel_simulate::path::Path;
 use taxel_simulate::timetable::Timetable;
 
 use crate::experiment::Experiment;
-use crate::metrics::{self, Errors, Measure};
+use crate::metrics::{self, Blocks, Errors, Measure};
 
 /// Time between two moments at which estimates are compared with the truth, in s: 1.5 ms times the golden section, so that
 /// no period keeps step with them, and every age of an estimate counts.
@@ -105,9 +105,14 @@ impl Moving {
 
     /// Errors of the newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`). There
     /// is no ratio to the limit, which is that of single frames.
-    pub fn errors(&self, estimates: &[f64], finished_ms: f64, measure: &Measure) -> Vec<Errors> {
+    pub fn errors(
+        &self,
+        estimates: &[f64],
+        finished_ms: f64,
+        measure: &Measure,
+    ) -> (Vec<Errors>, Blocks) {
         let measure = Measure { limit: None, ..measure.clone() };
-        metrics::by_group(&self.truth, &self.held(estimates, finished_ms), &measure)
+        metrics::with_blocks(&self.truth, &self.held(estimates, finished_ms), &measure)
     }
 }
 
@@ -144,7 +149,7 @@ mod tests {
         let measure = Experiment::load("moving").unwrap().measure();
         let rmse = |scan_ms, period_ms, finished_ms| {
             let moving = moving(scan_ms, period_ms);
-            moving.errors(&moving.frames.outputs.values, finished_ms, &measure)[0].rmse
+            moving.errors(&moving.frames.outputs.values, finished_ms, &measure).0[0].rmse
         };
         let (soon, late) = (rmse(0.01, 1.0, 0.01), rmse(0.01, 1.0, 4.01));
         let slow = rmse(6.0, 6.0, 6.0);

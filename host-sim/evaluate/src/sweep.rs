@@ -8,11 +8,13 @@ pub mod fields;
 pub mod file;
 pub mod plan;
 pub mod layouts;
-pub mod store;
 pub mod point;
+pub mod judge;
+pub mod store;
 pub mod work;
 pub mod shard;
 pub mod effects;
+pub mod front;
 pub mod merge;
 
 pub use merge::Merged;

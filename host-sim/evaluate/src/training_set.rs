@@ -7,7 +7,7 @@ use taxel_learn::decoders::LINEAR;
 use taxel_learn::kinds::{self, Choice};
 use taxel_learn::reading_model::{self, Extent, HeldOut, Statistics};
 use taxel_learn::select;
-use taxel_learn::train::{Examples, Refinement, resolution, train_refined};
+use taxel_learn::train::{Examples, Found, Refinement, Start, resolution, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
 
@@ -90,10 +90,47 @@ impl<'s> TrainingSet<'s> {
         self.check()?;
         let mut options = *options;
         let _ = self.choose(&mut options, progress);
-        let options = &options;
-        let trained = self.train(options, progress)?;
-        let origin = Origin { linear_rmse: self.linear_rmse(), ..self.origin.clone() };
-        let blob = pack(&trained, &self.frames, &origin)?;
+        self.packed(&self.train(&options, progress)?, &options, progress)
+    }
+
+    /// Layers for `options`, refined if that is asked for, from each of `starts`.
+    pub fn layers<'a>(
+        &self,
+        starts: &'a [Start],
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<Found<'a>> {
+        options.check_for(&self.frames)?;
+        resolution::check(&self.frames)?;
+        let settings = Refinement::default();
+        let refinement = self.examples().map(|examples| (&settings, examples));
+        Ok(Found::new(starts, options, refinement, progress)?)
+    }
+
+    /// Model whose layers are `found`, with weights in the format of `options`.
+    pub fn blob_of(
+        &self,
+        found: &Found<'_>,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        self.check()?;
+        let trained = found.fit(options.format, options.or_f32, progress)?;
+        self.packed(&trained, options, progress)
+    }
+
+    /// Blob of a trained model, with a reading model if one is asked for.
+    fn packed(
+        &self,
+        trained: &Trained,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        let mut origin = self.origin.clone();
+        if origin.linear_rmse.is_empty() {
+            origin.linear_rmse = self.linear_rmse();
+        }
+        let blob = pack(trained, &self.frames, &origin)?;
         match self.reading_model {
             Some(extent) => self.with_reading_model(&blob, extent, options, progress),
             None => Ok(blob),

@@ -24,8 +24,10 @@ pub mod layers;
 pub mod refine;
 mod trained;
 mod start;
+mod found;
 
 pub use format::FittedNetwork;
+pub use found::Found;
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
 use samples::Ridge;
@@ -307,18 +309,12 @@ pub fn train_refined(
 ) -> Result<Trained> {
     options.check_for(dataset)?;
     resolution::check(dataset)?;
-    let mut trained = Trained::default();
-    for start in Start::all(dataset, options)? {
-        let mut layers = start.layers(options);
-        if let Some((settings, examples)) = refinement {
-            layers = refine::refine(&start.frames, &layers, options, settings, examples, progress)?;
-        }
-        let options = start.fitting(&layers, options, refinement.map(|(settings, _)| settings))?;
-        for networks in fit(&layers, &options, &[options.penalty], progress)? {
-            trained.add(start.front(layers.projection.as_ref()), networks);
-        }
-    }
-    Ok(trained)
+    let starts = Start::all(dataset, options)?;
+    Found::new(&starts, options, refinement, progress)?.fit(
+        options.format,
+        options.or_f32,
+        progress,
+    )
 }
 
 /// Squared distance ‖a − b‖².

@@ -1,6 +1,6 @@
 //! Decoders and scans that `trade` and `compare` try, and what they choose by.
 
-use crate::evaluate::trade::Readout;
+use crate::device::Readout;
 use clap::{Args, ValueEnum};
 
 /// Decoders and scans to try, and the choice among them.

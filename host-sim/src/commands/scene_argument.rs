@@ -119,6 +119,11 @@ impl NoiseArgument {
         self.noise.map_or(Ok(()), |level| Ok(scene.world.set_noise_level(level)?))
     }
 
+    /// Level, if one was given.
+    pub fn level(&self) -> Option<f64> {
+        self.noise
+    }
+
     /// Whether a level was given.
     pub fn is_given(&self) -> bool {
         self.noise.is_some()

@@ -4,16 +4,18 @@ use std::path::{Path, PathBuf};
 
 use crate::experiment::{Experiment, names_a_scene};
 use crate::subject::Subject;
+use crate::sweep::file::Wanted;
 use crate::{Error, Result};
-use clap::Args;
+use clap::{Args, Parser};
 use taxel_learn::reading_model::Extent;
+use toml::{Table, Value};
 
-use super::Common;
 use super::data_argument::{DataArguments, HowToTrain, JudgedBy};
 use super::data_file::DATA_FILES;
 use super::scene_argument::{
     DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument, Sizes,
 };
+use super::{Common, command_line};
 
 /// Scene or CSV file to train and to judge on.
 #[derive(Args, Default)]
@@ -26,6 +28,14 @@ pub struct SubjectArgument {
     test: Option<PathBuf>,
     #[command(flatten)]
     options: SubjectOptions,
+}
+
+/// Options of measurements, as a plan has them.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+pub struct DataOptions {
+    #[command(flatten)]
+    pub subject: SubjectArgument,
 }
 
 /// Options for scenes and CSV files.
@@ -69,6 +79,49 @@ impl SubjectArgument {
             Subject::Scene(_) | Subject::Measured(_) => {}
         }
         Ok(subject)
+    }
+
+    /// Scene or file that was named.
+    pub fn source(&self) -> &str {
+        self.source.as_deref().unwrap_or(DEFAULT_SCENE)
+    }
+
+    /// Fields of a scene that its options set, for a plan.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a seed beyond those of a scene.
+    pub fn set(&self, common: &Common) -> Result<Table> {
+        let mut set = Table::new();
+        if let Some(seed) = common.seed {
+            let seed = i64::try_from(seed).map_err(|_| {
+                let most = i64::MAX;
+                Error::Usage(format!("--seed {seed}: give at most {most}, the most of a scene"))
+            })?;
+            set.insert("seed".into(), seed.into());
+        }
+        let options = &self.options;
+        let level = options.noise.level().map(|level| ("noise.level", Value::from(level)));
+        let refine = (!options.refine.over(true)).then_some(("training.refine", false.into()));
+        let relative = options.relative_inputs.relative_inputs;
+        let relative = relative.then_some(("training.relative_inputs", true.into()));
+        let given = [level, refine, relative].into_iter().flatten();
+        set.extend(given.map(|(field, value)| (field.to_owned(), value)));
+        Ok(set)
+    }
+
+    /// Text of a plan for this scene or data file.
+    pub fn plan_text(&self, name: &str, wanted: &Wanted) -> Result<String> {
+        let mut plan = Table::new();
+        plan.insert("name".into(), name.into());
+        if names_a_scene(self.source()) {
+            plan.insert("scene".into(), self.source().into());
+        } else {
+            plan.insert("data".into(), command_line::words_of::<DataOptions>().into());
+        }
+        let text = |cause: String| Error::failed(format!("cannot write the plan: {cause}"));
+        let wanted = Table::try_from(wanted).map_err(|cause| text(cause.to_string()))?;
+        plan.extend(wanted);
+        toml::to_string(&plan).map_err(|cause| text(cause.to_string()))
     }
 
     /// Error if a column of times was named: `command` tells nothing over time.

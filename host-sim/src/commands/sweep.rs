@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use crate::report::format::counted;
 use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
 use crate::{Error, Result};
-use clap::{Args, Parser};
+use clap::{Args, Parser as _};
 use serde::Serialize;
 use taxel_data::digest::digest;
 
 use super::merged::Files;
 use super::progress::Terminal;
-use super::subject_argument::SubjectArgument;
+use super::subject_argument::DataOptions;
 use super::{Common, arguments, command_line, print, stderr};
 
 mod schedule;
@@ -55,14 +55,6 @@ pub struct Arguments {
     /// Compute a few points, and say how long all would take and how much memory.
     #[arg(long, conflicts_with = "output")]
     dry_run: bool,
-}
-
-/// Options of measurements, as a plan has them.
-#[derive(Parser)]
-#[command(no_binary_name = true, disable_help_flag = true)]
-struct DataOptions {
-    #[command(flatten)]
-    subject: SubjectArgument,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -119,6 +111,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
 }
 
+/// Results of all points of a plan, each of which is kept in `folder` as soon as it is done; those that are there already
+/// are not computed again.
+pub fn all(plan: &Plan, points: &[Point], folder: &Path) -> Result<Merged> {
+    let store = store(folder);
+    let groups = Shard::WHOLE.groups(points);
+    let worked = work::run(plan, points, &groups, &store, &Terminal::new())?;
+    for replaced in &worked.replaced {
+        stderr::remark(format_args!("note: {replaced}; it is computed anew"));
+    }
+    Merged::read(plan, points, &store)
+}
+
 /// Table of results in the folder of a sweep.
 const RESULTS: &str = "results.csv";
 
@@ -153,7 +157,7 @@ impl std::fmt::Display for ShardSummary<'_> {
 }
 
 /// Version of this program, and a digest of it: another one may compute something else.
-fn build() -> Result<String> {
+pub fn build() -> Result<String> {
     let failed = |cause| Error::failed(format!("cannot read the program's own file: {cause}"));
     let bytes = std::env::current_exe().and_then(std::fs::read).map_err(failed)?;
     Ok(format!("host-sim {} {:016x}", env!("CARGO_PKG_VERSION"), digest(&bytes)))

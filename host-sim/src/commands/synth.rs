@@ -14,7 +14,7 @@ use taxel_simulate::timetable::Timetable;
 use super::recordings::{self, is_recording};
 use super::scene_argument::{NoiseArgument, SceneArgument};
 use super::{Common, print, stderr};
-use crate::evaluate::trade::{Device, Wires};
+use crate::device::{Device, Wires};
 use crate::experiment::Experiment;
 use crate::live::replay::USUAL_RATE;
 use crate::live::sheet;

@@ -3,20 +3,24 @@
 use std::cmp::Ordering;
 use std::path::PathBuf;
 
+use crate::device::{BOARD_CLOCK_MHZ, Device, Wires};
 use crate::error::{Bounded, NoPoint};
-use crate::evaluate::trade::{self, BOARD_CLOCK_MHZ, Bounds, Device, Plan, Wires};
+use crate::measurements::Measurements;
 use crate::metrics;
 use crate::subject::Subject;
-use crate::verdict::Warning;
+use crate::sweep::Plan;
+use crate::sweep::plan::Base;
+use crate::trade::{self, Asked, Bounds, Trade};
+use crate::verdict::{SLOT_BYTES, Warning};
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::columns;
+use taxel_data::{BadValue, columns};
+use taxel_learn::Options;
 
 use super::arguments::{self, of_option};
 use super::decoder_arguments::DecoderArguments;
-use super::progress::Terminal;
 use super::subject_argument::SubjectArgument;
-use super::{Common, command_line, print, stderr};
+use super::{Common, command_line, print, stderr, sweep};
 
 mod files;
 mod page;
@@ -28,7 +32,8 @@ mod page;
 /// estimate, and chooses the best point within your bounds.
 ///
 /// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/`, and with a bound chosen.bin, all together
-/// at the end; those of an earlier trade go.
+/// at the end; those of an earlier trade go. Each point is kept in points/ as soon as it is done: a trade that was stopped
+/// goes on, and another choice among the same points takes seconds.
 /// That time is the scan's, by the plan of the board's firmware for either readout (docs/board.md), and the decoding's, as
 /// predicted (docs/cycles.md). Bounds that nothing can meet are refused before anything is trained.
 #[derive(Args)]
@@ -39,6 +44,7 @@ mod page;
   host-sim trade press --max-cycles 40000 --max-flash 40000
   host-sim trade press --average 1,4,16 --max-latency-ms 25
   host-sim trade moving --readout onchip --average 1,4,12 --max-latency-ms 2
+  host-sim trade press --plan > plan.toml
   host-sim trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
     /// Folder that receives a folder named after the scene or the CSV file.
@@ -54,7 +60,7 @@ pub struct Arguments {
     #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
     max_error: Option<f64>,
     /// Choose within so many cycles a frame, at zero wait. Unless --max-error is given,
-    /// the most accurate point within all bounds is chosen (of errors within 0.5 %, the cheapest).
+    /// the most accurate point within all bounds is chosen (of errors that test frames do not tell apart, the cheapest).
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
     /// Choose within a blob of so many bytes [default, with another bound: a slot's 131072].
@@ -72,6 +78,9 @@ pub struct Arguments {
     /// Determine front and choice by the largest error of the scene's own contacts and those that it was not trained on.
     #[arg(long)]
     worst_case: bool,
+    /// Print this trade's plan for `sweep`, which computes it in parts on many machines, and compute nothing.
+    #[arg(long, conflicts_with = "output")]
+    plan: bool,
     /// Print all points, not only the front and the chosen one (files have all of them).
     #[arg(long)]
     all: bool,
@@ -82,10 +91,70 @@ pub struct Arguments {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.subject.refuse_time("trade")?;
     let subject = arguments.subject.load(common)?;
+    let asked = asked(arguments, &subject)?;
+    let bounds = Bounds {
+        error: arguments.max_error,
+        cycles: arguments.max_cycles,
+        blob_bytes: arguments.max_flash,
+        frame_rate_hz: arguments.frame_rate,
+        latency_ms: arguments.tried.max_latency_ms,
+    };
+    bounds.check().map_err(of_option)?;
+    let is_timed = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
+    if is_timed && asked.device.scan_ms(wires(&subject, 1), 1).is_none() {
+        let message = "--frame-rate and --max-latency-ms count the scan, whose time is not known: the readings name no \
+                       wires; give --scan-ms MS, or --grid ROWSxCOLUMNS for the board's own scan";
+        return Err(Error::Usage(message.into()));
+    }
+    let mut wanted = asked.wanted(&subject);
+    wanted.set.extend(arguments.subject.set(common)?);
+    if arguments.plan {
+        return print::show(&arguments.subject.plan_text(subject.name(), &wanted)?);
+    }
+    let folder = arguments.output.join(subject.name());
+    files::FILES.check(&folder, &arguments.subject.paths())?;
+    let base = match &subject {
+        Subject::Scene(_) => Base::of_scene(subject.name(), arguments.subject.source())?,
+        Subject::Measured(_) => Base::measured(subject.name()),
+    };
+    let data = subject.measurements().map(Measurements::unnamed);
+    let plan = Plan::new(subject.name(), (vec![base], data), wanted, &sweep::build()?)?;
+    let points = plan.points()?;
+    let refused = |cause: &NoPoint| {
+        let way =
+            in_the_way(cause, &subject, &asked).map_or(String::new(), |way| format!("; {way}"));
+        Error::Usage(format!("{cause}{way}"))
+    };
+    if bounds.any() {
+        let possible = trade::check_possible(&plan, &points, &bounds, &asked.group);
+        possible.map_err(|error| match error {
+            Error::NoPoint(cause) => refused(&cause),
+            other => other,
+        })?;
+    }
+    let merged = sweep::all(&plan, &points, &folder)?;
+    let mut trade = Trade::new(&subject, &asked, merged)?;
+    let choice = trade.choose(&bounds);
+    let shown = trade.shown(&subject, &plan, &points)?;
+    let command = command_line::of_this_process("trade", &[], None);
+    files::write(&folder, (&trade, shown.as_ref()), &command)?;
+    if common.json {
+        print::json(&trade)?;
+    } else {
+        page::of((&trade, shown.as_ref()), arguments.all, &folder).print()?;
+    }
+    // Measurements are kept and shown even if no point is within the bounds.
+    choice.map_err(|cause| refused(&cause))
+}
+
+/// What is varied, and what decides.
+fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked> {
     let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
+    let all_of_one = (groups.len() == 1).then(|| groups[0]);
     let group = match &arguments.tried.group {
-        Some(group) if group == metrics::ALL || groups.contains(&group.as_str()) => group.as_str(),
+        Some(group) if group == metrics::ALL => all_of_one.unwrap_or(metrics::ALL),
+        Some(group) if groups.contains(&group.as_str()) => group.as_str(),
         Some(group) => {
             let message = format!("--group {group}: the outputs are {}; or all", groups.join(", "));
             return Err(Error::Usage(message));
@@ -99,64 +168,69 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         scan_ms: arguments.scan_ms,
     };
     device.check().map_err(of_option)?;
-    let plan = Plan {
-        centres: centres(&arguments.tried.centres, &subject)?,
-        column_steps: column_steps(arguments, &subject)?,
+    let asked = Asked {
+        centres: centres(&arguments.tried.centres, subject)?,
+        column_steps: column_steps(arguments, subject)?,
         samples_averaged: match arguments.tried.average.as_slice() {
             [] => vec![1],
             given => distinct("--average", given)?,
         },
         device,
+        group: group.into(),
         worst_case: arguments.worst_case,
+        most_bytes: arguments.max_flash.unwrap_or(SLOT_BYTES),
     };
+    check(subject, &asked).map_err(of_option)?;
     if let Some(scene) = subject.scene() {
-        let left = |n| plan.device.averaged(scene.world.noise, wires(&subject, 1), n);
+        let left = |n| device.averaged(scene.world.noise, wires(subject, 1), n);
         let idle = |n: &usize| Warning::idle_averaging(*n, left);
-        plan.samples_averaged.iter().filter_map(idle).for_each(stderr::remark);
+        asked.samples_averaged.iter().filter_map(idle).for_each(stderr::remark);
     }
-    let bounds = Bounds {
-        error: arguments.max_error,
-        cycles: arguments.max_cycles,
-        blob_bytes: arguments.max_flash,
-        frame_rate_hz: arguments.frame_rate,
-        latency_ms: arguments.tried.max_latency_ms,
-    };
-    bounds.check().map_err(of_option)?;
-    let is_timed = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
-    if is_timed && plan.device.scan_ms(wires(&subject, 1), 1).is_none() {
-        let message = "--frame-rate and --max-latency-ms count the scan, whose time is not known: the readings name no \
-                       wires; give --scan-ms MS, or --grid ROWSxCOLUMNS for the board's own scan";
-        return Err(Error::Usage(message.into()));
+    Ok(asked)
+}
+
+/// Checks what is varied against the subject.
+fn check(subject: &Subject, asked: &Asked) -> std::result::Result<(), BadValue> {
+    for &centres in &asked.centres {
+        let options = Options { centres, ..subject.options() };
+        options.check(subject.training_frames()).map_err(|bad| match bad.field.as_str() {
+            "centres" => bad.named("--centres"),
+            _ => bad,
+        })?;
     }
-    let refused = |cause: &NoPoint| {
-        let way =
-            in_the_way(cause, &subject, &plan).map_or(String::new(), |way| format!("; {way}"));
-        Error::Usage(format!("{cause}{way}"))
-    };
-    let folder = arguments.output.join(subject.name());
-    files::FILES.check(&folder, &arguments.subject.paths())?;
-    let computed = trade::compute(&subject, &plan, group, &bounds, &Terminal::new());
-    let mut trade = computed.map_err(|error| match error {
-        Error::Data(taxel_data::Error::Setting(bad)) if bad.field == "memory" => {
-            let fix = "give fewer --centres or --inputs";
-            Error::Usage(format!("training takes {}, more than 8 GB: {fix}", bad.value))
+    let refuse = |option, value: String, rule: String| Err(BadValue::new(option, value, rule));
+    if let Some(samples) = asked.samples_averaged.iter().find(|it| !(1..=256).contains(*it)) {
+        return refuse(
+            "--average",
+            samples.to_string(),
+            "the firmware averages 1 to 256 samples".into(),
+        );
+    }
+    let (columns, rule) = match subject {
+        Subject::Scene(scene) => {
+            let columns = scene.world.sensor.column_wires;
+            (columns, format!("give steps from 1 to {columns}, the columns of the scene"))
         }
-        Error::Data(taxel_data::Error::Setting(bad)) if bad.field == "centres" => {
-            of_option(bad.named("--centres"))
+        Subject::Measured(_) => {
+            (1, "only a scene has columns to leave out; of a data file, choose --inputs".into())
         }
-        Error::Data(taxel_data::Error::Setting(bad)) => of_option(bad),
-        Error::NoPoint(cause) => refused(&cause),
-        other => other,
-    })?;
-    let choice = trade.choose(&bounds);
-    files::write(&folder, &trade, &command_line::of_this_process("trade", &[], None))?;
-    if common.json {
-        print::json(&trade)?;
-    } else {
-        page::of(&trade, arguments.all, &folder).print()?;
+    };
+    if let Some(step) = asked.column_steps.iter().find(|step| !(1..=columns).contains(*step)) {
+        return refuse("--column-step", step.to_string(), rule);
     }
-    // Measurements are kept and shown even if no point is within the bounds.
-    choice.map_err(|cause| refused(&cause))
+    let has_others = subject.scene().is_some_and(|scene| !scene.others.is_empty());
+    if asked.worst_case && !has_others {
+        let rule =
+            "there are no other contacts to judge by; leave it out, or give a scene of contacts";
+        return refuse("--worst-case", "true".into(), rule.into());
+    }
+    if let Subject::Measured(_) = subject
+        && let Some(samples) = asked.samples_averaged.iter().find(|samples| **samples != 1)
+    {
+        let rule = "measured readings are averaged already: give 1, or a scene";
+        return refuse("--average", samples.to_string(), rule.into());
+    }
+    Ok(())
 }
 
 /// Centres to try unless a user says otherwise.
@@ -199,7 +273,7 @@ fn column_steps(arguments: &Arguments, subject: &Subject) -> Result<Vec<usize>> 
 }
 
 /// What stands in the way of bounds on time that no point meets, and what helps.
-fn in_the_way(cause: &NoPoint, subject: &Subject, plan: &Plan) -> Option<String> {
+fn in_the_way(cause: &NoPoint, subject: &Subject, asked: &Asked) -> Option<String> {
     let NoPoint::Each { unmet, .. } = cause else { return None };
     let most_ms = unmet.iter().filter_map(|unmet| match unmet.bounded {
         Bounded::FrameRate => Some(1000.0 / unmet.bound),
@@ -207,11 +281,11 @@ fn in_the_way(cause: &NoPoint, subject: &Subject, plan: &Plan) -> Option<String>
         _ => None,
     });
     let most_ms = most_ms.reduce(f64::min)?;
-    let (step, samples) = (*plan.column_steps.last()?, *plan.samples_averaged.first()?);
-    let scan_ms = plan.device.scan_ms(wires(subject, step), samples)?;
+    let (step, samples) = (*asked.column_steps.last()?, *asked.samples_averaged.first()?);
+    let scan_ms = asked.device.scan_ms(wires(subject, step), samples)?;
     let helps = match subject {
         _ if scan_ms < most_ms => "give fewer --centres, which decode faster, or ",
-        _ if plan.device.scan_ms.is_some() => "",
+        _ if asked.device.scan_ms.is_some() => "",
         Subject::Scene(_) => "read fewer columns (a larger --column-step), or ",
         Subject::Measured(_) => "read fewer columns (--inputs), or ",
     };

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::data::number;
 use super::figures::{Figure, Figures, Page, link};
-use super::format::{UNDEFINED, fixed, significant, unbroken, with_unit};
+use super::format::{UNDEFINED, decimals, fixed, significant, unbroken, with_unit};
 use super::svg::escape;
 use taxel_evaluate::metrics::Definition;
 
@@ -117,10 +117,14 @@ impl Digits {
         }
     }
 
-    /// Text of a number with its standard error.
+    /// Text of a number with its standard error, which has as many decimals.
     pub fn with_error(self, value: Option<[f64; 2]>) -> String {
         let text = |[value, error]: [f64; 2]| {
-            format!("{} ± {}", self.text(Some(value)), self.text(Some(error)))
+            let decimals = match self {
+                Self::Decimals(decimals) => decimals,
+                Self::Significant(digits) => decimals(value, digits),
+            };
+            format!("{} ± {}", fixed(value, decimals), fixed(error, decimals))
         };
         value.map_or(UNDEFINED.into(), text)
     }

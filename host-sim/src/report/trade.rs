@@ -3,14 +3,14 @@
 use super::figures::Figure;
 use super::format::{UNDEFINED, fixed, grouped, noise, symbol};
 use super::sections::{Digits, Sections, TableOf};
-use taxel_evaluate::evaluate::trade::{Bounds, Point, Readings, Trade};
 use taxel_evaluate::metrics;
+use taxel_evaluate::trade::{Bounds, Point, Shown, Trade};
 
 mod words;
 mod plot;
 
-/// Sections of a trade, with the points of its front or with `all` of them.
-pub fn sections(trade: &Trade, all: bool) -> Sections {
+/// Sections of a trade, with the model that is `shown`, and with the points of its front or with `all` of them.
+pub fn sections(trade: &Trade, shown: Option<&Shown>, all: bool) -> Sections {
     let mut sections = Sections::new(format!("Speed against accuracy: {}", trade.subject));
     sections.files = vec!["trade.csv".into(), "trade.json".into()];
     let tested = match &trade.test_choice {
@@ -31,11 +31,11 @@ pub fn sections(trade: &Trade, all: bool) -> Sections {
         trade.device.clock_mhz
     ));
     answers(&mut sections, trade);
-    chosen(&mut sections, trade);
+    chosen(&mut sections, trade, shown);
     picture(&mut sections, trade);
     front(&mut sections, trade, all);
-    references(&mut sections, trade);
-    others(&mut sections, trade);
+    references(&mut sections, trade, shown);
+    others(&mut sections, trade, shown);
     trade.left_out.iter().for_each(|note| sections.note(format!("Left out: {note}.")));
     sections
 }
@@ -43,15 +43,9 @@ pub fn sections(trade: &Trade, all: bool) -> Sections {
 /// Rows of points: what marks them, and their indices.
 type Marked = (String, usize);
 
-/// Adds columns of the errors of points.
-fn with_errors<'r>(table: TableOf<'r, Marked>, trade: &'r Trade) -> TableOf<'r, Marked> {
-    let rmse = format!("RMSE of {}", symbol(&trade.group));
-    let point = |row: &Marked| &trade.points[row.1];
-    table
-        .numbers(&rmse, &trade.unit, Digits::Significant(3), |row| {
-            Some(point(row).rmse(&trade.group))
-        })
-        .numbers("× limit", "", Digits::Decimals(2), |row| point(row).ratio_to_limit(&trade.group))
+/// Heading of the errors of points.
+fn rmse(trade: &Trade) -> String {
+    format!("RMSE of {}", symbol(&trade.group))
 }
 
 /// Adds the points that a reader looks for first: the chosen one, the most accurate, the knee, and the fastest that is nearly
@@ -71,7 +65,7 @@ fn answers(sections: &mut Sections, trade: &Trade) {
             None => rows.push((answer.into(), point)),
         }
     }
-    let caption = "What one looks for first. Knee: where the front bends most. Within 10 %: of the smallest error. The option makes trade choose the point, and write its blob.";
+    let caption = "What one looks for first. Most accurate: the fastest whose error test frames do not tell from the smallest. Knee: where the front bends most. Within 10 %: of the smallest error. The option makes trade choose the point, and write its blob.";
     let table = TableOf::new(&rows, caption).names("answer", |(answer, _)| answer.clone()).names(
         "decoder",
         |(_, point)| {
@@ -79,7 +73,13 @@ fn answers(sections: &mut Sections, trade: &Trade) {
             format!("{}, {}", point.way(), words::brief(trade, point))
         },
     );
-    let table = with_errors(table, trade)
+    let table = table
+        .numbers(&rmse(trade), &trade.unit, Digits::Significant(3), |row| {
+            Some(trade.points[row.1].rmse(&trade.group))
+        })
+        .numbers("× limit", "", Digits::Decimals(2), |row| {
+            trade.points[row.1].result(&format!("ratio_to_limit_{}", trade.group))
+        })
         .texts("frames/s", "", |row| words::rate(trade.points[row.1].times.frames_per_s))
         .numbers("age", "ms", Digits::Decimals(2), |row| trade.points[row.1].times.age_ms)
         .texts("blob", "B", |row| grouped(trade.points[row.1].blob_bytes));
@@ -91,17 +91,18 @@ fn answers(sections: &mut Sections, trade: &Trade) {
 
 /// Adds what is chosen, what it is worth, and how a device is configured for it; of no choice, why, and what the most accurate
 /// point is worth.
-fn chosen(sections: &mut Sections, trade: &Trade) {
+fn chosen(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
+    let Some(shown) = shown else { return };
     let why = trade.refused.as_ref().map_or(
         "no bound was given (--max-error, --frame-rate, --max-latency-ms, --max-cycles or --max-flash)".into(),
         ToString::to_string,
     );
-    let (start, point) = match (trade.chosen, trade.most_accurate()) {
-        (Some(chosen), _) => (format!("Chosen for {}:", words::bounds(&trade.bounds)), chosen),
-        (None, Some(best)) => (format!("Nothing is chosen: {why}. The most accurate is"), best),
-        (None, None) => return,
+    let (point, verdict) = (shown.point, &shown.verdict);
+    let start = match trade.chosen {
+        Some(_) => format!("Chosen for {}:", words::bounds(&trade.bounds)),
+        None => format!("Nothing is chosen: {why}. The most accurate is"),
     };
-    let (verdict, name) = (trade.verdict_on(point), trade.points[point].name());
+    let name = trade.points[point].name();
     if let Some((decoder, least)) = trade.better_baseline(point) {
         let least = words::error(trade, least);
         sections.note(format!(
@@ -116,7 +117,7 @@ fn chosen(sections: &mut Sections, trade: &Trade) {
     if trade.chosen.is_none() {
         return;
     }
-    if let Some(columns) = &trade.main_readings().column_wires {
+    if let Some(columns) = &shown.column_wires {
         sections.note(format!("In a scene, below [readout]: column_wires = {columns:?}"));
     }
     let options = words::device_options(trade, &trade.points[point]);
@@ -143,7 +144,7 @@ fn cost(point: &Point) -> String {
     };
     format!(
         "{time}; {} cycles, {} bytes of flash, {} bytes of RAM.",
-        grouped(point.frame.cycles as usize),
+        grouped(point.cycles as usize),
         grouped(point.blob_bytes),
         grouped(point.ram_bytes)
     )
@@ -195,8 +196,9 @@ fn front(sections: &mut Sections, trade: &Trade, all: bool) {
     };
     let caption = format!(
         "{which} Array: one network for all rows, behind a projection. Samples: averaged for a reading. Filter: time constant of \
-         an α–β filter behind the decoder. × limit: to the least possible RMSE with as many samples and the same columns. Worst \
-         other: largest error on contacts that it was not trained on. Frame: time from the start of a scan to its estimate. Age: mean time from the middle of a scan until its \
+         an α–β filter behind the decoder. Two errors count as equal, and the faster point is on the front, within two standard errors (±, of the same test frames) of \
+         their difference, or half a per cent. × limit: to the least possible RMSE with as many samples and the same columns. Worst: \
+         largest error on its own and other contacts. Frame: time from the start of a scan to its estimate. Age: mean time from the middle of a scan until its \
          estimate is used. Cycles: of decoding by a Cortex-M4F whose memory never waits, predicted to a tenth (not checked \
          against silicon). {}",
         scan(trade)
@@ -215,53 +217,55 @@ fn front(sections: &mut Sections, trade: &Trade, all: bool) {
                 .filter
                 .map_or(UNDEFINED.into(), |it| format!("{:.1} ms", it.time_constant_ms))
         });
-    let worst = |row: &Marked| point(row).worst_other().map(|worst| worst.rmse);
-    let table = with_errors(table, trade)
-        .numbers("worst other", &trade.unit, Digits::Significant(3), worst)
+    let worst = |row: &Marked| point(row).result(&format!("worst_rmse_{}", trade.group));
+    let table = table
+        .estimates(&rmse(trade), &trade.unit, Digits::Significant(3), |row| {
+            point(row).estimate("rmse", &trade.group)
+        })
+        .estimates("× limit", "", Digits::Decimals(2), |row| {
+            point(row).estimate("ratio_to_limit", &trade.group)
+        })
+        .numbers("worst", &trade.unit, Digits::Significant(3), worst)
         .numbers("frame", "ms", Digits::Decimals(3), |row| Some(point(row).times.frame_ms))
         .numbers("age", "ms", Digits::Decimals(3), |row| point(row).times.age_ms)
         .texts("frames/s", "", |row| words::rate(point(row).times.frames_per_s))
-        .texts("cycles", "", |row| grouped(point(row).frame.cycles as usize))
+        .texts("cycles", "", |row| grouped(point(row).cycles as usize))
         .texts("blob", "B", |row| grouped(point(row).blob_bytes))
         .texts("RAM", "B", |row| grouped(point(row).ram_bytes));
     sections.table(table);
 }
 
 /// Adds errors to compare with, of each choice of readings.
-fn references(sections: &mut Sections, trade: &Trade) {
-    let mut rows: Vec<(&Readings, &str, f64)> = vec![];
-    for (place, readings) in trade.readings.iter().enumerate() {
+fn references(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
+    let mut rows: Vec<(&Point, &str, f64)> = vec![];
+    for (place, point) in trade.readings().into_iter().enumerate() {
         // Always predicting the mean is the same whatever is read.
-        let references = readings.references(&trade.group).skip(usize::from(place > 0));
-        rows.extend(references.map(|(name, rmse)| (readings, name, rmse)));
+        let references = trade.references(point).into_iter().skip(usize::from(place > 0));
+        rows.extend(references.map(|(name, rmse)| (point, name, rmse)));
     }
     let all = if trade.group == metrics::ALL {
         " RMSE of all: mean over the outputs of RMSE/standard deviation σ; always predicting the mean has 1."
     } else {
         ""
     };
-    let readings = trade.main_readings();
-    let of = match trade.distinction(readings) {
+    let Some(shown) = shown else { return };
+    let of = match trade.distinction(&trade.points[shown.point]) {
         of if of.is_empty() => of,
         of => format!(" With {of}:"),
     };
-    let caption = format!("Errors to compare with.{all}{of} {}", readings.limit.note());
+    let caption = format!("Errors to compare with.{all}{of} {}", shown.limit_note);
     let unknown = || UNDEFINED.to_owned();
     let table = TableOf::new(&rows, caption)
         .names("decoder", |(_, name, _)| (*name).into())
-        .names("columns", |(it, ..)| it.columns().map_or_else(unknown, |count| count.to_string()))
+        .names("columns", |(it, ..)| it.columns.map_or_else(unknown, |count| count.to_string()))
         .names("samples", |(it, ..)| it.samples_averaged.to_string())
         .numbers("RMSE", &trade.unit, Digits::Significant(3), |(.., rmse)| Some(*rmse));
     sections.table(table);
 }
 
 /// Adds what the chosen point, or the most accurate one, is worth on contacts that it was not trained on.
-fn others(sections: &mut Sections, trade: &Trade) {
-    let shown = trade.chosen.or_else(|| trade.most_accurate());
-    let Some(point) = shown.map(|point| &trade.points[point]) else { return };
-    if point.others.is_empty() {
-        return;
-    }
+fn others(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
+    let Some(shown) = shown.filter(|shown| !shown.others.is_empty()) else { return };
     let counted = if trade.worst_case {
         "Front and choice count the worst of these and its own."
     } else {
@@ -270,15 +274,15 @@ fn others(sections: &mut Sections, trade: &Trade) {
     let which = if trade.chosen.is_some() { "chosen" } else { "most accurate" };
     let caption =
         format!("The {which} point on still contacts that it was not trained on. {counted}");
-    let table = TableOf::new(&point.others, caption)
-        .names("contact", |other| other.name.clone())
-        .numbers("RMSE", &trade.unit, Digits::Significant(3), |other| Some(other.rmse));
+    let table = TableOf::new(&shown.others, caption)
+        .names("contact", |(name, _)| name.clone())
+        .numbers("RMSE", &trade.unit, Digits::Significant(3), |(_, rmse)| Some(*rmse));
     sections.table(table);
 }
 
 /// Where the time of a scan comes from.
 fn scan(trade: &Trade) -> String {
-    match (trade.device.scan_ms, trade.main_readings().wires) {
+    match (trade.device.scan_ms, trade.points[0].wires()) {
         (Some(ms), _) => {
             format!("The time of a scan was given: {ms} ms for each sample of a reading.")
         }

@@ -7,10 +7,12 @@ use taxel_learn::{Decoder, ModelBlob};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
-use super::trade::{Device, FilterSettings, Times, Touched, Touches, Way, Wires};
+use crate::device::{Device, Times, Wires};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::metrics::{DecoderErrors, Errors};
+use crate::touches::{Touched, Touches, Way};
+use crate::trade::FilterSettings;
 
 /// Errors on contacts that move: of the newest finished estimate against the truth at that moment.
 #[derive(Debug, Clone, PartialEq, Serialize)]

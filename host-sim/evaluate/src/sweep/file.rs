@@ -33,24 +33,28 @@ impl PlanFile {
 }
 
 /// What is wanted of the points, and which there are.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Wanted {
     /// Number of test frames for the limit, instead of as many as suffice; none for no limit.
     pub limit_frames: Option<usize>,
     /// Whether models are trained.
     pub train: bool,
+    /// What is computed besides.
+    pub also: Vec<Also>,
     /// Number of seeds that every point is computed with.
     pub repeats: usize,
     /// Results that are to be small.
     pub objectives: Vec<String>,
     /// Bounds on results.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub bounds: BTreeMap<String, Bound>,
     /// Device that scans and decodes, and `samples` averaged.
     pub device: Table,
     /// Prices of the parts of a sensor.
     pub prices: Option<PartPrices>,
     /// Fields that are changed in every point.
+    #[serde(skip_serializing_if = "Table::is_empty")]
     pub set: Table,
     /// Axes that are crossed.
     pub axes: Table,
@@ -63,6 +67,7 @@ impl Default for Wanted {
         Self {
             limit_frames: None,
             train: true,
+            also: vec![],
             repeats: 1,
             objectives: vec![],
             bounds: BTreeMap::new(),
@@ -73,6 +78,16 @@ impl Default for Wanted {
             draw: None,
         }
     }
+}
+
+/// What a plan may compute besides, since it takes its time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Also {
+    /// Errors of the baselines.
+    Baselines,
+    /// Errors on contacts that models are not trained on.
+    OtherContacts,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -92,7 +107,7 @@ impl OneOrMore {
 }
 
 /// Latin hypercube of some axes.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Draw {
     pub(super) points: usize,
@@ -208,12 +223,13 @@ impl PartPrices {
 
 /// Checks the names at the top of a plan: serde does not, where fields are flattened.
 fn check_top(text: &str) -> std::result::Result<(), String> {
-    const KNOWN: [&str; 13] = [
+    const KNOWN: [&str; 14] = [
         "name",
         "scene",
         "data",
         "limit_frames",
         "train",
+        "also",
         "repeats",
         "objectives",
         "bounds",

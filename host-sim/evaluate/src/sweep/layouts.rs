@@ -3,7 +3,7 @@
 use toml::{Table, Value};
 
 use super::fields::{self, with_nearest};
-use super::plan::{Base, document};
+use super::plan::Base;
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 
@@ -17,13 +17,12 @@ const MOST_LAYOUTS: usize = 1000;
 /// # Errors
 /// [`Error`] for a scene that cannot be read, and for one that is none with any value of its lists.
 pub fn of_scene(name_or_path: &str) -> Result<Vec<Base>> {
-    of_document(name_or_path, &document(name_or_path)?)
+    of_base(Base::of_scene(name_or_path, name_or_path)?)
 }
 
-fn of_document(label: &str, document: &Table) -> Result<Vec<Base>> {
-    let Err(message) = check(document) else {
-        return Ok(vec![Base { label: label.into(), document: document.clone() }]);
-    };
+fn of_base(base: Base) -> Result<Vec<Base>> {
+    let Err(message) = check(&base.document) else { return Ok(vec![base]) };
+    let (label, document) = (base.label.as_str(), &base.document);
     let leaves = fields::leaves(document, &|_| false).into_iter();
     let lists: Vec<(String, Vec<Value>)> =
         leaves.filter_map(|(path, value)| plain_list(path, value)).collect();
@@ -44,14 +43,15 @@ fn of_document(label: &str, document: &Table) -> Result<Vec<Base>> {
         }
     }
     let Some(chosen) = chosen else { return Err(Error::of_scene(label, with_nearest(&wrong))) };
-    let mut layouts = vec![Base { label: label.into(), document: document.clone() }];
+    let mut layouts = vec![base.clone()];
     for list in chosen {
         let (path, values) = &lists[list];
         let short = path.rsplit('.').next().unwrap_or(path);
         let each = |base: &Base| -> Vec<Base> {
             let changed = |value: &Value| {
                 let document = with(&base.document, [(path, value)].into_iter())?;
-                Some(Base { label: format!("{} {short}={value}", base.label), document })
+                let label = format!("{} {short}={value}", base.label);
+                Some(Base { label, document, digest: base.digest })
             };
             values.iter().filter_map(changed).collect()
         };
@@ -112,7 +112,7 @@ mod tests {
 
     fn layouts(change: impl Fn(&str) -> String) -> Result<Vec<String>> {
         let document: Table = toml::from_str(&change(crate::scenes::ALL[1].1)).unwrap();
-        let layouts = of_document("mat", &document)?;
+        let layouts = of_base(Base { label: "mat".into(), document, digest: 0 })?;
         for layout in &layouts {
             check(&layout.document).unwrap();
         }

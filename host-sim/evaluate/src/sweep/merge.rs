@@ -1,6 +1,5 @@
 //! Results of a whole plan, whoever computed them: all points, the best of them, and what the axes do.
 
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
@@ -9,10 +8,12 @@ use serde_json::Value;
 use super::axis::rounded;
 use super::effects::{Effect, Settings};
 use super::file::{Bound, PartPrices};
+use super::front::{Offer, front};
 use super::plan::{Plan, Point, SEED};
-use super::point::place_of;
+use super::point::{place_of, standard_error_of};
 use super::store::{Found, Record, Store};
 use crate::error::{Error, Result};
+use crate::metrics::{Blocks, standard_error};
 
 /// Results of a plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,6 +42,9 @@ pub struct PointResult {
     pub id: String,
     pub values: BTreeMap<String, Value>,
     pub results: BTreeMap<String, f64>,
+    /// Parts of blocks of frames in errors.
+    #[serde(skip)]
+    pub blocks: Blocks,
     /// Remarks on them.
     pub notes: Vec<String>,
     /// Reason why there are none.
@@ -51,11 +55,11 @@ impl PointResult {
     fn new(point: &Point, record: Record, prices: Option<&PartPrices>) -> Self {
         let value = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
         let values = point.values.iter().map(|(field, it)| (field.clone(), value(it))).collect();
-        let Record { id, mut results, notes, failed, .. } = record;
+        let Record { id, mut results, blocks, notes, failed, .. } = record;
         if let Some(prices) = prices {
             prices.add_cost(&mut results);
         }
-        Self { id, values, results, notes, failed }
+        Self { id, values, results, blocks, notes, failed }
     }
 }
 
@@ -70,9 +74,13 @@ pub struct Setting {
     pub results: BTreeMap<String, f64>,
     /// Standard deviations between them; nothing without repeats.
     pub deviations: BTreeMap<String, f64>,
+    /// Means of the parts of blocks of frames in errors.
+    #[serde(skip)]
+    pub blocks: Blocks,
     /// Whether the means are within all bounds.
     pub is_within: bool,
-    /// Whether no other setting within the bounds is as good in all objectives and better in one.
+    /// Whether no other setting within the bounds is as good in all objectives and better in one. Errors that their test
+    /// frames do not tell apart are equal, and then the cheaper setting is on the front.
     pub on_front: bool,
     /// Scene of its first point, for settings on the front.
     pub scene: Option<String>,
@@ -295,7 +303,14 @@ fn settings(points: &[PointResult]) -> Vec<(Setting, usize)> {
                 deviations.insert(name.clone(), (squares / (count - 1.0)).sqrt());
             }
         }
+        let blocks = mean_blocks(&group);
+        for (name, parts) in &blocks {
+            if let Some(name) = standard_error_of(name) {
+                results.insert(name, standard_error(parts.iter().copied()));
+            }
+        }
         let setting = Setting {
+            blocks,
             values: without_seed(&group[0].values),
             repeats: group.len(),
             results,
@@ -309,6 +324,24 @@ fn settings(points: &[PointResult]) -> Vec<(Setting, usize)> {
     groups.into_iter().map(setting).collect()
 }
 
+/// Means of the blocks of points that differ in their seed.
+fn mean_blocks(points: &[&PointResult]) -> Blocks {
+    let mut means = points[0].blocks.clone();
+    means.retain(|name, parts| {
+        let same = |point: &&PointResult| {
+            point.blocks.get(name).is_some_and(|other| other.len() == parts.len())
+        };
+        let are_same = points.iter().all(same);
+        let mean = |block: usize| {
+            let sum: f64 = points.iter().filter_map(|it| it.blocks.get(name)?.get(block)).sum();
+            sum / points.len() as f64
+        };
+        *parts = (0..parts.len()).map(mean).collect();
+        are_same
+    });
+    means
+}
+
 /// Marks the settings within the bounds, and the Pareto front of these.
 fn mark(settings: &mut [Setting], objectives: &[String], bounds: &BTreeMap<String, Bound>) {
     for setting in settings.iter_mut() {
@@ -317,70 +350,14 @@ fn mark(settings: &mut [Setting], objectives: &[String], bounds: &BTreeMap<Strin
         };
         setting.is_within = bounds.iter().all(allows);
     }
-    let ranks = settings.iter().enumerate().filter_map(|(place, setting)| {
+    let offered = settings.iter().enumerate().filter_map(|(place, setting)| {
         let values = objectives.iter().map(|name| setting.results.get(name).copied());
-        Some((place, values.collect::<Option<Vec<f64>>>().filter(|_| setting.is_within)?))
+        let values = values.collect::<Option<Vec<f64>>>().filter(|_| setting.is_within)?;
+        Some((place, Offer { values, blocks: &setting.blocks }))
     });
-    let mut ranks: Vec<(usize, Vec<f64>)> = ranks.collect();
-    // What beats a setting stands before it in this order, and so does one on the front that beats it.
-    ranks.sort_by(|(_, a), (_, b)| {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| a.total_cmp(b))
-            .find(|it| it.is_ne())
-            .unwrap_or(Ordering::Equal)
-    });
-    // Of two objectives the second falls along the front, so its last setting beats whatever any of it beats.
-    let looked_at = if objectives.len() <= 2 { 1 } else { usize::MAX };
-    let mut front: Vec<&Vec<f64>> = Vec::new();
-    for (place, own) in &ranks {
-        let beats = |other: &&Vec<f64>| {
-            *other != own && other.iter().zip(own).all(|(other, own)| other <= own)
-        };
-        if front.iter().rev().take(looked_at).any(beats) {
-            continue;
-        }
-        settings[*place].on_front = true;
-        if front.last() != Some(&own) {
-            front.push(own);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_front_is_that_of_all_pairs() {
-        for objectives in [1, 2, 3_usize] {
-            let names: Vec<String> = (0..objectives).map(|it| format!("o{it}")).collect();
-            let value = |i: u32, it: usize| f64::from((i * [7, 11, 29][it] + 3) % [13, 17, 19][it]);
-            let setting = |i: u32| Setting {
-                values: BTreeMap::new(),
-                repeats: 1,
-                results: names
-                    .iter()
-                    .enumerate()
-                    .map(|(it, name)| (name.clone(), value(i, it)))
-                    .collect(),
-                deviations: BTreeMap::new(),
-                is_within: false,
-                on_front: false,
-                scene: None,
-            };
-            let mut settings: Vec<Setting> = (0..300).map(setting).collect();
-            let bounds = BTreeMap::from([("o0".to_owned(), Bound::Least { least: 2.0 })]);
-            mark(&mut settings, &names, &bounds);
-            let of = |it: &Setting| -> Vec<f64> { it.results.values().copied().collect() };
-            let beats = |a: &Setting, b: &Setting| {
-                of(a) != of(b) && of(a).iter().zip(of(b)).all(|(a, b)| *a <= b)
-            };
-            for it in &settings {
-                let is_beaten = settings.iter().any(|other| other.is_within && beats(other, it));
-                assert_eq!(it.on_front, it.is_within && !is_beaten, "{it:?}");
-            }
-            assert!(settings.iter().any(|it| !it.is_within));
-        }
+    let (places, offers): (Vec<usize>, Vec<Offer<'_>>) = offered.unzip();
+    let front = front(objectives, &offers);
+    for place in front {
+        settings[places[place]].on_front = true;
     }
 }

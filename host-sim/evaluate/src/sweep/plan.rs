@@ -6,17 +6,18 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
+use taxel_core::rbf::Format;
 use taxel_data::digest::{digest, of_debug};
 use taxel_data::{BadValue, columns, input, require};
 use toml::{Table, Value};
 
 use super::axis::{Axis, latin_hypercube};
 use super::fields::{self, require_known};
-use super::file::{Bound, OneOrMore, PartPrices, PlanFile, Wanted};
-use super::point::{columns_of, not_computed};
+use super::file::{Also, Bound, OneOrMore, PartPrices, PlanFile, Wanted};
+use super::point::{columns_of, group_in, not_computed};
+use crate::device::Device;
 use crate::error::{Error, Result};
-use crate::evaluate::trade::Device;
-use crate::experiment::{Experiment, check_name, names_a_scene};
+use crate::experiment::{Experiment, check_name};
 use crate::measurements::Measurements;
 use crate::subject::Subject;
 
@@ -39,6 +40,26 @@ pub struct Base {
     pub label: String,
     /// Its fields; none of measurements.
     pub document: Table,
+    /// Digest of its text, which ties models to it.
+    pub digest: u64,
+}
+
+impl Base {
+    /// Base of a scene called `label`, a built-in one or a file.
+    ///
+    /// # Errors
+    /// [`Error`] for a scene that cannot be read.
+    pub fn of_scene(label: &str, name_or_path: &str) -> Result<Self> {
+        let text = Experiment::text(name_or_path)?;
+        let document = toml::from_str(&text)
+            .map_err(|cause| Error::of_scene(name_or_path, cause.to_string().trim_end()))?;
+        Ok(Self { label: label.into(), document, digest: digest(text.as_bytes()) })
+    }
+
+    /// Base of measurements.
+    pub fn measured(label: &str) -> Self {
+        Self { label: label.into(), document: Table::new(), digest: 0 }
+    }
 }
 
 /// Plan, checked.
@@ -57,6 +78,8 @@ pub struct Plan {
     /// Number of test frames for the limit, if not as many as suffice.
     pub limit_frames: Option<usize>,
     pub train: bool,
+    /// What is computed besides.
+    pub also: Vec<Also>,
     /// Whether axes are drawn.
     pub is_drawn: bool,
     /// Program that computes it: another one may compute something else.
@@ -80,8 +103,26 @@ pub struct Point {
     pub device: Device,
     /// Number of samples averaged for each reading.
     pub samples: usize,
+    /// Steps from one column-wire that is read to the next.
+    pub column_step: usize,
+    /// Whether a filter in time stands behind the decoder.
+    pub filter: bool,
+    pub usual: Usual,
+    /// Digest of the scene's text, whatever is changed in it.
+    pub digest: u64,
     /// Digest of all but training: points with the same one share their limit.
     pub shares: u64,
+    /// Digests of what points share besides: frames, what training starts from, layers, and the model.
+    pub keys: [u64; 4],
+}
+
+/// Settings of a plan's scene, whatever the axes say, for which its points find what they share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Usual {
+    /// Number format for which layers are found.
+    pub format: Format,
+    /// Number of centres for which features are chosen.
+    pub centres: usize,
 }
 
 fn in_words(values: &[(String, Value)]) -> String {
@@ -133,7 +174,7 @@ impl Plan {
         let bases = scenes.iter().map(|name| {
             let built_in = crate::scenes::ALL.iter().any(|(known, _)| known == name);
             let file = if built_in { name.clone() } else { beside(name) };
-            Ok(Base { label: name.clone(), document: document(&file)? })
+            Base::of_scene(name, &file)
         });
         let mut bases: Vec<Base> = bases.collect::<Result<_>>()?;
         let mut load_all = |words: OneOrMore| {
@@ -144,7 +185,7 @@ impl Plan {
                 Subject::Measured(mut data) => {
                     // The name is in the blob, and no result must depend on it.
                     let label = std::mem::replace(&mut data.name, "data".into());
-                    bases.push(Base { label, document: Table::new() });
+                    bases.push(Base::measured(&label));
                     Ok(Arc::from(data))
                 }
                 Subject::Scene(_) => Err(of_plan("data is a scene: give it as scene".into())),
@@ -183,6 +224,7 @@ impl Plan {
             data,
             limit_frames: wanted.limit_frames,
             train: wanted.train,
+            also: wanted.also,
             is_drawn: wanted.draw.is_some(),
             build: build.into(),
             bases,
@@ -212,7 +254,7 @@ impl Plan {
         let check = |places: &[usize]| {
             let document = self.document_at(places)?;
             match self.check_scene(&document.scene) {
-                Ok(()) => device_of(document.device).map(drop),
+                Ok(()) => OnDevice::new(document.device).map(drop),
                 Err(message) => Err(self.blamed(&document, &message)),
             }
         };
@@ -307,6 +349,16 @@ impl Plan {
         Ok(())
     }
 
+    /// Whether the plan computes this besides.
+    pub fn has(&self, also: Also) -> bool {
+        self.also.contains(&also)
+    }
+
+    /// Group of outputs that the first objective is of.
+    pub fn group(&self) -> Option<&str> {
+        self.objectives.first().and_then(|name| group_in(name))
+    }
+
     /// Point in words: its values, or the only scene.
     pub fn in_words(&self, point: &Point) -> String {
         match (point.values.is_empty(), self.bases.first()) {
@@ -343,20 +395,64 @@ impl Plan {
     fn point(&self, places: &[usize]) -> Checked<Point> {
         let document = self.document_at(places)?;
         let scene = text(&document.scene)?;
+        let base = self.base_of(&document.values);
+        let of_scene = base.map_or(0, |base| base.digest);
+        let usual = match self.usual_of(base) {
+            Some(usual) => usual,
+            None => self.usual_in(&scene).unwrap_or(USUAL),
+        };
         let mut shared = document.scene;
-        shared.remove("training");
+        let training = match shared.remove("training") {
+            Some(Value::Table(training)) => training,
+            _ => Table::new(),
+        };
         shared.remove("table1");
-        let (device, samples) = device_of(document.device)?;
-        let how = format!("{device:?} {samples} {:?} {}", self.limit_frames, self.train);
-        let decides = format!("{}\n{how}\n{:016x}\n{scene}", self.build, self.data_digest);
+        let OnDevice { device, samples, column_step, filter } = OnDevice::new(document.device)?;
+        let (limit_frames, train, also) = (self.limit_frames, self.train, &self.also);
+        let how = format!("{device:?} {samples} {column_step} {limit_frames:?} {train} {also:?}");
+        let filtered = self.group().filter(|_| filter);
+        let decides = format!(
+            "{}\n{how} {filtered:?} {usual:?} {of_scene:x}\n{:016x}\n{scene}",
+            self.build, self.data_digest
+        );
+        let shares = digest(format!("{how}\n{}", text(&shared)?).as_bytes());
+        let key = |is_shared: &dyn Fn(&str) -> bool| -> Checked<u64> {
+            let mut training = training.clone();
+            training.retain(|field, _| is_shared(field));
+            Ok(digest(format!("{shares:x}\n{}", text(&training)?).as_bytes()))
+        };
+        let of_frames = |field: &str| FIELDS_OF_FRAMES.contains(&field);
+        let keys = [
+            key(&of_frames)?,
+            key(&|field| !["centres", "format"].contains(&field))?,
+            key(&|field| field != "format")?,
+            key(&|_| true)?,
+        ];
+        let id = format!("{:016x}", digest(decides.as_bytes()));
+        let (values, digest) = (document.values, of_scene);
         Ok(Point {
-            id: format!("{:016x}", digest(decides.as_bytes())),
-            values: document.values,
-            shares: digest(format!("{how}\n{}", text(&shared)?).as_bytes()),
+            id,
+            values,
             scene,
             device,
             samples,
+            column_step,
+            filter,
+            usual,
+            digest,
+            shares,
+            keys,
         })
+    }
+
+    /// Usual settings of a base, unless it is a scene only with what axes give.
+    fn usual_of(&self, base: Option<&Base>) -> Option<Usual> {
+        self.usual_in(&text(&self.changed(base, &[]).ok()?.scene).ok()?)
+    }
+
+    fn usual_in(&self, scene: &str) -> Option<Usual> {
+        let options = super::point::options(self.data.as_deref(), scene).ok()?;
+        Some(Usual { format: options.format, centres: options.centres })
     }
 
     /// Fields of the point at these places of the axes.
@@ -367,6 +463,34 @@ impl Plan {
         });
         let values: Vec<(String, Value)> = values.collect();
         self.changed(self.base_of(&values), &values)
+    }
+
+    /// Gives networks of the other kind, for each row or for the array, their own spread, and those of rows no features, unless
+    /// the point says which.
+    fn follow_each_row(
+        &self,
+        document: &mut Table,
+        base: Option<&Base>,
+        values: &[(String, Value)],
+    ) -> Checked<()> {
+        let is_given = |field: &str| values.iter().any(|(given, _)| given == field);
+        if !is_given("training.each_row") {
+            return Ok(());
+        }
+        let before = text(&self.changed(base, &[])?.scene)?;
+        // What is wrong with a scene is told elsewhere.
+        let before = super::point::options(self.data.as_deref(), &before).ok();
+        let training = document.get_mut("training").and_then(Value::as_table_mut);
+        let (Some(before), Some(training)) = (before, training) else { return Ok(()) };
+        let each_row = training.get("each_row").and_then(Value::as_bool);
+        let after = before.for_each_row(each_row.unwrap_or(before.each_row));
+        if !is_given("training.spread") {
+            training.insert("spread".into(), after.spread.into());
+        }
+        if after.features.is_none() && !is_given("training.features") {
+            training.remove("features");
+        }
+        Ok(())
     }
 
     /// Scene that a point with these values changes.
@@ -385,6 +509,7 @@ impl Plan {
         for (field, value) in changed {
             fields::set(&mut document, field, value.clone())?;
         }
+        self.follow_each_row(&mut document, base, values)?;
         let device = match document.remove("device") {
             Some(Value::Table(device)) => device,
             _ => Table::new(),
@@ -392,6 +517,12 @@ impl Plan {
         Ok(Document { scene: document, device, values: values.to_vec() })
     }
 }
+
+/// Fields of training that frames depend on, and what is held out of them.
+const FIELDS_OF_FRAMES: [&str; 5] =
+    ["frames", "test_frames", "relative_inputs", "refine", "reading_model"];
+/// Settings of what is no scene, which no point gets as far as to use.
+const USUAL: Usual = Usual { format: Format::Fixed16, centres: 64 };
 
 /// Digest of all that decides what measurements give: of the frames and the options, whatever the file of the test frames is called.
 fn digest_of(data: &Measurements) -> u64 {
@@ -409,36 +540,42 @@ fn text(table: &Table) -> Checked<String> {
     toml::to_string(table).map_err(|cause| BadValue::new("axes", "values", cause.to_string()))
 }
 
-/// Fields of a scene: a built-in one, or a file.
-pub fn document(name_or_path: &str) -> Result<Table> {
-    if !names_a_scene(name_or_path) {
-        // Its text is refused with the reason.
-        return Experiment::text(name_or_path).map(|_| Table::new());
-    }
-    let text = Experiment::text(name_or_path)?;
-    toml::from_str(&text)
-        .map_err(|cause| Error::of_scene(name_or_path, cause.to_string().trim_end()))
+/// Device of a point, and what it reads.
+struct OnDevice {
+    device: Device,
+    samples: usize,
+    column_step: usize,
+    filter: bool,
 }
 
-/// Device, and the number of samples averaged.
-fn device_of(mut table: Table) -> Checked<(Device, usize)> {
-    let samples = table.remove("samples").unwrap_or(Value::Integer(1));
-    let count = samples.as_integer().and_then(|count| usize::try_from(count).ok());
-    let count = count.filter(|count| (1..=usize::from(u16::MAX)).contains(count));
-    let count = count.ok_or_else(|| {
-        BadValue::new("device.samples", samples, "give a whole number, at least 1")
-    })?;
-    let shown = table.to_string().trim_end().replace('\n', ", ");
-    let device: Device = table.try_into().map_err(|cause: toml::de::Error| {
-        // `samples` is taken out before, and belongs to the names as well.
-        let message = cause.message().replace("expected one of ", "expected one of `samples`, ");
-        BadValue::new("device", shown, fields::with_nearest(&message))
-    })?;
-    device.check().map_err(|bad| {
-        let field = format!("device.{}", bad.field.replace('-', "_"));
-        bad.named(&field)
-    })?;
-    Ok((device, count))
+impl OnDevice {
+    fn new(mut table: Table) -> Checked<Self> {
+        let mut count = |field: &str| {
+            let value = table.remove(field).unwrap_or(Value::Integer(1));
+            let count = value.as_integer().and_then(|count| usize::try_from(count).ok());
+            count.filter(|count| (1..=usize::from(u16::MAX)).contains(count)).ok_or_else(|| {
+                let rule = "give a whole number, at least 1";
+                BadValue::new(format!("device.{field}"), value, rule)
+            })
+        };
+        let (samples, column_step) = (count("samples")?, count("column_step")?);
+        let filter = table.remove("filter").unwrap_or(Value::Boolean(false));
+        let filter = filter
+            .as_bool()
+            .ok_or_else(|| BadValue::new("device.filter", filter, "give true or false"))?;
+        let shown = table.to_string().trim_end().replace('\n', ", ");
+        let device: Device = table.try_into().map_err(|cause: toml::de::Error| {
+            // These are taken out before, and belong to the names as well.
+            let own = "expected one of `samples`, `column_step`, `filter`, ";
+            let message = cause.message().replace("expected one of ", own);
+            BadValue::new("device", shown, fields::with_nearest(&message))
+        })?;
+        device.check().map_err(|bad| {
+            let field = format!("device.{}", bad.field.replace('-', "_"));
+            bad.named(&field)
+        })?;
+        Ok(Self { device, samples, column_step, filter })
+    }
 }
 
 /// All axes: scenes, draws, seeds, and those that are crossed.

@@ -66,7 +66,9 @@ impl FromStr for Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::trade::Device;
+    use crate::device::Device;
+    use crate::sweep::plan::Usual;
+    use taxel_core::rbf::Format;
 
     fn points(shares: &[u64]) -> Vec<Point> {
         let point = |shares: &u64| Point {
@@ -75,7 +77,12 @@ mod tests {
             scene: String::new(),
             device: Device::default(),
             samples: 1,
+            column_step: 1,
+            filter: false,
+            usual: Usual { format: Format::Fixed16, centres: 64 },
+            digest: 0,
             shares: *shares,
+            keys: [0; 4],
         };
         shares.iter().map(point).collect()
     }

@@ -12,8 +12,11 @@ use serde::{Deserialize, Serialize};
 use taxel_data::digest::digest;
 use taxel_data::output;
 
+use super::judge::Outcome;
 use super::plan::{Plan, Point};
+use super::point::Results;
 use crate::error::{Error, Result};
+use crate::metrics::Blocks;
 
 /// Result of a point, as its file has it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,6 +28,8 @@ pub struct Record {
     pub build: String,
     /// Results by their names.
     pub results: BTreeMap<String, f64>,
+    /// Parts of blocks of frames in errors.
+    pub blocks: Blocks,
     /// Remarks on them.
     pub notes: Vec<String>,
     /// Reason why there are none.
@@ -48,15 +53,16 @@ pub struct Store {
 
 impl Record {
     /// Record of what became of a point.
-    pub fn new(plan: &Plan, point: &Point, outcome: Result<super::point::Results>) -> Self {
+    pub fn new(plan: &Plan, point: &Point, outcome: Outcome) -> Self {
         let (outcome, failed) = match outcome {
             Ok(results) => (results, None),
-            Err(error) => (super::point::Results::default(), Some(error.to_string())),
+            Err(why) => (Results::default(), Some(why)),
         };
         Self {
             id: point.id.clone(),
             build: plan.build.clone(),
             results: outcome.values,
+            blocks: outcome.blocks,
             notes: outcome.notes,
             failed,
         }

@@ -1,14 +1,13 @@
 //! Work on the points of a shard, on all threads.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use taxel_data::Progress;
 
+use super::judge::{self, Outcome};
 use super::plan::{Plan, Point};
-use super::point::{self, Shared};
 use super::store::{Found, Record, Store};
 use crate::error::{Error, Result};
 
@@ -67,7 +66,7 @@ pub fn run(
         worked.failed.extend(of_failed(plan, &points[index], record));
         Ok(())
     };
-    progress.stage("sweep", left.iter().map(Vec::len).sum());
+    progress.stage("train and measure", left.iter().map(Vec::len).sum());
     each(plan, points, &left, &keep)?;
     Ok(worked)
 }
@@ -82,7 +81,7 @@ pub fn in_memory(
     progress: &dyn Progress,
 ) -> Result<Vec<Option<Record>>> {
     let records = Mutex::new(vec![None; points.len()]);
-    progress.stage("compare", points.len());
+    progress.stage("train and measure", points.len());
     let keep = |index: usize, record: &Record| {
         progress.step();
         records.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(record.clone());
@@ -96,10 +95,15 @@ pub fn in_memory(
 ///
 /// # Errors
 /// [`Error`] for a thread that cannot be started.
-pub fn on_one_core(plan: &Plan, point: &Point) -> Result<(f64, Result<point::Results>)> {
-    let pool = pool(1)?;
+pub fn on_one_core(plan: &Plan, point: &Point) -> Result<(f64, Outcome)> {
+    let (pool, mut found) = (pool(1)?, None);
     let begun = Instant::now();
-    let outcome = pool.install(|| compute(plan, point, &mut Shared::default()));
+    let mut keep = |_, outcome| {
+        found = Some(outcome);
+        Ok(())
+    };
+    pool.install(|| judge::compute(plan, std::slice::from_ref(point), &[0], &mut keep))?;
+    let outcome = found.unwrap_or_else(|| Err("nothing was computed".into()));
     Ok((begun.elapsed().as_secs_f64(), outcome))
 }
 
@@ -117,26 +121,6 @@ fn of_failed(plan: &Plan, point: &Point, record: &Record) -> Option<String> {
     record.failed.as_ref().map(|why| format!("{} ({}): {why}", point.id, plan.in_words(point)))
 }
 
-/// Computes a point; a panic is a failure of this point, and not of all others.
-fn compute(plan: &Plan, point: &Point, shared: &mut Shared) -> Result<point::Results> {
-    let mut own = std::mem::take(shared);
-    let outcome = catch_unwind(AssertUnwindSafe(|| {
-        let outcome = point::compute(plan, point, &mut own);
-        (outcome, own)
-    }));
-    match outcome {
-        Ok((outcome, own)) => {
-            *shared = own;
-            outcome
-        }
-        Err(panic) => {
-            let text = panic.downcast_ref::<String>().map(String::as_str);
-            let text = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-            Err(Error::failed(format!("a fault of the program: {text}")))
-        }
-    }
-}
-
 /// Computes the points of all groups, and hands each record to `keep` as soon as it is there.
 fn each(
     plan: &Plan,
@@ -149,17 +133,15 @@ fn each(
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
     let work = || -> Result<()> {
         while let Some(group) = groups.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let mut shared = Shared::default();
-            for index in group {
+            let mut keep = |index: usize, outcome: Outcome| {
                 if stop.load(Ordering::Relaxed) {
-                    return Ok(());
+                    return Err(Error::failed("another thread failed"));
                 }
-                let outcome = compute(plan, &points[*index], &mut shared);
-                let kept = keep(*index, &Record::new(plan, &points[*index], outcome));
-                if kept.is_err() {
-                    stop.store(true, Ordering::Relaxed);
-                    return kept;
-                }
+                keep(index, &Record::new(plan, &points[index], outcome))
+            };
+            if let Err(error) = judge::compute(plan, points, group, &mut keep) {
+                // The first error is the one to tell.
+                return if stop.swap(true, Ordering::Relaxed) { Ok(()) } else { Err(error) };
             }
         }
         Ok(())

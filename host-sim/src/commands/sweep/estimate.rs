@@ -42,7 +42,9 @@ pub fn execute(plan: &Plan, points: &[Point], common: &Common) -> Result<()> {
         let (seconds, outcome) = work::on_one_core(plan, point)?;
         tried_s.push(seconds);
         failed.extend(
-            outcome.err().map(|cause| format!("{} ({}): {cause}", point.id, plan.in_words(point))),
+            outcome
+                .err()
+                .map(|cause: String| format!("{} ({}): {cause}", point.id, plan.in_words(point))),
         );
         taxel_data::Progress::step(&terminal);
     }

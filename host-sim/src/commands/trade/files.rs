@@ -1,10 +1,8 @@
 //! Files that the command writes.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::evaluate::trade::Trade;
-use crate::metrics::Errors;
+use crate::trade::{Shown, Trade};
 use crate::{Result, report};
 use taxel_data::output::FileSet;
 
@@ -17,59 +15,17 @@ pub const FILES: FileSet = FileSet {
 };
 
 /// Writes them to `folder`; `command` is what the user typed.
-pub fn write(folder: &Path, trade: &Trade, command: &str) -> Result<()> {
-    let csv = csv_of(trade);
+pub fn write(folder: &Path, (trade, shown): (&Trade, Option<&Shown>), command: &str) -> Result<()> {
+    let csv = trade.merged.csv();
     let json = print::json_text(trade)?;
-    let page = report::of_trade(trade, false).page(command);
+    let page = report::of_trade(trade, shown, false).page(command);
     let mut files = vec![
         ("trade.csv", csv.as_bytes()),
         ("trade.json", json.as_bytes()),
         ("trade.html", page.html.as_bytes()),
     ];
     files.extend(page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes())));
-    files.extend(trade.chosen.map(|point| ("chosen.bin", trade.blob(point))));
+    let chosen = shown.filter(|_| trade.chosen.is_some());
+    files.extend(chosen.map(|shown| ("chosen.bin", shown.blob.as_slice())));
     Ok(FILES.write(folder, &files)?)
-}
-
-/// Table of all points.
-fn csv_of(trade: &Trade) -> String {
-    let rmse = trade
-        .groups()
-        .map(|(group, _)| format!("{group}_rmse,{group}_ratio_to_best,{group}_ratio_to_limit"));
-    let mut csv = format!(
-        "format,each_row,centres,spread,columns,samples_averaged,filter_ms,lead_ms,{},instructions,cycles,scan_ms,decode_ms,frame_ms,frames_per_s,age_ms,blob_bytes,ram_bytes,\
-         on_front,chosen\n",
-        rmse.collect::<Vec<_>>().join(",")
-    );
-    for (i, p) in trade.points.iter().enumerate() {
-        let errors = p.errors.iter().zip(&p.ratio_to_best);
-        let to_limit = |e: &Errors| e.ratio_to_limit.map_or(String::new(), |r| r.to_string());
-        let errors = errors.map(|(e, ratio)| format!("{},{ratio},{}", e.rmse, to_limit(e)));
-        let errors = errors.collect::<Vec<_>>();
-        let _ = writeln!(
-            csv,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-            p.format.name(),
-            p.each_row,
-            p.centres,
-            p.spread,
-            p.columns.map_or(String::new(), |columns| columns.to_string()),
-            p.samples_averaged,
-            p.filter.map_or(String::new(), |filter| filter.time_constant_ms.to_string()),
-            p.filter.map_or(String::new(), |filter| filter.lead_ms.to_string()),
-            errors.join(","),
-            p.frame.instructions,
-            p.frame.cycles,
-            p.times.scan_ms.map_or(String::new(), |ms| ms.to_string()),
-            p.times.decode_ms,
-            p.times.frame_ms,
-            p.times.frames_per_s,
-            p.times.age_ms.map_or(String::new(), |ms| ms.to_string()),
-            p.blob_bytes,
-            p.ram_bytes,
-            p.on_front,
-            trade.chosen == Some(i)
-        );
-    }
-    csv
 }

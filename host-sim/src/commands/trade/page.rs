@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use crate::evaluate::trade::Trade;
 use crate::report;
+use crate::trade::{Shown, Trade};
 
 use crate::commands::print::Page;
 
 /// Page of the front, or of `all` points; the last lines say where files are.
-pub fn of(trade: &Trade, all: bool, folder: &Path) -> Page {
-    let mut page = Page::of(report::of_trade(trade, all).text());
+pub fn of((trade, shown): (&Trade, Option<&Shown>), all: bool, folder: &Path) -> Page {
+    let mut page = Page::of(report::of_trade(trade, shown, all).text());
     if trade.chosen.is_some() {
         page.line(format_args!("the blob: {}", folder.join("chosen.bin").display()));
     }

@@ -1,7 +1,8 @@
 //! The chart of a trade: all points, their front, and what to compare them with.
 
 use taxel_core::rbf::Format;
-use taxel_evaluate::evaluate::trade::{Point, Times, Trade};
+use taxel_evaluate::device::Times;
+use taxel_evaluate::trade::{Point, Trade};
 use taxel_learn::decoders::centroid;
 
 use super::words;
@@ -118,12 +119,14 @@ fn label(trade: &Trade) -> &'static str {
 
 /// Lines across the picture: what they are, their errors, and their style.
 fn levels(trade: &Trade) -> Vec<(String, f64, &'static str, Mark)> {
-    let readings = trade.main_readings();
-    let with = match trade.distinction(readings) {
+    let Some(of) = trade.chosen.map(|i| &trade.points[i]).or(trade.points.first()) else {
+        return vec![];
+    };
+    let with = match trade.distinction(of) {
         of if of.is_empty() => of,
         of => format!(" with {of}"),
     };
-    let references = readings.references(&trade.group).enumerate();
+    let references = trade.references(of).into_iter().enumerate();
     let references = references.map(|(place, (name, rmse))| {
         // What is read matters to all but the mean.
         let (with, class) = if place == 0 { ("", "muted") } else { (with.as_str(), "c3") };

@@ -1,7 +1,7 @@
 //! Points in words.
 
 use crate::report::format::{fixed, grouped, significant};
-use taxel_evaluate::evaluate::trade::{Bounds, Point, Trade};
+use taxel_evaluate::trade::{Bounds, Point, Trade};
 
 /// Text of a rate.
 pub fn rate(frames_per_s: f64) -> String {
@@ -19,7 +19,7 @@ pub fn error(trade: &Trade, rmse: f64) -> String {
 
 /// Number of centres, and what is read if points differ in it.
 pub fn brief(trade: &Trade, point: &Point) -> String {
-    let of = trade.distinction(&trade.readings[point.readings]);
+    let of = trade.distinction(point);
     if of.is_empty() {
         format!("K {}", point.centres)
     } else {

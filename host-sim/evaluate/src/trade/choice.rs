@@ -4,11 +4,8 @@ use serde::Serialize;
 use taxel_data::BadValue;
 
 use super::SLOT_BYTES;
-use super::device::Times;
+use crate::device::Times;
 use crate::error::{Bounded, NoPoint, Unmet};
-
-/// Ratio of errors that test frames do not tell apart: RMSEs of thousands of frames scatter by more.
-pub(super) const SAME_ERROR: f64 = 1.005;
 
 /// Bounds that a user sets for the chosen point.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -52,21 +49,26 @@ impl Bounds {
 
     /// Index of the best offer within all bounds; `None` if no bound was given.
     ///
-    /// The best offer is the cheapest one within the bound on the error; without such a bound, the cheapest of those whose
-    /// errors are the smallest, or so near that nobody could tell ([`SAME_ERROR`]). The cheapest takes the least time for
+    /// The best offer is the cheapest one within the bound on the error; without such a bound, the cheapest of those that are
+    /// as good as the one with the smallest error, by `is_as_good` of two indices. The cheapest takes the least time for
     /// scan and decoding; among equals, the fewest cycles, then the least flash.
     ///
     /// # Errors
     /// [`NoPoint`] if no offer is within the bounds, with the nearest that offers come to them.
-    pub(super) fn choose(&self, offers: &[Offer], unit: &str) -> Result<Option<usize>, NoPoint> {
+    pub(super) fn choose(
+        &self,
+        offers: &[Offer],
+        is_as_good: &dyn Fn(usize, usize) -> bool,
+        unit: &str,
+    ) -> Result<Option<usize>, NoPoint> {
         if !self.any() {
             return Ok(None);
         }
         let bounds = self.each();
         let within = |i: &usize| within(&bounds, &offers[*i], None);
-        let least = (0..offers.len()).filter(within).map(|i| offers[i].rmse).reduce(f64::min);
-        let most =
-            if self.error.is_some() { f64::INFINITY } else { SAME_ERROR * least.unwrap_or(0.0) };
+        let by_error = |a: &usize, b: &usize| offers[*a].rmse.total_cmp(&offers[*b].rmse);
+        let least = (0..offers.len()).filter(within).min_by(by_error);
+        let least = least.filter(|_| self.error.is_none());
         let key = |i: usize| {
             let Offer { rmse, cycles, blob_bytes, times } = offers[i];
             [times.frame_ms, cycles as f64, blob_bytes as f64, rmse]
@@ -75,7 +77,7 @@ impl Bounds {
             let ordered = key(*a).into_iter().zip(key(*b)).map(|(a, b)| a.total_cmp(&b));
             ordered.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
         };
-        let near = |i: &usize| within(i) && offers[*i].rmse <= most;
+        let near = |i: &usize| within(i) && least.is_none_or(|least| is_as_good(*i, least));
         let best = (0..offers.len()).filter(near).min_by(compare);
         best.map(Some).ok_or_else(|| refusal(&bounds, offers, unit, false))
     }
@@ -171,7 +173,9 @@ mod tests {
 
     #[test]
     fn the_cheapest_point_takes_the_least_time_for_scan_and_decoding() {
-        let chosen = |bounds: Bounds| bounds.choose(&offers(), "mm").unwrap();
+        let chosen = |bounds: Bounds| {
+            bounds.choose(&offers(), &|a, b| offers()[a].rmse <= offers()[b].rmse, "mm").unwrap()
+        };
         assert_eq!(chosen(Bounds::default()), None);
         // Fewer cycles do not make up for a longer scan.
         assert_eq!(chosen(Bounds { error: Some(0.045), ..Bounds::default() }), Some(0));
@@ -189,7 +193,7 @@ mod tests {
         let offers = [large, offer(0.04, 6.0, 36_000)];
         let chosen = |blob_bytes| {
             let bounds = Bounds { error: Some(0.05), blob_bytes, ..Bounds::default() };
-            bounds.choose(&offers, "mm").unwrap()
+            bounds.choose(&offers, &|a, b| a == b, "mm").unwrap()
         };
         assert_eq!((chosen(None), chosen(Some(SLOT_BYTES + 1))), (Some(1), Some(0)));
     }
@@ -199,7 +203,10 @@ mod tests {
         let offers =
             [offer(0.0404, 6.0, 9000), offer(0.0401, 6.0, 36_000), offer(0.04, 6.0, 90_000)];
         let rate = Bounds { frame_rate_hz: Some(100.0), ..Bounds::default() };
-        assert_eq!(rate.choose(&offers, "mm").unwrap(), Some(1));
+        assert_eq!(
+            rate.choose(&offers, &|a, b| offers[a].rmse <= 1.005 * offers[b].rmse, "mm").unwrap(),
+            Some(1)
+        );
     }
 
     #[test]
@@ -213,7 +220,10 @@ mod tests {
                 "without --frame-rate 100, the highest rate is 43.1 frames",
             ),
         ] {
-            let refused = bounds.choose(&offers(), "mm").unwrap_err().to_string();
+            let refused = bounds
+                .choose(&offers(), &|a, b| offers()[a].rmse <= offers()[b].rmse, "mm")
+                .unwrap_err()
+                .to_string();
             assert!(refused.contains(nearest), "{refused}");
         }
     }

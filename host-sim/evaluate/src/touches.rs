@@ -13,10 +13,10 @@ use taxel_learn::{ModelBlob, PreparedModel};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
-use super::device::{Device, Times};
+use crate::device::{Device, Times};
 use crate::error::Result;
 use crate::experiment::Experiment;
-use crate::metrics::{self, Errors, Measure};
+use crate::metrics::{self, Blocks, Errors, Measure};
 use crate::moving::{GRID_S, Moving};
 
 /// Trajectories on which a decoder's noise is measured.
@@ -56,6 +56,7 @@ pub struct Way {
     pub cost: Cost,
     pub times: Times,
     pub errors: Vec<Errors>,
+    pub blocks: Blocks,
 }
 
 /// Frames of one period, and what setting a filter needs to know of them.
@@ -99,16 +100,17 @@ impl<'s> Touches<'s> {
             |of_period: &OfPeriod| model.decode_lines(&of_period.moving.frames.inputs.values);
         let of_period = self.at(&times)?;
         let estimates = decode(&of_period);
-        let errors = of_period.moving.errors(&estimates, times.frame_ms, measure);
-        let plain = Way { filter: Settings::default(), cost, times, errors };
+        let (errors, blocks) = of_period.moving.errors(&estimates, times.frame_ms, measure);
+        let plain = Way { filter: Settings::default(), cost, times, errors, blocks };
         // Behind a filter frames take longer, if only a little.
         let slower = self.at(&filter_times)?;
         let estimates = if Arc::ptr_eq(&slower, &of_period) { estimates } else { decode(&slower) };
         let age_ms = filter_times.age_ms.unwrap_or_default();
         let filter = slower.filter_settings(model, &estimates, age_ms);
         let filtered = slower.moving.filtered(&estimates, filter);
-        let errors = slower.moving.errors(&filtered, filter_times.frame_ms, measure);
-        let behind = Way { filter, cost: behind_filter, times: filter_times, errors };
+        let (errors, blocks) = slower.moving.errors(&filtered, filter_times.frame_ms, measure);
+        let (cost, times) = (behind_filter, filter_times);
+        let behind = Way { filter, cost, times, errors, blocks };
         Ok(Touched { of_period: slower, estimates, filtered, ways: [plain, behind] })
     }
 
@@ -202,7 +204,7 @@ impl OfPeriod {
 
     /// Errors of the `estimates` of a decoder that takes no time.
     pub fn errors_at_once(&self, estimates: &[f64], measure: &Measure) -> Vec<Errors> {
-        self.moving.errors(estimates, self.scan_ms, measure)
+        self.moving.errors(estimates, self.scan_ms, measure).0
     }
 }
 

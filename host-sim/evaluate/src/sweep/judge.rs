@@ -1,0 +1,433 @@
+//! What points are worth: their scans, limits and models, and what these cost. What points share is computed once: the limit
+//! of their readings, frames, what training starts from, layers that any number format has, and a model.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use taxel_core::filter::{Settings, Track};
+use taxel_data::{Dataset, Silent, columns};
+use taxel_learn::cost::{Cost, DecoderRam, Design};
+use taxel_learn::decoders::BASELINES;
+use taxel_learn::train::projection::features_at_most;
+use taxel_learn::train::{Found, Start};
+use taxel_learn::{ModelBlob, Options, PreparedModel};
+use taxel_limit::{Reference, Refusal};
+use taxel_simulate::{Synthesis, World};
+
+use super::file::Also;
+use super::plan::{Plan, Point};
+use super::point::{self, Results};
+use crate::device::{Device, Wires};
+use crate::error::Result;
+use crate::experiment::Experiment;
+use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::others::{self, OtherFrames};
+use crate::subject::Subject;
+use crate::touches::{Touches, Way};
+use crate::training_set::TrainingSet;
+
+/// Bytes of RAM that a filter in time takes for each output.
+const FILTER_BYTES: usize = size_of::<Track>();
+
+/// Results of a point, or the reason why there are none.
+pub type Outcome = std::result::Result<Results, String>;
+
+/// Result of a stage of the work that later stages share, or the reason why there is none.
+type Stage<T> = std::result::Result<T, String>;
+
+/// Computes the points in `group`, indices of `points` that [share](Point::shares) their limit, and hands the outcome of each
+/// to `keep` as soon as it is there.
+///
+/// # Errors
+/// That of `keep`.
+pub fn compute(
+    plan: &Plan,
+    points: &[Point],
+    group: &[usize],
+    keep: &mut dyn FnMut(usize, Outcome) -> Result<()>,
+) -> Result<()> {
+    let mut limits = KnownLimit::default();
+    let mut order = group.to_vec();
+    order.sort_by_key(|index| (points[*index].keys, *index));
+    let same = |depth: usize| {
+        move |a: &usize, b: &usize| points[*a].keys[..=depth] == points[*b].keys[..=depth]
+    };
+    for of_frames in order.chunk_by(same(0)) {
+        let first = &points[of_frames[0]];
+        let subject = caught(|| subject_of(plan, first));
+        let readings = after(&subject, |subject| Readings::new(plan, first, subject, &mut limits));
+        if !plan.train {
+            let outcome = readings.as_ref().map(|it| it.results.clone()).map_err(Clone::clone);
+            of_frames.iter().try_for_each(|index| keep(*index, outcome.clone()))?;
+            continue;
+        }
+        let frames = after(&readings, |readings| Frames::new(plan, readings));
+        for of_starts in of_frames.chunk_by(same(1)) {
+            let first = &points[of_starts[0]];
+            let starts = after(&frames, |frames| Starts::new(plan, first, frames));
+            for of_layers in of_starts.chunk_by(same(2)) {
+                let first = &points[of_layers[0]];
+                let found = after(&starts, |starts| starts.layers(plan, first));
+                for of_model in of_layers.chunk_by(same(3)) {
+                    let first = &points[of_model[0]];
+                    let model = after(&found, |found| {
+                        let frames = frames.as_ref().map_err(crate::Error::failed)?;
+                        frames.judge(&frames.blob(plan, first, found)?)
+                    });
+                    for index in of_model {
+                        let outcome = after(&model, |model| model.results(points[*index].filter));
+                        keep(*index, outcome)?;
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What `next` makes of the result of the stage `before`.
+fn after<'t, T, U>(before: &'t Stage<T>, next: impl FnOnce(&'t T) -> Result<U>) -> Stage<U> {
+    before.as_ref().map_err(Clone::clone).and_then(|before| caught(|| next(before)))
+}
+
+/// Result of a stage; a panic is a failure of its points, and not of all others.
+fn caught<T>(stage: impl FnOnce() -> Result<T>) -> Stage<T> {
+    match catch_unwind(AssertUnwindSafe(stage)) {
+        Ok(outcome) => outcome.map_err(|error| error.to_string()),
+        Err(panic) => {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+            Err(format!("a fault of the program: {text}"))
+        }
+    }
+}
+
+/// Subject of a point, whose readings are averaged as its device does.
+pub fn subject_of(plan: &Plan, point: &Point) -> Result<Subject> {
+    if let Some(data) = &plan.data {
+        let data = point::measured(data, &point.scene).map_err(taxel_data::Error::unfit)?;
+        return Ok(Subject::Measured(Box::new(data)));
+    }
+    let scene = Subject::Scene(Box::new(Experiment::parse("of the point", &point.scene)?));
+    let mut subject = scene.with_every_column(point.column_step).into_owned();
+    if let Subject::Scene(scene) = &mut subject {
+        let wires = Some(Wires::of(&scene.world));
+        scene.digest = point.digest;
+        scene.world.noise = point.device.averaged(scene.world.noise, wires, point.samples);
+    }
+    Ok(subject)
+}
+
+/// Limit that was computed last: points share it that differ only in their training.
+#[derive(Default)]
+pub struct KnownLimit(Option<(World, usize, std::result::Result<Reference, Refusal>)>);
+
+impl KnownLimit {
+    /// Limit on the first `frames` test frames of a world.
+    fn of(&mut self, world: &World, frames: usize) -> std::result::Result<Reference, Refusal> {
+        match &self.0 {
+            Some((known, of, limit)) if known == world && *of == frames => limit.clone(),
+            _ => {
+                let limit = match world.path {
+                    Some(_) => Err(Refusal::Moving),
+                    None => Reference::new(world, frames, &Silent),
+                };
+                self.0 = Some((world.clone(), frames, limit.clone()));
+                limit
+            }
+        }
+    }
+}
+
+/// Readings that points decode: when they are taken, and what any decoder of them can do at best.
+pub struct Readings<'s> {
+    subject: &'s Subject,
+    device: Device,
+    samples: usize,
+    pub scan_ms: Option<f64>,
+    measure: Measure,
+    pub limit: LimitSummary,
+    results: Results,
+}
+
+impl<'s> Readings<'s> {
+    /// Readings of a point's `subject`.
+    pub fn new(
+        plan: &Plan,
+        point: &Point,
+        subject: &'s Subject,
+        limits: &mut KnownLimit,
+    ) -> Result<Self> {
+        let mut results = Results::default();
+        let (wires, mut measure) = match subject {
+            Subject::Scene(scene) => (Some(Wires::of(&scene.world)), scene.measure()),
+            Subject::Measured(data) => (Wires::named(&data.training.inputs.names), data.measure()),
+        };
+        let scan_ms = point.device.scan_ms(wires, point.samples);
+        results.add("rows", wires.map(|wires| wires.rows as f64));
+        results.add("columns", wires.map(|wires| wires.columns as f64));
+        results.add("scan_ms", scan_ms);
+        let mut limit = LimitSummary::new(&Err(Refusal::Measured));
+        if let Subject::Scene(scene) = subject {
+            let [x_mm, y_mm, _] = scene.world.sensor.size_mm;
+            results.add("area_cm2", Some(x_mm * y_mm / 100.0));
+            let frames = plan.limit_frames.unwrap_or_else(|| {
+                Reference::few_frames(&scene.world).min(scene.training.test_frames)
+            });
+            if frames > 0 {
+                let found = limits.of(&scene.world, frames);
+                limit = LimitSummary::new(&found);
+                match found {
+                    Ok(found) => measure.limit = Some(found),
+                    Err(refusal) => results.notes.push(format!("no limit: {refusal}")),
+                }
+            }
+        }
+        for limit in measure.limit.iter().flat_map(Reference::limits) {
+            let [name, error] = ["limit", "limit_standard_error"];
+            results.add(&format!("{name}_{}", limit.group), Some(limit.limit));
+            results.add(&format!("{error}_{}", limit.group), Some(limit.limit_standard_error));
+        }
+        let (device, samples) = (point.device, point.samples);
+        Ok(Self { subject, device, samples, scan_ms, measure, limit, results })
+    }
+
+    /// Test frames of contacts that move, for filters that are set for the errors of `group`.
+    fn touches(&self, group: &str) -> Option<Touches<'s>> {
+        let (scene, path) = self.subject.moving_scene()?;
+        let passes = self.device.passes(self.samples);
+        Some(Touches::new(scene, Synthesis::new(&scene.world), (path, passes), group))
+    }
+}
+
+/// Frames that models are trained on and judged by.
+pub struct Frames<'s> {
+    readings: &'s Readings<'s>,
+    set: TrainingSet<'s>,
+    test: Cow<'s, Dataset>,
+    touches: Option<Touches<'s>>,
+    pub others: OtherFrames,
+    /// Errors of the baselines, if the plan wants them.
+    pub baselines: Vec<DecoderErrors>,
+}
+
+impl<'s> Frames<'s> {
+    /// Frames of these `readings`.
+    pub fn new(plan: &Plan, readings: &'s Readings<'s>) -> Result<Self> {
+        let (mut set, test) = readings.subject.sets(None);
+        // All models of these frames tell it.
+        set.origin.linear_rmse = set.linear_rmse();
+        let names = &set.frames.outputs.names;
+        let last = columns::groups(names).last().map_or("", |(group, _)| *group).to_owned();
+        let group = plan.group().map_or(last, str::to_owned);
+        let touches = readings.touches(&group);
+        let others = if plan.has(Also::OtherContacts) {
+            others::frames(readings.subject, None)
+        } else {
+            vec![]
+        };
+        let mut frames = Self { readings, set, test, touches, others, baselines: vec![] };
+        if plan.has(Also::Baselines) {
+            frames.baselines = frames.baselines()?;
+        }
+        Ok(frames)
+    }
+
+    /// Errors of the baselines. On contacts that move, decoding takes them no time.
+    fn baselines(&self) -> Result<Vec<DecoderErrors>> {
+        let measure = &self.readings.measure;
+        let fitted = BASELINES.iter().filter_map(|baseline| baseline.fit(&self.set.frames));
+        let judged = fitted.map(|decoder| {
+            let Some(touches) = &self.touches else {
+                return Ok(metrics::judge(decoder.as_ref(), &self.test, measure));
+            };
+            let touched = touches.while_scanned(self.readings.scan_ms)?;
+            let estimates = decoder.decode_all(&touched.moving.frames.inputs.values, 1);
+            let errors = touched.errors_at_once(&estimates.values, measure);
+            Ok(DecoderErrors::new(decoder.name(), errors))
+        });
+        judged.collect()
+    }
+
+    /// Options for training a point's model on these frames. Fewer columns give fewer features.
+    fn options(&self, plan: &Plan, point: &Point) -> Result<Options> {
+        let mut options = point::options(plan.data.as_deref(), &point.scene)?;
+        if point.column_step > 1 {
+            let possible = |wanted| features_at_most(&self.set.frames, wanted).max(1);
+            options.features = options.features.map(possible);
+        }
+        Ok(options)
+    }
+
+    /// Blob of a point's model, whose layers are `found`.
+    pub fn blob(&self, plan: &Plan, point: &Point, found: &Found<'_>) -> Result<ModelBlob> {
+        self.set.blob_of(found, &self.options(plan, point)?, &Silent)
+    }
+
+    /// Errors and cost of a model.
+    pub fn judge(&self, blob: &ModelBlob) -> Result<Judged> {
+        let Readings { measure, device, scan_ms, .. } = self.readings;
+        let model = blob.prepare().of_inputs();
+        let design = Design::new(blob);
+        let cost = Cost::of_frame(&design);
+        let ways = match &self.touches {
+            None => {
+                let estimates = model.decode_lines(&self.test.inputs.values);
+                let (errors, blocks) =
+                    metrics::with_blocks(&self.test.outputs, &estimates, measure);
+                let (filter, times) = (Settings::default(), device.times(*scan_ms, &cost));
+                vec![Way { filter, cost, times, errors, blocks }]
+            }
+            Some(touches) => {
+                touches.judge((blob, &model), cost, (device, *scan_ms), measure)?.ways.into()
+            }
+        };
+        let mut before = self.readings.results.clone();
+        for decoder in &self.baselines {
+            for (group, rmse) in rmse_of_groups(&decoder.errors) {
+                before.add(&format!("{}_rmse_{group}", decoder.decoder), Some(rmse));
+            }
+        }
+        let centres = design.networks.iter().map(|network| network.shape.centres).max();
+        before.add("centres", centres.map(|centres| centres as f64));
+        before.add("spread", Some(blob.spread()));
+        before.add("blob_bytes", Some(blob.bytes().len() as f64));
+        let filter_bytes = FILTER_BYTES * self.test.outputs.names.len();
+        Ok(Judged {
+            worst: self.worst_other(&model),
+            ram_bytes: [0, filter_bytes].map(|bytes| DecoderRam::new(&design).bytes() + bytes),
+            before,
+            ways,
+        })
+    }
+
+    /// Errors of a `model` on other contacts: the name of each, and its errors.
+    pub fn on_others(&self, model: &PreparedModel<'_>) -> Vec<(String, Vec<Errors>)> {
+        let measure = Measure { limit: None, ..self.readings.measure.clone() };
+        let of = |(name, frames): &(String, Dataset)| {
+            (name.clone(), metrics::judge(model, frames, &measure).errors)
+        };
+        self.others.iter().map(of).collect()
+    }
+
+    /// Largest error of a `model` on other contacts, by group, with its blocks.
+    fn worst_other(&self, model: &PreparedModel<'_>) -> Worst {
+        let measure = Measure { limit: None, ..self.readings.measure.clone() };
+        let mut worst: Worst = BTreeMap::new();
+        for (_, frames) in &self.others {
+            let estimates = model.decode_lines(&frames.inputs.values);
+            let (errors, blocks) = metrics::with_blocks(&frames.outputs, &estimates, &measure);
+            for (group, rmse) in rmse_of_groups(&errors) {
+                let known = worst.get(&group).map_or(0.0, |known| known.0);
+                if rmse > known {
+                    let blocks = blocks.get(&group).cloned().unwrap_or_default();
+                    worst.insert(group, (rmse, blocks));
+                }
+            }
+        }
+        worst
+    }
+
+    /// Errors of the `model` of a still subject, and of the baselines.
+    pub fn decoders(&self, judged: &Judged, filter: bool) -> Vec<DecoderErrors> {
+        let way = judged.way(filter).map_or(vec![], |way| way.errors.clone());
+        let network = DecoderErrors::new(metrics::NETWORK, way);
+        std::iter::once(network).chain(self.baselines.iter().cloned()).collect()
+    }
+}
+
+/// RMSE of each group, and of [all](metrics::ALL) together if they are several.
+fn rmse_of_groups(errors: &[Errors]) -> Vec<(String, f64)> {
+    let mut rmse: Vec<(String, f64)> =
+        errors.iter().map(|errors| (errors.group.clone(), errors.rmse)).collect();
+    if let (true, Some(all)) = (errors.len() > 1, metrics::rmse_of(errors, metrics::ALL)) {
+        rmse.push((metrics::ALL.into(), all));
+    }
+    rmse
+}
+
+/// What training starts from, for points that differ in their centres, spreads and formats alone.
+pub struct Starts<'s> {
+    frames: &'s Frames<'s>,
+    /// Options whose features are chosen.
+    options: Options,
+    all: Vec<Start>,
+}
+
+impl<'s> Starts<'s> {
+    /// Starts for a point's training on these `frames`. Features are chosen for as many centres as the plan's scene has.
+    pub fn new(plan: &Plan, point: &Point, frames: &'s Frames<'s>) -> Result<Self> {
+        let own = frames.options(plan, point)?;
+        let mut options = Options { centres: point.usual.centres, ..own };
+        let _ = frames.set.choose(&mut options, &Silent);
+        let all = Start::all(&frames.set.frames, &options)?;
+        Ok(Self { frames, options, all })
+    }
+
+    /// Layers of a point's model, as they are found for the format of the plan's scene.
+    pub fn layers(&self, plan: &Plan, point: &Point) -> Result<Found<'_>> {
+        let own = self.frames.options(plan, point)?;
+        let (kinds, format) = (self.options.kinds, point.usual.format);
+        self.frames.set.layers(&self.all, &Options { kinds, format, ..own }, &Silent)
+    }
+}
+
+/// Largest error on other contacts by group, with its [blocks](metrics::Blocks).
+type Worst = BTreeMap<String, (f64, Vec<f64>)>;
+
+/// Errors and cost of a model, without a filter in time, and on contacts that move behind one.
+pub struct Judged {
+    before: Results,
+    worst: Worst,
+    ways: Vec<Way>,
+    /// Without a filter, and behind one.
+    ram_bytes: [usize; 2],
+}
+
+impl Judged {
+    fn way(&self, filter: bool) -> Result<&Way> {
+        self.ways.get(usize::from(filter)).ok_or_else(|| {
+            let fix = "leave device.filter out, or give the scene a [motion]";
+            crate::Error::failed(format!("a filter is judged on contacts that move: {fix}"))
+        })
+    }
+
+    /// Results by their names.
+    fn results(&self, filter: bool) -> Result<Results> {
+        let way = self.way(filter)?;
+        let mut results = self.before.clone();
+        for errors in &way.errors {
+            let group = &errors.group;
+            results.add(&format!("ratio_to_limit_{group}"), errors.ratio_to_limit);
+            let error = errors.ratio_standard_error;
+            results.add(&format!("ratio_to_limit_standard_error_{group}"), error);
+        }
+        for (group, rmse) in rmse_of_groups(&way.errors) {
+            results.add_estimate("rmse", &group, rmse, way.blocks.get(&group));
+            // What a filter in time makes of still contacts is not judged.
+            if let Some((worst, blocks)) = self.worst.get(&group) {
+                let (worst, blocks) = if *worst > rmse {
+                    (*worst, Some(blocks))
+                } else {
+                    (rmse, way.blocks.get(&group))
+                };
+                results.add_estimate("worst_rmse", &group, worst, blocks);
+            }
+        }
+        let times = &way.times;
+        results.add("decode_ms", Some(times.decode_ms));
+        results.add("frame_ms", Some(times.frame_ms));
+        results.add("frames_per_s", Some(times.frames_per_s));
+        results.add("age_ms", times.age_ms);
+        results.add("instructions", Some(way.cost.instructions as f64));
+        results.add("cycles", Some(way.cost.cycles as f64));
+        results.add("ram_bytes", Some(self.ram_bytes[usize::from(filter)] as f64));
+        if filter {
+            let Settings { time_constant_us, lead_us, .. } = way.filter;
+            results.add("filter_ms", Some(f64::from(time_constant_us) / 1000.0));
+            results.add("lead_ms", Some(f64::from(lead_us) / 1000.0));
+        }
+        Ok(results)
+    }
+}

@@ -1,0 +1,464 @@
+//! Trade between speed and accuracy: a [plan](crate::sweep) over the settings of a subject's decoder, and the choice of a
+//! point by its errors and its cost.
+//!
+//! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are predicted by
+//! a formula of the firmware's own code ([`Cost`](taxel_learn::cost::Cost)), the time of a scan by the firmware's own plan ([`Device`]).
+
+use serde::Serialize;
+use taxel_core::rbf::Format;
+use taxel_data::Silent;
+use taxel_learn::decoders::{centroid, linear, mean};
+use taxel_learn::outliers::Outliers;
+use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::outputs::Outputs;
+use taxel_simulate::path::Path;
+use toml::{Table, Value};
+
+use crate::device::{Device, Times};
+use crate::error::{Error, NoPoint, Result};
+use crate::experiment::Method;
+use crate::metrics::{self, DecoderErrors};
+use crate::subject::Subject;
+use crate::sweep::file::{Also, Bound, Wanted};
+use crate::sweep::front::is_as_good;
+use crate::sweep::judge::{self, Frames, KnownLimit, Starts};
+use crate::sweep::{self, Merged};
+use crate::verdict::{Verdict, Warning};
+
+mod line;
+mod choice;
+mod point;
+
+pub use choice::Bounds;
+use choice::Offer;
+pub use line::Line;
+pub use point::{FilterSettings, Point};
+
+pub use crate::verdict::SLOT_BYTES;
+
+/// Settings that a trade varies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Asked {
+    /// Numbers of centres K of each network.
+    pub centres: Vec<usize>,
+    /// Numbers of samples averaged for each reading: white noise falls with the square root, noise with a memory hardly.
+    pub samples_averaged: Vec<usize>,
+    /// Steps from one column-wire that is read to the next: 1 reads all. Only scenes have others than 1.
+    pub column_steps: Vec<usize>,
+    pub device: Device,
+    /// Group of outputs by whose errors front and choice are determined, or [`metrics::ALL`].
+    pub group: String,
+    /// Whether these count the largest error of the subject's own and other contacts.
+    pub worst_case: bool,
+    /// Largest blob on the front.
+    pub most_bytes: usize,
+}
+
+impl Asked {
+    /// What a sweep is asked for `subject`: its decoders, crossed with what is varied.
+    pub fn wanted(&self, subject: &Subject) -> Wanted {
+        let whole = |values: &[usize]| -> Value {
+            let values =
+                values.iter().map(|it| Value::Integer(i64::try_from(*it).unwrap_or(i64::MAX)));
+            values.collect::<Vec<_>>().into()
+        };
+        let mut wanted = Wanted {
+            objectives: vec![format!("{}_{}", self.error(), self.group), "frame_ms".into()],
+            also: vec![Also::Baselines],
+            bounds: [("blob_bytes".into(), Bound::Most(self.most_bytes as f64))].into(),
+            device: Table::try_from(self.device).unwrap_or_default(),
+            ..Wanted::default()
+        };
+        let mut axis = |field: &str, values: Value| wanted.axes.insert(field.into(), values);
+        // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
+        let rows = match subject {
+            Subject::Scene(scene) => match scene.world.outputs {
+                Outputs::Contact(_) => 1,
+                Outputs::Electrodes(_) => scene.world.read_rows.len(),
+            },
+            Subject::Measured(data) => data.training.rows,
+        };
+        let formats = Format::ALL.iter().rev().map(|format| Value::from(format.name()));
+        axis("training.format", formats.collect::<Vec<_>>().into());
+        axis("training.each_row", if rows > 1 { vec![true, false] } else { vec![false] }.into());
+        axis("training.centres", whole(&self.centres));
+        axis("device.samples", whole(&self.samples_averaged));
+        axis("device.column_step", whole(&self.column_steps));
+        if subject.moving_scene().is_some() {
+            axis("device.filter", vec![false, true].into());
+        }
+        if let Subject::Scene(scene) = subject {
+            if !scene.others.is_empty() {
+                wanted.also.push(Also::OtherContacts);
+            }
+            // The paper's own way is none that a device would choose.
+            if scene.training.method == Method::Paper {
+                wanted.set.insert("training.method".into(), "best".into());
+                wanted.set.insert("training.refine".into(), false.into());
+            }
+        }
+        wanted
+    }
+
+    /// Result by which front and choice are determined, without its group.
+    fn error(&self) -> &'static str {
+        if self.worst_case { "worst_rmse" } else { "rmse" }
+    }
+}
+
+/// Trade of a subject: every point, and the one chosen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trade {
+    /// Name of the scene, or of the data.
+    pub subject: String,
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// Kind of the noise that a scene adds; none for measured data, which has its own.
+    pub noise_kind: Option<NoiseKind>,
+    /// Level of that noise in one sample: a fraction, or in Ω for absolute noise.
+    pub noise_level: f64,
+    pub training_frames: usize,
+    pub test_frames: usize,
+    /// How test frames were chosen among measured ones, in words.
+    pub test_choice: Option<String>,
+    /// Path of the contacts that errors are of: newest finished estimates against the truth at that moment. `None` for still
+    /// test frames.
+    pub motion: Option<Path>,
+    /// Outliers among measured frames; `None` for a scene.
+    pub outliers: Option<Outliers>,
+    pub device: Device,
+    pub line: Line,
+    /// Group of outputs by which front and choice are determined, or [`metrics::ALL`].
+    pub group: String,
+    pub unit: String,
+    /// Whether these count the worst of the subject's own and other contacts.
+    pub worst_case: bool,
+    /// Every point that was judged.
+    pub points: Vec<Point>,
+    /// Points that cannot be trained, and why.
+    pub left_out: Vec<String>,
+    /// Bounds that [`Trade::choose`] was given.
+    pub bounds: Bounds,
+    /// Index of the point that [`Trade::choose`] picked.
+    pub chosen: Option<usize>,
+    /// Reason why no point was picked within bounds.
+    #[serde(skip)]
+    pub refused: Option<NoPoint>,
+    /// Results as those of any plan.
+    #[serde(skip)]
+    pub merged: Merged,
+}
+
+/// Model of one point, trained once more, and what it is worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shown {
+    pub point: usize,
+    pub blob: Vec<u8>,
+    pub verdict: Verdict,
+    /// RMSE of the trade's group on other contacts, by their names.
+    pub others: Vec<(String, f64)>,
+    /// What is known of the least possible error, in a sentence.
+    pub limit_note: String,
+    /// Column-wires (from 1) as a scene's `[readout]` takes them; `None` if all are read.
+    pub column_wires: Option<Vec<usize>>,
+}
+
+impl Trade {
+    /// Trade of a `subject`, whose points are `merged`.
+    ///
+    /// # Errors
+    /// [`Error`] if no point could be trained.
+    pub fn new(subject: &Subject, asked: &Asked, merged: Merged) -> Result<Self> {
+        let mut points: Vec<Point> = merged.points.iter().filter_map(Point::new).collect();
+        // Settings are in the order of points, but for those that failed.
+        for (point, setting) in points.iter_mut().zip(&merged.settings) {
+            point.on_front = setting.on_front;
+        }
+        points.sort_by_key(Point::order);
+        let left_out: Vec<String> = merged
+            .failed()
+            .map(|it| {
+                format!("{}: {}", Point::settings_of(it), it.failed.clone().unwrap_or_default())
+            })
+            .collect();
+        if let (true, Some(cause)) = (points.is_empty(), left_out.first()) {
+            return Err(Error::failed(format!("no way to decode can be trained: {cause}")));
+        }
+        let names = subject.output_names();
+        let rows = match subject {
+            Subject::Scene(scene) => match scene.world.outputs {
+                Outputs::Contact(_) => 1,
+                Outputs::Electrodes(_) => scene.world.read_rows.len(),
+            },
+            Subject::Measured(data) => data.training.rows,
+        };
+        Ok(Self {
+            subject: subject.name().into(),
+            seed: subject.origin().seed,
+            noise_kind: subject.scene().map(|scene| scene.world.noise.kind),
+            noise_level: match subject {
+                Subject::Scene(scene) => scene.world.noise.total_level(),
+                Subject::Measured(data) => data.noise_level().unwrap_or(0.0),
+            },
+            training_frames: subject.training_frames(),
+            test_frames: subject.test_frames(),
+            test_choice: subject.measurements().map(|data| data.test_choice.clone()),
+            motion: subject.moving_scene().map(|(_, path)| path),
+            outliers: subject.measurements().map(|data| data.outliers.clone()),
+            device: asked.device,
+            line: Line::new(rows, names.len()),
+            group: asked.group.clone(),
+            unit: metrics::unit_of_rmse(&asked.group).into(),
+            worst_case: asked.worst_case,
+            points,
+            left_out,
+            bounds: Bounds::default(),
+            chosen: None,
+            refused: None,
+            merged,
+        })
+    }
+
+    /// Picks the point within `bounds`, if any are given, among those that beat the baselines.
+    pub fn choose(&mut self, bounds: &Bounds) -> std::result::Result<(), NoPoint> {
+        self.bounds = *bounds;
+        let chosen = self.choice(bounds);
+        self.refused = chosen.as_ref().err().cloned();
+        self.chosen = chosen.clone().unwrap_or_default();
+        chosen.map(|_| ())
+    }
+
+    fn choice(&self, bounds: &Bounds) -> std::result::Result<Option<usize>, NoPoint> {
+        let unit = named(&self.unit, &self.group);
+        let choose = |among: &[usize]| {
+            let offers: Vec<Offer> = among.iter().map(|i| self.offer(*i)).collect();
+            let same = |a: usize, b: usize| self.is_as_good(among[a], among[b]);
+            Ok(bounds.choose(&offers, &same, &unit)?.map(|place| among[place]))
+        };
+        let all: Vec<usize> = (0..self.points.len()).collect();
+        let Some(best) = choose(&all)? else { return Ok(None) };
+        let Some((decoder, least)) = self.better_baseline(best) else { return Ok(Some(best)) };
+        let kept: Vec<usize> =
+            all.into_iter().filter(|i| self.better_baseline(*i).is_none()).collect();
+        let decoder = decoder.into();
+        choose(&kept).map_err(|_| NoPoint::Beaten { decoder, least, unit: unit.clone() })
+    }
+
+    fn offer(&self, point: usize) -> Offer {
+        let Point { cycles, blob_bytes, times, .. } = self.points[point];
+        Offer { rmse: self.counted_rmse(point), cycles, blob_bytes, times }
+    }
+
+    /// Whether the error of one point is no larger than that of another, as far as their test frames tell.
+    fn is_as_good(&self, one: usize, other: usize) -> bool {
+        let of = |point: usize| (self.counted_rmse(point), &self.points[point].blocks);
+        is_as_good(&self.error(), of(one), of(other))
+    }
+
+    /// Result by which front and choice are determined.
+    fn error(&self) -> String {
+        let error = if self.worst_case { "worst_rmse" } else { "rmse" };
+        format!("{error}_{}", self.group)
+    }
+
+    /// RMSE of the group that a point is chosen by.
+    pub fn counted_rmse(&self, point: usize) -> f64 {
+        self.points[point].result(&self.error()).unwrap_or(f64::NAN)
+    }
+
+    /// Baseline with the least error of the group, and that error, if it is smaller than that of a point which decodes the
+    /// same readings.
+    pub fn better_baseline(&self, point: usize) -> Option<(&'static str, f64)> {
+        let point = &self.points[point];
+        let baselines = [mean::NAME, linear::NAME, centroid::NAME];
+        let of = |name| Some((name, point.result(&format!("{name}_rmse_{}", self.group))?));
+        let least = baselines.into_iter().filter_map(of).min_by(|(_, a), (_, b)| a.total_cmp(b));
+        least.filter(|(_, least)| *least < point.rmse(&self.group))
+    }
+
+    /// Errors of the group to compare points with that decode the same readings as this one, by name.
+    pub fn references(&self, point: &Point) -> Vec<(&'static str, f64)> {
+        let references = [
+            ("always predicting the mean", "mean_rmse"),
+            ("best linear decoder", "linear_rmse"),
+            ("centroid", "centroid_rmse"),
+            ("least possible", "limit"),
+        ];
+        let of = |(name, result)| Some((name, point.result(&format!("{result}_{}", self.group))?));
+        references.into_iter().filter_map(of).collect()
+    }
+
+    /// First point of each choice of readings.
+    pub fn readings(&self) -> Vec<&Point> {
+        let mut readings: Vec<&Point> = vec![];
+        for point in &self.points {
+            if !readings.iter().any(|known| known.reads_like(point)) {
+                readings.push(point);
+            }
+        }
+        readings
+    }
+
+    /// Points of the front from fast to slow.
+    pub fn front(&self) -> Vec<usize> {
+        let mut front: Vec<usize> =
+            (0..self.points.len()).filter(|i| self.points[*i].on_front).collect();
+        let key = |i: usize| (self.points[i].times.frame_ms, self.counted_rmse(i));
+        front.sort_by(|a, b| {
+            let ((time_a, error_a), (time_b, error_b)) = (key(*a), key(*b));
+            time_a.total_cmp(&time_b).then(error_b.total_cmp(&error_a))
+        });
+        front
+    }
+
+    /// Fastest point with the smallest error, or with one that test frames do not tell from it.
+    pub fn most_accurate(&self) -> Option<usize> {
+        let rmse = |i: &usize| self.counted_rmse(*i);
+        let front = self.front();
+        let least = front.iter().copied().min_by(|a, b| rmse(a).total_cmp(&rmse(b)))?;
+        front.into_iter().find(|i| self.is_as_good(*i, least))
+    }
+
+    /// Fastest point of the front whose error is at most so many times the smallest.
+    pub fn fastest_within(&self, factor: f64) -> Option<usize> {
+        let least = self.counted_rmse(self.most_accurate()?);
+        self.front().into_iter().find(|i| self.counted_rmse(*i) <= factor * least)
+    }
+
+    /// Point of the front that lies farthest below the line between its ends, in the logarithms of time and error; `None` where
+    /// none does.
+    pub fn knee(&self) -> Option<usize> {
+        let front = self.front();
+        let at = |i: usize| {
+            let (ms, rmse) = (self.points[i].times.frame_ms, self.counted_rmse(i));
+            [ms.ln(), rmse.ln()]
+        };
+        let ([x0, y0], [x1, y1]) = (at(*front.first()?), at(*front.last()?));
+        let below = |i: usize| {
+            let [x, y] = at(i);
+            (y0 - y) / (y0 - y1) - (x - x0) / (x1 - x0)
+        };
+        let depths = front.into_iter().map(|i| (i, below(i))).filter(|(_, depth)| *depth > 0.0);
+        depths.max_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(i, _)| i)
+    }
+
+    /// Model of the chosen point, or else of the most accurate one, and what it is worth. It is trained once more: points keep
+    /// their results alone.
+    ///
+    /// # Errors
+    /// As training.
+    pub fn shown(
+        &self,
+        subject: &Subject,
+        plan: &sweep::Plan,
+        points: &[sweep::Point],
+    ) -> Result<Option<Shown>> {
+        let Some(shown) = self.chosen.or_else(|| self.most_accurate()) else { return Ok(None) };
+        let id = &self.points[shown].id;
+        let Some(point) = points.iter().find(|point| point.id == *id) else { return Ok(None) };
+        let mut of_point = judge::subject_of(plan, point)?;
+        // The blob tells what the file is called.
+        if let (Subject::Measured(data), Subject::Measured(own)) = (&mut of_point, subject) {
+            data.name.clone_from(&own.name);
+        }
+        let readings = judge::Readings::new(plan, point, &of_point, &mut KnownLimit::default())?;
+        let frames = Frames::new(plan, &readings)?;
+        let starts = Starts::new(plan, point, &frames)?;
+        let blob = frames.blob(plan, point, &starts.layers(plan, point)?)?;
+        let judged = frames.judge(&blob)?;
+        let decoders: Vec<DecoderErrors> = frames.decoders(&judged, point.filter);
+        let verdict = Verdict::new(&decoders, &readings.limit)
+            .with(Warning::other_image(&blob.parse()))
+            .of_blob(&blob, self.training_frames)
+            .of_frames(self.outliers.as_ref(), self.test_frames);
+        let others = frames.on_others(&blob.prepare().of_inputs()).into_iter();
+        let others = others
+            .filter_map(|(name, errors)| Some((name, metrics::rmse_of(&errors, &self.group)?)));
+        let sensor = of_point.scene().map(|scene| &scene.world.sensor);
+        let chosen = sensor.filter(|sensor| sensor.read_columns.is_some());
+        Ok(Some(Shown {
+            point: shown,
+            blob: blob.bytes().to_vec(),
+            verdict,
+            others: others.collect(),
+            limit_note: readings.limit.note(),
+            column_wires: chosen.map(|it| it.column_numbers().map(|wire| wire + 1).collect()),
+        }))
+    }
+
+    /// What tells the readings of this point from those of others, such as `6 columns, 4 samples`; empty if nothing does.
+    pub fn distinction(&self, of: &Point) -> String {
+        let differ = |by: &dyn Fn(&Point) -> bool| self.points.iter().any(by);
+        let columns = of.columns.filter(|_| differ(&|other| other.columns != of.columns));
+        let samples = differ(&|other| other.samples_averaged != of.samples_averaged);
+        let samples = samples.then_some(of.samples_averaged);
+        point::in_words(columns, samples).trim_start_matches(", ").into()
+    }
+
+    /// What the board's line carries, and what helps if that is less than the frames a second that were asked for.
+    pub fn line_note(&self) -> String {
+        let Line { baud, estimate_bytes, estimates_per_s } = self.line;
+        let carries = format!(
+            "The board's serial line carries at most {estimates_per_s:.0} estimates a second: {estimate_bytes} bytes each, \
+             at {baud} baud."
+        );
+        match self.bounds.frame_rate_hz {
+            Some(asked) if asked > estimates_per_s => format!(
+                "{carries} For {asked} a second decode fewer outputs (axes of a scene's [outputs], or --outputs '*_dz_mm' of a CSV file), or use the estimates on the device."
+            ),
+            _ => carries,
+        }
+    }
+}
+
+/// Refuses `bounds` that no point can meet, by the time of its scan and its least possible error, before anything is trained.
+///
+/// # Errors
+/// [`NoPoint`], or an [`Error`] for a scene that does not hold.
+pub fn check_possible(
+    plan: &sweep::Plan,
+    points: &[sweep::Point],
+    bounds: &Bounds,
+    group: &str,
+) -> Result<()> {
+    /// Standard errors by which an error must lie below the limit to be called impossible.
+    const CERTAIN: f64 = 3.0;
+    let mut offers = vec![];
+    let mut limits = KnownLimit::default();
+    let mut known: Vec<u64> = vec![];
+    for point in points {
+        if known.contains(&point.shares) {
+            continue;
+        }
+        known.push(point.shares);
+        let mut plan = plan.clone();
+        plan.limit_frames = plan.limit_frames.or(bounds.error.is_none().then_some(0));
+        let subject = judge::subject_of(&plan, point)?;
+        let readings = judge::Readings::new(&plan, point, &subject, &mut limits)?;
+        let least = readings.limit.groups.iter().find(|limit| limit.group == group);
+        let rmse = least.map_or(0.0, |it| it.limit - CERTAIN * it.limit_standard_error);
+        let nothing = taxel_learn::cost::Cost { instructions: 0, cycles: 0 };
+        let times: Times = point.device.times(readings.scan_ms, &nothing);
+        offers.push(Offer { rmse, cycles: 0, blob_bytes: 0, times });
+    }
+    bounds.check_possible(&offers, &named(metrics::unit_of_rmse(group), group))?;
+    Ok(())
+}
+
+/// Computes all points in memory and makes a trade of them.
+///
+/// # Errors
+/// [`Error`] if no point could be trained.
+pub fn compute(
+    subject: &Subject,
+    asked: &Asked,
+    (plan, points): (&sweep::Plan, &[sweep::Point]),
+) -> Result<Trade> {
+    let records = sweep::work::in_memory(plan, points, &Silent)?;
+    Trade::new(subject, asked, Merged::new(plan, points, records))
+}
+
+/// Unit and group of an error, for messages.
+fn named(unit: &str, group: &str) -> String {
+    format!("{unit} ({group})").trim_start().into()
+}
