@@ -1,6 +1,6 @@
 //! Command `limit`: the least possible error of any decoder, and what the sensor shows at all.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::evaluate::limit::{self, Candidate, LimitResult, Plan};
@@ -8,7 +8,6 @@ use crate::experiment::Experiment;
 use crate::report::Sections;
 use crate::{Error, Result, report};
 use clap::Args;
-use serde::Serialize;
 use taxel_data::output::{FileSet, Written};
 use taxel_learn::ModelBlob;
 
@@ -54,12 +53,6 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
-/// Results of several scenes.
-#[derive(Serialize)]
-struct Scenes {
-    scenes: Vec<LimitResult>,
-}
-
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let scenes = arguments.scenes.iter().map(|scene| prepared(scene, arguments, common));
     let scenes: Vec<Prepared> = scenes.collect::<Result<_>>()?;
@@ -89,10 +82,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         print::result(common, result, || page_of(&report::of_limit(result), folder, ""))?;
         return refusal(result);
     }
-    let several = Scenes { scenes: results };
-    let sections = || report::of_limits(&several.scenes);
-    print::result(common, &several, || page_of(&sections(), folder, "/SCENE"))?;
-    several.scenes.iter().try_for_each(refusal)
+    let page = || page_of(&report::of_limits(&results), folder, "/SCENE");
+    print::result(common, &BTreeMap::from([("scenes", &results)]), page)?;
+    results.iter().try_for_each(refusal)
 }
 
 /// Scene with what is to be computed of it.

@@ -1,12 +1,12 @@
 //! Command `view`: a sensor in the browser, live.
 
+use std::collections::BTreeMap;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::{self, Stdio};
 use std::sync::mpsc::Receiver;
 
 use clap::{Args, ValueEnum, value_parser};
-use serde::Serialize;
 use taxel_data::Clock;
 use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
@@ -90,11 +90,6 @@ enum SerialProtocol {
     Flexitac,
     /// A line of numbers a scan, between commas, semicolons, tabs or blanks.
     Csv,
-}
-
-#[derive(Serialize)]
-struct Summary {
-    address: String,
 }
 
 fn shape(text: &str) -> std::result::Result<[usize; 2], String> {
@@ -260,13 +255,7 @@ fn show(
     common: &Common,
 ) -> Result<()> {
     let address = view.address();
-    if common.json {
-        print::json(&Summary { address: address.clone() })?;
-    } else {
-        let mut page = print::Page::default();
-        page.line(&address);
-        page.print()?;
-    }
+    print::result(common, &BTreeMap::from([("address", &address)]), || print::Page::of(&address))?;
     // Whoever reads the address waits for it.
     let _ = std::io::stdout().flush();
     if !arguments.no_browser && !open_browser(&address) {

@@ -104,7 +104,7 @@ pub fn sections(judged: &Judged<'_>, made: Sections) -> Sections {
     }
     if let Some(contacts) = judged.moving {
         sections.heading("Contacts that move");
-        moving::add(&mut sections, contacts);
+        moving_contacts(&mut sections, contacts);
     }
     sections.heading("How it was made, and what it costs");
     sections.extend(made);
@@ -114,7 +114,7 @@ pub fn sections(judged: &Judged<'_>, made: Sections) -> Sections {
         let figures = frames::readings(pictures).into_iter().chain(arrows);
         let figures = figures.chain(pictures.sensor.map(sketch::figure));
         let figures = figures.map(Section::Figure).collect();
-        sections.folded("Readings, shear and the sensor", figures);
+        sections.folded("Readings and other pictures", figures);
     }
     if let (Some(table), Some(group)) = (judged.table1, main_group(groups(judged))) {
         sections.heading("Noise");
@@ -235,12 +235,15 @@ fn with_rmse<'r, R>(
     groups: &[Errors],
     errors: impl Fn(&'r R) -> &'r [Errors],
 ) -> TableOf<'r, R> {
-    for group in groups {
-        table = table.numbers(&symbol(&group.group), &group.unit, RMSE, |row| {
-            rmse_of(errors(row), &group.group)
-        });
+    for Errors { group, unit, .. } in groups {
+        table = table.numbers(&symbol(group), unit, RMSE, |row| rmse_of(errors(row), group));
     }
     table
+}
+
+/// Coefficient of determination of a `group`.
+fn r_squared(errors: &[Errors], group: &str) -> Option<f64> {
+    errors.iter().find(|it| it.group == group)?.r_squared
 }
 
 fn by_row(sections: &mut Sections, rows: &[RowErrors]) {
@@ -286,15 +289,47 @@ fn others(sections: &mut Sections, others: &Others, decoders: &[DecoderErrors]) 
         grouped(others.frames)
     );
     let mut table = TableOf::new(&rows, caption).names("contact", |row| row.0.into());
-    for group in own {
-        let of = |errors: &[Errors]| errors.iter().find(|it| it.group == group.group).cloned();
-        let r_squared = |row: &Row<'_>| of(row.1)?.r_squared;
+    for Errors { group, unit, .. } in own {
         table = table
-            .numbers(&symbol(&group.group), &group.unit, RMSE, |row| rmse_of(row.1, &group.group))
-            .numbers("R²", "", Digits::Decimals(2), r_squared)
-            .numbers("mean", "", RMSE, |row| rmse_of(row.2, &group.group));
+            .numbers(&symbol(group), unit, RMSE, |row| rmse_of(row.1, group))
+            .numbers("R²", "", Digits::Decimals(2), |row| r_squared(row.1, group))
+            .numbers("mean", "", RMSE, |row| rmse_of(row.2, group));
     }
     sections.table(table.numbers("novel", "%", Digits::Decimals(1), |row| row.3));
+}
+
+/// Adds errors with and without a filter and of the baselines, beside the age of an estimate, and a trajectory.
+fn moving_contacts(sections: &mut Sections, moving: &MovingContacts) {
+    let ways = moving.ways.iter().map(|way| {
+        let name = way.filter.map_or(NETWORK.to_owned(), |filter| {
+            let [tau, lead] = [filter.time_constant_ms, filter.lead_ms].map(|ms| fixed(ms, 1));
+            format!("{NETWORK}, filter of {tau} ms, {lead} ms ahead")
+        });
+        (name, way.times.age_ms, &way.errors[..])
+    });
+    let baselines = moving.decoders.iter().map(|it| (it.decoder.clone(), None, &it.errors[..]));
+    let rows: Vec<(String, Option<f64>, &[Errors])> = ways.chain(baselines).collect();
+    let caption = format!(
+        "RMSE and R² as a robot meets them, on {}: the newest finished estimate against the truth at that moment, every ms, \
+         read by the board. Age: mean time from the middle of a scan until its estimate is used.",
+        moving.path.in_words()
+    );
+    let mut table = TableOf::new(&rows, caption)
+        .names("decoder", |(name, ..)| name.clone())
+        .numbers("age", "ms", Digits::Decimals(2), |(_, age, _)| *age);
+    for Errors { group, unit, .. } in rows.first().map_or(&[][..], |(.., errors)| errors) {
+        table = table
+            .numbers(&symbol(group), unit, RMSE, |(.., errors)| rmse_of(errors, group))
+            .numbers("R²", "", Digits::Decimals(3), |(.., errors)| r_squared(errors, group));
+    }
+    sections.table(table);
+    for filter in moving.ways.iter().filter_map(|way| way.filter) {
+        sections.note(format!(
+            "The filter on a device: `host-sim link PORT configure --filter-ms {} --lead-ms {}` (docs/filter.md).",
+            filter.time_constant_ms, filter.lead_ms
+        ));
+    }
+    sections.figure(moving::trajectory(moving));
 }
 
 fn coverage(sections: &mut Sections, judged: &Judged<'_>) {
@@ -306,13 +341,14 @@ fn coverage(sections: &mut Sections, judged: &Judged<'_>) {
         rows.push((group, "least sure quarter", group.least_sure_quarter));
     }
     sections.heading("Reading model");
-    let caption = "Share of the errors that the model's intervals of 68.3 % and 95 % cover.";
+    let caption =
+        "Share of the errors that are within the model’s intervals of 68.3 % and of 95 %.";
     let table = TableOf::new(&rows, caption)
         .names("output", |(group, ..)| with_unit(&symbol(&group.group), &group.unit))
         .names("of", |(_, part, _)| (*part).into())
         .numbers("RMSE", "", RMSE, |(.., it)| Some(it.rmse))
-        .numbers("in 68.3 %", "%", Digits::Decimals(1), |(.., it)| Some(it.percent_within_68))
-        .numbers("in 95 %", "%", Digits::Decimals(1), |(.., it)| Some(it.percent_within_95));
+        .numbers("within 68.3 %", "%", Digits::Decimals(1), |(.., it)| Some(it.percent_within_68))
+        .numbers("within 95 %", "%", Digits::Decimals(1), |(.., it)| Some(it.percent_within_95));
     sections.table(table);
     sections.note(format!("{percent:.2} % of the frames are novel: unlike those of training."));
 }
