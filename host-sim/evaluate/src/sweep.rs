@@ -5,6 +5,7 @@
 
 pub mod axis;
 pub mod fields;
+pub mod bounds;
 pub mod file;
 pub mod plan;
 pub mod layouts;

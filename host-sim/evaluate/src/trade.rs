@@ -7,6 +7,7 @@
 use serde::Serialize;
 use taxel_core::rbf::Format;
 use taxel_data::Silent;
+use taxel_learn::cost::Cost;
 use taxel_learn::decoders::{centroid, linear, mean};
 use taxel_learn::outliers::Outliers;
 use taxel_simulate::noise::NoiseKind;
@@ -14,23 +15,21 @@ use taxel_simulate::outputs::Outputs;
 use taxel_simulate::path::Path;
 use toml::{Table, Value};
 
-use crate::device::{Device, Times};
-use crate::error::{Error, NoPoint, Result};
+use crate::device::Device;
+use crate::error::{Error, Result};
 use crate::experiment::Method;
 use crate::metrics::{self, DecoderErrors};
 use crate::subject::Subject;
-use crate::sweep::file::{Also, Bound, Wanted};
+use crate::sweep::bounds::{self, Bound, Bounds, Values};
+use crate::sweep::file::{Also, Wanted};
 use crate::sweep::front::is_as_good;
 use crate::sweep::judge::{self, Frames, KnownLimit, Starts};
 use crate::sweep::{self, Merged};
 use crate::verdict::{Verdict, Warning};
 
 mod line;
-mod choice;
 mod point;
 
-pub use choice::Bounds;
-use choice::Offer;
 pub use line::Line;
 pub use point::{FilterSettings, Point};
 
@@ -63,7 +62,7 @@ impl Asked {
             values.collect::<Vec<_>>().into()
         };
         let mut wanted = Wanted {
-            objectives: vec![format!("{}_{}", self.error(), self.group), "frame_ms".into()],
+            objectives: vec![self.error(), "frame_ms".into()],
             also: vec![Also::Baselines],
             bounds: [("blob_bytes".into(), Bound::Most(self.most_bytes as f64))].into(),
             device: Table::try_from(self.device).unwrap_or_default(),
@@ -100,10 +99,14 @@ impl Asked {
         wanted
     }
 
-    /// Result by which front and choice are determined, without its group.
-    fn error(&self) -> &'static str {
-        if self.worst_case { "worst_rmse" } else { "rmse" }
+    /// Name of the result by which front and choice are determined.
+    pub fn error(&self) -> String {
+        error_of(&self.group, self.worst_case)
     }
+}
+
+fn error_of(group: &str, worst_case: bool) -> String {
+    format!("{}_{group}", if worst_case { "worst_rmse" } else { "rmse" })
 }
 
 /// Trade of a subject: every point, and the one chosen.
@@ -143,7 +146,7 @@ pub struct Trade {
     pub chosen: Option<usize>,
     /// Reason why no point was picked within bounds.
     #[serde(skip)]
-    pub refused: Option<NoPoint>,
+    pub refused: Option<String>,
     /// Results as those of any plan.
     #[serde(skip)]
     pub merged: Merged,
@@ -212,41 +215,76 @@ impl Trade {
             worst_case: asked.worst_case,
             points,
             left_out,
-            bounds: Bounds::default(),
+            bounds: Bounds::new(),
             chosen: None,
             refused: None,
             merged,
         })
     }
 
-    /// Picks the point within `bounds`, if any are given, among those that beat the baselines.
-    pub fn choose(&mut self, bounds: &Bounds) -> std::result::Result<(), NoPoint> {
-        self.bounds = *bounds;
-        let chosen = self.choice(bounds);
+    /// Picks the point within `bounds`, if any are given, among those that beat the baselines. A blob fits a slot
+    /// ([`SLOT_BYTES`]) unless another bound is given.
+    ///
+    /// It is the cheapest one within the bound on the error; without such a bound, the cheapest of those that are as good as the
+    /// one with the smallest error. The cheapest takes the least time for scan and decoding; among equals, the fewest cycles,
+    /// then the least flash.
+    ///
+    /// # Errors
+    /// The reason why there is none.
+    pub fn choose(&mut self, bounds: &Bounds) -> std::result::Result<(), String> {
+        self.bounds = bounds.clone();
+        let chosen = self.choice();
         self.refused = chosen.as_ref().err().cloned();
         self.chosen = chosen.clone().unwrap_or_default();
         chosen.map(|_| ())
     }
 
-    fn choice(&self, bounds: &Bounds) -> std::result::Result<Option<usize>, NoPoint> {
-        let unit = named(&self.unit, &self.group);
-        let choose = |among: &[usize]| {
-            let offers: Vec<Offer> = among.iter().map(|i| self.offer(*i)).collect();
-            let same = |a: usize, b: usize| self.is_as_good(among[a], among[b]);
-            Ok(bounds.choose(&offers, &same, &unit)?.map(|place| among[place]))
+    fn choice(&self) -> std::result::Result<Option<usize>, String> {
+        if self.bounds.is_empty() {
+            return Ok(None);
+        }
+        let mut bounds = self.bounds.clone();
+        bounds.entry("blob_bytes".into()).or_insert(Bound::Most(SLOT_BYTES as f64));
+        let within: Vec<usize> = (0..self.points.len())
+            .filter(|i| bounds::are_within(&bounds, &self.points[*i].results))
+            .collect();
+        let Some(best) = self.best(&within) else {
+            let results = self.points.iter().map(|point| &point.results);
+            let nearest = bounds::nearest(&bounds, results);
+            let nearest = nearest.map_or(String::new(), |(place, results)| {
+                format!("; the nearest is {} with {results}", self.points[place].name())
+            });
+            return Err(format!("no point is within {}{nearest}", bounds::in_words(&bounds)));
         };
-        let all: Vec<usize> = (0..self.points.len()).collect();
-        let Some(best) = choose(&all)? else { return Ok(None) };
         let Some((decoder, least)) = self.better_baseline(best) else { return Ok(Some(best)) };
         let kept: Vec<usize> =
-            all.into_iter().filter(|i| self.better_baseline(*i).is_none()).collect();
-        let decoder = decoder.into();
-        choose(&kept).map_err(|_| NoPoint::Beaten { decoder, least, unit: unit.clone() })
+            within.into_iter().filter(|i| self.better_baseline(*i).is_none()).collect();
+        let beaten = || {
+            format!(
+                "no model within the bounds is worth its cost: the baseline {decoder} has an error of {least:.4} {}, \
+                 which is smaller",
+                format!("{} ({})", self.unit, self.group).trim_start()
+            )
+        };
+        self.best(&kept).map(Some).ok_or_else(beaten)
     }
 
-    fn offer(&self, point: usize) -> Offer {
-        let Point { cycles, blob_bytes, times, .. } = self.points[point];
-        Offer { rmse: self.counted_rmse(point), cycles, blob_bytes, times }
+    /// The cheapest of some points, with a bound on the error, or else of those that are as good as the best.
+    fn best(&self, among: &[usize]) -> Option<usize> {
+        let by_error =
+            |a: &&usize, b: &&usize| self.counted_rmse(**a).total_cmp(&self.counted_rmse(**b));
+        let least = *among.iter().min_by(by_error)?;
+        let is_bounded = self.bounds.contains_key(&self.error());
+        let near = among.iter().filter(|i| is_bounded || self.is_as_good(**i, least));
+        let key = |i: usize| {
+            let Point { cycles, blob_bytes, times, .. } = &self.points[i];
+            [times.frame_ms, *cycles as f64, *blob_bytes as f64, self.counted_rmse(i)]
+        };
+        let compare = |a: &&usize, b: &&usize| {
+            let ordered = key(**a).into_iter().zip(key(**b)).map(|(a, b)| a.total_cmp(&b));
+            ordered.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+        };
+        near.min_by(compare).copied()
     }
 
     /// Whether the error of one point is no larger than that of another, as far as their test frames tell.
@@ -255,10 +293,9 @@ impl Trade {
         is_as_good(&self.error(), of(one), of(other))
     }
 
-    /// Result by which front and choice are determined.
-    fn error(&self) -> String {
-        let error = if self.worst_case { "worst_rmse" } else { "rmse" };
-        format!("{error}_{}", self.group)
+    /// Name of the result by which front and choice are determined.
+    pub fn error(&self) -> String {
+        error_of(&self.group, self.worst_case)
     }
 
     /// RMSE of the group that a point is chosen by.
@@ -402,8 +439,8 @@ impl Trade {
             "The board's serial line carries at most {estimates_per_s:.0} estimates a second: {estimate_bytes} bytes each, \
              at {baud} baud."
         );
-        match self.bounds.frame_rate_hz {
-            Some(asked) if asked > estimates_per_s => format!(
+        match self.bounds.get("frames_per_s") {
+            Some(Bound::Least { least: asked }) if *asked > estimates_per_s => format!(
                 "{carries} For {asked} a second decode fewer outputs (axes of a scene's [outputs], or --outputs '*_dz_mm' of a CSV file), or use the estimates on the device."
             ),
             _ => carries,
@@ -411,38 +448,47 @@ impl Trade {
     }
 }
 
-/// Refuses `bounds` that no point can meet, by the time of its scan and its least possible error, before anything is trained.
+/// What stands in the way of bounds on time or error that no point can meet, by the time of its scan and its least possible
+/// error, before anything is trained; `None` if nothing does.
 ///
 /// # Errors
-/// [`NoPoint`], or an [`Error`] for a scene that does not hold.
-pub fn check_possible(
+/// [`Error`] for a scene that does not hold.
+pub fn impossible(
     plan: &sweep::Plan,
     points: &[sweep::Point],
     bounds: &Bounds,
-    group: &str,
-) -> Result<()> {
+    asked: &Asked,
+) -> Result<Option<String>> {
     /// Standard errors by which an error must lie below the limit to be called impossible.
     const CERTAIN: f64 = 3.0;
-    let mut offers = vec![];
-    let mut limits = KnownLimit::default();
-    let mut known: Vec<u64> = vec![];
-    for point in points {
-        if known.contains(&point.shares) {
-            continue;
-        }
-        known.push(point.shares);
-        let mut plan = plan.clone();
-        plan.limit_frames = plan.limit_frames.or(bounds.error.is_none().then_some(0));
+    let mut known = bounds.clone();
+    known.retain(|name, _| {
+        *name == asked.error() || ["frame_ms", "frames_per_s"].contains(&name.as_str())
+    });
+    let mut plan = plan.clone();
+    if !known.contains_key(&asked.error()) {
+        plan.limit_frames = Some(0);
+    }
+    let (mut limits, mut best) = (KnownLimit::default(), vec![]);
+    for of_readings in points.chunk_by(|a, b| a.shares == b.shares) {
+        let point = &of_readings[0];
         let subject = judge::subject_of(&plan, point)?;
         let readings = judge::Readings::new(&plan, point, &subject, &mut limits)?;
-        let least = readings.limit.groups.iter().find(|limit| limit.group == group);
+        let least = readings.limit.groups.iter().find(|limit| limit.group == asked.group);
         let rmse = least.map_or(0.0, |it| it.limit - CERTAIN * it.limit_standard_error);
-        let nothing = taxel_learn::cost::Cost { instructions: 0, cycles: 0 };
-        let times: Times = point.device.times(readings.scan_ms, &nothing);
-        offers.push(Offer { rmse, cycles: 0, blob_bytes: 0, times });
+        let nothing = Cost { instructions: 0, cycles: 0 };
+        let times = point.device.times(readings.scan_ms, &nothing);
+        best.push(Values::from([
+            (asked.error(), rmse),
+            ("frame_ms".into(), times.frame_ms),
+            ("frames_per_s".into(), times.frames_per_s),
+        ]));
     }
-    bounds.check_possible(&offers, &named(metrics::unit_of_rmse(group), group))?;
-    Ok(())
+    let nearest = bounds::nearest(&known, best.iter());
+    Ok(nearest.map(|(_, results)| {
+        let bounds = bounds::in_words(&known);
+        format!("no point can be within {bounds}; the nearest is {results}, if decoding took no time; nothing was trained")
+    }))
 }
 
 /// Computes all points in memory and makes a trade of them.
@@ -456,9 +502,4 @@ pub fn compute(
 ) -> Result<Trade> {
     let records = sweep::work::in_memory(plan, points, &Silent)?;
     Trade::new(subject, asked, Merged::new(plan, points, records))
-}
-
-/// Unit and group of an error, for messages.
-fn named(unit: &str, group: &str) -> String {
-    format!("{unit} ({group})").trim_start().into()
 }

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::report::{TableOf, result_text};
+use crate::sweep::bounds::Bound;
 use crate::sweep::fields::require_known;
-use crate::sweep::file::{Bound, Wanted};
+use crate::sweep::file::Wanted;
 use crate::sweep::merge::{PointResult, Setting};
 use crate::sweep::plan::{Base, SCENE, SEED};
 use crate::sweep::{Merged, Plan, layouts, work};

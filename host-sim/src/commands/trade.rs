@@ -4,13 +4,13 @@ use std::cmp::Ordering;
 use std::path::PathBuf;
 
 use crate::device::{BOARD_CLOCK_MHZ, Device, Wires};
-use crate::error::{Bounded, NoPoint};
 use crate::measurements::Measurements;
 use crate::metrics;
 use crate::subject::Subject;
 use crate::sweep::Plan;
+use crate::sweep::bounds::{Bound, Bounds};
 use crate::sweep::plan::Base;
-use crate::trade::{self, Asked, Bounds, Trade};
+use crate::trade::{self, Asked, Trade};
 use crate::verdict::{SLOT_BYTES, Warning};
 use crate::{Error, Result};
 use clap::Args;
@@ -35,7 +35,7 @@ mod page;
 /// at the end; those of an earlier trade go. Each point is kept in points/ as soon as it is done: a trade that was stopped
 /// goes on, and another choice among the same points takes seconds.
 /// That time is the scan's, by the plan of the board's firmware for either readout (docs/board.md), and the decoding's, as
-/// predicted (docs/cycles.md). Bounds that nothing can meet are refused before anything is trained.
+/// predicted (docs/cycles.md). Bounds on time and error that nothing can meet are refused before anything is trained.
 #[derive(Args)]
 #[command(after_help = "Examples:
   host-sim trade press
@@ -92,14 +92,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.subject.refuse_time("trade")?;
     let subject = arguments.subject.load(common)?;
     let asked = asked(arguments, &subject)?;
-    let bounds = Bounds {
-        error: arguments.max_error,
-        cycles: arguments.max_cycles,
-        blob_bytes: arguments.max_flash,
-        frame_rate_hz: arguments.frame_rate,
-        latency_ms: arguments.tried.max_latency_ms,
-    };
-    bounds.check().map_err(of_option)?;
+    let bounds = bounds(arguments, &asked)?;
     let is_timed = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
     if is_timed && asked.device.scan_ms(wires(&subject, 1), 1).is_none() {
         let message = "--frame-rate and --max-latency-ms count the scan, whose time is not known: the readings name no \
@@ -120,17 +113,15 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let data = subject.measurements().map(Measurements::unnamed);
     let plan = Plan::new(subject.name(), (vec![base], data), wanted, &sweep::build()?)?;
     let points = plan.points()?;
-    let refused = |cause: &NoPoint| {
+    let refused = |cause: &str| {
         let way =
-            in_the_way(cause, &subject, &asked).map_or(String::new(), |way| format!("; {way}"));
-        Error::Usage(format!("{cause}{way}"))
+            in_the_way(arguments, &subject, &asked).map_or(String::new(), |way| format!("; {way}"));
+        let given = given_bounds(arguments).into_iter();
+        let given = given.filter_map(|(option, ..)| option).collect::<Vec<_>>().join(", ");
+        Error::Usage(format!("{given}: {cause}{way}"))
     };
-    if bounds.any() {
-        let possible = trade::check_possible(&plan, &points, &bounds, &asked.group);
-        possible.map_err(|error| match error {
-            Error::NoPoint(cause) => refused(&cause),
-            other => other,
-        })?;
+    if let Some(cause) = trade::impossible(&plan, &points, &bounds, &asked)? {
+        return Err(refused(&cause));
     }
     let merged = sweep::all(&plan, &points, &folder)?;
     let mut trade = Trade::new(&subject, &asked, merged)?;
@@ -145,6 +136,40 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     // Measurements are kept and shown even if no point is within the bounds.
     choice.map_err(|cause| refused(&cause))
+}
+
+/// Bounds as they can be given: the option where one is, its result, and the bound.
+fn given_bounds(arguments: &Arguments) -> Vec<(Option<String>, &'static str, Option<Bound>)> {
+    let most = |option: &str, result, most: Option<f64>| {
+        (most.map(|most| format!("{option} {most}")), result, most.map(Bound::Most))
+    };
+    let least = arguments.frame_rate;
+    vec![
+        most("--max-error", "error", arguments.max_error),
+        most("--max-cycles", "cycles", arguments.max_cycles.map(|it| it as f64)),
+        most("--max-flash", "blob_bytes", arguments.max_flash.map(|it| it as f64)),
+        most("--max-latency-ms", "frame_ms", arguments.tried.max_latency_ms),
+        (
+            least.map(|least| format!("--frame-rate {least}")),
+            "frames_per_s",
+            least.map(|least| Bound::Least { least }),
+        ),
+    ]
+}
+
+/// Bounds on results that options give.
+fn bounds(arguments: &Arguments, asked: &Asked) -> Result<Bounds> {
+    let mut bounds = Bounds::new();
+    for (option, result, bound) in given_bounds(arguments) {
+        let (Some(option), Some(bound)) = (option, bound) else { continue };
+        let (Bound::Most(value) | Bound::Least { least: value }) = bound;
+        if !(value.is_finite() && value > 0.0) {
+            return Err(Error::Usage(format!("{option}: give a positive number")));
+        }
+        let result = if result == "error" { asked.error() } else { result.into() };
+        bounds.insert(result, bound);
+    }
+    Ok(bounds)
 }
 
 /// What is varied, and what decides.
@@ -272,15 +297,10 @@ fn column_steps(arguments: &Arguments, subject: &Subject) -> Result<Vec<usize>> 
     }
 }
 
-/// What stands in the way of bounds on time that no point meets, and what helps.
-fn in_the_way(cause: &NoPoint, subject: &Subject, asked: &Asked) -> Option<String> {
-    let NoPoint::Each { unmet, .. } = cause else { return None };
-    let most_ms = unmet.iter().filter_map(|unmet| match unmet.bounded {
-        Bounded::FrameRate => Some(1000.0 / unmet.bound),
-        Bounded::Latency => Some(unmet.bound),
-        _ => None,
-    });
-    let most_ms = most_ms.reduce(f64::min)?;
+/// What stands in the way of bounds on time, if there are any, and what helps.
+fn in_the_way(arguments: &Arguments, subject: &Subject, asked: &Asked) -> Option<String> {
+    let of_rate = arguments.frame_rate.map(|hz| 1000.0 / hz);
+    let most_ms = of_rate.into_iter().chain(arguments.tried.max_latency_ms).reduce(f64::min)?;
     let (step, samples) = (*asked.column_steps.last()?, *asked.samples_averaged.first()?);
     let scan_ms = asked.device.scan_ms(wires(subject, step), samples)?;
     let helps = match subject {

@@ -10,8 +10,8 @@ use super::svg::{Anchor, Shape, Svg, TEXT_PX, text_width};
 use super::ticks;
 use taxel_evaluate::metrics::unit_of_rmse;
 use taxel_evaluate::sweep::Merged;
+use taxel_evaluate::sweep::bounds::Bounds;
 use taxel_evaluate::sweep::effects::Level;
-use taxel_evaluate::sweep::file::Bound;
 use taxel_evaluate::sweep::merge::Setting;
 use taxel_evaluate::sweep::plan::SEED;
 
@@ -259,11 +259,10 @@ pub fn sections(merged: &Merged, stem: &str) -> Sections {
     sections
 }
 
-fn in_bound(name: &str, bound: Bound) -> String {
-    match bound {
-        Bound::Most(most) => format!("{name} at most {most}"),
-        Bound::Least { least } => format!("{name} at least {least}"),
-    }
+/// Bounds in words.
+pub fn in_bounds(bounds: &Bounds) -> String {
+    let bounds = bounds.iter().map(|(result, bound)| format!("{} {bound}", name(result)));
+    bounds.collect::<Vec<_>>().join(", ")
 }
 
 /// Adds columns of the fields that settings differ in and of their objectives.
@@ -286,8 +285,7 @@ fn front_table(sections: &mut Sections, merged: &Merged) {
     let front = merged.front();
     let places = evenly(front.len(), SHOWN);
     let shown: Vec<&Setting> = places.iter().map(|place| front[*place]).collect();
-    let bounds = merged.bounds.iter().map(|(name, bound)| in_bound(name, *bound));
-    let bounds = bounds.collect::<Vec<_>>().join(", ");
+    let bounds = in_bounds(&merged.bounds);
     let bounds = if bounds.is_empty() { bounds } else { format!(" Bounds: {bounds}.") };
     let some = if front.len() > SHOWN {
         format!(" {SHOWN} of {} settings; the files have all.", front.len())

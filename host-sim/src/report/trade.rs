@@ -2,9 +2,10 @@
 
 use super::figures::Figure;
 use super::format::{UNDEFINED, fixed, grouped, noise, symbol};
+use super::points::in_bounds;
 use super::sections::{Digits, Sections, TableOf};
 use taxel_evaluate::metrics;
-use taxel_evaluate::trade::{Bounds, Point, Shown, Trade};
+use taxel_evaluate::trade::{Point, Shown, Trade};
 
 mod words;
 mod plot;
@@ -93,13 +94,12 @@ fn answers(sections: &mut Sections, trade: &Trade) {
 /// point is worth.
 fn chosen(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
     let Some(shown) = shown else { return };
-    let why = trade.refused.as_ref().map_or(
-        "no bound was given (--max-error, --frame-rate, --max-latency-ms, --max-cycles or --max-flash)".into(),
-        ToString::to_string,
+    let why = trade.refused.as_deref().unwrap_or(
+        "no bound was given (--max-error, --frame-rate, --max-latency-ms, --max-cycles or --max-flash)",
     );
     let (point, verdict) = (shown.point, &shown.verdict);
     let start = match trade.chosen {
-        Some(_) => format!("Chosen for {}:", words::bounds(&trade.bounds)),
+        Some(_) => format!("Chosen for {}:", in_bounds(&trade.bounds)),
         None => format!("Nothing is chosen: {why}. The most accurate is"),
     };
     let name = trade.points[point].name();
@@ -157,15 +157,12 @@ fn picture(sections: &mut Sections, trade: &Trade) {
         1 => " One dominated point lies outside.".into(),
         outside => format!(" {outside} dominated points lie outside."),
     };
-    let hidden = Bounds {
-        cycles: trade.bounds.cycles,
-        blob_bytes: trade.bounds.blob_bytes,
-        ..Default::default()
-    };
-    let hidden = if hidden.any() {
-        format!(" Not drawn: the bounds of {}.", words::bounds(&hidden))
-    } else {
+    let mut hidden = trade.bounds.clone();
+    hidden.retain(|name, _| ["cycles", "blob_bytes"].contains(&name.as_str()));
+    let hidden = if hidden.is_empty() {
         String::new()
+    } else {
+        format!(" Not drawn: {}.", in_bounds(&hidden))
     };
     let caption = format!(
         "RMSE of {} against the time of a frame, both logarithmic. The line joins the Pareto front: no other point is as good \

@@ -7,8 +7,9 @@ use host_sim::device::Device;
 use host_sim::experiment::Experiment;
 use host_sim::subject::Subject;
 use host_sim::sweep;
+use host_sim::sweep::bounds::{Bound, Bounds};
 use host_sim::sweep::plan::Base;
-use host_sim::trade::{self, Asked, Bounds, Trade};
+use host_sim::trade::{self, Asked, Trade};
 use taxel_data::Stream;
 use taxel_learn::ModelBlob;
 use taxel_simulate::Synthesis;
@@ -52,6 +53,10 @@ impl Planned {
     fn trade(&self) -> Trade {
         trade::compute(&self.subject, &self.asked, (&self.plan, &self.points)).unwrap()
     }
+}
+
+fn at_most(result: &str, most: f64) -> Bounds {
+    [(result.to_owned(), Bound::Most(most))].into()
 }
 
 /// The plan's trade, which several tests look at.
@@ -128,7 +133,7 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
 fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
     let (planned, trade) = traded();
     let mut trade = trade.clone();
-    trade.choose(&Bounds { error: Some(0.04), ..Bounds::default() }).unwrap();
+    trade.choose(&at_most("rmse_dz_mm", 0.04)).unwrap();
     let chosen = &trade.points[trade.chosen.unwrap()];
     assert!(chosen.rmse("dz_mm") <= 0.04 && chosen.samples_averaged == 16);
     for other in &trade.points {
@@ -153,7 +158,7 @@ fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
 #[test]
 fn a_point_that_loses_to_a_baseline_is_never_chosen() {
     let mut trade = traded().1.clone();
-    let bounds = Bounds { error: Some(0.055), ..Bounds::default() };
+    let bounds = at_most("rmse_dz_mm", 0.055);
     trade.choose(&bounds).unwrap();
     let first = trade.chosen.unwrap();
     // A baseline that beats this point, then one that beats all.
@@ -161,7 +166,7 @@ fn a_point_that_loses_to_a_baseline_is_never_chosen() {
         for point in &mut trade.points {
             point.results.insert("linear_rmse_dz_mm".into(), least);
         }
-        let refused = trade.choose(&bounds).map_err(|cause| cause.to_string());
+        let refused = trade.choose(&bounds);
         let chosen = trade.chosen.map(|point| trade.points[point].rmse("dz_mm"));
         assert!(chosen.is_none_or(|rmse| rmse < least), "{chosen:?}");
         let beaten = "the baseline linear has an error of 0.0010 mm (dz_mm)";
@@ -173,7 +178,7 @@ fn a_point_that_loses_to_a_baseline_is_never_chosen() {
 #[test]
 fn the_worst_case_counts_other_contacts_in_front_and_choice() {
     let one_row = press().replace("[outputs]", "[readout]\nrow_wires = [4]\n\n[outputs]");
-    let bounds = Bounds { frame_rate_hz: Some(1.0), ..Bounds::default() };
+    let bounds = at_most("frame_ms", 1000.0);
     let [own, worst] = [false, true].map(|worst_case| {
         let planned = Planned::new(&one_row, |asked| {
             (asked.samples_averaged, asked.centres) = (vec![1], vec![8, 64]);
@@ -285,7 +290,7 @@ fn the_files_and_the_table_tell_every_point() {
     assert_eq!(picture.lines().filter(|line| line.starts_with("Pareto front,")).count(), front);
     assert!(html.contains("<td>chosen</td><td>fixed16") && html.contains(">chosen: K"));
     assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
-    assert!(html.contains("at most 9\u{202f}000\u{a0}cycles at zero wait"), "the bound");
+    assert!(html.contains("cycles of decoding at most 9000"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());
     // Measurements are kept where no point is chosen, and another run's choice is not left beside them.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use taxel_data::{BadValue, require};
 use toml::Table;
 
+use super::bounds::Bounds;
 use super::fields::require_known;
 
 /// Plan as it stands in its file.
@@ -47,8 +48,8 @@ pub struct Wanted {
     /// Results that are to be small.
     pub objectives: Vec<String>,
     /// Bounds on results.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub bounds: BTreeMap<String, Bound>,
+    #[serde(skip_serializing_if = "Bounds::is_empty")]
+    pub bounds: Bounds,
     /// Device that scans and decodes, and `samples` averaged.
     pub device: Table,
     /// Prices of the parts of a sensor.
@@ -70,7 +71,7 @@ impl Default for Wanted {
             also: vec![],
             repeats: 1,
             objectives: vec![],
-            bounds: BTreeMap::new(),
+            bounds: Bounds::new(),
             device: Table::new(),
             prices: None,
             set: Table::new(),
@@ -118,68 +119,6 @@ pub struct Draw {
 impl Default for Draw {
     fn default() -> Self {
         Self { points: 0, seed: 1, axes: Table::new() }
-    }
-}
-
-/// Bound on a result: the most, or the least.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "BoundFile")]
-#[serde(untagged)]
-pub enum Bound {
-    Most(f64),
-    Least { least: f64 },
-}
-
-/// Bound as it stands in a plan: a number is the most.
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "give the most, such as 10, or { least = 10 }")]
-enum BoundFile {
-    Number(f64),
-    Named(NamedBound),
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NamedBound {
-    most: Option<f64>,
-    least: Option<f64>,
-}
-
-impl TryFrom<BoundFile> for Bound {
-    type Error = &'static str;
-
-    fn try_from(file: BoundFile) -> std::result::Result<Self, Self::Error> {
-        match file {
-            BoundFile::Number(most)
-            | BoundFile::Named(NamedBound { most: Some(most), least: None })
-                if !most.is_nan() =>
-            {
-                Ok(Self::Most(most))
-            }
-            BoundFile::Named(NamedBound { most: None, least: Some(least) }) if !least.is_nan() => {
-                Ok(Self::Least { least })
-            }
-            _ => Err("a bound is the most or the least; give one of them, as a number"),
-        }
-    }
-}
-
-impl Bound {
-    /// Whether a result is within the bound.
-    pub fn allows(self, value: f64) -> bool {
-        match self {
-            Self::Most(most) => value <= most,
-            Self::Least { least } => value >= least,
-        }
-    }
-
-    /// Logarithm of the factor by which a value misses the bound, or the difference where there is no factor.
-    pub fn missed_by(self, value: f64) -> f64 {
-        if self.allows(value) {
-            return 0.0;
-        }
-        let (Self::Most(bound) | Self::Least { least: bound }) = self;
-        if bound > 0.0 && value > 0.0 { (value / bound).ln().abs() } else { (value - bound).abs() }
     }
 }
 

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::axis::rounded;
+use super::bounds::{self, Bounds};
 use super::effects::{Effect, Settings};
-use super::file::{Bound, PartPrices};
+use super::file::PartPrices;
 use super::front::{Offer, front};
 use super::plan::{Plan, Point, SEED};
 use super::point::{place_of, standard_error_of};
@@ -26,7 +26,7 @@ pub struct Merged {
     /// Names of all results, in the order of tables.
     pub columns: Vec<String>,
     pub objectives: Vec<String>,
-    pub bounds: BTreeMap<String, Bound>,
+    pub bounds: Bounds,
     /// Points with a result, in the plan's order.
     pub points: Vec<PointResult>,
     /// Identities of points without a result.
@@ -216,24 +216,9 @@ impl Merged {
 
     /// Sentence for results none of which is within the bounds: it names the setting that misses the worst of them least.
     pub fn none_within(&self) -> Option<String> {
-        if self.settings.iter().any(|setting| setting.is_within) {
-            return None;
-        }
-        let misses = |setting: &Setting| {
-            let of = |(name, bound): (&String, &Bound)| {
-                setting.results.get(name).map_or(f64::INFINITY, |value| bound.missed_by(*value))
-            };
-            self.bounds.iter().map(of).fold(0.0, f64::max)
-        };
-        let nearest = self.settings.iter().min_by(|a, b| misses(a).total_cmp(&misses(b)))?;
-        let results = self.bounds.keys().map(|name| match nearest.results.get(name) {
-            // Five digits, or all of a count.
-            Some(value) if value.abs() < 1000.0 => format!("{name} = {}", rounded(*value)),
-            Some(value) => format!("{name} = {value:.0}"),
-            None => format!("no {name}"),
-        });
-        let results = results.collect::<Vec<_>>().join(", ");
-        let words = match nearest.in_words() {
+        let (place, results) =
+            bounds::nearest(&self.bounds, self.settings.iter().map(|setting| &setting.results))?;
+        let words = match self.settings[place].in_words() {
             words if words.is_empty() => results,
             words => format!("{words} with {results}"),
         };
@@ -343,12 +328,9 @@ fn mean_blocks(points: &[&PointResult]) -> Blocks {
 }
 
 /// Marks the settings within the bounds, and the Pareto front of these.
-fn mark(settings: &mut [Setting], objectives: &[String], bounds: &BTreeMap<String, Bound>) {
+fn mark(settings: &mut [Setting], objectives: &[String], bounds: &Bounds) {
     for setting in settings.iter_mut() {
-        let allows = |(name, bound): (&String, &Bound)| {
-            setting.results.get(name).is_some_and(|value| bound.allows(*value))
-        };
-        setting.is_within = bounds.iter().all(allows);
+        setting.is_within = bounds::are_within(bounds, &setting.results);
     }
     let offered = settings.iter().enumerate().filter_map(|(place, setting)| {
         let values = objectives.iter().map(|name| setting.results.get(name).copied());

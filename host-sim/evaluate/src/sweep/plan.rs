@@ -2,7 +2,7 @@
 //!
 //! A plan is a TOML file; `docs/sweeps.md` explains every field.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -12,8 +12,9 @@ use taxel_data::{BadValue, columns, input, require};
 use toml::{Table, Value};
 
 use super::axis::{Axis, latin_hypercube};
+use super::bounds::Bounds;
 use super::fields::{self, require_known};
-use super::file::{Also, Bound, OneOrMore, PartPrices, PlanFile, Wanted};
+use super::file::{Also, OneOrMore, PartPrices, PlanFile, Wanted};
 use super::point::{columns_of, group_in, not_computed};
 use crate::device::Device;
 use crate::error::{Error, Result};
@@ -69,7 +70,7 @@ pub struct Plan {
     /// Fields that points differ in.
     pub fields: Vec<String>,
     pub objectives: Vec<String>,
-    pub bounds: BTreeMap<String, Bound>,
+    pub bounds: Bounds,
     pub prices: Option<PartPrices>,
     /// Measurements that all points are trained on, if it is no plan of scenes.
     pub data: Option<Arc<Measurements>>,

@@ -2,6 +2,7 @@
 
 use taxel_core::rbf::Format;
 use taxel_evaluate::device::Times;
+use taxel_evaluate::sweep::bounds::Bound;
 use taxel_evaluate::trade::{Point, Trade};
 use taxel_learn::decoders::centroid;
 
@@ -137,8 +138,17 @@ fn levels(trade: &Trade) -> Vec<(String, f64, &'static str, Mark)> {
         };
         (format!("{name}{with} {}", significant(rmse, 3)), rmse, class, mark)
     });
-    let bound = trade.bounds.error.map(|y| (format!("at most {y}"), y, "bound", Mark::Line));
+    let bound = most(trade, &trade.error());
+    let bound = bound.map(|y| (format!("at most {y}"), y, "bound", Mark::Line));
     references.chain(bound).collect()
+}
+
+/// Most that a result may be.
+fn most(trade: &Trade, result: &str) -> Option<f64> {
+    match trade.bounds.get(result) {
+        Some(Bound::Most(most)) => Some(*most),
+        _ => None,
+    }
 }
 
 /// Bounds on time: what they are, and the time of a frame that each allows.
@@ -146,8 +156,11 @@ fn uprights(trade: &Trade) -> Vec<(String, f64)> {
     // A rate bounds the time of a frame only where the next scan starts when the estimate is finished.
     let in_turn = |times: &Times| (times.period_ms() / times.frame_ms - 1.0).abs() < 1e-9;
     let in_turn = trade.points.iter().all(|point| in_turn(&point.times));
-    let rate = trade.bounds.frame_rate_hz.filter(|_| in_turn);
+    let rate = match trade.bounds.get("frames_per_s") {
+        Some(Bound::Least { least }) if in_turn => Some(least),
+        _ => None,
+    };
     let rate = rate.map(|hz| (format!("at least {hz} frames/s"), 1000.0 / hz));
-    let latency = trade.bounds.latency_ms.map(|ms| (format!("at most {ms} ms"), ms));
+    let latency = most(trade, "frame_ms").map(|ms| (format!("at most {ms} ms"), ms));
     rate.into_iter().chain(latency).collect()
 }

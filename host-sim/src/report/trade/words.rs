@@ -1,7 +1,8 @@
 //! Points in words.
 
 use crate::report::format::{fixed, grouped, significant};
-use taxel_evaluate::trade::{Bounds, Point, Trade};
+use taxel_evaluate::sweep::bounds::Bound;
+use taxel_evaluate::trade::{Point, Trade};
 
 /// Text of a rate.
 pub fn rate(frames_per_s: f64) -> String {
@@ -32,18 +33,6 @@ pub fn chosen(trade: &Trade, point: &Point) -> String {
     format!("chosen: {}, {}", brief(trade, point), error(trade, point.rmse(&trade.group)))
 }
 
-/// Bounds that are given.
-pub fn bounds(bounds: &Bounds) -> String {
-    let given = [
-        bounds.error.map(|most| format!("an error of at most {most}")),
-        bounds.cycles.map(|most| format!("at most {} cycles at zero wait", grouped(most as usize))),
-        bounds.blob_bytes.map(|most| format!("a blob of at most {} bytes", grouped(most))),
-        bounds.frame_rate_hz.map(|least| format!("at least {least} frames a second")),
-        bounds.latency_ms.map(|most| format!("at most {most} ms for scan and decoding")),
-    ];
-    given.into_iter().flatten().collect::<Vec<_>>().join(", ")
-}
-
 /// The least number with three digits that is not below an error, as a bound that it keeps.
 pub fn above(rmse: f64) -> String {
     let step = 10_f64.powi(rmse.log10().floor() as i32 - 2);
@@ -65,7 +54,9 @@ pub fn device_options(trade: &Trade, point: &Point) -> String {
 /// the latter, at which the point was judged.
 fn period_us(trade: &Trade, point: &Point) -> Option<u64> {
     let shortest = point.times.scan_ms.map(|_| (1000.0 * point.times.period_ms()).ceil())?;
-    let asked = trade.bounds.frame_rate_hz.filter(|_| trade.motion.is_none());
-    let asked = asked.map(|hz| (1e6 / hz).floor());
+    let asked = match trade.bounds.get("frames_per_s") {
+        Some(Bound::Least { least }) if trade.motion.is_none() => Some((1e6 / least).floor()),
+        _ => None,
+    };
     Some(asked.unwrap_or(shortest) as u64)
 }
