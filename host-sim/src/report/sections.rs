@@ -362,23 +362,22 @@ impl Sections {
                     facts.iter().map(fact).collect()
                 }
                 Section::Table(table) => {
-                    format!("{}\n{}", wrapped(&table.caption, WIDTH), table.text())
+                    format!("{}\n{}", wrapped(&table.caption), table.text())
                 }
                 Section::Details(details) => {
-                    let line =
-                        |(name, text): &(_, String)| wrapped(&format!("{name}: {text}"), WIDTH);
+                    let line = |(name, text): &(_, String)| wrapped(&format!("{name}: {text}"));
                     details.iter().map(line).collect()
                 }
-                Section::Note(note) => wrapped(note, WIDTH),
+                Section::Note(note) => wrapped(note),
             };
             text += "\n";
             text += &part;
         }
         if !self.lead.is_empty() {
             text += "\n";
-            text += &wrapped(&self.lead, WIDTH);
+            text += &wrapped(&self.lead);
         }
-        let warning = |text: &String| wrapped(&format!("warning: {text}"), WIDTH);
+        let warning = |text: &String| wrapped(&format!("warning: {text}"));
         text + &self.warnings.iter().map(warning).collect::<String>()
     }
 
@@ -423,9 +422,10 @@ fn document(title: &str, body: &str) -> String {
         "<!DOCTYPE html>\n<html lang=\"en-GB\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n\
-         <style>\n{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
+         <style>\n{}{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
         escape(title),
-        include_str!("style.css")
+        include_str!("style.css"),
+        include_str!("drawing.css")
     )
 }
 
@@ -486,11 +486,11 @@ impl Numbers {
     }
 }
 
-/// Text in lines of at most so many characters.
-pub fn wrapped(text: &str, most: usize) -> String {
+/// Text in lines of at most [`WIDTH`] characters.
+fn wrapped(text: &str) -> String {
     let (mut lines, mut line) = (String::new(), String::new());
     for word in text.split(' ') {
-        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > most {
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > WIDTH {
             lines.extend([&line, "\n"]);
             line.clear();
         }

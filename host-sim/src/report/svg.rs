@@ -56,7 +56,7 @@ pub fn standalone(drawing: &str, [width, height]: [f64; 2]) -> String {
     );
     let css = format!(
         "<style>\n{}svg {{ background: var(--paper); font-family: system-ui, \"Segoe UI\", Arial, sans-serif; }}\n</style>\n",
-        include_str!("style.css")
+        include_str!("drawing.css")
     );
     let drawing = drawing.replacen("<svg role=\"img\"", &open, 1);
     drawing.replacen("<title>", &format!("{css}<title>"), 1)
