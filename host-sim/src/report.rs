@@ -37,7 +37,7 @@ pub use judged::{Judged, errors_of, sections as of_judged, worth};
 pub use limit::{sections as of_limit, several as of_limits};
 pub use points::{result_text, sections as of_points};
 pub use run::{in_words, reasons, sections as of_run};
-pub use sections::{Digits, Section, Sections, TableOf, wrapped};
+pub use sections::{Digits, Sections, TableOf};
 pub use table1::sections as of_table1;
 pub use trade::sections as of_trade;
 

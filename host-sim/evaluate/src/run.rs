@@ -100,6 +100,7 @@ pub struct SceneSummary {
     /// Number of row-wires of the sensor, read or not.
     pub row_wires: usize,
     /// Wires and electrodes of the sensor; `None` for too many to draw.
+    #[serde(skip)]
     pub sensor: Option<SensorSketch>,
 }
 

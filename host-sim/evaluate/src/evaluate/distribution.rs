@@ -14,16 +14,19 @@ pub use frames::{Rank, ShownFrame};
 pub use histogram::Histogram;
 pub use readings::{Reference, RelativeTo, ShownReadings};
 
-/// Distribution of a decoder's errors over the frames of a table.
+/// Distribution of a decoder's errors over the frames of a table. What pictures show stands in their CSV files alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Distribution {
     /// Errors by group of outputs, in the order in which groups first appear.
     pub groups: Vec<GroupDistribution>,
     /// Errors by output, in the order of the columns.
+    #[serde(skip)]
     pub outputs: Vec<OutputError>,
     /// Readings that the frames below have.
+    #[serde(skip)]
     pub readings: ShownReadings,
     /// Frames of median, high and largest error; fewer if two of them are the same frame.
+    #[serde(skip)]
     pub frames: Vec<ShownFrame>,
     /// Frames of these and of other ranks, from the least to the largest error, without their readings: for pictures.
     #[serde(skip)]
@@ -45,13 +48,15 @@ pub struct GroupDistribution {
     /// Largest |e|.
     pub largest: f64,
     /// How many errors have which size |e|.
+    #[serde(skip)]
     pub histogram: Histogram,
     /// How many pairs of truth and estimate lie where.
+    #[serde(skip)]
     pub density: Density,
 }
 
 /// Error of one output.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct OutputError {
     pub name: String,
     pub group: String,

@@ -25,6 +25,7 @@ pub struct MovingContacts {
     /// Errors of the baselines, whose decoding takes no time.
     pub decoders: Vec<DecoderErrors>,
     /// Trajectory to look at.
+    #[serde(skip)]
     pub shown: ShownTrajectory,
 }
 
@@ -39,7 +40,7 @@ pub struct MovingWay {
 }
 
 /// One output over a trajectory, every ms: the truth, and the newest finished estimate.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ShownTrajectory {
     pub output: String,
     pub unit: String,

@@ -1,13 +1,12 @@
 //! Geometry of a sensor, for drawings of it.
 
-use serde::Serialize;
 use taxel_simulate::World;
 
 /// Electrodes that a drawing may have at most; with more, nothing could be told apart.
 const MOST_ELECTRODES: usize = 4000;
 
 /// Wires and electrodes of a sensor at rest, in plan view.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SensorSketch {
     /// Extent of the sensor in x and y, in mm.
     pub face_mm: [f64; 2],
@@ -20,7 +19,7 @@ pub struct SensorSketch {
 }
 
 /// Row-wire of a sensor.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RowWire {
     pub read: bool,
     /// Electrodes on it: x and y in mm.

@@ -1,11 +1,9 @@
 //! Densities of pairs of truth and estimate.
 
-use serde::Serialize;
-
 const BINS: usize = 32;
 
 /// Numbers of pairs of truth and estimate in square bins.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Density {
     /// Least truth and estimate that have a bin, in the unit of the outputs.
     pub low: f64,

@@ -2,14 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use serde::Serialize;
 use taxel_data::{Table, columns};
 
 use super::{nearest_rank, pairs};
 
 /// Place of a frame among all frames, in the order of their errors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rank {
     /// Half of the frames have no larger error.
     Median,
@@ -58,7 +56,7 @@ impl Rank {
 ///
 /// Frames are ordered by the root mean square of the errors of their outputs. Outputs of one quantity are compared as
 /// they are; where there are several quantities, each is divided by the standard deviation of its true values.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ShownFrame {
     /// Place among all frames.
     pub rank: Rank,

@@ -1,14 +1,12 @@
 //! Histograms of the size of errors.
 
-use serde::Serialize;
-
 const BINS: usize = 50;
 /// Largest error that has a bin, relative to what 95 % of the errors do not exceed: few wild errors must not squeeze
 /// all others into one bin.
 const MOST_OF_PERCENTILE_95: f64 = 8.0;
 
 /// Numbers of errors |e| in bins of equal width from 0 on.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Histogram {
     /// Width of a bin, in the unit of the errors.
     pub bin_width: f64,

@@ -1,6 +1,5 @@
 //! Readings of frames, relative to what is known of the sensor at rest.
 
-use serde::Serialize;
 use taxel_data::{Table, columns};
 
 use super::frames::ShownFrame;
@@ -17,8 +16,7 @@ pub enum Reference<'a> {
 }
 
 /// What shown readings are relative to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RelativeTo {
     /// Change from the sensor at rest, ΔR/R₀ in per cent.
     Rest,
@@ -29,7 +27,7 @@ pub enum RelativeTo {
 }
 
 /// Readings of the shown frames.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ShownReadings {
     pub relative_to: RelativeTo,
     pub names: Vec<String>,
