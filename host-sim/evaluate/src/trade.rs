@@ -8,7 +8,7 @@ use serde::Serialize;
 use taxel_core::rbf::Format;
 use taxel_data::Silent;
 use taxel_learn::cost::Cost;
-use taxel_learn::decoders::{centroid, linear, mean};
+use taxel_learn::decoders::{BASELINES, Baseline};
 use taxel_learn::outliers::Outliers;
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::outputs::Outputs;
@@ -307,9 +307,10 @@ impl Trade {
     /// same readings.
     pub fn better_baseline(&self, point: usize) -> Option<(&'static str, f64)> {
         let point = &self.points[point];
-        let baselines = [mean::NAME, linear::NAME, centroid::NAME];
-        let of = |name| Some((name, point.result(&format!("{name}_rmse_{}", self.group))?));
-        let least = baselines.into_iter().filter_map(of).min_by(|(_, a), (_, b)| a.total_cmp(b));
+        let of = |it: &Baseline| {
+            Some((it.name, point.result(&format!("{}_rmse_{}", it.name, self.group))?))
+        };
+        let least = BASELINES.iter().filter_map(of).min_by(|(_, a), (_, b)| a.total_cmp(b));
         least.filter(|(_, least)| *least < point.rmse(&self.group))
     }
 

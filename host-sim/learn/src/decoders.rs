@@ -18,6 +18,8 @@ pub mod textbook;
 pub struct Baseline {
     /// Name of the decoder in tables and results.
     pub name: &'static str,
+    /// What it is, for legends.
+    pub in_words: &'static str,
     fit: Fit,
 }
 
@@ -39,12 +41,14 @@ impl Baseline {
 /// The best linear decoder of each row-wire.
 pub const LINEAR: Baseline = Baseline {
     name: linear::NAME,
+    in_words: "best linear decoder",
     fit: |dataset, lines| Some(Box::new(linear::fit(dataset, lines))),
 };
 
 /// The centroid of the touch.
 pub const CENTROID: Baseline = Baseline {
     name: centroid::NAME,
+    in_words: "centroid",
     fit: |dataset, lines| Some(Box::new(centroid::Centroid::fit(&dataset.subset(lines))?)),
 };
 
@@ -54,6 +58,7 @@ pub const BASELINES: &[Baseline] = &[
     CENTROID,
     Baseline {
         name: mean::NAME,
+        in_words: "always predicting the mean",
         fit: |dataset, lines| Some(Box::new(mean::Mean::fit(&dataset.subset(lines)))),
     },
 ];

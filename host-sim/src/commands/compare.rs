@@ -36,7 +36,8 @@ pub struct Arguments {
     /// Train nothing: the least possible error and the scan alone.
     #[arg(long, conflicts_with_all = ["centres", "max_latency_ms"])]
     limit_only: bool,
-    /// Folder that receives compare.csv, compare.json, a page compare.html and pictures.
+    /// Folder that receives compare.csv, compare.json, a page compare.html and pictures. Each decoder is kept in its points/ as
+    /// soon as it is judged: what was stopped goes on.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
     output: Option<PathBuf>,
 }
@@ -56,7 +57,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return Err(Error::Usage("a scene is given twice; give each once".into()));
     }
     let first = bases.first().map_or(String::new(), |base| base.label.clone());
-    let mut plan = Plan::new("compare", (bases, None), wanted(arguments, common)?, "")?;
+    let build = super::sweep::build()?;
+    let mut plan = Plan::new("compare", (bases, None), wanted(arguments, common)?, &build)?;
     if let Some(group) = &arguments.tried.group {
         let groups = plan.groups();
         require_known("--group", group, &groups.iter().map(String::as_str).collect::<Vec<_>>())?;
@@ -64,8 +66,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         plan.objectives[0] = format!("{error}_{group}");
     }
     let points = plan.points()?;
-    let records = work::in_memory(&plan, &points, &Terminal::new())?;
-    let merged = Merged::new(&plan, &points, records);
+    let merged = match &arguments.output {
+        Some(folder) => super::sweep::all(&plan, &points, folder)?,
+        None => Merged::new(&plan, &points, work::in_memory(&plan, &points, &Terminal::new())?),
+    };
     if let Some(failed) = merged.failed().next().filter(|_| merged.settings.is_empty()) {
         return Err(Error::Usage(reason(failed, &first)));
     }

@@ -21,7 +21,7 @@ use super::point::{self, Results};
 use crate::device::{Device, Wires};
 use crate::error::Result;
 use crate::experiment::Experiment;
-use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
+use crate::metrics::{self, DecoderErrors, Definition, Errors, LimitSummary, Measure};
 use crate::others::{self, OtherFrames};
 use crate::subject::Subject;
 use crate::touches::{Touches, Way};
@@ -398,10 +398,12 @@ impl Judged {
         let way = self.way(filter)?;
         let mut results = self.before.clone();
         for errors in &way.errors {
-            let group = &errors.group;
-            results.add(&format!("ratio_to_limit_{group}"), errors.ratio_to_limit);
-            let error = errors.ratio_standard_error;
-            results.add(&format!("ratio_to_limit_standard_error_{group}"), error);
+            for definition in Definition::ALL {
+                let (name, group) = (definition.name, &errors.group);
+                results.add(&format!("{name}_{group}"), definition.of(errors));
+                let error = (definition.standard_error)(errors);
+                results.add(&format!("{name}_standard_error_{group}"), error);
+            }
         }
         for (group, rmse) in rmse_of_groups(&way.errors) {
             results.add_estimate("rmse", &group, rmse, way.blocks.get(&group));

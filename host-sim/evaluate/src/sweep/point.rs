@@ -1,10 +1,12 @@
 //! Results of a point by their names, and the fields of its training.
 
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 use serde::Deserialize;
 use taxel_core::rbf::Format;
 use taxel_learn::Options;
+use taxel_learn::decoders::BASELINES;
 use taxel_learn::reading_model::Extent;
 
 use super::fields::nearest;
@@ -13,7 +15,7 @@ use super::plan::Plan;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
-use crate::metrics::{self, Blocks};
+use crate::metrics::{self, Blocks, Definition};
 
 /// Results of a point by their names, such as `rmse_dz_mm`, and remarks on them.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -69,29 +71,22 @@ const GENERAL: [&str; 17] = [
     "blob_bytes",
     "ram_bytes",
 ];
-/// Results of each group of outputs, in the order of tables.
-const OF_GROUP: [&str; 11] = [
-    "limit",
-    "limit_standard_error",
-    "rmse",
-    "rmse_standard_error",
-    "ratio_to_limit",
-    "ratio_to_limit_standard_error",
-    "worst_rmse",
-    "worst_rmse_standard_error",
-    "mean_rmse",
-    "linear_rmse",
-    "centroid_rmse",
-];
+/// Results of each group of outputs, in the order of tables: the limit, errors by all definitions, and of the baselines.
+static OF_GROUP: LazyLock<Vec<String>> = LazyLock::new(|| {
+    let errors = Definition::ALL.iter().map(|definition| definition.name);
+    let errors = ["limit"].into_iter().chain(errors).chain(["worst_rmse"]);
+    let with_errors = errors.flat_map(|name| [name.to_owned(), format!("{name}_standard_error")]);
+    let baselines = BASELINES.iter().map(|baseline| format!("{}_rmse", baseline.name));
+    with_errors.chain(baselines).collect()
+});
 
 /// Result of a group: what it is, and the group. The longest name that fits, since `limit_standard_error_…` begins with
 /// `limit_…`.
 fn of_group(name: &str) -> Option<(usize, &str)> {
-    let prefixes = OF_GROUP
-        .iter()
-        .enumerate()
-        .filter_map(|(place, prefix)| Some((place, name.strip_prefix(prefix)?.strip_prefix('_')?)));
-    prefixes.min_by_key(|(_, group)| group.len())
+    let group = |what: &String| name.strip_prefix(what.as_str())?.strip_prefix('_');
+    let found = OF_GROUP.iter().enumerate();
+    let found = found.filter_map(|(place, what)| Some((place, group(what)?)));
+    found.min_by_key(|(_, group)| group.len())
 }
 
 /// Name of the standard error of an error.
@@ -109,7 +104,8 @@ pub fn group_in(name: &str) -> Option<&str> {
 pub fn columns_of(plan: &Plan, groups: &[&str]) -> Vec<String> {
     let all = Some(metrics::ALL).filter(|_| groups.len() > 1);
     let of_groups = groups.iter().copied().chain(all);
-    let of_groups = of_groups.flat_map(|group| OF_GROUP.map(|name| format!("{name}_{group}")));
+    let of_groups =
+        of_groups.flat_map(|group| OF_GROUP.iter().map(move |name| format!("{name}_{group}")));
     let all = GENERAL.iter().map(|name| (*name).into()).chain(of_groups);
     all.filter(|name| not_computed(plan, name).is_none()).collect()
 }
@@ -117,11 +113,13 @@ pub fn columns_of(plan: &Plan, groups: &[&str]) -> Vec<String> {
 /// Reason why a plan does not compute the result called `name`, and what to give for it; `None` if it does, and for a
 /// name that no result has.
 pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
-    let what = of_group(name).map_or(name, |(place, _)| OF_GROUP[place]);
+    let what = of_group(name).map_or(name, |(place, _)| &OF_GROUP[place]);
     let is_of_limit = what.starts_with("limit") || what.starts_with("ratio_to_limit");
     let first_of_model = GENERAL.iter().position(|it| *it == "centres").unwrap_or(0);
     let is_of_model = GENERAL[first_of_model..].contains(&what)
-        || (OF_GROUP.contains(&what) && !what.starts_with("limit"));
+        || (of_group(name).is_some() && !what.starts_with("limit"));
+    let of_baseline =
+        BASELINES.iter().any(|it| what.strip_suffix("_rmse").is_some_and(|name| name == it.name));
     let is_of_scene = ["area_cm2", "cost_eur"].contains(&what) || is_of_limit;
     match what {
         _ if plan.data.is_some() && is_of_scene => {
@@ -134,7 +132,7 @@ pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
         _ if is_of_model && !plan.train => {
             Some("the plan trains no model; leave train = false out")
         }
-        "mean_rmse" | "linear_rmse" | "centroid_rmse" if !plan.has(Also::Baselines) => {
+        _ if of_baseline && !plan.has(Also::Baselines) => {
             Some("the plan has no baselines; give also = [\"baselines\"]")
         }
         "worst_rmse" | "worst_rmse_standard_error" if !plan.has(Also::OtherContacts) => {
