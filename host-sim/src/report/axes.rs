@@ -95,24 +95,23 @@ impl Panel {
         }
         svg.line([left, bottom], [right, bottom], "axis");
         let at = self.x.ticks.at.iter().map(|(value, label)| (self.x(*value), label.as_str()));
-        draw_level_ticks(svg, &at.collect::<Vec<_>>(), bottom, 1.0);
+        draw_level_ticks(svg, &at.collect::<Vec<_>>(), bottom);
         let middle = f64::midpoint(left, right);
         svg.label(middle, bottom + 38.0, Anchor::Middle, "tick", &self.x.label);
     }
 }
 
-/// Draws ticks of a level axis at height `y`, at places in px: below it if `side` is 1, above it if it is −1. Where labels
-/// are dense, only some are written; all ticks stay.
-pub fn draw_level_ticks(svg: &mut Svg, at: &[(f64, &str)], y: f64, side: f64) {
+/// Draws ticks below a level axis at height `y`, at places in px. Where labels are dense, only some are written; all ticks
+/// stay.
+pub fn draw_level_ticks(svg: &mut Svg, at: &[(f64, &str)], y: f64) {
     let places: Vec<f64> = at.iter().map(|(x, _)| *x).collect();
     let step = ticks::written(&places, |a, b| {
         f64::midpoint(text_width(at[a].1), text_width(at[b].1)) + 4.0
     });
-    let baseline = if side > 0.0 { y + 18.0 } else { y - 8.0 };
     for (i, (x, label)) in at.iter().enumerate() {
-        svg.line([*x, y], [*x, y + 4.0 * side], "axis");
+        svg.line([*x, y], [*x, y + 4.0], "axis");
         if i % step == 0 {
-            svg.text(*x, baseline, Anchor::Middle, "tick", label);
+            svg.text(*x, y + 18.0, Anchor::Middle, "tick", label);
         }
     }
 }

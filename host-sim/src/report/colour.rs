@@ -85,7 +85,7 @@ impl ColourScale {
             |value: f64| left + (value - self.low) / (self.high - self.low) * (right - left);
         let at: Vec<_> =
             ticks.at.iter().map(|(value, text)| (place(*value), text.as_str())).collect();
-        draw_level_ticks(svg, &at, top + height, 1.0);
+        draw_level_ticks(svg, &at, top + height);
         svg.label(f64::midpoint(left, right), top + height + 36.0, Anchor::Middle, "tick", label);
     }
 }

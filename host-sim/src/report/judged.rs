@@ -88,7 +88,7 @@ pub fn sections(judged: &Judged<'_>, made: Sections) -> Sections {
     }
     let by_electrode = pictures.zip(face.as_ref()).map(|(it, face)| errors::by_electrode(it, face));
     if by_electrode.is_some() || !judged.by_row.is_empty() || !judged.by_load.is_empty() {
-        sections.heading("Errors by place and depth");
+        sections.heading("Errors by place and load");
         by_electrode.into_iter().for_each(|map| sections.figure(map));
         by_row(&mut sections, judged.by_row);
         by_load(&mut sections, judged.by_load);

@@ -13,14 +13,10 @@ use taxel_evaluate::verdict::{Verdict, Warning};
 
 use super::{Judged, Page, Pictures, Sections};
 
-fn sections(result: &RunResult) -> Sections {
+fn page(result: &RunResult) -> Page {
     let mut sections = super::of_run(result);
     sections.files = ["model.bin", "metrics.json"].map(String::from).to_vec();
-    sections
-}
-
-fn page(result: &RunResult) -> Page {
-    sections(result).page("host-sim run 'by <hand>.toml' --seed 7")
+    sections.page("host-sim run 'by <hand>.toml' --seed 7")
 }
 
 fn html(result: &RunResult) -> String {
@@ -96,10 +92,8 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
     let page = html(&result);
     assert_eq!(page, html(&result));
     assert!(is_drawable(&page));
-    // Frames; density, histogram; by electrode; readings, arrows, sensor; noise.
-    assert_eq!(figures(&page), 8);
-    // Errors, by row-wire, other contacts.
-    assert_eq!(page.matches("<figure id=\"table-").count(), 3);
+    // Frames; density, histogram; by electrode; readings, arrows, sensor; noise. Errors, by row-wire, other contacts.
+    assert_eq!((figures(&page), page.matches("<figure id=\"table-").count()), (8, 3));
     for text in [
         "seed 7",
         "K = 9",
