@@ -1,4 +1,4 @@
-//! Data files, read whole: text of any dialect, packed by gzip or not.
+//! Data files: text of any dialect, packed by gzip or not.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -7,15 +7,16 @@ use std::path::{Path, PathBuf};
 use crate::columns;
 use crate::digest;
 use crate::error::{Error, Problem, Result};
-use crate::input;
+use crate::input::{MOST_DATA_BYTES, Source};
 
 mod time;
 mod csv;
+mod blocks;
 mod dialect;
 
 pub use dialect::{Separator, Stated};
 
-/// Data file that was read whole: named columns of numbers, one frame a line.
+/// Data file that was read: named columns of numbers, one frame a line.
 ///
 /// Missing values are held as NaN: empty fields, words such as N/A, and NaN. Time stamps by ISO 8601 are seconds since 1970. Other text is NaN too, and an error once its column is asked for.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -51,11 +52,11 @@ pub(crate) struct NotNumbers {
 }
 
 /// Fields as they are written, line after line, without spaces around.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Texts {
     text: String,
-    /// Where the first field begins in the text, and where each ends.
-    places: Vec<usize>,
+    /// Where each field ends in the text.
+    ends: Vec<usize>,
 }
 
 /// One column's fields, as text.
@@ -75,9 +76,10 @@ impl<'f> FieldTexts<'f> {
         let is_text = || self.file.not_numbers.iter().any(|it| it.column == self.column);
         match &self.file.texts {
             _ if value.is_nan() && !is_text() => Cow::Borrowed(""),
-            Some(Texts { text, places }) => {
+            Some(Texts { text, ends }) => {
                 let field = (self.file.kept.start + line) * self.file.header.len() + self.column;
-                Cow::Borrowed(&text[places[field]..places[field + 1]])
+                let start = field.checked_sub(1).map_or(0, |before| ends[before]);
+                Cow::Borrowed(&text[start..ends[field]])
             }
             None => Cow::Owned(value.to_string()),
         }
@@ -104,7 +106,7 @@ impl DataFile {
     ///
     /// # Errors
     /// [`Error::Read`] if the file cannot be read. [`Error::File`] for a file beyond
-    /// [`input::MOST_DATA_BYTES`], packed or not, an empty file, a repeated column name, or a line with too few or too
+    /// [`MOST_DATA_BYTES`], packed or not, an empty file, a repeated column name, or a line with too few or too
     /// many fields; for text that can be read in two ways, and for files that hold no text.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_as(path, &Reading::default())
@@ -112,18 +114,12 @@ impl DataFile {
 
     /// Reads the file at `path` as [`read`](Self::read) does, but for what `reading` says.
     pub fn read_as(path: &Path, reading: &Reading) -> Result<Self> {
-        Self::parse(path, &input::read(path, input::MOST_DATA_BYTES)?, reading)
+        csv::parse(Source::open(path, MOST_DATA_BYTES)?, reading)
     }
 
     /// Parses `bytes` as [`read_as`](Self::read_as) does those of the file at `path`.
     pub fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Self> {
-        let unpacked = input::unpacked(path, bytes)?;
-        let bytes = unpacked.as_deref().unwrap_or(bytes);
-        let mut file = csv::parse(path, bytes, reading)?;
-        if unpacked.is_some() {
-            file.add_found("gzip");
-        }
-        Ok(file)
+        csv::parse(Source::of_bytes(path, bytes), reading)
     }
 
     /// A table that was read otherwise, from the file at `path`: columns called `header`, and their `values` line after line.
@@ -185,19 +181,26 @@ impl DataFile {
         self.kept = self.kept.start + range.start..self.kept.start + range.end;
     }
 
-    /// Lines of data in turn, each a slice of one value a column.
-    pub fn rows(&self) -> std::slice::ChunksExact<'_, f64> {
-        let columns = self.header.len();
-        self.values[self.kept.start * columns..self.kept.end * columns].chunks_exact(columns)
-    }
-
-    /// Values at `line` (from 0, header not counted), one a column.
+    /// Values of these `lines` (from 0, ascending) in each of the lists of `columns`, as tables of `lines × columns`. The
+    /// file's memory is given back step by step, so that it never takes that of the tables besides its own.
     ///
     /// # Panics
-    /// If the file has no such line.
-    pub fn row(&self, line: usize) -> &[f64] {
-        let (line, columns) = (self.kept.start + line, self.header.len());
-        &self.values[line * columns..(line + 1) * columns]
+    /// If the file has no such line or column.
+    pub(crate) fn into_tables(mut self, lines: &[usize], columns: [&[usize]; 2]) -> [Vec<f64>; 2] {
+        const STEPS: usize = 16;
+        let mut tables = columns.map(|it| vec![0.0; lines.len() * it.len()]);
+        let mut first = lines.len();
+        for some in lines.rchunks(lines.len().div_ceil(STEPS).max(1)) {
+            first -= some.len();
+            for (table, columns) in tables.iter_mut().zip(columns) {
+                let values = some.iter().flat_map(|l| columns.iter().map(|c| self.value(*l, *c)));
+                let places = table[first * columns.len()..].iter_mut();
+                places.zip(values).for_each(|(place, value)| *place = value);
+            }
+            self.values.truncate((self.kept.start + some[0]) * self.header.len());
+            self.values.shrink_to_fit();
+        }
+        tables
     }
 
     /// Lines of data that are not kept, each a slice of one value a column.

@@ -1,7 +1,7 @@
 //! Data sets: tables of readings and of the outputs that a decoder should predict from them.
 
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
+use std::hash::{DefaultHasher, Hasher};
 
 use serde::Serialize;
 
@@ -115,29 +115,14 @@ impl Dataset {
         ranges
     }
 
-    /// Selects the columns that match the patterns `inputs` and `outputs` (see [`columns::select`]), by
-    /// default those with the project's own names, but for the inputs called `unused`. Frames with a missing input, or
-    /// without any output, are skipped; [`Kept`] counts them.
+    /// Frames of `file` in the `chosen` columns. Frames with a missing input, or without any output, are skipped; [`Kept`]
+    /// counts them.
     ///
     /// # Errors
-    /// [`Error::File`] for a pattern without a column, a column that is input and output, a value that
-    /// is too large, or a file without a complete frame.
-    pub fn from_file(
-        file: &DataFile,
-        inputs: Option<&str>,
-        outputs: Option<&str>,
-        unused: &[String],
-    ) -> Result<(Self, Kept)> {
-        let mut input_columns = chosen(file, inputs, Role::Inputs)?;
-        input_columns.retain(|column| !unused.contains(&file.header[*column]));
-        let output_columns = chosen(file, outputs, Role::Outputs)?;
-        if let Some(both) = input_columns.iter().find(|c| output_columns.contains(c)) {
-            let name = file.header[*both].clone();
-            return Err(Error::file(&file.path, Problem::InputAndOutput { name }));
-        }
-        let (input_columns, output_columns, rows) =
-            by_rows(&file.header, input_columns, output_columns);
-        for &column in input_columns.iter().chain(&output_columns) {
+    /// [`Error::File`] for a value that is too large, or a file without a complete frame.
+    pub fn from_file(file: DataFile, chosen: Chosen) -> Result<(Self, Kept)> {
+        let Chosen { inputs, outputs, names: [input_names, output_names], rows } = chosen;
+        for &column in inputs.iter().chain(&outputs) {
             if let Some(line) = (0..file.lines()).find(|l| file.value(*l, column).abs() > LARGEST) {
                 let problem = Problem::TooLarge {
                     line: file.line_number(line),
@@ -150,28 +135,41 @@ impl Dataset {
         }
         let is_missing = |line: usize, column: &usize| file.value(line, *column).is_nan();
         let (without_reading, rest): (Vec<usize>, Vec<usize>) = (0..file.lines())
-            .partition(|line| input_columns.iter().any(|column| is_missing(*line, column)));
-        let (without_output, kept): (Vec<usize>, Vec<usize>) = rest
+            .partition(|line| inputs.iter().any(|column| is_missing(*line, column)));
+        let (without_output, lines): (Vec<usize>, Vec<usize>) = rest
             .into_iter()
-            .partition(|line| output_columns.iter().all(|column| is_missing(*line, column)));
-        if kept.is_empty() {
+            .partition(|line| outputs.iter().all(|column| is_missing(*line, column)));
+        if lines.is_empty() {
             return Err(Error::file(&file.path, Problem::NoCompleteLine));
         }
         let left_out = LeftOut {
             without_reading: without_reading.len(),
             without_output: without_output.len(),
-            missing_most: missing_most(file, &input_columns, &output_columns),
+            missing_most: missing_most(&file, &inputs, &outputs),
         };
-        let take = |columns: &[usize]| Table {
-            names: columns.iter().map(|c| file.header[*c].clone()).collect(),
-            values: kept.iter().flat_map(|l| columns.iter().map(|c| file.value(*l, *c))).collect(),
-        };
-        let tables = Self {
-            inputs: take(&input_columns),
-            outputs: take(&output_columns),
+        let numbers = lines.iter().map(|line| file.line_number(*line)).collect();
+        let kept = Kept { numbers, of: file.lines(), left_out, lines };
+        let [input_values, output_values] = file.into_tables(&kept.lines, [&inputs, &outputs]);
+        let frames = Self {
+            inputs: Table { names: input_names, values: input_values.into() },
+            outputs: Table { names: output_names, values: output_values.into() },
             ..Self::empty(vec![], vec![], rows, 0)
         };
-        Ok((tables, Kept { lines: kept, of: file.lines(), left_out }))
+        Ok((frames, kept))
+    }
+
+    /// Keeps the frames at these ascending `indices` (from 0) alone, without a copy of them.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn keep(&mut self, indices: &[usize]) {
+        for table in [&mut self.inputs, &mut self.outputs] {
+            let columns = table.names.len();
+            for (to, from) in indices.iter().enumerate().filter(|(to, from)| to != *from) {
+                table.values.copy_within(from * columns..(from + 1) * columns, to * columns);
+            }
+            table.values.truncate(indices.len() * columns);
+        }
     }
 
     /// Frames at `indices` (from 0), in that order.
@@ -186,11 +184,49 @@ impl Dataset {
     }
 }
 
+/// Columns of a file that a data set is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chosen {
+    inputs: Vec<usize>,
+    outputs: Vec<usize>,
+    /// Names of the inputs, and of the outputs, in the data set.
+    pub names: [Vec<String>; 2],
+    /// Number of row tables.
+    rows: usize,
+}
+
+impl Chosen {
+    /// Selects the columns that match the patterns `inputs` and `outputs` (see [`columns::select`]), by
+    /// default those with the project's own names, but for the inputs called `unused`.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a pattern without a column, or a column that is input and output.
+    pub fn new(
+        file: &DataFile,
+        inputs: Option<&str>,
+        outputs: Option<&str>,
+        unused: &[String],
+    ) -> Result<Self> {
+        let mut inputs = chosen(file, inputs, Role::Inputs)?;
+        inputs.retain(|column| !unused.contains(&file.header[*column]));
+        let outputs = chosen(file, outputs, Role::Outputs)?;
+        if let Some(both) = inputs.iter().find(|column| outputs.contains(column)) {
+            let name = file.header[*both].clone();
+            return Err(Error::file(&file.path, Problem::InputAndOutput { name }));
+        }
+        let (inputs, outputs, rows) = by_rows(&file.header, inputs, outputs);
+        let names = [&inputs, &outputs]
+            .map(|columns| columns.iter().map(|column| file.header[*column].clone()).collect());
+        Ok(Self { inputs, outputs, names, rows })
+    }
+}
+
 /// Lines of a file that a data set uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kept {
-    /// Indices (from 0) of the lines used.
+    /// Indices (from 0) of the lines used, and their numbers in the file (from 1).
     pub lines: Vec<usize>,
+    pub numbers: Vec<u64>,
     /// Number of lines in the file.
     pub of: usize,
     /// Lines that are not used.
@@ -245,23 +281,27 @@ impl UnusedInputs {
     /// Columns of `file`, among these, that can tell nothing. There are none if no other would be left.
     pub fn among(file: &DataFile, columns: impl IntoIterator<Item = usize>) -> Self {
         let mut unused = Self::default();
-        // Readings as bits, so that equal columns are found by looking each one up.
-        let mut known: HashMap<Vec<u64>, &str> = HashMap::new();
+        // Columns by a hash of their values, so that equal ones are found by looking each one up.
+        let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
+        let bits = |column| (0..file.lines()).map(move |line| file.value(line, column).to_bits());
         for column in columns {
             let name = &file.header[column];
-            let values = (0..file.lines()).map(|line| file.value(line, column));
+            let values = bits(column).map(f64::from_bits);
             let mut told = values.clone().filter(|value| !value.is_nan());
             let first = told.next();
-            if 2 * values.clone().filter(|value| value.is_nan()).count() > file.lines() {
+            if 2 * values.filter(|value| value.is_nan()).count() > file.lines() {
                 unused.dead.push(name.clone());
             } else if told.all(|value| first.is_none_or(|first| value.total_cmp(&first).is_eq())) {
                 unused.constant.push(name.clone());
             } else {
-                match known.entry(values.map(f64::to_bits).collect()) {
-                    Entry::Occupied(other) => {
-                        unused.duplicated.push((name.clone(), (*other.get()).to_owned()));
+                let mut hasher = DefaultHasher::new();
+                bits(column).for_each(|value| hasher.write_u64(value));
+                let alike = known.entry(hasher.finish()).or_default();
+                match alike.iter().find(|other| bits(**other).eq(bits(column))) {
+                    Some(other) => {
+                        unused.duplicated.push((name.clone(), file.header[*other].clone()));
                     }
-                    Entry::Vacant(place) => _ = place.insert(name),
+                    None => alike.push(column),
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! Input files, read whole up to a size that is told when it is exceeded: not every path names a file that ends.
+//! Input files, read up to a size that is told when it is exceeded: not every path names a file that ends.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read};
@@ -71,20 +71,9 @@ fn is_pipe(_: &Path) -> bool {
 /// # Errors
 /// [`Error::Read`] if the file cannot be read, [`Error::File`] if it is larger.
 pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
-    let error = |cause| Error::read(path, cause);
-    let file = open(path)?;
-    let metadata = file.metadata().map_err(error)?;
-    let most_bytes =
-        if metadata.is_file() { most_bytes } else { most_bytes.min(MOST_STREAM_BYTES) };
-    let too_large = || Error::file(path, Problem::FileTooLarge { most_bytes });
-    // That of a device or a pipe is 0.
-    let length = metadata.len();
-    if length > most_bytes {
-        return Err(too_large());
-    }
-    let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
-    file.take(most_bytes + 1).read_to_end(&mut bytes).map_err(error)?;
-    if bytes.len() as u64 > most_bytes { Err(too_large()) } else { Ok(bytes) }
+    let mut bytes = vec![];
+    Source::open(path, most_bytes)?.read(&mut bytes, usize::MAX)?;
+    Ok(bytes)
 }
 
 /// First bytes of what gzip packed.
@@ -95,20 +84,82 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 const FEW_UNPACKED_BYTES: u64 = 64_000_000;
 const MOST_UNPACKED_A_BYTE: u64 = 100;
 
-/// What gzip packed into the `bytes` of the file at `path`, if it did.
-pub(crate) fn unpacked(path: &Path, bytes: &[u8]) -> Result<Option<Vec<u8>>> {
-    if !bytes.starts_with(&GZIP) {
-        return Ok(None);
+/// Bytes of a file as they are read.
+pub(crate) struct Source<'s> {
+    pub path: &'s Path,
+    pub is_packed: bool,
+    /// Length of the file in bytes; of a device or a pipe what it may have.
+    length: u64,
+    reader: Box<dyn Read + 's>,
+    most_bytes: u64,
+    /// Bytes that may still come.
+    left: u64,
+}
+
+impl<'s> Source<'s> {
+    /// Source of the bytes in the file at `path`, if it has at most `most_bytes`.
+    pub fn open(path: &'s Path, most_bytes: u64) -> Result<Self> {
+        let file = open(path)?;
+        let metadata = file.metadata().map_err(|cause| Error::read(path, cause))?;
+        let most = most_bytes.min(MOST_STREAM_BYTES);
+        let (length, most_bytes) =
+            if metadata.is_file() { (metadata.len(), most_bytes) } else { (most, most) };
+        if length > most_bytes {
+            return Err(Error::file(path, Problem::FileTooLarge { most_bytes }));
+        }
+        Ok(Self::new(path, file, length, most_bytes))
     }
-    let most_bytes = bytes.len() as u64 * MOST_UNPACKED_A_BYTE;
-    let most_bytes = most_bytes.clamp(FEW_UNPACKED_BYTES, MOST_DATA_BYTES);
-    let mut unpacked = vec![];
-    let read = MultiGzDecoder::new(bytes).take(most_bytes + 1).read_to_end(&mut unpacked);
-    read.map_err(|cause| Error::file(path, Problem::Packed { cause: cause.to_string() }))?;
-    if unpacked.len() as u64 > most_bytes {
-        return Err(Error::file(path, Problem::UnpackedTooLarge { most_bytes }));
+
+    /// Source of `bytes`, as if they were in the file at `path`.
+    pub fn of_bytes(path: &'s Path, bytes: &'s [u8]) -> Self {
+        Self::new(path, bytes, bytes.len() as u64, MOST_DATA_BYTES)
     }
-    Ok(Some(unpacked))
+
+    fn new(path: &'s Path, reader: impl Read + 's, length: u64, most_bytes: u64) -> Self {
+        let reader = Box::new(reader);
+        Self { path, is_packed: false, length, reader, most_bytes, left: most_bytes }
+    }
+
+    /// Source of what gzip packed, if it did.
+    pub fn unpacked(mut self) -> Result<Self> {
+        let mut first = vec![];
+        self.read(&mut first, GZIP.len())?;
+        self.is_packed = first == GZIP;
+        let whole = io::Cursor::new(first).chain(self.reader);
+        if !self.is_packed {
+            return Ok(Self { reader: Box::new(whole), left: self.most_bytes, ..self });
+        }
+        let most_bytes = self.length.saturating_mul(MOST_UNPACKED_A_BYTE);
+        let most_bytes = most_bytes.clamp(FEW_UNPACKED_BYTES, MOST_DATA_BYTES);
+        let reader = Box::new(MultiGzDecoder::new(whole));
+        Ok(Self { reader, most_bytes, left: most_bytes, ..self })
+    }
+
+    /// Appends up to `most` bytes to `bytes`; returns false if there are no more.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if they cannot be read, [`Error::File`] if they are too many.
+    pub fn read(&mut self, bytes: &mut Vec<u8>, most: usize) -> Result<bool> {
+        let (path, most_bytes) = (self.path, self.most_bytes);
+        let most = (most as u64).min(self.left + 1); // one more tells that they are too many
+        let read = self.reader.by_ref().take(most).read_to_end(bytes);
+        let (is_packed, packed) = (self.is_packed, |cause| Problem::Packed { cause });
+        let count = read.map_err(|cause| {
+            if is_packed {
+                Error::file(path, packed(cause.to_string()))
+            } else {
+                Error::read(path, cause)
+            }
+        })?;
+        let too_large = if is_packed {
+            Problem::UnpackedTooLarge { most_bytes }
+        } else {
+            Problem::FileTooLarge { most_bytes }
+        };
+        let left = self.left.checked_sub(count as u64);
+        self.left = left.ok_or_else(|| Error::file(path, too_large))?;
+        Ok(count > 0)
+    }
 }
 
 /// Reads the text file at `path` whole, if it has at most [`MOST_TEXT_BYTES`].
@@ -140,9 +191,10 @@ mod tests {
         let mut packed = flate2::write::GzEncoder::new(vec![], flate2::Compression::fast());
         io::copy(&mut io::repeat(b'1').take(FEW_UNPACKED_BYTES + 1), &mut packed).unwrap();
         let packed = packed.finish().unwrap();
-        let refused = unpacked(Path::new("log.csv.gz"), &packed).unwrap_err().to_string();
+        let source = Source::of_bytes(Path::new("log.csv.gz"), &packed);
+        let mut source = source.unpacked().unwrap();
+        let refused = source.read(&mut vec![], usize::MAX).unwrap_err().to_string();
         assert!(refused.contains("more than 64 MB unpacked"), "{refused}");
-        assert_eq!(unpacked(Path::new("log.csv"), b"a,b\n").unwrap(), None);
     }
 
     #[cfg(unix)]

@@ -1,5 +1,7 @@
 //! Tables of numbers with named columns.
 
+use std::borrow::Cow;
+
 use crate::columns;
 use crate::values::Values;
 
@@ -171,10 +173,14 @@ impl Table {
     /// `estimates` of the same shape, `lines × columns`, with the mean of the column for places that are not told, because
     /// nothing seems to touch: a decoder that always tells one says as much there. Lines that are not decoded at all stay
     /// as they are.
-    pub fn with_places(&self, mut estimates: Vec<f64>) -> Vec<f64> {
+    pub fn with_places<'e>(&self, estimates: impl Into<Cow<'e, [f64]>>) -> Cow<'e, [f64]> {
         let places: Vec<bool> = self.names.iter().map(|name| columns::is_place(name)).collect();
+        let mut estimates = estimates.into();
+        if !places.contains(&true) {
+            return estimates;
+        }
         let (means, all_are) = (self.means(), !places.contains(&false));
-        for line in estimates.chunks_exact_mut(means.len().max(1)) {
+        for line in estimates.to_mut().chunks_exact_mut(means.len().max(1)) {
             if all_are || line.iter().any(|value| !value.is_nan()) {
                 let missing = line.iter_mut().zip(&places).zip(&means);
                 let missing = missing.filter(|((value, is_place), _)| **is_place && value.is_nan());

@@ -47,24 +47,6 @@ impl DerefMut for Values {
     }
 }
 
-impl<'v> IntoIterator for &'v Values {
-    type Item = &'v f64;
-    type IntoIter = std::slice::Iter<'v, f64>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.iter()
-    }
-}
-
-impl<'v> IntoIterator for &'v mut Values {
-    type Item = &'v mut f64;
-    type IntoIter = std::slice::IterMut<'v, f64>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.iter_mut()
-    }
-}
-
 impl<T: ?Sized> PartialEq<T> for Values
 where
     Vec<f64>: PartialEq<T>,

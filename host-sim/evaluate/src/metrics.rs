@@ -294,7 +294,7 @@ impl Definition {
 /// # Panics
 /// If `estimate` is not as long as `truth`, or `measure` does not have one full scale a column.
 pub fn by_group(truth: &Table, estimate: &[f64], measure: &Measure) -> Vec<Errors> {
-    let estimate = &truth.with_places(estimate.to_vec());
+    let estimate = &truth.with_places(estimate);
     columns::groups(&truth.names)
         .iter()
         .map(|(group, members)| of_columns(group, members, truth, estimate, measure))

@@ -22,9 +22,6 @@ mod float32;
 mod fixed16;
 mod front;
 
-/// Lines below which each is decoded by itself: columns cost as much for one line as for all that they hold. In fixed16 that
-/// is what five single lines cost.
-const FEW_LINES: usize = 5;
 /// Lines that one thread takes at a time.
 const LINES_AT_ONCE: usize = 4 * LANES;
 
@@ -56,13 +53,6 @@ pub(crate) fn decode(fronts: &[Front<'_>], networks: &[Network<'_>], inputs: &[f
     }
     let steps = [width, outputs].map(|step| step.max(1));
     let mut values = vec![0.0; inputs.len() / steps[0] * outputs];
-    if inputs.len() < FEW_LINES * steps[0] {
-        for (inputs, values) in inputs.chunks_exact(steps[0]).zip(values.chunks_exact_mut(steps[1]))
-        {
-            parts.iter().for_each(|part| part.decode_line(inputs, values));
-        }
-        return values;
-    }
     parallel::fill(&mut values, LINES_AT_ONCE * steps[1], &|index, values| {
         let inputs = parallel::piece(inputs, LINES_AT_ONCE * steps[0], index);
         parts.iter().for_each(|part| part.decode(inputs, values, steps));
@@ -83,33 +73,6 @@ impl Part<'_> {
     /// Number of the model's inputs that it sees.
     fn inputs(&self) -> usize {
         self.front.and_then(|front| readings(&front)).unwrap_or(self.network.shape().inputs)
-    }
-
-    /// Decodes one line of the model's `inputs` to its `outputs`, by the device's own code.
-    fn decode_line(&self, inputs: &[f64], outputs: &mut [f64]) {
-        let touch = self.front.and_then(|front| front.touch);
-        let projection = self.front.and_then(|front| front.projection);
-        let readings = &inputs[self.first_input..][..self.inputs()];
-        let mut given: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
-        let mut factor = 1.0;
-        if let Some(touch) = touch {
-            let mut made = vec![0.0; touch.inputs()];
-            let strength = touch.apply(&given, None, &mut made);
-            (given, factor) = (made, touch.factor(strength).unwrap_or(f32::NAN));
-        }
-        if let Some(projection) = projection {
-            let mut features = vec![0.0; projection.features()];
-            projection.project(&given, &mut features);
-            given = features;
-        }
-        let (mut scaled, mut inferred) =
-            (vec![0.0; given.len()], vec![0.0; self.network.shape().outputs]);
-        let fits = self.network.infer(&given, &mut scaled, &mut inferred);
-        fits.expect("lengths of the network");
-        inferred.iter_mut().for_each(|output| *output *= factor);
-        let is_decoded = given.iter().chain(&inferred).all(|number| number.is_finite());
-        let places = outputs[self.first_output..].iter_mut().zip(inferred);
-        places.for_each(|(place, y)| *place = f64::from(if is_decoded { y } else { f32::NAN }));
     }
 
     /// Decodes its `inputs` to its `outputs`, in lines that start every so many (`steps`) of the model's.

@@ -7,6 +7,7 @@ use taxel_core::blob::{Front, Model};
 use taxel_core::rbf::Network;
 use taxel_core::reading_model::ReadingModel;
 use taxel_core::scale::CLAMP;
+use taxel_core::{Decoder, Frame};
 use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames};
@@ -15,6 +16,11 @@ use crate::packing::ModelBlob;
 use crate::parallel;
 use crate::relative::{ratios, reciprocals};
 
+/// Most rows of a model.
+pub(crate) const MOST_ROWS: usize = u8::MAX as usize;
+/// Frames below which each is decoded by the device's own code: those side by side cost as much for one as for all. In
+/// fixed16 that is what five single frames cost.
+const FEW_LINES: usize = 5;
 /// Frames that a thread fills at a time.
 const FRAMES_AT_ONCE: usize = 64;
 
@@ -122,7 +128,18 @@ impl<'b> PreparedModel<'b> {
     ///
     /// Outputs that are places are NaN in frames without a touch, as outputs of a frame with a missing reading are.
     pub fn decode_lines(&self, readings: &[f64]) -> Vec<f64> {
-        decode(&self.fronts, &self.networks, &self.model_inputs(readings))
+        let inputs = self.model_inputs(readings);
+        if inputs.len() < FEW_LINES * self.inputs()
+            && let Ok(decoder) = Decoder::<MOST_ROWS>::new(self.model)
+        {
+            let inputs: Vec<f32> = inputs.iter().map(|input| *input as f32).collect();
+            let reciprocals = &vec![1.0; self.inputs()]; // of inputs that are relative already
+            let frames = inputs.chunks_exact(reciprocals.len());
+            let frames = frames.map(|readings_ohm| Frame { readings_ohm, reciprocals });
+            let outputs = |frame| decoder.decode(frame).map_or(vec![], |decoded| decoded.outputs);
+            return frames.flat_map(outputs).map(f64::from).collect();
+        }
+        decode(&self.fronts, &self.networks, &inputs)
     }
 
     /// Inputs of each network in turn, for `readings` (`frames × inputs`): numbers of a whole table a network that sees

@@ -119,11 +119,11 @@ impl HeldOut {
     pub fn add(&mut self, blob: &ModelBlob, statistics: &Statistics, dataset: &Dataset) {
         let mixture = statistics.mixture.as_ref().expect("statistics with a mixture");
         let decoded = blob.prepare().of_inputs().decode_table(&dataset.inputs);
-        let errors = decoded.values.iter().zip(&dataset.outputs.values);
+        let errors = decoded.values.iter().zip(dataset.outputs.values.iter());
         self.errors.extend(errors.map(|(estimate, truth)| estimate - truth));
         let assessed = statistics.assess(mixture, &dataset.inputs.values);
         self.surprises.extend(assessed.iter().map(|(_, log_density)| -log_density));
-        self.inputs.extend(&dataset.inputs.values);
+        self.inputs.extend(dataset.inputs.values.iter());
     }
 }
 

@@ -8,7 +8,7 @@ use clap::Args;
 use taxel_data::clock::neighbours_alike;
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::Grid;
-use taxel_data::{DataFile, Dataset, Rest, Table};
+use taxel_data::{DataFile, Rest, Table};
 use taxel_learn::reading_model::Extent;
 use taxel_learn::select;
 
@@ -148,29 +148,23 @@ impl DataArguments {
         [self.inputs.as_deref(), self.outputs.as_deref()]
     }
 
-    /// Readings of the untouched sensor in the columns of `inputs`, if a file with them was given.
-    pub fn rest_of_file(&self, inputs: &Table) -> Result<Option<Rest>> {
-        let read = |path| readings::at_rest(&self.file.fields().read(path)?, inputs);
-        let of_file = self.untouched.baseline.as_deref().map(read).transpose()?;
-        Ok(of_file.map(|readings| Rest { readings, lines: None }))
-    }
-
-    /// Readings of the untouched sensor in the columns of `frames`: from a file of their own, or lines of the log `file`.
-    /// Inputs relative to the baseline need them.
-    fn rest(&self, file: &DataFile, frames: &Dataset, how: HowToTrain) -> Result<Option<Rest>> {
-        if let Some(rest) = self.rest_of_file(&frames.inputs)? {
-            return Ok(Some(rest));
+    /// Readings of the untouched sensor in the columns called `inputs`: from a file of their own, or lines of the log `file` by
+    /// its `outputs`. Inputs relative to the baseline need them.
+    fn rest(
+        &self,
+        file: &DataFile,
+        [inputs, outputs]: &[Vec<String>; 2],
+        relative: bool,
+    ) -> Result<Option<Rest>> {
+        if let Some(path) = self.untouched.baseline.as_deref() {
+            let readings = readings::at_rest(&self.file.fields().read(path)?, inputs)?;
+            return Ok(Some(Rest { readings, lines: None }));
         }
-        let outputs = frames.outputs.names.iter().map(String::as_str);
-        let rest = self.rest.find(file, (&frames.inputs.names, true), outputs)?;
-        if how.relative_inputs {
-            let Some(rest) = &rest else {
-                let message = "--relative-inputs: no line is known to be at rest: name columns that are zero there (--rest), \
-                               or give --baseline FILE, with frames of the untouched sensor";
-                return Err(Error::Unfit { path: file.path.clone(), message: message.into() });
-            };
-            check_level(&rest.readings, &frames.inputs, &file.path)?;
-            readings::check_baseline(&rest.readings, &file.path)?;
+        let rest = self.rest.find(file, (inputs, true), outputs.iter().map(String::as_str))?;
+        if rest.is_none() && relative {
+            let message = "--relative-inputs: no line is known to be at rest: name columns that are zero there (--rest), \
+                           or give --baseline FILE, with frames of the untouched sensor";
+            return Err(Error::Unfit { path: file.path.clone(), message: message.into() });
         }
         Ok(rest)
     }

@@ -69,7 +69,7 @@ impl DataFileArguments {
 
     /// Reads the file at `path` as [`read`](Self::read) does, with its text.
     pub fn read_with_text(&self, path: &Path) -> Result<DataFile> {
-        self.cut(self.fields.read_with_text(path)?)
+        self.cut(self.fields.read_as(path, true)?)
     }
 
     fn cut(&self, mut file: DataFile) -> Result<DataFile> {
@@ -153,11 +153,6 @@ impl FieldArguments {
         self.read_as(path, false)
     }
 
-    /// Reads the file at `path` as [`read`](Self::read) does, with its text.
-    pub fn read_with_text(&self, path: &Path) -> Result<DataFile> {
-        self.read_as(path, true)
-    }
-
     fn read_as(&self, path: &Path, keeps_text: bool) -> Result<DataFile> {
         if is_recording(path) {
             refuse_given(self.of_text(), |option| {
@@ -214,7 +209,9 @@ mod tests {
                 DataFile::parse(Path::new("d.csv"), text.as_bytes(), &Reading::default()).unwrap();
             let lines = |first_share, last_share| {
                 let cut = DataFileArguments { first_share, last_share, ..Default::default() };
-                cut.cut(file.clone()).map_or(vec![], |file| file.rows().map(|r| r[0]).collect())
+                cut.cut(file.clone()).map_or(vec![], |file| {
+                    (0..file.lines()).map(|line| file.value(line, 0)).collect()
+                })
             };
             for percent in 1..100 {
                 let share = |percent: i32| format!("0.{percent:02}").parse::<f64>().ok();

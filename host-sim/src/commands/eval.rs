@@ -86,10 +86,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
     let mut estimate = model.decode_table(&readings);
     let with_untold = estimate.values.clone();
-    estimate.values = truth.with_places(estimate.values.into_vec()).into();
+    estimate.values = truth.with_places(estimate.values.into_vec()).into_owned().into();
     let measure = measure_of(metadata);
     // The mean is judged on the same pairs as the model, and computed from them.
-    let pairs = truth.values.iter_mut().zip(&estimate.values);
+    let pairs = truth.values.iter_mut().zip(estimate.values.iter());
     pairs.filter(|(_, estimate)| estimate.is_nan()).for_each(|(truth, _)| *truth = f64::NAN);
     let is_empty = |line: &&[f64]| line.iter().all(|value| value.is_nan());
     let without_reading = estimate.lines().filter(is_empty).count();

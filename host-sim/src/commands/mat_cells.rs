@@ -2,7 +2,7 @@
 
 use taxel_data::dataset::USUAL_INPUTS;
 use taxel_data::mat::{self, Grid, Mat};
-use taxel_data::{DataFile, Table, columns};
+use taxel_data::{DataFile, columns};
 
 /// Input columns of a file, each with its name in a model: that of a cell, if they are a mat.
 pub struct MatCells {
@@ -25,9 +25,9 @@ impl MatCells {
         Ok(Self { names: own.zip(cells).collect(), found })
     }
 
-    /// Names `inputs`, which are among these columns, after their cells.
-    pub fn name(&self, inputs: &mut Table) {
-        for name in &mut inputs.names {
+    /// Names inputs, which are among these columns, after their cells.
+    pub fn name(&self, inputs: &mut [String]) {
+        for name in inputs {
             if let Some((_, cell)) = self.names.iter().find(|(own, _)| own == name) {
                 name.clone_from(cell);
             }

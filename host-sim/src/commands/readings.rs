@@ -81,9 +81,9 @@ impl BaselineArgument {
     }
 }
 
-/// Readings of the untouched sensor in `file`, in the columns of `inputs`, of which every one has a mean to divide by.
-pub fn at_rest(file: &DataFile, inputs: &Table) -> Result<Table> {
-    let rest = usual_lines(file, inputs.names.iter().map(String::as_str))?;
+/// Readings of the untouched sensor in `file`, in the columns called `inputs`, of which every one has a mean to divide by.
+pub fn at_rest(file: &DataFile, inputs: &[String]) -> Result<Table> {
+    let rest = usual_lines(file, inputs.iter().map(String::as_str))?;
     check_baseline(&rest, &file.path)?;
     Ok(rest)
 }

@@ -5,7 +5,7 @@ use crate::subject::Subject;
 use taxel_core::health::Limits;
 use taxel_data::{Stream, Table};
 use taxel_learn::faults::{Place, diagnose};
-use taxel_learn::health::judge;
+use taxel_learn::health::{fault, judge};
 use taxel_simulate::Synthesis;
 
 /// Frames of a scene that are looked at.
@@ -28,6 +28,11 @@ pub fn note(readings: &Table, source: &str) {
 
 fn notes(readings: &Table, source: &str) -> Vec<String> {
     let limits = Limits::USUAL;
+    let is_faulty =
+        |(name, reading): (&String, &f64)| fault(name, *reading, Some(limits)).is_some();
+    if !readings.lines().any(|line| readings.names.iter().zip(line).any(is_faulty)) {
+        return vec![]; // without a copy of all readings
+    }
     let mut columns = judge(&mut readings.clone(), Some(limits));
     columns.iter_mut().for_each(|column| column.missing = 0); // lines without a value are told of elsewhere
     columns.retain(|column| column.faulty() > 0);

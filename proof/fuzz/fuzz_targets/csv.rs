@@ -23,24 +23,30 @@ fuzz_target!(|bytes: &[u8]| {
     let Ok(file) = DataFile::parse(path, bytes, &reading) else { return };
     let lines: Vec<u64> = (0..file.lines()).map(|line| file.line_number(line)).collect();
     assert!(lines.is_sorted_by(|one, next| one < next), "line numbers that do not rise");
-    let read: Vec<&[f64]> = file.rows().collect();
+    let read = &values(&file);
     assert!(!read.iter().any(|line| line.iter().any(|value| value.is_infinite())), "infinite");
     if file.found.is_empty() && *stated < 2 {
         let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let is_number = |column: usize| file.check_numbers(&[column]).is_ok();
         let columns: Vec<bool> = (0..file.header.len()).map(is_number).collect();
-        compare(&read, &by_crate(text, file.names_columns, &columns));
+        compare(read, &by_crate(text, file.names_columns, &columns));
     }
     // That name would state a separator.
     if !file.header[0].to_ascii_lowercase().starts_with("sep=") {
-        let again = as_plain(path, &file, &read);
+        let again = as_plain(path, &file, read);
         assert_eq!(again.header, file.header);
-        compare(&read, &again.rows().map(<[f64]>::to_vec).collect::<Vec<_>>());
+        compare(read, &values(&again));
     }
 });
 
+/// Values of all lines of a file.
+fn values(file: &DataFile) -> Vec<Vec<f64>> {
+    let line = |line| (0..file.header.len()).map(|column| file.value(line, column)).collect();
+    (0..file.lines()).map(line).collect()
+}
+
 /// The names of `file` and its `lines`, written as plain CSV and read again.
-fn as_plain(path: &Path, file: &DataFile, lines: &[&[f64]]) -> DataFile {
+fn as_plain(path: &Path, file: &DataFile, lines: &[Vec<f64>]) -> DataFile {
     let quoted = |name: &String| format!("\"{}\"", name.replace('"', "\"\""));
     let mut plain = file.header.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n";
     for line in lines {
@@ -88,7 +94,7 @@ fn number(field: &[u8], is_number: bool) -> f64 {
 }
 
 /// Compares numbers to the bit; infinity stands for a time stamp, which is not compared.
-fn compare(read: &[&[f64]], expected: &[Vec<f64>]) {
+fn compare(read: &[Vec<f64>], expected: &[Vec<f64>]) {
     assert_eq!(read.len(), expected.len(), "another number of lines");
     for (read, expected) in read.iter().zip(expected) {
         assert_eq!(read.len(), expected.len(), "another number of fields");

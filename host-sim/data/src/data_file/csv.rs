@@ -1,93 +1,88 @@
 //! Text files: a header of names, then one frame a line. Files without a header are recognised.
 
 use std::collections::HashSet;
-use std::path::Path;
 
-use super::dialect::Dialect;
+use super::blocks::{BLOCK, Blocks};
 use super::{DataFile, NotNumbers, Reading, Texts, numbered, time};
 use crate::columns::some_names;
 use crate::error::{Error, Problem, Result};
+use crate::input::Source;
 
 mod body;
 
-/// Parses the bytes of a text file of any dialect; `path` names it in messages.
-pub(super) fn parse(path: &Path, bytes: &[u8], reading: &Reading) -> Result<DataFile> {
-    let error = |problem| Error::file(path, problem);
-    let found = Dialect::find(bytes, reading.stated, reading.has_header);
-    let (dialect, text) = found.map_err(error)?;
-    let plain = dialect.to_plain(&text).map_err(error)?;
-    let mut file = parse_plain(path, &plain, reading.has_header || dialect.has_names())?;
-    file.add_found(&dialect.found);
-    if reading.keeps_text {
-        file.texts = Some(texts(&file, &plain));
+/// Bytes that end lines.
+const ENDS: [u8; 2] = *b"\n\r";
+
+/// Reads the text file of `source`, of any dialect.
+pub(super) fn parse(source: Source<'_>, reading: &Reading) -> Result<DataFile> {
+    let source = source.unpacked()?;
+    let (path, is_packed) = (source.path, source.is_packed);
+    let mut blocks = Blocks::new(source, reading)?;
+    let mut block = blocks.next()?.unwrap_or_default();
+    let mut file = DataFile { path: path.into(), ..DataFile::default() };
+    file.texts = reading.keeps_text.then(Texts::default);
+    let has_names = reading.has_header || blocks.dialect.has_names();
+    let start = read_header(&mut file, &block, has_names)?;
+    let seen = file.header.iter().map(|_| Seen::default()).collect();
+    let mut body = Body { file, seen, line: 1 + line_ends(&block[..start]) };
+    block.drain(..start);
+    loop {
+        let next = blocks.next()?;
+        let used = body.add(&block, next.is_none())?;
+        let Some(mut next) = next else { break };
+        next.splice(..0, block.drain(used..));
+        block = next;
     }
+    let Body { mut file, seen, .. } = body;
+    if file.values.is_empty() {
+        return Err(Error::file(path, Problem::NoLines));
+    }
+    file.values.shrink_to_fit();
+    file.kept = 0..file.line_numbers.len();
+    file.not_numbers = seen.into_iter().filter_map(|it| it.not_numbers).collect();
+    file.lacks_last_line_end = !matches!(block[..], [.., b'\n' | b'\r']);
+    file.add_found(&blocks.dialect.found);
+    file.add_found(if is_packed { "gzip" } else { "" });
     Ok(file)
 }
 
-/// Parses plain CSV `text`. The first line is a header even if it holds numbers alone, if it `has_header`.
-fn parse_plain(path: &Path, text: &[u8], has_header: bool) -> Result<DataFile> {
-    let error = |problem| Error::file(path, problem);
+/// Reads the names of columns from the beginning of a plain `text`; returns where the lines of data begin. The first line is
+/// a header even if it holds numbers alone, if it `has_names`.
+fn read_header(file: &mut DataFile, text: &[u8], has_names: bool) -> Result<usize> {
+    let error = |problem| Error::file(&file.path, problem);
     let mut reader = reader(text, true);
     let header = reader.headers().map_err(|e| error(Problem::Header { cause: cause_of(&e) }))?;
     let mut header: Vec<String> = header.iter().map(|name| name.trim().to_owned()).collect();
     if header.is_empty() {
         return Err(error(Problem::Empty));
     }
-    if header.len() == 1
-        && let Some(line) = blank_line(text)
-    {
-        return Err(error(Problem::BlankLine { line }));
-    }
-    let names_columns = has_header || !holds_numbers(&header);
-    let mut found = String::new();
-    let (header, lines) = if names_columns {
+    let mut start = 0;
+    file.names_columns = has_names || !holds_numbers(&header);
+    if file.names_columns {
         let nameless = name_columns(&mut header).map_err(error)?;
         if !nameless.is_empty() {
-            found = format!("columns without a name are called {}", some_names(&nameless));
+            file.found = format!("columns without a name are called {}", some_names(&nameless));
         }
-        let lines = lines_of_data(text, reader.position());
-        (header, lines)
+        start = reader.position().byte() as usize;
+        start += usize::from(text[..start].ends_with(b"\r") && text[start..].starts_with(b"\n"));
     } else {
-        reader = self::reader(text, false);
-        (numbered(header.len()), Some((1, text)))
-    };
-    let values = lines.and_then(|(_, lines)| body::read(lines, header.len()));
-    let (values, line_numbers, not_numbers) = match (lines, values) {
-        (Some((first, _)), Some(values)) if !values.is_empty() => {
-            let line_numbers = (first..).take(values.len() / header.len()).collect();
-            (values, line_numbers, vec![])
-        }
-        _ => read_carefully(path, text, &mut reader, &header)?,
-    };
-    let lacks_last_line_end = !matches!(text, [.., b'\n' | b'\r']);
-    Ok(DataFile {
-        kept: 0..line_numbers.len(),
-        path: path.into(),
-        header,
-        names_columns,
-        lacks_last_line_end,
-        found,
-        values,
-        line_numbers,
-        not_numbers,
-        ..DataFile::default()
-    })
+        header = numbered(header.len());
+    }
+    file.header = header;
+    Ok(start)
 }
 
-/// Fields of `file`, which was parsed from plain `text`, as they are written there.
-fn texts(file: &DataFile, plain: &[u8]) -> Texts {
-    let mut reader = reader(plain, file.names_columns);
-    let (mut text, mut record) = (String::new(), csv::ByteRecord::new());
-    let mut places = Vec::with_capacity(file.values.len() + 1);
-    places.push(0);
-    // What was parsed has no error.
-    while reader.read_byte_record(&mut record).unwrap_or(false) {
-        for field in &record {
-            text += String::from_utf8_lossy(field).trim();
-            places.push(text.len());
+impl Texts {
+    /// Adds the fields of these `lines` of plain text, in which no error was found.
+    fn add(&mut self, lines: &[u8]) {
+        let (mut reader, mut record) = (reader(lines, false), csv::ByteRecord::new());
+        while reader.read_byte_record(&mut record).unwrap_or(false) {
+            for field in &record {
+                self.text += String::from_utf8_lossy(field).trim();
+                self.ends.push(self.text.len());
+            }
         }
     }
-    Texts { text, places }
 }
 
 fn reader(text: &[u8], has_header: bool) -> csv::Reader<&[u8]> {
@@ -164,85 +159,98 @@ impl Seen {
     }
 }
 
-/// Reads the lines of data one by one, quotes, blank lines, text and times included.
-fn read_carefully(
-    path: &Path,
-    bytes: &[u8],
-    reader: &mut csv::Reader<&[u8]>,
-    header: &[String],
-) -> Result<(Vec<f64>, Vec<u64>, Vec<NotNumbers>)> {
-    let error = |problem| Error::file(path, problem);
-    let mut values = Vec::new();
-    let mut line_numbers = Vec::new();
-    let mut lines = LineCount { bytes, at: 0, line: 1 };
-    let mut record = csv::ByteRecord::new();
-    let mut seen: Vec<Seen> = header.iter().map(|_| Seen::default()).collect();
-    let read_error = |e: csv::Error| error(Problem::Line { cause: cause_of(&e) });
-    while reader.read_byte_record(&mut record).map_err(read_error)? {
-        let line = lines.of_record_at(record.position().map_or(0, csv::Position::byte));
-        if record.len() != header.len() {
-            let (fields, columns) = (record.len(), header.len());
-            return Err(error(if reader.has_headers() {
-                Problem::FieldCount { line, fields, columns }
-            } else {
-                Problem::UnevenLine { line, fields, columns }
-            }));
-        }
-        for (column, (field, seen)) in record.iter().zip(&mut seen).enumerate() {
-            values.push(seen.value(field, line, column));
-        }
-        line_numbers.push(line);
-    }
-    if values.is_empty() {
-        return Err(error(Problem::NoLines));
-    }
-    Ok((values, line_numbers, seen.into_iter().filter_map(|it| it.not_numbers).collect()))
-}
-
-/// Count of lines; the CSV reader's own count is one short where lines end in CR LF.
-struct LineCount<'b> {
-    bytes: &'b [u8],
-    at: usize,
+/// Lines of data that are read block by block.
+struct Body {
+    file: DataFile,
+    seen: Vec<Seen>,
+    /// Number of the next line.
     line: u64,
 }
 
-impl LineCount<'_> {
-    /// Number (from 1) of the line on which the record after byte `position` begins. `position` never
-    /// decreases.
-    fn of_record_at(&mut self, position: u64) -> u64 {
-        let is_end = |byte: u8| matches!(byte, b'\r' | b'\n');
-        while let Some(&byte) = self.bytes.get(self.at)
-            && ((self.at as u64) < position || is_end(byte))
-        {
-            self.at += 1;
-            let ends = byte == b'\n' || byte == b'\r' && self.bytes.get(self.at) != Some(&b'\n');
-            self.line += u64::from(ends);
+impl Body {
+    /// Adds `lines` of plain text, up to an unfinished one unless they are the last; returns the bytes of what was added.
+    fn add(&mut self, lines: &[u8], are_last: bool) -> Result<usize> {
+        // Lines that were no lines of the table are blank.
+        let start = lines.iter().position(|byte| !ENDS.contains(byte)).unwrap_or(lines.len());
+        self.line += line_ends(&lines[..start]);
+        let used = match self.add_plain(&lines[start..]) {
+            Some(()) => lines.len(),
+            None => start + self.add_carefully(&lines[start..], are_last)?,
+        };
+        if let Some(texts) = &mut self.file.texts {
+            texts.add(&lines[..used]);
         }
-        self.line
+        Ok(used)
+    }
+
+    /// Adds `lines` on all cores, if they hold nothing but numbers.
+    fn add_plain(&mut self, lines: &[u8]) -> Option<()> {
+        let (columns, before) = (self.file.header.len(), self.file.values.len());
+        if self.seen.iter().any(|seen| seen.time) {
+            return None;
+        }
+        body::read(lines, columns, &mut self.file.values)?;
+        let added = &self.file.values[before..];
+        for (column, seen) in self.seen.iter_mut().enumerate().filter(|(_, seen)| !seen.number) {
+            seen.number = added.iter().skip(column).step_by(columns).any(|value| !value.is_nan());
+        }
+        let next = self.line + (added.len() / columns) as u64;
+        self.file.line_numbers.extend(self.line..next);
+        self.line = next;
+        Some(())
+    }
+
+    /// Adds `lines` one by one, quotes, blank lines, text and times included; returns the bytes of what was added.
+    fn add_carefully(&mut self, lines: &[u8], are_last: bool) -> Result<usize> {
+        let Self { file, seen, line } = self;
+        let path = file.path.clone();
+        let error = |problem| Error::file(&path, problem);
+        let columns = file.header.len();
+        let (mut reader, mut record) = (reader(lines, false), csv::ByteRecord::new());
+        let mut at = 0;
+        let read_error = |e: csv::Error| error(Problem::Line { cause: cause_of(&e) });
+        while reader.read_byte_record(&mut record).map_err(read_error)? {
+            let mut start = record.position().map_or(0, |position| position.byte() as usize);
+            start += lines[start..].iter().take_while(|byte| ENDS.contains(byte)).count();
+            *line += line_ends(&lines[at..start]);
+            at = start;
+            // A quoted field that goes on in the next block has taken the last line end.
+            let ends_block = !are_last && reader.position().byte() == lines.len() as u64;
+            if ends_block
+                && record
+                    .iter()
+                    .next_back()
+                    .and_then(<[u8]>::last)
+                    .is_some_and(|byte| ENDS.contains(byte))
+            {
+                if lines.len() - at > BLOCK {
+                    let cause = format!("line {line}: a quoted field does not end");
+                    return Err(error(Problem::Line { cause }));
+                }
+                return Ok(at);
+            }
+            let (line, fields) = (*line, record.len());
+            if fields != columns {
+                return Err(error(if file.names_columns {
+                    Problem::FieldCount { line, fields, columns }
+                } else {
+                    Problem::UnevenLine { line, fields, columns }
+                }));
+            }
+            file.line_numbers.push(line);
+            let fields = record.iter().zip(&mut *seen).enumerate();
+            let values = fields.map(|(column, (field, seen))| seen.value(field, line, column));
+            file.values.extend(values);
+        }
+        *line += line_ends(&lines[at..]);
+        Ok(lines.len())
     }
 }
 
-/// Number (from 1) of the first line after the header, and those lines; `None` where the header's end is
-/// not certain.
-fn lines_of_data<'b>(bytes: &'b [u8], position: &csv::Position) -> Option<(u64, &'b [u8])> {
-    let (header, lines) = bytes.split_at_checked(usize::try_from(position.byte()).ok()?)?;
-    let lines = match (header.last()?, lines.strip_prefix(b"\n")) {
-        (b'\n', _) => lines,
-        (b'\r', Some(lines)) => lines,
-        _ => return None,
-    };
-    // Lines that were no lines of the table are blank.
-    let blank = lines.iter().position(|byte| !matches!(byte, b'\n' | b'\r')).unwrap_or(0);
-    let lines = &lines[blank..];
-    Some((LineCount { bytes, at: 0, line: 1 }.of_record_at(position.byte()), lines))
-}
-
-/// Number (from 1) of the first blank line that a line of text follows.
-fn blank_line(bytes: &[u8]) -> Option<usize> {
-    let is_blank = |line: &[u8]| line.iter().all(u8::is_ascii_whitespace);
-    let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
-    let last = lines.iter().rposition(|line| !is_blank(line))?;
-    lines[..last].iter().position(|line| is_blank(line)).map(|index| index + 1)
+/// Number of line ends in a text: LF, CR or both. The CSV reader's own count is one short where lines end in CR LF.
+fn line_ends(text: &[u8]) -> u64 {
+    let is_end = |at: &usize| text[*at] == b'\n' || text.get(at + 1) != Some(&b'\n');
+    memchr::memchr2_iter(b'\n', b'\r', text).filter(is_end).count() as u64
 }
 
 /// Words for a missing value, but for NaN and an empty field. Letters may be upper or lower case.

@@ -38,7 +38,7 @@ pub struct Stated {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Encoding {
+pub(super) enum Encoding {
     Utf8,
     Utf16 { is_big_endian: bool },
     Latin1,
@@ -58,29 +58,33 @@ pub(super) struct Dialect {
     left_out: Vec<usize>,
     /// Number of columns, without one that a separator at the end of each line makes.
     columns: usize,
+    has_one_column: bool,
     ends_in_separator: bool,
     /// What is not plain, in words.
     pub(super) found: String,
+    /// Number of lines that were made plain so far.
+    lines: usize,
+    /// Number (from 1) of the first blank one among them.
+    blank: Option<usize>,
 }
 
 /// Fields of a line of the table, and its number (from 0) in the file.
 type Line<'t> = (usize, Vec<Cow<'t, str>>);
 
 impl Dialect {
-    /// Finds the dialect of a file of these `bytes`, and decodes them to UTF-8 without a byte order mark. The first line
+    /// Finds the dialect of a text that begins with these `bytes`, in UTF-8 unless the `encoding` is Latin-1. The first line
     /// holds names, if it `has_header`.
     pub(super) fn find(
+        encoding: Encoding,
         bytes: &[u8],
         stated: Stated,
         has_header: bool,
-    ) -> Result<(Self, Cow<'_, [u8]>), Problem> {
-        let encoding = Encoding::of(bytes);
-        let text = encoding.decode(bytes);
-        let sample = String::from_utf8_lossy(sample(&text)).into_owned();
+    ) -> Result<Self, Problem> {
+        let sample = String::from_utf8_lossy(sample(bytes)).into_owned();
         if sample.contains('\0') {
             return Err(Problem::NoText);
         }
-        Ok((Self::of_sample(encoding, &sample, stated, has_header)?, text))
+        Self::of_sample(encoding, &sample, stated, has_header)
     }
 
     fn of_sample(
@@ -181,8 +185,11 @@ impl Dialect {
             header,
             left_out,
             columns: table.last().map_or(0, |(_, fields)| fields.len()),
+            has_one_column: table.first().is_some_and(|(_, fields)| fields.len() == 1),
             ends_in_separator,
             found: words.collect::<Vec<_>>().join(", "),
+            lines: 0,
+            blank: None,
         })
     }
 
@@ -201,20 +208,20 @@ impl Dialect {
             && !self.ends_in_separator
     }
 
-    /// Plain CSV text of the same table: commas, points in numbers. Lines keep their numbers: what is no line of the
-    /// table becomes a blank one.
-    pub(super) fn to_plain<'b>(&self, text: &'b [u8]) -> Result<Cow<'b, [u8]>, Problem> {
-        if self.is_plain() {
-            return Ok(text.into());
+    /// Plain CSV text of the next lines of the table: commas, points in numbers. Lines keep their numbers: what is no line of
+    /// the table becomes a blank one.
+    pub(super) fn rewrite(&mut self, text: Vec<u8>) -> Result<Vec<u8>, Problem> {
+        if self.is_plain() && !self.has_one_column {
+            return Ok(text);
         }
-        let text = String::from_utf8_lossy(text);
+        let text = String::from_utf8_lossy(&text);
         let mut plain = String::with_capacity(text.len() + 64);
-        let mut blank = None;
-        for (index, (line, end)) in lines(&text).enumerate() {
-            let number = index as u64 + 1;
+        for (line, end) in lines(&text) {
+            let (index, number) = (self.lines, self.lines as u64 + 1);
+            self.lines += 1;
             if line.trim().is_empty() {
-                blank = blank.or(Some(number as usize));
-            } else if let (Some(line), true) = (blank, self.columns == 1) {
+                self.blank = self.blank.or(Some(index + 1));
+            } else if let (Some(line), true) = (self.blank, self.has_one_column) {
                 return Err(Problem::BlankLine { line });
             }
             let is_left_out = line.trim().is_empty() || self.left_out.contains(&index);
@@ -230,7 +237,7 @@ impl Dialect {
             }
             plain.push_str(end);
         }
-        Ok(plain.into_bytes().into())
+        Ok(plain.into_bytes())
     }
 
     /// Appends a line of the table, of this number.
@@ -259,7 +266,7 @@ impl Dialect {
 }
 
 impl Encoding {
-    fn of(bytes: &[u8]) -> Self {
+    pub(super) fn of(bytes: &[u8]) -> Self {
         let zeros = |from: usize| {
             bytes.iter().take(64).skip(from).step_by(2).filter(|byte| **byte == 0).count()
         };
@@ -278,23 +285,20 @@ impl Encoding {
         }
     }
 
-    /// `bytes` in UTF-8, without a byte order mark.
-    fn decode(self, bytes: &[u8]) -> Cow<'_, [u8]> {
-        match self {
-            Self::Utf8 => bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).into(),
-            Self::Latin1 => {
-                let text: String = bytes.iter().map(|byte| char::from(*byte)).collect();
-                text.into_bytes().into()
-            }
+    /// `bytes` in UTF-8, without a byte order mark. UTF-16 is decoded as a whole.
+    pub(super) fn decode(self, bytes: Vec<u8>) -> Vec<u8> {
+        let text: String = match self {
+            Self::Utf8 => return bytes,
+            Self::Latin1 => bytes.iter().map(|byte| char::from(*byte)).collect(),
             Self::Utf16 { is_big_endian } => {
                 let unit = if is_big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
                 let units = bytes.as_chunks::<2>().0.iter().map(|bytes| unit(*bytes));
                 let text = char::decode_utf16(units)
                     .map(|char| char.unwrap_or(char::REPLACEMENT_CHARACTER));
-                let text: String = text.collect();
-                text.strip_prefix('\u{feff}').unwrap_or(&text).as_bytes().to_vec().into()
+                text.collect()
             }
-        }
+        };
+        text.into_bytes()
     }
 }
 

@@ -17,6 +17,9 @@ use crate::verdict::{Verdict, Warning};
 /// Most frames of a scene that are synthesised for it.
 const FRESH_FRAMES: usize = 2000;
 
+/// Most frames of a data set that are decoded for it: an even selection where there are more.
+const MOST_FRAMES: usize = 32_768;
+
 /// Frames that errors were measured on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -69,7 +72,10 @@ impl Worth {
                 (JudgedOn::FreshFrames, on_frames(blob, set, &test, &scene.measure()))
             }
             (None, Subject::Measured(data)) => {
-                (JudgedOn::TrainingFrames, on_frames(blob, set, &set.frames, &data.measure()))
+                let step = set.frames.frames().div_ceil(MOST_FRAMES).max(1);
+                let some: Vec<usize> = (0..set.frames.frames()).step_by(step).collect();
+                let frames = set.frames.subset(&some);
+                (JudgedOn::TrainingFrames, on_frames(blob, set, &frames, &data.measure()))
             }
         };
         let no_limit = LimitSummary::new(&Err(Refusal::Measured));

@@ -155,7 +155,7 @@ mod tests {
         let fit = |covariance| hidden.fit(&table, 0.005, covariance);
         let [exact, nothing] = [1e12, 1e-12].map(|it| fit(it).predict(&table.inputs.values));
         let far = |predicted: &[f64]| {
-            let pairs = predicted.iter().zip(&table.outputs.values);
+            let pairs = predicted.iter().zip(table.outputs.values.iter());
             pairs.map(|(p, y)| (p - y).abs()).fold(0.0, f64::max)
         };
         assert!(far(&exact) < 1e-6, "{}", far(&exact));

@@ -26,7 +26,7 @@ fn log(lines: usize, pressed: impl Fn(usize) -> bool) -> Dataset {
     let mut random = Random::new(4, Stream::Training, Purpose::Noise, 0, 0);
     let names = |name: &str, count: usize| (1..=count).map(|i| format!("{name}{i}")).collect();
     let mut data = Dataset::empty(names("ch", 4), names("f", 1), 1, lines);
-    let frames = data.inputs.values.chunks_exact_mut(4).zip(&mut data.outputs.values);
+    let frames = data.inputs.values.chunks_exact_mut(4).zip(data.outputs.values.iter_mut());
     for (line, (inputs, force)) in frames.enumerate() {
         *force = if pressed(line) { 1.0 + random.unit() } else { 0.001 * random.normal() };
         for (channel, value) in inputs.iter_mut().enumerate() {

@@ -192,7 +192,7 @@ fn filled_readings_are_as_near_as_noise_lets_them_be() {
         }
         let (filled, counts) = model.filled(&faulty.values, None).unwrap();
         assert!(counts.iter().all(|count| *count == missing.len()));
-        let errors = filled.iter().zip(&fresh.values).enumerate();
+        let errors = filled.iter().zip(fresh.values.iter()).enumerate();
         for at in &missing {
             let of = errors.clone().skip(*at).step_by(36).map(|(_, (a, b))| (a - b).powi(2));
             let error = (of.sum::<f64>() / fresh.len() as f64).sqrt();
@@ -200,7 +200,7 @@ fn filled_readings_are_as_near_as_noise_lets_them_be() {
             assert!((0.2..0.4).contains(&error), "{at}: {error} Ω");
             assert!(error < 0.7 * deviations[*at], "{at}: {error} Ω of {}", deviations[*at]);
         }
-        let untouched = filled.iter().zip(&faulty.values).filter(|(_, b)| !b.is_nan());
+        let untouched = filled.iter().zip(faulty.values.iter()).filter(|(_, b)| !b.is_nan());
         untouched.for_each(|(a, b)| assert_eq!(a.to_bits(), b.to_bits()));
     }
     // A row is half of the readings: too much.

@@ -61,12 +61,13 @@ impl Sensor {
         let (deviations, novelty) = model.assess(&readings.values).unwrap();
         let novel = novelty.iter().filter(|it| **it > 0.0).count() as f64 / novelty.len() as f64;
         let decoded = model.decode_table(&readings).values;
-        let errors = decoded.iter().zip(&self.test.outputs.values).map(|(a, b)| (a - b).abs());
+        let errors =
+            decoded.iter().zip(self.test.outputs.values.iter()).map(|(a, b)| (a - b).abs());
         let within = errors.zip(&deviations).filter(|(error, of)| error <= of).count();
         let mut missing = readings.values.clone();
         missing.iter_mut().skip(4).step_by(18).for_each(|it| *it = f64::NAN);
         let (filled, _) = model.filled(&missing, None).unwrap();
-        let of_wire = filled.iter().zip(&readings.values).skip(4).step_by(18);
+        let of_wire = filled.iter().zip(readings.values.iter()).skip(4).step_by(18);
         let squares: Vec<f64> = of_wire.map(|(a, b)| (a - b) * (a - b)).collect();
         [novel, within as f64 / decoded.len() as f64, mean(&squares).sqrt()]
     }

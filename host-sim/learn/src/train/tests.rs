@@ -29,12 +29,12 @@ fn the_standard_network_interpolates_its_samples_exactly() {
     let table = table(60, 0.2);
     let standard = StandardNetwork::fit(&table, 0.05).unwrap();
     let predicted = standard.predict(&table.inputs.values);
-    let differ = predicted.iter().zip(&table.outputs.values).map(|(p, y)| (p - y).abs());
+    let differ = predicted.iter().zip(table.outputs.values.iter()).map(|(p, y)| (p - y).abs());
     assert!(differ.fold(0.0, f64::max) < 1e-9);
     assert_eq!(StandardNetwork::fit(&table, 30.0), None, "its solution misses the samples");
     let mut twice = table.clone();
-    twice.inputs.values.extend(&table.inputs.values);
-    twice.outputs.values.extend(&table.outputs.values);
+    twice.inputs.values.extend(table.inputs.values.iter());
+    twice.outputs.values.extend(table.outputs.values.iter());
     assert!(StandardNetwork::fit(&twice, 0.05).is_none(), "duplicates cannot be interpolated");
 }
 

@@ -78,8 +78,13 @@ fn noise_of_each_kind_has_the_size_it_is_asked_for_in_frames_and_in_baselines() 
         let found = moments(&noisy.inputs, &ideal.inputs, sigma_ohm);
         check_standard_normal(found, noisy.inputs.values.len(), kind.name());
         // White: neither neighbours in a frame nor those from frame to frame go together.
-        let differences: Vec<f64> =
-            noisy.inputs.values.iter().zip(&ideal.inputs.values).map(|(a, b)| a - b).collect();
+        let differences: Vec<f64> = noisy
+            .inputs
+            .values
+            .iter()
+            .zip(ideal.inputs.values.iter())
+            .map(|(a, b)| a - b)
+            .collect();
         let variance = differences.iter().map(|n| n * n).sum::<f64>();
         for apart in [1, 18] {
             let products: f64 = differences.windows(apart + 1).map(|n| n[0] * n[apart]).sum();
@@ -248,7 +253,7 @@ fn synthesised_numbers_are_fixed_for_all_time() {
         ("mix", World::of_motion(mix), 0x108d_4c69_134e_e9ab),
     ] {
         let dataset = synthesise(&world, Stream::Training, 10);
-        let values = dataset.inputs.values.iter().chain(&dataset.outputs.values);
+        let values = dataset.inputs.values.iter().chain(dataset.outputs.values.iter());
         let bytes: Vec<u8> = values.flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(digest(&bytes), pinned, "{name}");
     }
@@ -323,7 +328,7 @@ fn the_centre_of_a_contact_that_is_lifted_is_missing() {
     let middle = synthesis.clone().timed(Timetable::instants(middle));
     let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
     let there = middle.true_outputs(Stream::Test, 300 * 8);
-    assert!(outputs.values.iter().zip(&there.values).all(same));
+    assert!(outputs.values.iter().zip(there.values.iter()).all(same));
 }
 
 /// World of `press` with noise of a memory.
@@ -464,7 +469,7 @@ fn rubber_with_a_memory_changes_where_electrodes_are_and_not_what_pushes_them() 
     for outputs in [forces().into(), contact()] {
         let [remembering, at_once] = [&world, &elastic].map(|it| frames(it, outputs.clone()));
         let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
-        assert!(remembering.outputs.values.iter().zip(&at_once.outputs.values).all(same));
+        assert!(remembering.outputs.values.iter().zip(at_once.outputs.values.iter()).all(same));
         assert_ne!(remembering.inputs.values, at_once.inputs.values);
     }
     // Readings are those of the electrodes' places.

@@ -3,15 +3,15 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{DataArguments, HowToTrain, JudgedBy, with_options};
+use super::{DataArguments, HowToTrain, JudgedBy, check_level, with_options};
 use crate::commands::mat_cells::MatCells;
-use crate::commands::{data_notes, refused_readings, stderr};
+use crate::commands::{data_notes, readings, refused_readings, stderr};
 use crate::measurements::{Frames, Judged, Log, Measurements, Split, Spread};
 use crate::over_time::is_log;
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use taxel_data::clock::neighbours_alike;
-use taxel_data::dataset::{LeftOut, UnusedInputs};
+use taxel_data::dataset::{Chosen, LeftOut, UnusedInputs};
 use taxel_data::error::Problem;
 use taxel_data::{Clock, DataFile, Dataset};
 use taxel_learn::outliers::{self, Outliers};
@@ -35,13 +35,8 @@ impl DataArguments {
         for wire in cells.silent_wires(&unused.names()) {
             stderr::remark(format_args!("note: {wire}: none of its readings tells anything"));
         }
-        let (all, outliers, left_out) = self.usual_frames(&file, (&unused, &cells), how)?;
-        let given_folds = self
-            .fold_column
-            .as_ref()
-            .map(|name| folds_from(&file, name, &all.log.lines))
-            .transpose()?;
-        let digest = file.digest(&all.frames.names())?;
+        let Usual { all, outliers, left_out, digest, folds: given_folds } =
+            self.usual_frames(file, (&unused, &cells), self.fold_column.as_deref(), how)?;
         let judged_by = self.judged(judged, &all.frames, &unused, digest, how)?;
         let Split { training: kept, test, choice } =
             Split::new(&all, given_folds.as_deref(), judged_by);
@@ -120,44 +115,61 @@ impl DataArguments {
         Outliers { left_out: false, kept: (0..frames.frames()).collect(), ..outliers }
     }
 
-    /// Frames of `file` without outliers and without unused inputs, the outliers, and the lines that lack a value.
+    /// Frames of `file` without outliers and without the `unused` inputs, which are named after their `cells`, with the
+    /// folds that a column tells. The file's memory becomes theirs.
     fn usual_frames(
         &self,
-        file: &DataFile,
-        inputs: (&UnusedInputs, &MatCells),
+        file: DataFile,
+        (unused, cells): (&UnusedInputs, &MatCells),
+        fold_column: Option<&str>,
         how: HowToTrain,
-    ) -> Result<(Frames, Outliers, LeftOut)> {
-        let (frames, lines, missing) = self.frames(file, inputs)?;
-        let outliers = self.outliers(&frames, |frame| file.line_number(lines[frame]));
+    ) -> Result<Usual> {
+        let [inputs, outputs] = self.patterns();
+        let mut chosen =
+            Chosen::new(&file, inputs, outputs, &unused.names()).map_err(with_options)?;
+        cells.name(&mut chosen.names[0]);
+        let names: Vec<&str> = chosen.names.iter().flatten().map(String::as_str).collect();
+        let digest = file.digest(&names)?;
+        let clock = Clock::of(&file, self.clock.time.as_deref())?;
+        let why_counted = clock.why_counted(&file);
+        let rest = self.rest(&file, &chosen.names, how.relative_inputs)?.map(Arc::new);
+        let column = fold_column.map(|name| file.column(name)).transpose()?;
+        let fold_values: Option<Vec<f64>> =
+            column.map(|column| (0..file.lines()).map(|line| file.value(line, column)).collect());
+        let path = file.path.clone();
+
+        let (mut frames, kept) = Dataset::from_file(file, chosen).map_err(with_options)?;
+        data_notes::print_left_out(&kept.left_out, &path, kept.of);
+        let outliers = self.outliers(&frames, |frame| kept.numbers[frame]);
         let left_out = "training and judging (--keep-outliers keeps them)";
-        data_notes::print_outliers(&outliers, &file.path, frames.frames(), left_out);
-        let lines = outliers.kept.iter().map(|frame| lines[*frame]).collect();
-        let frames = frames.subset(&outliers.kept);
-        refused_readings::note(&frames.inputs, &file.path.display().to_string());
-        let log = Log { clock: Clock::of(file, self.clock.time.as_deref())?, lines };
-        if let Some(why) = log.clock.why_counted(file) {
+        data_notes::print_outliers(&outliers, &path, frames.frames(), left_out);
+        frames.keep(&outliers.kept);
+        refused_readings::note(&frames.inputs, &path.display().to_string());
+        if let Some(why) = why_counted {
             stderr::remark(format_args!("note: {why}; lines are counted instead (--time)"));
         }
-        let rest = self.rest(file, &frames, how)?.map(Arc::new);
-        if rest.is_none() && !self.rest.is_given() && is_log(&log, &frames.outputs) {
-            data_notes::print_no_rest(&frames.outputs, &file.path);
+        let log = Log { clock, lines: outliers.kept.iter().map(|it| kept.lines[*it]).collect() };
+        let of_log = rest.as_ref().filter(|rest| how.relative_inputs && rest.lines.is_some());
+        if let Some(rest) = of_log {
+            check_level(&rest.readings, &frames.inputs, &path)?;
+            readings::check_baseline(&rest.readings, &path)?;
         }
-        Ok((Frames { frames, log, rest }, outliers, missing))
-    }
-
-    /// Frames of `file` without the `unused` inputs, which are named after their `cells`; the indices of their lines, and the
-    /// lines that lack a value.
-    fn frames(
-        &self,
-        file: &DataFile,
-        (unused, cells): (&UnusedInputs, &MatCells),
-    ) -> Result<(Dataset, Vec<usize>, LeftOut)> {
-        let [inputs, outputs] = self.patterns();
-        let (mut frames, kept) =
-            Dataset::from_file(file, inputs, outputs, &unused.names()).map_err(with_options)?;
-        cells.name(&mut frames.inputs);
-        data_notes::print_left_out(&kept.left_out, &file.path, kept.of);
-        Ok((frames, kept.lines, kept.left_out))
+        if rest.is_none() && !self.rest.is_given() && is_log(&log, &frames.outputs) {
+            data_notes::print_no_rest(&frames.outputs, &path);
+        }
+        let folds = fold_values.map(|values| {
+            let values: Vec<f64> = log.lines.iter().map(|line| values[*line]).collect();
+            if let Some(place) = values.iter().position(|value| value.is_nan()) {
+                let name = fold_column.unwrap_or_default();
+                let rule = format!("column {name:?}: every line needs a fold; fill it in");
+                let line = kept.numbers[outliers.kept[place]];
+                let problem = Problem::MissingValue { line, rule };
+                return Err(taxel_data::Error::file(&path, problem));
+            }
+            Ok(select::number_folds(&values))
+        });
+        let all = Frames { frames, log, rest };
+        Ok(Usual { all, outliers, left_out: kept.left_out, digest, folds: folds.transpose()? })
     }
 
     /// Frames that the model trained on some of `frames` is judged by. `digest` is that of their columns.
@@ -175,12 +187,13 @@ impl DataArguments {
             JudgedBy::File(path) => path,
         };
         let file = self.file.fields().read(path)?;
-        if file.digest(&frames.names()).is_ok_and(|of_file| of_file == digest) {
+        let cells = MatCells::of(&file, self.inputs.as_deref(), self.grid)?;
+        let own = self.usual_frames(file, (unused, &cells), None, how)?;
+        if own.digest == digest {
             let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
-        let cells = MatCells::of(&file, self.inputs.as_deref(), self.grid)?;
-        let (own, ..) = self.usual_frames(&file, (unused, &cells), how)?;
+        let own = own.all;
         if own.frames.names() != frames.names() {
             let message = "its columns are not those of the frames to train on: give a file with the same columns, \
                            in the same order (--test)";
@@ -188,6 +201,18 @@ impl DataArguments {
         }
         Ok(Judged::File { frames: Box::new(own), name: path.display().to_string() })
     }
+}
+
+/// Frames of a file that are used, and what is known of them.
+struct Usual {
+    all: Frames,
+    outliers: Outliers,
+    /// Lines that lack a value.
+    left_out: LeftOut,
+    /// Digest of the columns, of all lines.
+    digest: u64,
+    /// Fold of each frame, if a column tells it.
+    folds: Option<Vec<usize>>,
 }
 
 /// Checks the folds that are left for refinement, `if_refined` after one of them was held out to judge by.
@@ -200,16 +225,4 @@ fn check_folds(folds: &[usize], if_refined: bool) -> Result<()> {
         "--fold-column: the last fold is held out to judge by, which leaves {count}, and refinement needs {LEAST_FOLDS}: \
          give --test FILE, a column with more folds, or --no-refine"
     )))
-}
-
-/// Folds from column `name`, numbered from 0.
-fn folds_from(file: &DataFile, name: &str, lines: &[usize]) -> Result<Vec<usize>> {
-    let column = file.column(name)?;
-    let values: Vec<f64> = lines.iter().map(|line| file.value(*line, column)).collect();
-    if let Some(place) = values.iter().position(|value| value.is_nan()) {
-        let rule = format!("column {name:?}: every line needs a fold; fill it in");
-        let problem = Problem::MissingValue { line: file.line_number(lines[place]), rule };
-        return Err(taxel_data::Error::file(&file.path, problem).into());
-    }
-    Ok(select::number_folds(&values))
 }

@@ -8,27 +8,13 @@ use rayon::prelude::*;
 /// Bytes read at a time: many enough to be worth a thread's start, few enough for a core's cache.
 const PIECE: usize = 256 * 1024;
 
-/// Values of CSV `lines` of so many `columns`, NaN where one is missing; `None` if the lines are not
-/// plain.
-pub(super) fn read(lines: &[u8], columns: usize) -> Option<Vec<f64>> {
-    let pieces = pieces(lines);
-    let counts: Option<Vec<usize>> = pieces.par_iter().map(|piece| count_lines(piece)).collect();
-    let counts = counts?;
-    let total = counts.iter().sum::<usize>().checked_mul(columns)?;
-    if total > lines.len() + 1 {
-        return None; // a field takes a byte at least: lines are short
-    }
-    let mut values = vec![0.0; total];
-    let mut rest = &mut values[..];
-    let mut places = Vec::with_capacity(pieces.len());
-    for count in counts {
-        let (place, others) = rest.split_at_mut(count * columns);
-        places.push(place);
-        rest = others;
-    }
-    let read = pieces.into_par_iter().zip(places);
-    read.map(|(piece, place)| read_piece(piece, columns, place)).collect::<Option<()>>()?;
-    Some(values)
+/// Appends the values of CSV `lines` of so many `columns`, NaN where one is missing; `None`, and nothing is appended, if
+/// the lines are not plain.
+pub(super) fn read(lines: &[u8], columns: usize, values: &mut Vec<f64>) -> Option<()> {
+    let read = pieces(lines).into_par_iter().map(|piece| read_piece(piece, columns));
+    let read: Option<Vec<Vec<f64>>> = read.collect();
+    read?.iter().for_each(|piece| values.extend_from_slice(piece));
+    Some(())
 }
 
 /// Pieces of about [`PIECE`] bytes, each cut after a line end.
@@ -46,36 +32,23 @@ fn pieces(mut lines: &[u8]) -> Vec<&[u8]> {
     pieces
 }
 
-/// Number of lines in a piece, the last perhaps without an end; `None` if there are quotes.
-fn count_lines(piece: &[u8]) -> Option<usize> {
-    if memchr::memchr(b'"', piece).is_some() {
-        return None;
-    }
-    let unended = usize::from(piece.last().is_some_and(|byte| *byte != b'\n'));
-    Some(memchr::memchr_iter(b'\n', piece).count() + unended)
-}
-
-fn read_piece(mut piece: &[u8], columns: usize, values: &mut [f64]) -> Option<()> {
-    for line in values.chunks_exact_mut(columns) {
-        let (last, others) = line.split_last_mut()?;
-        for place in others {
+fn read_piece(mut piece: &[u8], columns: usize) -> Option<Vec<f64>> {
+    let mut values = Vec::with_capacity(piece.len() / 4);
+    while !piece.is_empty() {
+        for column in 0..columns {
+            piece = if column == 0 { piece } else { piece.strip_prefix(b",")? };
             let (value, length) = field(piece)?;
-            *place = value;
-            piece = piece[length..].strip_prefix(b",")?;
+            if length == 0 && columns == 1 {
+                return None; // a blank line is no line
+            }
+            values.push(value);
+            piece = &piece[length..];
         }
-        let is_blank = columns == 1 && matches!(piece.first(), None | Some(b'\n' | b'\r'));
-        if is_blank {
-            return None;
-        }
-        let (value, length) = field(piece)?;
-        *last = value;
-        piece = &piece[length..];
         if !piece.is_empty() {
-            let end = piece.strip_prefix(b"\r").unwrap_or(piece);
-            piece = end.strip_prefix(b"\n")?;
+            piece = piece.strip_prefix(b"\r").unwrap_or(piece).strip_prefix(b"\n")?;
         }
     }
-    piece.is_empty().then_some(())
+    Some(values)
 }
 
 /// Number at the start of `text`, and its length in bytes.

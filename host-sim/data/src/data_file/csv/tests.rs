@@ -1,17 +1,25 @@
 use super::*;
+use crate::data_file::Stated;
 use crate::random::{Purpose, Random, Stream};
+use std::path::Path;
 
 /// The text as it is parsed, of any dialect.
 fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataFile> {
-    super::parse(path, bytes, &Reading { has_header, ..Reading::default() })
+    super::parse(Source::of_bytes(path, bytes), &Reading { has_header, ..Reading::default() })
 }
 
-/// Values and line numbers that the careful reader finds in a file.
-fn carefully(bytes: &[u8]) -> Result<(Vec<f64>, Vec<u64>)> {
-    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
-    let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
-    let read = read_carefully(Path::new("test.csv"), bytes, &mut reader, &header);
-    read.map(|(values, line_numbers, _)| (values, line_numbers))
+/// Body of a file with the header of a plain text, and the lines of data.
+fn body(text: &[u8]) -> (Body, &[u8]) {
+    let mut file = DataFile { path: "test.csv".into(), ..DataFile::default() };
+    let start = read_header(&mut file, text, true).unwrap();
+    let seen = file.header.iter().map(|_| Seen::default()).collect();
+    (Body { file, seen, line: 1 + line_ends(&text[..start]) }, &text[start..])
+}
+
+/// What the careful reader finds in a plain text.
+fn carefully(text: &[u8]) -> Result<DataFile> {
+    let (mut body, lines) = body(text);
+    body.add_carefully(lines, true).map(|_| body.file)
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {
@@ -41,13 +49,12 @@ fn the_quick_reader_reads_what_the_careful_one_reads() {
         ("a,b\n\u{a0}1,2\n", true),
     ] {
         let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
-        let (values, line_numbers) = carefully(text.as_bytes()).unwrap();
-        assert_eq!(bits(&file.values), bits(&values), "{text:?}");
-        assert_eq!(file.line_numbers, line_numbers, "{text:?}");
-        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(text.as_bytes());
-        let columns = reader.headers().unwrap().len();
-        let quick = lines_of_data(text.as_bytes(), reader.position())
-            .and_then(|(_, lines)| body::read(lines, columns));
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let careful = carefully(text.as_bytes()).unwrap();
+        assert_eq!(bits(&file.values), bits(&careful.values), "{text:?}");
+        assert_eq!(file.line_numbers, careful.line_numbers, "{text:?}");
+        let (mut body, lines) = body(text.as_bytes());
+        let quick = body.add_plain(lines);
         assert_eq!(quick.is_some(), is_plain, "{text:?}");
     }
 }
@@ -85,26 +92,42 @@ fn what_is_wrong_is_left_to_the_careful_reader() {
 }
 
 #[test]
-fn files_of_many_pieces_are_read_whole_and_faults_in_them_found() {
-    let mut text = String::from("a,b,c\n");
-    let lines = 60_000;
-    for line in 0..lines {
-        let value = f64::from(line).sqrt();
-        text += &[value, -value * 1e-7, f64::from(line)].map(|v| v.to_string()).join(",");
-        text += "\n";
+fn files_of_many_blocks_are_read_whole_and_faults_in_them_found() {
+    let path = Path::new("test.csv");
+    let lines = 3 * BLOCK / 40;
+    for (separator, line_break, line_end) in
+        [(",", "", "\n"), (",", "\n", "\r\n"), (",", "\r", "\n"), (";", " ", "\r")]
+    {
+        let note = |line: usize| match line_break {
+            "" => line.to_string(),
+            _ => format!("line{line_break}no. {line}, {}.", "x".repeat(line % 7)),
+        };
+        let quote = if line_break.is_empty() { "" } else { "\"" };
+        let mut text = vec![["a", "b (µm)", "c"].join(separator)];
+        text.extend((0..lines).map(|line| {
+            let note = [quote, &note(line), quote].concat();
+            [(line as f64).sqrt().to_string(), note, "0.5".into()].join(separator)
+        }));
+        text.push(["1", "2", "three"].join(separator) + line_end);
+        let text = text.join(line_end);
+        let latin_1: Vec<u8> = text.chars().map(|char| char as u8).collect();
+        let stated = Stated { separator: separator.parse().ok(), decimal_comma: Some(false) };
+        let reading = Reading { keeps_text: true, stated, ..Reading::default() };
+        let file = super::parse(Source::of_bytes(path, &latin_1), &reading).unwrap();
+        assert_eq!((file.lines(), &*file.header[1]), (lines + 1, "b (µm)"));
+        let of_a_line = if line_break.trim_end_matches(' ').is_empty() { 1 } else { 2 };
+        for line in 0..lines {
+            assert_eq!([file.value(line, 0), file.value(line, 2)], [(line as f64).sqrt(), 0.5]);
+            assert_eq!(file.texts(1).at(line), note(line));
+            assert_eq!(file.line_number(line), 2 + (line * of_a_line) as u64);
+        }
+        let message = file.column("c").unwrap_err().to_string();
+        let line = file.line_number(lines);
+        assert!(message.contains(&format!("line {line}, column \"c\": \"three\"")), "{message}");
     }
-    let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
-    assert_eq!(file.lines(), lines as usize);
-    for line in 0..lines {
-        let value = f64::from(line).sqrt();
-        let found = [0, 1, 2].map(|column| file.value(line as usize, column));
-        assert_eq!(found, [value, -value * 1e-7, f64::from(line)]);
-        assert_eq!(file.line_number(line as usize), line as u64 + 2);
-    }
-    text += "1,2,three\n";
-    let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
-    let message = file.column("c").unwrap_err().to_string();
-    assert!(message.contains("line 60002, column \"c\": \"three\" is not a number"), "{message}");
+    let open = format!("a,b\n1,2\n3,\"{}", "4\n".repeat(3 * BLOCK));
+    let refused = parse(path, open.as_bytes(), false).unwrap_err().to_string();
+    assert!(refused.contains("line 3: a quoted field does not end"), "{refused}");
 }
 
 #[test]
@@ -164,7 +187,7 @@ fn words_for_missing_values_and_columns_without_a_name_are_known() {
     let path = Path::new("test.csv");
     let file = parse(path, b",a,\n0,N/A,1\n1,na,null\n2,-,?\n", false).unwrap();
     assert_eq!(file.header, ["c1", "a", "c3"]);
-    assert!(file.rows().all(|row| row[1].is_nan()) && file.not_numbers.is_empty());
+    assert!((0..3).all(|line| file.value(line, 1).is_nan()) && file.not_numbers.is_empty());
     let refused = parse(path, b",c1\n1,2\n", false).unwrap_err().to_string();
     assert!(refused.contains("header: column \"c1\" stands twice"), "{refused}");
 }
@@ -193,8 +216,8 @@ fn a_damaged_file_is_refused_or_read_to_finite_numbers() {
         }
         let Ok(file) = parse(Path::new("test.csv"), &bytes, case % 2 == 0) else { continue };
         read += 1;
-        assert!(file.rows().all(|line| line.len() == file.header.len()), "{bytes:?}");
-        assert!(!file.rows().flatten().any(|value| value.is_infinite()), "{bytes:?}");
+        assert_eq!(file.values.len(), file.lines() * file.header.len(), "{bytes:?}");
+        assert!(!file.values.iter().any(|value| value.is_infinite()), "{bytes:?}");
     }
     assert!((1000..4000).contains(&read), "{read} files were read");
 }

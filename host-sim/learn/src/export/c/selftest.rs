@@ -9,9 +9,7 @@ use taxel_data::exp;
 
 use super::numbers::{array, table, word};
 use crate::error::{Error, Result};
-
-/// Most rows of a model.
-const MOST_ROWS: usize = 255;
+use crate::prepared::MOST_ROWS;
 
 /// Sweeps that bring readings to given features.
 const SWEEPS: usize = 30;

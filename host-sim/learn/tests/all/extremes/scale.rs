@@ -88,7 +88,7 @@ fn errors(changes: [Change; 2], format: Format) -> Option<Errors> {
     let mut random = Random::new(1, Stream::Training, Purpose::Noise, 0, 0);
     let [of_input, of_output] =
         changes.map(|change| move |value: f64| value * change.factor + change.offset);
-    for (inputs, y) in data.inputs.values.chunks_exact_mut(2).zip(&mut data.outputs.values) {
+    for (inputs, y) in data.inputs.values.chunks_exact_mut(2).zip(data.outputs.values.iter_mut()) {
         let [a, b] = [random.unit(), random.unit()];
         inputs.copy_from_slice(&[of_input(a), b]);
         *y = of_output((3.0 * a).sin() * (2.0 * b).cos() + 0.5 * b * b);

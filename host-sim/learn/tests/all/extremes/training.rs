@@ -63,7 +63,7 @@ impl Law {
         let width = 2 + usize::from(self.apart.is_some());
         let names = ["a", "b", "sum"][..width].iter().map(|name| (*name).to_owned()).collect();
         let mut data = Dataset::empty(names, vec!["y".into()], 1, count);
-        let lines = data.inputs.values.chunks_exact_mut(width).zip(&mut data.outputs.values);
+        let lines = data.inputs.values.chunks_exact_mut(width).zip(data.outputs.values.iter_mut());
         for (sample, (inputs, y)) in lines.enumerate() {
             let drawn = [random.unit(), random.unit()];
             let [a, b] = *self.places.get(sample % self.places.len().max(1)).unwrap_or(&drawn);
