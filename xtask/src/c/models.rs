@@ -1,4 +1,4 @@
-//! Models that are exported and tried: four shapes, each in every number format.
+//! Models that are exported and tried: four shapes, each in every number format, and one of them without a reading model.
 
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
@@ -29,23 +29,24 @@ const FEATURES_OF_PLACE: usize = 5;
 pub enum Shape {
     /// The paper's sensor: a network a row, 18 readings to 18 outputs, which fills missing readings.
     Rows,
+    /// The same model without a reading model.
+    Bare,
     /// All of it by one network behind a projection, with a full reading model.
     Array,
     /// A mat of 4 × 7 cells: a network a row without affine tail, inputs relative to the baseline, a full reading
     /// model.
     Mat,
     /// Place, depth and force of a contact on 4 × 4 cells, by two networks behind shape and strength of the touch: the first
-    /// has a projection. It fills missing readings. In f32 inputs are relative to the baseline. In fixed16 they are not, and every other reading
-    /// moves the other way.
+    /// has a projection. In f32 inputs are relative to the baseline, and it fills missing readings. In fixed16 inputs are
+    /// readings, every other of which moves the other way, and it has a full reading model.
     Touch,
 }
 
 impl Shape {
-    pub const ALL: [Self; 4] = [Self::Rows, Self::Array, Self::Mat, Self::Touch];
-
     pub fn name(self) -> &'static str {
         match self {
             Self::Rows => "rows",
+            Self::Bare => "bare",
             Self::Array => "array",
             Self::Mat => "mat",
             Self::Touch => "touch",
@@ -54,7 +55,7 @@ impl Shape {
 
     fn world(self) -> World {
         let columns: &[usize] = match self {
-            Self::Rows | Self::Array => return World::press(),
+            Self::Rows | Self::Bare | Self::Array => return World::press(),
             Self::Mat => &[0, 3, 6, 8, 11, 14, 17],
             Self::Touch => &[3, 6, 11, 14],
         };
@@ -85,8 +86,9 @@ impl Model {
 
 /// Trains all models, with so many `frames` to try each with.
 pub fn all(frames: usize) -> Outcome<Vec<Model>> {
-    let wanted = Shape::ALL.into_iter().flat_map(|shape| Format::ALL.map(|format| (shape, format)));
-    let wanted: Vec<_> = wanted.collect();
+    let shapes = [Shape::Rows, Shape::Array, Shape::Mat, Shape::Touch];
+    let mut wanted = shapes.map(|shape| Format::ALL.map(|format| (shape, format))).concat();
+    wanted.push((Shape::Bare, Format::Fixed16));
     wanted.par_iter().map(|(shape, format)| made(*shape, *format, frames)).collect()
 }
 
@@ -142,14 +144,22 @@ fn made(shape: Shape, format: Format, frames: usize) -> Outcome<Model> {
         trained.networks[0] = projected.networks.remove(0);
     }
     let blob = pack(&trained, &dataset, &origin).map_err(failed)?;
-    let is_full = matches!(shape, Shape::Array | Shape::Mat);
-    let extent = if is_full { Extent::Full } else { Extent::Fill };
-    let statistics = Statistics::fit(&dataset.inputs, extent, 1).map_err(failed)?;
-    let mut others = HeldOut::default();
-    if is_full {
-        others.add(&blob, &statistics, &held_out);
-    }
-    let blob = reading_model::add(&blob, &statistics, &others).map_err(failed)?;
+    let extent = match (shape, format) {
+        (Shape::Bare, _) => None,
+        (Shape::Rows, _) | (Shape::Touch, Format::F32) => Some(Extent::Fill),
+        _ => Some(Extent::Full),
+    };
+    let blob = match extent {
+        Some(extent) => {
+            let statistics = Statistics::fit(&dataset.inputs, extent, 1).map_err(failed)?;
+            let mut others = HeldOut::default();
+            if extent == Extent::Full {
+                others.add(&blob, &statistics, &held_out);
+            }
+            reading_model::add(&blob, &statistics, &others).map_err(failed)?
+        }
+        None => blob,
+    };
     let is_as_asked = blob.parse().networks().all(|network| network.format() == format);
     if !is_as_asked {
         return Err(format!(
