@@ -7,6 +7,7 @@ pub mod axis;
 pub mod fields;
 pub mod bounds;
 pub mod file;
+pub mod on_device;
 pub mod plan;
 pub mod layouts;
 pub mod point;

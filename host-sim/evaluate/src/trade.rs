@@ -404,7 +404,7 @@ impl Trade {
         let starts = Starts::new(plan, point, &frames)?;
         let blob = frames.blob(plan, point, &starts.layers(plan, point)?)?;
         let judged = frames.judge(&blob)?;
-        let decoders: Vec<DecoderErrors> = frames.decoders(&judged, point.filter);
+        let decoders: Vec<DecoderErrors> = frames.decoders(&judged, point.on_device.filter);
         let verdict = Verdict::new(&decoders, &readings.limit)
             .with(Warning::other_image(&blob.parse()))
             .of_blob(&blob, self.training_frames)
@@ -478,7 +478,7 @@ pub fn impossible(
         let least = readings.limit.groups.iter().find(|limit| limit.group == asked.group);
         let rmse = least.map_or(0.0, |it| it.limit - CERTAIN * it.limit_standard_error);
         let nothing = Cost { instructions: 0, cycles: 0 };
-        let times = point.device.times(readings.scan_ms, &nothing);
+        let times = point.on_device.device.times(readings.scan_ms, &nothing);
         best.push(Values::from([
             (asked.error(), rmse),
             ("frame_ms".into(), times.frame_ms),

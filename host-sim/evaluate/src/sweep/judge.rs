@@ -76,7 +76,8 @@ pub fn compute(
                         frames.judge(&frames.blob(plan, first, found)?)
                     });
                     for index in of_model {
-                        let outcome = after(&model, |model| model.results(points[*index].filter));
+                        let outcome =
+                            after(&model, |model| model.results(points[*index].on_device.filter));
                         keep(*index, outcome)?;
                     }
                 }
@@ -110,11 +111,12 @@ pub fn subject_of(plan: &Plan, point: &Point) -> Result<Subject> {
         return Ok(Subject::Measured(Box::new(data)));
     }
     let scene = Subject::Scene(Box::new(Experiment::parse("of the point", &point.scene)?));
-    let mut subject = scene.with_every_column(point.column_step).into_owned();
+    let mut subject = scene.with_every_column(point.on_device.column_step).into_owned();
     if let Subject::Scene(scene) = &mut subject {
         let wires = Some(Wires::of(&scene.world));
         scene.digest = point.digest;
-        scene.world.noise = point.device.averaged(scene.world.noise, wires, point.samples);
+        scene.world.noise =
+            point.on_device.device.averaged(scene.world.noise, wires, point.on_device.samples);
     }
     Ok(subject)
 }
@@ -164,7 +166,7 @@ impl<'s> Readings<'s> {
             Subject::Scene(scene) => (Some(Wires::of(&scene.world)), scene.measure()),
             Subject::Measured(data) => (Wires::named(&data.training.inputs.names), data.measure()),
         };
-        let scan_ms = point.device.scan_ms(wires, point.samples);
+        let scan_ms = point.on_device.device.scan_ms(wires, point.on_device.samples);
         results.add("rows", wires.map(|wires| wires.rows as f64));
         results.add("columns", wires.map(|wires| wires.columns as f64));
         results.add("scan_ms", scan_ms);
@@ -189,7 +191,7 @@ impl<'s> Readings<'s> {
             results.add(&format!("{name}_{}", limit.group), Some(limit.limit));
             results.add(&format!("{error}_{}", limit.group), Some(limit.limit_standard_error));
         }
-        let (device, samples) = (point.device, point.samples);
+        let (device, samples) = (point.on_device.device, point.on_device.samples);
         Ok(Self { subject, device, samples, scan_ms, measure, limit, results })
     }
 
@@ -253,7 +255,7 @@ impl<'s> Frames<'s> {
     /// Options for training a point's model on these frames. Fewer columns give fewer features.
     fn options(&self, plan: &Plan, point: &Point) -> Result<Options> {
         let mut options = point::options(plan.data.as_deref(), &point.scene)?;
-        if point.column_step > 1 {
+        if point.on_device.column_step > 1 {
             let possible = |wanted| features_at_most(&self.set.frames, wanted).max(1);
             options.features = options.features.map(possible);
         }

@@ -15,8 +15,8 @@ use super::axis::{Axis, latin_hypercube};
 use super::bounds::Bounds;
 use super::fields::{self, require_known};
 use super::file::{Also, OneOrMore, PartPrices, PlanFile, Wanted};
+use super::on_device::OnDevice;
 use super::point::{columns_of, group_in, not_computed};
-use crate::device::Device;
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, check_name};
 use crate::measurements::Measurements;
@@ -101,13 +101,7 @@ pub struct Point {
     pub values: Vec<(String, Value)>,
     /// Scene's text; of measurements, the fields of training.
     pub scene: String,
-    pub device: Device,
-    /// Number of samples averaged for each reading.
-    pub samples: usize,
-    /// Steps from one column-wire that is read to the next.
-    pub column_step: usize,
-    /// Whether a filter in time stands behind the decoder.
-    pub filter: bool,
+    pub on_device: OnDevice,
     pub usual: Usual,
     /// Digest of the scene's text, whatever is changed in it.
     pub digest: u64,
@@ -408,7 +402,8 @@ impl Plan {
             _ => Table::new(),
         };
         shared.remove("table1");
-        let OnDevice { device, samples, column_step, filter } = OnDevice::new(document.device)?;
+        let on_device = OnDevice::new(document.device)?;
+        let OnDevice { device, samples, column_step, filter } = on_device;
         let (limit_frames, train, also) = (self.limit_frames, self.train, &self.also);
         let how = format!("{device:?} {samples} {column_step} {limit_frames:?} {train} {also:?}");
         let filtered = self.group().filter(|_| filter);
@@ -431,19 +426,7 @@ impl Plan {
         ];
         let id = format!("{:016x}", digest(decides.as_bytes()));
         let (values, digest) = (document.values, of_scene);
-        Ok(Point {
-            id,
-            values,
-            scene,
-            device,
-            samples,
-            column_step,
-            filter,
-            usual,
-            digest,
-            shares,
-            keys,
-        })
+        Ok(Point { id, values, scene, on_device, usual, digest, shares, keys })
     }
 
     /// Usual settings of a base, unless it is a scene only with what axes give.
@@ -539,44 +522,6 @@ struct Document {
 
 fn text(table: &Table) -> Checked<String> {
     toml::to_string(table).map_err(|cause| BadValue::new("axes", "values", cause.to_string()))
-}
-
-/// Device of a point, and what it reads.
-struct OnDevice {
-    device: Device,
-    samples: usize,
-    column_step: usize,
-    filter: bool,
-}
-
-impl OnDevice {
-    fn new(mut table: Table) -> Checked<Self> {
-        let mut count = |field: &str| {
-            let value = table.remove(field).unwrap_or(Value::Integer(1));
-            let count = value.as_integer().and_then(|count| usize::try_from(count).ok());
-            count.filter(|count| (1..=usize::from(u16::MAX)).contains(count)).ok_or_else(|| {
-                let rule = "give a whole number, at least 1";
-                BadValue::new(format!("device.{field}"), value, rule)
-            })
-        };
-        let (samples, column_step) = (count("samples")?, count("column_step")?);
-        let filter = table.remove("filter").unwrap_or(Value::Boolean(false));
-        let filter = filter
-            .as_bool()
-            .ok_or_else(|| BadValue::new("device.filter", filter, "give true or false"))?;
-        let shown = table.to_string().trim_end().replace('\n', ", ");
-        let device: Device = table.try_into().map_err(|cause: toml::de::Error| {
-            // These are taken out before, and belong to the names as well.
-            let own = "expected one of `samples`, `column_step`, `filter`, ";
-            let message = cause.message().replace("expected one of ", own);
-            BadValue::new("device", shown, fields::with_nearest(&message))
-        })?;
-        device.check().map_err(|bad| {
-            let field = format!("device.{}", bad.field.replace('-', "_"));
-            bad.named(&field)
-        })?;
-        Ok(Self { device, samples, column_step, filter })
-    }
 }
 
 /// All axes: scenes, draws, seeds, and those that are crossed.

@@ -66,7 +66,7 @@ impl FromStr for Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Device;
+    use crate::sweep::on_device::OnDevice;
     use crate::sweep::plan::Usual;
     use taxel_core::rbf::Format;
 
@@ -75,10 +75,7 @@ mod tests {
             id: String::new(),
             values: vec![],
             scene: String::new(),
-            device: Device::default(),
-            samples: 1,
-            column_step: 1,
-            filter: false,
+            on_device: OnDevice::new(toml::Table::new()).unwrap(),
             usual: Usual { format: Format::Fixed16, centres: 64 },
             digest: 0,
             shares: *shares,

@@ -1,0 +1,53 @@
+//! Device of a point, as a plan gives it.
+
+use taxel_data::BadValue;
+use toml::{Table, Value};
+
+use super::fields;
+use crate::device::Device;
+
+/// Device of a point, and what it reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnDevice {
+    pub device: Device,
+    /// Number of samples averaged for each reading.
+    pub samples: usize,
+    /// Steps from one column-wire that is read to the next.
+    pub column_step: usize,
+    /// Whether a filter in time stands behind the decoder.
+    pub filter: bool,
+}
+
+impl OnDevice {
+    /// What a plan's `[device]` says.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a field that it has not, or a value that it cannot take.
+    pub fn new(mut table: Table) -> Result<Self, BadValue> {
+        let mut count = |field: &str| {
+            let value = table.remove(field).unwrap_or(Value::Integer(1));
+            let count = value.as_integer().and_then(|count| usize::try_from(count).ok());
+            count.filter(|count| (1..=usize::from(u16::MAX)).contains(count)).ok_or_else(|| {
+                let rule = "give a whole number, at least 1";
+                BadValue::new(format!("device.{field}"), value, rule)
+            })
+        };
+        let (samples, column_step) = (count("samples")?, count("column_step")?);
+        let filter = table.remove("filter").unwrap_or(Value::Boolean(false));
+        let filter = filter
+            .as_bool()
+            .ok_or_else(|| BadValue::new("device.filter", filter, "give true or false"))?;
+        let shown = table.to_string().trim_end().replace('\n', ", ");
+        let device: Device = table.try_into().map_err(|cause: toml::de::Error| {
+            // These are taken out before, and belong to the names as well.
+            let own = "expected one of `samples`, `column_step`, `filter`, ";
+            let message = cause.message().replace("expected one of ", own);
+            BadValue::new("device", shown, fields::with_nearest(&message))
+        })?;
+        device.check().map_err(|bad| {
+            let field = format!("device.{}", bad.field.replace('-', "_"));
+            bad.named(&field)
+        })?;
+        Ok(Self { device, samples, column_step, filter })
+    }
+}
