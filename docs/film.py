@@ -1,7 +1,7 @@
 """Makes a moving picture (SVG) of a log and its estimates: python3 film.py rest.csv log.csv estimate.csv film.svg
 
-The log is `host-sim synth`'s, of a scene whose outputs are the compression of the paper's 6 x 8 upper electrodes; the estimate is
-what `host-sim decode` makes of it; rest is the log of the untouched sensor. Three maps play in real time: readings (how far below rest), decoded, and true.
+The log is `taxel synth`'s, of a scene whose outputs are the compression of the paper's 6 x 8 upper electrodes; the estimate is
+what `taxel decode` makes of it; rest is the log of the untouched sensor. Three maps play in real time: readings (how far below rest), decoded, and true.
 """
 
 import csv

@@ -34,7 +34,7 @@ class TaxelCamera:
     def connect(self, warmup: bool = True) -> None:
         self._link = taxel.Link(self.port, send="estimates")
         if self._link.model_crc is None:
-            raise ValueError("the device has no model: host-sim link PORT upload model.bin")
+            raise ValueError("the device has no model: taxel link PORT upload model.bin")
         if warmup:
             self.async_read(2000)
 

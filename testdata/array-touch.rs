@@ -1,4 +1,4 @@
-// Model "touch" in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: 6311af60.
+// Model "touch" in arrays of fixed size, as `taxel export` wrote it; CRC-32 of its blob: 6311af60.
 // Readings, row after row, with their units:
 //     x, x (36 times)
 // Outputs, row after row, with their units:

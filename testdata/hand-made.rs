@@ -1,4 +1,4 @@
-// Model "hand-made" in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: 8def53c7.
+// Model "hand-made" in arrays of fixed size, as `taxel export` wrote it; CRC-32 of its blob: 8def53c7.
 // Readings, row after row, with their units:
 //     x, x (144 times)
 // Outputs, row after row, with their units:

@@ -1,4 +1,4 @@
-// Model "press" in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: cfdbbd9b.
+// Model "press" in arrays of fixed size, as `taxel export` wrote it; CRC-32 of its blob: cfdbbd9b.
 // Readings, row after row, with their units:
 //     r4c1_ohm, Ω
 //     r4c2_ohm, Ω

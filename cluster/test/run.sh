@@ -1,15 +1,15 @@
 #!/bin/bash
-# Tests `host-sim sweep` as a cluster uses it: shards, Slurm, GNU parallel, killed tasks, bad files and a full disk.
+# Tests `taxel sweep` as a cluster uses it: shards, Slurm, GNU parallel, killed tasks, bad files and a full disk.
 #
-#   HOST_SIM=path cluster/test/run.sh    [default: target/release/host-sim]
+#   TAXEL=path cluster/test/run.sh    [default: target/release/taxel]
 #
 # Whatever happens on the way, the points and the table must be those of one process, byte for byte. It needs root and
 # Debian's packages slurm-wlm, munge and parallel. Its Slurm is its own, on loopback, in a temporary folder that goes at the end.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 plan=$here/plan64.toml
-HOST_SIM=$(realpath "${HOST_SIM:-$here/../../target/release/host-sim}")
-export HOST_SIM
+TAXEL=$(realpath "${TAXEL:-$here/../../target/release/taxel}")
+export TAXEL
 # A scheduler that started this test is not the one that is tested.
 unset ${!SLURM_@} ${!HQ_@} PARALLEL_SEQ RAYON_NUM_THREADS SHARDS
 
@@ -18,14 +18,14 @@ say() { echo "ok: $*"; }
 need() { command -v "$1" >/dev/null || fail "$1 is missing: apt-get install slurm-wlm munge parallel"; }
 now() { echo "$EPOCHREALTIME"; }
 since() { awk -v a="$1" -v b="$EPOCHREALTIME" 'BEGIN { printf "%.1f", b - a }'; }
-sweep() { "$HOST_SIM" sweep "$@" >>"$work/log" 2>&1; }
+sweep() { "$TAXEL" sweep "$@" >>"$work/log" 2>&1; }
 count() { find "$1/points" -name '*.json' 2>/dev/null | wc -l; }
 
 . "$here/own-slurm.sh"
 
 [ "$(id -u)" = 0 ] || fail "this test starts daemons and mounts a small disk: run it as root"
 for program in munged slurmctld slurmd sbatch parallel; do need "$program"; done
-[ -x "$HOST_SIM" ] || fail "$HOST_SIM is missing: cargo build --release, or set HOST_SIM"
+[ -x "$TAXEL" ] || fail "$TAXEL is missing: cargo build --release, or set TAXEL"
 work=$(mktemp -d "${TMPDIR:-/tmp}/sweep-test.XXXXXX")
 
 clean_up() {
@@ -84,7 +84,7 @@ gnu_parallel() {
 # Whether a shard of the array has kept a point by now.
 has_begun() {
     local id
-    for id in $("$HOST_SIM" sweep "$plan" --list --shard "$1/8" | cut -d' ' -f1); do
+    for id in $("$TAXEL" sweep "$plan" --list --shard "$1/8" | cut -d' ' -f1); do
         [ ! -f "$work/slurm/points/$id.json" ] || return 0
     done
     return 1
@@ -137,7 +137,7 @@ bad_files() {
     perl -pi -e 'substr($_, 400, 1) ^= "\x01"' "$points/${files[1]}"
     cp "$points/${files[4]}" "$points/${files[2]}"
     : >"$points/${files[3]}"
-    "$HOST_SIM" sweep "$plan" --merge "$work/bad" -o "$work/bad.csv" >"$work/said" 2>&1 || status=$?
+    "$TAXEL" sweep "$plan" --merge "$work/bad" -o "$work/bad.csv" >"$work/said" 2>&1 || status=$?
     [ $status = 2 ] || fail "merge of bad files: exit status $status"
     for file in "${files[@]:0:4}"; do grep -q "$file" "$work/said" || fail "the merge does not name $file"; done
     ! grep -q "${files[4]}" "$work/said" || fail "the merge names a good file"
@@ -168,7 +168,7 @@ full_disk() {
     # Room for 8 files of a page beside 40 that are there.
     if mount -t tmpfs -o size=$((48 * 4))k tmpfs "$points" 2>>"$work/log"; then how=tmpfs; else how="ulimit -f"; fi
     find "$work/reference/points" -name '*.json' | head -n 40 | xargs cp -t "$points"
-    ( [ "$how" = tmpfs ] || ulimit -f 0; exec "$HOST_SIM" sweep "$plan" -o "$work/full" >/dev/null 2>"$work/said" ) || status=$?
+    ( [ "$how" = tmpfs ] || ulimit -f 0; exec "$TAXEL" sweep "$plan" -o "$work/full" >/dev/null 2>"$work/said" ) || status=$?
     [ $status != 0 ] || fail "full disk: exit status 0"
     [ "$(count "$work/full")" -lt 64 ] || fail "the disk was not full"
     for file in "$points"/*.json; do cmp "$file" "$work/reference/points/${file##*/}" || fail "full disk: $file is not whole"; done
@@ -183,7 +183,7 @@ at_once() {
     local shard pids=() id
     cp -r "$work/reference" "$work/together"
     for shard in 1 2; do
-        for id in $("$HOST_SIM" sweep "$plan" --list --shard "$shard/8" | cut -d' ' -f1); do rm "$work/together/points/$id.json"; done
+        for id in $("$TAXEL" sweep "$plan" --list --shard "$shard/8" | cut -d' ' -f1); do rm "$work/together/points/$id.json"; done
     done
     for shard in 1 2 1 2; do sweep "$plan" --shard "$shard/8" -o "$work/together" & pids+=($!); done
     for id in "${pids[@]}"; do wait "$id" || fail "a shard beside others"; done

@@ -1,8 +1,8 @@
 //! Reads one row-wire by pins and SPI, and estimates how far its six electrodes are pressed in. Nothing here fails or panics,
 //! and all of it takes less than 8 kB of flash without weights: `cargo xtask size`.
 //!
-//! The model, of `host-sim synth press -n 20000 -o press.csv`:
-//! `host-sim train press.csv --inputs 'r4c*_ohm' --outputs 'r4e*_dz_mm' --centres 16 --format f32 -o row4.bin`
+//! The model, of `taxel synth press -n 20000 -o press.csv`:
+//! `taxel train press.csv --inputs 'r4c*_ohm' --outputs 'r4e*_dz_mm' --centres 16 --format f32 -o row4.bin`
 
 use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiDevice};
 use taxel_core::{ColumnWires, RowWire};
@@ -11,7 +11,7 @@ use taxel_firmware::readout::{
     FrameSource, Mcp3208s, ScanSettings, Scanner, Selection, ShiftRegister595,
 };
 
-/// What `host-sim export row4.bin --rust row4.rs` writes.
+/// What `taxel export row4.bin --rust row4.rs` writes.
 #[path = "../../testdata/row4.rs"]
 mod row4;
 

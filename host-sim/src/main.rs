@@ -1,4 +1,4 @@
-//! `host-sim`: from a scene or a CSV file to a trained, checked weight blob.
+//! `taxel`: from a scene or a CSV file to a trained, checked weight blob.
 
 use std::process::ExitCode;
 

@@ -50,7 +50,7 @@ enum Command {
     View(view::Arguments),
     /// Print a script that completes commands and options in a shell.
     ///
-    /// bash: `host-sim completions bash > ~/.local/share/bash-completion/completions/host-sim`.
+    /// bash: `taxel completions bash > ~/.local/share/bash-completion/completions/taxel`.
     Completions {
         shell: clap_complete::Shell,
     },
@@ -107,7 +107,7 @@ pub fn call(
     tables: Vec<DataFile>,
     stop: &Arc<AtomicBool>,
 ) -> std::result::Result<Called, (String, u8)> {
-    let all = ["host-sim", "--json"].into_iter().chain(arguments.iter().map(String::as_str));
+    let all = ["taxel", "--json"].into_iter().chain(arguments.iter().map(String::as_str));
     let cli = Cli::try_parse_from(all)
         .map_err(|error| (advised(error).to_string().trim_end().to_owned(), 2))?;
     let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
@@ -153,7 +153,7 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::View(arguments) => view::execute(&arguments, common),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut script);
+            clap_complete::generate(shell, &mut Cli::command(), "taxel", &mut script);
             commands::print::show(&String::from_utf8_lossy(&script))
         }
     }

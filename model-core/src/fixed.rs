@@ -9,7 +9,7 @@ use crate::reading_model::ReadingModel;
 /// Model in arrays of fixed size: `ROWS` rows of `INPUTS` readings and `OUTPUTS` outputs.
 ///
 /// It needs no blob, no buffer and no error: its sizes are part of its type, and are checked when the program is compiled.
-/// `host-sim export model.bin --rust FILE.rs` writes any trained model as such a static. It gives what
+/// `taxel export model.bin --rust FILE.rs` writes any trained model as such a static. It gives what
 /// [`Decoder`](crate::Decoder) gives of the blob, to the bit.
 ///
 /// `N` is the type of its networks: [`float32::Network`](crate::rbf::float32::Network), [`fixed16::Network`](crate::rbf::fixed16::Network), or

@@ -1,4 +1,4 @@
-"""A bench: an emulated board, and `host-sim` beside it."""
+"""A bench: an emulated board, and `taxel` beside it."""
 
 import mmap
 import os
@@ -49,12 +49,12 @@ class Bench:
         self.board.run_for(seconds)
 
     def host_sim(self, *arguments, status=0):
-        """Runs `host-sim link` with the board's serial port and `arguments` to its end, with this exit status, and returns
+        """Runs `taxel link` with the board's serial port and `arguments` to its end, with this exit status, and returns
         what it says. Its clock is the board's, so it does not matter how busy the computer is.
         """
         terminal = Terminal(self.board)
         command = [self._host_sim, "link", terminal.path, *map(str, arguments)]
-        self._log("$ host-sim link", *arguments)
+        self._log("$ taxel link", *arguments)
         with tempfile.TemporaryDirectory() as directory, open(pathlib.Path(directory) / "clock", "w+b") as file:
             os.ftruncate(file.fileno(), mmap.PAGESIZE)
             clock = HostClock.from_buffer(mmap.mmap(file.fileno(), mmap.PAGESIZE))
@@ -70,15 +70,15 @@ class Bench:
                 said = host.communicate()[0]
                 terminal.close()
         self._log(said.rstrip())
-        expect(host.returncode == status, f"host-sim link {arguments[0]} ended with {host.returncode}")
+        expect(host.returncode == status, f"taxel link {arguments[0]} ended with {host.returncode}")
         return said
 
     def program(self, *arguments):
-        """Runs another command of `host-sim`, and returns what it says."""
-        self._log("$ host-sim", *arguments)
+        """Runs another command of `taxel`, and returns what it says."""
+        self._log("$ taxel", *arguments)
         command = [self._host_sim, *map(str, arguments)]
         ended = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        expect(ended.returncode == 0, f"host-sim {arguments[0]} ended with {ended.returncode}: {ended.stderr}")
+        expect(ended.returncode == 0, f"taxel {arguments[0]} ended with {ended.returncode}: {ended.stderr}")
         return ended.stdout
 
     def ask(self, message, expected, patience_s=PATIENCE_S, before=b""):

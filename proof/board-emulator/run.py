@@ -26,7 +26,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=1.0, help="seconds for which `onchip-stream` counts estimates (1)")
     parser.add_argument("scenarios", nargs="*", metavar="scenario",
                         help=f"all, or some of: {', '.join(SCENARIOS)}; or serve")
-    parser.add_argument("--host-sim", type=pathlib.Path, required=True, help="the program host-sim")
+    parser.add_argument("--taxel", type=pathlib.Path, required=True, help="the program taxel")
     parser.add_argument("--model", type=pathlib.Path, required=True, help="a model of the scene `press`")
     parser.add_argument("--directory", type=pathlib.Path, required=True, help="folder for logs and tables")
     parser.add_argument("--frames", type=int, default=30, help="frames that `check` decodes (30)")

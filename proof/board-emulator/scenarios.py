@@ -47,7 +47,7 @@ FOURTH_SELECT = "C", 5
 
 
 def session(make, files):
-    """A whole session with `host-sim`: identify, upload, check, baseline."""
+    """A whole session with `taxel`: identify, upload, check, baseline."""
     bench = make()
     fill(bench, SLOT_B, RUBBISH)
     bench.run_for(0.02)
@@ -130,7 +130,7 @@ def check_errors(bench, errors, readings):
 
 
 def check_scan_time(bench, model):
-    """The mean time of scans, and of those with idle samples, against what `host-sim inspect` computes for the model."""
+    """The mean time of scans, and of those with idle samples, against what `taxel inspect` computes for the model."""
     computed = json.loads(bench.program("inspect", model, "--json"))["scan"]
     board, edges = bench.board, []
     listeners = board.ports["C"].listeners
@@ -504,7 +504,7 @@ def serve(make, files):
     terminal = Terminal(bench.board)
     # Both depend on the settling time and the number of samples, which a user may configure.
     bench.board.rules.waived = {"row-left", "wait-short"}
-    bench.board.note(f"the image nucleo-f446re, resistances that never change: host-sim link {terminal.path} identify")
+    bench.board.note(f"the image nucleo-f446re, resistances that never change: taxel link {terminal.path} identify")
     stopped = []
     signal.signal(signal.SIGINT, lambda *_: stopped.append(True))
     bench.board.run_until(lambda: stopped)

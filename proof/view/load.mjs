@@ -2,7 +2,7 @@
 // what program and page take of memory. Run it beside a build to see what a busy computer does to it.
 //
 //     (cd /tmp && npm install puppeteer-core)
-//     NODE_PATH=/tmp/node_modules node proof/view/load.mjs target/release/host-sim /usr/bin/chromium [SECONDS [RATE]]
+//     NODE_PATH=/tmp/node_modules node proof/view/load.mjs target/release/taxel /usr/bin/chromium [SECONDS [RATE]]
 
 import { spawn } from "node:child_process";
 import { readFileSync } from "node:fs";

@@ -75,7 +75,7 @@ pub fn wait<T: Send>(
 /// A table: its path among the arguments of a command, the names of its columns, and its lines.
 type Table<'py> = (String, Vec<String>, PyReadonlyArray2<'py, f64>);
 
-/// Calls a command of `host-sim` with these arguments, of which some are paths of `tables`. Returns its result as JSON, and
+/// Calls a command of `taxel` with these arguments, of which some are paths of `tables`. Returns its result as JSON, and
 /// its remarks.
 #[pyfunction]
 pub fn call(

@@ -1,7 +1,7 @@
 """Tactile sensors of conductive rubber: simulate, train, decode, export to C.
 
 Readings are in Ω, lengths in mm, forces in N. Errors of what was given are `ValueError`, with the message of the command
-`host-sim`; work that failed is `RuntimeError`.
+`taxel`; work that failed is `RuntimeError`.
 """
 
 from importlib import import_module

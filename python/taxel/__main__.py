@@ -1,4 +1,4 @@
-"""`python -m taxel` is the command `host-sim`."""
+"""`python -m taxel` is the command `taxel`."""
 
 import sys
 

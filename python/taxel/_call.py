@@ -30,7 +30,7 @@ class TaxelWarning(UserWarning):
 
 
 def call(arguments: Sequence[object], *, tables: Sequence[Table] = (), warn: bool = True) -> dict[str, Any]:
-    """Result of a command of `host-sim`, as its `--json` has it. Its remarks become warnings."""
+    """Result of a command of `taxel`, as its `--json` has it. Its remarks become warnings."""
     try:
         text, remarks = _native.call([str(argument) for argument in arguments], list(tables))
     except (ValueError, RuntimeError) as error:

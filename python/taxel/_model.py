@@ -49,7 +49,7 @@ except ImportError:  # scikit-learn is optional
 
 
 class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
-    """A network of Gaussians, trained by `host-sim train` and decoded as a device decodes, to the bit.
+    """A network of Gaussians, trained by `taxel train` and decoded as a device decodes, to the bit.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
     feature_names_in_ : array of str, where X had names
     output_names_ : list of str
     report_ : dict
-        What `host-sim train --json` says: errors, verdict, warnings, outliers, lines left out.
+        What `taxel train --json` says: errors, verdict, warnings, outliers, lines left out.
     blob_ : taxel._native.Blob
         The model as a device has it.
     """
@@ -225,7 +225,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return float(np.mean(1 - left / np.average((y - mean) ** 2, axis=0, weights=weights)))
 
     def save(self, path: str | Path) -> None:
-        """Writes the blob, as `host-sim train -o` does: for `host-sim link PORT upload`."""
+        """Writes the blob, as `taxel train -o` does: for `taxel link PORT upload`."""
         self._fitted()
         Path(path).write_bytes(self.blob_.to_bytes())
 
@@ -236,7 +236,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
     @classmethod
     def load(cls, path: str | Path) -> Model:
-        """Model of a blob that `save` or `host-sim train` wrote. Columns of a DataFrame are taken by the blob's names, in any
+        """Model of a blob that `save` or `taxel train` wrote. Columns of a DataFrame are taken by the blob's names, in any
         order and among others. Parameters that a blob does not hold, such as `refine`, are the usual ones."""
         return cls.of_bytes(Path(path).read_bytes())
 

@@ -99,7 +99,7 @@ class Frames:
 
 
 def synth(scene: Scene | str | Path, n: int, *, seed: int | None = None, stream: str = "test") -> Frames:
-    """`n` frames of a scene's still contacts, with its noise: those that `host-sim train` trains on with
+    """`n` frames of a scene's still contacts, with its noise: those that `taxel train` trains on with
     `stream="training"`, and fresh ones with `stream="test"`. None takes the scene's own seed."""
     if stream not in ("training", "test"):
         raise ValueError(f'stream={stream!r}: give "training" or "test"')

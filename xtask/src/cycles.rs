@@ -1,4 +1,4 @@
-//! Cost of decoding on a Cortex-M4: instructions counted exactly in QEMU, beside those that `host-sim` predicts.
+//! Cost of decoding on a Cortex-M4: instructions counted exactly in QEMU, beside those that `taxel` predicts.
 //!
 //! `docs/cycles.md` explains all this.
 

@@ -69,7 +69,7 @@ enum Command {
     /// Flash a board, let it test itself, and write what it does beside what is predicted to one JSON file. docs/board.md
     /// tells what it takes.
     Accept(accept::Options),
-    /// Print a log that `host-sim emulate --log FILE` saved.
+    /// Print a log that `taxel emulate --log FILE` saved.
     Log {
         log: String,
         /// The image that wrote it, if it is not that command's own.
@@ -77,7 +77,7 @@ enum Command {
     },
     /// Print the flash and RAM of the images; fail if one takes more than firmware/budget.txt allows.
     Size,
-    /// Count in QEMU what decoding costs a Cortex-M4, and compare with firmware/cycles.csv and with what `host-sim`
+    /// Count in QEMU what decoding costs a Cortex-M4, and compare with firmware/cycles.csv and with what `taxel`
     /// predicts.
     Cycles(cycles::Options),
     /// Export models as C and Rust, compile them with gcc, clang, arm-none-eabi-gcc and rustc in many ways, and compare all bits

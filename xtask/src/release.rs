@@ -117,8 +117,8 @@ fn program(folder: &Path) -> Outcome {
     run_command(cargo(&build).args(stripped)).map_err(|cause| {
         format!("{cause}; the target is installed by: rustup target add {STATIC}")
     })?;
-    let built = target_dir().join(STATIC).join("release/host-sim");
-    let kept = folder.join("host-sim-x86_64-linux");
+    let built = target_dir().join(STATIC).join("release/taxel");
+    let kept = folder.join("taxel-x86_64-linux");
     fs::copy(&built, &kept).map_err(|cause| failed(&built, &cause))?;
     Ok(())
 }

@@ -25,7 +25,7 @@ pub struct Size {
     uninit: u64,
     /// Size of the stack's region, whether it is used or not.
     stack: u64,
-    /// Bytes of the constants that are networks of fixed size, as `host-sim export` names them.
+    /// Bytes of the constants that are networks of fixed size, as `taxel export` names them.
     weights: u64,
 }
 
@@ -128,7 +128,7 @@ fn print_line(image: &Budget<'_>, size: &Size) {
     );
 }
 
-/// Whether a mangled name is that of a network in the module `row4`, as `host-sim export` writes it.
+/// Whether a mangled name is that of a network in the module `row4`, as `taxel export` writes it.
 fn is_weights(name: &str) -> bool {
     name.contains("4row49NETWORK_")
 }

@@ -9,7 +9,7 @@ mod device {
     use taxel_firmware::circuit::ZeroPotential;
     use taxel_firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
 
-    /// Constants of the circuit, until others are kept: `host-sim link PORT constants FILE` sets your own.
+    /// Constants of the circuit, until others are kept: `taxel link PORT constants FILE` sets your own.
     const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
 
     type BoardScanner<D, S, T> = Scanner<D, S, T, { CAPACITY.rows }, { CAPACITY.columns }>;

@@ -14,7 +14,7 @@ mod device {
         "the pins are for 8 rows and 18 columns"
     );
 
-    /// Constants of the circuit, until others are kept: `host-sim link PORT constants FILE` sets your own.
+    /// Constants of the circuit, until others are kept: `taxel link PORT constants FILE` sets your own.
     const CIRCUIT: ZeroPotential<{ LINES - 1 }, COLUMNS> = ZeroPotential::TYPICAL;
 
     #[entry]

@@ -1,4 +1,4 @@
-//! The application in the emulator, without a sensor. `host-sim emulate` is at the other end of its link, a mailbox.
+//! The application in the emulator, without a sensor. `taxel emulate` is at the other end of its link, a mailbox.
 #![no_std]
 #![no_main]
 
@@ -20,7 +20,7 @@ use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
 use taxel_firmware::store::Journal;
 
-/// The RAM figure of `host-sim inspect` must be at least the compiler's.
+/// The RAM figure of `taxel inspect` must be at least the compiler's.
 const _: () = assert!(size_of::<Decoder<'static, 8>>() <= decoder_ram_bytes(8));
 
 /// Watchdog period in ms: longer than a loop takes even on a very slow computer.

@@ -537,7 +537,7 @@ pub enum ConfigurationField {
     ReportEvery,
 }
 
-/// Fault of an uploaded blob; `host-sim inspect` says more about the file itself.
+/// Fault of an uploaded blob; `taxel inspect` says more about the file itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ModelFault {
     /// The bytes do not start as a blob does, or the blob is of another version.

@@ -68,7 +68,7 @@ impl CheckArguments {
     fn load_csv(&self) -> Result<Checked> {
         let Some(path) = &self.model else {
             return Err(Error::Usage(format!(
-                "{}: readings of a CSV file need --model FILE; `host-sim train` makes one",
+                "{}: readings of a CSV file need --model FILE; `taxel train` makes one",
                 self.source
             )));
         };

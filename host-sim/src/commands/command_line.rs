@@ -45,7 +45,7 @@ pub fn words_of<C: CommandFactory>() -> Vec<String> {
 const TOLD: [&str; 5] = ["--json", "-q", "--quiet", "-v", "--verbose"];
 
 fn repeated(given: &[String], command: &str, left_out: &[&str], seed: Option<u64>) -> String {
-    let mut words = vec!["host-sim".to_owned()];
+    let mut words = vec!["taxel".to_owned()];
     // Without a command there is a default one.
     if !given.iter().any(|word| word == command) {
         words.push(command.into());
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn the_same_results_have_the_same_command_line() {
-        let plain = "host-sim run press --noise 0.01 --seed 7";
+        let plain = "taxel run press --noise 0.01 --seed 7";
         for words in [
             &["run", "press", "--noise", "0.01"][..],
             &["run", "press", "--noise", "0.01", "-o", "there"],
@@ -95,7 +95,7 @@ mod tests {
         ] {
             assert_eq!(of_run(words), plain);
         }
-        assert_eq!(of_run(&[]), "host-sim run --seed 7");
-        assert_eq!(of_run(&["run", "my scene.toml"]), "host-sim run 'my scene.toml' --seed 7");
+        assert_eq!(of_run(&[]), "taxel run --seed 7");
+        assert_eq!(of_run(&["run", "my scene.toml"]), "taxel run 'my scene.toml' --seed 7");
     }
 }

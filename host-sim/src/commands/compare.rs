@@ -25,8 +25,8 @@ use super::{Common, arguments, command_line, print};
 /// crossed. Of every layout the most accurate of its decoders is chosen, within the bound.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim compare thin.toml thick.toml
-  host-sim compare layouts.toml --centres 32,64,128 --average 1,4 --max-latency-ms 10 -o out/layouts")]
+  taxel compare thin.toml thick.toml
+  taxel compare layouts.toml --centres 32,64,128 --average 1,4 --max-latency-ms 10 -o out/layouts")]
 pub struct Arguments {
     /// Scenes: built-in ones (paper, press, contact, moving), or scene files (.toml).
     #[arg(required = true)]

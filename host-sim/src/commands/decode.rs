@@ -39,11 +39,11 @@ use super::{Common, print, stderr};
 /// noted by wire and column on stderr.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim decode press.bin readings.csv -o estimate.csv
-  host-sim decode press.bin readings.csv --confidence -o estimate.csv
-  host-sim decode relative.bin readings.csv --baseline rest.csv -o estimate.csv
-  host-sim decode m.bin log.csv --keep time_s,frame -o estimate.csv
-  host-sim decode m.bin log.csv --filter-ms 8 --lead-ms 5 -o estimate.csv")]
+  taxel decode press.bin readings.csv -o estimate.csv
+  taxel decode press.bin readings.csv --confidence -o estimate.csv
+  taxel decode relative.bin readings.csv --baseline rest.csv -o estimate.csv
+  taxel decode m.bin log.csv --keep time_s,frame -o estimate.csv
+  taxel decode m.bin log.csv --filter-ms 8 --lead-ms 5 -o estimate.csv")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,

@@ -34,10 +34,10 @@ use super::{Common, command_line, print};
 /// --without shows what that costs.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim eval press.bin test.csv --html report.html
-  host-sim eval relative.bin test.csv --baseline rest.csv
-  host-sim eval array.bin test.csv --without 'r4c*_ohm'
-  host-sim eval m.bin log.csv --missing -1 --last-share 0.2")]
+  taxel eval press.bin test.csv --html report.html
+  taxel eval relative.bin test.csv --baseline rest.csv
+  taxel eval array.bin test.csv --without 'r4c*_ohm'
+  taxel eval m.bin log.csv --missing -1 --last-share 0.2")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,

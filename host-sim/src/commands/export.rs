@@ -22,9 +22,9 @@ use super::{Common, print};
 #[derive(Args)]
 #[command(group(ArgGroup::new("language").required(true)))]
 #[command(after_help = "Examples:
-  host-sim train press -o press.bin
-  host-sim export press.bin --c lib/press --name press
-  host-sim export press.bin --rust src/press.rs")]
+  taxel train press -o press.bin
+  taxel export press.bin --c lib/press --name press
+  taxel export press.bin --rust src/press.rs")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,

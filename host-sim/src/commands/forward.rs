@@ -13,7 +13,7 @@ use super::{Common, print};
 
 /// Compute the ideal readings for deformations from a CSV file.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim forward paper deformation.csv -o readings.csv")]
+#[command(after_help = "Example: taxel forward paper deformation.csv -o readings.csv")]
 pub struct Arguments {
     /// A built-in scene (paper, press) or the path of a scene file.
     scene: String,

@@ -21,7 +21,7 @@ use super::{Common, print};
 
 /// Show a blob's shape, origin, training errors and needs on a device.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim inspect press.bin")]
+#[command(after_help = "Example: taxel inspect press.bin")]
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,

@@ -28,9 +28,9 @@ const FILES: FileSet = FileSet {
 /// that the sample does not carry is refused (docs/what-the-sensor-knows.md).
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim limit press --row 4 --noise 0.005,0.01 -o out/limit
-  host-sim limit thin.toml thick.toml
-  host-sim limit press --model m.bin -n 2000")]
+  taxel limit press --row 4 --noise 0.005,0.01 -o out/limit
+  taxel limit thin.toml thick.toml
+  taxel limit press --model m.bin -n 2000")]
 pub struct Arguments {
     /// Built-in scenes (paper, press, contact, moving) or paths of scene files. One table compares several.
     #[arg(value_name = "SCENE", default_value = DEFAULT_SCENE)]

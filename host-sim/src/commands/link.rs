@@ -15,7 +15,7 @@ use super::{Common, interruption, stderr};
 
 /// Talk to a device on a serial port: identify, upload, record, configure, recalibrate.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
+#[command(after_help = "Example: taxel link /dev/ttyACM0 upload press.bin")]
 pub struct Arguments {
     /// Serial port, such as /dev/ttyACM0 or COM3.
     port: String,
@@ -38,51 +38,51 @@ mod recalibrate;
 #[derive(Subcommand)]
 enum Action {
     /// Show the device's identity, active model, use of memory, and counters.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 identify")]
+    #[command(after_help = "Example: taxel link /dev/ttyACM0 identify")]
     Identify,
     /// Upload a model and activate it; if refused, the previous one stays.
     ///
     /// The model is on trial until the device is seen to decode and scan with it. Until then a restart returns to the
     /// previous one, whatever caused it.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 upload press.bin")]
+    #[command(after_help = "Example: taxel link /dev/ttyACM0 upload press.bin")]
     Upload(UploadArguments),
     /// Confirm the model that `upload --trial` left on trial: it stays active over restarts.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 confirm")]
+    #[command(after_help = "Example: taxel link /dev/ttyACM0 confirm")]
     Confirm,
     /// Let the device scan, and save readings or estimates as CSV.
     #[command(
-        after_help = "Example: host-sim link /dev/ttyACM0 record press.bin -n 1000 -o estimates.csv"
+        after_help = "Example: taxel link /dev/ttyACM0 record press.bin -n 1000 -o estimates.csv"
     )]
     Record(record::RecordArguments),
     /// Capture the untouched sensor, keep its baseline over restarts, and save the mean readings as CSV.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 baseline -o rest.csv")]
+    #[command(after_help = "Example: taxel link /dev/ttyACM0 baseline -o rest.csv")]
     Baseline(record::BaselineArguments),
     /// Change the configuration, and keep it over restarts.
     #[command(
-        after_help = "Example: host-sim link /dev/ttyACM0 configure --period-us 20000 --send both"
+        after_help = "Example: taxel link /dev/ttyACM0 configure --period-us 20000 --send both"
     )]
     Configure(settings::ConfigureArguments),
     /// Set the constants of the device's circuit, and keep them over restarts.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 constants circuit.toml")]
+    #[command(after_help = "Example: taxel link /dev/ttyACM0 constants circuit.toml")]
     Constants(constants::Arguments),
     /// Mend the device's model after the sensor has changed, from reference presses, and upload it.
     ///
     /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, these are taken;
     /// otherwise the device scans, and you are asked for one press after the other. docs/drift.md says more.
     #[command(
-        after_help = "Example: host-sim link /dev/ttyACM0 recalibrate press.bin presses.csv -o mended.bin"
+        after_help = "Example: taxel link /dev/ttyACM0 recalibrate press.bin presses.csv -o mended.bin"
     )]
     Recalibrate(recalibrate::Arguments),
     /// Return to the model that was active before the last recalibration or upload, or before the trial.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 undo")]
+    #[command(after_help = "Example: taxel link /dev/ttyACM0 undo")]
     Undo,
     /// Show configuration, constants and baseline, and what of them is kept over restarts.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 settings")]
+    #[command(after_help = "Example: taxel link /dev/ttyACM0 settings")]
     Settings(settings::SettingsArguments),
     /// Let the device decode a scene's frames, and compare with the host bit for bit.
     ///
     /// The model that is checked with replaces the active one.
-    #[command(after_help = "Example: host-sim link /dev/ttyACM0 check press --model press.bin")]
+    #[command(after_help = "Example: taxel link /dev/ttyACM0 check press --model press.bin")]
     Check(CheckArguments),
 }
 

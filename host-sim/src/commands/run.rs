@@ -42,8 +42,8 @@ const FILES: FileSet = FileSet {
 /// those of an earlier run go. Frames of a scene are synthesised. Of a CSV file, the last fifth is held out to judge by.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim run press --noise 0.01 -o out/noise-1
-  host-sim run measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column fold")]
+  taxel run press --noise 0.01 -o out/noise-1
+  taxel run measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column fold")]
 pub struct Arguments {
     #[command(flatten)]
     network: NetworkArguments,

@@ -188,7 +188,7 @@ pub fn model(
         return Ok(blob);
     }
     let message = format!(
-        "its columns are not those of scene {}; train one with `host-sim train` on this scene",
+        "its columns are not those of scene {}; train one with `taxel train` on this scene",
         scene.name
     );
     Err(Error::Unfit { path: path.into(), message })

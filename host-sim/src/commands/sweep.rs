@@ -27,11 +27,11 @@ mod estimate;
 /// and --merge reads what all of them wrote. Results do not depend on how the plan was cut.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim sweep cluster/plans/small.toml
-  host-sim sweep plan.toml --list
-  host-sim sweep plan.toml --dry-run
-  host-sim sweep plan.toml --shard 3/8 -o out/plan
-  host-sim sweep plan.toml --merge out/plan -o results.csv")]
+  taxel sweep cluster/plans/small.toml
+  taxel sweep plan.toml --list
+  taxel sweep plan.toml --dry-run
+  taxel sweep plan.toml --shard 3/8 -o out/plan
+  taxel sweep plan.toml --merge out/plan -o results.csv")]
 pub struct Arguments {
     /// Plan (.toml).
     plan: PathBuf,
@@ -160,7 +160,7 @@ impl std::fmt::Display for ShardSummary<'_> {
 pub fn build() -> Result<String> {
     let failed = |cause| Error::failed(format!("cannot read the program's own file: {cause}"));
     let bytes = std::env::current_exe().and_then(std::fs::read).map_err(failed)?;
-    Ok(format!("host-sim {} {:016x}", env!("CARGO_PKG_VERSION"), digest(&bytes)))
+    Ok(format!("taxel {} {:016x}", env!("CARGO_PKG_VERSION"), digest(&bytes)))
 }
 
 #[derive(Serialize)]

@@ -26,10 +26,10 @@ use crate::report::Sections;
 /// own time, as the board scans. A second lies between two trajectories, so that a filter starts anew with each.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim synth press -n 5000 --seed 2 -o test.csv
-  host-sim synth press -n 100 --seed 2 --untouched -o rest.csv
-  host-sim synth moving -n 6000 --frame-rate 1000 --scan-ms 0.9 -o touches.csv
-  host-sim synth press -n 6000 --untouched --frame-rate 500 -o rest.csv
+  taxel synth press -n 5000 --seed 2 -o test.csv
+  taxel synth press -n 100 --seed 2 --untouched -o rest.csv
+  taxel synth moving -n 6000 --frame-rate 1000 --scan-ms 0.9 -o touches.csv
+  taxel synth press -n 6000 --untouched --frame-rate 500 -o rest.csv
 
 A scene's own seed gives the very frames that `train` and `run` train on: evaluate on another.")]
 pub struct Arguments {

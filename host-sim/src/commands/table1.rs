@@ -19,8 +19,8 @@ use super::{Common, print};
 /// linear decoder, the paper's standard network (K = N), and the 40 cells that the paper prints.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim table1 paper -o table1.csv
-  host-sim table1 paper-as-printed")]
+  taxel table1 paper -o table1.csv
+  taxel table1 paper-as-printed")]
 pub struct Arguments {
     /// A built-in scene (paper, paper-as-printed) or the path of a scene file with [table1].
     #[arg(default_value = "paper")]

@@ -38,14 +38,14 @@ mod page;
 /// predicted (docs/cycles.md). Bounds on time and error that nothing can meet are refused before anything is trained.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim trade press
-  host-sim trade press --frame-rate 100
-  host-sim trade press --max-error 0.045
-  host-sim trade press --max-cycles 40000 --max-flash 40000
-  host-sim trade press --average 1,4,16 --max-latency-ms 25
-  host-sim trade moving --readout onchip --average 1,4,12 --max-latency-ms 2
-  host-sim trade press --plan > plan.toml
-  host-sim trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
+  taxel trade press
+  taxel trade press --frame-rate 100
+  taxel trade press --max-error 0.045
+  taxel trade press --max-cycles 40000 --max-flash 40000
+  taxel trade press --average 1,4,16 --max-latency-ms 25
+  taxel trade moving --readout onchip --average 1,4,12 --max-latency-ms 2
+  taxel trade press --plan > plan.toml
+  taxel trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
     /// Folder that receives a folder named after the scene or the CSV file.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = "out")]

@@ -35,13 +35,13 @@ mod choice;
 /// names (r4c17_ohm, r4e2_dz_mm), --each-row trains one for each row-wire.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim train press -o press.bin
-  host-sim train press --centres 256 -o press.bin
-  host-sim train press --paper -o paper.bin
-  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
-  host-sim train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
-  host-sim train log.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs -o m.bin
-  host-sim train log.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs c17 --fold-blocks 10 -o m.bin")]
+  taxel train press -o press.bin
+  taxel train press --centres 256 -o press.bin
+  taxel train press --paper -o paper.bin
+  taxel train measured.csv --inputs 'ch*' --outputs 'f?_n' --centres 200 --spread 0.5 -o m.bin
+  taxel train measured.csv --inputs 'ch*' --outputs 'f?_n' --select --fold-column fold -o m.bin
+  taxel train log.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs -o m.bin
+  taxel train log.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs c17 --fold-blocks 10 -o m.bin")]
 pub struct Arguments {
     /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a data file (CSV, .mcap).
     source: String,

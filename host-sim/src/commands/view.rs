@@ -39,11 +39,11 @@ const FLEXITAC_SHAPE: [usize; 2] = [16, 32];
 /// screenshots. docs/live.md tells more.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  host-sim view                          # the device that is plugged in, or else a simulation
-  host-sim view /dev/ttyACM0 --model press.bin
-  host-sim view recording-1.mcap
-  host-sim view mat.csv --model mat.bin
-  host-sim view /dev/ttyUSB0 --protocol csv --model mat.bin")]
+  taxel view                          # the device that is plugged in, or else a simulation
+  taxel view /dev/ttyACM0 --model press.bin
+  taxel view recording-1.mcap
+  taxel view mat.csv --model mat.bin
+  taxel view /dev/ttyUSB0 --protocol csv --model mat.bin")]
 pub struct Arguments {
     /// A serial port, a scene (press, contact, moving, or a scene file), a recording (.mcap), or a data file of readings [default:
     /// the only port of USB, or else the scene press].

@@ -325,7 +325,7 @@ fn moving_contacts(sections: &mut Sections, moving: &MovingContacts) {
     sections.table(table);
     for filter in moving.ways.iter().filter_map(|way| way.filter) {
         sections.note(format!(
-            "The filter on a device: `host-sim link PORT configure --filter-ms {} --lead-ms {}` (docs/filter.md).",
+            "The filter on a device: `taxel link PORT configure --filter-ms {} --lead-ms {}` (docs/filter.md).",
             filter.time_constant_ms, filter.lead_ms
         ));
     }

@@ -520,7 +520,7 @@ mod tests {
         assert_eq!(lines[4], "output        RMSE (mm)     R²");
         assert_eq!(lines[5], "dz      0.0371 ± 0.0002   1.00");
         assert_eq!(lines[6], "d<x                   –  −0.50");
-        let page = sections.page("host-sim x").html;
+        let page = sections.page("taxel x").html;
         let line =
             "<tr><td>d&lt;x</td><td class=\"number\">–</td><td class=\"number\">−0.50</td></tr>";
         assert!(page.contains(line) && page.contains("<title>Taxel: A &amp; B</title>"), "{page}");

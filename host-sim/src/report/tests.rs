@@ -16,7 +16,7 @@ use super::{Judged, Page, Pictures, Sections};
 fn page(result: &RunResult) -> Page {
     let mut sections = super::of_run(result);
     sections.files = ["model.bin", "metrics.json"].map(String::from).to_vec();
-    sections.page("host-sim run 'by <hand>.toml' --seed 7")
+    sections.page("taxel run 'by <hand>.toml' --seed 7")
 }
 
 fn html(result: &RunResult) -> String {
@@ -105,7 +105,7 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
         "200\u{a0}<span>µs</span>",
         "14\u{202f}345\u{a0}bytes",
         "fits a slot of 131\u{202f}072\u{a0}bytes",
-        "host-sim run &#39;by &lt;hand&gt;.toml&#39; --seed 7",
+        "taxel run &#39;by &lt;hand&gt;.toml&#39; --seed 7",
         "<a href=\"model.bin\">model.bin</a>",
         env!("CARGO_PKG_VERSION"),
     ] {

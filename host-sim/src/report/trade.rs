@@ -122,7 +122,7 @@ fn chosen(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
     }
     let options = words::device_options(trade, &trade.points[point]);
     if !options.is_empty() {
-        sections.note(format!("On a device: host-sim link PORT configure{options}"));
+        sections.note(format!("On a device: taxel link PORT configure{options}"));
     }
 }
 

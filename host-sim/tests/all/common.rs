@@ -10,7 +10,7 @@ use taxel_learn::Options;
 pub struct Folder(PathBuf);
 
 /// Path of the program.
-const PROGRAM: &str = env!("CARGO_BIN_EXE_host-sim");
+const PROGRAM: &str = env!("CARGO_BIN_EXE_taxel");
 
 /// The program as a terminal starts it: signals end it, even if whoever runs the tests ignores some, as behind a
 /// script's `&`.
@@ -55,7 +55,7 @@ impl Folder {
         names
     }
 
-    /// Runs `host-sim` in this folder.
+    /// Runs `taxel` in this folder.
     pub fn run(&self, arguments: &[&str]) -> Output {
         self.run_with_threads(arguments, 2)
     }
@@ -77,7 +77,7 @@ impl Folder {
         stderr
     }
 
-    /// Runs `host-sim` and expects success; returns stdout.
+    /// Runs `taxel` and expects success; returns stdout.
     pub fn succeed(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
         assert!(
@@ -88,7 +88,7 @@ impl Folder {
         String::from_utf8(output.stdout).unwrap()
     }
 
-    /// Runs `host-sim` and expects success; returns what it says on stderr.
+    /// Runs `taxel` and expects success; returns what it says on stderr.
     pub fn notes(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
         let stderr = String::from_utf8(output.stderr).unwrap();
@@ -96,7 +96,7 @@ impl Folder {
         stderr
     }
 
-    /// Runs `host-sim` with `--json` and expects success; returns its result.
+    /// Runs `taxel` with `--json` and expects success; returns its result.
     pub fn json(&self, arguments: &[&str]) -> serde_json::Value {
         let text = self.succeed(&[arguments, &["--json"]].concat());
         serde_json::from_str(&text).unwrap_or_else(|error| panic!("{arguments:?}: {error}: {text}"))

@@ -27,7 +27,7 @@ fn sources_in_testdata_are_those_that_the_command_writes() {
         let source = fs::read_to_string(in_testdata(&format!("{name}.rs"))).unwrap();
         assert!(
             exported(&folder, &format!("{name}.bin")) == source,
-            "changed on purpose? host-sim export testdata/{name}.bin --rust testdata/{name}.rs"
+            "changed on purpose? taxel export testdata/{name}.bin --rust testdata/{name}.rs"
         );
     }
 }

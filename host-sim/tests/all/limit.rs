@@ -32,7 +32,7 @@ fn the_command_prints_the_same_bytes_on_any_number_of_threads_and_writes_its_fil
     let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
     assert!(page.contains("observable, above the dashed line") && !page.contains("NaN"));
     assert!(page.find("<svg") < page.find("<table"), "the picture stands before the table");
-    assert!(page.contains("<p class=\"note\">Made by <code>host-sim limit "));
+    assert!(page.contains("<p class=\"note\">Made by <code>taxel limit "));
     for figure in ["limit-by-noise", "directions-at-1-percent", "known-at-10-percent"] {
         let picture = folder.path(&format!("out/figures/{figure}.svg"));
         let picture = std::fs::read_to_string(picture).unwrap();

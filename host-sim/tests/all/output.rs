@@ -22,7 +22,7 @@ fn host(folder: &Folder, arguments: &[&str]) -> Command {
 /// Command of a shell that ends as the program, `"$0"`.
 fn shell(folder: &Folder, script: &str) -> Command {
     let mut command = Command::new("sh");
-    command.args(["-c", script, env!("CARGO_BIN_EXE_host-sim")]).current_dir(folder.path("."));
+    command.args(["-c", script, env!("CARGO_BIN_EXE_taxel")]).current_dir(folder.path("."));
     command
 }
 

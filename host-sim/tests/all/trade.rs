@@ -289,7 +289,7 @@ fn the_files_and_the_table_tell_every_point() {
     let picture = read("out/few/figures/error-by-time.csv");
     assert_eq!(picture.lines().filter(|line| line.starts_with("Pareto front,")).count(), front);
     assert!(html.contains("<td>chosen</td><td>fixed16") && html.contains(">chosen: K"));
-    assert!(html.contains("host-sim trade few.toml --no-refine --centres 16"), "the command");
+    assert!(html.contains("taxel trade few.toml --no-refine --centres 16"), "the command");
     assert!(html.contains("cycles of decoding at most 9000"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());

@@ -29,7 +29,7 @@ fn a_csv_file_trains_decodes_and_evaluates() {
     let page = std::fs::read_to_string(folder.path("page.html")).unwrap();
     for text in [
         "m.bin on test.csv",
-        "host-sim eval m.bin test.csv --html page.html",
+        "taxel eval m.bin test.csv --html page.html",
         "<title>row-wire 4, electrode 1: ",
         "relative to the median",
     ] {
@@ -122,7 +122,7 @@ fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
     // (2 baselines + 10 spreads × 2 networks) × 3 axes × 7 definitions.
     assert_eq!(table.lines().count(), 1 + (2 + 20) * 3 * 7);
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(page.contains("<code>host-sim run scene.toml --seed ") && page.contains("table1.csv"));
+    assert!(page.contains("<code>taxel run scene.toml --seed ") && page.contains("table1.csv"));
     let links: Vec<&str> =
         page.split("href=\"").skip(1).map(|it| it.split('"').next().unwrap()).collect();
     assert!(links.contains(&"figures/errors-by-electrode.svg"), "{links:?}");
@@ -144,7 +144,7 @@ fn every_command_has_help_with_an_example() {
         "link", "view",
     ] {
         let help = folder.succeed(&[command, "--help"]);
-        assert!(help.contains(&format!("host-sim {command} ")), "{help}");
+        assert!(help.contains(&format!("taxel {command} ")), "{help}");
         assert!(help.contains("--json"), "{help}");
     }
     let help = folder.succeed(&["trade", "-h"]);

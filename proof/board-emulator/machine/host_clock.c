@@ -1,5 +1,5 @@
-/* Loaded into host-sim (LD_PRELOAD): its clock is the emulated board's, so neither of them is late however busy the computer
-   is. A wait lasts until something arrives or the board's time is up; the board waits while host-sim computes. */
+/* Loaded into taxel (LD_PRELOAD): its clock is the emulated board's, so neither of them is late however busy the computer
+   is. A wait lasts until something arrives or the board's time is up; the board waits while taxel computes. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -14,11 +14,11 @@
 /* Shared with machine/line.py. */
 typedef struct {
     volatile int64_t now_us;  /* the board's time */
-    volatile int64_t until_us; /* until when host-sim waits */
+    volatile int64_t until_us; /* until when taxel waits */
     volatile int64_t waits;   /* 1 while it sleeps, 2 while it waits for bytes */
 } Shared;
 
-#define START_S 1000000 /* host-sim's time when the board's is 0: it may reckon back */
+#define START_S 1000000 /* taxel's time when the board's is 0: it may reckon back */
 #define LOOK_NS 2000000 /* from one look at the board's time to the next, while it waits */
 
 static Shared *shared(void) {

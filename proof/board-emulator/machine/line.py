@@ -98,7 +98,7 @@ class Terminal:
             else:
                 time.sleep(LOOK_S)
             if time.monotonic() > start + LONGEST_S:
-                raise Fault("host-sim neither waits for the board nor ends")
+                raise Fault("taxel neither waits for the board nor ends")
 
     def _unread(self):
         """Number of bytes that the host has not read."""

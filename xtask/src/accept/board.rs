@@ -24,7 +24,7 @@ const CHIP: &str = "STM32F446RETx";
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// What the emulated board prints before the name of its port.
-const PORT: &str = "host-sim link ";
+const PORT: &str = "taxel link ";
 
 pub struct Board {
     port: String,

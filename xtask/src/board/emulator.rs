@@ -32,13 +32,13 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    /// Finds Python and its packages, builds host-sim, and trains the model.
+    /// Finds Python and its packages, builds taxel, and trains the model.
     pub fn prepare(options: &Options) -> Outcome<Self> {
         let python = python()?;
         let folder = folder();
         fs::create_dir_all(&folder).map_err(|cause| format!("{}: {cause}", folder.display()))?;
         run(&mut cargo(&["build", "--quiet", "--package", "host-sim"]))?;
-        let host_sim = target_dir().join("debug").join("host-sim");
+        let host_sim = target_dir().join("debug").join("taxel");
         let model = if let Some(model) = &options.model {
             root().join(model)
         } else {
@@ -48,7 +48,7 @@ impl Emulator {
         };
         let frames = options.frames.to_string();
         let named = [
-            ("--host-sim", host_sim),
+            ("--taxel", host_sim),
             ("--model", model),
             ("--directory", folder),
             ("--wide-image", elf(NUCLEO_WIDE)),

@@ -36,7 +36,7 @@ pub struct Run {
     minutes: f64,
     /// Day on which it was run last, where it is too slow for every change.
     checked: Option<String>,
-    /// Lines of bash: `host-sim` is the program, `$ROOT` the project's folder.
+    /// Lines of bash: `taxel` is the program, `$ROOT` the project's folder.
     command: String,
     #[serde(default)]
     figure: Vec<Figure>,

@@ -1,4 +1,4 @@
-//! The application in the emulator, compared with the host by `host-sim emulate`.
+//! The application in the emulator, compared with the host by `taxel emulate`.
 
 use std::ffi::{OsStr, OsString};
 use std::fs;
@@ -26,7 +26,7 @@ const FILTERED: &[&str] = &["-n500", "--filter-ms=5", "--lead-ms=2", "--period-m
 /// Training options of networks for each row, in the format that takes the longest.
 const ROWS: &[&str] = &["--each-row", "--format=f32"];
 
-/// Arguments for the test of host-sim that the image keeps settings over restarts.
+/// Arguments for the test of taxel that the image keeps settings over restarts.
 const BY_TESTS: &[&str] = &[
     "test",
     "--quiet",
@@ -41,7 +41,7 @@ const BY_TESTS: &[&str] = &[
 /// Output of a test that was found, and passed.
 const PASSED: &str = "test result: ok. 1 passed";
 
-/// Arguments with which cargo runs host-sim.
+/// Arguments with which cargo runs taxel.
 const HOST_SIM: &[&str] = &["run", "--quiet", "--package=host-sim", "--"];
 
 /// One run of the application.
@@ -101,7 +101,7 @@ impl Check {
     }
 }
 
-/// Checks what the image takes, by the output of `host-sim emulate`, against the [`LIMITS`].
+/// Checks what the image takes, by the output of `taxel emulate`, against the [`LIMITS`].
 fn check_memory(out: &str) -> Outcome {
     for (part, limit) in LIMITS {
         let bytes = out.lines().find_map(|line| {

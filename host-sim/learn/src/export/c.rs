@@ -40,7 +40,7 @@ const LIBRARY: [(&str, &str); 9] = [
 ];
 
 /// What the header of every library says.
-const WRITTEN_BY_EXPORT: &str = "`host-sim export` wrote this file";
+const WRITTEN_BY_EXPORT: &str = "`taxel export` wrote this file";
 
 fn header_path(name: &Name) -> String {
     format!("src/{}.h", name.lower())

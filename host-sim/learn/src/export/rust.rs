@@ -56,7 +56,7 @@ fn header(model: &Model<'_>) -> String {
     let columns =
         |names, units| columns(names, units, "//     ", |it| it.escape_debug().to_string());
     format!(
-        "// Model {:?} in arrays of fixed size, as `host-sim export` wrote it; CRC-32 of its blob: {:08x}.\n\
+        "// Model {:?} in arrays of fixed size, as `taxel export` wrote it; CRC-32 of its blob: {:08x}.\n\
          // Readings, row after row, with their units:\n{}\
          // Outputs, row after row, with their units:\n{}\
          #[allow(unused_imports)]\n\

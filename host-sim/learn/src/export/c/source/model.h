@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: MIT OR Apache-2.0
  *
  * A model of Taxel as C99: no heap, no libm, no state@BUT_BASELINE@. It gives the bits of Taxel's own decoder.
- * `host-sim export` wrote this file; write it anew rather than edit it.
+ * `taxel export` wrote this file; write it anew rather than edit it.
  *
 @COLUMNS@ *
 @COST@ */
