@@ -2,14 +2,11 @@
 
 use std::time::Duration;
 
-use taxel_core::blob::Model;
 use taxel_core::filter::{Settings, State};
-use taxel_core::relative::reciprocal;
-use taxel_core::{Decoder, Frame};
 use taxel_data::{Progress, Table};
 use taxel_firmware::link::message::{Configuration, EstimateReport};
-use taxel_learn::ModelBlob;
 use taxel_learn::filtered::filter_frames;
+use taxel_learn::{ModelBlob, PreparedModel};
 
 use super::{Device, stream, upload};
 use crate::error::{Result, check_room};
@@ -61,8 +58,7 @@ impl Expected {
             |values: &[f64]| -> Vec<f32> { values.iter().map(|value| *value as f32).collect() };
         let (baseline_ohm, readings_ohm) = (baseline_ohm.map(f32s), f32s(&readings.values));
         let per_frame = [readings.names.len(), outputs.names.len()];
-        let confidence =
-            confidence(&blob.parse(), &readings_ohm, per_frame, baseline_ohm.as_deref());
+        let confidence = confidence(&model, readings);
         let outputs = f32s(&outputs.values);
         Self { readings_ohm, outputs, per_frame, confidence, baseline_ohm, start_us, filter }
     }
@@ -132,25 +128,13 @@ impl Expected {
     }
 }
 
-/// Novelty and deviations of all frames by `model`, if it tells them.
-fn confidence(
-    model: &Model<'_>,
-    readings_ohm: &[f32],
-    [inputs, outputs]: [usize; 2],
-    baseline_ohm: Option<&[f32]>,
-) -> Vec<(f32, Vec<f32>)> {
-    let Ok(decoder) = Decoder::<{ u8::MAX as usize }>::new(*model) else { return Vec::new() };
-    let unknown = vec![f32::NAN; inputs];
-    let reciprocals: Vec<f32> =
-        baseline_ohm.unwrap_or(&unknown).iter().map(|ohm| reciprocal(*ohm)).collect();
-    let mut scratch = vec![0.0; decoder.scratch_floats()];
-    let frames = readings_ohm.chunks_exact(inputs.max(1)).map(|readings_ohm| {
-        let frame = Frame { readings_ohm, reciprocals: &reciprocals };
-        let mut deviation = vec![0.0; outputs];
-        let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).ok()??;
-        Some((novelty, deviation))
-    });
-    frames.map_while(|frame| frame).collect()
+/// Novelty and deviations of all frames of `readings` by `model`, if it tells them.
+fn confidence(model: &PreparedModel<'_>, readings: &Table) -> Vec<(f32, Vec<f32>)> {
+    let Some((deviations, novelty)) = model.assess(&readings.values) else { return vec![] };
+    let of_a_frame = deviations.len() / novelty.len().max(1);
+    let of_frames = deviations.chunks_exact(of_a_frame.max(1));
+    let of_frames = of_frames.map(|of| of.iter().map(|deviation| *deviation as f32).collect());
+    novelty.into_iter().map(|novelty| novelty as f32).zip(of_frames).collect()
 }
 
 /// Activates the model of `blob` unless it is active already.
