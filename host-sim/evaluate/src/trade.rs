@@ -316,14 +316,11 @@ impl Trade {
 
     /// Errors of the group to compare points with that decode the same readings as this one, by name.
     pub fn references(&self, point: &Point) -> Vec<(&'static str, f64)> {
-        let references = [
-            ("always predicting the mean", "mean_rmse"),
-            ("best linear decoder", "linear_rmse"),
-            ("centroid", "centroid_rmse"),
-            ("least possible", "limit"),
-        ];
+        let baselines = BASELINES.iter().rev();
+        let baselines = baselines.map(|it| (it.in_words, format!("{}_rmse", it.name)));
+        let references = baselines.chain([("least possible", "limit".to_owned())]);
         let of = |(name, result)| Some((name, point.result(&format!("{result}_{}", self.group))?));
-        references.into_iter().filter_map(of).collect()
+        references.filter_map(of).collect()
     }
 
     /// First point of each choice of readings.
