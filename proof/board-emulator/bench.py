@@ -38,22 +38,22 @@ class Bench:
     The resistances at its wires are known: `ohm`.
     """
 
-    def __init__(self, image, host_sim, log, shape=(8, 18), **options):
+    def __init__(self, image, taxel, log, shape=(8, 18), **options):
         draw, (rows, columns) = random.Random(7), shape
         self.ohm = [[draw.uniform(44.0, 68.0) for _ in range(columns)] for _ in range(rows)]
         self.board = Board(image, self.ohm, log=log, **options)
-        self._host_sim, self._log, self._number = host_sim, log, 0
+        self._taxel, self._log, self._number = taxel, log, 0
 
     def run_for(self, seconds):
         """Lets the board run for so many seconds of its own time."""
         self.board.run_for(seconds)
 
-    def host_sim(self, *arguments, status=0):
+    def taxel(self, *arguments, status=0):
         """Runs `taxel link` with the board's serial port and `arguments` to its end, with this exit status, and returns
         what it says. Its clock is the board's, so it does not matter how busy the computer is.
         """
         terminal = Terminal(self.board)
-        command = [self._host_sim, "link", terminal.path, *map(str, arguments)]
+        command = [self._taxel, "link", terminal.path, *map(str, arguments)]
         self._log("$ taxel link", *arguments)
         with tempfile.TemporaryDirectory() as directory, open(pathlib.Path(directory) / "clock", "w+b") as file:
             os.ftruncate(file.fileno(), mmap.PAGESIZE)
@@ -76,7 +76,7 @@ class Bench:
     def program(self, *arguments):
         """Runs another command of `taxel`, and returns what it says."""
         self._log("$ taxel", *arguments)
-        command = [self._host_sim, *map(str, arguments)]
+        command = [self._taxel, *map(str, arguments)]
         ended = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         expect(ended.returncode == 0, f"taxel {arguments[0]} ended with {ended.returncode}: {ended.stderr}")
         return ended.stdout

@@ -50,7 +50,7 @@ def run(name, scenario, files):
         print("  ", *words, flush=True)
 
     def make(image=files.image, **options):
-        made.append(Bench(image, files.host_sim, log, **options))
+        made.append(Bench(image, files.taxel, log, **options))
         return made[-1]
 
     try:

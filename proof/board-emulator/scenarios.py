@@ -51,25 +51,25 @@ def session(make, files):
     bench = make()
     fill(bench, SLOT_B, RUBBISH)
     bench.run_for(0.02)
-    said = bench.host_sim("identify")
+    said = bench.taxel("identify")
     expect("nucleo-f446re" in said and "none: upload one" in said, "it does not tell who it is")
-    said = bench.host_sim("upload", files.model)
+    said = bench.taxel("upload", files.model)
     expect("slot 1, generation 1" in said, "the model is not in force")
     # Erasing a slot and a page takes 2.5 s at most with 32 bits at once, and a word 100 us.
     most_s, busy_s = 2.5 + 1.02 * PROGRAM_S * files.model.stat().st_size / 4, bench.board.store.busy_s
     expect(busy_s <= most_s, f"erasing and writing take {busy_s:.2f} s")
-    said = bench.host_sim("check", "press", "--model", files.model, "-n", files.frames)
+    said = bench.taxel("check", "press", "--model", files.model, "-n", files.frames)
     expect(f"{files.frames} of {files.frames} bit-identical" in said, "it does not decode as the host")
-    filtered = bench.host_sim("check", "press", "--model", files.model, "-n", 10, "--filter-ms", 5, "--period-ms", 1)
+    filtered = bench.taxel("check", "press", "--model", files.model, "-n", 10, "--filter-ms", 5, "--period-ms", 1)
     expect("10 of 10 bit-identical" in filtered, "it does not filter as the host")
-    bench.host_sim("baseline", "-n", 10, "-o", files.directory / "baseline.csv")
+    bench.taxel("baseline", "-n", 10, "-o", files.directory / "baseline.csv")
     check_baseline(bench, files.directory / "baseline.csv", 8 * 18)
     check_scan_time(bench, files.model)
     # A model that is flashed into slot A now is not used, and the log says so (xtask reads it).
     fill(bench, SLOT_A, files.model.read_bytes())
     bench.ask(RESTART, RESTARTING)
     bench.run_for(0.1)
-    expect("slot 1, generation 1" in bench.host_sim("identify"), "the model is not in force any more")
+    expect("slot 1, generation 1" in bench.taxel("identify"), "the model is not in force any more")
     expect(bench.board.untouched(*FOURTH_SELECT), "the pin of a fourth converter is not as after a reset")
     bench.finish(resets=["program"], erased=[JOURNAL[1], SLOT_B])
 
@@ -84,9 +84,9 @@ def wide(make, files):
     """An image for 16 rows and 32 columns: two row registers, four converters."""
     bench = make(image=files.wide_image, shape=(16, 32))
     bench.run_for(0.1)
-    said = bench.host_sim("identify")
+    said = bench.taxel("identify")
     expect("16 rows, 32 columns" in said and ", 0 samples failed" in said, "it does not read all columns")
-    bench.host_sim("baseline", "-n", 3, "-o", files.directory / "baseline.csv")
+    bench.taxel("baseline", "-n", 3, "-o", files.directory / "baseline.csv")
     check_baseline(bench, files.directory / "baseline.csv", 16 * 32)
     bench.finish(erased=[JOURNAL[1]])
 
@@ -101,8 +101,8 @@ def sparse(make, files):
         bench.program("train", frames, "--inputs", inputs, "--outputs", "*_dz_mm", "--no-refine", "--centres", 4,
                       "-o", model)
         bench.run_for(0.02)
-        bench.host_sim("upload", model)
-        bench.host_sim("baseline", "--model", model, "-n", 10, "-o", files.directory / "baseline.csv")
+        bench.taxel("upload", model)
+        bench.taxel("baseline", "--model", model, "-n", 10, "-o", files.directory / "baseline.csv")
         check_baseline(bench, files.directory / "baseline.csv", 24 if name == "columns" else 5)
         check_scan_time(bench, model)
         bench.finish(erased=[JOURNAL[1], SLOT_B])
@@ -213,7 +213,7 @@ def no_clock(make, files):
     for error in (-LARGEST_HSI_ERROR, LARGEST_HSI_ERROR, 0.0):
         bench = make(hse=False, hsi_error=error)
         bench.run_for(0.15)
-        said = bench.host_sim("identify")
+        said = bench.taxel("identify")
         expect("nucleo-f446re" in said, "it does not tell who it is")
         bench.finish()
 
@@ -365,13 +365,13 @@ def dead_host(make, files):
     """A host that dies behind `try`: when the trial is over, the model before, here none, is in force again."""
     bench = make()
     bench.run_for(0.02)
-    bench.host_sim("upload", files.model, "--trial")
-    expect("on trial" in bench.host_sim("identify"), "the model is not on trial")
+    bench.taxel("upload", files.model, "--trial")
+    expect("on trial" in bench.taxel("identify"), "the model is not on trial")
     bench.ask(b"\x06\x02" + varint(2000), ON_TRIAL)
     bench.run_for(1.9)
-    expect("on trial" in bench.host_sim("identify"), "the trial ended too early")
+    expect("on trial" in bench.taxel("identify"), "the trial ended too early")
     bench.run_for(0.2)
-    expect("none: upload one" in bench.host_sim("identify"), "the trial has no end")
+    expect("none: upload one" in bench.taxel("identify"), "the trial has no end")
     bench.finish(erased=[JOURNAL[1], SLOT_B])
 
 
@@ -442,8 +442,8 @@ def onchip_stream(make, files):
     """A thousand contacts a second by the chip's own converters, twelve samples a reading: none missed, and how old they are."""
     bench, model = onchip_bench(make, files), files.directory / "contact.bin"
     bench.program("train", "contact", "--no-refine", "--centres", 64, "--format", "fixed16", "-o", model)
-    bench.host_sim("upload", model)
-    said = bench.host_sim("check", "contact", "--model", model, "-n", files.frames)
+    bench.taxel("upload", model)
+    said = bench.taxel("check", "contact", "--model", model, "-n", files.frames)
     expect(f"{files.frames} of {files.frames} bit-identical" in said, "it does not decode as the host")
     bench.scan_every(1e-3, samples=12)
     bench.run_for(0.02)

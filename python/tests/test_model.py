@@ -16,7 +16,7 @@ import taxel
 RANDOM = np.random.default_rng(5)
 
 
-def host_sim(*arguments):
+def command_line(*arguments):
     command = [sys.executable, "-m", "taxel", *map(str, arguments), "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
@@ -41,12 +41,12 @@ def test_the_blob_is_that_of_the_command_line(tmp_path, parameters):
     names = [*(f"x{i}" for i in (1, 2, 3)), "y1", "y2"]
     pandas.DataFrame(np.column_stack([x, y]), columns=names).to_csv(tmp_path / "data.csv", index=False)
     options = ["--format", "fixed16", "--reading-model", "full"] if "format" in parameters else []
-    host_sim(
+    command_line(
         *("train", tmp_path / "data.csv", "--inputs", "x1..x3", "--outputs", "y1,y2", "--no-refine"),
         *("--centres", 12, *options, "-o", tmp_path / "model.bin"),
     )
     assert model.to_bytes() == (tmp_path / "model.bin").read_bytes()
-    host_sim("decode", tmp_path / "model.bin", tmp_path / "data.csv", "-o", tmp_path / "out.csv")
+    command_line("decode", tmp_path / "model.bin", tmp_path / "data.csv", "-o", tmp_path / "out.csv")
     decoded = pandas.read_csv(tmp_path / "out.csv")[["y1", "y2"]].to_numpy()
     assert np.array_equal(decoded.astype(np.float32), model.predict(x).astype(np.float32))
     assert np.abs(model.predict(x) - y).max() < 0.5

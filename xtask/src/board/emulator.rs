@@ -38,17 +38,17 @@ impl Emulator {
         let folder = folder();
         fs::create_dir_all(&folder).map_err(|cause| format!("{}: {cause}", folder.display()))?;
         run(&mut cargo(&["build", "--quiet", "--package", "host-sim"]))?;
-        let host_sim = target_dir().join("debug").join("taxel");
+        let taxel = target_dir().join("debug").join("taxel");
         let model = if let Some(model) = &options.model {
             root().join(model)
         } else {
             let model = folder.join("model.bin");
-            run(Command::new(&host_sim).args(TRAIN).arg(&model).current_dir(root()))?;
+            run(Command::new(&taxel).args(TRAIN).arg(&model).current_dir(root()))?;
             model
         };
         let frames = options.frames.to_string();
         let named = [
-            ("--taxel", host_sim),
+            ("--taxel", taxel),
             ("--model", model),
             ("--directory", folder),
             ("--wide-image", elf(NUCLEO_WIDE)),

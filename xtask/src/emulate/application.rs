@@ -42,7 +42,7 @@ const BY_TESTS: &[&str] = &[
 const PASSED: &str = "test result: ok. 1 passed";
 
 /// Arguments with which cargo runs taxel.
-const HOST_SIM: &[&str] = &["run", "--quiet", "--package=host-sim", "--"];
+const TAXEL: &[&str] = &["run", "--quiet", "--package=host-sim", "--"];
 
 /// One run of the application.
 pub struct Check {
@@ -81,7 +81,7 @@ pub fn checks() -> Outcome<[Check; 4]> {
 impl Check {
     fn new(name: &'static str, checks: &[&str], files: &[&OsStr]) -> Self {
         let image = elf(IMAGE).into_os_string();
-        let arguments = HOST_SIM.iter().chain(&["emulate", "press"]).chain(checks);
+        let arguments = TAXEL.iter().chain(&["emulate", "press"]).chain(checks);
         let files = files.iter().map(OsString::from).chain(["--image".into(), image]);
         let arguments = arguments.map(OsString::from).chain(files).collect();
         Self { name, arguments, says: None }
@@ -117,7 +117,7 @@ fn check_memory(out: &str) -> Outcome {
 }
 
 fn train(options: &[&str], model: &OsStr) -> Outcome {
-    let mut command = cargo(HOST_SIM);
+    let mut command = cargo(TAXEL);
     run(command.args(["train", "press", "--no-refine"]).args(options).arg("--output").arg(model))
 }
 
