@@ -29,8 +29,11 @@ pub struct Choice {
 }
 
 impl Display for Choice {
-    /// What was chosen, and the scores of all, in a sentence for each kind of outputs.
+    /// What was chosen, and the scores of all, in a sentence for each kind of outputs; empty if nothing was tried.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.tried.is_empty() {
+            return Ok(());
+        }
         for (index, of_kind) in self.tried.chunk_by(|a, b| a.outputs == b.outputs).enumerate() {
             let score = |it: &Tried| format!("{} {:.3}", it.features, it.score);
             let scores: Vec<String> = of_kind.iter().map(score).collect();

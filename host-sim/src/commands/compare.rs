@@ -74,7 +74,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return Err(Error::Usage(reason(failed, &first)));
     }
     if let Some(files) = &files {
-        files.write(&merged, &command_line::of_this_process("compare", &[], common.seed))?;
+        files.write(
+            &merged,
+            &command_line::of_this_process("compare", &["-o", "--output"], common.seed),
+        )?;
     }
     print::result(common, &merged, || {
         let mut page = print::Page::default();

@@ -34,8 +34,10 @@ mod page;
 /// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/`, and with a bound chosen.bin, all together
 /// at the end; those of an earlier trade go. Each point is kept in points/ as soon as it is done: a trade that was stopped
 /// goes on, and another choice among the same points takes seconds.
-/// That time is the scan's, by the plan of the board's firmware for either readout (docs/board.md), and the decoding's, as
-/// predicted (docs/cycles.md). Bounds on time and error that nothing can meet are refused before anything is trained.
+///
+/// The time of a point is that of its scan, by the plan of the board's firmware for either readout (docs/board.md), and
+/// that of decoding, as predicted (docs/cycles.md). Bounds on time and error that nothing can meet are refused before
+/// anything is trained.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel trade press
@@ -127,7 +129,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut trade = Trade::new(&subject, &asked, merged)?;
     let choice = trade.choose(&bounds);
     let shown = trade.shown(&subject, &plan, &points)?;
-    let command = command_line::of_this_process("trade", &[], None);
+    let command = command_line::of_this_process("trade", &["-o", "--output"], None);
     files::write(&folder, (&trade, shown.as_ref()), &command)?;
     if common.json {
         print::json(&trade)?;

@@ -69,6 +69,11 @@ pub fn symbol(group: &str) -> String {
     }
 }
 
+/// Text in which `groups` of outputs have their symbols.
+pub fn named<'g>(text: &str, groups: impl Iterator<Item = &'g str>) -> String {
+    groups.fold(text.to_owned(), |text, group| text.replace(group, &symbol(group)))
+}
+
 /// Text in which no number is parted from its unit at the end of a line.
 pub fn unbroken(text: &str) -> String {
     const UNITS: [&str; 20] = [

@@ -4,7 +4,7 @@ use taxel_learn::decoders::mean;
 
 use super::errors::Pictures;
 use super::face::Face;
-use super::format::{decimals, fixed, grouped, significant, symbol, with_unit};
+use super::format::{decimals, fixed, grouped, named, significant, symbol, with_unit};
 use super::sections::{Digits, Fact, Section, Sections, TableOf};
 use super::{errors, frames, moving, noise, over_time, sketch, table1};
 use taxel_evaluate::by_load::LoadErrors;
@@ -130,15 +130,15 @@ pub fn sections(judged: &Judged<'_>, made: Sections) -> Sections {
 
 /// Sets what a model is worth as the lead.
 pub fn worth(sections: &mut Sections, verdict: &Verdict, groups: &[Errors]) {
-    sections.lead = named(&verdict.sentence, groups);
+    sections.lead = named(&verdict.sentence, names(groups));
     let warnings = verdict.warnings.iter();
     sections.warnings =
-        warnings.map(|it| format!("{} ({})", named(&it.text, groups), it.name)).collect();
+        warnings.map(|it| format!("{} ({})", named(&it.text, names(groups)), it.name)).collect();
 }
 
-/// Text in which `groups` of outputs have their symbols.
-fn named(text: &str, groups: &[Errors]) -> String {
-    groups.iter().fold(text.to_owned(), |text, it| text.replace(&it.group, &symbol(&it.group)))
+/// Names of groups, as columns have them.
+fn names(groups: &[Errors]) -> impl Iterator<Item = &str> {
+    groups.iter().map(|it| it.group.as_str())
 }
 
 /// Errors of the model.
@@ -226,7 +226,7 @@ fn all_errors(sections: &mut Sections, judged: &Judged<'_>) {
             "RMSE of the best linear decoder in training, on frames that it was not fitted to: {linear}."
         ));
     }
-    sections.note(named(&judged.limit.note(), groups(judged)));
+    sections.note(named(&judged.limit.note(), names(groups(judged))));
 }
 
 /// Adds the RMSE of each of the `groups` of outputs.

@@ -71,6 +71,7 @@ fn directions(level: &Level) -> Chart {
 /// Sections of a scene's limit.
 pub fn sections(result: &LimitResult) -> Sections {
     let mut sections = Sections::new(format!("What the sensor of {} can know", result.subject));
+    sections.files = vec!["limit.json".into()];
     sections.note(format!(
         "{} noise; {} test frames; seed {}",
         result.noise_kind.name(),

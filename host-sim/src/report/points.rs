@@ -218,9 +218,12 @@ fn shares(merged: &Merged) -> Data {
 
 /// Sections of a sweep or a comparison whose files begin with `stem`.
 pub fn sections(merged: &Merged, stem: &str) -> Sections {
-    let mut sections = Sections::new(format!("Sweep {}", merged.plan));
+    let mut sections = Sections::new(match stem {
+        "compare" => "Layouts compared".into(),
+        _ => format!("Sweep {}", merged.plan),
+    });
     sections.prefix = format!("{stem}-");
-    sections.files = vec![format!("{stem}.csv")];
+    sections.files = vec![format!("{stem}.csv"), format!("{stem}.json")];
     let within = merged.settings.iter().filter(|setting| setting.is_within).count();
     let bounded = if merged.bounds.is_empty() { 0 } else { within };
     let counts = [

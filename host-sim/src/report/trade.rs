@@ -1,7 +1,7 @@
 //! Trade between speed and accuracy: three answers, a picture, and the front.
 
 use super::figures::Figure;
-use super::format::{UNDEFINED, fixed, grouped, noise, symbol};
+use super::format::{UNDEFINED, fixed, grouped, named, noise, symbol};
 use super::points::in_bounds;
 use super::sections::{Digits, Sections, TableOf};
 use taxel_evaluate::metrics;
@@ -49,6 +49,12 @@ fn rmse(trade: &Trade) -> String {
     format!("RMSE of {}", symbol(&trade.group))
 }
 
+/// Text in which groups of outputs have their symbols.
+fn in_symbols(trade: &Trade, text: &str) -> String {
+    let results = trade.points.first().map(|point| point.results.keys());
+    named(text, results.into_iter().flatten().filter_map(|name| name.strip_prefix("rmse_")))
+}
+
 /// Adds the points that a reader looks for first: the chosen one, the most accurate, the knee, and the fastest that is nearly
 /// as accurate.
 fn answers(sections: &mut Sections, trade: &Trade) {
@@ -66,7 +72,7 @@ fn answers(sections: &mut Sections, trade: &Trade) {
             None => rows.push((answer.into(), point)),
         }
     }
-    let caption = "What one looks for first. Most accurate: the fastest whose error test frames do not tell from the smallest. Knee: where the front bends most. Within 10 %: of the smallest error. The option makes trade choose the point, and write its blob.";
+    let caption = "Points to look at first. Most accurate: the fastest of those whose errors the test frames do not tell from the smallest. Knee: where the front bends most. Within 10 %: of the smallest error. With its option, trade chooses the point and writes its blob.";
     let table = TableOf::new(&rows, caption).names("answer", |(answer, _)| answer.clone()).names(
         "decoder",
         |(_, point)| {
@@ -110,7 +116,7 @@ fn chosen(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
         ));
         return;
     }
-    sections.note(format!("{start} {name}. {}", verdict.sentence));
+    sections.note(format!("{start} {name}. {}", in_symbols(trade, &verdict.sentence)));
     sections.note(cost(&trade.points[point]));
     sections.note(trade.line_note());
     verdict.warnings.iter().for_each(|warning| sections.note(warning.to_string()));
@@ -250,7 +256,8 @@ fn references(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
         of if of.is_empty() => of,
         of => format!(" With {of}:"),
     };
-    let caption = format!("Errors to compare with.{all}{of} {}", shown.limit_note);
+    let caption =
+        format!("Errors to compare with.{all}{of} {}", in_symbols(trade, &shown.limit_note));
     let unknown = || UNDEFINED.to_owned();
     let table = TableOf::new(&rows, caption)
         .names("decoder", |(_, name, _)| (*name).into())
