@@ -3,6 +3,9 @@
 use std::collections::BTreeMap;
 use std::fs;
 
+use host_sim::sweep::Plan;
+use host_sim::sweep::file::Wanted;
+use host_sim::sweep::plan::Base;
 use serde_json::Value;
 
 use crate::common::{Folder, tiny_scene};
@@ -252,6 +255,21 @@ fn repeats_are_put_together_and_draws_are_the_same_everywhere() {
         let parts = 5.0 + 2.0 * result("rows") + 0.5 * result("columns");
         assert!((result("cost_eur") - parts - 0.25 * expected).abs() < 1e-9);
     }
+}
+
+#[test]
+fn points_share_what_is_found_for_the_same_settings() {
+    // Only the axis leaves fewer centres than frames, so that each point has its own usual number.
+    let wanted = Wanted {
+        set: [("training.frames".into(), 20.into())].into_iter().collect(),
+        axes: [("training.centres".into(), vec![8, 16].into())].into_iter().collect(),
+        ..Wanted::default()
+    };
+    let base = Base::of_scene("press", "press").unwrap();
+    let plan = Plan::new("few", (vec![base], None), wanted, "a test").unwrap();
+    let [few, more] = &plan.points().unwrap()[..] else { panic!("two points") };
+    assert_eq!((few.usual.centres, more.usual.centres), (8, 16));
+    assert_ne!(few.keys[1], more.keys[1]);
 }
 
 #[test]

@@ -415,7 +415,7 @@ impl Plan {
         let key = |is_shared: &dyn Fn(&str) -> bool| -> Checked<u64> {
             let mut training = training.clone();
             training.retain(|field, _| is_shared(field));
-            Ok(digest(format!("{shares:x}\n{}", text(&training)?).as_bytes()))
+            Ok(digest(format!("{shares:x} {usual:?}\n{}", text(&training)?).as_bytes()))
         };
         let of_frames = |field: &str| FIELDS_OF_FRAMES.contains(&field);
         let keys = [
@@ -461,7 +461,9 @@ impl Plan {
         if !is_given("training.each_row") {
             return Ok(());
         }
-        let before = text(&self.changed(base, &[])?.scene)?;
+        let others: Vec<_> =
+            values.iter().filter(|(field, _)| field != "training.each_row").cloned().collect();
+        let before = text(&self.changed(base, &others)?.scene)?;
         // What is wrong with a scene is told elsewhere.
         let before = super::point::options(self.data.as_deref(), &before).ok();
         let training = document.get_mut("training").and_then(Value::as_table_mut);
