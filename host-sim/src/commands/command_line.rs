@@ -18,7 +18,7 @@ pub fn words_of<C: CommandFactory>() -> Vec<String> {
         command.get_arguments().find(|argument| argument.get_long() == Some(name))
     };
     let mut words = vec![];
-    let mut given = std::env::args().skip(2);
+    let (mut given, mut is_behind) = (std::env::args().skip(1), false);
     while let Some(word) = given.next() {
         let is_option = word.starts_with('-');
         let takes_value = |argument: &Arg| argument.get_action().takes_values();
@@ -28,6 +28,8 @@ pub fn words_of<C: CommandFactory>() -> Vec<String> {
                 words.push(word);
                 words.extend(value.flatten());
             }
+            // The first word is the command.
+            None if !is_option && !std::mem::replace(&mut is_behind, true) => {}
             None if !is_option => words.push(word),
             // Only options of `trade` that take a value are followed by one.
             None if word == "--plan"

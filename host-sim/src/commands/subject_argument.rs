@@ -32,10 +32,20 @@ pub struct SubjectArgument {
 
 /// Options of measurements, as a plan has them.
 #[derive(Parser)]
-#[command(no_binary_name = true, disable_help_flag = true)]
+#[command(name = "data", no_binary_name = true, disable_help_flag = true)]
 pub struct DataOptions {
     #[command(flatten)]
-    pub subject: SubjectArgument,
+    subject: SubjectArgument,
+    /// Seed of every random draw.
+    #[arg(long)]
+    seed: Option<u64>,
+}
+
+impl DataOptions {
+    /// Loads the measurements.
+    pub fn load(&self) -> Result<Subject> {
+        self.subject.load(&Common { seed: self.seed, ..Common::default() })
+    }
 }
 
 /// Options for scenes and CSV files.
@@ -86,12 +96,15 @@ impl SubjectArgument {
         self.source.as_deref().unwrap_or(DEFAULT_SCENE)
     }
 
-    /// Fields of a scene that its options set, for a plan.
+    /// Fields of a scene that its options set, for a plan; measurements are loaded with theirs.
     ///
     /// # Errors
     /// [`Error::Usage`] for a seed beyond those of a scene.
     pub fn set(&self, common: &Common) -> Result<Table> {
         let mut set = Table::new();
+        if !names_a_scene(self.source()) {
+            return Ok(set);
+        }
         if let Some(seed) = common.seed {
             let seed = i64::try_from(seed).map_err(|_| {
                 let most = i64::MAX;

@@ -65,7 +65,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let load = |words: &[String]| {
         let options = DataOptions::try_parse_from(words)
             .map_err(|cause| Error::Usage(format!("data: {}", cause.to_string().trim_end())))?;
-        options.subject.load(common)
+        options.load()
     };
     let plan = Plan::read(&arguments.plan, &build()?, &load)?;
     let points = plan.points()?;

@@ -91,7 +91,7 @@ fn answers(sections: &mut Sections, trade: &Trade) {
         .numbers("age", "ms", Digits::Decimals(2), |row| trade.points[row.1].times.age_ms)
         .texts("blob", "B", |row| grouped(trade.points[row.1].blob_bytes));
     let table = table.texts("option", "", |(_, point)| {
-        format!("--max-error {}", words::above(trade.points[*point].rmse(&trade.group)))
+        format!("--max-error {}", words::above(trade.counted_rmse(*point)))
     });
     sections.table(table);
 }

@@ -203,6 +203,11 @@ fn the_worst_case_counts_other_contacts_in_front_and_choice() {
         let errors: Vec<f64> = trade.front().iter().map(|i| trade.counted_rmse(*i)).collect();
         assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
     }
+    // The option that the page names makes a choice.
+    let text = host_sim::report::of_trade(&worst.0, None, false).text();
+    let most = text.split("--max-error ").nth(1).and_then(|it| it.split_whitespace().next());
+    let bounds = at_most("worst_rmse_dz_mm", most.unwrap().parse().unwrap());
+    assert_eq!(worst.0.clone().choose(&bounds), Ok(()));
     let counted = |(trade, _): &(Trade, _)| trade.counted_rmse(trade.chosen.unwrap());
     assert!(counted(&worst) > counted(&own));
 }
@@ -315,7 +320,24 @@ fn measurements_are_traded_as_they_are() {
     assert!(page.contains("1.425 ms to scan") && page.contains("2 × 18 wires"), "{page}");
     assert!(folder.path("out/data/chosen.bin").exists());
 
+    // All that is said of the data stands in a plan for it.
+    folder.succeed(&["synth", "small.toml", "-n", "9", "--untouched", "-o", "rest.csv"]);
+    let relative = ["data.csv", "--relative-inputs", "--baseline", "rest.csv", "-o", "relative"];
+    let relative = [&["--seed", "7", "trade"][..], &relative, &few].concat();
+    folder.succeed(&relative);
+    folder.write("plan.toml", folder.succeed(&[&relative[..7], &few, &["--plan"]].concat()));
+    let points = folder.succeed(&["sweep", "plan.toml", "--list"]);
+    let is_there = |id: &str| folder.path(&format!("relative/data/points/{id}.json")).exists();
+    assert!(points.lines().all(|line| is_there(&line[..16])), "{points}");
+
     let csv = std::fs::read_to_string(folder.path("data.csv")).unwrap();
+    // An output without a value in the last fifth is not judged.
+    let blank = |(i, line): (usize, &str)| match line.rsplit_once(',') {
+        Some((line, _)) if i > 320 => format!("{line},\n"),
+        _ => format!("{line}\n"),
+    };
+    folder.write("blank.csv", csv.lines().enumerate().map(blank).collect::<String>());
+    folder.succeed(&[&["trade", "blank.csv"], &few[..]].concat());
     folder.write("other.csv", csv.replace("r4c", "a").replace("r5c", "b"));
     let columns = ["--inputs", "a*_ohm,b*_ohm", "--outputs", "r4e*_dz_mm"];
     let other = [&["trade", "other.csv"], &few[..], &columns].concat();
