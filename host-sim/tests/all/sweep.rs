@@ -237,7 +237,7 @@ fn plans_that_cannot_be_used_are_refused_with_what_is_near() {
 #[test]
 fn repeats_are_put_together_and_draws_are_the_same_everywhere() {
     let folder = prepared("sweep_drawn");
-    let plan = "name = \"drawn\"\nscene = \"scene.toml\"\nlimit_frames = 0\nrepeats = 2\n\
+    let plan = "name = \"drawn\"\nscene = \"scene.toml\"\nlimit_frames = 2\nrepeats = 2\n\
                 [prices]\nfixed_eur = 5.0\nrow_eur = 2.0\ncolumn_eur = 0.5\ncm2_eur = 0.25\n[set]\ntraining.centres = 4\n\
                 [draw]\npoints = 3\n[draw.axes]\nsensor.pitch_mm = {from = 2.0, to = 4.0}\n";
     folder.write("plan.toml", plan);
@@ -250,6 +250,12 @@ fn repeats_are_put_together_and_draws_are_the_same_everywhere() {
         assert!(setting["deviations"]["rmse_dz_mm"].as_f64().unwrap() > 0.0);
         let pitch_mm = setting["values"]["sensor.pitch_mm"].as_f64().unwrap();
         let result = |name: &str| setting["results"][name].as_f64().unwrap();
+        let error_of_limit = |of: &Value| of["limit_standard_error_dz_mm"].as_f64().unwrap();
+        let points = all["points"].as_array().unwrap().iter();
+        let own = points.filter(|it| it["values"]["sensor.pitch_mm"] == pitch_mm);
+        let squares: f64 = own.map(|it| error_of_limit(&it["results"]).powi(2)).sum();
+        let expected = squares.sqrt() / setting["repeats"].as_f64().unwrap();
+        assert!((error_of_limit(&setting["results"]) / expected - 1.0).abs() < 1e-9);
         let expected = 8.0 * 18.0 * pitch_mm.powi(2) / 100.0;
         assert!((result("area_cm2") - expected).abs() < 1e-9);
         let parts = 5.0 + 2.0 * result("rows") + 0.5 * result("columns");

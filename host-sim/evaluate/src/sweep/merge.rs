@@ -282,6 +282,12 @@ fn settings(points: &[PointResult]) -> Vec<(Setting, usize)> {
                 group.iter().filter_map(|point| point.results.get(name).copied()).collect();
             let count = values.len() as f64;
             let mean = values.iter().sum::<f64>() / count;
+            if name.contains("_standard_error_") {
+                // That of the mean of independent results.
+                let squares: f64 = values.iter().map(|error| error.powi(2)).sum();
+                results.insert(name.clone(), squares.sqrt() / count);
+                continue;
+            }
             results.insert(name.clone(), mean);
             if values.len() > 1 {
                 let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
