@@ -119,7 +119,10 @@ fn chosen(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
     sections.note(format!("{start} {name}. {}", in_symbols(trade, &verdict.sentence)));
     sections.note(cost(&trade.points[point]));
     sections.note(trade.line_note());
-    verdict.warnings.iter().for_each(|warning| sections.note(warning.to_string()));
+    verdict
+        .warnings
+        .iter()
+        .for_each(|warning| sections.note(in_symbols(trade, &warning.to_string())));
     if trade.chosen.is_none() {
         return;
     }
