@@ -58,20 +58,14 @@ fn in_symbols(trade: &Trade, text: &str) -> String {
 /// Adds the points that a reader looks for first: the chosen one, the most accurate, the knee, and the fastest that is nearly
 /// as accurate.
 fn answers(sections: &mut Sections, trade: &Trade) {
-    let mut rows: Vec<Marked> = vec![];
     let found = [
         ("chosen", trade.chosen),
         ("most accurate", trade.most_accurate()),
         ("knee", trade.knee()),
         ("fastest within 10 %", trade.fastest_within(1.1)),
     ];
-    for (answer, point) in found {
-        let Some(point) = point else { continue };
-        match rows.iter_mut().find(|(_, known)| *known == point) {
-            Some((names, _)) => names.extend([", ", answer]),
-            None => rows.push((answer.into(), point)),
-        }
-    }
+    let rows: Vec<Marked> =
+        found.into_iter().filter_map(|(answer, point)| Some((answer.into(), point?))).collect();
     let caption = "Points to look at first. Most accurate: the fastest of those whose errors the test frames do not tell from the smallest. Knee: where the front bends most. Within 10 %: of the smallest error. With its option, trade chooses the point and writes its blob.";
     let table = TableOf::new(&rows, caption).names("answer", |(answer, _)| answer.clone()).names(
         "decoder",
