@@ -2,7 +2,7 @@
 //! point by its errors and its cost.
 //!
 //! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are predicted by
-//! a formula of the firmware's own code ([`Cost`](taxel_learn::cost::Cost)), the time of a scan by the firmware's own plan ([`Device`]).
+//! a formula of the firmware's own code ([`Cost`]), the time of a scan by the firmware's own plan ([`Device`]).
 
 use serde::Serialize;
 use taxel_core::rbf::Format;
