@@ -105,7 +105,8 @@ impl Check {
 fn check_memory(out: &str) -> Outcome {
     for (part, limit) in LIMITS {
         let bytes = out.lines().find_map(|line| {
-            line.strip_prefix(part)?.split_whitespace().next()?.parse::<u32>().ok()
+            let bytes = line.strip_prefix(part)?.strip_prefix(':')?;
+            bytes.split_whitespace().next()?.parse::<u32>().ok()
         });
         match bytes {
             Some(bytes) if bytes <= limit => {}
@@ -129,12 +130,12 @@ mod tests {
     fn an_image_that_takes_more_than_its_limits_is_refused() {
         let out = |flash: u32, ram: u32| {
             format!(
-                "flash             {flash} bytes without the model: vector table 8\nRAM               {ram} bytes: variables 8\n"
+                "flash: {flash} bytes without the model: vector table 8\nRAM: {ram} bytes: variables 8\n"
             )
         };
         assert!(check_memory(&out(98_304, 14_336)).is_ok());
         assert!(check_memory(&out(98_305, 14_336)).is_err());
         assert!(check_memory(&out(98_304, 14_337)).is_err());
-        assert!(check_memory("frames 7").is_err());
+        assert!(check_memory("frames: 7").is_err());
     }
 }
