@@ -66,6 +66,17 @@ pub struct Common {
     pub verbose: bool,
 }
 
+impl Common {
+    /// Seed as a scene's field, if one is given.
+    fn seed_in_scene(&self) -> Result<Option<toml::Value>> {
+        let Some(seed) = self.seed else { return Ok(None) };
+        let most = i64::MAX;
+        let refused =
+            || Error::Usage(format!("--seed {seed}: give at most {most}, the most of a scene"));
+        Ok(Some(i64::try_from(seed).map_err(|_| refused())?.into()))
+    }
+}
+
 /// Runs the `work` of the command of this `name`, prints its error, and returns the program's exit status.
 pub fn run_to_end(name: &str, common: &Common, work: impl FnOnce() -> Result<()>) -> u8 {
     stderr::set(common.quiet, common.verbose);

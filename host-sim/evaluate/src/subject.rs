@@ -116,6 +116,17 @@ impl Subject {
         }
     }
 
+    /// Number of rows that outputs belong to; 1 where they belong to none.
+    pub fn rows(&self) -> usize {
+        match self {
+            Self::Scene(scene) => match scene.world.outputs {
+                Outputs::Contact(_) => 1,
+                Outputs::Electrodes(_) => scene.world.read_rows.len(),
+            },
+            Self::Measured(data) => data.training.rows,
+        }
+    }
+
     /// Row-wire (from 1) of each row table, where outputs belong to row-wires.
     pub fn row_wires(&self) -> Vec<usize> {
         match self {

@@ -9,14 +9,14 @@ use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::cost::Cost;
 use taxel_learn::filtered::{Movement, settings_for};
-use taxel_learn::{ModelBlob, PreparedModel};
+use taxel_learn::{Decoder, ModelBlob, PreparedModel};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
 use crate::device::{Device, Times};
 use crate::error::Result;
 use crate::experiment::Experiment;
-use crate::metrics::{self, Blocks, Errors, Measure};
+use crate::metrics::{self, Blocks, DecoderErrors, Errors, Measure};
 use crate::moving::{GRID_S, Moving};
 
 /// Trajectories on which a decoder's noise is measured.
@@ -120,12 +120,21 @@ impl<'s> Touches<'s> {
         self.of(times.scan_ms.unwrap_or_default(), times.period_ms())
     }
 
-    /// Frames of a device whose decoding takes no time.
+    /// Errors of a `decoder` that takes no time, behind scans that take `scan_ms`.
     ///
     /// # Errors
     /// [`Error`](crate::Error) for times that [`Moving::new`] refuses.
-    pub fn while_scanned(&self, scan_ms: Option<f64>) -> Result<Arc<OfPeriod>> {
-        self.of(scan_ms.unwrap_or_default(), scan_ms.unwrap_or_default())
+    pub fn judge_at_once(
+        &self,
+        decoder: &dyn Decoder,
+        scan_ms: Option<f64>,
+        measure: &Measure,
+    ) -> Result<DecoderErrors> {
+        let scan_ms = scan_ms.unwrap_or_default();
+        let scanned = self.of(scan_ms, scan_ms)?;
+        let estimates = decoder.decode_all(&scanned.moving.frames.inputs.values, 1);
+        let (errors, _) = scanned.moving.errors(&estimates.values, scanned.scan_ms, measure);
+        Ok(DecoderErrors::new(decoder.name(), errors))
     }
 
     fn of(&self, scan_ms: f64, period_ms: f64) -> Result<Arc<OfPeriod>> {
@@ -200,11 +209,6 @@ impl OfPeriod {
         ]
         .map(f64::sqrt);
         Movement { rate_per_s, acceleration_per_s2 }
-    }
-
-    /// Errors of the `estimates` of a decoder that takes no time.
-    pub fn errors_at_once(&self, estimates: &[f64], measure: &Measure) -> Vec<Errors> {
-        self.moving.errors(estimates, self.scan_ms, measure).0
     }
 }
 

@@ -11,18 +11,17 @@ use taxel_learn::cost::Cost;
 use taxel_learn::decoders::{BASELINES, Baseline};
 use taxel_learn::outliers::Outliers;
 use taxel_simulate::noise::NoiseKind;
-use taxel_simulate::outputs::Outputs;
 use taxel_simulate::path::Path;
 use toml::{Table, Value};
 
 use crate::device::Device;
 use crate::error::{Error, Result};
 use crate::experiment::Method;
-use crate::metrics::{self, DecoderErrors};
+use crate::metrics::{self, Blocks, DecoderErrors};
 use crate::subject::Subject;
 use crate::sweep::bounds::{self, Bound, Bounds, Values};
 use crate::sweep::file::{Also, Wanted};
-use crate::sweep::front::is_as_good;
+use crate::sweep::front;
 use crate::sweep::judge::{self, Frames, KnownLimit, Starts};
 use crate::sweep::{self, Merged};
 use crate::verdict::{Verdict, Warning};
@@ -70,13 +69,7 @@ impl Asked {
         };
         let mut axis = |field: &str, values: Value| wanted.axes.insert(field.into(), values);
         // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
-        let rows = match subject {
-            Subject::Scene(scene) => match scene.world.outputs {
-                Outputs::Contact(_) => 1,
-                Outputs::Electrodes(_) => scene.world.read_rows.len(),
-            },
-            Subject::Measured(data) => data.training.rows,
-        };
+        let rows = subject.rows();
         let formats = Format::ALL.iter().rev().map(|format| Value::from(format.name()));
         axis("training.format", formats.collect::<Vec<_>>().into());
         axis("training.each_row", if rows > 1 { vec![true, false] } else { vec![false] }.into());
@@ -188,13 +181,6 @@ impl Trade {
             return Err(Error::failed(format!("no way to decode can be trained: {cause}")));
         }
         let names = subject.output_names();
-        let rows = match subject {
-            Subject::Scene(scene) => match scene.world.outputs {
-                Outputs::Contact(_) => 1,
-                Outputs::Electrodes(_) => scene.world.read_rows.len(),
-            },
-            Subject::Measured(data) => data.training.rows,
-        };
         Ok(Self {
             subject: subject.name().into(),
             seed: subject.origin().seed,
@@ -209,7 +195,7 @@ impl Trade {
             motion: subject.moving_scene().map(|(_, path)| path),
             outliers: subject.measurements().map(|data| data.outliers.clone()),
             device: asked.device,
-            line: Line::new(rows, names.len()),
+            line: Line::new(subject.rows(), names.len()),
             group: asked.group.clone(),
             unit: metrics::unit_of_rmse(&asked.group).into(),
             worst_case: asked.worst_case,
@@ -271,26 +257,23 @@ impl Trade {
 
     /// The cheapest of some points, with a bound on the error, or else of those that are as good as the best.
     fn best(&self, among: &[usize]) -> Option<usize> {
-        let by_error =
-            |a: &&usize, b: &&usize| self.counted_rmse(**a).total_cmp(&self.counted_rmse(**b));
-        let least = *among.iter().min_by(by_error)?;
-        let is_bounded = self.bounds.contains_key(&self.error());
-        let near = among.iter().filter(|i| is_bounded || self.is_as_good(**i, least));
         let key = |i: usize| {
             let Point { cycles, blob_bytes, times, .. } = &self.points[i];
             [times.frame_ms, *cycles as f64, *blob_bytes as f64, self.counted_rmse(i)]
         };
-        let compare = |a: &&usize, b: &&usize| {
+        let by_cost = |a: &&usize, b: &&usize| {
             let ordered = key(**a).into_iter().zip(key(**b)).map(|(a, b)| a.total_cmp(&b));
             ordered.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
         };
-        near.min_by(compare).copied()
+        if self.bounds.contains_key(&self.error()) {
+            return among.iter().min_by(by_cost).copied();
+        }
+        front::best(&self.error(), among, |i| self.estimate(*i), by_cost).copied()
     }
 
-    /// Whether the error of one point is no larger than that of another, as far as their test frames tell.
-    fn is_as_good(&self, one: usize, other: usize) -> bool {
-        let of = |point: usize| (self.counted_rmse(point), &self.points[point].blocks);
-        is_as_good(&self.error(), of(one), of(other))
+    /// RMSE that a point is chosen by, with its blocks.
+    fn estimate(&self, point: usize) -> (f64, &Blocks) {
+        (self.counted_rmse(point), &self.points[point].blocks)
     }
 
     /// Name of the result by which front and choice are determined.
@@ -348,10 +331,11 @@ impl Trade {
 
     /// Fastest point with the smallest error, or with one that test frames do not tell from it.
     pub fn most_accurate(&self) -> Option<usize> {
-        let rmse = |i: &usize| self.counted_rmse(*i);
-        let front = self.front();
-        let least = front.iter().copied().min_by(|a, b| rmse(a).total_cmp(&rmse(b)))?;
-        front.into_iter().find(|i| self.is_as_good(*i, least))
+        let by_time = |a: &&usize, b: &&usize| {
+            let [a, b] = [a, b].map(|i| self.points[**i].times.frame_ms);
+            a.total_cmp(&b)
+        };
+        front::best(&self.error(), &self.front(), |i| self.estimate(*i), by_time).copied()
     }
 
     /// Fastest point of the front whose error is at most so many times the smallest.
@@ -406,9 +390,8 @@ impl Trade {
             .with(Warning::other_image(&blob.parse()))
             .of_blob(&blob, self.training_frames)
             .of_frames(self.outliers.as_ref(), self.test_frames);
-        let others = frames.on_others(&blob.prepare().of_inputs()).into_iter();
-        let others = others
-            .filter_map(|(name, errors)| Some((name, metrics::rmse_of(&errors, &self.group)?)));
+        let others = judged.others.iter();
+        let others = others.filter_map(|it| Some((it.name.clone(), it.rmse(&self.group)?)));
         let sensor = of_point.scene().map(|scene| &scene.world.sensor);
         let chosen = sensor.filter(|sensor| sensor.read_columns.is_some());
         Ok(Some(Shown {

@@ -7,7 +7,7 @@ use crate::report::{TableOf, result_text};
 use crate::sweep::bounds::Bound;
 use crate::sweep::fields::require_known;
 use crate::sweep::file::Wanted;
-use crate::sweep::front::is_as_good;
+use crate::sweep::front;
 use crate::sweep::merge::{PointResult, Setting};
 use crate::sweep::plan::{Base, SCENE, SEED};
 use crate::sweep::{Merged, Plan, layouts, work};
@@ -106,12 +106,7 @@ fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
     if let ReadoutOption::Onchip = arguments.tried.readout {
         wanted.device.insert("readout".into(), "onchip".into());
     }
-    if let Some(seed) = common.seed {
-        let seed = i64::try_from(seed).map_err(|_| {
-            Error::Usage(format!("--seed {seed}: give at most {}, the most of a scene", i64::MAX))
-        })?;
-        wanted.set.insert(SEED.into(), Value::Integer(seed));
-    }
+    wanted.set.extend(common.seed_in_scene()?.map(|seed| (SEED.into(), seed)));
     wanted
         .bounds
         .extend(arguments.tried.max_latency_ms.map(|most| ("frame_ms".into(), Bound::Most(most))));
@@ -148,15 +143,9 @@ fn table(page: &mut print::Page, merged: &Merged, first: &str) {
     for (layout, own) in layouts {
         // A layout with other outputs has its limit and its first decoder.
         let within: Vec<&Setting> = own.into_iter().filter(|it| it.is_within).collect();
-        let least =
-            within.iter().copied().min_by(|a, b| result(a, error).total_cmp(&result(b, error)));
-        let near = within.into_iter().filter(|setting| {
-            least.is_some_and(|least| {
-                let [one, other] = [*setting, least].map(|it| (result(it, error), &it.blocks));
-                is_as_good(error, one, other)
-            })
-        });
-        rows.push((layout, near.min_by(|a, b| result(a, time).total_cmp(&result(b, time)))));
+        let by_time = |a: &&&Setting, b: &&&Setting| result(a, time).total_cmp(&result(b, time));
+        let best = front::best(error, &within, |it| (result(it, error), &it.blocks), by_time);
+        rows.push((layout, best.copied()));
     }
     let mut table = TableOf::new(&rows, "Layouts, each with its best decoder.")
         .names("layout", |(layout, _)| (*layout).into());

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::experiment::{Experiment, names_a_scene};
 use crate::subject::Subject;
 use crate::sweep::file::Wanted;
+use crate::sweep::plan::SEED;
 use crate::{Error, Result};
 use clap::{Args, Parser};
 use taxel_learn::reading_model::Extent;
@@ -105,13 +106,7 @@ impl SubjectArgument {
         if !names_a_scene(self.source()) {
             return Ok(set);
         }
-        if let Some(seed) = common.seed {
-            let seed = i64::try_from(seed).map_err(|_| {
-                let most = i64::MAX;
-                Error::Usage(format!("--seed {seed}: give at most {most}, the most of a scene"))
-            })?;
-            set.insert("seed".into(), seed.into());
-        }
+        set.extend(common.seed_in_scene()?.map(|seed| (SEED.into(), seed)));
         let options = &self.options;
         let level = options.noise.level().map(|level| ("noise.level", Value::from(level)));
         let refine = (!options.refine.over(true)).then_some(("training.refine", false.into()));

@@ -81,16 +81,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return list(&plan, &points, shard, common);
     }
     let folder = arguments.output.clone().unwrap_or_else(|| Path::new("out").join(&plan.name));
-    let store = store(&folder);
     let table = folder.join(RESULTS);
     if shard.is_none() {
         Files::of(&table)?.check(&[&arguments.plan])?;
     }
-    let groups = shard.unwrap_or(Shard::WHOLE).groups(&points);
-    let worked = work::run(&plan, &points, &groups, &store, &Terminal::new())?;
-    for replaced in &worked.replaced {
-        stderr::remark(format_args!("note: {replaced}; it is computed anew"));
-    }
+    let worked = work(&plan, &points, shard.unwrap_or(Shard::WHOLE), &folder)?;
     match shard {
         None => merge(&plan, &points, &folder, &table, arguments, common),
         Some(shard) => {
@@ -114,13 +109,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 /// Results of all points of a plan, each of which is kept in `folder` as soon as it is done; those that are there already
 /// are not computed again.
 pub fn all(plan: &Plan, points: &[Point], folder: &Path) -> Result<Merged> {
-    let store = store(folder);
-    let groups = Shard::WHOLE.groups(points);
-    let worked = work::run(plan, points, &groups, &store, &Terminal::new())?;
+    work(plan, points, Shard::WHOLE, folder)?;
+    Merged::read(plan, points, &store(folder))
+}
+
+/// Computes a shard's points into `folder`, and remarks on files that are replaced.
+fn work(plan: &Plan, points: &[Point], shard: Shard, folder: &Path) -> Result<work::Worked> {
+    let groups = shard.groups(points);
+    let worked = work::run(plan, points, &groups, &store(folder), &Terminal::new())?;
     for replaced in &worked.replaced {
         stderr::remark(format_args!("note: {replaced}; it is computed anew"));
     }
-    Merged::read(plan, points, &store)
+    Ok(worked)
 }
 
 /// Table of results in the folder of a sweep.

@@ -68,12 +68,9 @@ impl MovingContacts {
         let model = blob.prepare().of_inputs();
         let cost = Cost::of_frame(&Design::new(blob));
         let touched = touches.judge((blob, &model), cost, (&device, scan_ms), &scene.measure())?;
-        let scanned = touches.while_scanned(scan_ms)?;
-        let decoders = baselines.iter().map(|baseline| {
-            let estimates = baseline.decode_all(&scanned.moving.frames.inputs.values, 1);
-            let errors = scanned.errors_at_once(&estimates.values, &scene.measure());
-            DecoderErrors::new(baseline.name(), errors)
-        });
+        let measure = scene.measure();
+        let decoders =
+            baselines.iter().map(|it| touches.judge_at_once(it.as_ref(), scan_ms, &measure));
         let way = |way: &Way| MovingWay {
             filter: way.filter.is_on().then(|| way.filter.into()),
             times: way.times,
@@ -83,7 +80,7 @@ impl MovingContacts {
             path,
             group: group.into(),
             ways: touched.ways.iter().map(way).collect(),
-            decoders: decoders.collect(),
+            decoders: decoders.collect::<Result<_>>()?,
             shown: ShownTrajectory::new(&touched, group),
         }))
     }

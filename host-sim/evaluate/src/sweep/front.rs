@@ -25,6 +25,17 @@ pub fn is_as_good(name: &str, one: (f64, &Blocks), other: (f64, &Blocks)) -> boo
     one.0 <= other.0 + unsure
 }
 
+/// The cheapest of the offers whose errors called `name` are as good as the smallest.
+pub fn best<'t, 'o, T>(
+    name: &str,
+    offers: &'t [T],
+    error: impl Fn(&T) -> (f64, &'o Blocks),
+    by_cost: impl Fn(&&T, &&T) -> Ordering,
+) -> Option<&'t T> {
+    let least = offers.iter().min_by(|a, b| error(a).0.total_cmp(&error(b).0))?;
+    offers.iter().filter(|it| is_as_good(name, error(it), error(least))).min_by(by_cost)
+}
+
 /// Setting with the results that are to be small.
 pub struct Offer<'o> {
     pub values: Vec<f64>,

@@ -2,7 +2,6 @@
 //! of their readings, frames, what training starts from, layers that any number format has, and a model.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use taxel_core::filter::{Settings, Track};
@@ -21,7 +20,7 @@ use super::point::{self, Results};
 use crate::device::{Device, Wires};
 use crate::error::Result;
 use crate::experiment::Experiment;
-use crate::metrics::{self, DecoderErrors, Definition, Errors, LimitSummary, Measure};
+use crate::metrics::{self, Blocks, DecoderErrors, Definition, Errors, LimitSummary, Measure};
 use crate::others::{self, OtherFrames};
 use crate::subject::Subject;
 use crate::touches::{Touches, Way};
@@ -40,7 +39,7 @@ type Stage<T> = std::result::Result<T, String>;
 /// to `keep` as soon as it is there.
 ///
 /// # Errors
-/// That of `keep`.
+/// [`Error`](crate::Error) if `keep` refuses an outcome.
 pub fn compute(
     plan: &Plan,
     points: &[Point],
@@ -209,9 +208,9 @@ pub struct Frames<'s> {
     set: TrainingSet<'s>,
     test: Cow<'s, Dataset>,
     touches: Option<Touches<'s>>,
-    pub others: OtherFrames,
+    others: OtherFrames,
     /// Errors of the baselines, if the plan wants them.
-    pub baselines: Vec<DecoderErrors>,
+    baselines: Vec<DecoderErrors>,
 }
 
 impl<'s> Frames<'s> {
@@ -240,14 +239,11 @@ impl<'s> Frames<'s> {
     fn baselines(&self) -> Result<Vec<DecoderErrors>> {
         let measure = &self.readings.measure;
         let fitted = BASELINES.iter().filter_map(|baseline| baseline.fit(&self.set.frames));
-        let judged = fitted.map(|decoder| {
-            let Some(touches) = &self.touches else {
-                return Ok(metrics::judge(decoder.as_ref(), &self.test, measure));
-            };
-            let touched = touches.while_scanned(self.readings.scan_ms)?;
-            let estimates = decoder.decode_all(&touched.moving.frames.inputs.values, 1);
-            let errors = touched.errors_at_once(&estimates.values, measure);
-            Ok(DecoderErrors::new(decoder.name(), errors))
+        let judged = fitted.map(|decoder| match &self.touches {
+            Some(touches) => {
+                touches.judge_at_once(decoder.as_ref(), self.readings.scan_ms, measure)
+            }
+            None => Ok(metrics::judge(decoder.as_ref(), &self.test, measure)),
         });
         judged.collect()
     }
@@ -297,38 +293,22 @@ impl<'s> Frames<'s> {
         before.add("blob_bytes", Some(blob.bytes().len() as f64));
         let filter_bytes = FILTER_BYTES * self.test.outputs.names.len();
         Ok(Judged {
-            worst: self.worst_other(&model),
+            others: self.others(&model),
             ram_bytes: [0, filter_bytes].map(|bytes| DecoderRam::new(&design).bytes() + bytes),
             before,
             ways,
         })
     }
 
-    /// Errors of a `model` on other contacts: the name of each, and its errors.
-    pub fn on_others(&self, model: &PreparedModel<'_>) -> Vec<(String, Vec<Errors>)> {
+    /// What a `model` makes of other contacts.
+    fn others(&self, model: &PreparedModel<'_>) -> Vec<OtherContact> {
         let measure = Measure { limit: None, ..self.readings.measure.clone() };
         let of = |(name, frames): &(String, Dataset)| {
-            (name.clone(), metrics::judge(model, frames, &measure).errors)
-        };
-        self.others.iter().map(of).collect()
-    }
-
-    /// Largest error of a `model` on other contacts, by group, with its blocks.
-    fn worst_other(&self, model: &PreparedModel<'_>) -> Worst {
-        let measure = Measure { limit: None, ..self.readings.measure.clone() };
-        let mut worst: Worst = BTreeMap::new();
-        for (_, frames) in &self.others {
             let estimates = model.decode_lines(&frames.inputs.values);
             let (errors, blocks) = metrics::with_blocks(&frames.outputs, &estimates, &measure);
-            for (group, rmse) in rmse_of_groups(&errors) {
-                let known = worst.get(&group).map_or(0.0, |known| known.0);
-                if rmse > known {
-                    let blocks = blocks.get(&group).cloned().unwrap_or_default();
-                    worst.insert(group, (rmse, blocks));
-                }
-            }
-        }
-        worst
+            OtherContact { name: name.clone(), rmse: rmse_of_groups(&errors), blocks }
+        };
+        self.others.iter().map(of).collect()
     }
 
     /// Errors of the `model` of a still subject, and of the baselines.
@@ -375,13 +355,25 @@ impl<'s> Starts<'s> {
     }
 }
 
-/// Largest error on other contacts by group, with its [blocks](metrics::Blocks).
-type Worst = BTreeMap<String, (f64, Vec<f64>)>;
+/// What a model makes of contacts that it was not trained on.
+pub struct OtherContact {
+    pub name: String,
+    /// RMSE by group.
+    rmse: Vec<(String, f64)>,
+    blocks: Blocks,
+}
+
+impl OtherContact {
+    /// RMSE of a group, in its unit.
+    pub fn rmse(&self, group: &str) -> Option<f64> {
+        self.rmse.iter().find(|(of, _)| of == group).map(|(_, rmse)| *rmse)
+    }
+}
 
 /// Errors and cost of a model, without a filter in time, and on contacts that move behind one.
 pub struct Judged {
     before: Results,
-    worst: Worst,
+    pub others: Vec<OtherContact>,
     ways: Vec<Way>,
     /// Without a filter, and behind one.
     ram_bytes: [usize; 2],
@@ -410,13 +402,12 @@ impl Judged {
         for (group, rmse) in rmse_of_groups(&way.errors) {
             results.add_estimate("rmse", &group, rmse, way.blocks.get(&group));
             // What a filter in time makes of still contacts is not judged.
-            if let Some((worst, blocks)) = self.worst.get(&group) {
-                let (worst, blocks) = if *worst > rmse {
-                    (*worst, Some(blocks))
-                } else {
-                    (rmse, way.blocks.get(&group))
-                };
-                results.add_estimate("worst_rmse", &group, worst, blocks);
+            let others = self.others.iter().filter_map(|it| Some((it.rmse(&group)?, &it.blocks)));
+            let others = others.filter(|(rmse, _)| *rmse > 0.0);
+            if let Some(other) = others.reduce(|a, b| if b.0 > a.0 { b } else { a }) {
+                let own = (rmse, &way.blocks);
+                let (worst, blocks) = if other.0 > rmse { other } else { own };
+                results.add_estimate("worst_rmse", &group, worst, blocks.get(&group));
             }
         }
         let times = &way.times;

@@ -2,7 +2,7 @@
 //!
 //! A plan is a TOML file; `docs/sweeps.md` explains every field.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -86,6 +86,8 @@ pub struct Plan {
     /// Program that computes it: another one may compute something else.
     pub build: String,
     bases: Vec<Base>,
+    /// Usual settings by the bases' labels, unless one is a scene only with what axes give.
+    usual: BTreeMap<String, Usual>,
     set: Vec<(String, Value)>,
     device: Table,
     /// Values of every axis: of those that are drawn together, one line a draw.
@@ -223,6 +225,7 @@ impl Plan {
             is_drawn: wanted.draw.is_some(),
             build: build.into(),
             bases,
+            usual: BTreeMap::new(),
             set: fields::leaves(&wanted.set, &|_| false),
             device: wanted.device,
             axes,
@@ -240,6 +243,8 @@ impl Plan {
             return Err(BadValue::new("set", field, "it is an axis as well; give it once"));
         }
         plan.check_fields()?;
+        let usual = |base: &Base| Some((base.label.clone(), plan.usual_of(base)?));
+        plan.usual = plan.bases.iter().filter_map(usual).collect();
         plan.choose_objectives()?;
         Ok(plan)
     }
@@ -392,8 +397,8 @@ impl Plan {
         let scene = text(&document.scene)?;
         let base = self.base_of(&document.values);
         let of_scene = base.map_or(0, |base| base.digest);
-        let usual = match self.usual_of(base) {
-            Some(usual) => usual,
+        let usual = match base.and_then(|base| self.usual.get(&base.label)) {
+            Some(usual) => *usual,
             None => self.usual_in(&scene).unwrap_or(USUAL),
         };
         let mut shared = document.scene;
@@ -429,9 +434,8 @@ impl Plan {
         Ok(Point { id, values, scene, on_device, usual, digest, shares, keys })
     }
 
-    /// Usual settings of a base, unless it is a scene only with what axes give.
-    fn usual_of(&self, base: Option<&Base>) -> Option<Usual> {
-        self.usual_in(&text(&self.changed(base, &[]).ok()?.scene).ok()?)
+    fn usual_of(&self, base: &Base) -> Option<Usual> {
+        self.usual_in(&text(&self.changed(Some(base), &[]).ok()?.scene).ok()?)
     }
 
     fn usual_in(&self, scene: &str) -> Option<Usual> {
