@@ -6,7 +6,7 @@ mod stdout;
 pub mod print;
 pub mod progress;
 pub mod arguments;
-mod model_argument;
+mod format_note;
 mod decoder_arguments;
 mod command_line;
 mod model_outputs;

@@ -138,7 +138,7 @@ impl Blob {
     #[getter]
     fn reading_model(&self) -> Option<&'static str> {
         let model = self.ways().frames.model();
-        model.reading_model().map(|it| Extent::NAMES[usize::from(it.assesses())])
+        model.reading_model().map(|it| Extent::ALL[usize::from(it.assesses())].name())
     }
 
     /// Decodes readings (frames × inputs) to outputs (frames × outputs).

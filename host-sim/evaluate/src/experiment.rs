@@ -8,11 +8,9 @@ use std::path::Path;
 
 use serde::Deserialize;
 use taxel_core::blob::NoiseKind as BlobNoiseKind;
-use taxel_core::rbf::Format;
 use taxel_data::digest::digest;
 use taxel_data::{AtRest, BadValue, Dataset, Progress, Stream, input, require};
-use taxel_learn::reading_model::Extent;
-use taxel_learn::train::{Features, FreshFrames, Kinds, Solver, check_spread};
+use taxel_learn::train::{FreshFrames, Solver, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
 use taxel_simulate::noise::{Noise, NoiseKind};
@@ -23,6 +21,7 @@ use taxel_simulate::{Synthesis, World};
 
 use crate::error::{Error, Result};
 use crate::metrics::{LimitSummary, Measure};
+use crate::training_options::{Training, TrainingOptions};
 
 mod others;
 mod file;
@@ -60,58 +59,15 @@ pub struct Experiment {
     /// CRC-64/XZ of the scene's text.
     pub digest: u64,
     pub world: World,
+    /// Number of frames to train on.
+    pub frames: usize,
+    /// Number of frames to judge by.
+    pub test_frames: usize,
     pub training: Training,
     /// Settings of Table 1, if it is wanted.
     pub table1: Option<Table1>,
     /// Contacts that the model is not trained on, and judged by as well.
     pub others: Vec<OtherContact>,
-}
-
-/// Settings of a model's training.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Training {
-    pub frames: usize,
-    pub test_frames: usize,
-    /// Number of centres K of each row's network.
-    pub centres: usize,
-    /// Width σ on scaled inputs.
-    pub spread: f64,
-    /// How the model is trained.
-    #[serde(default)]
-    pub method: Method,
-    /// How output weights are computed; the paper's method has its own way.
-    #[serde(default)]
-    pub solver: Solver,
-    /// Number format of the weights; `None` for fixed16, or f32 where that does not hold the model.
-    #[serde(default, deserialize_with = "file::format::deserialize")]
-    pub format: Option<Format>,
-    /// Whether each row has a network of its own, instead of one network for all rows behind a projection of all readings.
-    #[serde(default)]
-    pub each_row: bool,
-    /// Number of features that the network of all rows sees.
-    pub features: Option<usize>,
-    /// How features are made of readings; `None` for what frames that are held out tell.
-    pub features_kind: Option<Features>,
-    /// Whether inputs are readings relative to the baseline (R/R₀), and not readings as they are.
-    #[serde(default)]
-    pub relative_inputs: bool,
-    /// Whether centres, widths and the projection are refined after K-means.
-    #[serde(default = "yes")]
-    pub refine: bool,
-    /// What the model's statistics of readings tell: missing readings, and how novel a frame is and how far off outputs.
-    pub reading_model: Option<Extent>,
-}
-
-/// Way to train a model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// As accurate as it can be: centres and projection are refined, and networks have an affine tail.
-    #[default]
-    Best,
-    /// As the paper has it ([`Options::as_in_paper`]): nothing is refined.
-    Paper,
 }
 
 /// Settings of the paper's Table 1.
@@ -143,10 +99,6 @@ impl Table1 {
         let of_textbook = self.textbook_covariance.map(|_| Solver::Qr);
         self.solver.or(of_textbook).unwrap_or(Solver::Rls)
     }
-}
-
-fn yes() -> bool {
-    true
 }
 
 impl Experiment {
@@ -236,26 +188,18 @@ impl Experiment {
 
     /// Options for training the scene's model.
     pub fn options(&self) -> Options {
-        let t = &self.training;
-        let usual = Options::default();
-        let options = Options {
-            centres: t.centres,
-            spread: t.spread,
-            solver: t.solver,
-            seed: self.world.seed,
-            format: t.format.unwrap_or(usual.format),
-            or_f32: t.format.is_none(),
-            each_row: t.each_row,
-            features: t.features,
-            kinds: t.features_kind.map(Kinds::all),
-            ..usual
-        };
-        match t.method {
-            Method::Best => options,
-            Method::Paper => {
-                Options { format: t.format.unwrap_or(Format::F32), ..options.as_in_paper() }
-            }
-        }
+        Options { seed: self.world.seed, ..self.training.options }
+    }
+
+    /// This experiment, trained as `given` says. [`check_sizes`](Self::check_sizes) checks its numbers.
+    ///
+    /// # Errors
+    /// As [`TrainingOptions::over`].
+    pub fn trained_with(self, given: &TrainingOptions) -> std::result::Result<Self, BadValue> {
+        let training = given.over(&self.training)?;
+        let frames = given.frames.unwrap_or(self.frames);
+        let test_frames = given.test_frames.unwrap_or(self.test_frames);
+        Ok(Self { frames, test_frames, training, ..self })
     }
 
     /// Origin of the training data, for the model's metadata.
@@ -342,7 +286,7 @@ impl Experiment {
     fn check(&self) -> Check {
         check_name(&self.name)?;
         self.world.check()?;
-        check_spread("training.spread", self.training.spread)?;
+        check_spread("training.spread", self.training.options.spread)?;
         let noise_kind = self.world.noise.kind;
         self.table1.as_ref().map_or(Ok(()), |table| check_table1(table, noise_kind))?;
         self.check_outputs()?;
@@ -353,10 +297,10 @@ impl Experiment {
 
     /// Checks the numbers of frames and of centres to train with, which options may have replaced.
     pub fn check_sizes(&self) -> Check {
-        let t = &self.training;
-        check_sizes("training", t.frames, t.test_frames, t.centres)?;
-        self.world.check_frames("training.frames", t.frames)?;
-        self.world.check_frames("training.test_frames", t.test_frames)
+        let (frames, test_frames) = (self.frames, self.test_frames);
+        check_sizes("training", frames, test_frames, self.training.options.centres)?;
+        self.world.check_frames("training.frames", frames)?;
+        self.world.check_frames("training.test_frames", test_frames)
     }
 }
 

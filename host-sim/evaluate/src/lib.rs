@@ -9,6 +9,7 @@
 
 pub mod scenes;
 pub mod error;
+pub mod training_options;
 pub mod metrics;
 pub mod by_load;
 pub mod measurements;

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use taxel_data::dataset::{LeftOut, UnusedInputs};
-use taxel_data::{AtRest, Clock, Dataset, Rest, Table};
+use taxel_data::{AtRest, BadValue, Clock, Dataset, Rest, Table, require};
 use taxel_learn::outliers::Outliers;
-use taxel_learn::reading_model::Extent;
-use taxel_learn::{Options, Origin, relative};
+use taxel_learn::{Origin, relative};
 
 use crate::metrics::Measure;
+use crate::training_options::{Training, TrainingOptions};
 
 /// Measured frames, and how a model is trained on them.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,11 +45,8 @@ pub struct Measurements {
     pub unused: UnusedInputs,
     /// Readings of the untouched sensor, in the readings' columns, if they are known.
     pub rest: Option<Arc<Rest>>,
-    pub options: Options,
-    /// Whether centres, widths and the projection are refined after K-means.
-    pub refine: bool,
-    /// What the model's statistics of readings tell.
-    pub reading_model: Option<Extent>,
+    /// How a model is trained on them.
+    pub how: Training,
 }
 
 /// When the frames of a data set were measured.
@@ -186,9 +183,32 @@ impl Measurements {
         Arc::new(Self { name: "data".into(), ..self.clone() })
     }
 
+    /// Trains on these measurements as `given` says from now on.
+    ///
+    /// # Errors
+    /// [`BadValue`] for an option that is a scene's alone, for inputs that are not as they were loaded, and as
+    /// [`TrainingOptions::over`].
+    pub fn train_with(&mut self, given: &TrainingOptions) -> Result<(), BadValue> {
+        for (field, frames) in [("frames", given.frames), ("test_frames", given.test_frames)] {
+            if let Some(frames) = frames {
+                let rule = "it sets a scene's frames; a data file has its own: leave it out";
+                return Err(BadValue::new(format!("training.{field}"), frames, rule));
+            }
+        }
+        let how = given.over(&self.how)?;
+        require(
+            how.relative_inputs == self.training.relative_inputs,
+            "training.relative_inputs",
+            how.relative_inputs,
+            || "inputs of all points are the same: give it in [set]".into(),
+        )?;
+        self.how = how;
+        Ok(())
+    }
+
     /// Origin of the frames, for the model's metadata.
     pub fn origin(&self) -> Origin {
-        Origin::of_data(&self.name, self.digest, self.options.seed, &self.training)
+        Origin::of_data(&self.name, self.digest, self.how.options.seed, &self.training)
     }
 
     /// Names of the inputs that never change in the training frames.

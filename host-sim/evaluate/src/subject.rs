@@ -72,15 +72,7 @@ impl Subject {
     pub fn options(&self) -> Options {
         match self {
             Self::Scene(scene) => scene.options(),
-            Self::Measured(data) => data.options,
-        }
-    }
-
-    /// Leaves centres of its model where K-means puts them.
-    pub fn refine_not(&mut self) {
-        match self {
-            Self::Scene(scene) => scene.training.refine = false,
-            Self::Measured(data) => data.refine = false,
+            Self::Measured(data) => data.how.options,
         }
     }
 
@@ -103,7 +95,7 @@ impl Subject {
     /// Number of frames to train on.
     pub fn training_frames(&self) -> usize {
         match self {
-            Self::Scene(scene) => scene.training.frames,
+            Self::Scene(scene) => scene.frames,
             Self::Measured(data) => data.training.frames(),
         }
     }
@@ -111,7 +103,7 @@ impl Subject {
     /// Number of frames to judge by.
     pub fn test_frames(&self) -> usize {
         match self {
-            Self::Scene(scene) => scene.training.test_frames,
+            Self::Scene(scene) => scene.test_frames,
             Self::Measured(data) => data.test.frames(),
         }
     }
@@ -157,7 +149,7 @@ impl Subject {
             Self::Scene(scene) => TrainingSet::of_scene(scene, Self::synthesis(scene, noise)),
             Self::Measured(data) => {
                 let mut set = TrainingSet::of_folds(&data.training, &data.fold_of, data.origin());
-                (set.refine, set.reading_model) = (data.refine, data.reading_model);
+                (set.refine, set.reading_model) = (data.how.refine, data.how.reading_model);
                 set
             }
         }
@@ -168,7 +160,7 @@ impl Subject {
         let test = match self {
             Self::Scene(scene) => {
                 let synthesis = Self::synthesis(scene, noise);
-                let frames = scene.training.test_frames;
+                let frames = scene.test_frames;
                 Cow::Owned(scene.dataset(&synthesis, Stream::Test, frames))
             }
             Self::Measured(data) => Cow::Borrowed(&data.test),
@@ -186,7 +178,7 @@ impl Subject {
         match self {
             Self::Scene(scene) => {
                 let noise = noise.unwrap_or(scene.world.noise);
-                scene.measure_beside_limit(noise, scene.training.test_frames, progress)
+                scene.measure_beside_limit(noise, scene.test_frames, progress)
             }
             Self::Measured(data) => (data.measure(), LimitSummary::new(&Err(Refusal::Measured))),
         }

@@ -16,7 +16,6 @@ use toml::{Table, Value};
 
 use crate::device::Device;
 use crate::error::{Error, Result};
-use crate::experiment::Method;
 use crate::metrics::{self, Blocks, DecoderErrors};
 use crate::subject::Subject;
 use crate::sweep::bounds::{self, Bound, Bounds, Values};
@@ -84,7 +83,7 @@ impl Asked {
                 wanted.also.push(Also::OtherContacts);
             }
             // The paper's own way is none that a device would choose.
-            if scene.training.method == Method::Paper {
+            if !scene.training.options.affine_tail {
                 wanted.set.insert("training.method".into(), "best".into());
                 wanted.set.insert("training.refine".into(), false.into());
             }

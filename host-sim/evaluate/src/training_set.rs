@@ -39,7 +39,7 @@ impl<'s> TrainingSet<'s> {
     pub fn of_scene(experiment: &'s Experiment, synthesis: Synthesis<'s>) -> Self {
         let t = &experiment.training;
         Self {
-            frames: Cow::Owned(experiment.dataset(&synthesis, Stream::Training, t.frames)),
+            frames: Cow::Owned(experiment.dataset(&synthesis, Stream::Training, experiment.frames)),
             origin: experiment.origin(),
             refine: t.refine,
             reading_model: t.reading_model,

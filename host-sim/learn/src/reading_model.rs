@@ -4,7 +4,7 @@
 //! Factors and the density of frames are fitted to those of training. Deviations and the threshold of novelty are
 //! calibrated on frames that training did not see.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use taxel_core::reading_model::{ReadingModel, Sizes};
 use taxel_data::{Dataset, Table, require};
 
@@ -32,7 +32,7 @@ const FACTORS: usize = 11;
 const COMPONENTS: usize = 16;
 
 /// What a reading model tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Extent {
     /// Readings that are missing.
@@ -42,15 +42,15 @@ pub enum Extent {
 }
 
 impl Extent {
-    /// Names of all, as options and scenes have them.
-    pub const NAMES: [&str; 2] = ["fill", "full"];
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Fill, Self::Full];
 
-    /// Extent of this name.
-    pub fn of_name(name: &str) -> Option<Self> {
-        [Self::Fill, Self::Full]
-            .into_iter()
-            .zip(Self::NAMES)
-            .find_map(|(it, of)| (of == name).then_some(it))
+    /// Name, as options and scenes have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fill => "fill",
+            Self::Full => "full",
+        }
     }
 }
 

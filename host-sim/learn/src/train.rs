@@ -4,7 +4,7 @@
 //! alone decides how work is cut into pieces, whose results are merged in order. The network is rounded
 //! once, to the numbers of its format, as a [`FittedNetwork`].
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use taxel_core::rbf::Format;
 use taxel_data::{BadValue, Dataset, Progress, require};
 
@@ -38,7 +38,7 @@ pub(crate) use trained::fit;
 pub use trained::{FittedFront, Trained};
 
 /// How output weights are computed. Both ways give the same weights, but for rounding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Solver {
     /// Blocked QR decomposition of all samples, which several penalties share.

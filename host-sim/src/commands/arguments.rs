@@ -1,24 +1,13 @@
-//! Parsers of options: names of formats, and errors that name an option.
+//! Options that were given, and errors that name them.
 
 use std::path::PathBuf;
 
+use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
-use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
-use taxel_core::rbf::Format;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::{Args, Command};
+use serde::Serialize;
 use taxel_data::BadValue;
-use taxel_learn::train::Solver;
-
-/// Parser for the name of a number format.
-pub fn format() -> impl TypedValueParser<Value = Format> {
-    let named = |format: Format| PossibleValue::new(format.name()).help(format.description());
-    one_of(Format::ALL.map(|format| (named(format), format)))
-}
-
-/// Parser for the name of a solver.
-pub fn solver() -> impl TypedValueParser<Value = Solver> {
-    let named = |solver: Solver| PossibleValue::new(solver.name()).help(solver.description());
-    one_of(Solver::ALL.map(|solver| (named(solver), solver)))
-}
 
 /// Parser for the path of a folder that receives several files: not `-`, which stands for stdout elsewhere.
 pub fn folder() -> impl TypedValueParser<Value = PathBuf> {
@@ -37,15 +26,29 @@ pub fn refuse_given(
     given.map_or(Ok(()), |(option, _)| Err(Error::Usage(message(option))))
 }
 
-fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
-    values: [(PossibleValue, T); N],
-) -> impl TypedValueParser<Value = T> {
-    let names: Vec<PossibleValue> = values.iter().map(|(name, _)| name.clone()).collect();
-    PossibleValuesParser::new(names).map(move |found| {
-        let mut values = values.iter();
-        let value = values.find(|(name, _)| name.get_name() == found);
-        value.expect("one of the possible values").1
-    })
+/// Options that were given: the field that each sets, and its name on the command line.
+pub fn given<A: Args + Serialize>(options: &A) -> Vec<(String, String)> {
+    let command = A::augment_args(Command::new("taxel"));
+    let fields = toml::Table::try_from(options).unwrap_or_default();
+    let option_of = |field: String| {
+        let option = command.get_arguments().find(|it| it.get_id().as_str() == field)?;
+        let short = option.get_short().map(|letter| format!("-{letter}"));
+        let name = short.or_else(|| option.get_long().map(|name| format!("--{name}")))?;
+        Some((field, name))
+    };
+    fields.into_iter().filter_map(|(field, _)| option_of(field)).collect()
+}
+
+/// A `bad` value of training, named by the option that gave it, if one of `options` did.
+pub fn named(mut bad: BadValue, options: &TrainingOptions) -> BadValue {
+    for (field, option) in given(options) {
+        let path = format!("training.{field}");
+        bad.rule = bad.rule.replace(&path, &option);
+        if bad.field == path || bad.field == field {
+            bad = bad.named(&option);
+        }
+    }
+    bad
 }
 
 /// Error for a `bad` value, written as on the command line if its field is an option.
@@ -59,7 +62,7 @@ pub fn of_option(bad: BadValue) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::{Arg, Command};
+    use clap::Arg;
 
     #[test]
     fn stdout_is_no_folder() {

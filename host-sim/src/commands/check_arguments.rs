@@ -19,7 +19,7 @@ use super::filter_arguments::{FilterArguments, PeriodArgument, cycled};
 use super::progress::Terminal;
 use super::readings::model_inputs;
 use super::rest_argument::UntouchedArguments;
-use super::scene_argument::{DEFAULT_SCENE, SceneArgument, Sizes};
+use super::scene_argument::{DEFAULT_SCENE, SceneArgument};
 use super::{Common, print, stderr};
 
 /// Time in µs from one frame of a scene to the next.
@@ -108,7 +108,7 @@ impl CheckArguments {
         scene.world.check_frames("-n", self.frames)?;
         let model = match &self.model {
             Some(path) => ModelBlob::read(path)?,
-            None => Sizes::default().apply(scene.clone(), &self.source)?.train(&Terminal::new())?,
+            None => SceneArgument::new(&self.source).load(common)?.train(&Terminal::new())?,
         };
         let parsed = model.parse();
         let metadata = parsed.metadata();

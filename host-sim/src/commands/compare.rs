@@ -11,6 +11,7 @@ use crate::sweep::front;
 use crate::sweep::merge::{PointResult, Setting};
 use crate::sweep::plan::{Base, SCENE, SEED};
 use crate::sweep::{Merged, Plan, layouts, work};
+use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
 use clap::Args;
 use toml::Value;
@@ -18,6 +19,7 @@ use toml::Value;
 use super::decoder_arguments::{DecoderArguments, ReadoutOption};
 use super::merged::Files;
 use super::progress::Terminal;
+use super::subject_argument::fields_of;
 use super::{Common, arguments, command_line, print};
 
 /// Compare layouts of a sensor: the least possible error, the best decoder, its scan and its cost.
@@ -36,12 +38,14 @@ pub struct Arguments {
     #[command(flatten)]
     tried: DecoderArguments,
     /// Train nothing: the least possible error and the scan alone.
-    #[arg(long, conflicts_with_all = ["centres", "max_latency_ms"])]
+    #[arg(long, conflicts_with_all = ["TrainingOptions", "max_latency_ms"])]
     limit_only: bool,
     /// Folder that receives compare.csv, compare.json, a page compare.html and pictures. Each decoder is kept in its points/ as
     /// soon as it is judged: what was stopped goes on.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    training: TrainingOptions,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -95,10 +99,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
     let whole = |value: usize| Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
     let mut wanted = Wanted { train: !arguments.limit_only, ..Wanted::default() };
-    let axes = [
-        ("training.centres", &arguments.tried.centres),
-        ("device.samples", &arguments.tried.average),
-    ];
+    wanted.set = fields_of(&arguments.training)?;
+    wanted.set.remove("training.centres");
+    let centres = arguments.training.centres.as_deref().unwrap_or_default();
+    let axes = [("training.centres", centres), ("device.samples", &arguments.tried.average)];
     for (field, values) in axes.into_iter().filter(|(_, values)| !values.is_empty()) {
         let values = values.iter().map(|value| whole(*value)).collect();
         wanted.axes.insert(field.into(), Value::Array(values));

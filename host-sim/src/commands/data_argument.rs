@@ -9,7 +9,6 @@ use taxel_data::clock::neighbours_alike;
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::Grid;
 use taxel_data::{DataFile, Rest, Table};
-use taxel_learn::reading_model::Extent;
 use taxel_learn::select;
 
 use super::arguments::refuse_given;
@@ -57,19 +56,6 @@ pub struct DataArguments {
     clock: TimeArgument,
     #[command(flatten)]
     pub file: DataFileArguments,
-}
-
-/// How a model is trained on a CSV file, besides its columns.
-#[derive(Clone, Copy)]
-pub struct HowToTrain {
-    /// Seed of every random draw.
-    pub seed: u64,
-    /// Whether inputs are relative to the baseline.
-    pub relative_inputs: bool,
-    /// Whether training is refined.
-    pub refine: bool,
-    /// What the model's statistics of readings are to tell.
-    pub reading_model: Option<Extent>,
 }
 
 /// Frames that a model is judged by.

@@ -6,10 +6,6 @@ use clap::{Args, ValueEnum};
 /// Decoders and scans to try, and the choice among them.
 #[derive(Args)]
 pub struct DecoderArguments {
-    /// Centres K to try [default: of trade 16,32,64,128,256, of a CSV file those that are fewer than its training frames;
-    /// of compare the scene's].
-    #[arg(long, value_name = "K,…", value_delimiter = ',')]
-    pub centres: Vec<usize>,
     /// Numbers of samples averaged for each reading, to try: more lower the noise, and make the scan longer [default: 1].
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     pub average: Vec<usize>,

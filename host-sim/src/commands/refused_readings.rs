@@ -15,7 +15,7 @@ const FRAMES_OF_SCENE: usize = 200;
 /// are noted when their files are read.
 pub fn note_scene(subject: &Subject) {
     if let Some(scene) = subject.scene() {
-        let frames = scene.training.frames.min(FRAMES_OF_SCENE);
+        let frames = scene.frames.min(FRAMES_OF_SCENE);
         let readings = Synthesis::new(&scene.world).frames(Stream::Training, frames).inputs;
         note(&readings, &format!("scene {}", scene.name));
     }

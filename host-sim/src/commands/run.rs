@@ -12,7 +12,7 @@ use clap::Args;
 use taxel_data::output::FileSet;
 use taxel_learn::{ModelBlob, Options};
 
-use super::model_argument::{ModelArguments, NetworkArguments, note_format};
+use super::format_note::note_format;
 use super::subject_argument::SubjectArgument;
 use super::{Common, arguments, command_line, print, refused_readings, stderr};
 
@@ -45,10 +45,6 @@ const FILES: FileSet = FileSet {
   taxel run press --noise 0.01 -o out/noise-1
   taxel run measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column fold")]
 pub struct Arguments {
-    #[command(flatten)]
-    network: NetworkArguments,
-    #[command(flatten)]
-    model: ModelArguments,
     /// Folder that receives a folder named after the scene.
     #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = DEFAULT_OUTPUT)]
     output: PathBuf,
@@ -58,21 +54,13 @@ pub struct Arguments {
 
 impl Default for Arguments {
     fn default() -> Self {
-        Self {
-            subject: SubjectArgument::default(),
-            network: NetworkArguments::default(),
-            model: ModelArguments::default(),
-            output: DEFAULT_OUTPUT.into(),
-        }
+        Self { subject: SubjectArgument::default(), output: DEFAULT_OUTPUT.into() }
     }
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let centres = arguments.network.centres.iter().min().copied();
-    let mut subject = arguments.subject.load_with(common, centres)?;
-    let mut options = arguments.model.over(&mut subject);
-    arguments.network.apply(&mut options)?;
-    options.check(subject.training_frames())?;
+    let subject = arguments.subject.load(common)?;
+    let options = subject.options();
     let folder = arguments.output.join(subject.name());
     FILES.check(&folder, &arguments.subject.paths())?;
     refused_readings::note_scene(&subject);

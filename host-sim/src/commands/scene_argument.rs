@@ -8,7 +8,7 @@ use clap::Args;
 use taxel_data::{Progress, columns};
 use taxel_learn::ModelBlob;
 
-use super::{Common, arguments, stderr};
+use super::{Common, stderr};
 
 /// Scene that stands for none.
 pub const DEFAULT_SCENE: &str = "press";
@@ -36,7 +36,8 @@ impl SceneArgument {
     /// Loads the scene and applies the overrides.
     pub fn load(&self, common: &Common) -> Result<Experiment> {
         let scene = self.load_world(common)?;
-        Sizes::default().apply(scene, &self.scene)
+        scene.check_sizes().map_err(|cause| Error::of_scene(&self.scene, cause))?;
+        Ok(scene)
     }
 
     /// Loads the scene for its world, whatever it says of training, and applies the overrides.
@@ -72,39 +73,6 @@ pub fn group_of_scene(scene: &Experiment, group: &str) -> Result<()> {
     Err(Error::Usage(format!("--group {group}: the scene has {}", groups.join(", "))))
 }
 
-/// Numbers of frames and centres to train with that options give instead of the scene's.
-#[derive(Clone, Copy, Default)]
-pub struct Sizes {
-    /// Frames (`-n`).
-    pub frames: Option<usize>,
-    /// Centres, or the fewest of several candidates (`--centres`).
-    pub centres: Option<usize>,
-}
-
-impl Sizes {
-    /// The scene from `source` with these numbers, which are checked together with those that it keeps.
-    pub fn apply(self, mut scene: Experiment, source: &str) -> Result<Experiment> {
-        let training = &mut scene.training;
-        training.frames = self.frames.unwrap_or(training.frames);
-        training.centres = self.centres.unwrap_or(training.centres);
-        let Err(mut bad) = scene.check_sizes() else { return Ok(scene) };
-        let all = [
-            ("training.frames", "-n", self.frames.is_some()),
-            ("training.centres", "--centres", self.centres.is_some()),
-        ];
-        let given = all.iter().filter(|(.., is_given)| *is_given);
-        let options: Vec<(&str, &str)> =
-            given.map(|(field, option, _)| (*field, *option)).collect();
-        for (field, option) in &options {
-            bad.rule = bad.rule.replace(field, option);
-        }
-        if let Some((_, option)) = options.iter().find(|(field, _)| *field == bad.field) {
-            return Err(arguments::of_option(bad.named(*option)));
-        }
-        Err(Error::of_scene(source, bad))
-    }
-}
-
 /// Noise level instead of the scene's.
 #[derive(Args, Default)]
 pub struct NoiseArgument {
@@ -127,38 +95,6 @@ impl NoiseArgument {
     /// Whether a level was given.
     pub fn is_given(&self) -> bool {
         self.noise.is_some()
-    }
-}
-
-/// Whether training is refined, whatever the scene says.
-#[derive(Args, Default)]
-pub struct RefineArgument {
-    /// Leave centres where K-means puts them, as the paper does. Otherwise centres, widths and the projection are refined
-    /// by their gradient: more accurate at the same cost on the device, and slower to train (docs/training.md).
-    #[arg(long)]
-    no_refine: bool,
-}
-
-impl RefineArgument {
-    /// Whether to refine, where `default` is what holds without an option.
-    pub fn over(&self, default: bool) -> bool {
-        default && !self.no_refine
-    }
-}
-
-/// Inputs relative to the baseline, whatever the scene says.
-#[derive(Args, Default)]
-pub struct RelativeInputsArgument {
-    /// Train on readings relative to the baseline, R/R₀, which a drift of the gain leaves as they are
-    /// (docs/drift.md).
-    #[arg(long)]
-    pub relative_inputs: bool,
-}
-
-impl RelativeInputsArgument {
-    /// Asks for relative inputs, if the option was given.
-    pub fn apply(&self, scene: &mut Experiment) {
-        scene.training.relative_inputs |= self.relative_inputs;
     }
 }
 

@@ -6,16 +6,15 @@ use crate::experiment::{Experiment, names_a_scene};
 use crate::subject::Subject;
 use crate::sweep::file::Wanted;
 use crate::sweep::plan::SEED;
+use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
 use clap::{Args, Parser};
-use taxel_learn::reading_model::Extent;
-use toml::{Table, Value};
+use toml::Table;
 
-use super::data_argument::{DataArguments, HowToTrain, JudgedBy};
+use super::arguments::{named, of_option};
+use super::data_argument::{DataArguments, JudgedBy};
 use super::data_file::DATA_FILES;
-use super::scene_argument::{
-    DEFAULT_SCENE, NoiseArgument, RefineArgument, RelativeInputsArgument, Sizes,
-};
+use super::scene_argument::{DEFAULT_SCENE, NoiseArgument};
 use super::{Common, command_line};
 
 /// Scene or CSV file to train and to judge on.
@@ -23,12 +22,12 @@ use super::{Common, command_line};
 pub struct SubjectArgument {
     /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a CSV file [default: press].
     source: Option<String>,
+    #[command(flatten)]
+    options: SubjectOptions,
     /// CSV file with frames to judge by, in the same columns [default: the last fifth of the lines is held out, or the
     /// last fold of --fold-column].
     #[arg(long, value_name = "FILE", help_heading = DATA_FILES)]
     test: Option<PathBuf>,
-    #[command(flatten)]
-    options: SubjectOptions,
 }
 
 /// Options of measurements, as a plan has them.
@@ -45,7 +44,7 @@ pub struct DataOptions {
 impl DataOptions {
     /// Loads the measurements.
     pub fn load(&self) -> Result<Subject> {
-        self.subject.load(&Common { seed: self.seed, ..Common::default() })
+        self.subject.load_to_trade(&Common { seed: self.seed, ..Common::default() })
     }
 }
 
@@ -53,12 +52,10 @@ impl DataOptions {
 #[derive(Args, Default)]
 pub struct SubjectOptions {
     #[command(flatten)]
-    pub noise: NoiseArgument,
+    noise: NoiseArgument,
+    // Last, since options behind these would stand under their headings.
     #[command(flatten)]
-    pub relative_inputs: RelativeInputsArgument,
-    #[command(flatten)]
-    pub refine: RefineArgument,
-    // Last, since options behind it would stand under its heading.
+    pub training: TrainingOptions,
     #[command(flatten)]
     pub data: DataArguments,
 }
@@ -66,15 +63,19 @@ pub struct SubjectOptions {
 impl SubjectArgument {
     /// Loads the scene or the CSV file.
     pub fn load(&self, common: &Common) -> Result<Subject> {
-        self.load_with(common, None)
+        self.load_for(&self.options.training, common)
     }
 
-    /// Loads the scene or the CSV file; `centres` are instead of the scene's.
-    pub fn load_with(&self, common: &Common, centres: Option<usize>) -> Result<Subject> {
+    /// Loads the scene or the CSV file for a trade, whose points have the centres that are given.
+    pub fn load_to_trade(&self, common: &Common) -> Result<Subject> {
+        let training = &self.options.training;
+        self.load_for(&TrainingOptions { centres: None, ..training.clone() }, common)
+    }
+
+    fn load_for(&self, training: &TrainingOptions, common: &Common) -> Result<Subject> {
         let source = self.source.as_deref().unwrap_or(DEFAULT_SCENE);
         let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
-        let sizes = Sizes { frames: None, centres };
-        let subject = self.options.load(source, common, judged, None, sizes)?;
+        let subject = self.options.load((source, training), common, judged)?;
         match &subject {
             Subject::Scene(_) if self.test.is_some() => {
                 let message =
@@ -83,7 +84,8 @@ impl SubjectArgument {
             }
             // A fold column may tell which frames to judge by.
             Subject::Measured(data)
-                if !(data.refine || self.options.data.has_fold_column() && self.test.is_none()) =>
+                if !(data.how.refine
+                    || self.options.data.has_fold_column() && self.test.is_none()) =>
             {
                 self.options.data.refuse_folds()?;
             }
@@ -97,23 +99,20 @@ impl SubjectArgument {
         self.source.as_deref().unwrap_or(DEFAULT_SCENE)
     }
 
-    /// Fields of a scene that its options set, for a plan; measurements are loaded with theirs.
+    /// Centres that are given, or candidates for them.
+    pub fn centres(&self) -> &[usize] {
+        self.options.training.centres.as_deref().unwrap_or_default()
+    }
+
+    /// Fields that its options set in every point of a plan, but for centres.
     ///
     /// # Errors
     /// [`Error::Usage`] for a seed beyond those of a scene.
     pub fn set(&self, common: &Common) -> Result<Table> {
-        let mut set = Table::new();
-        if !names_a_scene(self.source()) {
-            return Ok(set);
-        }
+        let mut set = fields_of(&self.options.training)?;
+        set.remove("training.centres");
         set.extend(common.seed_in_scene()?.map(|seed| (SEED.into(), seed)));
-        let options = &self.options;
-        let level = options.noise.level().map(|level| ("noise.level", Value::from(level)));
-        let refine = (!options.refine.over(true)).then_some(("training.refine", false.into()));
-        let relative = options.relative_inputs.relative_inputs;
-        let relative = relative.then_some(("training.relative_inputs", true.into()));
-        let given = [level, refine, relative].into_iter().flatten();
-        set.extend(given.map(|(field, value)| (field.to_owned(), value)));
+        set.extend(self.options.noise.level().map(|it| ("noise.level".into(), it.into())));
         Ok(set)
     }
 
@@ -148,39 +147,43 @@ impl SubjectArgument {
     }
 }
 
+/// Fields of a plan that options of `training` set.
+pub fn fields_of(training: &TrainingOptions) -> Result<Table> {
+    let fields = Table::try_from(training)
+        .map_err(|cause| Error::failed(format!("cannot write the plan: {cause}")))?;
+    Ok(fields.into_iter().map(|(field, value)| (format!("training.{field}"), value)).collect())
+}
+
 impl SubjectOptions {
-    /// Loads the scene or CSV file called `source`. `reading_model` asks for one that tells at least that much, whatever a scene says; `sizes` are instead
-    /// of the scene's.
+    /// Loads the scene or CSV file called `source`, for models trained as `training` says.
     pub fn load(
         &self,
-        source: &str,
+        (source, training): (&str, &TrainingOptions),
         common: &Common,
         judged: JudgedBy<'_>,
-        reading_model: Option<Extent>,
-        sizes: Sizes,
     ) -> Result<Subject> {
-        if names_a_scene(source) {
+        let subject = if names_a_scene(source) {
             let scene = Experiment::load_open(source)?;
             self.data.refuse_for_scene()?;
-            let mut scene = sizes.apply(scene, source)?;
+            let given = scene.trained_with(training);
+            let checked = given.and_then(|scene| scene.check_sizes().map(|()| scene));
+            let mut scene = checked.map_err(|bad| match named(bad, training) {
+                bad if bad.field.starts_with('-') => of_option(bad),
+                bad => Error::of_scene(source, bad),
+            })?;
             scene.world.seed = common.seed.unwrap_or(scene.world.seed);
-            self.relative_inputs.apply(&mut scene);
             self.noise.apply(&mut scene)?;
-            scene.training.refine = self.refine.over(scene.training.refine);
-            scene.training.reading_model = scene.training.reading_model.max(reading_model);
-            return Ok(Subject::Scene(Box::new(scene)));
-        }
-        if self.noise.is_given() {
-            let message = "--noise adds noise to a scene; a CSV file has its own";
-            return Err(Error::Usage(message.into()));
-        }
-        let how = HowToTrain {
-            seed: common.seed.unwrap_or(1),
-            relative_inputs: self.relative_inputs.relative_inputs,
-            refine: self.refine.over(true),
-            reading_model,
+            Subject::Scene(Box::new(scene))
+        } else {
+            if self.noise.is_given() {
+                let message = "--noise adds noise to a scene; a CSV file has its own";
+                return Err(Error::Usage(message.into()));
+            }
+            let how = (training, common.seed.unwrap_or(1));
+            Subject::Measured(Box::new(self.data.load(Path::new(source), how, judged)?))
         };
-        let data = self.data.load(Path::new(source), how, judged)?;
-        Ok(Subject::Measured(Box::new(data)))
+        let checked = subject.options().check(subject.training_frames());
+        checked.map_err(|bad| of_option(named(bad, training)))?;
+        Ok(subject)
     }
 }

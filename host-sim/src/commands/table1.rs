@@ -10,7 +10,7 @@ use clap::Args;
 use serde::Serialize;
 use taxel_data::output;
 
-use super::scene_argument::{RelativeInputsArgument, SceneArgument, group_of_scene};
+use super::scene_argument::{SceneArgument, group_of_scene};
 use super::{Common, print};
 
 /// Compute the paper's Table 1: errors by spread and noise.
@@ -25,8 +25,6 @@ pub struct Arguments {
     /// A built-in scene (paper, paper-as-printed) or the path of a scene file with [table1].
     #[arg(default_value = "paper")]
     scene: String,
-    #[command(flatten)]
-    relative_inputs: RelativeInputsArgument,
     /// CSV file to write, with all axes, decoders and definitions.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -45,8 +43,7 @@ struct Summary {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let argument = SceneArgument::new(&arguments.scene);
-    let mut scene = argument.load(common)?;
-    arguments.relative_inputs.apply(&mut scene);
+    let scene = argument.load(common)?;
     if scene.table1.is_some() {
         group_of_scene(&scene, &arguments.group)?;
     }

@@ -92,7 +92,7 @@ pub struct Arguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     arguments.subject.refuse_time("trade")?;
-    let subject = arguments.subject.load(common)?;
+    let subject = arguments.subject.load_to_trade(common)?;
     let asked = asked(arguments, &subject)?;
     let bounds = bounds(arguments, &asked)?;
     let is_timed = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
@@ -102,7 +102,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return Err(Error::Usage(message.into()));
     }
     let mut wanted = asked.wanted(&subject);
-    wanted.set.extend(arguments.subject.set(common)?);
+    for (field, value) in arguments.subject.set(common)? {
+        match wanted.axes.get_mut(&field) {
+            Some(axis) => *axis = vec![value].into(),
+            None => drop(wanted.set.insert(field, value)),
+        }
+    }
     if arguments.plan {
         return print::show(&arguments.subject.plan_text(subject.name(), &wanted)?);
     }
@@ -196,7 +201,7 @@ fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked> {
     };
     device.check().map_err(of_option)?;
     let asked = Asked {
-        centres: centres(&arguments.tried.centres, subject)?,
+        centres: centres(arguments.subject.centres(), subject)?,
         column_steps: column_steps(arguments, subject)?,
         samples_averaged: match arguments.tried.average.as_slice() {
             [] => vec![1],

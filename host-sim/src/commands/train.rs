@@ -10,10 +10,10 @@ use crate::metrics::{self, NETWORK};
 use crate::report::format::symbol;
 use crate::report::{self, Digits, Sections, TableOf};
 use crate::subject::Subject;
+use crate::training_options::TrainingOptions;
 use crate::training_set::TrainingSet;
 use crate::{Error, Result};
 use clap::Args;
-use clap::builder::PossibleValuesParser;
 use taxel_data::{columns, output};
 use taxel_learn::kinds::Choice;
 use taxel_learn::reading_model::Extent;
@@ -21,9 +21,8 @@ use taxel_learn::select::{Scored, Selection};
 use taxel_learn::{ModelBlob, Options};
 
 use super::data_argument::JudgedBy;
-use super::model_argument::{ModelArguments, NetworkArguments, note_format};
+use super::format_note::note_format;
 use super::model_outputs::{self, ModelOutput};
-use super::scene_argument::Sizes;
 use super::subject_argument::SubjectOptions;
 use super::{Common, print, refused_readings};
 
@@ -48,24 +47,10 @@ pub struct Arguments {
     /// Blob to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    #[command(flatten)]
-    network: NetworkArguments,
-    #[command(flatten)]
-    model: ModelArguments,
     /// Choose K, spread and penalty among the candidates by cross-validation, and print every score. Best values at
     /// an edge of default spreads and penalties are looked beyond; other edges are named.
     #[arg(long)]
     select: bool,
-    /// Give the model statistics of its readings (docs/reading-model.md): with fill, it tells missing readings from the others
-    /// of their frame, so that a broken wire costs accuracy, but no frames. With full, it also tells how far off each output
-    /// may be, and how novel a frame is; on a CSV file, that trains once more for every fold: give folds of whole places or
-    /// days (--fold-column), because frames of one resemble each other. Estimates of whole frames stay the same. For 144
-    /// readings, fill takes 7 kB, and full 27 kB. Either takes ten frames of training for each reading.
-    #[arg(long, value_name = "EXTENT", value_parser = PossibleValuesParser::new(Extent::NAMES))]
-    reading_model: Option<String>,
-    /// Frames to synthesise from a scene, instead of the scene's number.
-    #[arg(short = 'n', long, value_name = "N")]
-    frames: Option<usize>,
     #[command(flatten)]
     subject: SubjectOptions,
 }
@@ -75,9 +60,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
     let inputs = [source, baseline];
     print::check_output(&arguments.output, &inputs)?;
-    let mut subject = load(arguments, common)?;
+    let subject = load(arguments, common)?;
     refused_readings::note_scene(&subject);
-    let mut options = arguments.model.over(&mut subject);
+    let mut options = subject.options();
     let set = subject.training_set(None);
     set.check()?;
     if arguments.select && options.projects(&set.frames) {
@@ -101,24 +86,26 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 /// Scene or CSV file that is trained on: all frames of a file, or so many of a scene.
 fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
     let options = &arguments.subject;
-    if options.data.baseline().is_some() && !options.relative_inputs.relative_inputs {
+    if options.data.baseline().is_some() && options.training.relative_inputs.is_none() {
         let message = "--baseline is what --relative-inputs divides by: give both, or neither";
         return Err(Error::Usage(message.into()));
     }
-    let centres = arguments.network.centres.iter().min().copied();
-    let sizes = Sizes { frames: arguments.frames, centres };
-    let extent = arguments.reading_model.as_deref().and_then(Extent::of_name);
-    let subject = options.load(&arguments.source, common, JudgedBy::None, extent, sizes)?;
+    let mut training = options.training.clone();
+    if arguments.select {
+        // One of the candidates holds until one is chosen.
+        let fewest = training.centres.iter().flatten().min().map(|fewest| vec![*fewest]);
+        training = TrainingOptions { centres: fewest, spread: None, penalty: None, ..training };
+    }
+    let subject = options.load((&arguments.source, &training), common, JudgedBy::None)?;
     match &subject {
         Subject::Scene(_) if options.data.folds().is_some() && !arguments.select => {
             let message = "--folds holds out frames of a CSV file, or with --select; a scene has fresh frames: leave it out";
             return Err(Error::Usage(message.into()));
         }
-        Subject::Measured(_) if arguments.frames.is_some() => {
-            return Err(Error::Usage("-n sets a scene's frames; a CSV file has its own".into()));
-        }
         Subject::Measured(data)
-            if !(data.refine || extent == Some(Extent::Full) || arguments.select) =>
+            if !(data.how.refine
+                || data.how.reading_model == Some(Extent::Full)
+                || arguments.select) =>
         {
             options.data.refuse_folds()?;
         }
@@ -177,7 +164,7 @@ impl Trained<'_> {
         result.fact("seed", "seed", "", set.origin.seed);
         let relative = set.frames.relative_inputs;
         result.fact("relative_inputs", "readings relative to the baseline", "", relative);
-        let extent = model.reading_model().map(|it| Extent::NAMES[usize::from(it.assesses())]);
+        let extent = model.reading_model().map(|it| Extent::ALL[usize::from(it.assesses())].name());
         result.fact("reading_model", "reading model", "", extent);
         result.value("features", &features);
         result.line("chosen", features.map_or(String::new(), ToString::to_string));

@@ -57,7 +57,7 @@ const AT_REST: usize = 64;
 /// If the scene cannot be trained on.
 pub fn small_model(scene: &Experiment) -> Result<ModelBlob> {
     let mut scene = scene.clone();
-    scene.training.frames = scene.training.frames.min(TRAINING_FRAMES);
+    scene.frames = scene.frames.min(TRAINING_FRAMES);
     let each_row = scene.world.motion.largest_contact(&scene.world.sensor).is_none();
     let subject = Subject::Scene(Box::new(scene));
     let usual = subject.options();

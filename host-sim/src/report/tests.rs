@@ -32,9 +32,8 @@ fn result() -> RunResult {
     let run = RUN.get_or_init(|| {
         let mut scene = Experiment::load("press").unwrap();
         scene.world.read_rows = vec![1, 2, 3];
-        let training = &mut scene.training;
-        (training.frames, training.test_frames, training.centres) = (600, 20, 9);
-        training.refine = false;
+        (scene.frames, scene.test_frames) = (600, 20);
+        (scene.training.options.centres, scene.training.refine) = (9, false);
         let options = scene.options();
         run(&Subject::Scene(scene.into()), &options, &Silent).unwrap().0
     });

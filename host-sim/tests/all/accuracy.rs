@@ -11,7 +11,7 @@ fn row_4(scene: &str, noise_level: f64) -> Experiment {
     let mut scene = unrefined(scene);
     scene.world.read_rows = vec![3];
     scene.world.set_noise_level(noise_level).unwrap();
-    scene.training.frames = 20_000;
+    scene.frames = 20_000;
     scene
 }
 
@@ -20,7 +20,7 @@ fn network_and_linear(scene: &str, noise_level: f64) -> (Vec<Errors>, Vec<Errors
     let scene = row_4(scene, noise_level);
     let frames = |stream, count| -> Dataset { synthesise(&scene.world, stream, count) };
     let (training, test) = (frames(Stream::Training, 20_000), frames(Stream::Test, 5000));
-    assert!(scene.training.centres <= 128);
+    assert!(scene.training.options.centres <= 128);
     let blob = scene.train(&Silent).unwrap();
     let measure = scene.measure();
     let network = metrics::judge(&blob.prepare(), &test, &measure);
@@ -56,7 +56,7 @@ fn without_noise_no_axis_is_behind_the_best_linear_decoder() {
 fn a_few_frames_without_noise_train_a_network_for_others_too() {
     let mut scene = unrefined("press");
     scene.world.set_noise_level(0.0).unwrap();
-    (scene.training.frames, scene.training.centres) = (300, 8);
+    (scene.frames, scene.training.options.centres) = (300, 8);
     let test = synthesise(&scene.world, Stream::Test, 2000);
     let blob = scene.train(&Silent).unwrap();
     let errors = metrics::judge(&blob.prepare(), &test, &scene.measure());

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Output};
 
-use host_sim::experiment::{Experiment, Method};
+use host_sim::experiment::Experiment;
 use taxel_learn::Options;
 
 /// Folder that is removed after the test.
@@ -127,10 +127,9 @@ pub fn untimed(json: &str) -> String {
 /// A built-in scene with a network for each row in f32, whose centres stay where K-means puts them.
 pub fn unrefined(scene: &str) -> Experiment {
     let mut experiment = Experiment::load(scene).unwrap();
-    let Options { format, spread, each_row, .. } = Options::of_rows();
-    let training = &mut experiment.training;
-    (training.method, training.refine, training.format) = (Method::Best, false, Some(format));
-    (training.spread, training.each_row) = (spread, each_row);
+    let Options { centres, features, .. } = experiment.training.options;
+    experiment.training.options = Options { centres, features, ..Options::of_rows() };
+    experiment.training.refine = false;
     experiment
 }
 

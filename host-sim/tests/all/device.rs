@@ -27,7 +27,7 @@ pub fn model(centres: usize) -> ModelBlob {
     let mut trained = TRAINED.lock().unwrap();
     let bytes = trained.entry(centres).or_insert_with(|| {
         let mut scene = unrefined("press");
-        (scene.training.frames, scene.training.centres) = (500, centres);
+        (scene.frames, scene.training.options.centres) = (500, centres);
         scene.train(&Silent).unwrap().bytes().to_vec()
     });
     ModelBlob::of_bytes(bytes).unwrap()

@@ -146,7 +146,7 @@ fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
     assert_eq!(model.bytes().len(), chosen.blob_bytes);
     let scene = planned.subject.scene().unwrap();
     let frames = Synthesis::new(&scene.world).noise_level(scene.world.noise.level / 4.0);
-    let test = frames.frames(Stream::Test, scene.training.test_frames);
+    let test = frames.frames(Stream::Test, scene.test_frames);
     let estimate = model.prepare().decode_table(&test.inputs);
     let errors = test.outputs.squared_errors(&estimate.values);
     let z = errors.iter().skip(2).step_by(3);

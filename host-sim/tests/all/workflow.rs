@@ -150,9 +150,11 @@ fn every_command_has_help_with_an_example() {
     let help = folder.succeed(&["trade", "-h"]);
     let options = |section: &str| section.lines().filter(|line| line.contains("--")).count();
     let (_, help) = help.split_once("\nOptions:\n").unwrap();
-    let (own, rest) = help.split_once("\nData files (CSV, .mcap):\n").unwrap();
+    let (own, rest) = help.split_once("\nTraining:\n").unwrap();
+    let (training, rest) = rest.split_once("\nData files (CSV, .mcap):\n").unwrap();
     let (of_files, _) = rest.split_once("\nExamples:").unwrap();
-    assert!((20..=31).contains(&options(own)) && own.contains("--seed"), "{own}");
+    assert!((15..=22).contains(&options(own)) && own.contains("--seed"), "{own}");
+    assert!(options(training) >= 10 && training.contains("--centres"), "{training}");
     assert!(options(of_files) >= 10 && of_files.contains("--test"), "{of_files}");
     assert!(!of_files.contains("--max-error"), "{of_files}");
 }

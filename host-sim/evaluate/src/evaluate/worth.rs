@@ -67,7 +67,7 @@ impl Worth {
         let (judged_on, decoders) = match (selection, subject) {
             (Some(selection), _) => (JudgedOn::HeldOutFolds, on_folds(selection, set)),
             (None, Subject::Scene(scene)) => {
-                let frames = scene.training.test_frames.min(FRESH_FRAMES);
+                let frames = scene.test_frames.min(FRESH_FRAMES);
                 let test = scene.dataset(&Synthesis::new(&scene.world), Stream::Test, frames);
                 (JudgedOn::FreshFrames, on_frames(blob, set, &test, &scene.measure()))
             }

@@ -13,7 +13,13 @@ use taxel_simulate::sensor::{self, Sensor, Vector3};
 use taxel_simulate::world::check_counts;
 
 use super::others::{self, OtherContact};
-use super::{Experiment, Method, Table1, Training};
+use super::{Experiment, Table1};
+use crate::training_options::{Training, TrainingOptions};
+
+/// Number of frames to train on, unless a scene says otherwise.
+const USUAL_FRAMES: usize = 20_000;
+/// Number of frames to judge by, unless a scene says otherwise.
+const USUAL_TEST_FRAMES: usize = 8000;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -31,7 +37,8 @@ pub(super) struct SceneFile {
     #[serde(default)]
     readout: Readout,
     outputs: Outputs,
-    training: Training,
+    #[serde(default)]
+    training: TrainingOptions,
     table1: Option<Table1>,
     others: Option<Vec<OtherContact>>,
 }
@@ -93,23 +100,6 @@ fn default_seed() -> u64 {
 
 fn default_stiffness() -> Vector3 {
     sensor::TYPICAL_STIFFNESS_N_PER_MM
-}
-
-/// Number format by its name.
-pub(super) mod format {
-    use serde::{Deserialize, Deserializer, de::Error};
-    use taxel_core::rbf::Format;
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Format>, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        Format::from_name(&name).map(Some).ok_or_else(|| {
-            let known: Vec<String> =
-                Format::ALL.iter().map(|format| format!("`{}`", format.name())).collect();
-            D::Error::custom(format!("unknown format `{name}`, expected {}", known.join(", ")))
-        })
-    }
 }
 
 /// Column-wires of a list that counts from 1, of a sensor that has so many.
@@ -182,9 +172,10 @@ impl SceneFile {
             Some(given) => others::check(&given, &world).map(|()| given)?,
             None => others::derived(&world),
         };
-        let (mut training, table1) = (self.training, self.table1);
-        training.each_row |= training.method == Method::Paper;
-        training.refine &= training.method != Method::Paper;
-        Ok(Experiment { name: self.name, digest, world, training, table1, others })
+        let (name, table1, training) = (self.name, self.table1, Training::default());
+        let (frames, test_frames) = (USUAL_FRAMES, USUAL_TEST_FRAMES);
+        let usual =
+            Experiment { name, digest, world, frames, test_frames, training, table1, others };
+        usual.trained_with(&self.training)
     }
 }

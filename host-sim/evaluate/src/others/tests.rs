@@ -60,7 +60,7 @@ fn contacts_that_novelty_notices_and_outputs_that_are_hardly_decoded_are_not_war
 fn press() -> Experiment {
     let mut scene = Experiment::load("press").unwrap();
     scene.world.read_rows = vec![3, 4];
-    (scene.training.frames, scene.training.centres, scene.training.refine) = (2000, 16, false);
+    (scene.frames, scene.training.options.centres, scene.training.refine) = (2000, 16, false);
     scene.training.reading_model = Some(Extent::Full);
     scene
 }

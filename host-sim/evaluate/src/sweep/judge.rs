@@ -173,9 +173,9 @@ impl<'s> Readings<'s> {
         if let Subject::Scene(scene) = subject {
             let [x_mm, y_mm, _] = scene.world.sensor.size_mm;
             results.add("area_cm2", Some(x_mm * y_mm / 100.0));
-            let frames = plan.limit_frames.unwrap_or_else(|| {
-                Reference::few_frames(&scene.world).min(scene.training.test_frames)
-            });
+            let frames = plan
+                .limit_frames
+                .unwrap_or_else(|| Reference::few_frames(&scene.world).min(scene.test_frames));
             if frames > 0 {
                 let found = limits.of(&scene.world, frames);
                 limit = LimitSummary::new(&found);

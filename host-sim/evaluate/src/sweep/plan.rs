@@ -21,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::experiment::{Experiment, check_name};
 use crate::measurements::Measurements;
 use crate::subject::Subject;
+use crate::training_options::{Training, TrainingOptions};
 
 /// Fields, and lines of values of them.
 type Lines = (Vec<String>, Vec<Vec<Value>>);
@@ -454,31 +455,34 @@ impl Plan {
     }
 
     /// Gives networks of the other kind, for each row or for the array, their own spread, and those of rows no features, unless
-    /// the point says which.
+    /// the plan says which.
     fn follow_each_row(
         &self,
         document: &mut Table,
         base: Option<&Base>,
         values: &[(String, Value)],
     ) -> Checked<()> {
-        let is_given = |field: &str| values.iter().any(|(given, _)| given == field);
-        if !is_given("training.each_row") {
+        const FIELD: &str = "training.each_row";
+        if !self.set.iter().chain(values).any(|(field, _)| field == FIELD) {
             return Ok(());
         }
-        let others: Vec<_> =
-            values.iter().filter(|(field, _)| field != "training.each_row").cloned().collect();
-        let before = text(&self.changed(base, &others)?.scene)?;
-        // What is wrong with a scene is told elsewhere.
-        let before = super::point::options(self.data.as_deref(), &before).ok();
-        let training = document.get_mut("training").and_then(Value::as_table_mut);
-        let (Some(before), Some(training)) = (before, training) else { return Ok(()) };
-        let each_row = training.get("each_row").and_then(Value::as_bool);
-        let after = before.for_each_row(each_row.unwrap_or(before.each_row));
-        if !is_given("training.spread") {
-            training.insert("spread".into(), after.spread.into());
+        let mut training = self.data.as_ref().map_or(Training::default(), |data| data.how);
+        let mut layers = vec![base.map(|base| base.document.clone()).unwrap_or_default()];
+        for given in [&self.set, values] {
+            let mut layer = Table::new();
+            for (field, value) in given.iter().filter(|(field, _)| field.starts_with("training.")) {
+                fields::set(&mut layer, field, value.clone())?;
+            }
+            layers.push(layer);
         }
-        if after.features.is_none() && !is_given("training.features") {
-            training.remove("features");
+        for given in layers.iter().filter_map(|layer| layer.get("training")) {
+            // What is wrong with a value is told elsewhere.
+            let Ok(given) = given.clone().try_into::<TrainingOptions>() else { return Ok(()) };
+            training = given.over(&training)?;
+        }
+        fields::set(document, "training.spread", training.options.spread.into())?;
+        if let (None, Some(of)) = (training.options.features, document.get_mut("training")) {
+            of.as_table_mut().map(|of| of.remove("features"));
         }
         Ok(())
     }

@@ -4,18 +4,16 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use serde::Deserialize;
-use taxel_core::rbf::Format;
 use taxel_learn::Options;
 use taxel_learn::decoders::BASELINES;
-use taxel_learn::reading_model::Extent;
 
-use super::fields::nearest;
 use super::file::Also;
 use super::plan::Plan;
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
 use crate::metrics::{self, Blocks, Definition};
+use crate::training_options::TrainingOptions;
 
 /// Results of a point by their names, such as `rmse_dz_mm`, and remarks on them.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -154,7 +152,7 @@ pub fn place_of(name: &str) -> (usize, &str, usize) {
 pub fn options(data: Option<&Measurements>, text: &str) -> Result<Options> {
     Ok(match data {
         None => Experiment::parse("of the point", text)?.options(),
-        Some(data) => measured(data, text).map_err(taxel_data::Error::unfit)?.options,
+        Some(data) => measured(data, text).map_err(taxel_data::Error::unfit)?.how.options,
     })
 }
 
@@ -163,19 +161,8 @@ pub fn options(data: Option<&Measurements>, text: &str) -> Result<Options> {
 #[serde(deny_unknown_fields)]
 struct MeasuredFile {
     seed: Option<u64>,
-    training: Option<TrainingFile>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct TrainingFile {
-    centres: Option<usize>,
-    spread: Option<f64>,
-    format: Option<String>,
-    each_row: Option<bool>,
-    features: Option<usize>,
-    refine: Option<bool>,
-    reading_model: Option<Extent>,
+    #[serde(default)]
+    training: TrainingOptions,
 }
 
 /// Measurements, trained on as the fields in `text` say.
@@ -185,18 +172,7 @@ struct TrainingFile {
 pub fn measured(data: &Measurements, text: &str) -> std::result::Result<Measurements, String> {
     let file: MeasuredFile = toml::from_str(text).map_err(|cause| cause.message().to_owned())?;
     let mut data = data.clone();
-    let (t, options) = (file.training.unwrap_or_default(), &mut data.options);
-    options.seed = file.seed.unwrap_or(options.seed);
-    options.centres = t.centres.unwrap_or(options.centres);
-    options.spread = t.spread.unwrap_or(options.spread);
-    if let Some(name) = &t.format {
-        let known = Format::ALL.map(Format::name);
-        let unknown = || format!("unknown format `{name}`; {}", nearest(name, &known));
-        options.format = Format::from_name(name).ok_or_else(unknown)?;
-    }
-    options.each_row = t.each_row.unwrap_or(options.each_row);
-    options.features = t.features.or(options.features);
-    data.refine = t.refine.unwrap_or(data.refine);
-    data.reading_model = t.reading_model.or(data.reading_model);
+    data.train_with(&file.training).map_err(|bad| bad.to_string())?;
+    data.how.options.seed = file.seed.unwrap_or(data.how.options.seed);
     Ok(data)
 }

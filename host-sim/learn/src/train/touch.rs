@@ -10,7 +10,7 @@ use std::fmt::{self, Display};
 use std::ops::Range;
 use std::str::FromStr;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize, Serializer};
 use taxel_core::blob::Front;
 use taxel_core::touch::{Kind, Touch};
 use taxel_data::{AtRest, Dataset, Table, columns, exp, normal_share_below};
@@ -86,6 +86,12 @@ impl FromStr for Features {
         } else {
             Err(rule())
         }
+    }
+}
+
+impl Serialize for Features {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

@@ -3,11 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{DataArguments, HowToTrain, JudgedBy, check_level, with_options};
+use super::{DataArguments, JudgedBy, check_level, with_options};
+use crate::commands::arguments::{named, of_option};
 use crate::commands::mat_cells::MatCells;
 use crate::commands::{data_notes, readings, refused_readings, stderr};
 use crate::measurements::{Frames, Judged, Log, Measurements, Split, Spread};
 use crate::over_time::is_log;
+use crate::training_options::{Training, TrainingOptions};
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use taxel_data::clock::neighbours_alike;
@@ -20,8 +22,15 @@ use taxel_learn::train::{projection, resolution};
 use taxel_learn::{Options, select};
 
 impl DataArguments {
-    /// Measurements in the CSV file at `path`.
-    pub fn load(&self, path: &Path, how: HowToTrain, judged: JudgedBy<'_>) -> Result<Measurements> {
+    /// Measurements in the CSV file at `path`, for models trained as `given` says, with this `seed`.
+    pub fn load(
+        &self,
+        path: &Path,
+        (given, seed): (&TrainingOptions, u64),
+        judged: JudgedBy<'_>,
+    ) -> Result<Measurements> {
+        let named = |bad| of_option(named(bad, given));
+        let how = given.over(&Training::default()).map_err(named)?;
         let file = self.file.read(path)?;
         let [inputs, outputs] = self.patterns();
         let unused = UnusedInputs::find(&file, inputs, outputs).map_err(with_options)?;
@@ -35,9 +44,13 @@ impl DataArguments {
         for wire in cells.silent_wires(&unused.names()) {
             stderr::remark(format_args!("note: {wire}: none of its readings tells anything"));
         }
-        let Usual { all, outliers, left_out, digest, folds: given_folds } =
-            self.usual_frames(file, (&unused, &cells), self.fold_column.as_deref(), how)?;
-        let judged_by = self.judged(judged, &all.frames, &unused, digest, how)?;
+        let Usual { all, outliers, left_out, digest, folds: given_folds } = self.usual_frames(
+            file,
+            (&unused, &cells),
+            self.fold_column.as_deref(),
+            how.relative_inputs,
+        )?;
+        let judged_by = self.judged(judged, &all.frames, &unused, digest, how.relative_inputs)?;
         let Split { training: kept, test, choice } =
             Split::new(&all, given_folds.as_deref(), judged_by);
         if kept.is_empty() {
@@ -58,7 +71,7 @@ impl DataArguments {
                 rest
             }
             None if count < 2 && self.folds.is_none() => vec![0; count],
-            None => self.folds_of(&training.frames.outputs, how.seed)?,
+            None => self.folds_of(&training.frames.outputs, seed)?,
         };
         // Readings themselves, even if the model is given their ratios to the baseline.
         resolution::check(&training.frames)
@@ -80,7 +93,8 @@ impl DataArguments {
         };
         let centres =
             usual.centres.min(Warning::enough_frames_for(training.fewest_values(), inputs));
-        let measurements = Measurements {
+        let options = Options { seed, centres, ..usual };
+        let mut measurements = Measurements {
             name: name.into_owned(),
             digest,
             log,
@@ -97,10 +111,9 @@ impl DataArguments {
             left_out,
             unused,
             rest,
-            options: Options { seed: how.seed, centres, ..usual },
-            refine: how.refine,
-            reading_model: how.reading_model,
+            how: Training { options, relative_inputs: how.relative_inputs, ..Training::default() },
         };
+        measurements.train_with(given).map_err(named)?;
         let constant = measurements.constant_inputs();
         data_notes::print_constant(&constant, path);
         Ok(measurements)
@@ -122,7 +135,7 @@ impl DataArguments {
         file: DataFile,
         (unused, cells): (&UnusedInputs, &MatCells),
         fold_column: Option<&str>,
-        how: HowToTrain,
+        relative_inputs: bool,
     ) -> Result<Usual> {
         let [inputs, outputs] = self.patterns();
         let mut chosen =
@@ -132,7 +145,7 @@ impl DataArguments {
         let digest = file.digest(&names)?;
         let clock = Clock::of(&file, self.clock.time.as_deref())?;
         let why_counted = clock.why_counted(&file);
-        let rest = self.rest(&file, &chosen.names, how.relative_inputs)?.map(Arc::new);
+        let rest = self.rest(&file, &chosen.names, relative_inputs)?.map(Arc::new);
         let column = fold_column.map(|name| file.column(name)).transpose()?;
         let fold_values: Option<Vec<f64>> =
             column.map(|column| (0..file.lines()).map(|line| file.value(line, column)).collect());
@@ -149,7 +162,7 @@ impl DataArguments {
             stderr::remark(format_args!("note: {why}; lines are counted instead (--time)"));
         }
         let log = Log { clock, lines: outliers.kept.iter().map(|it| kept.lines[*it]).collect() };
-        let of_log = rest.as_ref().filter(|rest| how.relative_inputs && rest.lines.is_some());
+        let of_log = rest.as_ref().filter(|rest| relative_inputs && rest.lines.is_some());
         if let Some(rest) = of_log {
             check_level(&rest.readings, &frames.inputs, &path)?;
             readings::check_baseline(&rest.readings, &path)?;
@@ -179,7 +192,7 @@ impl DataArguments {
         frames: &Dataset,
         unused: &UnusedInputs,
         digest: u64,
-        how: HowToTrain,
+        relative_inputs: bool,
     ) -> Result<Judged> {
         let path = match judged {
             JudgedBy::None => return Ok(Judged::None),
@@ -188,7 +201,7 @@ impl DataArguments {
         };
         let file = self.file.fields().read(path)?;
         let cells = MatCells::of(&file, self.inputs.as_deref(), self.grid)?;
-        let own = self.usual_frames(file, (unused, &cells), None, how)?;
+        let own = self.usual_frames(file, (unused, &cells), None, relative_inputs)?;
         if own.digest == digest {
             let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
             return Err(Error::Unfit { path: path.into(), message: message.into() });

@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::commands::stderr;
 use crate::subject::Subject;
+use crate::training_options::TrainingOptions;
 use crate::training_set::TrainingSet;
 use taxel_data::Table;
 use taxel_learn::Options;
@@ -11,7 +12,6 @@ use taxel_learn::select::{self, Candidates, Edge, Selection};
 use taxel_learn::train::Refinement;
 
 use super::Arguments;
-use crate::commands::model_argument::NetworkArguments;
 use crate::commands::progress::Terminal;
 
 /// Spreads that are tried for centres of K-means. Refinement moves the width itself.
@@ -30,7 +30,9 @@ pub fn choose(
     options: &mut Options,
 ) -> Result<(Option<Choice>, Option<Selection>)> {
     let usual = Options::default().centres;
-    if arguments.network.centres.is_empty() && subject.scene().is_none() && options.centres < usual
+    if arguments.subject.training.centres.is_none()
+        && subject.scene().is_none()
+        && options.centres < usual
     {
         let (frames, centres) = (set.frames.fewest_values(), options.centres);
         stderr::remark(format_args!(
@@ -39,7 +41,6 @@ pub fn choose(
         ));
     }
     if !arguments.select {
-        arguments.network.apply(options)?;
         return Ok((set.choose(options, &Terminal::new()), None));
     }
     // Settings are compared with the features that the model will have.
@@ -51,7 +52,12 @@ pub fn choose(
     let selection = select::cross_validate(
         &set.frames,
         &fold_of,
-        &candidates(&arguments.network, (&fold_of, &set.frames.outputs), set.refine, options),
+        &candidates(
+            &arguments.subject.training,
+            (&fold_of, &set.frames.outputs),
+            set.refine,
+            options,
+        ),
         options,
         set.refine.then(Refinement::default).as_ref(),
         &Terminal::new(),
@@ -65,32 +71,30 @@ pub fn choose(
 
 /// Candidates as given, and usual ones for the rest. Only grids of usual ones grow.
 fn candidates(
-    given: &NetworkArguments,
+    given: &TrainingOptions,
     (fold_of, outputs): (&[usize], &Table),
     refine: bool,
     options: &Options,
 ) -> Candidates {
-    let centres = if given.centres.is_empty() {
+    let centres = if let Some(centres) = &given.centres {
+        centres.clone()
+    } else {
         // K around the usual one, as far as the smallest training part allows.
         let largest = select::smallest_training_part(fold_of, outputs).saturating_sub(1).max(1);
         let usual = [options.centres / 2, options.centres, options.centres * 2];
         let mut candidates = usual.map(|k| k.clamp(1, largest)).to_vec();
         candidates.dedup();
         candidates
-    } else {
-        given.centres.clone()
     };
-    let usual_spreads = given.spread.is_empty();
-    let spreads = match (usual_spreads, refine) {
-        (false, _) => given.spread.clone(),
-        (true, true) => vec![options.spread],
-        (true, false) => SPREADS.to_vec(),
+    let spreads = match (&given.spread, refine) {
+        (Some(spreads), _) => spreads.clone(),
+        (None, true) => vec![options.spread],
+        (None, false) => SPREADS.to_vec(),
     };
-    let usual_penalties = given.penalty.is_empty();
-    let penalties = match (usual_penalties, refine) {
-        (false, _) => given.penalty.iter().copied().map(Some).collect(),
-        (true, true) => vec![options.penalty],
-        (true, false) => {
+    let penalties = match (&given.penalty, refine) {
+        (Some(penalties), _) => penalties.iter().copied().map(Some).collect(),
+        (None, true) => vec![options.penalty],
+        (None, false) => {
             [options.penalty].into_iter().chain(PENALTIES.map(Some)).collect::<Vec<_>>()
         }
     };
@@ -99,8 +103,8 @@ fn candidates(
         centres,
         spreads,
         penalties,
-        most_spreads: most_steps(usual_spreads),
-        most_penalties: most_steps(usual_penalties),
+        most_spreads: most_steps(given.spread.is_none()),
+        most_penalties: most_steps(given.penalty.is_none()),
     }
 }
 
