@@ -10,7 +10,7 @@ use serde::Deserialize;
 use taxel_core::blob::NoiseKind as BlobNoiseKind;
 use taxel_data::digest::digest;
 use taxel_data::{AtRest, BadValue, Dataset, Progress, Stream, input, require};
-use taxel_learn::train::{FreshFrames, Solver, check_spread};
+use taxel_learn::train::{FreshFrames, Solver, check_penalty, check_spread};
 use taxel_learn::{Options, Origin, relative};
 use taxel_limit::Reference;
 use taxel_simulate::noise::{Noise, NoiseKind};
@@ -286,7 +286,10 @@ impl Experiment {
     fn check(&self) -> Check {
         check_name(&self.name)?;
         self.world.check()?;
-        check_spread("training.spread", self.training.options.spread)?;
+        let options = &self.training.options;
+        check_spread("training.spread", options.spread)?;
+        let penalty = options.penalty.map_or(Ok(()), check_penalty);
+        penalty.map_err(|bad| bad.named("training.penalty"))?;
         let noise_kind = self.world.noise.kind;
         self.table1.as_ref().map_or(Ok(()), |table| check_table1(table, noise_kind))?;
         self.check_outputs()?;

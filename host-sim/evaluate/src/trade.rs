@@ -21,7 +21,7 @@ use crate::subject::Subject;
 use crate::sweep::bounds::{self, Bound, Bounds, Values};
 use crate::sweep::file::{Also, Wanted};
 use crate::sweep::front;
-use crate::sweep::judge::{self, Frames, KnownLimit, Starts};
+use crate::sweep::judge::{self, Frames, KnownLimit};
 use crate::sweep::{self, Merged};
 use crate::verdict::{Verdict, Warning};
 
@@ -381,8 +381,7 @@ impl Trade {
         }
         let readings = judge::Readings::new(plan, point, &of_point, &mut KnownLimit::default())?;
         let frames = Frames::new(plan, &readings)?;
-        let starts = Starts::new(plan, point, &frames)?;
-        let blob = frames.blob(plan, point, &starts.layers(plan, point)?)?;
+        let blob = frames.blob(plan, point)?;
         let judged = frames.judge(&blob)?;
         let decoders: Vec<DecoderErrors> = frames.decoders(&judged, point.on_device.filter);
         let verdict = Verdict::new(&decoders, &readings.limit)

@@ -7,7 +7,7 @@ use taxel_learn::decoders::LINEAR;
 use taxel_learn::kinds::{self, Choice};
 use taxel_learn::reading_model::{self, Extent, HeldOut, Statistics};
 use taxel_learn::select;
-use taxel_learn::train::{Examples, Found, Refinement, Start, resolution, train_refined};
+use taxel_learn::train::{Examples, Found, Layers, Refinement, Start, resolution, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
 
@@ -93,34 +93,23 @@ impl<'s> TrainingSet<'s> {
         self.packed(&self.train(&options, progress)?, &options, progress)
     }
 
-    /// Layers for `options`, refined if that is asked for, from each of `starts`.
-    pub fn layers<'a>(
+    /// Layers for `options`, refined if that is asked for, from each of `starts` and its own `layers` with K-means centres.
+    /// Weights will be fitted with each of `penalties`.
+    pub fn found<'a>(
         &self,
         starts: &'a [Start],
+        layers: Vec<Layers>,
         options: &Options,
+        penalties: &[Option<f64>],
         progress: &dyn Progress,
     ) -> Result<Found<'a>> {
-        options.check_for(&self.frames)?;
-        resolution::check(&self.frames)?;
         let settings = Refinement::default();
         let refinement = self.examples().map(|examples| (&settings, examples));
-        Ok(Found::new(starts, options, refinement, progress)?)
-    }
-
-    /// Model whose layers are `found`, with weights in the format of `options`.
-    pub fn blob_of(
-        &self,
-        found: &Found<'_>,
-        options: &Options,
-        progress: &dyn Progress,
-    ) -> Result<ModelBlob> {
-        self.check()?;
-        let trained = found.fit(options.format, options.or_f32, progress)?;
-        self.packed(&trained, options, progress)
+        Ok(Found::new(starts, layers, options, penalties, refinement, progress)?)
     }
 
     /// Blob of a trained model, with a reading model if one is asked for.
-    fn packed(
+    pub fn packed(
         &self,
         trained: &Trained,
         options: &Options,

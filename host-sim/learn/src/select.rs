@@ -6,8 +6,8 @@ use taxel_data::{BadValue, Dataset, Progress, Silent};
 use crate::decoders::{BASELINES, Baseline};
 use crate::error::Result;
 use crate::parallel;
-use crate::train::refine::{LEAST_FOLDS, refine};
-use crate::train::{self, Examples, FittedNetwork, Options, Refinement, Start, Trained};
+use crate::train::refine::LEAST_FOLDS;
+use crate::train::{Examples, Found, Layers, Options, Refinement, Start};
 
 mod folds;
 mod grid;
@@ -188,44 +188,25 @@ impl<'d> Judge<'d> {
         let (held, kept) = split(self.fold_of, fold);
         let [test, training] = [held, kept].map(|frames| self.dataset.subset(&frames));
         let inner = without(self.fold_of, fold);
-        let mut all = vec![Trained::default(); spreads.len() * penalties.len()];
-        for start in Start::all(&training, options)? {
-            let mut layers = start.layers(options);
-            let mut places = all.iter_mut();
-            let mut add = |projection: Option<&Vec<f32>>, models: Vec<Vec<FittedNetwork>>| {
-                let models = places.by_ref().zip(models);
-                models
-                    .for_each(|(trained, networks)| trained.add(start.front(projection), networks));
-            };
-            for spread in spreads {
-                layers.hidden.iter_mut().for_each(|layer| layer.spread = *spread);
-                let Some(settings) = self.refinement else {
-                    let with = |penalty: &Option<f64>| {
-                        let options = Options { penalty: *penalty, ..*options };
-                        Ok(start.fitting(&layers, &options, None)?.penalty)
-                    };
-                    let penalties = penalties.iter().map(with).collect::<Result<Vec<_>>>()?;
-                    let models = train::fit(&layers, options, &penalties, &Silent)?;
-                    add(layers.projection.as_ref(), models);
-                    continue;
-                };
-                for penalty in penalties {
-                    // Where centres move to depends on the penalty.
-                    let options = Options { penalty: *penalty, ..*options };
-                    let examples = Examples::Folds(&inner);
-                    let layers =
-                        refine(&start.frames, &layers, &options, settings, examples, &Silent)?;
-                    let options = start.fitting(&layers, &options, Some(settings))?;
-                    let models = train::fit(&layers, &options, &[options.penalty], &Silent)?;
-                    add(layers.projection.as_ref(), models);
+        let refinement = self.refinement.map(|settings| (settings, Examples::Folds(&inner)));
+        // Where centres move to depends on the penalty.
+        let together = if refinement.is_some() { 1 } else { penalties.len().max(1) };
+        let starts = Start::all(&training, options)?;
+        let layers: Vec<Layers> = starts.iter().map(|start| start.layers(options)).collect();
+        let mut squares = Vec::new();
+        for spread in spreads {
+            for penalties in penalties.chunks(together) {
+                let options = Options { spread: *spread, penalty: penalties[0], ..*options };
+                let layers = layers.clone();
+                let found = Found::new(&starts, layers, &options, penalties, refinement, &Silent)?;
+                for trained in found.fit(options.format, options.or_f32, &Silent) {
+                    let decoded = trained?.decode(&test.inputs.values);
+                    let decoded = test.outputs.with_places(decoded);
+                    squares.push(test.outputs.squared_errors(&decoded));
                 }
             }
         }
-        let squares = |trained: &Trained| {
-            let decoded = trained.decode(&test.inputs.values);
-            test.outputs.squared_errors(&test.outputs.with_places(decoded))
-        };
-        Ok(all.iter().map(squares).collect())
+        Ok(squares)
     }
 
     /// Baselines on the same folds.

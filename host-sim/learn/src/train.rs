@@ -34,7 +34,6 @@ use samples::Ridge;
 pub use samples::{HiddenLayer, InputScale, Samples, Seen};
 pub use start::Start;
 pub use touch::{Features, FittedTouch, Group, Kinds, THRESHOLD};
-pub(crate) use trained::fit;
 pub use trained::{FittedFront, Trained};
 
 /// How output weights are computed. Both ways give the same weights, but for rounding.
@@ -94,7 +93,7 @@ pub struct Options {
     /// Ridge penalty on squared weights, for each training frame: at 1 it is as strong as an input that is always 1,
     /// and as strong as all activations that are fully on; on the affine tail it is at most 1e-7. `None` for the usual one:
     /// 1/[`INITIAL_COVARIANCE`] for all frames together, or [`Refinement::ridge`] if training is refined. That of places
-    /// behind normalised features is chosen ([`Start::fitting`]).
+    /// behind normalised features is chosen ([`Start::penalty`]).
     pub penalty: Option<f64>,
     /// How output weights are computed.
     pub solver: Solver,
@@ -268,8 +267,8 @@ impl Samples<'_> {
     /// # Panics
     /// Never: one penalty gives one network.
     pub fn fit_layer(&self, layer: &HiddenLayer, options: &Options) -> Result<FittedNetwork> {
-        let fitted = self.fit_each(layer, options, &[options.penalty])?;
-        Ok(fitted.into_iter().next().expect("one network a penalty"))
+        let mut fitted = self.fit_each(layer, options, &[options.penalty]).into_iter();
+        fitted.next().expect("one network a penalty")
     }
 
     /// Fits output weights as [`fit_layer`](Self::fit_layer) does, with each of `penalties` instead of the options' own.
@@ -278,7 +277,7 @@ impl Samples<'_> {
         layer: &HiddenLayer,
         options: &Options,
         penalties: &[Option<f64>],
-    ) -> Result<Vec<FittedNetwork>> {
+    ) -> Vec<Result<FittedNetwork>> {
         let with = |penalty: &Option<f64>| Options { penalty: *penalty, ..*options };
         let ridge = |penalty| Ridge::new(self.inputs(), &with(penalty));
         let ridges: Vec<Ridge> = penalties.iter().map(ridge).collect();
@@ -301,6 +300,9 @@ pub fn train(dataset: &Dataset, options: &Options, progress: &dyn Progress) -> R
 ///
 /// # Errors
 /// As [`train`] and [`refine`](refine::refine).
+///
+/// # Panics
+/// Never: one penalty gives one model.
 pub fn train_refined(
     dataset: &Dataset,
     options: &Options,
@@ -310,11 +312,10 @@ pub fn train_refined(
     options.check_for(dataset)?;
     resolution::check(dataset)?;
     let starts = Start::all(dataset, options)?;
-    Found::new(&starts, options, refinement, progress)?.fit(
-        options.format,
-        options.or_f32,
-        progress,
-    )
+    let layers = starts.iter().map(|start| start.layers(options)).collect();
+    let found = Found::new(&starts, layers, options, &[options.penalty], refinement, progress)?;
+    let mut trained = found.fit(options.format, options.or_f32, progress).into_iter();
+    trained.next().expect("one model a penalty")
 }
 
 /// Squared distance ‖a − b‖².

@@ -1,12 +1,13 @@
 //! Sweeps: what comes out does not depend on how a plan was cut, and nothing is mixed that does not belong together.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
-use host_sim::sweep::Plan;
 use host_sim::sweep::file::Wanted;
 use host_sim::sweep::plan::Base;
+use host_sim::sweep::{Plan, Point, work};
 use serde_json::Value;
+use taxel_data::Silent;
 
 use crate::common::{Folder, tiny_scene};
 
@@ -278,6 +279,26 @@ fn points_share_what_is_found_for_the_same_settings() {
     assert_ne!(few.keys[1], more.keys[1]);
 }
 
+/// Centres do not depend on the spread, and unless they are refined neither on the penalty.
+#[test]
+fn points_that_share_centres_and_decompositions_have_the_results_that_each_has_alone() {
+    let folder = prepared("sweep_shared");
+    let wanted = "limit_frames = 0\n[set]\ntraining.frames = 60\ntraining.test_frames = 20\n[axes]\n\
+                  training.refine = [false, true]\ntraining.spread = [0.5, 0.8]\ntraining.penalty = [1e-7, 1e-3]\n";
+    let base = Base::of_scene("scene", &folder.path("scene.toml").display().to_string()).unwrap();
+    let wanted: Wanted = toml::from_str(wanted).unwrap();
+    let plan = Plan::new("shared", (vec![base], None), wanted, "a test").unwrap();
+    let points = plan.points().unwrap();
+    let computed = |points: &[Point]| work::in_memory(&plan, points, &Silent).unwrap();
+    let together = computed(&points);
+    let mut errors = BTreeSet::new();
+    for (point, record) in points.iter().zip(&together) {
+        assert_eq!(*record, computed(std::slice::from_ref(point))[0]);
+        errors.insert(record.as_ref().unwrap().results["rmse_dz_mm"].to_bits());
+    }
+    assert_eq!(errors.len(), 8, "each setting has its own error");
+}
+
 #[test]
 fn measurements_are_swept_by_the_settings_of_training() {
     let folder = prepared("sweep_measured");
@@ -313,7 +334,7 @@ fn measurements_are_swept_by_the_settings_of_training() {
         seen.push(listed["points"][0]["id"].as_str().unwrap().to_owned());
     }
     assert_eq!(seen[0], seen[4]);
-    assert_eq!(seen.iter().collect::<std::collections::BTreeSet<_>>().len(), 4, "{seen:?}");
+    assert_eq!(seen.iter().collect::<BTreeSet<_>>().len(), 4, "{seen:?}");
     folder.write("plan.toml", plan.replace("training.centres", "sensor.row_wires"));
     let message = folder.fail(&["sweep", "plan.toml"], 2);
     assert!(message.contains("unknown field `sensor`"), "{message}");

@@ -1,5 +1,6 @@
 //! What points are worth: their scans, limits and models, and what these cost. What points share is computed once: the limit
-//! of their readings, frames, what training starts from, layers that any number format has, and a model.
+//! of their readings, frames, what training starts from, centres, layers, weights in a number format but for their penalty,
+//! and a model.
 
 use std::borrow::Cow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,7 +10,7 @@ use taxel_data::{Dataset, Silent, columns};
 use taxel_learn::cost::{Cost, DecoderRam, Design};
 use taxel_learn::decoders::BASELINES;
 use taxel_learn::train::projection::features_at_most;
-use taxel_learn::train::{Found, Start};
+use taxel_learn::train::{Found, Kinds, Layers, Start, resolution};
 use taxel_learn::{ModelBlob, Options, PreparedModel};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::{Synthesis, World};
@@ -62,22 +63,71 @@ pub fn compute(
             continue;
         }
         let frames = after(&readings, |readings| Frames::new(plan, readings));
-        for of_starts in of_frames.chunk_by(same(1)) {
-            let first = &points[of_starts[0]];
-            let starts = after(&frames, |frames| Starts::new(plan, first, frames));
-            for of_layers in of_starts.chunk_by(same(2)) {
-                let first = &points[of_layers[0]];
-                let found = after(&starts, |starts| starts.layers(plan, first));
-                for of_model in of_layers.chunk_by(same(3)) {
-                    let first = &points[of_model[0]];
-                    let model = after(&found, |found| {
-                        let frames = frames.as_ref().map_err(crate::Error::failed)?;
-                        frames.judge(&frames.blob(plan, first, found)?)
-                    });
-                    for index in of_model {
-                        let outcome =
-                            after(&model, |model| model.results(points[*index].on_device.filter));
-                        keep(*index, outcome)?;
+        let mut members = vec![];
+        for index in of_frames {
+            let point = &points[*index];
+            match after(&frames, |frames| frames.options(plan, point)) {
+                Ok(options) => members.push(Member { index: *index, point, options }),
+                Err(why) => keep(*index, Err(why))?,
+            }
+        }
+        if let Ok(frames) = &frames {
+            train_each(frames, &members, keep)?;
+        }
+    }
+    Ok(())
+}
+
+/// Point whose model is trained, and the options for it.
+struct Member<'p> {
+    index: usize,
+    point: &'p Point,
+    options: Options,
+}
+
+/// Trains and judges the models of all `members`, in the order of their keys.
+fn train_each(
+    frames: &Frames<'_>,
+    members: &[Member<'_>],
+    keep: &mut dyn FnMut(usize, Outcome) -> Result<()>,
+) -> Result<()> {
+    let same = |depth: usize| {
+        move |a: &Member<'_>, b: &Member<'_>| a.point.keys[..=depth] == b.point.keys[..=depth]
+    };
+    for of_starts in members.chunk_by(same(1)) {
+        let first = &of_starts[0];
+        let starts = caught(|| Starts::new(frames, first.point, &first.options));
+        for of_centres in of_starts.chunk_by(same(2)) {
+            let options = &of_centres[0].options;
+            let centred = after(&starts, |starts| Ok(starts.centred(options)));
+            for of_layers in of_centres.chunk_by(same(3)) {
+                let first = &of_layers[0];
+                let mut penalties = vec![];
+                for Member { options, .. } in of_layers {
+                    if !penalties.contains(&options.penalty) {
+                        penalties.push(options.penalty);
+                    }
+                }
+                let found = after(&centred, |centred| {
+                    let (format, own) = (first.point.usual.format, first.options);
+                    centred.found(&Options { format, ..own }, &penalties)
+                });
+                for of_weights in of_layers.chunk_by(same(4)) {
+                    let Options { format, or_f32, .. } = of_weights[0].options;
+                    let trained = after(&found, |found| Ok(found.fit(format, or_f32, &Silent)));
+                    for of_model in of_weights.chunk_by(same(5)) {
+                        let options = &of_model[0].options;
+                        let place = penalties.iter().position(|it| *it == options.penalty);
+                        let model = after(&trained, |trained| {
+                            let trained = trained[place.unwrap_or(0)].as_ref();
+                            let trained =
+                                trained.map_err(|why| crate::Error::failed(why.to_string()))?;
+                            frames.judge(&frames.set.packed(trained, options, &Silent)?)
+                        });
+                        for Member { index, point, .. } in of_model {
+                            let results = |model: &Judged| model.results(point.on_device.filter);
+                            keep(*index, after(&model, results))?;
+                        }
                     }
                 }
             }
@@ -217,6 +267,7 @@ impl<'s> Frames<'s> {
     /// Frames of these `readings`.
     pub fn new(plan: &Plan, readings: &'s Readings<'s>) -> Result<Self> {
         let (mut set, test) = readings.subject.sets(None);
+        set.check()?;
         // All models of these frames tell it.
         set.origin.linear_rmse = set.linear_rmse();
         let names = &set.frames.outputs.names;
@@ -249,18 +300,31 @@ impl<'s> Frames<'s> {
     }
 
     /// Options for training a point's model on these frames. Fewer columns give fewer features.
-    fn options(&self, plan: &Plan, point: &Point) -> Result<Options> {
+    ///
+    /// # Errors
+    /// [`Error`](crate::Error) for options that do not fit the frames.
+    pub fn options(&self, plan: &Plan, point: &Point) -> Result<Options> {
         let mut options = point::options(plan.data.as_deref(), &point.scene)?;
         if point.on_device.column_step > 1 {
             let possible = |wanted| features_at_most(&self.set.frames, wanted).max(1);
             options.features = options.features.map(possible);
         }
+        options.check_for(&self.set.frames)?;
         Ok(options)
     }
 
-    /// Blob of a point's model, whose layers are `found`.
-    pub fn blob(&self, plan: &Plan, point: &Point, found: &Found<'_>) -> Result<ModelBlob> {
-        self.set.blob_of(found, &self.options(plan, point)?, &Silent)
+    /// Blob of a point's model.
+    ///
+    /// # Errors
+    /// As training.
+    pub fn blob(&self, plan: &Plan, point: &Point) -> Result<ModelBlob> {
+        let options = self.options(plan, point)?;
+        let starts = Starts::new(self, point, &options)?;
+        let centred = starts.centred(&options);
+        let of_usual = Options { format: point.usual.format, ..options };
+        let found = centred.found(&of_usual, &[options.penalty])?;
+        let trained = found.fit(options.format, options.or_f32, &Silent).remove(0)?;
+        self.set.packed(&trained, &options, &Silent)
     }
 
     /// Errors and cost of a model.
@@ -329,29 +393,43 @@ fn rmse_of_groups(errors: &[Errors]) -> Vec<(String, f64)> {
     rmse
 }
 
-/// What training starts from, for points that differ in their centres, spreads and formats alone.
+/// What training starts from, for points that differ in their centres, spreads, penalties and formats alone.
 pub struct Starts<'s> {
-    frames: &'s Frames<'s>,
-    /// Options whose features are chosen.
-    options: Options,
+    set: &'s TrainingSet<'s>,
+    /// Features that are chosen.
+    kinds: Option<Kinds>,
     all: Vec<Start>,
 }
 
 impl<'s> Starts<'s> {
-    /// Starts for a point's training on these `frames`. Features are chosen for as many centres as the plan's scene has.
-    pub fn new(plan: &Plan, point: &Point, frames: &'s Frames<'s>) -> Result<Self> {
-        let own = frames.options(plan, point)?;
-        let mut options = Options { centres: point.usual.centres, ..own };
-        let _ = frames.set.choose(&mut options, &Silent);
-        let all = Start::all(&frames.set.frames, &options)?;
-        Ok(Self { frames, options, all })
+    /// Starts for training a point's model on these `frames`. Features are chosen for the network of the plan's scene.
+    pub fn new(frames: &'s Frames<'s>, point: &Point, options: &Options) -> Result<Self> {
+        let Options { centres, spread, penalty, .. } = point.usual.for_each_row(options.each_row);
+        let mut options = Options { centres, spread, penalty, ..*options };
+        let set = &frames.set;
+        resolution::check(&set.frames)?;
+        let _ = set.choose(&mut options, &Silent);
+        Ok(Self { set, kinds: options.kinds, all: Start::all(&set.frames, &options)? })
     }
 
-    /// Layers of a point's model, as they are found for the format of the plan's scene.
-    pub fn layers(&self, plan: &Plan, point: &Point) -> Result<Found<'_>> {
-        let own = self.frames.options(plan, point)?;
-        let (kinds, format) = (self.options.kinds, point.usual.format);
-        self.frames.set.layers(&self.all, &Options { kinds, format, ..own }, &Silent)
+    /// Starts with K-means centres for `options`, whatever their spread.
+    pub fn centred(&self, options: &Options) -> Centred<'_> {
+        Centred { starts: self, layers: self.all.iter().map(|it| it.layers(options)).collect() }
+    }
+}
+
+/// K-means centres, for points that differ in their spreads, penalties and formats alone.
+pub struct Centred<'s> {
+    starts: &'s Starts<'s>,
+    layers: Vec<Layers>,
+}
+
+impl Centred<'_> {
+    /// Layers for `options`, to which weights will be fitted with each of `penalties`.
+    pub fn found(&self, options: &Options, penalties: &[Option<f64>]) -> Result<Found<'_>> {
+        let Starts { set, kinds, all } = self.starts;
+        let options = Options { kinds: *kinds, ..*options };
+        set.found(all, self.layers.clone(), &options, penalties, &Silent)
     }
 }
 

@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use taxel_core::rbf::Format;
 use taxel_data::digest::{digest, of_debug};
 use taxel_data::{BadValue, columns, input, require};
+use taxel_learn::Options;
 use toml::{Table, Value};
 
 use super::axis::{Axis, latin_hypercube};
@@ -88,7 +88,7 @@ pub struct Plan {
     pub build: String,
     bases: Vec<Base>,
     /// Usual settings by the bases' labels, unless one is a scene only with what axes give.
-    usual: BTreeMap<String, Usual>,
+    usual: BTreeMap<String, Options>,
     set: Vec<(String, Value)>,
     device: Table,
     /// Values of every axis: of those that are drawn together, one line a draw.
@@ -105,22 +105,15 @@ pub struct Point {
     /// Scene's text; of measurements, the fields of training.
     pub scene: String,
     pub on_device: OnDevice,
-    pub usual: Usual,
+    /// Options of the plan's scene, whatever the axes say, for which points find what they share.
+    pub usual: Options,
     /// Digest of the scene's text, whatever is changed in it.
     pub digest: u64,
     /// Digest of all but training: points with the same one share their limit.
     pub shares: u64,
-    /// Digests of what points share besides: frames, what training starts from, layers, and the model.
-    pub keys: [u64; 4],
-}
-
-/// Settings of a plan's scene, whatever the axes say, for which its points find what they share.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Usual {
-    /// Number format for which layers are found.
-    pub format: Format,
-    /// Number of centres for which features are chosen.
-    pub centres: usize,
+    /// Digests of what points share besides: frames, what training starts from, centres, layers, weights but for their
+    /// penalty, and the model.
+    pub keys: [u64; 6],
 }
 
 fn in_words(values: &[(String, Value)]) -> String {
@@ -400,7 +393,7 @@ impl Plan {
         let of_scene = base.map_or(0, |base| base.digest);
         let usual = match base.and_then(|base| self.usual.get(&base.label)) {
             Some(usual) => *usual,
-            None => self.usual_in(&scene).unwrap_or(USUAL),
+            None => self.usual_in(&scene).unwrap_or_default(),
         };
         let mut shared = document.scene;
         let training = match shared.remove("training") {
@@ -424,10 +417,15 @@ impl Plan {
             Ok(digest(format!("{shares:x} {usual:?}\n{}", text(&training)?).as_bytes()))
         };
         let of_frames = |field: &str| FIELDS_OF_FRAMES.contains(&field);
+        // Where centres move to depends on the penalty.
+        let of_layers: &[&str] =
+            if self.refines(&training) { &["format"] } else { &["format", "penalty"] };
         let keys = [
             key(&of_frames)?,
-            key(&|field| !["centres", "format"].contains(&field))?,
-            key(&|field| field != "format")?,
+            key(&|field| !["centres", "spread", "penalty", "format"].contains(&field))?,
+            key(&|field| !["spread", "penalty", "format"].contains(&field))?,
+            key(&|field| !of_layers.contains(&field))?,
+            key(&|field| field != "penalty")?,
             key(&|_| true)?,
         ];
         let id = format!("{:016x}", digest(decides.as_bytes()));
@@ -435,13 +433,18 @@ impl Plan {
         Ok(Point { id, values, scene, on_device, usual, digest, shares, keys })
     }
 
-    fn usual_of(&self, base: &Base) -> Option<Usual> {
+    /// Whether models with these fields of `training` may be refined.
+    fn refines(&self, training: &Table) -> bool {
+        let is_usual = self.data.as_deref().is_none_or(|data| data.how.refine);
+        training.get("refine").and_then(Value::as_bool).unwrap_or(is_usual)
+    }
+
+    fn usual_of(&self, base: &Base) -> Option<Options> {
         self.usual_in(&text(&self.changed(Some(base), &[]).ok()?.scene).ok()?)
     }
 
-    fn usual_in(&self, scene: &str) -> Option<Usual> {
-        let options = super::point::options(self.data.as_deref(), scene).ok()?;
-        Some(Usual { format: options.format, centres: options.centres })
+    fn usual_in(&self, scene: &str) -> Option<Options> {
+        super::point::options(self.data.as_deref(), scene).ok()
     }
 
     /// Fields of the point at these places of the axes.
@@ -515,8 +518,6 @@ impl Plan {
 /// Fields of training that frames depend on, and what is held out of them.
 const FIELDS_OF_FRAMES: [&str; 5] =
     ["frames", "test_frames", "relative_inputs", "refine", "reading_model"];
-/// Settings of what is no scene, which no point gets as far as to use.
-const USUAL: Usual = Usual { format: Format::Fixed16, centres: 64 };
 
 /// Digest of all that decides what measurements give: of the frames and the options, whatever the file of the test frames is called.
 fn digest_of(data: &Measurements) -> u64 {

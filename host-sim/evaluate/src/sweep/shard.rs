@@ -67,8 +67,7 @@ impl FromStr for Shard {
 mod tests {
     use super::*;
     use crate::sweep::on_device::OnDevice;
-    use crate::sweep::plan::Usual;
-    use taxel_core::rbf::Format;
+    use taxel_learn::Options;
 
     fn points(shares: &[u64]) -> Vec<Point> {
         let point = |shares: &u64| Point {
@@ -76,10 +75,10 @@ mod tests {
             values: vec![],
             scene: String::new(),
             on_device: OnDevice::new(toml::Table::new()).unwrap(),
-            usual: Usual { format: Format::Fixed16, centres: 64 },
+            usual: Options::default(),
             digest: 0,
             shares: *shares,
-            keys: [0; 4],
+            keys: [0; 6],
         };
         shares.iter().map(point).collect()
     }

@@ -242,22 +242,24 @@ impl<'s> Fit<'s> {
     }
 }
 
-/// Fits `samples` with the Gaussians of `layer`: one network for each of `ridges`. They share one
-/// decomposition, unless the solver is a recursion.
-///
-/// # Errors
-/// [`Error`](crate::Error) if the format does not hold a network.
+/// Fits `samples` with the Gaussians of `layer`: a network for each of `ridges`, or an error where the format does not hold
+/// it. They share one decomposition, unless the solver is a recursion.
 pub(super) fn fit(
     samples: &Samples<'_>,
     layer: &HiddenLayer,
     options: &Options,
     ridges: &[Ridge],
-) -> Result<Vec<FittedNetwork>> {
+) -> Vec<Result<FittedNetwork>> {
     let (targets, frames) = (Targets::new(samples), samples.table.outputs.counts());
-    let held: &dyn Held = match options.format {
-        Format::F32 => &float32::Gaussians::new(samples, layer, options),
-        Format::Fixed16 => &fixed16::Exponents::new(samples, layer, options)?,
+    let with = |held: &dyn Held| {
+        let fit = Fit::new(held, &targets, options.solver, &frames);
+        ridges.iter().map(|ridge| fit.network(*ridge)).collect()
     };
-    let fit = Fit::new(held, &targets, options.solver, &frames);
-    ridges.iter().map(|ridge| fit.network(*ridge)).collect()
+    match options.format {
+        Format::F32 => with(&float32::Gaussians::new(samples, layer, options)),
+        Format::Fixed16 => match fixed16::Exponents::new(samples, layer, options) {
+            Ok(held) => with(&held),
+            Err(cause) => ridges.iter().map(|_| Err(Error::unfit(cause.to_string()))).collect(),
+        },
+    }
 }

@@ -82,18 +82,18 @@ impl Start {
         Layers { projection: self.projection.clone(), seen, hidden }
     }
 
-    /// Options for fitting weights to these `layers`: with the usual penalty, if `options` give none. That of places is
-    /// chosen on frames that are held out.
+    /// Penalty for fitting weights to these `layers`: the usual one, if `options` give none. That of places is chosen on
+    /// frames that are held out.
     ///
     /// # Errors
     /// As [`train`](super::train).
-    pub fn fitting(
+    pub fn penalty(
         &self,
         layers: &Layers,
         options: &Options,
         refinement: Option<&Refinement>,
-    ) -> Result<Options> {
-        let penalty = match (options.penalty, &self.frames.group.touch) {
+    ) -> Result<Option<f64>> {
+        Ok(match (options.penalty, &self.frames.group.touch) {
             (None, Some(touch)) if touch.kind() == Kind::Place => {
                 let examples = &self.frames.examples;
                 let mut seen = touch::seen(None, self.projection.as_deref(), examples).table;
@@ -109,8 +109,7 @@ impl Start {
                 Some(touch::best_penalty(&seen, &layers.hidden[0], options)?)
             }
             (given, _) => given.or(refinement.map(|settings| settings.ridge)),
-        };
-        Ok(Options { penalty, ..*options })
+        })
     }
 
     /// What stands before its network with this `projection`, if it sees whole frames.

@@ -47,7 +47,11 @@ fn penalties_that_share_a_decomposition_give_the_networks_that_each_gives_alone(
         let options = Options { centres: 12, spread: 0.4, format, ..Options::of_rows() };
         let centres = samples.centres(&options, 0);
         let layer = samples.layer(centres.clone(), &options);
-        let together = samples.fit_each(&layer, &options, &penalties).unwrap();
+        let together: Vec<FittedNetwork> = samples
+            .fit_each(&layer, &options, &penalties)
+            .into_iter()
+            .map(Result::unwrap)
+            .collect();
         for (penalty, fitted) in penalties.iter().zip(&together) {
             let options = Options { penalty: *penalty, ..options };
             assert_eq!(*fitted, samples.fit(&centres, &options).unwrap(), "{format:?} {penalty:?}");

@@ -64,34 +64,45 @@ impl Trained {
 }
 
 /// Networks with these `layers`, and output weights that are fitted to the frames that they were found on, with each of
-/// `penalties` instead of the options' own: those of one model for each. They share the decomposition of the samples.
-///
-/// # Errors
-/// [`Error`](crate::Error) for data or layers that the format does not hold.
+/// `penalties` instead of the options' own: those of one model for each, or an error where the format does not hold them.
+/// They share the decomposition of the samples.
 pub(crate) fn fit(
     layers: &Layers,
     options: &Options,
     penalties: &[Option<f64>],
     progress: &dyn Progress,
-) -> Result<Vec<Vec<FittedNetwork>>> {
+) -> Vec<Result<Vec<FittedNetwork>>> {
     progress.stage("fit weights", layers.hidden.len());
-    let fit_rows = |options: &Options| {
-        let fitted = parallel::map(layers.hidden.len(), &|row| {
-            let seen = layers.seen.row(row);
-            let fitted = Samples::of(&seen).fit_each(&layers.hidden[row], options, penalties);
-            progress.step();
-            fitted
-        });
-        // One list of networks a row-wire, one network a penalty.
-        fitted.into_iter().collect::<Result<Vec<Vec<FittedNetwork>>>>()
+    let mut fitted = fit_rows(layers, options, penalties, progress);
+    let failed: Vec<usize> = (0..fitted.len()).filter(|place| fitted[*place].is_err()).collect();
+    if options.or_f32 && !failed.is_empty() {
+        progress.stage("fit weights in f32", layers.hidden.len());
+        let options = Options { format: Format::F32, ..*options };
+        let penalties: Vec<Option<f64>> = failed.iter().map(|place| penalties[*place]).collect();
+        let in_f32 = fit_rows(layers, &options, &penalties, progress);
+        failed.into_iter().zip(in_f32).for_each(|(place, networks)| fitted[place] = networks);
+    }
+    fitted
+}
+
+/// Networks of all rows in the format of `options`, with each of `penalties`.
+fn fit_rows(
+    layers: &Layers,
+    options: &Options,
+    penalties: &[Option<f64>],
+    progress: &dyn Progress,
+) -> Vec<Result<Vec<FittedNetwork>>> {
+    let of_row = |row: usize| {
+        let seen = layers.seen.row(row);
+        let fitted = Samples::of(&seen).fit_each(&layers.hidden[row], options, penalties);
+        progress.step();
+        fitted.into_iter()
     };
-    let fitted = match fit_rows(options) {
-        Err(_) if options.or_f32 => {
-            progress.stage("fit weights in f32", layers.hidden.len());
-            fit_rows(&Options { format: Format::F32, ..*options })?
-        }
-        fitted => fitted?,
+    let mut rows = parallel::map(layers.hidden.len(), &of_row);
+    let of_penalty = |_| {
+        let of_rows: Vec<Result<FittedNetwork>> =
+            rows.iter_mut().filter_map(Iterator::next).collect();
+        of_rows.into_iter().collect()
     };
-    let mut rows: Vec<_> = fitted.into_iter().map(Vec::into_iter).collect();
-    Ok(penalties.iter().map(|_| rows.iter_mut().filter_map(Iterator::next).collect()).collect())
+    penalties.iter().map(of_penalty).collect()
 }

@@ -8,7 +8,8 @@ use super::loss::{Loss, held_out_errors, on_held_out, on_same};
 use super::movable::{Movable, Piece, Sizes};
 use super::*;
 use crate::infer::infer;
-use crate::train::{Start, fit, train, train_refined};
+use crate::train::trained::fit;
+use crate::train::{Start, train, train_refined};
 
 fn draws(purpose: u64) -> impl FnMut() -> f64 {
     let mut random = Random::new(11, Stream::Test, Purpose::Damage, purpose, 0);
@@ -232,8 +233,8 @@ fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
         let start = Start::all(&training, &options).unwrap().remove(0);
         let layers = start.layers(&options);
         let layers = refine(&start.frames, &layers, &options, &quick(), examples, &taken).unwrap();
-        let refined = start.fitting(&layers, &options, Some(&quick())).unwrap();
-        let networks = fit(&layers, &refined, &[refined.penalty], &Silent).unwrap().remove(0);
+        let penalty = start.penalty(&layers, &options, Some(&quick())).unwrap();
+        let networks = fit(&layers, &options, &[penalty], &Silent).remove(0).unwrap();
         let refined = crate::train::Trained { fronts: vec![], networks };
         let start = train(&training, &options, &Silent).unwrap();
         let ratio = rmse(&refined, &test) / rmse(&start, &test);
@@ -259,7 +260,7 @@ fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
     let held = |spread: f64| {
         let mut layers = start.clone();
         layers.hidden[0].spread = spread;
-        fit(&layers, &options, &[None], &Silent).is_ok()
+        fit(&layers, &options, &[None], &Silent)[0].is_ok()
     };
     assert!(held(least) && !held(0.999 * least), "{least}");
 }

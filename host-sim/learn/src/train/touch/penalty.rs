@@ -22,9 +22,10 @@ pub fn best(seen: &Dataset, layer: &HiddenLayer, options: &Options) -> Result<f6
     for part in parts(seen.frames()) {
         training.weights = Some(all.clone());
         training.weights.iter_mut().for_each(|weights| weights[part.clone()].fill(0.0));
-        let networks = Samples::new(&training).fit_each(layer, &options, &PENALTIES.map(Some))?;
+        let networks = Samples::new(&training).fit_each(layer, &options, &PENALTIES.map(Some));
         let held = seen.subset(&part.collect::<Vec<_>>());
-        for (error, network) in errors.iter_mut().zip(&networks) {
+        for (error, network) in errors.iter_mut().zip(networks) {
+            let network = network?;
             *error += Samples::new(&held).squared_errors(&network.network()).iter().sum::<f64>();
         }
     }
