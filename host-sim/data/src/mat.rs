@@ -43,6 +43,15 @@ impl FromStr for Grid {
     }
 }
 
+impl Display for Grid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Of(mat) => write!(f, "{}x{}", mat.rows, mat.columns),
+            Self::None => f.write_str("none"),
+        }
+    }
+}
+
 impl Display for Mat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} × {}", self.rows, self.columns)

@@ -17,15 +17,6 @@ pub fn folder() -> impl TypedValueParser<Value = PathBuf> {
     })
 }
 
-/// Refuses the first of these options that was given, with a `message` that takes its name.
-pub fn refuse_given(
-    options: impl IntoIterator<Item = (&'static str, bool)>,
-    message: impl Fn(&str) -> String,
-) -> Result<()> {
-    let given = options.into_iter().find(|(_, given)| *given);
-    given.map_or(Ok(()), |(option, _)| Err(Error::Usage(message(option))))
-}
-
 /// Options that were given: the field that each sets, and its name on the command line.
 pub fn given<A: Args + Serialize>(options: &A) -> Vec<(String, String)> {
     let command = A::augment_args(Command::new("taxel"));
@@ -37,6 +28,17 @@ pub fn given<A: Args + Serialize>(options: &A) -> Vec<(String, String)> {
         Some((field, name))
     };
     fields.into_iter().filter_map(|(field, _)| option_of(field)).collect()
+}
+
+/// Refuses the first of the `options` that was given and sets a field which `is_refused`, with a `message` that takes its
+/// name.
+pub fn refuse<A: Args + Serialize>(
+    options: &A,
+    is_refused: impl Fn(&str) -> bool,
+    message: impl Fn(&str) -> String,
+) -> Result<()> {
+    let refused = given(options).into_iter().find(|(field, _)| is_refused(field));
+    refused.map_or(Ok(()), |(_, option)| Err(Error::Usage(message(&option))))
 }
 
 /// A `bad` value of training, named by the option that gave it, if one of `options` did.
@@ -57,6 +59,27 @@ pub fn of_option(bad: BadValue) -> Error {
         return Error::Usage(format!("{} {}: {}", bad.field, bad.value, bad.rule));
     }
     bad.into()
+}
+
+/// Values as files have them: by the names that options have.
+pub mod as_text {
+    use std::fmt::Display;
+    use std::str::FromStr;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+    pub fn serialize<T: Display, S: Serializer>(
+        value: &Option<T>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.as_ref().map(ToString::to_string).serialize(serializer)
+    }
+
+    pub fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<T>, D::Error> {
+        String::deserialize(deserializer)?.parse().map(Some).map_err(de::Error::custom)
+    }
 }
 
 #[cfg(test)]

@@ -1,46 +1,11 @@
 //! Command lines that give the same results again, for reports.
 
-use clap::{Arg, CommandFactory};
-
 /// Command line of this process, with the `seed` that it drew from. It has no `left_out` options, which do not change
 /// results and take a value, and none that says how results are told.
 pub fn of_this_process(command: &str, left_out: &[&str], seed: Option<u64>) -> String {
     let given: Vec<String> =
         std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
     repeated(&given, command, left_out, seed)
-}
-
-/// Words of this process's command line that the command `C` takes as well, but for those that do not belong to its subject.
-pub fn words_of<C: CommandFactory>() -> Vec<String> {
-    let command = C::command();
-    let known = |word: &str| {
-        let name = word.strip_prefix("--")?.split('=').next()?;
-        command.get_arguments().find(|argument| argument.get_long() == Some(name))
-    };
-    let mut words = vec![];
-    let (mut given, mut is_behind) = (std::env::args().skip(1), false);
-    while let Some(word) = given.next() {
-        let is_option = word.starts_with('-');
-        let takes_value = |argument: &Arg| argument.get_action().takes_values();
-        match known(&word) {
-            Some(argument) => {
-                let value = (takes_value(argument) && !word.contains('=')).then(|| given.next());
-                words.push(word);
-                words.extend(value.flatten());
-            }
-            // The first word is the command.
-            None if !is_option && !std::mem::replace(&mut is_behind, true) => {}
-            None if !is_option => words.push(word),
-            // Only options of `trade` that take a value are followed by one.
-            None if word == "--plan"
-                || word == "--worst-case"
-                || word == "--all"
-                || TOLD.contains(&word.as_str()) => {}
-            None if word.contains('=') => {}
-            None => drop(given.next()),
-        }
-    }
-    words
 }
 
 /// Options that change what is said, and no result.

@@ -1,27 +1,29 @@
 //! Options of measurements in a data file: its columns, its lines at rest, its folds.
 
-use std::path::Path;
+use std::ops::Not;
+use std::path::{Path, PathBuf};
 
 use crate::measurements::far_from_zero;
 use crate::{Error, Result};
 use clap::Args;
+use serde::{Deserialize, Serialize};
 use taxel_data::clock::neighbours_alike;
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::Grid;
 use taxel_data::{DataFile, Rest, Table};
 use taxel_learn::select;
 
-use super::arguments::refuse_given;
-use super::data_file::{DATA_FILES, DataFileArguments, TimeArgument};
+use super::arguments::{as_text, refuse};
+use super::data_file::{DATA_FILES, DataFileArguments, TimeArgument, for_data};
 use super::readings::{self, BaselineArgument};
 use super::rest_argument::RestArgument;
 
 mod load;
 
-/// What a CSV file's columns are.
-#[derive(Args, Default)]
+/// What a data file holds, and how it is read: of commands, and of the `[data]` of a plan.
+#[derive(Clone, Args, Default, Serialize, Deserialize)]
 #[command(next_help_heading = DATA_FILES)]
-pub struct DataArguments {
+pub struct DataOptions {
     /// Reading columns of a data file: names with * and ?, and ranges such as c2..c16, comma-separated; !NAME leaves
     /// columns out [default: r*c*_ohm].
     #[arg(long, value_name = "GLOB")]
@@ -33,6 +35,7 @@ pub struct DataArguments {
     /// names say so: r1c1 and so on, or numbers that fill a square of 8x8 or more, from which dead cells may be missing; with
     /// none they are no mat.
     #[arg(long, value_name = "ROWSxCOLUMNS|none")]
+    #[serde(default, with = "as_text")]
     grid: Option<Grid>,
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
     #[arg(long, value_name = "NAME", conflicts_with = "folds")]
@@ -47,14 +50,19 @@ pub struct DataArguments {
     fold_blocks: Option<usize>,
     /// Train on the lines of a CSV file that hold an outlier, too: a value far from all others in its column.
     #[arg(long)]
+    #[serde(default, skip_serializing_if = "Not::not")]
     keep_outliers: bool,
     #[command(flatten)]
+    #[serde(flatten)]
     untouched: BaselineArgument,
     #[command(flatten)]
+    #[serde(flatten)]
     rest: RestArgument,
     #[command(flatten)]
+    #[serde(flatten)]
     clock: TimeArgument,
     #[command(flatten)]
+    #[serde(flatten)]
     pub file: DataFileArguments,
 }
 
@@ -69,32 +77,10 @@ pub enum JudgedBy<'p> {
     File(&'p Path),
 }
 
-impl DataArguments {
-    /// Error if an option was given that is for CSV files alone.
-    pub fn refuse_for_scene(&self) -> Result<()> {
-        for (option, picked, given) in [
-            ("--inputs", "columns", self.inputs.is_some()),
-            ("--outputs", "columns", self.outputs.is_some()),
-            ("--grid", "columns", self.grid.is_some()),
-            ("--fold-column", "columns", self.fold_column.is_some()),
-            ("--fold-blocks", "lines", self.fold_blocks.is_some()),
-            ("--keep-outliers", "lines", self.keep_outliers),
-            ("--rest", "lines", self.rest.is_given()),
-            ("--time", "columns", self.clock.time.is_some()),
-        ] {
-            refuse_given([(option, given)], |option| {
-                format!("{option} picks {picked} of a CSV file; a scene has its own")
-            })?;
-        }
-        refuse_given([("--baseline", self.untouched.baseline.is_some())], |option| {
-            format!("{option} is for a CSV file; a scene synthesises its own: leave it out")
-        })?;
-        self.file.refuse_for_scene()
-    }
-
-    /// Number of random folds, if it was given.
-    pub fn folds(&self) -> Option<usize> {
-        self.folds
+impl DataOptions {
+    /// Error if an option was given: a scene takes none. With `--select` it takes random folds.
+    pub fn refuse_for_scene(&self, selects: bool) -> Result<()> {
+        refuse(self, |field| !(selects && field == "folds"), for_data)
     }
 
     /// Whether a column gives the folds.
@@ -104,29 +90,32 @@ impl DataArguments {
 
     /// Error if a column of times was named: `command` tells nothing over time.
     pub fn refuse_time(&self, command: &str) -> Result<()> {
-        refuse_given([("--time", self.clock.time.is_some())], |option| {
-            format!("{option} has no effect in {command}: leave it out")
-        })
+        let message = |option: &str| format!("{option} has no effect in {command}: leave it out");
+        refuse(&self.clock, |_| true, message)
     }
 
     /// Error if folds were asked for: nothing uses them.
     pub fn refuse_folds(&self) -> Result<()> {
-        let of_folds = [
-            ("--folds", self.folds.is_some()),
-            ("--fold-blocks", self.fold_blocks.is_some()),
-            ("--fold-column", self.fold_column.is_some()),
-        ];
-        refuse_given(of_folds, |option| {
-            format!(
-                "{option} has no effect without refinement, --select or --reading-model full: leave it out, or leave \
+        refuse(
+            self,
+            |field| field.starts_with("fold"),
+            |option| {
+                format!(
+                    "{option} has no effect without refinement, --select or --reading-model full: leave it out, or leave \
                  out --no-refine"
-            )
-        })
+                )
+            },
+        )
     }
 
     /// File with frames of the untouched sensor, if it was given.
     pub fn baseline(&self) -> Option<&Path> {
         self.untouched.baseline.as_deref()
+    }
+
+    /// File with frames of the untouched sensor, to change where it is.
+    pub fn baseline_mut(&mut self) -> Option<&mut PathBuf> {
+        self.untouched.baseline.as_mut()
     }
 
     /// Patterns of the input and output columns, as they were given.

@@ -1,23 +1,31 @@
 //! Data files that commands read: how they are read, and cut to a part.
 
+use std::ops::Not;
 use std::path::Path;
 
-use super::arguments::refuse_given;
+use super::arguments::{as_text, refuse};
 use super::recordings::{self, is_recording};
 use super::{captured, stderr};
 use crate::{Error, Result};
-use clap::Args;
+use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
 use taxel_data::DataFile;
 use taxel_data::data_file::{Reading, Separator, Stated};
 
 /// Heading of options for data files.
 pub const DATA_FILES: &str = "Data files (CSV, .mcap)";
 
+/// Refusal of an option of data files.
+pub fn for_data(option: &str) -> String {
+    format!("{option} is for data files; a scene has none: leave it out")
+}
+
 /// How data files are read: text of any dialect (with or without a header), recordings (.mcap).
-#[derive(Args, Default)]
+#[derive(Clone, Args, Default, Serialize, Deserialize)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct DataFileArguments {
     #[command(flatten)]
+    #[serde(flatten)]
     fields: FieldArguments,
     /// Use the first lines alone, this share of all: 0.8 leaves out the last fifth.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
@@ -33,7 +41,7 @@ pub struct DataFileArguments {
 }
 
 /// Times of a log's lines.
-#[derive(Args, Default)]
+#[derive(Clone, Args, Default, Serialize, Deserialize)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct TimeArgument {
     /// Column of a log with the time of each line [default: one called time, t, timestamp, …; without one lines are
@@ -43,22 +51,33 @@ pub struct TimeArgument {
 }
 
 /// What the fields of a data file mean.
-#[derive(Args, Default)]
+#[derive(Clone, Args, Default, Serialize, Deserialize)]
 pub struct FieldArguments {
     /// Take the first line of a CSV file as names even if it holds numbers alone. Otherwise such a file has no header,
     /// and its columns are called c1, c2, …
     #[arg(long)]
+    #[serde(default, skip_serializing_if = "Not::not")]
     header: bool,
     /// Numbers that stand for a missing value, such as -1.
     #[arg(long, value_name = "VALUE", value_delimiter = ',', allow_negative_numbers = true)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     missing: Vec<f64>,
     /// Separator between the fields of a text file, which is otherwise found: comma, semicolon, tab, space, or another
     /// character.
     #[arg(long, value_name = "NAME")]
+    #[serde(default, with = "as_text")]
     separator: Option<Separator>,
     /// Decimal sign of a text file, which is otherwise found.
-    #[arg(long, value_name = "SIGN", value_parser = ["point", "comma"])]
-    decimal: Option<String>,
+    #[arg(long, value_enum, value_name = "SIGN")]
+    decimal: Option<Decimal>,
+}
+
+/// Decimal sign.
+#[derive(Clone, Copy, PartialEq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Decimal {
+    Point,
+    Comma,
 }
 
 impl DataFileArguments {
@@ -97,16 +116,8 @@ impl DataFileArguments {
     }
 
     /// Error if an option was given: they are for data files alone.
-    pub fn refuse_for_scene(&self) -> Result<()> {
-        let of_fields = [
-            ("--header", self.fields.header),
-            ("--missing", !self.fields.missing.is_empty()),
-            ("--first-share", self.first_share.is_some()),
-            ("--last-share", self.last_share.is_some()),
-        ];
-        refuse_given(of_fields.into_iter().chain(self.fields.of_text()), |option| {
-            format!("{option} is for data files; a scene has none: leave it out")
-        })
+    pub fn refuse(&self) -> Result<()> {
+        refuse(self, |_| true, for_data)
     }
 }
 
@@ -138,14 +149,9 @@ impl FieldArguments {
     pub fn reading(&self) -> Reading {
         let stated = Stated {
             separator: self.separator,
-            decimal_comma: self.decimal.as_ref().map(|sign| sign == "comma"),
+            decimal_comma: self.decimal.map(|sign| sign == Decimal::Comma),
         };
         Reading { has_header: self.header, stated, ..Reading::default() }
-    }
-
-    /// Options that are for text files alone, and whether they were given.
-    fn of_text(&self) -> [(&'static str, bool); 2] {
-        [("--separator", self.separator.is_some()), ("--decimal", self.decimal.is_some())]
     }
 
     /// Reads the file at `path`, and says on stderr what it made of it.
@@ -155,7 +161,8 @@ impl FieldArguments {
 
     fn read_as(&self, path: &Path, keeps_text: bool) -> Result<DataFile> {
         if is_recording(path) {
-            refuse_given(self.of_text(), |option| {
+            let of_text = |field: &str| ["separator", "decimal"].contains(&field);
+            refuse(self, of_text, |option| {
                 format!("{option} is for text files; {} is none: leave it out", path.display())
             })?;
         }

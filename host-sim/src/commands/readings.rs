@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 use clap::Args;
+use serde::{Deserialize, Serialize};
 use taxel_core::blob::Metadata;
 use taxel_core::health::Limits;
 use taxel_data::rest::is_zero_at_rest;
@@ -17,7 +18,7 @@ use super::stderr;
 use super::data_file::FieldArguments;
 
 /// Baseline of the sensor that readings are from.
-#[derive(Args, Default)]
+#[derive(Clone, Args, Default, Serialize, Deserialize)]
 pub struct BaselineArgument {
     /// CSV file with frames of the untouched sensor, in columns of the same names as the readings. The mean of its lines is the
     /// baseline of relative inputs, instead of lines at rest.

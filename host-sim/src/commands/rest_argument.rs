@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::{Error, Result};
 use clap::Args;
+use serde::{Deserialize, Serialize};
 use taxel_core::blob::Metadata;
 use taxel_core::health::Limits;
 use taxel_data::rest;
@@ -16,7 +17,7 @@ use super::readings::BaselineArgument;
 use super::stderr;
 
 /// Which lines of a log are those of the untouched sensor.
-#[derive(Args, Default)]
+#[derive(Clone, Args, Default, Serialize, Deserialize)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct RestArgument {
     /// Columns of a log that are zero while nothing touches the sensor; lines at which all of them are make the baseline of the

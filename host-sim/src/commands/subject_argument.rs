@@ -3,19 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use crate::experiment::{Experiment, names_a_scene};
+use crate::measurements::Measurements;
 use crate::subject::Subject;
+use crate::sweep::fields::require_known;
 use crate::sweep::file::Wanted;
 use crate::sweep::plan::SEED;
 use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
-use clap::{Args, Parser};
+use clap::{Args, Command};
+use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::arguments::{named, of_option};
-use super::data_argument::{DataArguments, JudgedBy};
+use super::Common;
+use super::arguments::{named, of_option, refuse};
+use super::data_argument::{DataOptions, JudgedBy};
 use super::data_file::DATA_FILES;
 use super::scene_argument::{DEFAULT_SCENE, NoiseArgument};
-use super::{Common, command_line};
 
 /// Scene or CSV file to train and to judge on.
 #[derive(Args, Default)]
@@ -30,21 +33,46 @@ pub struct SubjectArgument {
     test: Option<PathBuf>,
 }
 
-/// Options of measurements, as a plan has them.
-#[derive(Parser)]
-#[command(name = "data", no_binary_name = true, disable_help_flag = true)]
-pub struct DataOptions {
-    #[command(flatten)]
-    subject: SubjectArgument,
-    /// Seed of every random draw.
-    #[arg(long)]
-    seed: Option<u64>,
+/// Data file of a plan, beside it, and its options.
+#[derive(Serialize, Deserialize)]
+pub struct PlannedData {
+    file: PathBuf,
+    /// File with frames to judge by.
+    test: Option<PathBuf>,
+    #[serde(flatten)]
+    options: DataOptions,
 }
 
-impl DataOptions {
-    /// Loads the measurements.
-    pub fn load(&self) -> Result<Subject> {
-        self.subject.load_to_trade(&Common { seed: self.seed, ..Common::default() })
+impl PlannedData {
+    /// Data in the table `data` of the plan at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for fields that are not those of data files.
+    pub fn read(data: &Table, path: &Path) -> Result<Self> {
+        let of_plan = |cause: &str| {
+            taxel_data::Error::unfit(format!("plan {}: data: {cause}", path.display()))
+        };
+        let options = DataOptions::augment_args(Command::new("data"));
+        let options = options.get_arguments().map(|option| option.get_id().as_str());
+        let known: Vec<&str> = ["file", "test"].into_iter().chain(options).collect();
+        let fields = data.keys().try_for_each(|field| require_known("field", field, &known));
+        fields.map_err(|bad| of_plan(&bad.to_string()))?;
+        let read = data.clone().try_into();
+        let mut read: Self = read.map_err(|cause: toml::de::Error| of_plan(cause.message()))?;
+        let files = [Some(&mut read.file), read.test.as_mut(), read.options.baseline_mut()];
+        for file in files.into_iter().flatten() {
+            let beside = path.with_file_name(&file);
+            if beside.is_file() {
+                *file = beside;
+            }
+        }
+        Ok(read)
+    }
+
+    /// Loads the measurements, for models trained as `training` says, with this `seed`.
+    pub fn load(&self, training: &TrainingOptions, seed: u64) -> Result<Measurements> {
+        let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
+        self.options.load(&self.file, (training, seed), judged)
     }
 }
 
@@ -57,7 +85,7 @@ pub struct SubjectOptions {
     #[command(flatten)]
     pub training: TrainingOptions,
     #[command(flatten)]
-    pub data: DataArguments,
+    pub data: DataOptions,
 }
 
 impl SubjectArgument {
@@ -75,7 +103,7 @@ impl SubjectArgument {
     fn load_for(&self, training: &TrainingOptions, common: &Common) -> Result<Subject> {
         let source = self.source.as_deref().unwrap_or(DEFAULT_SCENE);
         let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
-        let subject = self.options.load((source, training), common, judged)?;
+        let subject = self.options.load(source, (training, false), common, judged)?;
         match &subject {
             Subject::Scene(_) if self.test.is_some() => {
                 let message =
@@ -118,22 +146,30 @@ impl SubjectArgument {
 
     /// Text of a plan for this scene or data file.
     pub fn plan_text(&self, name: &str, wanted: &Wanted) -> Result<String> {
+        let text = |cause: String| Error::failed(format!("cannot write the plan: {cause}"));
         let mut plan = Table::new();
         plan.insert("name".into(), name.into());
         if names_a_scene(self.source()) {
             plan.insert("scene".into(), self.source().into());
         } else {
-            plan.insert("data".into(), command_line::words_of::<DataOptions>().into());
+            let (file, test) = (self.source().into(), self.test.clone());
+            let data = PlannedData { file, test, options: self.options.data.clone() };
+            let data = Table::try_from(&data).map_err(|cause| text(cause.to_string()))?;
+            plan.insert("data".into(), data.into());
         }
-        let text = |cause: String| Error::failed(format!("cannot write the plan: {cause}"));
         let wanted = Table::try_from(wanted).map_err(|cause| text(cause.to_string()))?;
         plan.extend(wanted);
         toml::to_string(&plan).map_err(|cause| text(cause.to_string()))
     }
 
-    /// Error if a column of times was named: `command` tells nothing over time.
-    pub fn refuse_time(&self, command: &str) -> Result<()> {
-        self.options.data.refuse_time(command)
+    /// Error for an option that tells a trade nothing.
+    pub fn refuse_in_trade(&self) -> Result<()> {
+        self.options.data.refuse_time("trade")?;
+        refuse(
+            &self.options.training,
+            |field| field == "method",
+            |option| format!("{option} is no way that a device would choose: leave it out"),
+        )
     }
 
     /// Paths of all files that are read, which must not be replaced.
@@ -155,16 +191,18 @@ pub fn fields_of(training: &TrainingOptions) -> Result<Table> {
 }
 
 impl SubjectOptions {
-    /// Loads the scene or CSV file called `source`, for models trained as `training` says.
+    /// Loads the scene or CSV file called `source`, for models trained as `training` says; or whose options a trial
+    /// `selects`.
     pub fn load(
         &self,
-        (source, training): (&str, &TrainingOptions),
+        source: &str,
+        (training, selects): (&TrainingOptions, bool),
         common: &Common,
         judged: JudgedBy<'_>,
     ) -> Result<Subject> {
         let subject = if names_a_scene(source) {
             let scene = Experiment::load_open(source)?;
-            self.data.refuse_for_scene()?;
+            self.data.refuse_for_scene(selects)?;
             let given = scene.trained_with(training);
             let checked = given.and_then(|scene| scene.check_sizes().map(|()| scene));
             let mut scene = checked.map_err(|bad| match named(bad, training) {
@@ -185,5 +223,30 @@ impl SubjectOptions {
         let checked = subject.options().check(subject.training_frames());
         checked.map_err(|bad| of_option(named(bad, training)))?;
         Ok(subject)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::FromArgMatches;
+
+    #[test]
+    fn a_plan_holds_options_of_a_data_file_as_they_were_given() {
+        for words in [
+            "--inputs a* --outputs b* --grid 4x8 --fold-blocks 5 --keep-outliers --baseline rest.csv",
+            "--grid none --fold-column day --rest b1 --time t --header --missing 99,-1 --separator tab",
+            "--folds 3 --separator | --decimal comma --first-share 0.5",
+            "",
+        ] {
+            let command = DataOptions::augment_args(Command::new("data").no_binary_name(true));
+            let matches = command.get_matches_from(words.split_whitespace());
+            let options = DataOptions::from_arg_matches(&matches).unwrap();
+            let given = PlannedData { file: "d.csv".into(), test: None, options };
+            let written = Table::try_from(&given).unwrap();
+            let read = PlannedData::read(&written, Path::new("plan.toml")).unwrap();
+            assert_eq!(Table::try_from(&read).unwrap(), written);
+            assert_eq!(written.len(), 1 + words.matches("--").count(), "{written}");
+        }
     }
 }

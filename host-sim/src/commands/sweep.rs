@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 
 use crate::report::format::counted;
 use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
+use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
-use clap::{Args, Parser as _};
+use clap::Args;
 use serde::Serialize;
 use taxel_data::digest::digest;
 
 use super::merged::Files;
 use super::progress::Terminal;
-use super::subject_argument::DataOptions;
+use super::subject_argument::PlannedData;
 use super::{Common, arguments, command_line, print, stderr};
 
 mod schedule;
@@ -62,10 +63,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let message = "--seed: a plan has its own seeds; give `repeats`, or `seed` in [set]";
         return Err(Error::Usage(message.into()));
     }
-    let load = |words: &[String]| {
-        let options = DataOptions::try_parse_from(words)
-            .map_err(|cause| Error::Usage(format!("data: {}", cause.to_string().trim_end())))?;
-        options.load()
+    let load = |data: &toml::Table, training: &TrainingOptions, seed| {
+        PlannedData::read(data, &arguments.plan)?.load(training, seed)
     };
     let plan = Plan::read(&arguments.plan, &build()?, &load)?;
     let points = plan.points()?;

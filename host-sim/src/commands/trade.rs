@@ -91,7 +91,7 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    arguments.subject.refuse_time("trade")?;
+    arguments.subject.refuse_in_trade()?;
     let subject = arguments.subject.load_to_trade(common)?;
     let asked = asked(arguments, &subject)?;
     let bounds = bounds(arguments, &asked)?;

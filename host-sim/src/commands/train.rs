@@ -96,12 +96,9 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
         let fewest = training.centres.iter().flatten().min().map(|fewest| vec![*fewest]);
         training = TrainingOptions { centres: fewest, spread: None, penalty: None, ..training };
     }
-    let subject = options.load((&arguments.source, &training), common, JudgedBy::None)?;
+    let how = (&training, arguments.select);
+    let subject = options.load(&arguments.source, how, common, JudgedBy::None)?;
     match &subject {
-        Subject::Scene(_) if options.data.folds().is_some() && !arguments.select => {
-            let message = "--folds holds out frames of a CSV file, or with --select; a scene has fresh frames: leave it out";
-            return Err(Error::Usage(message.into()));
-        }
         Subject::Measured(data)
             if !(data.how.refine
                 || data.how.reading_model == Some(Extent::Full)

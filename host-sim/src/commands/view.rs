@@ -7,13 +7,14 @@ use std::process::{self, Stdio};
 use std::sync::mpsc::Receiver;
 
 use clap::{Args, ValueEnum, value_parser};
+use serde::Serialize;
 use taxel_data::Clock;
 use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::serial;
 use taxel_view::{Command, View};
 
-use super::arguments::refuse_given;
+use super::arguments::refuse;
 use super::data_file::DataFileArguments;
 use super::scene_argument::DEFAULT_SCENE;
 use super::{Common, interruption, print, recordings, stderr};
@@ -52,18 +53,8 @@ pub struct Arguments {
     /// one.
     #[arg(long, value_name = "BLOB")]
     model: Option<PathBuf>,
-    /// How a sensor on a serial port tells its readings [default: taxel].
-    #[arg(long, value_enum, value_name = "NAME")]
-    protocol: Option<SerialProtocol>,
-    /// Speed of the line in bits a second [default: the board's; 2000000 of flexitac].
-    #[arg(long, value_name = "BAUD", value_parser = value_parser!(u32).range(1..))]
-    baud: Option<u32>,
-    /// Rows and columns of a sensor that does not tell them, such as 16x32 [default of flexitac: 16x32].
-    #[arg(long, value_name = "ROWSxCOLUMNS", value_parser = shape)]
-    shape: Option<[usize; 2]>,
-    /// Time from one scan of a device to the next [default: the device's own].
-    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(100..=1_000_000_000))]
-    period_us: Option<u32>,
+    #[command(flatten)]
+    port: PortArguments,
     /// Frames a second, of a simulation or of a data file [default: 100, or what the file's times tell].
     #[arg(long, value_name = "HZ", value_parser = rate)]
     frame_rate: Option<f64>,
@@ -81,8 +72,25 @@ pub struct Arguments {
     file: DataFileArguments,
 }
 
+/// How a sensor on a serial port is read.
+#[derive(Args, Serialize)]
+struct PortArguments {
+    /// How a sensor on a serial port tells its readings [default: taxel].
+    #[arg(long, value_enum, value_name = "NAME")]
+    protocol: Option<SerialProtocol>,
+    /// Speed of the line in bits a second [default: the board's; 2000000 of flexitac].
+    #[arg(long, value_name = "BAUD", value_parser = value_parser!(u32).range(1..))]
+    baud: Option<u32>,
+    /// Rows and columns of a sensor that does not tell them, such as 16x32 [default of flexitac: 16x32].
+    #[arg(long, value_name = "ROWSxCOLUMNS", value_parser = shape)]
+    shape: Option<[usize; 2]>,
+    /// Time from one scan of a device to the next [default: the device's own].
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(100..=1_000_000_000))]
+    period_us: Option<u32>,
+}
+
 /// How a sensor on a serial port tells its readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
 enum SerialProtocol {
     /// Taxel's link (docs/link.md).
     Taxel,
@@ -128,18 +136,19 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let view = (&view, &commands);
     match source {
         Source::Port(port) => {
-            let (protocol, usual_baud) = match arguments.protocol.unwrap_or(SerialProtocol::Taxel) {
-                SerialProtocol::Taxel => (Protocol::Taxel, NUCLEO_BAUD),
-                SerialProtocol::Flexitac => (Protocol::Flexitac, FLEXITAC_BAUD),
-                SerialProtocol::Csv => (Protocol::Csv, NUCLEO_BAUD),
-            };
+            let (protocol, usual_baud) =
+                match arguments.port.protocol.unwrap_or(SerialProtocol::Taxel) {
+                    SerialProtocol::Taxel => (Protocol::Taxel, NUCLEO_BAUD),
+                    SerialProtocol::Flexitac => (Protocol::Flexitac, FLEXITAC_BAUD),
+                    SerialProtocol::Csv => (Protocol::Csv, NUCLEO_BAUD),
+                };
             let usual = (protocol == Protocol::Flexitac).then_some(FLEXITAC_SHAPE);
             let line = Line {
                 port,
-                baud: arguments.baud.unwrap_or(usual_baud),
+                baud: arguments.port.baud.unwrap_or(usual_baud),
                 protocol,
-                shape: arguments.shape.or(usual),
-                period_us: arguments.period_us,
+                shape: arguments.port.shape.or(usual),
+                period_us: arguments.port.period_us,
             };
             let mut feed = DeviceFeed::open(line, blob.as_ref())?;
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
@@ -185,21 +194,19 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// Error for an option that has no effect on such a source.
 fn check_options(arguments: &Arguments, source: &Source) -> Result<()> {
-    let is_port = matches!(source, Source::Port(_));
-    let of_port = [
-        ("--protocol", arguments.protocol.is_some()),
-        ("--baud", arguments.baud.is_some()),
-        ("--shape", arguments.shape.is_some()),
-        ("--period-us", arguments.period_us.is_some()),
-    ];
-    refuse_given(of_port.into_iter().filter(|_| !is_port), |option| {
-        format!("{option} is for a sensor on a serial port: leave it out")
-    })?;
+    if !matches!(source, Source::Port(_)) {
+        refuse(
+            &arguments.port,
+            |_| true,
+            |option| format!("{option} is for a sensor on a serial port: leave it out"),
+        )?;
+    }
     let has_rate = matches!(source, Source::Scene(_) | Source::Data(_));
-    refuse_given([("--frame-rate", arguments.frame_rate.is_some() && !has_rate)], |option| {
-        format!("{option} is for a simulation or a data file: leave it out")
-    })?;
-    if matches!(source, Source::Data(_)) { Ok(()) } else { arguments.file.refuse_for_scene() }
+    if arguments.frame_rate.is_some() && !has_rate {
+        let message = "--frame-rate is for a simulation or a data file: leave it out";
+        return Err(Error::Usage(message.into()));
+    }
+    if matches!(source, Source::Data(_)) { Ok(()) } else { arguments.file.refuse() }
 }
 
 /// What the argument names, or what there is without one.

@@ -305,8 +305,7 @@ fn measurements_are_swept_by_the_settings_of_training() {
     folder.succeed(&["synth", "scene.toml", "-n", "300", "-o", "data.csv"]);
     folder.write(
         "plan.toml",
-        "name = \"log\"\ndata = [\"data.csv\", \"--inputs\", \"r4c*_ohm\", \"--outputs\", \"r4e*_dz_mm\", \"--folds\", \"4\"]\n\
-         [set]\ntraining.refine = false\n[axes]\ntraining.centres = [4, 8]\ntraining.format = [\"f32\", \"fixed16\"]\n",
+        "name = \"log\"\n[data]\nfile = \"data.csv\"\ninputs = \"r4c*_ohm\"\noutputs = \"r4e*_dz_mm\"\nfolds = 4\n[set]\ntraining.refine = false\n[axes]\ntraining.centres = [4, 8]\ntraining.format = [\"f32\", \"fixed16\"]\n",
     );
     let all: Value =
         serde_json::from_str(&folder.succeed(&["sweep", "plan.toml", "--json"])).unwrap();
@@ -322,9 +321,9 @@ fn measurements_are_swept_by_the_settings_of_training() {
     let mut seen = Vec::new();
     for (from, to) in [
         ("", ""),
-        ("\"--folds\", \"4\"", "\"--folds\", \"5\""),
-        ("\"--folds\", \"4\"", "\"--test\", \"test.csv\""),
-        ("\"--folds\", \"4\"", "\"--test\", \"other.csv\""),
+        ("folds = 4", "folds = 5"),
+        ("folds = 4", "test = \"test.csv\""),
+        ("folds = 4", "test = \"other.csv\""),
         ("\"data.csv\"", "\"a-longer-name.csv\""),
     ] {
         folder.write("plan.toml", plan.replace(from, to));
@@ -335,9 +334,18 @@ fn measurements_are_swept_by_the_settings_of_training() {
     }
     assert_eq!(seen[0], seen[4]);
     assert_eq!(seen.iter().collect::<BTreeSet<_>>().len(), 4, "{seen:?}");
-    folder.write("plan.toml", plan.replace("training.centres", "sensor.row_wires"));
-    let message = folder.fail(&["sweep", "plan.toml"], 2);
-    assert!(message.contains("unknown field `sensor`"), "{message}");
+    for (from, to, says) in [
+        ("training.centres", "sensor.row_wires", "unknown field `sensor`"),
+        ("training.centres", "training.frames", "training.frames = 4: it sets a scene's frames"),
+        ("training.centres = [4, 8]", "training.relative_inputs = [true]", "give it in [set]"),
+        ("inputs = ", "input = ", "data: field = input: the nearest are `inputs`"),
+        ("folds = 4", "folds = \"four\"", "data: invalid type: string \"four\""),
+        ("file = \"data.csv\"", "", "data: missing field `file`"),
+    ] {
+        folder.write("plan.toml", plan.replace(from, to));
+        let message = folder.fail(&["sweep", "plan.toml"], 2);
+        assert!(message.contains(says), "{message}");
+    }
 }
 
 #[test]

@@ -16,8 +16,8 @@ pub(super) struct PlanFile {
     pub name: String,
     /// Scenes: built-in ones, or files beside the plan.
     pub scene: Option<OneOrMore>,
-    /// Measurements instead of a scene: a data file beside the plan, and the options that `train` takes for it.
-    pub data: Option<OneOrMore>,
+    /// Measurements instead of a scene: a data file beside the plan, and options for it.
+    pub data: Option<Table>,
     #[serde(flatten)]
     pub wanted: Wanted,
 }

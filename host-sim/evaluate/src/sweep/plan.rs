@@ -14,13 +14,12 @@ use toml::{Table, Value};
 use super::axis::{Axis, latin_hypercube};
 use super::bounds::Bounds;
 use super::fields::{self, require_known};
-use super::file::{Also, OneOrMore, PartPrices, PlanFile, Wanted};
+use super::file::{Also, PartPrices, PlanFile, Wanted};
 use super::on_device::OnDevice;
 use super::point::{columns_of, group_in, not_computed};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, check_name};
 use crate::measurements::Measurements;
-use crate::subject::Subject;
 use crate::training_options::{Training, TrainingOptions};
 
 /// Fields, and lines of values of them.
@@ -122,14 +121,15 @@ fn in_words(values: &[(String, Value)]) -> String {
 }
 
 impl Plan {
-    /// Reads a plan for the program `build`. Scenes and data files stand beside it; `load` reads the latter, with options.
+    /// Reads a plan for the program `build`. Scenes stand beside it. `load` makes measurements of its `[data]`, for options of
+    /// training and a seed, which [set] gives.
     ///
     /// # Errors
     /// [`Error::Data`] for a file that cannot be read, and for its content.
     pub fn read(
         path: &Path,
         build: &str,
-        load: &dyn Fn(&[String]) -> Result<Subject>,
+        load: &dyn Fn(&Table, &TrainingOptions, u64) -> Result<Measurements>,
     ) -> Result<Self> {
         let origin = path.display().to_string();
         let of_plan = |cause: String| {
@@ -168,21 +168,16 @@ impl Plan {
             Base::of_scene(name, &file)
         });
         let mut bases: Vec<Base> = bases.collect::<Result<_>>()?;
-        let mut load_all = |words: OneOrMore| {
-            let words: Vec<String> = words.all().iter().map(beside).collect();
-            require(!words.is_empty(), "data", "[]", || "name a file".into())
-                .map_err(|bad| of_plan(bad.to_string()))?;
-            match load(&words)? {
-                Subject::Measured(mut data) => {
-                    // The name is in the blob, and no result must depend on it.
-                    let label = std::mem::replace(&mut data.name, "data".into());
-                    bases.push(Base::measured(&label));
-                    Ok(Arc::from(data))
-                }
-                Subject::Scene(_) => Err(of_plan("data is a scene: give it as scene".into())),
+        let data = match &file.data {
+            None => None,
+            Some(data) => {
+                let set = super::point::set(&file.wanted.set).map_err(&of_plan)?;
+                let mut data = load(data, &set.training, set.seed.unwrap_or(1))?;
+                // The name is in the blob, and no result must depend on it.
+                bases.push(Base::measured(&std::mem::replace(&mut data.name, "data".into())));
+                Some(Arc::new(data))
             }
         };
-        let data = file.data.map(&mut load_all).transpose()?;
         Self::new(&file.name, (bases, data), file.wanted, build)
             .map_err(|bad| of_plan(bad.to_string()))
     }

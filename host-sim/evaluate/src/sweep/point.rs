@@ -6,7 +6,9 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 use taxel_learn::Options;
 use taxel_learn::decoders::BASELINES;
+use toml::Table;
 
+use super::fields;
 use super::file::Also;
 use super::plan::Plan;
 use crate::error::Result;
@@ -159,10 +161,23 @@ pub fn options(data: Option<&Measurements>, text: &str) -> Result<Options> {
 /// Fields that a plan may change in the training on measurements.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct MeasuredFile {
-    seed: Option<u64>,
+pub(super) struct MeasuredFile {
+    pub seed: Option<u64>,
     #[serde(default)]
-    training: TrainingOptions,
+    pub training: TrainingOptions,
+}
+
+/// What the `[set]` of a plan says of the training on measurements.
+///
+/// # Errors
+/// The reason, in serde's words.
+pub(super) fn set(set: &Table) -> std::result::Result<MeasuredFile, String> {
+    let mut document = Table::new();
+    for (field, value) in fields::leaves(set, &|_| false) {
+        fields::set(&mut document, &field, value).map_err(|bad| bad.to_string())?;
+    }
+    document.remove("device");
+    document.try_into().map_err(|cause| fields::with_nearest(cause.message()))
 }
 
 /// Measurements, trained on as the fields in `text` say.

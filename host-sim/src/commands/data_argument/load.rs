@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{DataArguments, JudgedBy, check_level, with_options};
+use super::{DataOptions, JudgedBy, check_level, with_options};
 use crate::commands::arguments::{named, of_option};
 use crate::commands::mat_cells::MatCells;
 use crate::commands::{data_notes, readings, refused_readings, stderr};
@@ -21,7 +21,7 @@ use taxel_learn::train::refine::LEAST_FOLDS;
 use taxel_learn::train::{projection, resolution};
 use taxel_learn::{Options, select};
 
-impl DataArguments {
+impl DataOptions {
     /// Measurements in the CSV file at `path`, for models trained as `given` says, with this `seed`.
     pub fn load(
         &self,

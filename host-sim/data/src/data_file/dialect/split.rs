@@ -1,6 +1,7 @@
 //! Lines of a text, the fields of a line, and quotes around them.
 
 use std::borrow::Cow;
+use std::fmt::{self, Display};
 use std::str::FromStr;
 
 /// What stands between the fields of a line.
@@ -26,6 +27,16 @@ impl FromStr for Separator {
             }
             _ => return Err("give comma, semicolon, tab, space, or one character".into()),
         })
+    }
+}
+
+impl Display for Separator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Char('\t') => f.write_str("tab"),
+            Self::Char(char) => write!(f, "{char}"),
+            Self::Spaces => f.write_str("space"),
+        }
     }
 }
 
