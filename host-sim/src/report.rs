@@ -23,23 +23,26 @@ mod sketch;
 mod noise;
 mod over_time;
 mod sections;
+mod quantity;
 mod moving;
 mod table1;
 mod judged;
 mod run;
+mod points;
+mod layouts;
 mod trade;
 mod limit;
-mod points;
 
 pub use errors::Pictures;
 pub use figures::{FOLDER as FIGURES, Page};
 pub use judged::{Judged, errors_of, sections as of_judged, worth};
+pub use layouts::{reason, sections as of_layouts};
 pub use limit::{sections as of_limit, several as of_limits};
-pub use points::{result_text, sections as of_points};
+pub use points::{points, sections as of_sweep};
 pub use run::{in_words, reasons, sections as of_run};
-pub use sections::{Digits, Sections, TableOf};
+pub use sections::{Digits, Sections, Table, TableOf};
 pub use table1::sections as of_table1;
-pub use trade::sections as of_trade;
+pub use trade::{With as TradeWith, sections as of_trade};
 
 /// Files of figures of these names.
 pub const fn figures_named(names: &'static [&'static str]) -> Inner {

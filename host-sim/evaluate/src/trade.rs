@@ -4,7 +4,6 @@
 //! Errors are measured on test frames through the blob that a device would get. Instructions and cycles are predicted by
 //! a formula of the firmware's own code ([`Cost`]), the time of a scan by the firmware's own plan ([`Device`]).
 
-use serde::Serialize;
 use taxel_core::rbf::Format;
 use taxel_data::Silent;
 use taxel_learn::cost::Cost;
@@ -102,7 +101,7 @@ fn error_of(group: &str, worst_case: bool) -> String {
 }
 
 /// Trade of a subject: every point, and the one chosen.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Trade {
     /// Name of the scene, or of the data.
     pub subject: String,
@@ -137,10 +136,8 @@ pub struct Trade {
     /// Index of the point that [`Trade::choose`] picked.
     pub chosen: Option<usize>,
     /// Reason why no point was picked within bounds.
-    #[serde(skip)]
     pub refused: Option<String>,
     /// Results as those of any plan.
-    #[serde(skip)]
     pub merged: Merged,
 }
 

@@ -9,7 +9,7 @@ pub fn of_this_process(command: &str, left_out: &[&str], seed: Option<u64>) -> S
 }
 
 /// Options that change what is said, and no result.
-const TOLD: [&str; 5] = ["--json", "-q", "--quiet", "-v", "--verbose"];
+const TOLD: [&str; 6] = ["--json", "--all", "-q", "--quiet", "-v", "--verbose"];
 
 fn repeated(given: &[String], command: &str, left_out: &[&str], seed: Option<u64>) -> String {
     let mut words = vec!["taxel".to_owned()];

@@ -1,18 +1,15 @@
 //! Command `compare`: layouts side by side, by their least possible error, the best decoder, and what both cost.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::report::{TableOf, result_text};
 use crate::sweep::bounds::Bound;
 use crate::sweep::fields::require_known;
 use crate::sweep::file::Wanted;
-use crate::sweep::front;
-use crate::sweep::merge::{PointResult, Setting};
-use crate::sweep::plan::{Base, SCENE, SEED};
+use crate::sweep::plan::{Base, SEED};
 use crate::sweep::{Merged, Plan, layouts, work};
 use crate::training_options::TrainingOptions;
-use crate::{Error, Result};
+use crate::{Error, Result, report};
 use clap::Args;
 use toml::Value;
 
@@ -77,22 +74,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         None => Merged::new(&plan, &points, work::in_memory(&plan, &points, &Terminal::new())?),
     };
     if let Some(failed) = merged.failed().next().filter(|_| merged.settings.is_empty()) {
-        return Err(Error::Usage(reason(failed, &first)));
+        return Err(Error::Usage(report::reason(failed, &first)));
     }
+    let sections = report::of_layouts(&merged, &first);
+    let mut written = vec![];
     if let Some(files) = &files {
-        files.write(
-            &merged,
-            &command_line::of_this_process("compare", &["-o", "--output"], common.seed),
-        )?;
+        let command = command_line::of_this_process("compare", &["-o", "--output"], common.seed);
+        files.write(&merged, &sections, &command)?;
+        written.push(format!("\nwritten: {}", files.names()));
     }
-    print::result(common, &merged, || {
-        let mut page = print::Page::default();
-        table(&mut page, &merged, &first);
-        if let Some(files) = &files {
-            page.line(format_args!("\nwritten: {}", files.names()));
-        }
-        page
-    })
+    print::sections_above(common, &sections, &written)
 }
 
 /// What is wanted of the layouts.
@@ -115,74 +106,4 @@ fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
         .bounds
         .extend(arguments.tried.max_latency_ms.map(|most| ("frame_ms".into(), Bound::Most(most))));
     Ok(wanted)
-}
-
-/// Prints a line for each layout: its least possible errors, and its best decoder.
-fn table(page: &mut print::Page, merged: &Merged, first: &str) {
-    let mut layouts: Vec<(&str, Vec<&Setting>)> = Vec::new();
-    for setting in &merged.settings {
-        // The decoders of a layout follow each other.
-        let label = label(&setting.values, first);
-        match layouts.last_mut().filter(|(last, _)| *last == label) {
-            Some((_, own)) => own.push(setting),
-            None => layouts.push((label, vec![setting])),
-        }
-    }
-    let is_limit =
-        |name: &&str| name.starts_with("limit_") && !name.starts_with("limit_standard_error_");
-    let limits = merged.columns.iter().map(String::as_str).filter(is_limit);
-    let error = merged.objectives.first().map_or("", String::as_str);
-    let others = ["rows", "columns", "area_cm2", "scan_ms", "frame_ms", "blob_bytes"];
-    let others = others.iter().filter(|name| merged.columns.iter().any(|known| known == *name));
-    let mut columns: Vec<&str> = others.copied().chain(limits).chain([error]).collect();
-    // Layouts that cannot be have no error, and its place is taken by a time.
-    let mut seen = BTreeSet::new();
-    columns.retain(|column| seen.insert(*column));
-    let mut fields: Vec<&str> = merged.fields.iter().map(String::as_str).collect();
-    fields.retain(|field| ![SCENE, SEED].contains(field));
-    let result =
-        |setting: &Setting, name: &str| setting.results.get(name).copied().unwrap_or(f64::INFINITY);
-    let time = merged.objectives.last().map_or("", String::as_str);
-    let mut rows: Vec<(&str, Option<&Setting>)> = vec![];
-    for (layout, own) in layouts {
-        // A layout with other outputs has its limit and its first decoder.
-        let within: Vec<&Setting> = own.into_iter().filter(|it| it.is_within).collect();
-        let by_time = |a: &&&Setting, b: &&&Setting| result(a, time).total_cmp(&result(b, time));
-        let best = front::best(error, &within, |it| (result(it, error), &it.blocks), by_time);
-        rows.push((layout, best.copied()));
-    }
-    let mut table = TableOf::new(&rows, "Layouts, each with its best decoder.")
-        .names("layout", |(layout, _)| (*layout).into());
-    for field in fields {
-        table = table.names(field, move |(_, best)| {
-            let value = best.and_then(|best| best.values.get(field));
-            value.map_or("-".into(), ToString::to_string)
-        });
-    }
-    for column in columns {
-        table = table.texts(column, "", move |(_, best)| {
-            best.map_or("-".into(), |best| result_text(best, column))
-        });
-    }
-    page.line(table.text().trim_end());
-    if rows.iter().any(|(_, best)| best.is_none()) {
-        page.line("-: no decoder of the layout is within the bound");
-    }
-    for failed in merged.failed() {
-        page.line(format_args!("failed: {}", reason(failed, first)));
-    }
-}
-
-/// Name of a layout; of one alone it is that of the `first`.
-fn label<'l>(values: &'l BTreeMap<String, serde_json::Value>, first: &'l str) -> &'l str {
-    values.get(SCENE).and_then(serde_json::Value::as_str).unwrap_or(first)
-}
-
-/// Reason why a decoder of a layout has no result.
-fn reason(point: &PointResult, first: &str) -> String {
-    let why = point.failed.as_deref().unwrap_or_default().replace("scene of the point: ", "");
-    let others = point.values.iter().filter(|(field, _)| ![SCENE, SEED].contains(&field.as_str()));
-    let name = [label(&point.values, first).to_owned()].into_iter();
-    let name = name.chain(others.map(|(field, value)| format!("{field} = {value}")));
-    format!("{}: {why}", name.collect::<Vec<_>>().join(", "))
 }

@@ -77,9 +77,13 @@ fn sections_of(blob: &ModelBlob) -> Sections {
     };
     let shown = &outputs[..outputs.len().min(SHOWN)];
     let table = TableOf::new(shown, caption)
-        .names("output", |it| with_unit(&it.name, &it.unit))
-        .numbers("training RMSE", "", Digits::Significant(3), |it| Some(it.training_rmse.into()))
-        .numbers("full scale", "", Digits::Significant(4), |it| Some(it.full_scale.into()));
+        .names("output", "output", |it| with_unit(&it.name, &it.unit))
+        .numbers("training_rmse", "training RMSE", "", Digits::Significant(3), |it| {
+            Some(it.training_rmse.into())
+        })
+        .numbers("full_scale", "full scale", "", Digits::Significant(4), |it| {
+            Some(it.full_scale.into())
+        });
     result.table(table);
     result
 }

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::report::Sections;
+use crate::report::{self, Sections};
 use crate::sweep::Merged;
-use crate::{Error, Result, report};
+use crate::{Error, Result};
 use taxel_data::output::{self, check_writable};
 
 use super::print;
@@ -42,18 +42,18 @@ impl Files {
         paths.iter().try_for_each(|path| Ok(check_writable(path, inputs)?))
     }
 
-    /// Writes them; `command` is what the user typed.
-    pub fn write(&self, merged: &Merged, command: &str) -> Result<()> {
-        let page = self.sections(merged).page(command);
-        let texts = [merged.csv(), print::json_text(merged)?, page.html];
+    /// Writes the results and their `sections`; `command` is what the user typed.
+    pub fn write(&self, merged: &Merged, sections: &Sections, command: &str) -> Result<()> {
+        let page = sections.page(command);
+        let texts = [report::points(merged).csv(), print::file_of(sections), page.html];
         let files = ENDS.iter().zip(texts).map(|(end, text)| (format!("{}{end}", self.stem), text));
         let files: Vec<_> = files.chain(page.figures).collect();
         Ok(output::write_folder(&self.folder, &files)?)
     }
 
-    /// Results as people read them.
-    pub fn sections(&self, merged: &Merged) -> Sections {
-        report::of_points(merged, &self.stem)
+    /// What their names begin with.
+    pub fn stem(&self) -> &str {
+        &self.stem
     }
 
     /// Names in words.

@@ -90,6 +90,11 @@ pub fn json_text(result: &impl Serialize) -> Result<String> {
     Ok(document(&object(result)?, false))
 }
 
+/// Result as JSON for a file, which is the same whenever it is written.
+pub fn file_of(sections: &Sections) -> String {
+    document(&sections.json(), false)
+}
+
 fn object(result: &impl Serialize) -> Result<String> {
     let text = serde_json::to_string_pretty(result);
     text.map_err(|cause| Error::failed(format!("cannot write JSON: {cause}")))
@@ -112,11 +117,17 @@ pub fn json(result: &impl Serialize) -> Result<()> {
 
 /// Prints the result of the command: as JSON if that was asked for, else as text.
 pub fn sections(common: &Common, sections: &Sections) -> Result<()> {
+    sections_above(common, sections, &[])
+}
+
+/// Prints the result of the command: as JSON if that was asked for, else as text above `more` lines.
+pub fn sections_above(common: &Common, sections: &Sections, more: &[String]) -> Result<()> {
     if common.json {
-        show(&document(&sections.json(), true))
-    } else {
-        Page::of_sections(sections).print()
+        return show(&document(&sections.json(), true));
     }
+    let mut page = Page::of_sections(sections);
+    more.iter().for_each(|line| page.line(line));
+    page.print()
 }
 
 /// Prints the result of the command: as JSON if that was asked for, else as a page.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::report::format::counted;
+use crate::report::{self, format::counted};
 use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
 use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
@@ -231,12 +231,9 @@ fn merge(
         return Err(Error::failed("every point failed; the warnings say why"));
     }
     let command = command_line::of_this_process("sweep", &[], None);
-    files.write(&merged, &command)?;
-    print::result(common, &merged, || {
-        let mut page = print::Page::of(files.sections(&merged).text().trim_end());
-        page.line(format_args!("\nwritten: {}", files.names()));
-        page
-    })?;
+    let sections = report::of_sweep(&merged, files.stem());
+    files.write(&merged, &sections, &command)?;
+    print::sections_above(common, &sections, &[format!("\nwritten: {}", files.names())])?;
     let missing = merged.missing.len();
     if missing == 0 {
         return Ok(());

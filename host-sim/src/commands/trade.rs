@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use crate::device::{BOARD_CLOCK_MHZ, Device, Wires};
 use crate::measurements::Measurements;
 use crate::metrics;
+use crate::report::{self, TradeWith};
 use crate::subject::Subject;
 use crate::sweep::Plan;
 use crate::sweep::bounds::{Bound, Bounds};
@@ -23,7 +24,6 @@ use super::subject_argument::SubjectArgument;
 use super::{Common, command_line, print, stderr, sweep};
 
 mod files;
-mod page;
 
 /// Trade speed for accuracy: measure every decoder, and choose the best.
 ///
@@ -135,14 +135,32 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let choice = trade.choose(&bounds);
     let shown = trade.shown(&subject, &plan, &points)?;
     let command = command_line::of_this_process("trade", &["-o", "--output"], None);
-    files::write(&folder, (&trade, shown.as_ref()), &command)?;
-    if common.json {
-        print::json(&trade)?;
-    } else {
-        page::of((&trade, shown.as_ref()), arguments.all, &folder).print()?;
+    let without_bounds = without_bounds(arguments, &asked);
+    let with = |all| {
+        let with = TradeWith { shown: shown.as_ref(), all, command: &without_bounds };
+        report::of_trade(&trade, with)
+    };
+    files::write(&folder, (&trade, shown.as_ref()), (&with(false), &command))?;
+    let mut written = vec![];
+    if trade.chosen.is_some() {
+        written.push(format!("the blob: {}", folder.join("chosen.bin").display()));
     }
+    written.push(format!("open {}", folder.join("trade.html").display()));
+    print::sections_above(common, &with(arguments.all), &written)?;
     // Measurements are kept and shown even if no point is within the bounds.
     choice.map_err(|cause| refused(&cause))
+}
+
+/// Command line that tries the same points, without a bound.
+fn without_bounds(arguments: &Arguments, asked: &Asked) -> String {
+    let bounds = ["--max-error", "--max-cycles", "--max-flash", "--max-latency-ms", "--frame-rate"];
+    let command = command_line::of_this_process("trade", &bounds, None);
+    // Bounds on time try more steps.
+    if arguments.column_step.is_empty() && asked.column_steps.len() > 1 {
+        let steps: Vec<String> = asked.column_steps.iter().map(usize::to_string).collect();
+        return format!("{command} --column-step {}", steps.join(","));
+    }
+    command
 }
 
 /// Bounds as they can be given: the option where one is, its result, and the bound.

@@ -202,14 +202,15 @@ fn scores(sections: &mut Sections, selection: &Selection, outputs: &[ModelOutput
     let caption = "Cross-validation: RMSE on folds that were held out. Score: mean over the outputs of RMSE/standard deviation, \
                    which is 1 for always predicting the mean.";
     let mut table = TableOf::new(&rows, caption)
-        .names("", |row| row.0.clone())
-        .names("K", |row| text(row.1.map(|it| it.centres.to_string())))
-        .names("spread", |row| text(row.1.map(|it| it.spread.to_string())))
-        .names("penalty", |row| text(row.1.and_then(|it| it.penalty).map(choice::short)))
-        .numbers("score", "", Digits::Decimals(4), |row| Some(row.2));
+        .names("decoder", "", |row| row.0.clone())
+        .names("centres", "K", |row| text(row.1.map(|it| it.centres.to_string())))
+        .names("spread", "spread", |row| text(row.1.map(|it| it.spread.to_string())))
+        .names("penalty", "penalty", |row| text(row.1.and_then(|it| it.penalty).map(choice::short)))
+        .numbers("score", "score", "", Digits::Decimals(4), |row| Some(row.2));
     for (place, (group, _)) in groups.iter().enumerate() {
         let (heading, unit) = (symbol(group), columns::unit_of(group));
-        table = table.numbers(&heading, unit, Digits::Significant(4), |row| Some(row.3[place]));
+        let (key, digits) = (format!("rmse_{group}"), Digits::Significant(4));
+        table = table.numbers(&key, &heading, unit, digits, |row| Some(row.3[place]));
     }
     sections.table(table);
     if let Some(better) = selection.better_baseline() {

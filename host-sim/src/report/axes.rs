@@ -33,6 +33,24 @@ impl Axis {
         }
     }
 
+    /// The axis with room beyond the `values` that lie at its ends, so that no mark is on the frame.
+    #[must_use]
+    pub fn with_room(mut self, values: impl Iterator<Item = f64>) -> Self {
+        /// Share of the axis that is free beyond a mark.
+        const ROOM: f64 = 0.03;
+        let places = values.filter(|value| self.holds(*value)).map(|value| self.place(value));
+        let Some((least, most)) = ticks::extent(places) else { return self };
+        let [low, high] = [(ROOM - least).max(0.0), (most - 1.0 + ROOM).max(0.0)];
+        let Ticks { low: from, high: to, .. } = self.ticks;
+        if self.logarithmic {
+            let whole = to / from;
+            (self.ticks.low, self.ticks.high) = (from / whole.powf(low), to * whole.powf(high));
+        } else {
+            (self.ticks.low, self.ticks.high) = (from - low * (to - from), to + high * (to - from));
+        }
+        self
+    }
+
     /// Whether `value` lies on the axis.
     pub fn holds(&self, value: f64) -> bool {
         (self.ticks.low..=self.ticks.high).contains(&value)

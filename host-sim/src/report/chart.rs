@@ -20,7 +20,7 @@ pub enum Mark {
     Dotted,
     /// Bars from zero, this wide on the x axis.
     Bars(f64),
-    /// Names of the points, below them; the first ones where there is no room for all.
+    /// Names of the points, beside them; those for which there is no room are left out.
     Names(Vec<String>),
 }
 
@@ -104,7 +104,9 @@ impl Chart {
         // The last label of the level axis needs half its width.
         let last = self.x.ticks.at.last().map_or(0.0, |(_, label)| text_width(label));
         let right = width - if self.end_labels { end_width } else { (0.5 * last).max(10.0) };
-        let (x, y) = (self.x.clone(), self.y.clone());
+        let marked = |axis: usize| self.marked().map(move |point| point[axis]);
+        let [x, y] =
+            [(&self.x, 0), (&self.y, 1)].map(|(axis, place)| axis.clone().with_room(marked(place)));
         let panel = Panel { x, y, left, right, top, bottom: height - BELOW_PX };
         panel.draw_axes(&mut svg, Upright::Grid);
         let most = self.series.iter().map(|series| series.points.len()).max().unwrap_or(0);
@@ -119,6 +121,12 @@ impl Chart {
             frame.draw_end_labels(&mut svg);
         }
         svg.finish()
+    }
+
+    /// Points that have a mark.
+    fn marked(&self) -> impl Iterator<Item = &[f64; 2]> {
+        let has_marks = |it: &&Series| matches!(it.mark, Mark::LineAnd(_) | Mark::Points(_));
+        self.series.iter().filter(has_marks).flat_map(|series| &series.points)
     }
 
     /// All points, by series.
@@ -247,24 +255,38 @@ impl Frame<'_> {
         }
     }
 
-    /// Writes names below points, to their left where there is room; those that would cover one before are left out.
+    /// Writes names beside points: below them to the left, or else where there is room. Those that would cover a mark or a name
+    /// before are left out.
     fn draw_names(&self, svg: &mut Svg, series: &Series, names: &[String]) {
+        let marks: Vec<[f64; 2]> = self.chart.marked().map(|point| self.panel.at(*point)).collect();
         let mut taken: Vec<[f64; 3]> = Vec::new();
-        for ([x, y], name) in series.points.iter().zip(names) {
-            let (x, baseline) = (self.panel.x(*x), self.panel.y(*y) + TEXT_PX + 2.0);
-            let width = text_width(name);
-            let (left, end) = if x - 5.0 - width > self.panel.left {
-                (x - 5.0 - width, Anchor::End)
-            } else {
-                (x + 5.0, Anchor::Start)
+        for (point, name) in series.points.iter().zip(names) {
+            let ([x, y], width) = (self.panel.at(*point), text_width(name));
+            let (below, above) = (y + TEXT_PX + 2.0, y - 6.0);
+            let (left, right) = (x - 6.0 - width, x + 6.0);
+            let is_free = |[from, baseline]: &[f64; 2]| {
+                let to = from + width;
+                let covers_name = |[other, end, at]: &[f64; 3]| {
+                    from < end && to > *other && (baseline - at).abs() < TEXT_PX
+                };
+                let covers_mark = |[x, y]: &[f64; 2]| {
+                    (from - 4.0..to + 4.0).contains(x)
+                        && (baseline - TEXT_PX..baseline + 4.0).contains(y)
+                };
+                let Panel { left, right, top, bottom, .. } = self.panel;
+                *from > left
+                    && to < right
+                    && baseline - TEXT_PX > top
+                    && *baseline < bottom
+                    && !taken.iter().any(covers_name)
+                    && !marks.iter().any(covers_mark)
             };
-            let covers = |[from, to, at]: &[f64; 3]| {
-                left < *to && left + width > *from && (baseline - at).abs() < TEXT_PX
-            };
-            if baseline < self.panel.bottom && !taken.iter().any(covers) {
-                taken.push([left, left + width, baseline]);
-                let at = if end == Anchor::End { left + width } else { left };
-                svg.text(at, baseline, end, series.class, name);
+            let places = [[left, below], [right, above], [left, above], [right, below]];
+            if let Some([from, baseline]) = places.into_iter().find(is_free) {
+                taken.push([from, from + width, baseline]);
+                let (at, anchor) =
+                    if from < x { (from + width, Anchor::End) } else { (from, Anchor::Start) };
+                svg.text(at, baseline, anchor, series.class, name);
             }
         }
     }
@@ -361,17 +383,38 @@ mod tests {
     }
 
     #[test]
-    fn names_do_not_overlap_and_stay_within_the_panel() {
-        let written = |y: f64| {
+    fn names_cover_neither_each_other_nor_marks_and_stay_within_the_panel() {
+        let written = |y: f64, marks: Vec<[f64; 2]>| {
             let mut chart = chart(Mark::Names((0..40).map(|i| format!("K {i}")).collect()), &[]);
             chart.series[0].points = (0..40).map(|i| [0.1 * f64::from(i), y]).collect();
             assert!(chart.data().lines.is_empty(), "places of names are those of other series");
+            chart.series.push(Series::new("marks", "c1", Mark::Points(Shape::Circle), marks));
             let picture = chart.draw([400.0, 200.0]);
-            (picture.matches(">K ").count(), picture.contains(">K 0<"))
+            let heights = picture.split("<text ").filter(|text| text.contains(">K "));
+            let heights = heights.map(|text| {
+                let height = text.split("y=\"").nth(1).unwrap().split('"').next().unwrap();
+                height.parse::<f64>().unwrap()
+            });
+            heights.collect::<Vec<_>>()
         };
-        let (crowded, has_first) = written(0.5);
-        assert!((3..15).contains(&crowded) && has_first, "{crowded}");
-        assert_eq!(written(-1.0).0, 0, "no room below the points");
+        let free = written(0.5, vec![]);
+        assert!((6..30).contains(&free.len()), "{free:?}");
+        let at_the_bottom = written(-1.0, vec![]);
+        let lowest = at_the_bottom.iter().copied().fold(0.0, f64::max);
+        assert!(!at_the_bottom.is_empty() && lowest < 200.0 - BELOW_PX, "{at_the_bottom:?}");
+        let grid = |i: i32| [0.05 * f64::from(i % 80), 0.05 * f64::from(i / 80) - 1.0];
+        assert_eq!(written(0.5, (0..3200).map(grid).collect()), [0.0; 0], "marks everywhere");
+    }
+
+    #[test]
+    fn no_mark_is_on_the_frame() {
+        let chart = chart(Mark::Points(Shape::Circle), &[1.0, -1.0, 0.0, 0.0, 0.5]);
+        let axis = chart.y.clone().with_room([1.0, -1.0].into_iter());
+        assert!(axis.ticks.low < -1.05 && axis.ticks.high > 1.05, "{:?}", axis.ticks);
+        let within = chart.y.clone().with_room([0.9, -0.9].into_iter());
+        assert_eq!(within, chart.y, "marks that have room");
+        let none = chart.y.clone().with_room([7.0, f64::NAN].into_iter());
+        assert_eq!(none, chart.y, "values off the scale");
     }
 
     #[test]

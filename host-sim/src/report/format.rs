@@ -28,6 +28,12 @@ pub fn significant(value: f64, digits: usize) -> String {
     fixed(value, decimals(value, digits))
 }
 
+/// Text of `value` with two significant digits, without zeros at its end: `0.5`, `1.5`, `200`.
+pub fn short(value: f64) -> String {
+    let text = significant(value, 2);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
 /// Text of `count` in groups of three digits.
 pub fn grouped(count: usize) -> String {
     let digits = count.to_string();
@@ -123,6 +129,7 @@ mod tests {
         assert_eq!(significant(1234.6, 3), "1235");
         assert_eq!(significant(0.0, 3), "0.00");
         assert_eq!(significant(f64::INFINITY, 3), "–");
+        assert_eq!([0.05, 0.15, 1.0, 1.5, 200.0].map(short), ["0.05", "0.15", "1", "1.5", "200"]);
         assert_eq!(grouped(999), "999");
         assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(percent(0.07), "7\u{a0}%");

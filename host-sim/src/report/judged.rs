@@ -191,11 +191,12 @@ pub fn errors_of(sections: &mut Sections, decoders: &[DecoderErrors], frames: &s
         "Errors {frames}. Mean: always predicting the mean; a decoder that is no better has learnt nothing."
     );
     let mut table = TableOf::new(&rows, caption)
-        .names("output", |(_, errors)| name(errors))
-        .names("decoder", |(decoder, _)| (*decoder).into());
+        .names("output", "output", |(_, errors)| name(errors))
+        .names("decoder", "decoder", |(decoder, _)| (*decoder).into());
     for definition in Definition::ALL {
         let digits = Digits::of(&definition);
-        table = table.texts(definition.heading, definition.unit, |(_, errors)| {
+        let heading = with_unit(definition.heading, definition.unit);
+        table = table.texts(definition.name, &heading, |(_, errors)| {
             let value = definition.of(errors);
             match value.zip((definition.standard_error)(errors)) {
                 Some((value, error)) => digits.with_error(Some([value, error])),
@@ -236,7 +237,8 @@ fn with_rmse<'r, R>(
     errors: impl Fn(&'r R) -> &'r [Errors],
 ) -> TableOf<'r, R> {
     for Errors { group, unit, .. } in groups {
-        table = table.numbers(&symbol(group), unit, RMSE, |row| rmse_of(errors(row), group));
+        let key = format!("rmse_{group}");
+        table = table.numbers(&key, &symbol(group), unit, RMSE, |row| rmse_of(errors(row), group));
     }
     table
 }
@@ -248,8 +250,9 @@ fn r_squared(errors: &[Errors], group: &str) -> Option<f64> {
 
 fn by_row(sections: &mut Sections, rows: &[RowErrors]) {
     let Some(first) = rows.first() else { return };
-    let table = TableOf::new(rows, "RMSE of the model by row-wire.")
-        .names("row-wire", |row| row.row_wire.to_string());
+    let table =
+        TableOf::new(rows, "RMSE of the model by row-wire.")
+            .names("row_wire", "row-wire", |row| row.row_wire.to_string());
     sections.table(with_rmse(table, &first.errors, |row| &row.errors));
 }
 
@@ -264,9 +267,9 @@ fn by_load(sections: &mut Sections, ranges: &[LoadErrors]) {
     }
     let caption = format!("RMSE by the true {}.", symbol(&first.load));
     let table = TableOf::new(&rows, caption)
-        .names("range", |(range, ..)| range.range())
-        .names("decoder", |(_, decoder, _)| (*decoder).into())
-        .texts("frames", "", |(range, ..)| grouped(range.frames));
+        .names("range", "range", |(range, ..)| range.range())
+        .names("decoder", "decoder", |(_, decoder, _)| (*decoder).into())
+        .numbers("frames", "frames", "", Digits::Count, |(range, ..)| Some(range.frames as f64));
     sections.table(with_rmse(table, &first.errors, |(.., errors)| errors));
 }
 
@@ -288,14 +291,16 @@ fn others(sections: &mut Sections, others: &Others, decoders: &[DecoderErrors]) 
          training.{novel}",
         grouped(others.frames)
     );
-    let mut table = TableOf::new(&rows, caption).names("contact", |row| row.0.into());
+    let mut table = TableOf::new(&rows, caption).names("contact", "contact", |row| row.0.into());
     for Errors { group, unit, .. } in own {
+        let [rmse, r2, of_mean] =
+            ["rmse", "r_squared", "mean_rmse"].map(|name| format!("{name}_{group}"));
         table = table
-            .numbers(&symbol(group), unit, RMSE, |row| rmse_of(row.1, group))
-            .numbers("R²", "", Digits::Decimals(2), |row| r_squared(row.1, group))
-            .numbers("mean", "", RMSE, |row| rmse_of(row.2, group));
+            .numbers(&rmse, &symbol(group), unit, RMSE, |row| rmse_of(row.1, group))
+            .numbers(&r2, "R²", "", Digits::Decimals(2), |row| r_squared(row.1, group))
+            .numbers(&of_mean, "mean", "", RMSE, |row| rmse_of(row.2, group));
     }
-    sections.table(table.numbers("novel", "%", Digits::Decimals(1), |row| row.3));
+    sections.table(table.numbers("percent_novel", "novel", "%", Digits::Decimals(1), |row| row.3));
 }
 
 /// Adds errors with and without a filter and of the baselines, beside the age of an estimate, and a trajectory.
@@ -315,12 +320,13 @@ fn moving_contacts(sections: &mut Sections, moving: &MovingContacts) {
         moving.path.in_words()
     );
     let mut table = TableOf::new(&rows, caption)
-        .names("decoder", |(name, ..)| name.clone())
-        .numbers("age", "ms", Digits::Decimals(2), |(_, age, _)| *age);
+        .names("decoder", "decoder", |(name, ..)| name.clone())
+        .numbers("age_ms", "age", "ms", Digits::Decimals(2), |(_, age, _)| *age);
     for Errors { group, unit, .. } in rows.first().map_or(&[][..], |(.., errors)| errors) {
+        let [rmse, r2] = ["rmse", "r_squared"].map(|name| format!("{name}_{group}"));
         table = table
-            .numbers(&symbol(group), unit, RMSE, |(.., errors)| rmse_of(errors, group))
-            .numbers("R²", "", Digits::Decimals(3), |(.., errors)| r_squared(errors, group));
+            .numbers(&rmse, &symbol(group), unit, RMSE, |(.., errors)| rmse_of(errors, group))
+            .numbers(&r2, "R²", "", Digits::Decimals(3), |(.., errors)| r_squared(errors, group));
     }
     sections.table(table);
     for filter in moving.ways.iter().filter_map(|way| way.filter) {
@@ -344,11 +350,15 @@ fn coverage(sections: &mut Sections, judged: &Judged<'_>) {
     let caption =
         "Share of the errors that are within the model’s intervals of 68.3 % and of 95 %.";
     let table = TableOf::new(&rows, caption)
-        .names("output", |(group, ..)| with_unit(&symbol(&group.group), &group.unit))
-        .names("of", |(_, part, _)| (*part).into())
-        .numbers("RMSE", "", RMSE, |(.., it)| Some(it.rmse))
-        .numbers("within 68.3 %", "%", Digits::Decimals(1), |(.., it)| Some(it.percent_within_68))
-        .numbers("within 95 %", "%", Digits::Decimals(1), |(.., it)| Some(it.percent_within_95));
+        .names("output", "output", |(group, ..)| with_unit(&symbol(&group.group), &group.unit))
+        .names("of", "of", |(_, part, _)| (*part).into())
+        .numbers("rmse", "RMSE", "", RMSE, |(.., it)| Some(it.rmse))
+        .numbers("percent_within_68", "within 68.3 %", "%", Digits::Decimals(1), |(.., it)| {
+            Some(it.percent_within_68)
+        })
+        .numbers("percent_within_95", "within 95 %", "%", Digits::Decimals(1), |(.., it)| {
+            Some(it.percent_within_95)
+        });
     sections.table(table);
     sections.note(format!("{percent:.2} % of the frames are novel: unlike those of training."));
 }
@@ -359,31 +369,31 @@ fn outputs(pictures: &Pictures<'_>) -> Section {
     let rows: Vec<_> = shown.outputs.iter().enumerate().take(MOST_OUTPUTS).collect();
     let caption = format!("{} of {} outputs, true and decoded.", rows.len(), shown.outputs.len());
     let mut table = TableOf::new(&rows, caption)
-        .names("output", |(_, output)| with_unit(&symbol(&output.name), &output.unit));
+        .names("output", "output", |(_, output)| with_unit(&symbol(&output.name), &output.unit));
     for frame in &shown.frames {
         for (what, line) in [("true", &frame.truth), ("decoded", &frame.estimate)] {
             let heading = format!("{} ({}), {what}", frames::name(frame), frame.frame);
-            table = table.texts(&heading, "", |(column, output)| {
+            table = table.texts(&heading, &heading, |(column, output)| {
                 fixed(line[*column], decimals(output.rmse, 2))
             });
         }
     }
-    table.section()
+    Section::Table(table.table())
 }
 
 /// Adds what decoding costs a device.
 fn cost(sections: &mut Sections, device: &DeviceCost) {
-    let weights = if device.weights_in_ram { device.blob_bytes } else { 0 };
-    let of_ram = match weights {
-        0 => "weights stay in flash".to_owned(),
-        bytes => format!("{} of them weights", grouped(bytes)),
+    let weights = if device.weights_in_ram {
+        "the images copy the weights there too, as many bytes as the blob has"
+    } else {
+        "weights stay in flash"
     };
     let [cycles, ram, blob, slot] =
-        [device.cycles as usize, device.ram_bytes + weights, device.blob_bytes, device.slot_bytes]
+        [device.cycles as usize, device.ram_bytes, device.blob_bytes, device.slot_bytes]
             .map(grouped);
     let fits = if device.fits_slot { "fits" } else { "does not fit" };
     let processor = "a Cortex-M4F whose memory never waits, as docs/cycles.md predicts them";
     sections.line("Decoding", format!("{cycles} cycles of {processor}"));
-    sections.line("RAM", format!("{ram} bytes, {of_ram}"));
+    sections.line("RAM for decoding", format!("{ram} bytes; {weights}"));
     sections.line("Flash", format!("{blob} bytes: the blob {fits} a slot of {slot} bytes"));
 }

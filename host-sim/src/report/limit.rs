@@ -12,7 +12,7 @@ use super::errors::BAR_PX;
 use super::face::Face;
 use super::face_map::{Map, Values};
 use super::figures::{Figure, Panel};
-use super::format::{UNDEFINED, noise, significant, symbol, with_unit};
+use super::format::{UNDEFINED, noise, short, significant, symbol, with_unit};
 use super::sections::{Digits, Fact, Section, Sections, TableOf};
 use super::svg::Shape;
 use super::ticks;
@@ -55,7 +55,7 @@ fn directions(level: &Level) -> Chart {
         vec![[0.5, 1.0], [most + 0.5, 1.0]],
     ));
     let ratios = series.iter().flat_map(|s| s.points.iter().map(|[_, ratio]| *ratio));
-    let y = ticks::logarithmic(ratios, |ratio| significant(ratio, 1));
+    let y = ticks::logarithmic(ratios, short);
     let mut x = ticks::linear([0.0, most], 8);
     (x.low, x.high) = (0.5, most + 0.5);
     x.at.retain(|(value, _)| (1.0..=most).contains(value));
@@ -137,8 +137,8 @@ fn limits(sections: &mut Sections, lines: &[Line<'_>]) {
                    Prior: always predicting the mean. ESS: smallest and median effective sample size of the posteriors. Own error: \
                    largest share of the squared error that is the sample's own; it is subtracted.";
     let mut table = TableOf::new(lines, caption)
-        .names("readings", |line| line.readings.clone())
-        .names("noise", Line::noise);
+        .names("readings", "readings", |line| line.readings.clone())
+        .names("noise", "noise", Line::noise);
     let mut names: Vec<&GroupLimit> = vec![];
     for group in lines.iter().flat_map(|line| &line.of.groups) {
         if names.iter().all(|known| known.group != group.group) {
@@ -150,7 +150,10 @@ fn limits(sections: &mut Sections, lines: &[Line<'_>]) {
         let limit = |line: &Line<'_>| of(line).map(|it| [it.limit, it.limit_standard_error]);
         let prior = |line: &Line<'_>| of(line).map(|it| it.prior_rmse);
         let (symbol, digits) = (symbol(&name.group), Digits::Decimals(4));
-        table = table.estimates(&symbol, &name.unit, digits, limit).numbers(
+        let [key, error, of_prior] = ["limit", "limit_standard_error", "prior_rmse"]
+            .map(|result| format!("{result}_{}", name.group));
+        table = table.estimates([&key, &error], &symbol, &name.unit, digits, limit).numbers(
+            &of_prior,
             &format!("prior {symbol}"),
             &name.unit,
             digits,
@@ -164,8 +167,14 @@ fn limits(sections: &mut Sections, lines: &[Line<'_>]) {
     let own = |line: &Line<'_>| {
         line.of.groups.iter().map(|group| 100.0 * group.monte_carlo_share).reduce(f64::max)
     };
-    let table = table.texts("ESS", "", samples);
-    sections.table(table.numbers("own error", "%", Digits::Decimals(2), own));
+    let table = table.texts("effective_samples", "ESS", samples);
+    sections.table(table.numbers(
+        "monte_carlo_percent",
+        "own error",
+        "%",
+        Digits::Decimals(2),
+        own,
+    ));
     for line in lines {
         if let Some(reason) = &line.of.refused {
             sections.note(format!("{}, {}: not given: {reason}", line.readings, line.noise()));
@@ -187,14 +196,18 @@ fn models(sections: &mut Sections, results: &[LimitResult]) {
     }
     let caption = "Models: RMSE on these frames, and its ratio to the limit of all readings.";
     let table = TableOf::new(&rows, caption)
-        .names("model", |(_, _, model, _)| model.decoder.clone())
-        .names("scene", |(result, ..)| result.subject.clone())
-        .names("noise", |(_, noise, ..)| noise.clone())
-        .names("output", |(.., errors)| with_unit(&symbol(&errors.group), &errors.unit))
-        .numbers("RMSE", "", Digits::Decimals(4), |(.., errors)| Some(errors.rmse))
-        .estimates("× limit", "", Digits::Decimals(3), |(.., errors)| {
-            Some([errors.ratio_to_limit?, errors.ratio_standard_error?])
-        });
+        .names("model", "model", |(_, _, model, _)| model.decoder.clone())
+        .names("scene", "scene", |(result, ..)| result.subject.clone())
+        .names("noise", "noise", |(_, noise, ..)| noise.clone())
+        .names("output", "output", |(.., errors)| with_unit(&symbol(&errors.group), &errors.unit))
+        .numbers("rmse", "RMSE", "", Digits::Decimals(4), |(.., errors)| Some(errors.rmse))
+        .estimates(
+            ["ratio_to_limit", "ratio_standard_error"],
+            "× limit",
+            "",
+            Digits::Decimals(3),
+            |(.., errors)| Some([errors.ratio_to_limit?, errors.ratio_standard_error?]),
+        );
     sections.table(table);
 }
 
@@ -251,14 +264,20 @@ fn directions_table(sections: &mut Sections, result: &LimitResult) {
                    signal-to-noise ratio is above 1. Known: share of the prior's variance that readings take away, and RMSE that \
                    is left, for a sensor linearised at the mean deformation. S/N: ratios of the first directions.";
     let mut table = TableOf::new(&rows, caption)
-        .names("readings", |(_, seen)| name(&seen.row_wires))
-        .names("noise", |(noise, _)| noise.clone())
-        .texts("observable", "", |(_, seen)| format!("{} of {}", seen.observable, seen.unknowns));
-    for (axis, letter) in ["Δx", "Δy", "Δz"].into_iter().enumerate() {
+        .names("readings", "readings", |(_, seen)| name(&seen.row_wires))
+        .names("noise", "noise", |(noise, _)| noise.clone())
+        .texts("observable", "observable", |(_, seen)| {
+            format!("{} of {}", seen.observable, seen.unknowns)
+        });
+    for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
         let known = |(_, seen): &(_, &Observability)| Some(100.0 * seen.axes[axis].known);
         let rmse = |(_, seen): &(_, &Observability)| Some(seen.axes[axis].rmse_mm);
-        table = table.numbers(&format!("known {letter}"), "%", Digits::Decimals(0), known).numbers(
-            &format!("RMSE {letter}"),
+        let [known_key, rmse_key] =
+            [format!("known_percent_d{letter}"), format!("rmse_d{letter}_mm")];
+        let [of_known, of_rmse] = [format!("known Δ{letter}"), format!("RMSE Δ{letter}")];
+        table = table.numbers(&known_key, &of_known, "%", Digits::Decimals(0), known).numbers(
+            &rmse_key,
+            &of_rmse,
             "mm",
             Digits::Decimals(4),
             rmse,
@@ -268,7 +287,7 @@ fn directions_table(sections: &mut Sections, result: &LimitResult) {
         let ratios = seen.signal_to_noise.iter().take(SHOWN_RATIOS);
         ratios.map(|ratio| significant(*ratio, 3)).collect::<Vec<_>>().join(" ")
     };
-    sections.table(table.texts("S/N", "", ratios));
+    sections.table(table.texts("signal_to_noise", "S/N", ratios));
 }
 
 /// Name of the readings of these row-wires.
@@ -303,7 +322,7 @@ fn by_noise(result: &LimitResult) -> Chart {
     let all = |axis: usize| series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
     let (x, y) = (
         ticks::logarithmic(all(0), |level| noise(result.noise_kind, level)),
-        ticks::logarithmic(all(1), |value| significant(value, 1)),
+        ticks::logarithmic(all(1), short),
     );
     Chart {
         title: "Least possible RMSE against the noise".into(),

@@ -4,90 +4,67 @@ use super::axes::Axis;
 use super::chart::{Chart, Mark, Series};
 use super::data::{Data, number};
 use super::figures::Figure;
-use super::format::{counted, significant, symbol};
-use super::sections::{Digits, Section, Sections, TableOf};
+use super::format::{UNDEFINED, counted, short, significant, with_unit};
+use super::quantity::{Quantity, in_bounds};
+use super::sections::{Digits, Section, Sections, Table, TableOf, number_value};
 use super::svg::{Anchor, Shape, Svg, TEXT_PX, text_width};
 use super::ticks;
-use taxel_evaluate::metrics::unit_of_rmse;
+use serde_json::Value;
 use taxel_evaluate::sweep::Merged;
-use taxel_evaluate::sweep::bounds::Bounds;
 use taxel_evaluate::sweep::effects::Level;
-use taxel_evaluate::sweep::merge::Setting;
+use taxel_evaluate::sweep::merge::{PointResult, Setting};
 use taxel_evaluate::sweep::plan::SEED;
 
 const WIDE: [f64; 2] = [920.0, 420.0];
 const NARROW: [f64; 2] = [480.0, 420.0];
+/// What tells errors apart.
+pub const EQUAL_ERRORS: &str = "Errors count as equal if they differ by at most two standard errors of their difference on the \
+                                same test frames, or by half a per cent.";
 /// Settings on the front whose scenes are shown.
 const SHOWN: usize = 12;
 
-/// Name of a result for people, with its unit.
-fn name(result: &str) -> String {
-    let of_group = [
-        ("limit_standard_error_", "standard error of the least possible RMSE of"),
-        ("limit_", "least possible RMSE of"),
-        ("rmse_", "RMSE of"),
-        ("ratio_to_limit_", "ratio to the limit of"),
-    ];
-    for (start, words) in of_group {
-        if let Some(group) = result.strip_prefix(start) {
-            let unit = if start.starts_with("ratio") {
-                String::new()
-            } else {
-                format!(" ({})", unit_of_rmse(group))
-            };
-            return format!("{words} {}{unit}", symbol(group));
-        }
-    }
-    let known = [
-        ("scan_ms", "time of a scan (ms)"),
-        ("decode_ms", "time of decoding (ms)"),
-        ("frame_ms", "time of a frame, scan and decoding (ms)"),
-        ("frames_per_s", "frames in a second"),
-        ("age_ms", "age of an estimate when it is used (ms)"),
-        ("cycles", "cycles of decoding"),
-        ("blob_bytes", "blob (bytes)"),
-        ("ram_bytes", "RAM for decoding (bytes)"),
-        ("area_cm2", "area (cm²)"),
-    ];
-    known
-        .iter()
-        .find(|(known, _)| *known == result)
-        .map_or_else(|| result.into(), |(_, words)| (*words).into())
-}
-
 /// Text of a setting's result, with its deviation between repeats.
-pub fn result_text(setting: &Setting, name: &str) -> String {
-    let Some(value) = setting.results.get(name) else { return "-".into() };
-    let is_count = value.fract() == 0.0 && value.abs() < 1e9;
-    match setting.deviations.get(name) {
-        Some(deviation) if *deviation > 0.0 => {
-            format!("{} ± {}", significant(*value, 4), significant(*deviation, 2))
+fn result_text(setting: &Setting, name: &str) -> String {
+    let value = setting.results.get(name).copied();
+    match (value, setting.deviations.get(name)) {
+        (Some(value), Some(deviation)) if *deviation > 0.0 => {
+            format!("{} ± {}", significant(value, 4), significant(*deviation, 2))
         }
-        _ if is_count => format!("{value}"),
-        _ => significant(*value, 4),
+        _ => Quantity::of(name).digits.text(value),
     }
 }
 
-/// Short names of the fields that settings differ in, for heads of tables.
-pub fn setting_heads(merged: &Merged) -> Vec<String> {
-    let is_name = |part: &&str| part.parse::<usize>().is_err();
-    fields(merged)
-        .map(|field| field.rsplit('.').find(is_name).unwrap_or(field).to_owned())
-        .collect()
-}
-
-/// A setting's values of these.
-pub fn setting_cells(merged: &Merged, setting: &Setting) -> Vec<String> {
-    let text = |field: &str| match setting.values.get(field) {
-        Some(serde_json::Value::String(text)) => text.clone(),
+/// Text of a setting's value of a field.
+fn field_text(setting: &Setting, field: &str) -> String {
+    match setting.values.get(field) {
+        Some(Value::String(text)) => text.clone(),
         Some(value) => value.to_string(),
-        None => "-".into(),
-    };
-    fields(merged).map(text).collect()
+        None => UNDEFINED.into(),
+    }
 }
 
-fn fields(merged: &Merged) -> impl Iterator<Item = &str> {
-    merged.fields.iter().map(String::as_str).filter(|field| *field != SEED)
+/// Adds columns of the fields that settings differ in, and of these results. A row without a setting has none of them.
+pub fn with_results<'r, R>(
+    mut table: TableOf<'r, R>,
+    (fields, results): (&[&str], &[&str]),
+    setting: impl Fn(&'r R) -> Option<&'r Setting>,
+) -> TableOf<'r, R> {
+    let is_name = |part: &&str| part.parse::<usize>().is_err();
+    for field in fields {
+        let heading = field.rsplit('.').find(is_name).unwrap_or(field).replace('_', " ");
+        table = table.names(field, &heading, |row| {
+            setting(row).map_or(UNDEFINED.into(), |it| field_text(it, field))
+        });
+    }
+    for result in results {
+        let Quantity { heading, unit, .. } = Quantity::of(result);
+        table = table.cells(result, &with_unit(&heading, &unit), |row| {
+            let Some(setting) = setting(row) else { return (UNDEFINED.into(), Value::Null) };
+            let value = number_value(setting.results.get(*result).copied());
+            (result_text(setting, result), value)
+        });
+    }
+    table
 }
 
 /// At most `most` places among so many things, evenly spread, both ends among them.
@@ -110,23 +87,28 @@ fn shown(merged: &Merged) -> Option<[&str; 2]> {
     Some([x.unwrap_or(y), y])
 }
 
+/// Place of a setting in the picture.
+fn place(setting: &Setting, [x, y]: [&str; 2]) -> Option<[f64; 2]> {
+    Some([*setting.results.get(x)?, *setting.results.get(y)?])
+}
+
 /// Axis of a result, logarithmic where all values are positive and differ much.
 fn axis(result: &str, values: &[f64]) -> Axis {
     let (low, high) = ticks::extent(values.iter().copied()).unwrap_or((0.0, 1.0));
     if low > 0.0 && high > 1.5 * low {
         return Axis::logarithmic(
-            name(result),
-            ticks::logarithmic(values.iter().copied(), |it| significant(it, 1)),
+            Quantity::of(result).label(),
+            ticks::logarithmic(values.iter().copied(), short),
         );
     }
     let digits = ticks::linear(values.iter().copied(), 6);
-    Axis::linear(name(result), digits)
+    Axis::linear(Quantity::of(result).label(), digits)
 }
 
 /// Chart of all settings, and the line of their front.
 fn front(merged: &Merged) -> Option<Chart> {
     let [x, y] = shown(merged)?;
-    let at = |setting: &Setting| Some([*setting.results.get(x)?, *setting.results.get(y)?]);
+    let at = |setting: &Setting| place(setting, [x, y]);
     let points = |wanted: &dyn Fn(&Setting) -> bool| -> Vec<[f64; 2]> {
         merged.settings.iter().filter(|setting| wanted(setting)).filter_map(at).collect()
     };
@@ -160,7 +142,7 @@ fn front(merged: &Merged) -> Option<Chart> {
     let series = [outside, beaten, front].into_iter().filter(|series| !series.points.is_empty());
     let column = |axis: usize| all.iter().map(|point| point[axis]).collect::<Vec<_>>();
     Some(Chart {
-        title: format!("{} against {}", name(y), name(x)),
+        title: format!("{} against {}", Quantity::of(y).label(), Quantity::of(x).label()),
         x: axis(x, &column(0)),
         y: axis(y, &column(1)),
         series: series.collect(),
@@ -184,7 +166,7 @@ fn bars(merged: &Merged, width: f64) -> String {
         Svg::new(width, height.max(LINE), "Share of the variance that each axis explains");
     let mut y = 0.0;
     for objective in groups {
-        svg.text(0.0, y + TEXT_PX, Anchor::Start, "label strong", &name(objective));
+        svg.text(0.0, y + TEXT_PX, Anchor::Start, "label strong", &Quantity::of(objective).label());
         y += 24.0;
         for field in &fields {
             let share = merged.effect(field, objective).map_or(0.0, |effect| effect.share);
@@ -216,14 +198,80 @@ fn shares(merged: &Merged) -> Data {
     data
 }
 
-/// Sections of a sweep or a comparison whose files begin with `stem`.
+/// All points: their fields, their results, and why there are none, as files have them.
+pub fn points(merged: &Merged) -> Table {
+    let text = |text: &Option<String>| text.clone().map_or(Value::Null, Value::from);
+    let mut table =
+        TableOf::new(&merged.points, "All points.").values("id", |it| it.id.as_str().into());
+    for field in &merged.fields {
+        table = table.values(field, |it| it.values.get(field).cloned().unwrap_or_default());
+    }
+    for name in &merged.columns {
+        table = table.values(name, |it| number_value(it.results.get(name).copied()));
+    }
+    let notes = |it: &PointResult| Some(it.notes.join("; ")).filter(|notes| !notes.is_empty());
+    table.values("notes", |it| text(&notes(it))).values("failed", |it| text(&it.failed)).table()
+}
+
+/// All settings, as files have them.
+fn settings(merged: &Merged) -> TableOf<'_, Setting> {
+    let mut table = TableOf::new(&merged.settings, "All settings.");
+    for field in merged.fields.iter().filter(|field| *field != SEED) {
+        table = table.values(field, |it| it.values.get(field).cloned().unwrap_or_default());
+    }
+    table = table.values("repeats", |it| it.repeats.into());
+    for name in &merged.columns {
+        table = table.values(name, |it| number_value(it.results.get(name).copied()));
+    }
+    for name in &merged.columns {
+        if merged.settings.iter().any(|it| it.deviations.contains_key(name)) {
+            let key = format!("deviation_{name}");
+            table = table.values(&key, |it| number_value(it.deviations.get(name).copied()));
+        }
+    }
+    table
+        .values("is_within", |it| it.is_within.into())
+        .values("on_front", |it| it.on_front.into())
+        .values("scene", |it| it.scene.clone().map_or(Value::Null, Value::from))
+}
+
+/// Adds what programs read of a plan's results.
+pub fn values(sections: &mut Sections, merged: &Merged) {
+    sections.value("plan", &merged.plan);
+    sections.value("build", &merged.build);
+    sections.value("fields", &merged.fields);
+    sections.value("columns", &merged.columns);
+    sections.value("objectives", &merged.objectives);
+    sections.value("bounds", &merged.bounds);
+    sections.value("points", &points(merged));
+    sections.value("missing", &merged.missing);
+    sections.rows("settings", settings(merged));
+}
+
+/// Sections of a sweep whose files begin with `stem`.
 pub fn sections(merged: &Merged, stem: &str) -> Sections {
-    let mut sections = Sections::new(match stem {
-        "compare" => "Layouts compared".into(),
-        _ => format!("Sweep {}", merged.plan),
-    });
+    let mut sections = Sections::new(format!("Sweep {}", merged.plan));
+    of_files(&mut sections, stem);
+    values(&mut sections, merged);
+    counts(&mut sections, merged);
+    picture(&mut sections, merged, &[]);
+    front_table(&mut sections, merged);
+    if !merged.effects.is_empty() {
+        sections.heading("What the axes do");
+        let effects = effects(&mut sections, merged);
+        sections.sections.extend(effects);
+    }
+    sections
+}
+
+/// Notes the files beside a page, whose names begin with `stem`.
+pub fn of_files(sections: &mut Sections, stem: &str) {
     sections.prefix = format!("{stem}-");
     sections.files = vec![format!("{stem}.csv"), format!("{stem}.json")];
+}
+
+/// Adds how many points there are, and what is to be known of them.
+pub fn counts(sections: &mut Sections, merged: &Merged) {
     let within = merged.settings.iter().filter(|setting| setting.is_within).count();
     let bounded = if merged.bounds.is_empty() { 0 } else { within };
     let counts = [
@@ -237,54 +285,51 @@ pub fn sections(merged: &Merged, stem: &str) -> Sections {
     let all = [counted(points, "point"), counted(settings, "setting")].into_iter();
     let all = all.chain(counts.map(|(count, what)| format!("{count} {what}")));
     let all = all.collect::<Vec<_>>().join(", ");
-    sections.note(format!("{all}; {}", merged.build));
+    sections.note(format!("{all}; {}.", merged.build));
     merged.none_within().into_iter().for_each(|sentence| sections.note(sentence));
     for (note, count) in merged.notes() {
         sections
             .note(format!("{} with {note}; the JSON says why of each", counted(count, "point")));
     }
-    if let Some(chart) = front(merged) {
-        let caption = "Every setting, and the Pareto front, on which no other setting within the bounds is as good in all \
-                       objectives and better in one.";
-        sections.figure(Figure::of_chart("front", caption.into(), &chart, [WIDE, NARROW]));
-    }
-    front_table(&mut sections, merged);
-    if !merged.effects.is_empty() {
-        sections.heading("What the axes do");
-        let drawings = [WIDE, NARROW].map(|size| bars(merged, size[0]));
-        let caption = "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of \
-                       its logarithm where all values are positive. What is left belongs to axes together, and to chance.";
-        let data = shares(merged);
-        sections.figure(Figure::of_drawings("effects", caption.into(), drawings, data));
-        shares_table(&mut sections, merged);
-        levels(&mut sections, merged);
-    }
-    sections
 }
 
-/// Bounds in words.
-pub fn in_bounds(bounds: &Bounds) -> String {
-    let bounds = bounds.iter().map(|(result, bound)| format!("{} {bound}", name(result)));
-    bounds.collect::<Vec<_>>().join(", ")
+/// Adds the picture of all settings, with `names` of some of them.
+pub fn picture(sections: &mut Sections, merged: &Merged, names: &[(&str, &Setting)]) {
+    if let Some(mut chart) = front(merged) {
+        let at = names.iter().filter_map(|(name, setting)| {
+            Some(((*name).to_owned(), place(setting, shown(merged)?)?))
+        });
+        let (names, places): (Vec<String>, Vec<[f64; 2]>) = at.unzip();
+        if !names.is_empty() {
+            let names = Series::new("names", "note-in-chart", Mark::Names(names), places);
+            chart.series.push(names.unlisted());
+        }
+        let caption = format!(
+            "Every setting, and the Pareto front, on which no other setting within the bounds is as good in all objectives and \
+             better in one. {EQUAL_ERRORS}"
+        );
+        sections.figure(Figure::of_chart("front", caption, &chart, [WIDE, NARROW]));
+    }
 }
 
-/// Adds columns of the fields that settings differ in and of their objectives.
-fn with_settings<'r>(
-    table: TableOf<'r, &'r Setting>,
-    merged: &'r Merged,
-) -> TableOf<'r, &'r Setting> {
-    let mut table = table;
-    for (place, head) in setting_heads(merged).iter().enumerate() {
-        table = table.names(head, |setting| setting_cells(merged, setting)[place].clone());
-    }
-    for objective in &merged.objectives {
-        table = table.texts(&name(objective), "", |setting| result_text(setting, objective));
-    }
-    table
+/// Effects of the axes, as a picture and as tables; programs read them as well.
+pub fn effects(sections: &mut Sections, merged: &Merged) -> Vec<Section> {
+    let table = TableOf::new(&merged.effects, "Effects.")
+        .names("field", "axis", |it| it.field.clone())
+        .names("result", "result", |it| it.result.clone())
+        .values("share", |it| number_value(Some(it.share)));
+    sections.rows("effects", table);
+    let drawings = [WIDE, NARROW].map(|size| bars(merged, size[0]));
+    let caption = "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of \
+                   its logarithm where all values are positive. What is left belongs to axes together, and to chance.";
+    let data = shares(merged);
+    let bars = Section::Figure(Figure::of_drawings("effects", caption.into(), drawings, data));
+    let levels = Section::Folded("Means by level".into(), vec![levels(sections, merged)]);
+    vec![bars, shares_table(merged), levels]
 }
 
-/// Adds the settings on the front, evenly chosen where they are many.
-fn front_table(sections: &mut Sections, merged: &Merged) {
+/// Settings on the front, evenly chosen where they are many.
+pub fn front_table(sections: &mut Sections, merged: &Merged) {
     let front = merged.front();
     let places = evenly(front.len(), SHOWN);
     let shown: Vec<&Setting> = places.iter().map(|place| front[*place]).collect();
@@ -296,7 +341,11 @@ fn front_table(sections: &mut Sections, merged: &Merged) {
         String::new()
     };
     let caption = format!("The Pareto front.{some}{bounds}");
-    sections.table(with_settings(TableOf::new(&shown, caption), merged));
+    let fields = merged.fields.iter().map(String::as_str).filter(|field| *field != SEED);
+    let fields: Vec<&str> = fields.collect();
+    let objectives: Vec<&str> = merged.objectives.iter().map(String::as_str).collect();
+    let table = TableOf::new(&shown, caption);
+    sections.table(with_results(table, (&fields, &objectives), |setting| Some(*setting)));
     let scenes = shown.iter().filter_map(|setting| {
         let scene = vec![Section::Listing(setting.scene.clone()?)];
         Some(Section::Folded(setting.in_words(), scene))
@@ -308,21 +357,22 @@ fn front_table(sections: &mut Sections, merged: &Merged) {
     }
 }
 
-/// Adds the share of each objective's variance that each axis explains.
-fn shares_table(sections: &mut Sections, merged: &Merged) {
+/// Share of each objective's variance that each axis explains.
+fn shares_table(merged: &Merged) -> Section {
     let fields: Vec<&String> = merged.fields_with_effects().collect();
     let caption = "Share of the variance that each axis explains, in per cent.";
-    let mut table = TableOf::new(&fields, caption).names("axis", |field| (*field).clone());
+    let mut table = TableOf::new(&fields, caption).names("field", "axis", |field| (*field).clone());
     for objective in &merged.objectives {
-        table = table.numbers(&name(objective), "", Digits::Decimals(0), |field| {
+        let heading = Quantity::of(objective).heading;
+        table = table.numbers(objective, &heading, "", Digits::Decimals(0), |field| {
             merged.effect(field, objective).map(|effect| 100.0 * effect.share)
         });
     }
-    sections.table(table);
+    Section::Table(table.table())
 }
 
-/// Adds means of each objective by the levels of each axis.
-fn levels(sections: &mut Sections, merged: &Merged) {
+/// Means of each objective by the levels of each axis; programs read them as well.
+fn levels(sections: &mut Sections, merged: &Merged) -> Section {
     let mut rows: Vec<(&String, usize, &Level)> = vec![];
     for field in &merged.fields {
         let first = merged.objectives.iter().find_map(|objective| merged.effect(field, objective));
@@ -331,15 +381,18 @@ fn levels(sections: &mut Sections, merged: &Merged) {
     }
     let caption = "Geometric means over all settings of a level, whatever their other axes are.";
     let mut table = TableOf::new(&rows, caption)
-        .names("axis", |(field, ..)| (*field).clone())
-        .names("level", |(.., level)| level.name.clone())
-        .texts("settings", "", |(.., level)| level.points.to_string());
+        .names("field", "axis", |(field, ..)| (*field).clone())
+        .names("level", "level", |(.., level)| level.name.clone())
+        .numbers("settings", "settings", "", Digits::Count, |row| Some(row.2.points as f64));
     for objective in &merged.objectives {
-        table = table.numbers(&name(objective), "", Digits::Significant(3), |(field, place, _)| {
+        let Quantity { heading, unit, .. } = Quantity::of(objective);
+        let digits = Digits::Significant(3);
+        table = table.numbers(objective, &heading, &unit, digits, |(field, place, _)| {
             let level = merged.effect(field, objective)?.levels.get(*place)?;
             Some(level.mean)
         });
     }
-    let summary = "Means by level".into();
-    sections.sections.push(Section::Folded(summary, vec![table.section()]));
+    let table = table.table();
+    sections.value("levels", &table);
+    Section::Table(table)
 }

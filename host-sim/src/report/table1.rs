@@ -46,10 +46,10 @@ fn errors(sections: &mut Sections, table: &Table1, definition: Definition, group
     let rows: Vec<_> = spreads.chain(baselines).collect();
     let caption = definition.in_words();
     let digits = Digits::of(&definition);
-    let mut cells = TableOf::new(&rows, caption).names("decoder", |row| row.0.clone());
+    let mut cells = TableOf::new(&rows, caption).names("decoder", "decoder", |row| row.0.clone());
     for column in &table.columns {
-        let noise = table.noise_kind.in_words(column.noise_level);
-        cells = cells.texts(&format!("{noise} noise"), "", |(_, decoder, spread)| {
+        let noise = format!("{} noise", table.noise_kind.in_words(column.noise_level));
+        cells = cells.texts(&noise, &noise, |(_, decoder, spread)| {
             let own = digits.text(of(column.errors(decoder, *spread)));
             let standard = spread.map(|_| of(column.errors(standard::NAME, *spread)));
             standard.map_or(own.clone(), |it| format!("{own} ({})", digits.text(it)))
@@ -70,10 +70,11 @@ pub fn compare(sections: &mut Sections, by_formula: &[Comparison], nearest: &Com
         "As the paper prints it, for z. It does not state its formula; nearest is {}: computed / printed, %.",
         nearest.formula
     );
-    let mut cells = TableOf::new(&rows, caption).names("decoder", |(name, _)| name.clone());
+    let mut cells =
+        TableOf::new(&rows, caption).names("decoder", "decoder", |(name, _)| name.clone());
     for (place, level) in NOISE_LEVELS.into_iter().enumerate() {
-        let noise = NoiseKind::Relative.in_words(level);
-        cells = cells.texts(&format!("{noise} noise"), "", |(_, line)| line[place].clone());
+        let noise = format!("{} noise", NoiseKind::Relative.in_words(level));
+        cells = cells.texts(&noise, &noise, |(_, line)| line[place].clone());
     }
     sections.table(cells);
     let constant = ("a constant".to_owned(), Nearness::of_a_constant());
@@ -81,8 +82,8 @@ pub fn compare(sections: &mut Sections, by_formula: &[Comparison], nearest: &Com
     let rows: Vec<(String, Nearness)> = [constant].into_iter().chain(formulas).collect();
     let caption = "How near each formula comes. Gap: root of the mean square over all cells, in points. docs/paper.md says what is open.";
     let table = TableOf::new(&rows, caption)
-        .names("formula", |(name, _)| name.clone())
-        .numbers("gap", "", Digits::Decimals(2), |(_, it)| Some(it.gap))
-        .numbers("correlation", "", Digits::Decimals(2), |(_, it)| it.correlation);
+        .names("formula", "formula", |(name, _)| name.clone())
+        .numbers("gap", "gap", "", Digits::Decimals(2), |(_, it)| Some(it.gap))
+        .numbers("correlation", "correlation", "", Digits::Decimals(2), |(_, it)| it.correlation);
     sections.table(table);
 }

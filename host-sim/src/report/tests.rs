@@ -102,7 +102,7 @@ fn the_page_is_whole_self_contained_and_always_the_same() {
         "It is a &lt;good&gt; model of Δz.",
         "<li>Few frames for Δz. (few-frames)</li>",
         "200\u{a0}<span>µs</span>",
-        "14\u{202f}345\u{a0}bytes",
+        "2\u{202f}000\u{a0}bytes; the images copy the weights",
         "fits a slot of 131\u{202f}072\u{a0}bytes",
         "taxel run &#39;by &lt;hand&gt;.toml&#39; --seed 7",
         "<a href=\"model.bin\">model.bin</a>",

@@ -248,15 +248,15 @@ fn repeats_are_put_together_and_draws_are_the_same_everywhere() {
     assert_eq!((all["points"].as_array().unwrap().len(), settings.len()), (6, 3));
     for setting in settings {
         assert_eq!(setting["repeats"], 2);
-        assert!(setting["deviations"]["rmse_dz_mm"].as_f64().unwrap() > 0.0);
-        let pitch_mm = setting["values"]["sensor.pitch_mm"].as_f64().unwrap();
-        let result = |name: &str| setting["results"][name].as_f64().unwrap();
+        assert!(setting["deviation_rmse_dz_mm"].as_f64().unwrap() > 0.0);
+        let pitch_mm = setting["sensor.pitch_mm"].as_f64().unwrap();
+        let result = |name: &str| setting[name].as_f64().unwrap();
         let error_of_limit = |of: &Value| of["limit_standard_error_dz_mm"].as_f64().unwrap();
         let points = all["points"].as_array().unwrap().iter();
-        let own = points.filter(|it| it["values"]["sensor.pitch_mm"] == pitch_mm);
-        let squares: f64 = own.map(|it| error_of_limit(&it["results"]).powi(2)).sum();
+        let own = points.filter(|it| it["sensor.pitch_mm"] == pitch_mm);
+        let squares: f64 = own.map(|it| error_of_limit(it).powi(2)).sum();
         let expected = squares.sqrt() / setting["repeats"].as_f64().unwrap();
-        assert!((error_of_limit(&setting["results"]) / expected - 1.0).abs() < 1e-9);
+        assert!((error_of_limit(setting) / expected - 1.0).abs() < 1e-9);
         let expected = 8.0 * 18.0 * pitch_mm.powi(2) / 100.0;
         assert!((result("area_cm2") - expected).abs() < 1e-9);
         let parts = 5.0 + 2.0 * result("rows") + 0.5 * result("columns");
@@ -312,7 +312,9 @@ fn measurements_are_swept_by_the_settings_of_training() {
     assert_eq!(all["objectives"][0], "rmse_dz_mm");
     let points = all["points"].as_array().unwrap();
     assert_eq!(points.len(), 4);
-    assert!(points.iter().all(|it| it["results"]["rmse_dz_mm"].as_f64().unwrap() > 0.0 && it["failed"].is_null()));
+    assert!(
+        points.iter().all(|it| it["rmse_dz_mm"].as_f64().unwrap() > 0.0 && it["failed"].is_null())
+    );
     let plan = read(&folder, "plan.toml");
     // Whatever decides a result is in a point's identity, and what a file is called is not.
     folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "9", "-o", "test.csv"]);
@@ -357,29 +359,41 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
     folder.write("lists.toml", lists);
     let said =
         folder.succeed(&["compare", "lists.toml", "scene.toml", "--centres", "4,8", "-o", "out"]);
-    let lines: Vec<&str> = said.lines().collect();
-    for (line, layout) in
-        lines[1..4].iter().zip(["lists.toml pitch_mm=1.5", "lists.toml pitch_mm=3", "scene.toml"])
-    {
+    let table_of = |said: &str| -> Vec<String> {
+        let lines = said.lines().skip_while(|line| !line.starts_with("layout "));
+        lines.skip(1).take(3).map(str::to_owned).collect()
+    };
+    let names = ["lists.toml pitch_mm=1.5", "lists.toml pitch_mm=3", "scene.toml"];
+    for (line, layout) in table_of(&said).iter().zip(names) {
         let centres = line.strip_prefix(layout).and_then(|rest| rest.split_whitespace().next());
         assert!(centres.is_some_and(|k| ["4", "8"].contains(&k)), "{said}");
     }
+    assert!(said.lines().all(|line| line.chars().count() <= 120), "{said}");
     let table = read(&folder, "out/compare.csv");
     assert_eq!(table.lines().count(), 7, "{table}");
+    // Page and JSON have the table as well, and JSON its numbers as they are.
+    let page = read(&folder, "out/compare.html");
+    assert!(names.iter().all(|name| page.contains(&format!("<td>{name}</td>"))), "{page}");
+    let json: Value = serde_json::from_str(&read(&folder, "out/compare.json")).unwrap();
+    for (layout, name) in json["layouts"].as_array().unwrap().iter().zip(names) {
+        assert_eq!(layout["layout"], name);
+        let rmse = layout["rmse_dz_mm"].as_f64().unwrap().to_string();
+        assert!(table.lines().any(|line| line.contains(name) && line.contains(&rmse)), "{rmse}");
+    }
     let limit = folder.succeed(&["compare", "lists.toml", "--limit-only", "--json"]);
     let limit: Value = serde_json::from_str(&limit).unwrap();
     assert_eq!(limit["objectives"][0], "limit_dz_mm");
     assert!(folder.fail(&["compare", "scene.toml", "scene.toml"], 2).contains("twice"));
     let none = folder.succeed(&["compare", "scene.toml", "--max-latency-ms", "0.001"]);
-    assert!(none.contains("no decoder of the layout is within the bound"), "{none}");
+    assert!(none.contains("has no decoder within the bound"), "{none}");
     assert!(none.contains("scene.toml") && !none.contains("the scene"), "{none}");
     // Two scenes may be the same, and one may be impossible.
     fs::copy(folder.path("scene.toml"), folder.path("same.toml")).unwrap();
     folder.write("bad.toml", scene.replace("row_wires = 8", "thickness_mm = 0.5\nrow_wires = 8"));
     let said = folder.succeed(&["compare", "bad.toml", "scene.toml", "same.toml"]);
-    let lines: Vec<&str> = said.lines().collect();
-    assert!(lines[1].starts_with("scene.toml") && lines[2].starts_with("same.toml"), "{said}");
-    assert!(said.contains(" rmse_dz_mm") && said.contains("failed: bad.toml: "), "{said}");
+    let lines = table_of(&said);
+    assert!(lines[0].starts_with("scene.toml") && lines[1].starts_with("same.toml"), "{said}");
+    assert!(said.contains(" RMSE of Δz (mm)") && said.contains("Failed: bad.toml: "), "{said}");
     let unknown = folder.fail(&["compare", "scene.toml", "--group", "dy"], 2);
     assert!(unknown.contains("--group = dy") && unknown.contains("`dz_mm`"), "{unknown}");
 }

@@ -204,7 +204,8 @@ fn the_worst_case_counts_other_contacts_in_front_and_choice() {
         assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
     }
     // The option that the page names makes a choice.
-    let text = host_sim::report::of_trade(&worst.0, None, false).text();
+    let with = host_sim::report::TradeWith { shown: None, all: false, command: "taxel trade" };
+    let text = host_sim::report::of_trade(&worst.0, with).text();
     let most = text.split("--max-error ").nth(1).and_then(|it| it.split_whitespace().next());
     let bounds = at_most("worst_rmse_dz_mm", most.unwrap().parse().unwrap());
     assert_eq!(worst.0.clone().choose(&bounds), Ok(()));
@@ -261,7 +262,9 @@ fn the_files_and_the_table_tell_every_point() {
     // Numbers of the table of points that end where this heading ends.
     let times_of = |page: &str| -> Vec<f64> {
         let heading = "frame (ms)";
-        let table = page.split("\n\n").find(|block| block.trim_start().starts_with("format"));
+        let is_of_times =
+            |block: &&str| block.lines().next().is_some_and(|line| line.contains(heading));
+        let table = page.split("\n\n").find(is_of_times);
         let table = table.unwrap().trim_start_matches('\n');
         let head = table.lines().next().unwrap();
         let end = head[..head.find(heading).unwrap()].chars().count() + heading.len();
@@ -295,7 +298,7 @@ fn the_files_and_the_table_tell_every_point() {
     assert_eq!(picture.lines().filter(|line| line.starts_with("Pareto front,")).count(), front);
     assert!(html.contains("<td>chosen</td><td>fixed16") && html.contains(">chosen: K"));
     assert!(html.contains("taxel trade few.toml --no-refine --centres 16"), "the command");
-    assert!(html.contains("cycles of decoding at most 9000"), "the bound");
+    assert!(html.contains("at most 9\u{202f}000\u{a0}cycles"), "the bound");
 
     assert!(folder.path("out/few/chosen.bin").exists());
     // Measurements are kept where no point is chosen, and another run's choice is not left beside them.
@@ -304,7 +307,7 @@ fn the_files_and_the_table_tell_every_point() {
     assert!(output.status.code() == Some(2) && stderr.contains("--max-error 0.05"), "{stderr}");
     assert!(stderr.contains("train and measure …\n"), "a log shows what runs: {stderr}");
     let page = String::from_utf8(output.stdout).unwrap();
-    assert!(page.contains("\nfront ") && page.contains("Nothing is chosen"), "{page}");
+    assert!(page.contains("\nfixed16 ") && page.contains("Nothing is chosen"), "{page}");
     assert!(!folder.path("out/few/chosen.bin").exists());
 }
 

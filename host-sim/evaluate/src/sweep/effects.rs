@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
 use serde_json::Value;
 
 /// Most levels of an axis; neighbouring values are put together where there are more.
 const MOST_LEVELS: usize = 8;
 /// What an axis does to a result, whatever the other axes are.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
     pub field: String,
     pub result: String,
@@ -19,7 +18,7 @@ pub struct Effect {
 }
 
 /// Values of an axis that are looked at together.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// Value, or the first and the last one.
     pub name: String,

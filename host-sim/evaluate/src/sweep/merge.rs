@@ -2,21 +2,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::Serialize;
 use serde_json::Value;
 
 use super::bounds::{self, Bounds};
 use super::effects::{Effect, Settings};
 use super::file::PartPrices;
-use super::front::{Offer, front};
-use super::plan::{Plan, Point, SEED};
+use super::front::{self, Offer, front};
+use super::plan::{Plan, Point, SCENE, SEED};
 use super::point::{place_of, standard_error_of};
 use super::store::{Found, Record, Store};
 use crate::error::{Error, Result};
 use crate::metrics::{Blocks, standard_error};
 
 /// Results of a plan.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Merged {
     pub plan: String,
     /// Program that computed them.
@@ -37,13 +36,12 @@ pub struct Merged {
 }
 
 /// Result of a point, with the fields that this plan's points differ in.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PointResult {
     pub id: String,
     pub values: BTreeMap<String, Value>,
     pub results: BTreeMap<String, f64>,
     /// Parts of blocks of frames in errors.
-    #[serde(skip)]
     pub blocks: Blocks,
     /// Remarks on them.
     pub notes: Vec<String>,
@@ -64,7 +62,7 @@ impl PointResult {
 }
 
 /// Points that differ at most in their seed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
     /// Fields, without the seed.
     pub values: BTreeMap<String, Value>,
@@ -75,7 +73,6 @@ pub struct Setting {
     /// Standard deviations between them; nothing without repeats.
     pub deviations: BTreeMap<String, f64>,
     /// Means of the parts of blocks of frames in errors.
-    #[serde(skip)]
     pub blocks: Blocks,
     /// Whether the means are within all bounds.
     pub is_within: bool,
@@ -176,30 +173,30 @@ impl Merged {
         }
     }
 
-    /// Table of all points: their identities, the fields that they differ in, their results, and why there are none.
-    pub fn csv(&self) -> String {
-        let quoted = |text: &str| {
-            let plain = !text.contains(['"', ',', '\n', '\r']);
-            if plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
+    /// Layouts in the order of their scenes, each with the setting that has the smallest first objective within the bounds; of
+    /// those whose errors count as equal, that with the smallest last one. A plan of one scene does not name it: that is the
+    /// `first`.
+    pub fn best_of_layouts<'m>(&'m self, first: &'m str) -> Vec<(&'m str, Option<&'m Setting>)> {
+        let layout = |setting: &'m Setting| layout_of(&setting.values, first);
+        let of = |name: Option<&String>, setting: &Setting| {
+            let result = name.and_then(|name| setting.results.get(name));
+            result.copied().unwrap_or(f64::INFINITY)
         };
-        let text = |value: Option<&Value>| match value {
-            Some(Value::String(text)) => quoted(text),
-            Some(value) => quoted(&value.to_string()),
-            None => String::new(),
+        let [error, cost] = [self.objectives.first(), self.objectives.last()];
+        // The decoders of a layout follow each other.
+        let layouts = self
+            .settings
+            .chunk_by(|a, b| layout_of(&a.values, first) == layout_of(&b.values, first));
+        let best = |own: &'m [Setting]| {
+            let within: Vec<&Setting> = own.iter().filter(|it| it.is_within).collect();
+            let by_cost = |a: &&&Setting, b: &&&Setting| of(cost, a).total_cmp(&of(cost, b));
+            let name = error.map_or("", String::as_str);
+            (
+                layout(&own[0]),
+                front::best(name, &within, |it| (of(error, it), &it.blocks), by_cost).copied(),
+            )
         };
-        let heads =
-            ["id".to_owned()].into_iter().chain(self.fields.clone()).chain(self.columns.clone());
-        let mut csv = heads.chain(["failed".into()]).collect::<Vec<_>>().join(",") + "\n";
-        for point in &self.points {
-            let fields = self.fields.iter().map(|field| text(point.values.get(field)));
-            let results = self.columns.iter();
-            let results =
-                results.map(|name| point.results.get(name).map_or(String::new(), f64::to_string));
-            let failed = quoted(point.failed.as_deref().unwrap_or_default());
-            let line = [point.id.clone()].into_iter().chain(fields).chain(results).chain([failed]);
-            csv += &(line.collect::<Vec<_>>().join(",") + "\n");
-        }
-        csv
+        layouts.map(best).collect()
     }
 
     /// Settings on the front, from the cheapest by the last objective on.
@@ -250,6 +247,11 @@ impl Merged {
     pub fn failed(&self) -> impl Iterator<Item = &PointResult> {
         self.points.iter().filter(|point| point.failed.is_some())
     }
+}
+
+/// Name of the layout of a point or a setting with these fields; of one alone it is that of the `first`.
+pub fn layout_of<'l>(values: &'l BTreeMap<String, Value>, first: &'l str) -> &'l str {
+    values.get(SCENE).and_then(Value::as_str).unwrap_or(first)
 }
 
 fn without_seed(values: &BTreeMap<String, Value>) -> BTreeMap<String, Value> {

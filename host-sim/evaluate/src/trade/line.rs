@@ -1,13 +1,12 @@
 //! Serial line of the board, which carries fewer estimates than a device may compute.
 
-use serde::Serialize;
 use taxel_core::blob::Floats;
 use taxel_firmware::link::message::{EstimateReport, Report};
 use taxel_firmware::link::{cobs, packet};
 use taxel_firmware::timing::NUCLEO_BAUD;
 
 /// Line of the board, and the estimates that it carries.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     pub baud: u32,
     /// Length of an estimate on the line, without a confidence.

@@ -11,14 +11,6 @@ use crate::device::{Times, Wires};
 use crate::metrics::Blocks;
 use crate::sweep::merge::PointResult;
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn by_name<S: serde::Serializer>(
-    format: &Format,
-    serializer: S,
-) -> std::result::Result<S::Ok, S::Error> {
-    serializer.serialize_str(format.name())
-}
-
 /// Settings of a filter in time, as a device is configured with them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FilterSettings {
@@ -36,12 +28,11 @@ impl From<Settings> for FilterSettings {
 }
 
 /// Way to decode, with its cost and its errors.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Point {
     /// Identity of its settings.
     pub id: String,
     /// Number format.
-    #[serde(serialize_with = "by_name")]
     pub format: Format,
     /// Whether each row is decoded by a network of its own, instead of all by one behind a projection.
     pub each_row: bool,
@@ -56,7 +47,6 @@ pub struct Point {
     /// Filter in time behind the decoder; `None` without one.
     pub filter: Option<FilterSettings>,
     /// Times of one frame on the plan's device.
-    #[serde(flatten)]
     pub times: Times,
     /// Cycles of decoding a frame on a Cortex-M4F.
     pub cycles: u64,
@@ -68,7 +58,6 @@ pub struct Point {
     /// All results, by the names that sweeps give them (docs/sweeps.md).
     pub results: BTreeMap<String, f64>,
     /// Parts of blocks of frames in errors.
-    #[serde(skip)]
     pub blocks: Blocks,
 }
 

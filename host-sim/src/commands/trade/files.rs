@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use crate::Result;
+use crate::report::{self, Sections};
 use crate::trade::{Shown, Trade};
-use crate::{Result, report};
 use taxel_data::output::FileSet;
 
 use super::super::print;
@@ -14,11 +15,15 @@ pub const FILES: FileSet = FileSet {
     inner: report::figures_named(&["error-by-time"]),
 };
 
-/// Writes them to `folder`; `command` is what the user typed.
-pub fn write(folder: &Path, (trade, shown): (&Trade, Option<&Shown>), command: &str) -> Result<()> {
-    let csv = trade.merged.csv();
-    let json = print::json_text(trade)?;
-    let page = report::of_trade(trade, shown, false).page(command);
+/// Writes them to `folder`: a trade and the model that is shown, their sections, and the command that the user typed.
+pub fn write(
+    folder: &Path,
+    (trade, shown): (&Trade, Option<&Shown>),
+    (sections, command): (&Sections, &str),
+) -> Result<()> {
+    let csv = report::points(&trade.merged).csv();
+    let json = print::file_of(sections);
+    let page = sections.page(command);
     let mut files = vec![
         ("trade.csv", csv.as_bytes()),
         ("trade.json", json.as_bytes()),

@@ -6,10 +6,10 @@ use taxel_evaluate::sweep::bounds::Bound;
 use taxel_evaluate::trade::{Point, Trade};
 use taxel_learn::decoders::centroid;
 
-use super::words;
+use super::{counted_rmse, words};
 use crate::report::axes::Axis;
 use crate::report::chart::{Chart, Mark, Series};
-use crate::report::format::{significant, symbol, with_unit};
+use crate::report::format::{short, significant, with_unit};
 use crate::report::svg::Shape;
 use crate::report::ticks::{self, Ticks};
 
@@ -26,8 +26,9 @@ fn shape(format: Format) -> Shape {
 
 /// Chart, and the number of points that lie outside it.
 pub fn chart(trade: &Trade) -> (Chart, usize) {
-    let error = format!("RMSE of {}", symbol(&trade.group));
-    let at = |point: &Point| [point.times.frame_ms, point.rmse(&trade.group)];
+    let error = counted_rmse(trade);
+    let counted = trade.error();
+    let at = |point: &Point| [point.times.frame_ms, point.result(&counted).unwrap_or(f64::NAN)];
     let chosen = trade.chosen.map(|i| &trade.points[i]);
     let is_chosen = |point: &Point| chosen.is_some_and(|chosen| std::ptr::eq(chosen, point));
     let (best, others): (Vec<&Point>, Vec<&Point>) =
@@ -89,9 +90,10 @@ pub fn chart(trade: &Trade) -> (Chart, usize) {
     let mut names: Vec<(String, [f64; 2])> = Vec::new();
     if let Some(chosen) = chosen {
         series.push(Series::new("chosen", "chosen", Mark::Points(Shape::Ring), vec![at(chosen)]));
-        names.push((words::chosen(trade, chosen), at(chosen)));
+        names.push((words::chosen(trade, chosen, at(chosen)[1]), at(chosen)));
     }
-    names.extend(front.iter().map(|point| (words::brief(trade, point), at(point))));
+    let named = front.iter().filter(|point| !is_chosen(point));
+    names.extend(named.map(|point| (words::brief(trade, point), at(point))));
     let (names, places) = names.into_iter().unzip();
     series.push(Series::new("front", "note-in-chart", Mark::Names(names), places).unlisted());
     let title = format!("{error} against the time of a frame");
@@ -103,7 +105,7 @@ pub fn chart(trade: &Trade) -> (Chart, usize) {
 fn around(values: impl Iterator<Item = f64>) -> Ticks {
     let (low, high) = ticks::extent(values.filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
     if high / low > 5.0 {
-        return ticks::logarithmic([low, high], |value| significant(value, 2));
+        return ticks::logarithmic([low, high], short);
     }
     let room = (high / low).powf(0.06).max(1.03);
     ticks::within(low / room, high * room, 5)
@@ -118,8 +120,14 @@ fn label(trade: &Trade) -> &'static str {
     }
 }
 
-/// Lines across the picture: what they are, their errors, and their style.
+/// Lines across the picture from top to bottom: what they are, their errors, and their style.
 fn levels(trade: &Trade) -> Vec<(String, f64, &'static str, Mark)> {
+    let bound = most(trade, &trade.error());
+    let bound = bound.map(|y| (format!("at most {y}"), y, "bound", Mark::Line));
+    // Other decoders are known on the own contacts alone.
+    if trade.worst_case {
+        return bound.into_iter().collect();
+    }
     let Some(of) = trade.chosen.map(|i| &trade.points[i]).or(trade.points.first()) else {
         return vec![];
     };
@@ -138,9 +146,9 @@ fn levels(trade: &Trade) -> Vec<(String, f64, &'static str, Mark)> {
         };
         (format!("{name}{with} {}", significant(rmse, 3)), rmse, class, mark)
     });
-    let bound = most(trade, &trade.error());
-    let bound = bound.map(|y| (format!("at most {y}"), y, "bound", Mark::Line));
-    references.chain(bound).collect()
+    let mut levels: Vec<_> = references.chain(bound).collect();
+    levels.sort_by(|a, b| b.1.total_cmp(&a.1));
+    levels
 }
 
 /// Most that a result may be.

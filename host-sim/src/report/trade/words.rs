@@ -1,16 +1,13 @@
 //! Points in words.
 
-use crate::report::format::{fixed, grouped, significant};
+use crate::report::format::significant;
 use taxel_evaluate::sweep::bounds::Bound;
 use taxel_evaluate::trade::{Point, Trade};
 
-/// Text of a rate.
-pub fn rate(frames_per_s: f64) -> String {
-    if frames_per_s < 1000.0 {
-        fixed(frames_per_s, 1)
-    } else {
-        grouped(frames_per_s.round() as usize)
-    }
+/// Text that begins a sentence.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Text of an error with its unit.
@@ -28,9 +25,9 @@ pub fn brief(trade: &Trade, point: &Point) -> String {
     }
 }
 
-/// The chosen point in few words.
-pub fn chosen(trade: &Trade, point: &Point) -> String {
-    format!("chosen: {}, {}", brief(trade, point), error(trade, point.rmse(&trade.group)))
+/// The chosen point, which has this error, in few words.
+pub fn chosen(trade: &Trade, point: &Point, rmse: f64) -> String {
+    format!("chosen: {}, {}", brief(trade, point), error(trade, rmse))
 }
 
 /// The least number with three digits that is not below an error, as a bound that it keeps.
