@@ -6,6 +6,7 @@ mod stdout;
 pub mod print;
 pub mod progress;
 pub mod arguments;
+mod device_arguments;
 mod format_note;
 mod decoder_arguments;
 mod command_line;

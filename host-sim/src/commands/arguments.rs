@@ -1,6 +1,6 @@
 //! Options that were given, and errors that name them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
@@ -8,6 +8,29 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, Command};
 use serde::Serialize;
 use taxel_data::BadValue;
+
+/// File that a command writes.
+#[derive(Args)]
+pub struct OutputFile {
+    /// File to write; - is stdout.
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
+/// Folder that a command writes to.
+#[derive(Args, Default)]
+pub struct OutputFolder {
+    /// Folder to write to.
+    #[arg(short, long, value_name = "DIR", value_parser = folder())]
+    pub output: Option<PathBuf>,
+}
+
+impl OutputFolder {
+    /// The folder, or `out`.
+    pub fn in_out(&self) -> &Path {
+        self.output.as_deref().unwrap_or(Path::new("out"))
+    }
+}
 
 /// Parser for the path of a folder that receives several files: not `-`, which stands for stdout elsewhere.
 pub fn folder() -> impl TypedValueParser<Value = PathBuf> {

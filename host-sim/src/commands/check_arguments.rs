@@ -1,6 +1,6 @@
 //! Common parts of `emulate` and `link … check`: the plan, the model, and the page.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::experiment::names_a_scene;
 use crate::report::Sections;
@@ -19,7 +19,7 @@ use super::filter_arguments::{FilterArguments, PeriodArgument, cycled};
 use super::progress::Terminal;
 use super::readings::model_inputs;
 use super::rest_argument::UntouchedArguments;
-use super::scene_argument::{DEFAULT_SCENE, SceneArgument};
+use super::scene_argument::{FramesArgument, ModelArgument, SceneArgument};
 use super::{Common, print, stderr};
 
 /// Time in µs from one frame of a scene to the next.
@@ -28,27 +28,18 @@ const PERIOD_US: u32 = 10_000;
 /// Options of a check.
 #[derive(Args)]
 pub struct CheckArguments {
-    /// A built-in scene (paper, press), the path of a scene file, or of a CSV file with the readings of --model.
-    #[arg(default_value = DEFAULT_SCENE, value_name = "SCENE|CSV")]
-    source: String,
-    /// Weight blob; without it a model of the scene is trained.
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgument,
+    #[command(flatten)]
+    of: ModelArgument,
     #[command(flatten)]
     untouched: UntouchedArguments,
     #[command(flatten)]
     filter: FilterArguments,
     #[command(flatten)]
     period: PeriodArgument,
-    /// Frames that the device decodes. Lines of a CSV file are repeated.
-    #[arg(
-        short = 'n',
-        long,
-        value_name = "N",
-        default_value_t = 1000,
-        allow_negative_numbers = true
-    )]
-    frames: usize,
+    #[command(flatten)]
+    count: FramesArgument,
 }
 
 /// What a device is checked with.
@@ -62,24 +53,24 @@ pub struct Checked {
 impl CheckArguments {
     /// Loads readings and model, which is trained if none was given.
     pub fn load(&self, common: &Common) -> Result<Checked> {
-        if names_a_scene(&self.source) { self.load_scene(common) } else { self.load_csv() }
+        if names_a_scene(self.scene.name()) { self.load_scene(common) } else { self.load_csv() }
     }
 
     fn load_csv(&self) -> Result<Checked> {
-        let Some(path) = &self.model else {
+        let Some(path) = &self.of.model else {
             return Err(Error::Usage(format!(
                 "{}: readings of a CSV file need --model FILE; `taxel train` makes one",
-                self.source
+                self.scene.name()
             )));
         };
         let model = ModelBlob::read(path)?;
-        let file = DataFile::read(Path::new(&self.source))?;
+        let file = DataFile::read(self.scene.path())?;
         let readings = model_inputs(&model.prepare(), &file)?;
         let parsed = model.parse();
         let metadata = parsed.metadata();
         let rest = self.untouched.rest_if_relative(&file, metadata, None)?;
         let baseline_ohm = self.baseline_ohm(metadata, path, rest.as_ref())?;
-        let count = self.frames.max(1);
+        let count = self.count.frames.max(1);
         let start_us = if self.filter.settings().is_on() {
             cycled(&self.period.of_file(&file)?, count)
         } else {
@@ -103,12 +94,12 @@ impl CheckArguments {
     }
 
     fn load_scene(&self, common: &Common) -> Result<Checked> {
-        let scene = SceneArgument::new(&self.source).load_world(common)?;
+        let scene = self.scene.load_world(common)?;
         self.untouched.refuse("a scene makes its own baseline")?;
-        scene.world.check_frames("-n", self.frames)?;
-        let model = match &self.model {
+        scene.world.check_frames("-n", self.count.frames)?;
+        let model = match &self.of.model {
             Some(path) => ModelBlob::read(path)?,
-            None => SceneArgument::new(&self.source).load(common)?.train(&Terminal::new())?,
+            None => self.scene.load(common)?.train(&Terminal::new())?,
         };
         let parsed = model.parse();
         let metadata = parsed.metadata();
@@ -127,7 +118,7 @@ impl CheckArguments {
                 scene.name
             )));
         }
-        let path = self.model.as_deref().unwrap_or(Path::new(&self.source));
+        let path = self.of.model.as_deref().unwrap_or(self.scene.path());
         let baseline_ohm = if metadata.relative_inputs && self.untouched.path().is_none() {
             // All frames are of one session, which does not drift.
             let session = Synthesis::new(&scene.world).drift(None);
@@ -135,7 +126,7 @@ impl CheckArguments {
         } else {
             self.baseline_ohm(metadata, path, None)?
         };
-        let readings = synthesise(&scene.world, Stream::Test, self.frames.max(1)).inputs;
+        let readings = synthesise(&scene.world, Stream::Test, self.count.frames.max(1)).inputs;
         let start_us = self.period.even(readings.len(), PERIOD_US);
         let frames = Frames { readings, baseline_ohm, start_us };
         Ok(Checked { frames, model })

@@ -1,7 +1,7 @@
 //! Command `compare`: layouts side by side, by their least possible error, the best decoder, and what both cost.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::sweep::bounds::Bound;
 use crate::sweep::fields::require_known;
@@ -24,6 +24,9 @@ use super::{Common, arguments, command_line, print};
 /// A scene may have lists where a value is expected, such as `pitch_mm = [3, 4, 5]`: it is then as many layouts, all lists
 /// crossed. Of every layout the most accurate of its decoders is chosen, within the bound; of errors that test frames do not tell
 /// apart, the fastest.
+///
+/// -o writes compare.csv, compare.json, a page compare.html and pictures. Each decoder is kept in points/ there as soon as it is
+/// judged: what was stopped goes on.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel compare thin.toml thick.toml
@@ -37,16 +40,15 @@ pub struct Arguments {
     /// Train nothing: the least possible error and the scan alone.
     #[arg(long, conflicts_with_all = ["TrainingOptions", "max_latency_ms"])]
     limit_only: bool,
-    /// Folder that receives compare.csv, compare.json, a page compare.html and pictures. Each decoder is kept in its points/ as
-    /// soon as it is judged: what was stopped goes on.
-    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    to: arguments::OutputFolder,
     #[command(flatten)]
     training: TrainingOptions,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let files = arguments
+        .to
         .output
         .as_ref()
         .map(|folder| Files::of(&folder.join("compare.csv")))
@@ -69,7 +71,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         plan.objectives[0] = format!("{error}_{group}");
     }
     let points = plan.points()?;
-    let merged = match &arguments.output {
+    let merged = match &arguments.to.output {
         Some(folder) => super::sweep::all(&plan, &points, folder)?,
         None => Merged::new(&plan, &points, work::in_memory(&plan, &points, &Terminal::new())?),
     };

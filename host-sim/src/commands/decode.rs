@@ -25,9 +25,9 @@ use super::health::{Health, HealthArguments};
 use super::readings::{model_inputs, related};
 use super::recordings::{self, is_recording};
 use super::rest_argument::UntouchedArguments;
-use super::{Common, print, stderr};
+use super::{Common, arguments, print, stderr};
 
-/// Decode readings from a data file, one line of estimates a line.
+/// Decode readings from a data file to CSV, one line of estimates a line; or to a recording (.mcap), with the readings too.
 ///
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
 /// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --reading-model
@@ -49,9 +49,8 @@ pub struct Arguments {
     model: PathBuf,
     /// CSV file or recording (.mcap) with the model's reading columns, in any order, among others.
     readings: PathBuf,
-    /// CSV file to write, with the model's output columns; or a recording (.mcap), with the readings too.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[command(flatten)]
+    to: arguments::OutputFile,
     /// Columns of the readings' file that are written too, as they stand there, in front of the estimates: the time, say.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     keep: Vec<String>,
@@ -74,8 +73,8 @@ pub struct Arguments {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baseline = arguments.untouched.path().unwrap_or(&arguments.readings);
     let read = [&*arguments.model, &arguments.readings, baseline];
-    print::check_output(&arguments.output, &read)?;
-    if is_recording(&arguments.output) && !arguments.keep.is_empty() {
+    print::check_output(&arguments.to.output, &read)?;
+    if is_recording(&arguments.to.output) && !arguments.keep.is_empty() {
         let message =
             "--keep: a recording has columns of its own; write a CSV file, or leave the option out";
         return Err(Error::Usage(message.into()));
@@ -95,7 +94,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let baselines =
         arguments.untouched.baselines(metadata, &arguments.model, log, fields, limits)?;
     let mut readings = model_inputs(&model, &file)?;
-    let scanned = is_recording(&arguments.output)
+    let scanned = is_recording(&arguments.to.output)
         .then(|| Ok::<_, Error>((clock_us(&file)?, readings.values.clone())))
         .transpose()?;
     let mut health = arguments.health.apply(&model, &mut readings, baselines.as_ref())?;
@@ -122,9 +121,15 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let flags = flags(&model, &readings, &estimate, &health, novelty);
     match scanned {
         Some((start_us, scanned)) => {
-            record(&arguments.output, &blob, (&start_us, &scanned), &estimate, assessed.as_ref())?;
+            record(
+                &arguments.to.output,
+                &blob,
+                (&start_us, &scanned),
+                &estimate,
+                assessed.as_ref(),
+            )?;
         }
-        None => write(&arguments.output, &keep, &estimate, assessed.as_ref(), &flags)?,
+        None => write(&arguments.to.output, &keep, &estimate, assessed.as_ref(), &flags)?,
     }
     let inputs = model.model_inputs(&readings.values);
     let frames = inputs.chunks_exact(readings.names.len());
@@ -143,7 +148,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     result.value("health", &health);
     let novel = assessed.map(|(_, frames)| novel(&frames));
     result.fact("frames_novel", "novel frames, unlike those of training", "", novel);
-    result.fact("file", "file", "", arguments.output.display().to_string());
+    result.fact("file", "file", "", arguments.to.output.display().to_string());
     print::sections(common, &result)
 }
 

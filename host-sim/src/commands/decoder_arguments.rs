@@ -22,6 +22,14 @@ pub struct DecoderArguments {
     pub group: Option<String>,
 }
 
+/// Time of a scan, of which the board's own is known.
+#[derive(Args)]
+pub struct ScanTimeArgument {
+    /// Time in ms of a scan of one sample a reading, which reads rows one after the other [default: what the board's takes].
+    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    pub scan_ms: Option<f64>,
+}
+
 /// Value of `--readout`.
 #[derive(Clone, Copy, ValueEnum)]
 pub enum ReadoutOption {

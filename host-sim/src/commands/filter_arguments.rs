@@ -2,18 +2,19 @@
 
 use crate::{Error, Result};
 use clap::Args;
+use serde::Serialize;
 use taxel_core::filter::Settings;
 use taxel_data::{Clock, DataFile};
 
 /// Options of the filter in time.
-#[derive(Args)]
+#[derive(Args, Serialize)]
 pub struct FilterArguments {
     /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/filter.md).
     #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
-    filter_ms: Option<u32>,
+    pub filter_ms: Option<u32>,
     /// Time in ms by which the filter extrapolates outputs: their age when they are used.
     #[arg(long, value_name = "MS", requires = "filter_ms", value_parser = milliseconds, allow_negative_numbers = true)]
-    lead_ms: Option<u32>,
+    pub lead_ms: Option<u32>,
 }
 
 impl FilterArguments {
@@ -78,7 +79,7 @@ pub fn cycled(start_us: &[u64], frames: usize) -> Vec<u64> {
 }
 
 /// Parser for a time constant or a lead, in µs.
-pub fn milliseconds(text: &str) -> std::result::Result<u32, String> {
+fn milliseconds(text: &str) -> std::result::Result<u32, String> {
     let most_us = f64::from(Settings::MOST_US);
     let us = text.parse::<f64>().ok().map(|ms| ms * 1e3).filter(|us| (0.0..=most_us).contains(us));
     let whole = us.filter(|us| *us == 0.0 || *us >= 1.0).map(|us| us.round() as u32);

@@ -26,6 +26,8 @@ const FILES: FileSet = FileSet {
 /// The least RMSE is that of the posterior mean E[Δ | readings]. It is sampled for a number of test frames, from the
 /// scene's own prior and noise, for ideal readings: a drift of the gain, circuits and time are not modelled. A figure
 /// that the sample does not carry is refused (docs/what-the-sensor-knows.md).
+///
+/// -o writes limit.json, a page limit.html, and its figures/ by themselves; of several scenes, to a folder for each, by its name.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel limit press --row 4 --noise 0.005,0.01 -o out/limit
@@ -47,10 +49,8 @@ pub struct Arguments {
     /// Models of the scenes to judge on the same frames: their errors, and the ratios of these to the limit.
     #[arg(long, value_name = "FILE,…", value_delimiter = ',')]
     model: Vec<PathBuf>,
-    /// Folder that receives limit.json, a page limit.html, and its figures/ by themselves; of several scenes, a folder
-    /// there for each, by its name.
-    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    to: arguments::OutputFolder,
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
@@ -61,7 +61,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return Err(Error::Usage("two scenes have the same name; give each its own".into()));
     }
     let folder_of = |scene: &Experiment| {
-        let folder = arguments.output.as_ref()?;
+        let folder = arguments.to.output.as_ref()?;
         Some(if scenes.len() == 1 { folder.clone() } else { folder.join(&scene.name) })
     };
     let inputs: Vec<&Path> = arguments.scenes.iter().map(Path::new).collect();
@@ -77,7 +77,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         folder_of(&it.scene).map(|folder| written_files(&folder, result))
     });
     Written::put_in_place(written.collect::<Result<_>>()?)?;
-    let folder = arguments.output.as_deref();
+    let folder = arguments.to.output.as_deref();
     if let [result] = &results[..] {
         print::result(common, result, || page_of(&report::of_limit(result), folder, ""))?;
         return refusal(result);

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use crate::Result;
-use clap::{Args, Subcommand, value_parser};
+use clap::{Args, Subcommand};
 use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::check;
 use taxel_rig::device::{Device, DeviceIdentity, serial, upload};
 
 use super::check_arguments::{CheckArguments, Checked, conclude};
+use super::device_arguments::BaudArgument;
 use super::progress::Terminal;
 use super::{Common, interruption, stderr};
 
@@ -19,9 +20,8 @@ use super::{Common, interruption, stderr};
 pub struct Arguments {
     /// Serial port, such as /dev/ttyACM0 or COM3.
     port: String,
-    /// Speed of the line in bits a second.
-    #[arg(long, value_name = "BAUD", default_value_t = NUCLEO_BAUD, value_parser = value_parser!(u32).range(1..))]
-    baud: u32,
+    #[command(flatten)]
+    line: BaudArgument,
     #[command(subcommand)]
     action: Action,
 }
@@ -49,7 +49,9 @@ enum Action {
     /// Confirm the model that `upload --trial` left on trial: it stays active over restarts.
     #[command(after_help = "Example: taxel link /dev/ttyACM0 confirm")]
     Confirm,
-    /// Let the device scan, and save readings or estimates as CSV.
+    /// Let the device scan, and save readings or estimates as CSV; or as a recording (.mcap), with both.
+    ///
+    /// A recording is written while frames come, and survives a kill (docs/live.md).
     #[command(
         after_help = "Example: taxel link /dev/ttyACM0 record press.bin -n 1000 -o estimates.csv"
     )]
@@ -124,7 +126,10 @@ struct UploadArguments {
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let open = || -> Result<_> {
-        let mut device = Device::new(serial::open(&arguments.port, arguments.baud)?)?;
+        let mut device = Device::new(serial::open(
+            &arguments.port,
+            arguments.line.baud.unwrap_or(NUCLEO_BAUD),
+        )?)?;
         device.stop = Some(interruption::flag());
         Ok(device)
     };

@@ -1,6 +1,6 @@
 //! Command `run`: the main job, from scene to blob to report.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::progress::Terminal;
 use crate::Result;
@@ -16,7 +16,6 @@ use super::format_note::note_format;
 use super::subject_argument::SubjectArgument;
 use super::{Common, arguments, command_line, print, refused_readings, stderr};
 
-const DEFAULT_OUTPUT: &str = "out";
 /// All files that a run may write.
 const FILES: FileSet = FileSet {
     files: &["model.bin", "metrics.json", "table1.csv", "report.html"],
@@ -38,30 +37,24 @@ const FILES: FileSet = FileSet {
 
 /// Do the whole job for a scene or a CSV file: train, write the blob, evaluate, report.
 ///
-/// Writes model.bin, metrics.json, table1.csv, report.html and its figures/ to `out/<name>/`, all together at the end;
+/// Writes model.bin, metrics.json, table1.csv, report.html and its figures/ to `out/<name>/` (-o: `DIR/<name>/`), all together at
+/// the end;
 /// those of an earlier run go. Frames of a scene are synthesised. Of a CSV file, the last fifth is held out to judge by.
-#[derive(Args)]
+#[derive(Args, Default)]
 #[command(after_help = "Examples:
   taxel run press --noise 0.01 -o out/noise-1
   taxel run measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column fold")]
 pub struct Arguments {
-    /// Folder that receives a folder named after the scene.
-    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = DEFAULT_OUTPUT)]
-    output: PathBuf,
+    #[command(flatten)]
+    to: arguments::OutputFolder,
     #[command(flatten)]
     subject: SubjectArgument,
-}
-
-impl Default for Arguments {
-    fn default() -> Self {
-        Self { subject: SubjectArgument::default(), output: DEFAULT_OUTPUT.into() }
-    }
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let subject = arguments.subject.load(common)?;
     let options = subject.options();
-    let folder = arguments.output.join(subject.name());
+    let folder = arguments.to.in_out().join(subject.name());
     FILES.check(&folder, &arguments.subject.paths())?;
     refused_readings::note_scene(&subject);
     run_into(&folder, &subject, &options, common)

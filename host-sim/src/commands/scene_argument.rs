@@ -1,6 +1,6 @@
 //! Scene argument, and the overrides that commands share.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::experiment::Experiment;
 use crate::{Error, Result};
@@ -16,7 +16,8 @@ pub const DEFAULT_SCENE: &str = "press";
 /// Scene, with the settings that are changed in it.
 #[derive(Args)]
 pub struct SceneArgument {
-    /// A built-in scene (paper, press, contact, moving) or the path of a scene file.
+    /// A built-in scene (paper, press, contact, moving) or the path of a scene file. A check also takes a CSV file with the
+    /// readings of --model.
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
 }
@@ -47,6 +48,11 @@ impl SceneArgument {
         Ok(scene)
     }
 
+    /// Scene, or the path of what is there in its place.
+    pub fn name(&self) -> &str {
+        &self.scene
+    }
+
     /// Path of the scene, as an input that must not be replaced.
     pub fn path(&self) -> &Path {
         Path::new(&self.scene)
@@ -71,6 +77,43 @@ pub fn group_of_scene(scene: &Experiment, group: &str) -> Result<()> {
         return Ok(());
     }
     Err(Error::Usage(format!("--group {group}: the scene has {}", groups.join(", "))))
+}
+
+/// Number of frames of a command that draws or repeats them.
+#[derive(Args)]
+pub struct FramesArgument {
+    /// Frames to synthesise; lines of a CSV file are repeated.
+    #[arg(
+        short = 'n',
+        long,
+        value_name = "N",
+        default_value_t = 1000,
+        allow_negative_numbers = true
+    )]
+    pub frames: usize,
+}
+
+/// Frames a second.
+#[derive(Args)]
+pub struct FrameRateArgument {
+    /// Frames a second. `synth` gives frames of moving contacts or of the untouched sensor a time by it [default of moving
+    /// contacts: as many as the board scans]; `view` shows so many of a simulation or a data file [default: 100, or what the
+    /// file's times tell].
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    pub frame_rate: Option<f64>,
+}
+
+fn rate(text: &str) -> std::result::Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (0.01..=10_000.0).contains(rate));
+    rate.ok_or_else(|| "give frames a second from 0.01 to 10000".into())
+}
+
+/// Model that decodes.
+#[derive(Args)]
+pub struct ModelArgument {
+    /// Weight blob. It names what a device decodes, and decodes what nobody has decoded; a scene without one trains its own.
+    #[arg(long, value_name = "BLOB")]
+    pub model: Option<PathBuf>,
 }
 
 /// Noise level instead of the scene's.

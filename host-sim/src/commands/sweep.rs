@@ -22,10 +22,12 @@ mod estimate;
 ///
 /// A plan (docs/sweeps.md) has a scene and axes. Every point becomes a file in DIR/points, which is whole or not there. What is
 /// there already is not computed again, so a sweep that was stopped goes on. When all points are there, results.csv,
-/// results.json, results.html and two pictures are written to DIR.
+/// results.json, results.html and two pictures are written to DIR, which is out/NAME after the plan's name unless -o says
+/// otherwise.
 ///
 /// On a cluster, every machine computes a shard (--shard, or --shards in an array of Slurm or HyperQueue, or in GNU parallel),
-/// and --merge reads what all of them wrote. Results do not depend on how the plan was cut.
+/// and --merge reads what all of them wrote; -o is then the file for the table of results (.csv), beside which the others are
+/// written. Results do not depend on how the plan was cut.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel sweep cluster/plans/small.toml
@@ -36,10 +38,8 @@ mod estimate;
 pub struct Arguments {
     /// Plan (.toml).
     plan: PathBuf,
-    /// Folder of the sweep [default: out/NAME, after the plan's name]; with --merge the file for the table of results
-    /// (.csv), beside which the others are written [default: results.csv in the folder].
-    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder())]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    to: arguments::OutputFolder,
     /// Print identity and fields of every point, and compute nothing.
     #[arg(long, conflicts_with_all = ["merge", "dry_run", "output"])]
     list: bool,
@@ -72,14 +72,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         return estimate::execute(&plan, &points, common);
     }
     if let Some(folder) = &arguments.merge {
-        let table = arguments.output.clone().unwrap_or_else(|| folder.join(RESULTS));
+        let table = arguments.to.output.clone().unwrap_or_else(|| folder.join(RESULTS));
         return merge(&plan, &points, folder, &table, arguments, common);
     }
     let shard = schedule::shard(arguments.shard, arguments.shards)?;
     if arguments.list {
         return list(&plan, &points, shard, common);
     }
-    let folder = arguments.output.clone().unwrap_or_else(|| Path::new("out").join(&plan.name));
+    let folder = arguments.to.output.clone().unwrap_or_else(|| Path::new("out").join(&plan.name));
     let table = folder.join(RESULTS);
     if shard.is_none() {
         Files::of(&table)?.check(&[&arguments.plan])?;

@@ -1,7 +1,5 @@
 //! Command `synth`: frames of a scene as CSV.
 
-use std::path::PathBuf;
-
 use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
@@ -11,16 +9,18 @@ use taxel_recording::{Extras, Frame};
 use taxel_simulate::Synthesis;
 use taxel_simulate::timetable::Timetable;
 
+use super::decoder_arguments::ScanTimeArgument;
 use super::recordings::{self, is_recording};
-use super::scene_argument::{NoiseArgument, SceneArgument};
-use super::{Common, print, stderr};
+use super::scene_argument::{FrameRateArgument, FramesArgument, NoiseArgument, SceneArgument};
+use super::{Common, arguments, print, stderr};
 use crate::device::{Device, Wires};
 use crate::experiment::Experiment;
 use crate::live::replay::USUAL_RATE;
 use crate::live::sheet;
 use crate::report::Sections;
 
-/// Synthesise frames of a scene as CSV: noisy readings, true outputs.
+/// Synthesise frames of a scene as CSV: noisy readings, then true outputs, one frame a line; or as a recording (.mcap,
+/// docs/live.md).
 ///
 /// A scene whose contacts move (`[motion]`) is written as a log: time_s and trajectory come first, and each row is read at its
 /// own time, as the board scans. A second lies between two trajectories, so that a filter starts anew with each.
@@ -37,28 +37,23 @@ pub struct Arguments {
     scene: SceneArgument,
     #[command(flatten)]
     noise: NoiseArgument,
-    /// Frames to synthesise.
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 1000)]
-    frames: usize,
+    #[command(flatten)]
+    count: FramesArgument,
     /// Leave the sensor untouched: frames of which a baseline is made.
     #[arg(long)]
     untouched: bool,
     /// Write still contacts of a scene whose contacts move: what its model is trained on.
     #[arg(long)]
     still: bool,
-    /// Scan so many frames a second, which gives the frames a time: of moving contacts, or of the untouched sensor
-    /// [default of moving contacts: as many as the board scans].
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
-    frame_rate: Option<f64>,
-    /// Time of a scan in ms, in which rows are read one after the other [default: what the board's takes].
-    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
-    scan_ms: Option<f64>,
+    #[command(flatten)]
+    rate: FrameRateArgument,
+    #[command(flatten)]
+    scan: ScanTimeArgument,
     /// Multiply all readings by this, as a sensor does whose gain has drifted: 1.02 is 2 % more.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
-    /// CSV file to write: readings, then outputs, one frame a line; or a recording (.mcap, docs/live.md).
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[command(flatten)]
+    to: arguments::OutputFile,
 }
 
 /// Time between the end of a trajectory and the start of the next one in s.
@@ -68,22 +63,21 @@ impl Arguments {
     /// Times of the scans of a trajectory, if the frames follow one another in time.
     fn timetable(&self, scene: &Experiment) -> Result<Option<Timetable>> {
         let path = scene.world.path.as_ref().filter(|_| !self.still && !self.untouched);
-        if path.is_none() && (!self.untouched || self.frame_rate.is_none()) {
-            if self.frame_rate.is_some() || self.scan_ms.is_some() {
+        if path.is_none() && (!self.untouched || self.rate.frame_rate.is_none()) {
+            if self.rate.frame_rate.is_some() || self.scan.scan_ms.is_some() {
                 let message = "--frame-rate and --scan-ms give frames a time, and still frames have none: take a scene with \
                                [motion], or --untouched with --frame-rate";
                 return Err(Error::Usage(message.into()));
             }
             return Ok(None);
         }
-        for (option, value) in [("--frame-rate", self.frame_rate), ("--scan-ms", self.scan_ms)] {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(Error::Usage(format!("{option} {value}: give a positive number")));
-            }
+        let not_positive = |ms: &f64| !(ms.is_finite() && *ms > 0.0);
+        if let Some(ms) = self.scan.scan_ms.filter(not_positive) {
+            return Err(Error::Usage(format!("--scan-ms {ms}: give a positive number")));
         }
-        let device = Device { scan_ms: self.scan_ms, ..Device::default() };
+        let device = Device { scan_ms: self.scan.scan_ms, ..Device::default() };
         let scan_s = device.scan_ms(Some(Wires::of(&scene.world)), 1).unwrap_or_default() / 1000.0;
-        let period_s = self.frame_rate.map_or(scan_s, |rate| 1.0 / rate);
+        let period_s = self.rate.frame_rate.map_or(scan_s, |rate| 1.0 / rate);
         if period_s < scan_s * (1.0 - 1e-9) {
             let most = 1.0 / scan_s;
             let message = format!(
@@ -93,7 +87,7 @@ impl Arguments {
             );
             return Err(Error::Usage(message));
         }
-        let frames = self.frames as f64;
+        let frames = self.count.frames as f64;
         let duration_s = path.map_or(frames * period_s, |path| path.duration_s);
         Ok(Some(Timetable::every(period_s, scan_s, duration_s)?))
     }
@@ -102,8 +96,8 @@ impl Arguments {
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut scene = arguments.scene.load_world(common)?;
     arguments.noise.apply(&mut scene)?;
-    scene.world.check_frames("-n", arguments.frames)?;
-    print::check_output(&arguments.output, &[arguments.scene.path()])?;
+    scene.world.check_frames("-n", arguments.count.frames)?;
+    print::check_output(&arguments.to.output, &[arguments.scene.path()])?;
     if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
         let message = format!("--scale {}: give a positive number, such as 1.02", arguments.scale);
         return Err(Error::Usage(message));
@@ -120,16 +114,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             None => synthesis.timed(timetable.clone()),
         };
     }
-    let mut dataset = synthesis.frames(Stream::Training, arguments.frames);
+    let mut dataset = synthesis.frames(Stream::Training, arguments.count.frames);
     dataset.inputs.values.iter_mut().for_each(|reading| *reading *= arguments.scale);
-    if is_recording(&arguments.output) {
+    if is_recording(&arguments.to.output) {
         return recorded(arguments, &scene, &dataset, timetable.as_ref(), common);
     }
     let names = dataset.inputs.names.iter().chain(&dataset.outputs.names).map(String::as_str);
     let lines = dataset.inputs.lines().zip(dataset.outputs.lines());
     let lines = lines.map(|(readings, outputs)| readings.iter().chain(outputs).copied());
     match &timetable {
-        None => csv_file::write(&arguments.output, names, lines)?,
+        None => csv_file::write(&arguments.to.output, names, lines)?,
         Some(timetable) => {
             let names = ["time_s", "trajectory"].into_iter().chain(names);
             let duration_s = scene.world.path.as_ref().map_or(0.0, |path| path.duration_s);
@@ -141,7 +135,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             };
             let lines =
                 lines.enumerate().map(|(frame, line)| of_frame(frame).into_iter().chain(line));
-            csv_file::write(&arguments.output, names, lines)?;
+            csv_file::write(&arguments.to.output, names, lines)?;
         }
     }
     conclude(arguments, &scene, &dataset, common)
@@ -182,7 +176,7 @@ fn recorded(
             ..Frame::default()
         }
     });
-    recordings::write(&arguments.output, &layout, &extras, frames)?;
+    recordings::write(&arguments.to.output, &layout, &extras, frames)?;
     conclude(arguments, scene, dataset, common)
 }
 
@@ -202,6 +196,6 @@ fn conclude(
     result.fact("readings", "readings of a frame", "", dataset.inputs.names.len());
     result.fact("outputs", "outputs of a frame", "", dataset.outputs.names.len());
     result.fact("seed", "seed", "", scene.world.seed);
-    result.fact("file", "file", "", arguments.output.display().to_string());
+    result.fact("file", "file", "", arguments.to.output.display().to_string());
     print::sections(common, &result)
 }

@@ -1,7 +1,6 @@
 //! Command `trade`: speed against accuracy, every setting measured.
 
 use std::cmp::Ordering;
-use std::path::PathBuf;
 
 use crate::device::{BOARD_CLOCK_MHZ, Device, Wires};
 use crate::measurements::Measurements;
@@ -19,7 +18,7 @@ use taxel_data::{BadValue, columns};
 use taxel_learn::Options;
 
 use super::arguments::{self, of_option};
-use super::decoder_arguments::DecoderArguments;
+use super::decoder_arguments::{DecoderArguments, ScanTimeArgument};
 use super::subject_argument::SubjectArgument;
 use super::{Common, command_line, print, stderr, sweep};
 
@@ -31,8 +30,8 @@ mod files;
 /// that move filter in time. Marks the Pareto front of error and time from the start of a scan to its
 /// estimate, and chooses the best point within your bounds.
 ///
-/// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/`, and with a bound chosen.bin, all together
-/// at the end; those of an earlier trade go. Each point is kept in points/ as soon as it is done: a trade that was stopped
+/// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/` (-o: `DIR/<scene>/`), and with a bound
+/// chosen.bin, all together at the end; those of an earlier trade go. Each point is kept in points/ as soon as it is done: a trade that was stopped
 /// goes on, and another choice among the same points takes seconds.
 ///
 /// The time of a point is that of its scan, by the plan of the board's firmware for either readout (docs/board.md), and
@@ -49,9 +48,8 @@ mod files;
   taxel trade press --plan > plan.toml
   taxel trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {
-    /// Folder that receives a folder named after the scene or the CSV file.
-    #[arg(short, long, value_name = "DIR", value_parser = arguments::folder(), default_value = "out")]
-    output: PathBuf,
+    #[command(flatten)]
+    to: arguments::OutputFolder,
     #[command(flatten)]
     tried: DecoderArguments,
     /// Columns of a scene to read, to try: every, every 2nd and so on. Fewer make the scan shorter [default: 1,2,3,6
@@ -74,9 +72,8 @@ pub struct Arguments {
     /// Clock of the device.
     #[arg(long, value_name = "MHZ", default_value_t = BOARD_CLOCK_MHZ, allow_negative_numbers = true)]
     clock_mhz: f64,
-    /// Time of a scan in ms with one sample a reading, instead of that of the board's readout.
-    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
-    scan_ms: Option<f64>,
+    #[command(flatten)]
+    scan: ScanTimeArgument,
     /// Determine front and choice by the largest error of the scene's own contacts and those that it was not trained on.
     #[arg(long)]
     worst_case: bool,
@@ -111,7 +108,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if arguments.plan {
         return print::show(&arguments.subject.plan_text(subject.name(), &wanted)?);
     }
-    let folder = arguments.output.join(subject.name());
+    let folder = arguments.to.in_out().join(subject.name());
     files::FILES.check(&folder, &arguments.subject.paths())?;
     let base = match &subject {
         Subject::Scene(_) => Base::of_scene(subject.name(), arguments.subject.source())?,
@@ -215,7 +212,7 @@ fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked> {
     let device = Device {
         clock_mhz: arguments.clock_mhz,
         readout: arguments.tried.readout.into(),
-        scan_ms: arguments.scan_ms,
+        scan_ms: arguments.scan.scan_ms,
     };
     device.check().map_err(of_option)?;
     let asked = Asked {
@@ -314,7 +311,7 @@ fn column_steps(arguments: &Arguments, subject: &Subject) -> Result<Vec<usize>> 
     let time_matters = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
     match subject {
         _ if !arguments.column_step.is_empty() => distinct("--column-step", &arguments.column_step),
-        Subject::Scene(scene) if time_matters && arguments.scan_ms.is_none() => {
+        Subject::Scene(scene) if time_matters && arguments.scan.scan_ms.is_none() => {
             let columns = scene.world.sensor.column_wires;
             Ok([1, 2, 3, 6].into_iter().filter(|step| columns.is_multiple_of(*step)).collect())
         }

@@ -1,6 +1,6 @@
 //! Command `train`: from a scene or any CSV file to a weight blob.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::progress::Terminal;
 use crate::evaluate::device_cost::DeviceCost;
@@ -24,7 +24,7 @@ use super::data_argument::JudgedBy;
 use super::format_note::note_format;
 use super::model_outputs::{self, ModelOutput};
 use super::subject_argument::SubjectOptions;
-use super::{Common, print, refused_readings};
+use super::{Common, arguments, print, refused_readings};
 
 mod choice;
 
@@ -44,9 +44,8 @@ mod choice;
 pub struct Arguments {
     /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a data file (CSV, .mcap).
     source: String,
-    /// Blob to write.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[command(flatten)]
+    to: arguments::OutputFile,
     /// Choose K, spread and penalty among the candidates by cross-validation, and print every score. Best values at
     /// an edge of default spreads and penalties are looked beyond; other edges are named.
     #[arg(long)]
@@ -59,7 +58,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let source = Path::new(&arguments.source);
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
     let inputs = [source, baseline];
-    print::check_output(&arguments.output, &inputs)?;
+    print::check_output(&arguments.to.output, &inputs)?;
     let subject = load(arguments, common)?;
     refused_readings::note_scene(&subject);
     let mut options = subject.options();
@@ -73,13 +72,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
     let progress = Terminal::new();
     let blob = set.blob(&options, &progress)?;
-    output::write_bytes(&arguments.output, blob.bytes())?;
+    output::write_bytes(&arguments.to.output, blob.bytes())?;
 
     note_format(&blob.parse(), &options, DeviceCost::new(&blob).cycles);
     let trained = Trained { subject: &subject, set: &set, options: &options, blob: &blob };
     print::sections(
         common,
-        &trained.sections(&arguments.output, features.as_ref(), selection.as_ref()),
+        &trained.sections(&arguments.to.output, features.as_ref(), selection.as_ref()),
     )
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{self, Stdio};
 use std::sync::mpsc::Receiver;
 
-use clap::{Args, ValueEnum, value_parser};
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use taxel_data::Clock;
 use taxel_firmware::timing::NUCLEO_BAUD;
@@ -16,7 +16,8 @@ use taxel_view::{Command, View};
 
 use super::arguments::refuse;
 use super::data_file::DataFileArguments;
-use super::scene_argument::DEFAULT_SCENE;
+use super::device_arguments::{BaudArgument, ScanPeriodArgument};
+use super::scene_argument::{DEFAULT_SCENE, FrameRateArgument, ModelArgument};
 use super::{Common, interruption, print, recordings, stderr};
 use crate::experiment::{Experiment, names_a_scene};
 use crate::live::device::{DeviceFeed, Line, Protocol};
@@ -49,15 +50,12 @@ pub struct Arguments {
     /// A serial port, a scene (press, contact, moving, or a scene file), a recording (.mcap), or a data file of readings [default:
     /// the only port of USB, or else the scene press].
     source: Option<String>,
-    /// Weight blob. It names what a device decodes, and decodes what nobody has decoded. A scene without it trains a small
-    /// one.
-    #[arg(long, value_name = "BLOB")]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    of: ModelArgument,
     #[command(flatten)]
     port: PortArguments,
-    /// Frames a second, of a simulation or of a data file [default: 100, or what the file's times tell].
-    #[arg(long, value_name = "HZ", value_parser = rate)]
-    frame_rate: Option<f64>,
+    #[command(flatten)]
+    rate: FrameRateArgument,
     /// Port of the page [default: a free one].
     #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
     http_port: u16,
@@ -78,15 +76,15 @@ struct PortArguments {
     /// How a sensor on a serial port tells its readings [default: taxel].
     #[arg(long, value_enum, value_name = "NAME")]
     protocol: Option<SerialProtocol>,
-    /// Speed of the line in bits a second [default: the board's; 2000000 of flexitac].
-    #[arg(long, value_name = "BAUD", value_parser = value_parser!(u32).range(1..))]
-    baud: Option<u32>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    line: BaudArgument,
     /// Rows and columns of a sensor that does not tell them, such as 16x32 [default of flexitac: 16x32].
     #[arg(long, value_name = "ROWSxCOLUMNS", value_parser = shape)]
     shape: Option<[usize; 2]>,
-    /// Time from one scan of a device to the next [default: the device's own].
-    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(100..=1_000_000_000))]
-    period_us: Option<u32>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    period: ScanPeriodArgument,
 }
 
 /// How a sensor on a serial port tells its readings.
@@ -108,11 +106,6 @@ fn shape(text: &str) -> std::result::Result<[usize; 2], String> {
     }
 }
 
-fn rate(text: &str) -> std::result::Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate| (0.01..=10_000.0).contains(rate));
-    rate.ok_or_else(|| "give frames a second from 0.01 to 10000".into())
-}
-
 /// What is watched.
 enum Source {
     Port(String),
@@ -122,7 +115,7 @@ enum Source {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
-    let blob = arguments.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
+    let blob = arguments.of.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
     let source = source(arguments)?;
     check_options(arguments, &source)?;
     let view = View::start(arguments.http_port, arguments.token.as_deref());
@@ -145,10 +138,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let usual = (protocol == Protocol::Flexitac).then_some(FLEXITAC_SHAPE);
             let line = Line {
                 port,
-                baud: arguments.port.baud.unwrap_or(usual_baud),
+                baud: arguments.port.line.baud.unwrap_or(usual_baud),
                 protocol,
                 shape: arguments.port.shape.or(usual),
-                period_us: arguments.port.period_us,
+                period_us: arguments.port.period.period_us,
             };
             let mut feed = DeviceFeed::open(line, blob.as_ref())?;
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
@@ -162,7 +155,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
                 stderr::remark("training a small model; --model takes a better one …");
                 simulation::small_model(&scene)?
             };
-            let rate = arguments.frame_rate.unwrap_or(SIMULATED_RATE);
+            let rate = arguments.rate.frame_rate.unwrap_or(SIMULATED_RATE);
             let mut feed = SimulationFeed::new(&scene, &blob, rate)?;
             let text = Experiment::text(&name)?.into_owned();
             show(
@@ -186,7 +179,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
                     "note: {why}; frames follow one another {USUAL_RATE} times a second, or by --frame-rate"
                 ));
             }
-            let mut feed = ReplayFeed::of_data(file, blob.as_ref(), &clock, arguments.frame_rate)?;
+            let mut feed =
+                ReplayFeed::of_data(file, blob.as_ref(), &clock, arguments.rate.frame_rate)?;
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
         }
     }
@@ -194,6 +188,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// Error for an option that has no effect on such a source.
 fn check_options(arguments: &Arguments, source: &Source) -> Result<()> {
+    arguments.port.period.check()?;
     if !matches!(source, Source::Port(_)) {
         refuse(
             &arguments.port,
@@ -202,7 +197,7 @@ fn check_options(arguments: &Arguments, source: &Source) -> Result<()> {
         )?;
     }
     let has_rate = matches!(source, Source::Scene(_) | Source::Data(_));
-    if arguments.frame_rate.is_some() && !has_rate {
+    if arguments.rate.frame_rate.is_some() && !has_rate {
         let message = "--frame-rate is for a simulation or a data file: leave it out";
         return Err(Error::Usage(message.into()));
     }

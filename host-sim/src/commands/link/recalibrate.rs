@@ -38,7 +38,7 @@ pub struct Arguments {
 }
 
 pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> Result<()> {
-    arguments.scan.check()?;
+    arguments.scan.timing.period.check()?;
     if let Some(path) = &arguments.output {
         let read = [&arguments.model, &arguments.presses].map(PathBuf::as_path);
         let baseline = arguments.baseline.baseline.as_deref();

@@ -6,7 +6,7 @@ use crate::live::recorder::{Beside, Recorder};
 use crate::live::sheet;
 use crate::report::Sections;
 use crate::{Error, Result};
-use clap::{Args, value_parser};
+use clap::Args;
 use taxel_core::blob::Model;
 use taxel_data::{Table, csv_file};
 use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request, Setting};
@@ -14,14 +14,15 @@ use taxel_learn::ModelBlob;
 use taxel_rig::device::{Device, DeviceIdentity};
 use taxel_rig::scans::ScanEstimate;
 
-use super::super::filter_arguments::FilterArguments;
+use super::super::arguments::refuse;
 use super::super::health::note_faults;
 use super::super::recordings::is_recording;
-use super::super::{Common, print};
+use super::super::scene_argument::ModelArgument;
+use super::super::{Common, arguments, print};
 use super::frames::{hear_scans, missing, values};
 use super::scan::{
-    Confidence, ScanArguments, Wanted, check_length, configure, patience, patience_for_next,
-    reading_names,
+    Confidence, ReportArguments, ScanArguments, Wanted, check_length, configure, patience,
+    patience_for_next, reading_names,
 };
 
 #[derive(Args)]
@@ -32,7 +33,7 @@ pub struct RecordArguments {
     #[arg(long, requires = "model")]
     recalibrated: bool,
     /// Save the readings that MODEL takes, not its estimates.
-    #[arg(long, requires = "model", conflicts_with = "confidence")]
+    #[arg(long, requires = "model")]
     readings: bool,
     #[command(flatten)]
     scan: ScanArguments,
@@ -40,30 +41,19 @@ pub struct RecordArguments {
     #[arg(long)]
     time: bool,
     #[command(flatten)]
-    filter: FilterArguments,
-    /// Scans of which one is saved; all are decoded and filtered.
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "model", conflicts_with = "readings", value_parser = value_parser!(u16).range(1..))]
-    report_every: u16,
-    /// What is saved of the MODEL's confidence: columns NAME_deviation for each output, and novelty_nats
-    /// (docs/reading-model.md).
-    #[arg(long, value_enum, value_name = "WHAT", default_value = "nothing", requires = "model")]
-    confidence: Confidence,
-    /// CSV file to write; or a recording (.mcap), with readings and estimates, which is written while they come and survives a
-    /// kill (docs/live.md).
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    reports: ReportArguments,
+    #[command(flatten)]
+    to: arguments::OutputFile,
 }
 
 #[derive(Args)]
 pub struct BaselineArguments {
     #[command(flatten)]
     scan: ScanArguments,
-    /// The model that is active, if it takes some of the readings: its blob tells their names.
-    #[arg(long, value_name = "BLOB")]
-    model: Option<PathBuf>,
-    /// CSV file to write.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[command(flatten)]
+    of: ModelArgument,
+    #[command(flatten)]
+    to: arguments::OutputFile,
 }
 
 /// Share of the frames that were asked for below which the device misses some.
@@ -71,15 +61,15 @@ const MISSED: f64 = 0.98;
 
 /// Checks before long work that the options go together, and that the file can be written.
 fn check_usage(action: &RecordArguments) -> Result<()> {
-    action.scan.check()?;
+    action.scan.timing.period.check()?;
     let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
-    if is_recording(&action.output) {
+    if is_recording(&action.to.output) {
         if action.time {
             let message = "-o: a recording has the times of all scans; leave --time out";
             return Err(Error::Usage(message.into()));
         }
     } else {
-        print::check_output(&action.output, &inputs)?;
+        print::check_output(&action.to.output, &inputs)?;
     }
     Ok(())
 }
@@ -102,31 +92,39 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
         Some(model) if !action.readings => {
             let names = model.metadata().output_names.iter().map(String::from).collect();
             let wanted =
-                if is_recording(&action.output) { Wanted::Both } else { Wanted::Estimates };
+                if is_recording(&action.to.output) { Wanted::Both } else { Wanted::Estimates };
             (wanted, names)
         }
         _ => (Wanted::Readings, reading_names(&identity, model.as_ref())?),
     };
+    if wanted == Wanted::Readings {
+        refuse(
+            &action.reports,
+            |_| true,
+            |option| {
+                format!(
+                    "{option} is of estimates, and readings are saved: name the MODEL, without --readings"
+                )
+            },
+        )?;
+    }
+    let confidence = action.reports.confidence.unwrap_or(Confidence::Nothing);
     let outputs = names.len();
     if let Some(model) = &model {
-        names.extend(confidence_names(model, action.confidence, &names)?);
+        names.extend(confidence_names(model, confidence, &names)?);
     }
-    let every = action.report_every;
+    let every = action.reports.report_every.unwrap_or(1);
     let patience = patience_for_next(&action.scan, &identity, every);
-    let filter = action.filter.settings();
-    if filter.is_on() && wanted == Wanted::Readings {
-        let message = "--filter-ms filters estimates, and readings are saved: name the MODEL, without --readings";
-        return Err(Error::Usage(message.into()));
-    }
+    let filter = action.reports.filter.settings();
     let decoding = Configuration {
-        confidence: action.confidence.into(),
+        confidence: confidence.into(),
         filter_time_constant_us: filter.time_constant_us,
         filter_lead_us: filter.lead_us,
         report_every: every,
         ..Configuration::DEFAULT
     };
-    let mut recorder = is_recording(&action.output)
-        .then(|| recorder(&action.output, &identity, &names[..outputs], blob))
+    let mut recorder = is_recording(&action.to.output)
+        .then(|| recorder(&action.to.output, &identity, &names[..outputs], blob))
         .transpose()?;
     let scans = device.while_paused(|device| -> Result<_> {
         configure(device, &action.scan, wanted, decoding)?;
@@ -150,7 +148,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let header = time.into_iter().chain(names.iter().map(String::as_str));
     match recorder {
         Some(recorder) => drop(recorder.finish()?),
-        None => csv_file::write(&action.output, header, lines)?,
+        None => csv_file::write(&action.to.output, header, lines)?,
     }
     let ends = scans.last().zip(scans.first());
     let steps = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number));
@@ -161,7 +159,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let is_novel = |it: &&ScanEstimate| it.flags & EstimateReport::NOVEL != 0;
     let frames_novel = estimates.filter(is_novel).count();
     let saved = Saved { frames: scans.len(), frames_per_s, frames_lost, missing, frames_novel };
-    saved.print((&action.output, action.scan.period_us()), common)
+    saved.print((&action.to.output, action.scan.period_us()), common)
 }
 
 /// A recording of what a device sends: of the model in `blob`, or of all its readings, called `names`.
@@ -220,11 +218,11 @@ fn confidence_names(
 }
 
 pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common) -> Result<()> {
-    action.scan.check()?;
-    let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
-    print::check_output(&action.output, &inputs)?;
+    action.scan.timing.period.check()?;
+    let inputs: Vec<&Path> = action.of.model.iter().map(PathBuf::as_path).collect();
+    print::check_output(&action.to.output, &inputs)?;
     let identity = device.identify()?;
-    let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
+    let model = action.of.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
     let model = model.as_ref().map(ModelBlob::parse);
     if let Some(model) = &model {
         check_active(model, identity.is_made_of(model), &identity)?;
@@ -247,7 +245,7 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
     let values_missing = missing(readings.iter(), Wanted::Readings)?;
     device.keep(Setting::Baseline)?;
     let lines = std::iter::once(readings.iter().copied());
-    csv_file::write(&action.output, names.iter().map(String::as_str), lines)?;
+    csv_file::write(&action.to.output, names.iter().map(String::as_str), lines)?;
     let saved = Saved {
         frames: frames.into(),
         frames_per_s: None,
@@ -255,7 +253,7 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
         missing: values_missing,
         frames_novel: 0,
     };
-    saved.print((&action.output, action.scan.period_us()), common)
+    saved.print((&action.to.output, action.scan.period_us()), common)
 }
 
 /// Frames that were saved.

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::{Error, Result};
 use clap::{Args, ValueEnum, value_parser};
+use serde::Serialize;
 use taxel_core::Wires;
 use taxel_core::blob::Model;
 use taxel_firmware::link::message::{ConfidenceSent, Configuration};
@@ -11,21 +12,23 @@ use taxel_firmware::timing::ScanPlan;
 use taxel_rig::device::{Device, DeviceIdentity};
 use taxel_rig::scans::Sent;
 
+use super::super::device_arguments::ScanPeriodArgument;
+use super::super::filter_arguments::FilterArguments;
+
 #[derive(Args)]
 pub struct ScanArguments {
     /// Frames to scan.
     #[arg(short = 'n', long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u16).range(1..), allow_negative_numbers = true)]
     pub frames: u16,
     #[command(flatten)]
-    timing: TimingArguments,
+    pub timing: TimingArguments,
 }
 
 /// Times of a scan, where they are not the ones that hold already.
 #[derive(Args)]
 pub struct TimingArguments {
-    /// Time from one scan to the next.
-    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=1_000_000_000), allow_negative_numbers = true)]
-    period_us: Option<u32>,
+    #[command(flatten)]
+    pub period: ScanPeriodArgument,
     /// Wait after a row is driven.
     #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=10_000), allow_negative_numbers = true)]
     settling_us: Option<u32>,
@@ -37,24 +40,29 @@ pub struct TimingArguments {
 impl TimingArguments {
     /// This configuration with the times that are given.
     pub fn over(&self, mut c: Configuration) -> Configuration {
-        c.frame_period_us = self.period_us.unwrap_or(c.frame_period_us);
+        c.frame_period_us = self.period.period_us.unwrap_or(c.frame_period_us);
         c.scan.settling_us = self.settling_us.unwrap_or(c.scan.settling_us);
         c.scan.oversampling = self.oversampling.unwrap_or(c.scan.oversampling);
         c
     }
 }
 
-impl ScanArguments {
-    /// Error for a period with which no frames come.
-    pub fn check(&self) -> Result<()> {
-        match self.timing.period_us {
-            Some(period_us @ ..100) => {
-                Err(Error::Usage(format!("--period-us {period_us}: give at least 100")))
-            }
-            _ => Ok(()),
-        }
-    }
+/// What is computed of each estimate, and how many are sent.
+#[derive(Args, Serialize)]
+pub struct ReportArguments {
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub filter: FilterArguments,
+    /// Scans of which one is reported, with its estimate and its faults; all are decoded and filtered.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
+    pub report_every: Option<u16>,
+    /// What is computed and sent of the model's confidence with each estimate: columns NAME_deviation for each output, and
+    /// novelty_nats (docs/reading-model.md).
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub confidence: Option<Confidence>,
+}
 
+impl ScanArguments {
     /// Time from one scan to the next that is asked for.
     pub fn period_us(&self) -> u32 {
         self.timing.over(Configuration::DEFAULT).frame_period_us
@@ -81,7 +89,7 @@ impl Wanted {
 }
 
 /// Part of a model's confidence that a device is to send with each estimate.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
 pub enum Confidence {
     /// Nothing, and nothing is computed.
     Nothing,

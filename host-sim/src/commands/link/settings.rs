@@ -2,13 +2,12 @@
 
 use crate::Result;
 use crate::report::Sections;
-use clap::{Args, ValueEnum, value_parser};
+use clap::{Args, ValueEnum};
 use taxel_firmware::link::message::{ConfidenceSent, Configuration, Setting};
 use taxel_rig::device::{CircuitConstants, Device};
 
-use super::super::filter_arguments::milliseconds;
 use super::super::{Common, print};
-use super::scan::{Confidence, TimingArguments, Wanted};
+use super::scan::{ReportArguments, TimingArguments, Wanted};
 
 #[derive(Args)]
 #[command(arg_required_else_help = true)]
@@ -18,9 +17,6 @@ pub struct ConfigureArguments {
     /// Reports that are sent of each scan.
     #[arg(long, value_enum, value_name = "WHAT")]
     send: Option<Wanted>,
-    /// What is computed and sent of the model's confidence with each estimate (docs/reading-model.md).
-    #[arg(long, value_enum, value_name = "WHAT")]
-    confidence: Option<Confidence>,
     /// Reading below which a short circuit is assumed.
     #[arg(long, value_name = "OHM")]
     shorted_below_ohm: Option<f32>,
@@ -30,15 +26,8 @@ pub struct ConfigureArguments {
     /// Relative change against the baseline that counts as contact.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     contact_threshold: Option<f32>,
-    /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/filter.md).
-    #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
-    filter_ms: Option<u32>,
-    /// Time in ms by which the filter extrapolates outputs: their age when they are used.
-    #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
-    lead_ms: Option<u32>,
-    /// Scans of which one is reported, with its estimate and its faults; all are decoded and filtered.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
-    report_every: Option<u16>,
+    #[command(flatten)]
+    reports: ReportArguments,
 }
 
 impl ConfigureArguments {
@@ -48,13 +37,14 @@ impl ConfigureArguments {
         if let Some(send) = self.send {
             (c.send_readings, c.send_estimates) = (send.sent().readings, send.sent().estimates);
         }
-        c.confidence = self.confidence.map_or(c.confidence, ConfidenceSent::from);
+        c.confidence = self.reports.confidence.map_or(c.confidence, ConfidenceSent::from);
         c.shorted_below_ohm = self.shorted_below_ohm.unwrap_or(c.shorted_below_ohm);
         c.open_above_ohm = self.open_above_ohm.unwrap_or(c.open_above_ohm);
         c.contact_threshold = self.contact_threshold.unwrap_or(c.contact_threshold);
-        c.filter_time_constant_us = self.filter_ms.unwrap_or(c.filter_time_constant_us);
-        c.filter_lead_us = self.lead_ms.unwrap_or(c.filter_lead_us);
-        c.report_every = self.report_every.unwrap_or(c.report_every);
+        c.filter_time_constant_us =
+            self.reports.filter.filter_ms.unwrap_or(c.filter_time_constant_us);
+        c.filter_lead_us = self.reports.filter.lead_ms.unwrap_or(c.filter_lead_us);
+        c.report_every = self.reports.report_every.unwrap_or(c.report_every);
         c
     }
 }
