@@ -1,6 +1,5 @@
 //! Errors by the depth or the force of a contact: where a light touch is, readings hardly tell.
 
-use serde::Serialize;
 use taxel_data::{Table, columns, rest};
 
 use crate::metrics::{self, Errors, Measure, RELATIVE_THRESHOLD};
@@ -25,7 +24,7 @@ const ALL: [f64; 2] = [0.0, f64::INFINITY];
 const FORCES: [[f64; 2]; 3] = [ALL, [RELATIVE_THRESHOLD, f64::INFINITY], [0.3, f64::INFINITY]];
 
 /// Errors on the frames whose contact has a depth or a force in some range.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LoadErrors {
     /// Output whose true magnitude tells frames apart.
     pub load: String,

@@ -75,7 +75,7 @@ impl Wires {
 }
 
 /// Times of one frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Times {
     /// Time of the scan; `None` if it is unknown.
     pub scan_ms: Option<f64>,

@@ -125,7 +125,7 @@ pub fn pooled(groups: &[(&str, Vec<usize>)], rmse: &[f64]) -> Vec<f64> {
 }
 
 /// Root mean square error of one group of outputs, in its unit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct GroupRmse {
     pub group: String,
     pub unit: String,

@@ -1,6 +1,5 @@
 //! Errors on contacts that a model was not trained on, and whether it notices that they are others.
 
-use serde::Serialize;
 use taxel_data::{Dataset, Stream};
 use taxel_learn::decoders::mean;
 use taxel_learn::{Decoder, PreparedModel};
@@ -21,7 +20,7 @@ const NOTICED: f64 = 90.0;
 const MOST_NAMED: usize = 2;
 
 /// Errors of a model on other contacts than those that it was trained on.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Others {
     /// Number of frames of each contact.
     pub frames: usize,
@@ -31,7 +30,7 @@ pub struct Others {
 }
 
 /// Errors of a model on one kind of other contacts.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct OtherErrors {
     pub name: String,
     /// Errors of the model by group of outputs, without a ratio to the limit.

@@ -33,7 +33,7 @@ mod sketch;
 pub use sketch::{RowWire, SensorSketch};
 
 /// Results of a run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RunResult {
     /// What the model is worth, in words.
     pub verdict: Verdict,
@@ -84,6 +84,7 @@ pub struct DataSummary {
     /// Inputs that are left in and never change in training; a network cannot use them.
     pub constant_inputs: Vec<String>,
     /// Errors and readings at rest by time; `None` if lines are in no order of time.
+    #[serde(skip)]
     pub over_time: Option<OverTime>,
 }
 
@@ -132,7 +133,7 @@ pub struct ModelSummary {
 }
 
 /// Errors of the network on one row-wire.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RowErrors {
     /// Row-wire, from 1.
     pub row_wire: usize,

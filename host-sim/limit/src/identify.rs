@@ -8,7 +8,6 @@
 //! would be L·(I + AᵀA)⁻¹·Lᵀ.
 
 use nalgebra::{Cholesky, DMatrix};
-use serde::Serialize;
 use taxel_data::Stream;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::sensor::{Axis, Vector3};
@@ -22,7 +21,7 @@ const PRIOR_FRAMES: usize = 20_000;
 const AXES: [Axis; 3] = [Axis::X, Axis::Y, Axis::Z];
 
 /// Directions that some readings show.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Observability {
     /// Row-wires (from 1) that are read.
     pub row_wires: Vec<usize>,
@@ -43,7 +42,7 @@ pub struct Observability {
 }
 
 /// What readings tell about the deformation along one axis, if all were linear and normal.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisKnowledge {
     /// Axis.
     pub axis: Axis,
@@ -56,7 +55,7 @@ pub struct AxisKnowledge {
 }
 
 /// What readings tell about one electrode.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElectrodeKnowledge {
     /// Position x and y at rest, in mm.
     pub position_mm: [f64; 2],

@@ -54,7 +54,7 @@ pub struct GroupLimit {
 }
 
 /// Ratio of a decoder's RMSE to the limit, on the same frames.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ratio {
     /// Ratio √(1 + mean (estimate − posterior mean)² / mean posterior variance).
     pub ratio: f64,
@@ -63,7 +63,7 @@ pub struct Ratio {
 }
 
 /// Effective sample sizes of all posteriors.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EffectiveSamples {
     /// Smallest one.
     pub least: f64,

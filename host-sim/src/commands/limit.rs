@@ -1,11 +1,10 @@
 //! Command `limit`: the least possible error of any decoder, and what the sensor shows at all.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::evaluate::limit::{self, Candidate, LimitResult, Plan};
 use crate::experiment::Experiment;
-use crate::report::Sections;
 use crate::{Error, Result, report};
 use clap::Args;
 use taxel_data::output::{FileSet, Written};
@@ -78,12 +77,13 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     });
     Written::put_in_place(written.collect::<Result<_>>()?)?;
     let folder = arguments.to.output.as_deref();
-    if let [result] = &results[..] {
-        print::result(common, result, || page_of(&report::of_limit(result), folder, ""))?;
-        return refusal(result);
-    }
-    let page = || page_of(&report::of_limits(&results), folder, "/SCENE");
-    print::result(common, &BTreeMap::from([("scenes", &results)]), page)?;
+    let (sections, place) = match &results[..] {
+        [result] => (report::of_limit(result), ""),
+        results => (report::of_limits(results), "/SCENE"),
+    };
+    let names = [FILES.files, &["figures/"]].concat().join(", ");
+    let written = folder.map(|it| format!("\nwritten to {}{place}: {names}", it.display()));
+    print::sections_above(common, &sections, &Vec::from_iter(written))?;
     results.iter().try_for_each(refusal)
 }
 
@@ -140,23 +140,10 @@ fn refusal(result: &LimitResult) -> Result<()> {
 }
 
 fn written_files(folder: &Path, result: &LimitResult) -> Result<Written> {
-    let json = print::json_text(result)?;
     let command = command_line::of_this_process("limit", &["-o", "--output"], Some(result.seed));
-    let page = report::of_limit(result).page(&command);
+    let sections = report::of_limit(result);
+    let (json, page) = (print::file_of(&sections), sections.page(&command));
     let mut files = vec![("limit.json", json.as_bytes()), ("limit.html", page.html.as_bytes())];
     files.extend(page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes())));
     Ok(FILES.written(folder, &files)?)
-}
-
-/// Sections as text, and which files were written to the `folder`.
-fn page_of(sections: &Sections, folder: Option<&Path>, place: &str) -> print::Page {
-    let mut page = print::Page::of(sections.text().trim_end());
-    if let Some(folder) = folder {
-        page.line(format_args!(
-            "\nwritten to {}{place}: {}",
-            folder.display(),
-            [FILES.files, &["figures/"]].concat().join(", ")
-        ));
-    }
-    page
 }

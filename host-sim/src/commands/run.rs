@@ -67,16 +67,14 @@ fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common
     note_format(&blob.parse(), options, result.device_cost.cycles);
     let mut sections = report::of_run(&result);
     let files = write_files(folder, &result, &blob, (&mut sections, &command))?;
-    if common.json {
-        return print::json(&result);
-    }
-    let mut page = print::Page::of_sections(&sections);
-    page.line(format_args!("written to {}: {}", folder.display(), files.join(", ")));
-    page.line(format_args!("Next: open {}", folder.join("report.html").display()));
+    let mut more = vec![
+        format!("written to {}: {}", folder.display(), files.join(", ")),
+        format!("Next: open {}", folder.join("report.html").display()),
+    ];
     if result.scene.is_some() && result.subject == "press" {
-        page.line("The paper's own scene is `run paper`, and its Table 1 `table1`.");
+        more.push("The paper's own scene is `run paper`, and its Table 1 `table1`.".into());
     }
-    page.print()?;
+    print::sections_above(common, &sections, &more)?;
     stderr::remark(format_args!("done in {:.1} s", started.elapsed().as_secs_f64()));
     Ok(())
 }
@@ -87,7 +85,7 @@ fn write_files(
     blob: &ModelBlob,
     (sections, command): (&mut Sections, &str),
 ) -> Result<Vec<&'static str>> {
-    let metrics = print::json_text(result)?;
+    let metrics = print::file_of(sections);
     let table = result.table1.as_ref().map(Table1::to_csv);
     let mut files = vec![("model.bin", blob.bytes()), ("metrics.json", metrics.as_bytes())];
     files.extend(table.as_ref().map(|table| ("table1.csv", table.as_bytes())));

@@ -5,12 +5,12 @@ use taxel_learn::decoders::mean;
 use super::errors::Pictures;
 use super::face::Face;
 use super::format::{decimals, fixed, grouped, named, significant, symbol, with_unit};
-use super::sections::{Digits, Fact, Section, Sections, TableOf};
+use super::sections::{Digits, Fact, Section, Sections, TableOf, number_value};
 use super::{errors, frames, moving, noise, over_time, sketch, table1};
 use taxel_evaluate::by_load::LoadErrors;
 use taxel_evaluate::evaluate::confidence::{Coverage, Covered};
 use taxel_evaluate::evaluate::device_cost::DeviceCost;
-use taxel_evaluate::evaluate::moving_contacts::MovingContacts;
+use taxel_evaluate::evaluate::moving_contacts::{MovingContacts, MovingWay};
 use taxel_evaluate::evaluate::table1::Table1;
 use taxel_evaluate::metrics::{
     self, DecoderErrors, Definition, Errors, GroupRmse, LimitSummary, NETWORK, rmse_of,
@@ -60,11 +60,10 @@ pub fn sections(judged: &Judged<'_>, made: Sections) -> Sections {
     let mut sections = Sections::new(&made.title);
     sections.value("verdict", judged.verdict);
     sections.value("decoders", judged.decoders);
-    sections.value("linear_at_training", judged.linear_at_training);
-    sections.value("by_load", judged.by_load);
+    sections.value("limit", judged.limit);
     sections.value("over_time", &judged.over_time);
-    sections.value("coverage", judged.coverage);
     sections.value("percent_novel", &judged.percent_novel);
+    sections.value("device_cost", judged.device);
     worth(&mut sections, judged.verdict, groups(judged));
     sections.sections.push(Section::Facts(facts(judged)));
     let pictures = judged.pictures.as_ref();
@@ -90,22 +89,17 @@ pub fn sections(judged: &Judged<'_>, made: Sections) -> Sections {
     if by_electrode.is_some() || !judged.by_row.is_empty() || !judged.by_load.is_empty() {
         sections.heading("Errors by place and load");
         by_electrode.into_iter().for_each(|map| sections.figure(map));
-        by_row(&mut sections, judged.by_row);
-        by_load(&mut sections, judged.by_load);
     }
+    by_row(&mut sections, judged.by_row);
+    by_load(&mut sections, judged.by_load);
     coverage(&mut sections, judged);
     if let Some(log) = judged.over_time.filter(|_| pictures.is_some()) {
         sections.heading("Over time");
         sections.figure(over_time::errors(log));
         log.rest.iter().for_each(|rest| sections.figure(over_time::at_rest(log, rest)));
     }
-    if let Some(it) = judged.others {
-        others(&mut sections, it, judged.decoders);
-    }
-    if let Some(contacts) = judged.moving {
-        sections.heading("Contacts that move");
-        moving_contacts(&mut sections, contacts);
-    }
+    others(&mut sections, judged.others, judged.decoders);
+    moving_contacts(&mut sections, judged.moving);
     sections.heading("How it was made, and what it costs");
     sections.extend(made);
     cost(&mut sections, judged.device);
@@ -216,8 +210,12 @@ pub fn errors_of(sections: &mut Sections, decoders: &[DecoderErrors], frames: &s
 /// Adds the errors of all decoders, and what no decoder can pass.
 fn all_errors(sections: &mut Sections, judged: &Judged<'_>) {
     errors_of(sections, judged.decoders, &format!("on {} frames", grouped(judged.frames)));
-    let linear = judged.linear_at_training.iter();
-    let linear = linear.map(|it| {
+    let linear = TableOf::new(judged.linear_at_training, "The best linear decoder in training.")
+        .values("group", |it| it.group.as_str().into())
+        .values("unit", |it| it.unit.as_str().into())
+        .values("rmse", |it| number_value(Some(it.rmse)));
+    sections.rows("linear_at_training", linear);
+    let linear = judged.linear_at_training.iter().map(|it| {
         let text = format!("{} {} {}", symbol(&it.group), significant(it.rmse, 3), it.unit);
         text.trim_end().to_owned()
     });
@@ -257,7 +255,6 @@ fn by_row(sections: &mut Sections, rows: &[RowErrors]) {
 }
 
 fn by_load(sections: &mut Sections, ranges: &[LoadErrors]) {
-    let Some(first) = ranges.first() else { return };
     let mut rows: Vec<(&LoadErrors, &str, &[Errors])> = vec![];
     for range in ranges {
         rows.push((range, NETWORK, &range.errors));
@@ -265,16 +262,22 @@ fn by_load(sections: &mut Sections, ranges: &[LoadErrors]) {
             rows.push((range, "centroid", &range.centroid));
         }
     }
-    let caption = format!("RMSE by the true {}.", symbol(&first.load));
+    let (load, groups) =
+        ranges.first().map_or(("", &[][..]), |first| (first.load.as_str(), &first.errors));
+    let caption = format!("RMSE by the true {}.", symbol(load));
     let table = TableOf::new(&rows, caption)
+        .values("load", |(range, ..)| range.load.as_str().into())
+        .values("from", |(range, ..)| number_value(Some(range.from)))
+        .values("to", |(range, ..)| number_value(range.to))
         .names("range", "range", |(range, ..)| range.range())
         .names("decoder", "decoder", |(_, decoder, _)| (*decoder).into())
         .numbers("frames", "frames", "", Digits::Count, |(range, ..)| Some(range.frames as f64));
-    sections.table(with_rmse(table, &first.errors, |(.., errors)| errors));
+    sections.table_as("by_load", with_rmse(table, groups, |(.., errors)| errors));
 }
 
-fn others(sections: &mut Sections, others: &Others, decoders: &[DecoderErrors]) {
+fn others(sections: &mut Sections, others: Option<&Others>, decoders: &[DecoderErrors]) {
     type Row<'r> = (&'r str, &'r [Errors], &'r [Errors], Option<f64>);
+    let Some(others) = others else { return sections.value("others", &[(); 0]) };
     let [own, own_mean] = [NETWORK, mean::NAME].map(|name| metrics::of_decoder(decoders, name));
     let mut rows: Vec<Row<'_>> = vec![("as trained", own, own_mean, others.own_percent_novel)];
     let contacts = others.contacts.iter();
@@ -300,35 +303,43 @@ fn others(sections: &mut Sections, others: &Others, decoders: &[DecoderErrors]) 
             .numbers(&r2, "R²", "", Digits::Decimals(2), |row| r_squared(row.1, group))
             .numbers(&of_mean, "mean", "", RMSE, |row| rmse_of(row.2, group));
     }
-    sections.table(table.numbers("percent_novel", "novel", "%", Digits::Decimals(1), |row| row.3));
+    let table = table.numbers("percent_novel", "novel", "%", Digits::Decimals(1), |row| row.3);
+    sections.table_as("others", table);
 }
 
 /// Adds errors with and without a filter and of the baselines, beside the age of an estimate, and a trajectory.
-fn moving_contacts(sections: &mut Sections, moving: &MovingContacts) {
+fn moving_contacts(sections: &mut Sections, moving: Option<&MovingContacts>) {
+    type Row<'r> = (String, Option<&'r MovingWay>, &'r [Errors]);
+    let Some(moving) = moving else { return sections.value("moving", &[(); 0]) };
+    sections.heading("Contacts that move");
     let ways = moving.ways.iter().map(|way| {
         let name = way.filter.map_or(NETWORK.to_owned(), |filter| {
             let [tau, lead] = [filter.time_constant_ms, filter.lead_ms].map(|ms| fixed(ms, 1));
             format!("{NETWORK}, filter of {tau} ms, {lead} ms ahead")
         });
-        (name, way.times.age_ms, &way.errors[..])
+        (name, Some(way), &way.errors[..])
     });
     let baselines = moving.decoders.iter().map(|it| (it.decoder.clone(), None, &it.errors[..]));
-    let rows: Vec<(String, Option<f64>, &[Errors])> = ways.chain(baselines).collect();
+    let rows: Vec<Row<'_>> = ways.chain(baselines).collect();
     let caption = format!(
         "RMSE and R² as a robot meets them, on {}: the newest finished estimate against the truth at that moment, every ms, \
          read by the board. Age: mean time from the middle of a scan until its estimate is used.",
         moving.path.in_words()
     );
+    let filter = |row: &Row<'_>| row.1.and_then(|way| way.filter);
     let mut table = TableOf::new(&rows, caption)
         .names("decoder", "decoder", |(name, ..)| name.clone())
-        .numbers("age_ms", "age", "ms", Digits::Decimals(2), |(_, age, _)| *age);
+        .values("filter_ms", |row| number_value(filter(row).map(|it| it.time_constant_ms)))
+        .values("lead_ms", |row| number_value(filter(row).map(|it| it.lead_ms)))
+        .values("frames_per_s", |row| number_value(row.1.map(|way| way.times.frames_per_s)))
+        .numbers("age_ms", "age", "ms", Digits::Decimals(2), |row| row.1?.times.age_ms);
     for Errors { group, unit, .. } in rows.first().map_or(&[][..], |(.., errors)| errors) {
         let [rmse, r2] = ["rmse", "r_squared"].map(|name| format!("{name}_{group}"));
         table = table
             .numbers(&rmse, &symbol(group), unit, RMSE, |(.., errors)| rmse_of(errors, group))
             .numbers(&r2, "R²", "", Digits::Decimals(3), |(.., errors)| r_squared(errors, group));
     }
-    sections.table(table);
+    sections.table_as("moving", table);
     for filter in moving.ways.iter().filter_map(|way| way.filter) {
         sections.note(format!(
             "The filter on a device: `taxel link PORT configure --filter-ms {} --lead-ms {}` (docs/filter.md).",
@@ -339,7 +350,9 @@ fn moving_contacts(sections: &mut Sections, moving: &MovingContacts) {
 }
 
 fn coverage(sections: &mut Sections, judged: &Judged<'_>) {
-    let Some(percent) = judged.percent_novel else { return };
+    let Some(percent) = judged.percent_novel else {
+        return sections.value("coverage", &[(); 0]);
+    };
     let mut rows: Vec<(&Coverage, &str, Covered)> = vec![];
     for group in judged.coverage {
         rows.push((group, "all outputs", group.all));
@@ -352,6 +365,7 @@ fn coverage(sections: &mut Sections, judged: &Judged<'_>) {
     let table = TableOf::new(&rows, caption)
         .names("output", "output", |(group, ..)| with_unit(&symbol(&group.group), &group.unit))
         .names("of", "of", |(_, part, _)| (*part).into())
+        .values("count", |(.., it)| it.count.into())
         .numbers("rmse", "RMSE", "", RMSE, |(.., it)| Some(it.rmse))
         .numbers("percent_within_68", "within 68.3 %", "%", Digits::Decimals(1), |(.., it)| {
             Some(it.percent_within_68)
@@ -359,7 +373,7 @@ fn coverage(sections: &mut Sections, judged: &Judged<'_>) {
         .numbers("percent_within_95", "within 95 %", "%", Digits::Decimals(1), |(.., it)| {
             Some(it.percent_within_95)
         });
-    sections.table(table);
+    sections.table_as("coverage", table);
     sections.note(format!("{percent:.2} % of the frames are novel: unlike those of training."));
 }
 

@@ -2,6 +2,7 @@
 
 use std::slice;
 
+use serde_json::Value;
 use taxel_limit::identify::Observability;
 use taxel_limit::reference::GroupLimit;
 
@@ -13,7 +14,7 @@ use super::face::Face;
 use super::face_map::{Map, Values};
 use super::figures::{Figure, Panel};
 use super::format::{UNDEFINED, noise, short, significant, symbol, with_unit};
-use super::sections::{Digits, Fact, Section, Sections, TableOf};
+use super::sections::{Digits, Fact, Section, Sections, TableOf, number_value};
 use super::svg::Shape;
 use super::ticks;
 use taxel_evaluate::evaluate::limit::{Figures as Limits, Level, LimitResult};
@@ -34,6 +35,10 @@ fn directions(level: &Level) -> Chart {
         ratios.filter(|(_, r)| **r > LEAST_RATIO).map(|(i, r)| [i as f64 + 1.0, *r]).collect()
     };
     let mut series = Vec::new();
+    if level.by_row.len() > 1 {
+        let all = line(&level.observability);
+        series.push(Series::new("all readings", "c1", Mark::LineAnd(Shape::Square), all));
+    }
     for (i, row) in level.by_row.iter().enumerate() {
         let name = match &row.row_wires[..] {
             _ if i == 0 => "each row by itself".into(),
@@ -42,10 +47,6 @@ fn directions(level: &Level) -> Chart {
         };
         let line = Series::new(&name, "c2", Mark::LineAnd(Shape::Circle), line(row));
         series.push(Series { opacity: 0.45, is_listed: i == 0, ..line });
-    }
-    if level.by_row.len() > 1 {
-        let all = line(&level.observability);
-        series.push(Series::new("all readings", "c1", Mark::LineAnd(Shape::Square), all));
     }
     let most = series.iter().map(|s| s.points.len()).max().unwrap_or(1) as f64;
     series.push(Series::new(
@@ -72,8 +73,15 @@ fn directions(level: &Level) -> Chart {
 pub fn sections(result: &LimitResult) -> Sections {
     let mut sections = Sections::new(format!("What the sensor of {} can know", result.subject));
     sections.files = vec!["limit.json".into()];
+    sections.value("subject", &result.subject);
+    sections.value("seed", &result.seed);
+    sections.value("noise_kind", &result.noise_kind);
+    sections.value("frames", &result.frames);
+    let at = result.levels.first().map_or(String::new(), |level| {
+        format!("at {} ", noise(result.noise_kind, level.noise_level))
+    });
     sections.note(format!(
-        "{} noise; {} test frames; seed {}",
+        "The least possible errors {at}noise ({}), on {} test frames, seed {}.",
         result.noise_kind.name(),
         result.frames,
         result.seed
@@ -88,28 +96,27 @@ pub fn sections(result: &LimitResult) -> Sections {
         figures(&mut sections, result, level);
     }
     sections.heading("Least possible errors");
-    let mut lines = vec![];
-    for level in &result.levels {
-        for of in &level.limits {
-            lines.push(Line { result, level, readings: name(&of.row_wires), of });
-        }
-    }
-    limits(&mut sections, &lines);
+    let lines = lines(slice::from_ref(result));
+    sections.table_as("limits", limits(&lines, |line| name(&line.of.row_wires)));
+    refusals(&mut sections, &lines, |line| name(&line.of.row_wires));
     models(&mut sections, slice::from_ref(result));
     sections.heading("Directions of the deformation");
-    directions_table(&mut sections, result);
+    let rows = directions_of(slice::from_ref(result));
+    sections.table_as("directions", directions_table(&rows));
     sections
 }
 
 /// Sections of several scenes: what all readings of each one show.
 pub fn several(results: &[LimitResult]) -> Sections {
     let mut sections = Sections::new("What the sensors can know");
-    let mut lines = vec![];
-    for (result, level) in levels(results) {
-        lines.push(Line { result, level, readings: result.subject.clone(), of: &level.limits[0] });
-    }
-    limits(&mut sections, &lines);
+    let name_of = |line: &Line<'_>| line.result.subject.clone();
+    let mut lines = lines(results);
+    sections.rows("limits", limits(&lines, name_of));
+    lines.retain(|line| line.is_whole);
+    sections.table(limits(&lines, name_of));
+    refusals(&mut sections, &lines, name_of);
     models(&mut sections, results);
+    sections.rows("directions", directions_table(&directions_of(results)));
     sections
 }
 
@@ -121,8 +128,9 @@ fn levels(results: &[LimitResult]) -> impl Iterator<Item = (&LimitResult, &Level
 struct Line<'r> {
     result: &'r LimitResult,
     level: &'r Level,
-    readings: String,
     of: &'r Limits,
+    /// Whether they are from all readings.
+    is_whole: bool,
 }
 
 impl Line<'_> {
@@ -131,13 +139,28 @@ impl Line<'_> {
     }
 }
 
-/// Adds a table of limits, with columns for each group of outputs, and the reasons for those that are not given.
-fn limits(sections: &mut Sections, lines: &[Line<'_>]) {
+fn lines(results: &[LimitResult]) -> Vec<Line<'_>> {
+    let mut lines = vec![];
+    for (result, level) in levels(results) {
+        let limits = level.limits.iter().enumerate();
+        lines.extend(limits.map(|(i, of)| Line { result, level, of, is_whole: i == 0 }));
+    }
+    lines
+}
+
+/// Table of limits, with columns for each group of outputs. Lines have a name.
+fn limits<'r>(
+    lines: &'r [Line<'r>],
+    name_of: impl Fn(&'r Line<'r>) -> String,
+) -> TableOf<'r, Line<'r>> {
     let caption = "Least possible RMSE of any decoder, ± its standard error over the frames: root of the posteriors' mean variance. \
                    Prior: always predicting the mean. ESS: smallest and median effective sample size of the posteriors. Own error: \
                    largest share of the squared error that is the sample's own; it is subtracted.";
     let mut table = TableOf::new(lines, caption)
-        .names("readings", "readings", |line| line.readings.clone())
+        .values("scene", |line| line.result.subject.as_str().into())
+        .values("noise_level", |line| number_value(Some(line.level.noise_level)))
+        .values("row_wires", |line| line.of.row_wires.clone().into())
+        .names("readings", "readings", name_of)
         .names("noise", "noise", Line::noise);
     let mut names: Vec<&GroupLimit> = vec![];
     for group in lines.iter().flat_map(|line| &line.of.groups) {
@@ -146,38 +169,38 @@ fn limits(sections: &mut Sections, lines: &[Line<'_>]) {
         }
     }
     for name in names {
-        let of = |line: &Line<'_>| line.of.groups.iter().find(|it| it.group == name.group).cloned();
-        let limit = |line: &Line<'_>| of(line).map(|it| [it.limit, it.limit_standard_error]);
-        let prior = |line: &Line<'_>| of(line).map(|it| it.prior_rmse);
-        let (symbol, digits) = (symbol(&name.group), Digits::Decimals(4));
-        let [key, error, of_prior] = ["limit", "limit_standard_error", "prior_rmse"]
-            .map(|result| format!("{result}_{}", name.group));
-        table = table.estimates([&key, &error], &symbol, &name.unit, digits, limit).numbers(
-            &of_prior,
-            &format!("prior {symbol}"),
-            &name.unit,
-            digits,
-            prior,
-        );
+        let of = |line: &Line<'r>| line.of.groups.iter().find(|it| it.group == name.group);
+        let limit = |line| of(line).map(|it| [it.limit, it.limit_standard_error]);
+        let prior = |line| of(line).map(|it| it.prior_rmse);
+        let (symbol, unit, digits) = (symbol(&name.group), &name.unit, Digits::Decimals(4));
+        let key = |result: &str| format!("{result}_{}", name.group);
+        let keys = [&*key("limit"), &key("limit_standard_error")];
+        let of_prior = format!("prior {symbol}");
+        table = table
+            .estimates(keys, &symbol, unit, digits, limit)
+            .numbers(&key("prior_rmse"), &of_prior, unit, digits, prior)
+            .values(&key("rmse"), |line| number_value(of(line).map(|it| it.rmse)));
     }
-    let samples = |line: &Line<'_>| {
-        let samples = line.of.effective_samples;
-        samples.map_or(UNDEFINED.into(), |it| format!("{:.0}, {:.0}", it.least, it.median))
-    };
-    let own = |line: &Line<'_>| {
+    let samples = |line: &Line<'r>| line.of.effective_samples;
+    let own = |line: &Line<'r>| {
         line.of.groups.iter().map(|group| 100.0 * group.monte_carlo_share).reduce(f64::max)
     };
-    let table = table.texts("effective_samples", "ESS", samples);
-    sections.table(table.numbers(
-        "monte_carlo_percent",
-        "own error",
-        "%",
-        Digits::Decimals(2),
-        own,
-    ));
+    let text = |line| {
+        samples(line).map_or(UNDEFINED.into(), |it| format!("{:.0}, {:.0}", it.least, it.median))
+    };
+    table
+        .cells("effective_samples", "ESS", |line| {
+            (text(line), number_value(samples(line).map(|it| it.least)))
+        })
+        .numbers("monte_carlo_percent", "own error", "%", Digits::Decimals(2), own)
+        .values("refused", |line| line.of.refused.clone().map_or(Value::Null, Value::from))
+}
+
+/// Adds the reasons for limits that are not given.
+fn refusals(sections: &mut Sections, lines: &[Line<'_>], name_of: impl Fn(&Line<'_>) -> String) {
     for line in lines {
         if let Some(reason) = &line.of.refused {
-            sections.note(format!("{}, {}: not given: {reason}", line.readings, line.noise()));
+            sections.note(format!("{}, {}: not given: {reason}", name_of(line), line.noise()));
         }
     }
 }
@@ -191,14 +214,12 @@ fn models(sections: &mut Sections, results: &[LimitResult]) {
             rows.extend(model.errors.iter().map(|it| (result, noise.clone(), model, it)));
         }
     }
-    if rows.is_empty() {
-        return;
-    }
     let caption = "Models: RMSE on these frames, and its ratio to the limit of all readings.";
     let table = TableOf::new(&rows, caption)
         .names("model", "model", |(_, _, model, _)| model.decoder.clone())
         .names("scene", "scene", |(result, ..)| result.subject.clone())
         .names("noise", "noise", |(_, noise, ..)| noise.clone())
+        .values("group", |(.., errors)| errors.group.as_str().into())
         .names("output", "output", |(.., errors)| with_unit(&symbol(&errors.group), &errors.unit))
         .numbers("rmse", "RMSE", "", Digits::Decimals(4), |(.., errors)| Some(errors.rmse))
         .estimates(
@@ -208,7 +229,7 @@ fn models(sections: &mut Sections, results: &[LimitResult]) {
             Digits::Decimals(3),
             |(.., errors)| Some([errors.ratio_to_limit?, errors.ratio_standard_error?]),
         );
-    sections.table(table);
+    sections.table_as("models", table);
 }
 
 /// Figures of what one level of noise leaves visible.
@@ -240,10 +261,9 @@ fn figures(sections: &mut Sections, result: &LimitResult, level: &Level) {
 /// Least possible errors of all readings at the first noise level.
 fn least(result: &LimitResult) -> Vec<Fact> {
     let of_level = |level: &Level| {
-        let noise = noise(result.noise_kind, level.noise_level);
         let groups = level.limits.first().map_or(&[][..], |figures| &figures.groups);
         let fact = |group: &GroupLimit| Fact {
-            label: format!("Least possible RMSE of {} at {noise} noise", symbol(&group.group)),
+            label: format!("Least possible RMSE of {}", symbol(&group.group)),
             value: significant(group.limit, 3),
             unit: group.unit.clone(),
         };
@@ -252,26 +272,36 @@ fn least(result: &LimitResult) -> Vec<Fact> {
     result.levels.first().map_or(vec![], of_level)
 }
 
-/// Adds a table of what readings tell about the deformation along each axis, and of the first directions.
-fn directions_table(sections: &mut Sections, result: &LimitResult) {
+/// Readings at a level of noise, and what they show.
+type Shown<'r> = (&'r LimitResult, &'r Level, &'r Observability);
+
+fn directions_of(results: &[LimitResult]) -> Vec<Shown<'_>> {
     let mut rows = vec![];
-    for level in &result.levels {
-        let noise = noise(result.noise_kind, level.noise_level);
+    for (result, level) in levels(results) {
         let all = [&level.observability].into_iter().chain(&level.by_row);
-        rows.extend(all.map(|seen| (noise.clone(), seen)));
+        rows.extend(all.map(|seen| (result, level, seen)));
     }
+    rows
+}
+
+/// Table of what readings tell about the deformation along each axis, and of the first directions.
+fn directions_table<'r>(rows: &'r [Shown<'r>]) -> TableOf<'r, Shown<'r>> {
     let caption = "Observable directions move the readings by more than the noise for one standard deviation of the prior: their \
                    signal-to-noise ratio is above 1. Known: share of the prior's variance that readings take away, and RMSE that \
                    is left, for a sensor linearised at the mean deformation. S/N: ratios of the first directions.";
-    let mut table = TableOf::new(&rows, caption)
-        .names("readings", "readings", |(_, seen)| name(&seen.row_wires))
-        .names("noise", "noise", |(noise, _)| noise.clone())
-        .texts("observable", "observable", |(_, seen)| {
-            format!("{} of {}", seen.observable, seen.unknowns)
-        });
+    let mut table = TableOf::new(rows, caption)
+        .values("scene", |(result, ..)| result.subject.as_str().into())
+        .values("noise_level", |(_, level, _)| number_value(Some(level.noise_level)))
+        .values("row_wires", |(.., seen)| seen.row_wires.clone().into())
+        .names("readings", "readings", |(.., seen)| name(&seen.row_wires))
+        .names("noise", "noise", |(result, level, _)| noise(result.noise_kind, level.noise_level))
+        .cells("observable", "observable", |(.., seen)| {
+            (format!("{} of {}", seen.observable, seen.unknowns), seen.observable.into())
+        })
+        .values("unknowns", |(.., seen)| seen.unknowns.into());
     for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-        let known = |(_, seen): &(_, &Observability)| Some(100.0 * seen.axes[axis].known);
-        let rmse = |(_, seen): &(_, &Observability)| Some(seen.axes[axis].rmse_mm);
+        let known = |(.., seen): &Shown<'r>| Some(100.0 * seen.axes[axis].known);
+        let rmse = |(.., seen): &Shown<'r>| Some(seen.axes[axis].rmse_mm);
         let [known_key, rmse_key] =
             [format!("known_percent_d{letter}"), format!("rmse_d{letter}_mm")];
         let [of_known, of_rmse] = [format!("known Δ{letter}"), format!("RMSE Δ{letter}")];
@@ -283,11 +313,11 @@ fn directions_table(sections: &mut Sections, result: &LimitResult) {
             rmse,
         );
     }
-    let ratios = |(_, seen): &(_, &Observability)| {
+    table.cells("signal_to_noise", "S/N", |(.., seen)| {
         let ratios = seen.signal_to_noise.iter().take(SHOWN_RATIOS);
-        ratios.map(|ratio| significant(*ratio, 3)).collect::<Vec<_>>().join(" ")
-    };
-    sections.table(table.texts("signal_to_noise", "S/N", ratios));
+        let text = ratios.map(|ratio| significant(*ratio, 3)).collect::<Vec<_>>().join(" ");
+        (text, seen.signal_to_noise.clone().into())
+    })
 }
 
 /// Name of the readings of these row-wires.

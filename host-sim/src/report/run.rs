@@ -11,7 +11,17 @@ use super::sections::Sections;
 
 /// Sections of a run.
 pub fn sections(result: &RunResult) -> Sections {
-    judged::sections(&of_run(result), made(result))
+    let mut sections = judged::sections(&of_run(result), made(result));
+    sections.value("subject", &result.subject);
+    sections.value("scene_digest", &result.scene_digest);
+    sections.value("seed", &result.seed);
+    sections.value("scene", &result.scene);
+    sections.value("data", &result.data);
+    sections.value("model", &result.model);
+    sections.value("features", &result.features);
+    sections.value("distribution", &result.distribution);
+    sections.value("table1", &result.table1);
+    sections
 }
 
 /// Model of a run, and its errors.

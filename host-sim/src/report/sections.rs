@@ -98,11 +98,13 @@ impl Sections {
         self.sections.push(Section::Table(table.table()));
     }
 
-    /// Adds a table that programs read as well.
+    /// Adds a table that programs read as well. People do not see one without lines.
     pub fn table_as<R>(&mut self, key: &'static str, table: TableOf<'_, R>) {
         let table = table.table();
         self.value(key, &table);
-        self.sections.push(Section::Table(table));
+        if !table.is_empty() {
+            self.sections.push(Section::Table(table));
+        }
     }
 
     /// Adds a table that programs read alone.

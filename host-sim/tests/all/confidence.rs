@@ -22,7 +22,7 @@ fn a_full_reading_model_is_judged_and_writes_it_beside_the_outputs() {
     assert!(inspected.contains("novelty and deviations by"), "{inspected}");
     folder.succeed(&["synth", "scene.toml", "-n", "300", "--seed", "9", "-o", "test.csv"]);
     let evaluated = json(&folder.succeed(&["eval", "model.bin", "test.csv", "--json"]));
-    assert_eq!(evaluated["coverage"].as_array().unwrap().len(), 3);
+    assert_eq!(evaluated["coverage"].as_array().unwrap().len(), 9, "three parts of three groups");
     assert!(evaluated["percent_novel"].as_f64().unwrap() < 4.0);
     let page = folder.succeed(&["eval", "model.bin", "test.csv"]);
     assert!(page.contains("surest quarter") && page.contains("are novel: unlike"));

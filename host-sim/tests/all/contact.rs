@@ -47,7 +47,7 @@ fn the_contact_is_trained_evaluated_inspected_and_run() {
         );
     }
     let ranges = evaluated["by_load"].as_array().unwrap();
-    let x = |range: &Value| rmse(&range["errors"], "contact_x_mm");
+    let x = |range: &Value| range["rmse_contact_x_mm"].as_f64().unwrap();
     let (shallow, deep) = (&ranges[0], &ranges[ranges.len() - 2]);
     assert!(x(shallow) > 2.0 * x(deep), "where a shallow contact is can hardly be known");
 

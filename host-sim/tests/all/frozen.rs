@@ -87,11 +87,11 @@ fn the_limit_is_the_frozen_one_within_two_standard_errors() {
     let folder = Folder::new("frozen-limit");
     let result = json(&folder, "limit press --noise 0.005,0.05 -n 100 --seed 1");
     let mut figures = String::new();
-    for level in result["levels"].as_array().unwrap() {
-        for group in level["limits"][0]["groups"].as_array().unwrap() {
-            let noise = &level["noise_level"];
-            let (name, limit) = (group["group"].as_str().unwrap(), &group["limit"]);
-            let error = &group["limit_standard_error"];
+    let of_all = |line: &&Value| line["readings"] == "all 8 rows";
+    for line in result["limits"].as_array().unwrap().iter().filter(of_all) {
+        for name in ["dx_mm", "dy_mm", "dz_mm"] {
+            let (noise, limit) = (&line["noise_level"], &line[format!("limit_{name}")]);
+            let error = &line[format!("limit_standard_error_{name}")];
             writeln!(figures, "{noise},{name},{limit},{error}").unwrap();
         }
     }

@@ -1,8 +1,10 @@
 //! The limit from the command line, and beside the errors of decoders.
 
+use serde_json::Value;
+
 use crate::common::{Folder, small_scene, tiny_scene, untimed};
 
-fn json(text: &str) -> serde_json::Value {
+fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
 }
 
@@ -16,19 +18,17 @@ fn the_command_prints_the_same_bytes_on_any_number_of_threads_and_writes_its_fil
     let alone = String::from_utf8(folder.run_with_threads(&arguments, 1).stdout).unwrap();
     assert_eq!(untimed(&printed), untimed(&alone));
     let result = json(&printed);
-    let levels = result["levels"].as_array().unwrap();
-    for level in levels {
-        // Both rows together, and each by itself.
-        let limits = level["limits"].as_array().unwrap();
-        assert_eq!(limits.len(), 3);
-        let z = |of: usize| limits[of]["groups"][2]["limit"].as_f64().unwrap();
-        let apart = (0.5 * (z(1).powi(2) + z(2).powi(2))).sqrt();
-        assert!(z(0) < apart, "two rows tell more than one: {limits:?}");
-        assert!(limits[0]["effective_samples"]["least"].as_f64().unwrap() > 30.0);
-        assert_eq!(level["by_row"].as_array().unwrap().len(), 2);
+    let limits = result["limits"].as_array().unwrap();
+    // At each level both rows together, and each by itself.
+    assert_eq!((limits.len(), result["directions"].as_array().unwrap().len()), (6, 6));
+    let z = |line: usize| limits[line]["limit_dz_mm"].as_f64().unwrap();
+    for first in [0, 3] {
+        let apart = (0.5 * (z(first + 1).powi(2) + z(first + 2).powi(2))).sqrt();
+        assert!(z(first) < apart, "two rows tell more than one: {limits:?}");
+        assert!(limits[first]["effective_samples"].as_f64().unwrap() > 30.0);
+        assert_eq!(limits[first]["row_wires"], serde_json::json!([4, 5]));
     }
-    let z = |level: usize| levels[level]["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
-    assert!(z(0) < z(1), "less noise, less error");
+    assert!(z(0) < z(3), "less noise, less error");
     let page = std::fs::read_to_string(folder.path("out/limit.html")).unwrap();
     assert!(page.contains("observable, above the dashed line") && !page.contains("NaN"));
     assert!(page.find("<svg") < page.find("<table"), "the picture stands before the table");
@@ -49,12 +49,10 @@ fn models_are_judged_on_the_frames_of_the_limit() {
     folder.succeed(&["train", "scene.toml", "--relative-inputs", "-o", "relative.bin"]);
     let models = ["limit", "scene.toml", "--model", "m.bin,relative.bin", "-n"];
     let result = json(&folder.succeed(&[&models[..], &["60", "--json"]].concat()));
-    let level = &result["levels"][0];
-    let limit = level["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
-    for (model, file) in level["decoders"].as_array().unwrap().iter().zip(["m.bin", "relative.bin"])
-    {
-        assert_eq!(model["decoder"], file);
-        let errors = &model["errors"][2];
+    let limit = result["limits"][0]["limit_dz_mm"].as_f64().unwrap();
+    let of_z = result["models"].as_array().unwrap().iter().filter(|it| it["group"] == "dz_mm");
+    for (errors, file) in of_z.zip(["m.bin", "relative.bin"]) {
+        assert_eq!(errors["model"], file);
         let number = |name: &str| errors[name].as_f64().unwrap();
         let (ratio, error) = (number("ratio_to_limit"), number("ratio_standard_error"));
         assert!(ratio > 1.0 + 2.0 * error, "{file}: {ratio} ± {error}");
@@ -76,13 +74,17 @@ fn several_scenes_stand_in_one_table_with_the_figures_of_each_alone() {
     let both = ["limit", "one.toml", "two.toml", "-n", "8"];
     let results = json(&folder.succeed(&[&both[..], &["--json", "-o", "out"]].concat()));
     let table = folder.succeed(&both);
-    for (scene, result) in ["one", "two"].iter().zip(results["scenes"].as_array().unwrap()) {
+    let all = results["limits"].as_array().unwrap();
+    for (scene, name) in [("one", "one"), ("two", "small")] {
         let file = format!("{scene}.toml");
         let alone = json(&folder.succeed(&["limit", &file, "-n", "8", "--json"]));
-        assert_eq!(result["levels"], alone["levels"]);
-        let name = result["subject"].as_str().unwrap();
+        let own: Vec<_> = all.iter().filter(|line| line["scene"] == name).collect();
+        let numbers =
+            |line: &Value| [&line["limit_dz_mm"], &line["limit_dx_mm"]].map(Value::as_f64);
+        let alone = alone["limits"].as_array().unwrap();
+        assert!(own.iter().map(|it| numbers(it)).eq(alone.iter().map(numbers)), "{own:?}");
         assert!(folder.path(&format!("out/{name}/limit.html")).exists());
-        let z = result["levels"][0]["limits"][0]["groups"][2]["limit"].as_f64().unwrap();
+        let z = own[0]["limit_dz_mm"].as_f64().unwrap();
         let line = table.lines().find(|line| line.starts_with(name));
         assert!(line.unwrap().contains(&format!("{z:.4} ± ")), "{table}");
     }

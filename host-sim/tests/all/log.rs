@@ -50,7 +50,7 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
     let run = [&["run", "log.csv"], &COLUMNS[..]].concat();
     let plain = folder.json(&run);
     assert_eq!(warnings(&plain), ["drift-at-rest"]);
-    let rest = &plain["data"]["over_time"]["rest"];
+    let rest = &plain["over_time"]["rest"];
     // Eleven lines without force in each of 150 pauses, less the first and the last.
     assert_eq!((&rest["lines"], &rest["percent_of"]), (&Value::from(1350), &Value::from("rest")));
     assert_eq!(
@@ -78,7 +78,7 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
     folder.write("still.csv", log(0.0));
     let still = folder.json(&[&["run", "still.csv"], &COLUMNS[..]].concat());
     assert_eq!(warnings(&still), [""; 0]);
-    assert_eq!(still["data"]["over_time"]["rest"]["drifts"], serde_json::json!([]));
+    assert_eq!(still["over_time"]["rest"]["drifts"], serde_json::json!([]));
 }
 
 #[test]

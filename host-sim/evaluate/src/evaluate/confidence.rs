@@ -1,10 +1,9 @@
 //! Confidence of a model: how many errors its intervals cover.
 
-use serde::Serialize;
 use taxel_data::{Table, columns};
 
 /// Errors of one group of outputs beside their deviations.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Coverage {
     /// Name of the group: `dz_mm`, or a column's name.
     pub group: String,
@@ -19,7 +18,7 @@ pub struct Coverage {
 }
 
 /// Errors, and how many of them the intervals cover.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Covered {
     /// Number of errors.
     pub count: usize,

@@ -3,7 +3,6 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
 use taxel_data::{Progress, Stream};
 use taxel_learn::ModelBlob;
 use taxel_limit::identify::{self, Observability, Prior};
@@ -58,7 +57,7 @@ pub fn usual_frames(world: &World) -> usize {
 }
 
 /// Limit of a scene.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LimitResult {
     pub subject: String,
     /// Seed of every random draw.
@@ -74,7 +73,7 @@ pub struct LimitResult {
 }
 
 /// Limit at one noise level.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// Noise level p: a fraction, or in Ω for absolute noise.
     pub noise_level: f64,
@@ -89,7 +88,7 @@ pub struct Level {
 }
 
 /// Limit of the electrodes of some rows, from the readings of these rows.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Figures {
     /// Row-wires, from 1.
     pub row_wires: Vec<usize>,

@@ -1,6 +1,5 @@
 //! What a model is worth on contacts that move, read by a board at its own pace.
 
-use serde::Serialize;
 use taxel_data::columns;
 use taxel_learn::cost::{Cost, Design};
 use taxel_learn::{Decoder, ModelBlob};
@@ -15,7 +14,7 @@ use crate::touches::{Touched, Touches, Way};
 use crate::trade::FilterSettings;
 
 /// Errors on contacts that move: of the newest finished estimate against the truth at that moment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MovingContacts {
     pub path: Path,
     /// Group of outputs for whose errors filters are set.
@@ -25,16 +24,14 @@ pub struct MovingContacts {
     /// Errors of the baselines, whose decoding takes no time.
     pub decoders: Vec<DecoderErrors>,
     /// Trajectory to look at.
-    #[serde(skip)]
     pub shown: ShownTrajectory,
 }
 
 /// Errors of one way to read and decode.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MovingWay {
     /// Filter in time behind the model; `None` without one.
     pub filter: Option<FilterSettings>,
-    #[serde(flatten)]
     pub times: Times,
     pub errors: Vec<Errors>,
 }

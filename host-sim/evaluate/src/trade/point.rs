@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
 use serde_json::Value;
 use taxel_core::filter::Settings;
 use taxel_core::rbf::Format;
@@ -12,7 +11,7 @@ use crate::metrics::Blocks;
 use crate::sweep::merge::PointResult;
 
 /// Settings of a filter in time, as a device is configured with them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilterSettings {
     pub time_constant_ms: f64,
     /// Time by which outputs are extrapolated.

@@ -193,6 +193,10 @@ fn of_text(text: String) -> (String, Value) {
 }
 
 impl Table {
+    pub fn is_empty(&self) -> bool {
+        self.lines == 0
+    }
+
     /// Text of a CSV file: a line of keys, then the values of each row.
     pub fn csv(&self) -> String {
         let field = |value: &Value| match value {
