@@ -1,7 +1,6 @@
 //! Subcommands, one small file each: arguments in, library calls, results out.
 
-mod captured;
-mod stderr;
+mod common;
 mod stdout;
 pub mod print;
 pub mod progress;
@@ -44,47 +43,20 @@ pub mod emulate;
 pub mod link;
 pub mod view;
 
-pub use captured::{Captured, Stopped, capture};
+pub use common::{Caller, Common};
+pub use progress::Stopped;
 
 use taxel_firmware::link::message::Refusal;
 
 use crate::{Error, Result};
+use print::Outcome;
 
-/// Options of every command.
-#[derive(clap::Args, Default)]
-pub struct Common {
-    /// Seed of every random draw, instead of the scene's or 1 (no effect where nothing is drawn).
-    #[arg(long, global = true)]
-    pub seed: Option<u64>,
-    /// Print the results as JSON.
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Say nothing on stderr but errors: no notes, no progress.
-    #[arg(short, long, global = true)]
-    pub quiet: bool,
-    /// Say how long each stage took, and how far a long one is.
-    #[arg(short, long, global = true, conflicts_with = "quiet")]
-    pub verbose: bool,
-}
-
-impl Common {
-    /// Seed as a scene's field, if one is given.
-    fn seed_in_scene(&self) -> Result<Option<toml::Value>> {
-        let Some(seed) = self.seed else { return Ok(None) };
-        let most = i64::MAX;
-        let refused =
-            || Error::Usage(format!("--seed {seed}: give at most {most}, the most of a scene"));
-        Ok(Some(i64::try_from(seed).map_err(|_| refused())?.into()))
-    }
-}
-
-/// Runs the `work` of the command of this `name`, prints its error, and returns the program's exit status.
-pub fn run_to_end(name: &str, common: &Common, work: impl FnOnce() -> Result<()>) -> u8 {
-    stderr::set(common.quiet, common.verbose);
-    print::begin(name);
+/// Does the `work` of a command, prints what it found and its error, and returns the program's exit status.
+pub fn run_to_end(work: impl FnOnce() -> Result<Outcome>) -> u8 {
     let outcome = interruption::watch()
         .map_err(|cause| Error::failed(format!("cannot watch for Ctrl-C: {cause}")))
-        .and_then(|()| work());
+        .and_then(|()| work())
+        .and_then(Outcome::print);
     let Err(error) = outcome else { return 0 };
     eprintln!("error: {}", message(&error));
     if matches!(error, Error::Rig(taxel_rig::Error::Interrupted)) {

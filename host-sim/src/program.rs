@@ -1,16 +1,18 @@
 //! The program: its command line, and every command by its name.
 
 use std::ffi::OsString;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use taxel_data::DataFile;
 
 use crate::Result;
+use crate::commands::print::Outcome;
 use crate::commands::{
-    self, Captured, Common, compare, decode, emulate, eval, export, forward, inspect, limit, link,
+    self, Caller, Common, compare, decode, emulate, eval, export, forward, inspect, limit, link,
     run, sweep, synth, table1, trade, train, view,
 };
 
@@ -85,11 +87,10 @@ impl Command {
 /// Runs the command line with these arguments, of which the first is the program's name, and returns its exit status.
 pub fn main_from<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> u8 {
     let cli = Cli::try_parse_from(arguments).unwrap_or_else(|error| advised(error).exit());
-    let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
-    commands::run_to_end(&command.name(), &cli.common, || execute(command, &cli.common))
+    commands::run_to_end(|| execute(cli, None).0)
 }
 
-/// What a command said that was called in this process.
+/// What a command told that was called in this process.
 pub struct Called {
     /// Its result, as `--json` prints it.
     pub json: String,
@@ -97,8 +98,8 @@ pub struct Called {
     pub remarks: Vec<String>,
 }
 
-/// Calls a command with these arguments (without the program's name) in this thread, and returns its result as JSON. It
-/// reads these `tables` where an argument is their path, and unwinds with [`commands::Stopped`] soon after `stop` is set.
+/// Calls a command with these arguments (without the program's name), and returns its result as JSON. It reads these
+/// `tables` where an argument is their path, and unwinds with [`commands::Stopped`] soon after `stop` is set.
 ///
 /// # Errors
 /// As the program has them, with its message and its exit status.
@@ -110,13 +111,14 @@ pub fn call(
     let all = ["taxel", "--json"].into_iter().chain(arguments.iter().map(String::as_str));
     let cli = Cli::try_parse_from(all)
         .map_err(|error| (advised(error).to_string().trim_end().to_owned(), 2))?;
-    let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
-    commands::print::begin(&command.name());
-    let (outcome, Captured { result: json, remarks, .. }) =
-        commands::capture(stop, tables, || execute(command, &cli.common));
+    let caller = Caller { tables, stop: Arc::clone(stop), remarks: Mutex::default() };
+    let (outcome, common) = execute(cli, Some(caller));
+    let remarks = common.caller.map_or(vec![], Caller::into_remarks);
     match outcome {
-        Ok(()) => Ok(Called { json, remarks }),
-        Err(error) => Err((commands::message(&error), commands::exit_status(&error))),
+        Ok(Outcome { text: json, failure: None }) => Ok(Called { json, remarks }),
+        Ok(Outcome { failure: Some(error), .. }) | Err(error) => {
+            Err((commands::message(&error), commands::exit_status(&error)))
+        }
     }
 }
 
@@ -133,7 +135,15 @@ fn advised(mut error: clap::Error) -> clap::Error {
     error
 }
 
-fn execute(command: Command, common: &Common) -> Result<()> {
+/// Does what a command line says, for a `caller` in this process or for who typed it.
+fn execute(cli: Cli, caller: Option<Caller>) -> (Result<Outcome>, Common) {
+    let command = cli.command.unwrap_or_else(|| Command::Run(run::Arguments::default()));
+    let begun = Some((command.name(), Instant::now()));
+    let common = Common { begun, caller, ..cli.common };
+    (outcome_of(command, &common), common)
+}
+
+fn outcome_of(command: Command, common: &Common) -> Result<Outcome> {
     match command {
         Command::Run(arguments) => run::execute(&arguments, common),
         Command::Synth(arguments) => synth::execute(&arguments, common),
@@ -154,7 +164,7 @@ fn execute(command: Command, common: &Common) -> Result<()> {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "taxel", &mut script);
-            commands::print::show(&String::from_utf8_lossy(&script))
+            Ok(Outcome::of(String::from_utf8_lossy(&script).into_owned()))
         }
     }
 }

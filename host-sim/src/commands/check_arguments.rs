@@ -20,7 +20,7 @@ use super::progress::Terminal;
 use super::readings::model_inputs;
 use super::rest_argument::UntouchedArguments;
 use super::scene_argument::{FramesArgument, ModelArgument, SceneArgument};
-use super::{Common, print, stderr};
+use super::{Common, print};
 
 /// Time in µs from one frame of a scene to the next.
 const PERIOD_US: u32 = 10_000;
@@ -53,10 +53,14 @@ pub struct Checked {
 impl CheckArguments {
     /// Loads readings and model, which is trained if none was given.
     pub fn load(&self, common: &Common) -> Result<Checked> {
-        if names_a_scene(self.scene.name()) { self.load_scene(common) } else { self.load_csv() }
+        if names_a_scene(self.scene.name()) {
+            self.load_scene(common)
+        } else {
+            self.load_csv(common)
+        }
     }
 
-    fn load_csv(&self) -> Result<Checked> {
+    fn load_csv(&self, common: &Common) -> Result<Checked> {
         let Some(path) = &self.of.model else {
             return Err(Error::Usage(format!(
                 "{}: readings of a CSV file need --model FILE; `taxel train` makes one",
@@ -68,8 +72,8 @@ impl CheckArguments {
         let readings = model_inputs(&model.prepare(), &file)?;
         let parsed = model.parse();
         let metadata = parsed.metadata();
-        let rest = self.untouched.rest_if_relative(&file, metadata, None)?;
-        let baseline_ohm = self.baseline_ohm(metadata, path, rest.as_ref())?;
+        let rest = self.untouched.rest_if_relative(&file, metadata, None, common)?;
+        let baseline_ohm = self.baseline_ohm(metadata, path, rest.as_ref(), common)?;
         let count = self.count.frames.max(1);
         let start_us = if self.filter.settings().is_on() {
             cycled(&self.period.of_file(&file)?, count)
@@ -87,9 +91,11 @@ impl CheckArguments {
         metadata: &Metadata<'_>,
         path: &Path,
         rest: Option<&Rest>,
+        common: &Common,
     ) -> Result<Option<Vec<f64>>> {
         let fields = FieldArguments::default();
-        let baseline = self.untouched.baselines(metadata, path, (rest, 1), &fields, None)?;
+        let baseline =
+            self.untouched.baselines(metadata, path, (rest, 1), &fields, None, common)?;
         Ok(baseline.map(|baseline| baseline.values.into_vec()))
     }
 
@@ -99,12 +105,12 @@ impl CheckArguments {
         scene.world.check_frames("-n", self.count.frames)?;
         let model = match &self.of.model {
             Some(path) => ModelBlob::read(path)?,
-            None => self.scene.load(common)?.train(&Terminal::new())?,
+            None => self.scene.load(common)?.train(&Terminal::new(common))?,
         };
         let parsed = model.parse();
         let metadata = parsed.metadata();
         if metadata.scene_digest != scene.digest {
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: the model was trained on {:?}, not on this scene; its bits can be compared all \
                  the same",
                 metadata.name
@@ -124,7 +130,7 @@ impl CheckArguments {
             let session = Synthesis::new(&scene.world).drift(None);
             Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values.into_vec())
         } else {
-            self.baseline_ohm(metadata, path, None)?
+            self.baseline_ohm(metadata, path, None, common)?
         };
         let readings = synthesise(&scene.world, Stream::Test, self.count.frames.max(1)).inputs;
         let start_us = self.period.even(readings.len(), PERIOD_US);
@@ -139,9 +145,10 @@ impl CheckArguments {
 }
 
 /// Prints the findings. Wrong answers are a failure.
-pub fn conclude(findings: &Findings, common: &Common) -> Result<()> {
-    print::result(common, findings, || print::Page::of_sections(&sections_of(findings)))?;
-    if findings.all_good() {
+pub fn conclude(findings: &Findings, common: &Common) -> Result<print::Outcome> {
+    let outcome =
+        print::result(common, findings, || print::Page::of_sections(&sections_of(findings)))?;
+    let sound = if findings.all_good() {
         Ok(())
     } else {
         Err(Error::failed(if findings.repeated > 0 || findings.damaged > 0 {
@@ -152,7 +159,8 @@ pub fn conclude(findings: &Findings, common: &Common) -> Result<()> {
         } else {
             "the device failed a check: see above".into()
         }))
-    }
+    };
+    Ok(outcome.and(sound))
 }
 
 fn sections_of(f: &Findings) -> Sections {

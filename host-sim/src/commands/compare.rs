@@ -46,7 +46,7 @@ pub struct Arguments {
     training: TrainingOptions,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let files = arguments
         .to
         .output
@@ -72,8 +72,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     }
     let points = plan.points()?;
     let merged = match &arguments.to.output {
-        Some(folder) => super::sweep::all(&plan, &points, folder)?,
-        None => Merged::new(&plan, &points, work::in_memory(&plan, &points, &Terminal::new())?),
+        Some(folder) => super::sweep::all(&plan, &points, folder, common)?,
+        None => {
+            Merged::new(&plan, &points, work::in_memory(&plan, &points, &Terminal::new(common))?)
+        }
     };
     if let Some(failed) = merged.failed().next().filter(|_| merged.settings.is_empty()) {
         return Err(Error::Usage(report::reason(failed, &first)));
@@ -82,10 +84,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut written = vec![];
     if let Some(files) = &files {
         let command = command_line::of_this_process("compare", &["-o", "--output"], common.seed);
-        files.write(&merged, &sections, &command)?;
+        files.write(&merged, &sections, &command, common)?;
         written.push(format!("\nwritten: {}", files.names()));
     }
-    print::sections_above(common, &sections, &written)
+    Ok(print::sections_above(common, &sections, &written))
 }
 
 /// What is wanted of the layouts.

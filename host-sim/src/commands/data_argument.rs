@@ -13,6 +13,7 @@ use taxel_data::mat::Grid;
 use taxel_data::{DataFile, Rest, Table};
 use taxel_learn::select;
 
+use super::Common;
 use super::arguments::{as_text, refuse};
 use super::data_file::{DATA_FILES, DataFileArguments, TimeArgument, for_data};
 use super::readings::{self, BaselineArgument};
@@ -130,12 +131,15 @@ impl DataOptions {
         file: &DataFile,
         [inputs, outputs]: &[Vec<String>; 2],
         relative: bool,
+        common: &Common,
     ) -> Result<Option<Rest>> {
         if let Some(path) = self.untouched.baseline.as_deref() {
-            let readings = readings::at_rest(&self.file.fields().read(path)?, inputs)?;
+            let readings =
+                readings::at_rest(&self.file.fields().read(path, common)?, inputs, common)?;
             return Ok(Some(Rest { readings, lines: None }));
         }
-        let rest = self.rest.find(file, (inputs, true), outputs.iter().map(String::as_str))?;
+        let outputs = outputs.iter().map(String::as_str);
+        let rest = self.rest.find(file, (inputs, true), outputs, common)?;
         if rest.is_none() && relative {
             let message = "--relative-inputs: no line is known to be at rest: name columns that are zero there (--rest), \
                            or give --baseline FILE, with frames of the untouched sensor";

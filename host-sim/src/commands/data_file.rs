@@ -3,9 +3,9 @@
 use std::ops::Not;
 use std::path::Path;
 
+use super::Common;
 use super::arguments::{as_text, refuse};
 use super::recordings::{self, is_recording};
-use super::{captured, stderr};
 use crate::{Error, Result};
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
@@ -82,13 +82,13 @@ enum Decimal {
 
 impl DataFileArguments {
     /// Reads the file at `path`, cut as was asked for.
-    pub fn read(&self, path: &Path) -> Result<DataFile> {
-        self.cut(self.fields.read(path)?)
+    pub fn read(&self, path: &Path, common: &Common) -> Result<DataFile> {
+        self.cut(self.fields.read(path, common)?)
     }
 
     /// Reads the file at `path` as [`read`](Self::read) does, with its text.
-    pub fn read_with_text(&self, path: &Path) -> Result<DataFile> {
-        self.cut(self.fields.read_as(path, true)?)
+    pub fn read_with_text(&self, path: &Path, common: &Common) -> Result<DataFile> {
+        self.cut(self.fields.read_as(path, true, common)?)
     }
 
     fn cut(&self, mut file: DataFile) -> Result<DataFile> {
@@ -155,41 +155,41 @@ impl FieldArguments {
     }
 
     /// Reads the file at `path`, and says on stderr what it made of it.
-    pub fn read(&self, path: &Path) -> Result<DataFile> {
-        self.read_as(path, false)
+    pub fn read(&self, path: &Path, common: &Common) -> Result<DataFile> {
+        self.read_as(path, false, common)
     }
 
-    fn read_as(&self, path: &Path, keeps_text: bool) -> Result<DataFile> {
+    fn read_as(&self, path: &Path, keeps_text: bool, common: &Common) -> Result<DataFile> {
         if is_recording(path) {
             let of_text = |field: &str| ["separator", "decimal"].contains(&field);
             refuse(self, of_text, |option| {
                 format!("{option} is for text files; {} is none: leave it out", path.display())
             })?;
         }
-        let mut file = if let Some(table) = captured::table(path) {
+        let mut file = if let Some(table) = common.table(path) {
             table
         } else if is_recording(path) {
-            recordings::read(path)?
+            recordings::read(path, common)?
         } else {
             DataFile::read_as(path, &Reading { keeps_text, ..self.reading() })?
         };
-        note_found(&file);
+        note_found(&file, common);
         let name = path.display();
         if !file.names_columns {
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: {name} names no columns: they are called c1 to c{} (c2..c5 stands for four of them)",
                 file.header.len()
             ));
         }
         if file.lacks_last_line_end {
             let last = file.line_number(file.lines() - 1);
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: {name} ends without a line end: if it is not whole, the last number of line {last} may be wrong"
             ));
         }
         for code in &self.missing {
             let marked = file.mark_missing(*code);
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: {marked} values of {name} are {code}, and count as missing"
             ));
         }
@@ -198,9 +198,9 @@ impl FieldArguments {
 }
 
 /// Says on stderr what is not plain CSV in a `file`.
-fn note_found(file: &DataFile) {
+fn note_found(file: &DataFile, common: &Common) {
     if !file.found.is_empty() {
-        stderr::remark(format_args!("note: {}: {}", file.path.display(), file.found));
+        common.remark(format_args!("note: {}: {}", file.path.display(), file.found));
     }
 }
 

@@ -8,39 +8,45 @@ use taxel_data::rest::is_zero_at_rest;
 use taxel_data::{Table, columns};
 use taxel_learn::outliers::{Outlier, Outliers};
 
-use super::stderr;
+use super::Common;
 
 /// Most lines with outliers that are named.
 const MOST_NAMED: usize = 5;
 
 /// Names the `outliers` of the file at `path`, which has so many usable `lines`, and says what they are `left_out` of.
-pub fn print_outliers(outliers: &Outliers, path: &Path, lines: usize, left_out: &str) {
+pub fn print_outliers(
+    outliers: &Outliers,
+    path: &Path,
+    lines: usize,
+    left_out: &str,
+    common: &Common,
+) {
     notes_on_outliers(outliers, &path.display().to_string(), lines, left_out)
         .iter()
-        .for_each(stderr::remark);
+        .for_each(|it| common.remark(it));
 }
 
 /// Names the columns of the file at `path` that never change.
-pub fn print_constant(columns: &[String], path: &Path) {
+pub fn print_constant(columns: &[String], path: &Path, common: &Common) {
     if let Some(note) = note_on_constant(columns, &path.display().to_string()) {
-        stderr::remark(note);
+        common.remark(note);
     }
 }
 
 /// Counts the lines of the file at `path`, which has `of` lines, that lack a value.
-pub fn print_left_out(left_out: &LeftOut, path: &Path, of: usize) {
+pub fn print_left_out(left_out: &LeftOut, path: &Path, of: usize, common: &Common) {
     if let Some(note) = note_on_left_out(left_out, &path.display().to_string(), of) {
-        stderr::remark(note);
+        common.remark(note);
     }
 }
 
 /// Names the inputs of the file at `path` that can tell nothing.
-pub fn print_unused(unused: &UnusedInputs, path: &Path) {
-    notes_on_unused(unused, &path.display().to_string()).iter().for_each(stderr::remark);
+pub fn print_unused(unused: &UnusedInputs, path: &Path, common: &Common) {
+    notes_on_unused(unused, &path.display().to_string()).iter().for_each(|it| common.remark(it));
 }
 
 /// Says that no line of the log at `path`, which has these `outputs`, is known to be at rest.
-pub fn print_no_rest(outputs: &Table, path: &Path) {
+pub fn print_no_rest(outputs: &Table, path: &Path, common: &Common) {
     let told = outputs.names.iter().filter(|name| is_zero_at_rest(name)).cloned();
     let told: Vec<String> = told.collect();
     let why = match told.as_slice() {
@@ -53,7 +59,7 @@ pub fn print_no_rest(outputs: &Table, path: &Path) {
             }
         ),
     };
-    stderr::remark(format_args!(
+    common.remark(format_args!(
         "note: no line of {} is known to be at rest, so drift is not looked for: {why} --rest NAME names a column that is 0 \
          while nothing touches the sensor",
         path.display()

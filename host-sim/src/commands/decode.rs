@@ -25,7 +25,7 @@ use super::health::{Health, HealthArguments};
 use super::readings::{model_inputs, related};
 use super::recordings::{self, is_recording};
 use super::rest_argument::UntouchedArguments;
-use super::{Common, arguments, print, stderr};
+use super::{Common, arguments, print};
 
 /// Decode readings from a data file to CSV, one line of estimates a line; or to a recording (.mcap), with the readings too.
 ///
@@ -70,7 +70,7 @@ pub struct Arguments {
     file: DataFileArguments,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let baseline = arguments.untouched.path().unwrap_or(&arguments.readings);
     let read = [&*arguments.model, &arguments.readings, baseline];
     print::check_output(&arguments.to.output, &read)?;
@@ -83,23 +83,24 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let model = blob.prepare();
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
     let file = if arguments.keep.is_empty() {
-        arguments.file.read(&arguments.readings)?
+        arguments.file.read(&arguments.readings, common)?
     } else {
-        arguments.file.read_with_text(&arguments.readings)?
+        arguments.file.read_with_text(&arguments.readings, common)?
     };
     let parsed = blob.parse();
     let metadata = parsed.metadata();
-    let rest = arguments.untouched.rest_if_relative(&file, metadata, limits)?;
+    let rest = arguments.untouched.rest_if_relative(&file, metadata, limits, common)?;
     let log = (rest.as_ref(), file.lines());
     let baselines =
-        arguments.untouched.baselines(metadata, &arguments.model, log, fields, limits)?;
+        arguments.untouched.baselines(metadata, &arguments.model, log, fields, limits, common)?;
     let mut readings = model_inputs(&model, &file)?;
     let scanned = is_recording(&arguments.to.output)
         .then(|| Ok::<_, Error>((clock_us(&file)?, readings.values.clone())))
         .transpose()?;
-    let mut health = arguments.health.apply(&model, &mut readings, baselines.as_ref())?;
-    let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
-    remark_on_range(&model, &readings);
+    let mut health = arguments.health.apply(&model, &mut readings, baselines.as_ref(), common)?;
+    let (model, readings) =
+        related(model, readings, baselines.as_ref(), &mut health.is_faulty, common);
+    remark_on_range(&model, &readings, common);
     let mut estimate = model.decode_table(&readings);
     let settings = arguments.filter.settings();
     if settings.is_on() {
@@ -149,7 +150,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let novel = assessed.map(|(_, frames)| novel(&frames));
     result.fact("frames_novel", "novel frames, unlike those of training", "", novel);
     result.fact("file", "file", "", arguments.to.output.display().to_string());
-    print::sections(common, &result)
+    Ok(print::sections(common, &result))
 }
 
 /// Column of novelty, and what follows an output's name in the name of its deviation.
@@ -313,9 +314,9 @@ fn kept<'k>(
 }
 
 /// Remarks on stderr if many readings lie outside the range that the model was trained on.
-fn remark_on_range(model: &PreparedModel<'_>, readings: &Table) {
+fn remark_on_range(model: &PreparedModel<'_>, readings: &Table, common: &Common) {
     if let Some(warning) = Warning::out_of_range(model.share_out_of_range(&readings.values)) {
-        stderr::remark(warning);
+        common.remark(warning);
     }
 }
 

@@ -41,7 +41,7 @@ pub struct Arguments {
     log: Option<PathBuf>,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     if let Some(log) = &arguments.log {
         print::check_output(log, &[&arguments.image])?;
     }
@@ -67,7 +67,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let mut device = Device::new(emulator)?;
         device.patience = PATIENCE;
         let plan = arguments.check.plan(WINDOW);
-        check(&mut device, &frames, &model, &plan, &Terminal::new())
+        check(&mut device, &frames, &model, &plan, &Terminal::new(common))
     });
     if let Some((temporary, wanted)) = log.zip(arguments.log.as_ref()) {
         let logged = std::fs::read(&temporary).unwrap_or_default();

@@ -56,34 +56,57 @@ pub struct Arguments {
     file: DataFileArguments,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     if let Some(html) = &arguments.html {
         let untouched = arguments.untouched.path().unwrap_or(&arguments.data);
         print::check_output(html, &[&*arguments.model, &arguments.data, untouched])?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
+    let file = arguments.file.read(&arguments.data, common)?;
+    let mut sections = judged(arguments, &blob, &file, common)?;
+    if let Some(html) = &arguments.html {
+        sections.is_alone = true;
+        let page = sections.page(&command_line::of_this_process("eval", &[], None));
+        output::write_bytes(html, page.html.as_bytes())?;
+    }
+    Ok(print::sections(common, &sections))
+}
+
+/// What the model in `blob` is worth on the lines of `file`.
+fn judged(
+    arguments: &Arguments,
+    blob: &ModelBlob,
+    file: &DataFile,
+    common: &Common,
+) -> Result<Sections> {
     let model = blob.prepare();
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
-    let file = arguments.file.read(&arguments.data)?;
     let parsed = blob.parse();
     let metadata = parsed.metadata();
-    let mut readings = model_inputs(&model, &file)?;
-    let mut truth = table_of(&file, metadata.output_names.iter())?;
-    let clock = Clock::of(&file, arguments.clock.time.as_deref())?;
+    let mut readings = model_inputs(&model, file)?;
+    let mut truth = table_of(file, metadata.output_names.iter())?;
+    let clock = Clock::of(file, arguments.clock.time.as_deref())?;
     let log = Log { clock, lines: (0..file.lines()).collect() };
     let rest = if over_time::is_log(&log, &truth) {
-        arguments.untouched.rest(&file, metadata, limits)?
+        arguments.untouched.rest(file, metadata, limits, common)?
     } else {
-        arguments.untouched.rest_if_relative(&file, metadata, limits)?
+        arguments.untouched.rest_if_relative(file, metadata, limits, common)?
     };
     let of_lines = (rest.as_ref(), file.lines());
-    let baselines =
-        arguments.untouched.baselines(metadata, &arguments.model, of_lines, fields, limits)?;
-    let mut health = arguments.health.apply(&model, &mut readings, baselines.as_ref())?;
+    let baselines = arguments.untouched.baselines(
+        metadata,
+        &arguments.model,
+        of_lines,
+        fields,
+        limits,
+        common,
+    )?;
+    let mut health = arguments.health.apply(&model, &mut readings, baselines.as_ref(), common)?;
     let lines_at_rest = rest.as_ref().and_then(|rest| rest.lines.clone());
     let at_rest =
         rest.and_then(|rest| RestOverTime::new(&rest, &log.clock, &Spread::of(&readings)));
-    let (model, readings) = related(model, readings, baselines.as_ref(), &mut health.is_faulty);
+    let (model, readings) =
+        related(model, readings, baselines.as_ref(), &mut health.is_faulty, common);
     let mut estimate = model.decode_table(&readings);
     let with_untold = estimate.values.clone();
     estimate.values = truth.with_places(estimate.values.into_vec()).into_owned().into();
@@ -114,7 +137,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let decoders = decoders_of(&truth, errors, of_centroid.as_deref(), &measure);
     let verdict = verdict_of(&decoders)
         .of_frames(None, frames_evaluated)
-        .with(Warning::trained_on(knows(metadata, &file)?))
+        .with(Warning::trained_on(knows(metadata, file)?))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
         .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift));
     let coverage = assessed.map_or(vec![], |(deviations, _)| {
@@ -128,10 +151,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         .is_some()
         .then(|| Distribution::new(&truth, &estimate, &readings, reference));
     let counts = [frames_evaluated, without_reading, values_evaluated, truth.values.len()];
-    let made = made(arguments, (&blob, &file), &health, counts)?;
+    let made = made(arguments, (blob, file), &health, counts)?;
     let judged = Judged {
         verdict: &verdict,
-        device: &DeviceCost::new(&blob),
+        device: &DeviceCost::new(blob),
         decoders: &decoders,
         linear_at_training: &linear_at_training,
         limit: &LimitSummary::new(&Err(Refusal::Measured)),
@@ -150,13 +173,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }),
         table1: None,
     };
-    let mut sections = report::of_judged(&judged, made);
-    if let Some(html) = &arguments.html {
-        sections.is_alone = true;
-        let page = sections.page(&command_line::of_this_process("eval", &[], None));
-        output::write_bytes(html, page.html.as_bytes())?;
-    }
-    print::sections(common, &sections)
+    Ok(report::of_judged(&judged, made))
 }
 
 /// The model's `errors`, and those of decoders that are fitted to the lines of `truth`: the centroid and the mean.

@@ -39,7 +39,7 @@ pub struct Arguments {
     rust: Option<PathBuf>,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let read = || ModelBlob::read(&arguments.model);
     let (written, blob);
     if let Some(file) = &arguments.rust {
@@ -60,5 +60,5 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     result.fact("networks", "networks", "", model.network_count());
     result.fact("weight_bytes", "numbers", "bytes", constant_bytes(&blob));
     result.fact("file", "written to", "", written.display().to_string());
-    print::sections(common, &result)
+    Ok(print::sections(common, &result))
 }

@@ -4,14 +4,14 @@ use taxel_core::blob::Model;
 use taxel_core::rbf::Format;
 use taxel_learn::Options;
 
-use super::stderr;
+use super::Common;
 
 /// Notes on stderr that a `model` is in f32, because no other format was asked for and fixed16 does not hold it. A frame of it
 /// takes so many `cycles`.
-pub fn note_format(model: &Model<'_>, options: &Options, cycles: u64) {
+pub fn note_format(model: &Model<'_>, options: &Options, cycles: u64, common: &Common) {
     let is_other = model.networks().any(|network| network.format() != options.format);
     if options.or_f32 && is_other {
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "note: {} does not hold this model (--format {0} tells why), so it is in {}: a frame takes {cycles} cycles",
             options.format.name(),
             Format::F32.name()

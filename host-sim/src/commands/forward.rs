@@ -23,7 +23,7 @@ pub struct Arguments {
     to: arguments::OutputFile,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let scene = Experiment::load_open(&arguments.scene)?;
     let file = DataFile::read(&arguments.deformation)?;
     print::check_output(&arguments.to.output, &[&arguments.deformation, arguments.scene.as_ref()])?;
@@ -36,5 +36,5 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     result.fact("frames", "frames", "", file.lines());
     result.fact("readings", "readings of a frame", "", names.len());
     result.fact("file", "file", "", arguments.to.output.display().to_string());
-    print::sections(common, &result)
+    Ok(print::sections(common, &result))
 }

@@ -1,6 +1,6 @@
 //! Faulty readings of data files: what is believed, what is filled, and notes on both.
 
-use super::stderr;
+use super::Common;
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -79,6 +79,7 @@ impl HealthArguments {
         model: &PreparedModel<'_>,
         readings: &mut Table,
         baselines: Option<&Table>,
+        common: &Common,
     ) -> Result<Health> {
         let lines = readings.len();
         let faults = match self.limits.0 {
@@ -90,20 +91,20 @@ impl HealthArguments {
             None => vec![],
         };
         if lines >= FEWEST_FOR_NOISE && stand_still(&readings.values, readings.names.len()) {
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: all {lines} lines are the same: do the readings stand still?"
             ));
         }
         let left_out = self.leave_out(readings)?;
         let columns = judge(readings, self.limits.0);
         let told = told(&columns, &faults, &readings.names, &left_out);
-        notes(&told.0, &told.1, lines).iter().for_each(stderr::remark);
+        notes(&told.0, &told.1, lines).iter().for_each(|it| common.remark(it));
         if let Some(limits) = self.limits.0
             && columns.len() == readings.names.len()
             && columns.iter().all(|column| column.shorted + column.open == lines)
         {
             let Limits { shorted_below_ohm, open_above_ohm } = limits;
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: no reading lies within {shorted_below_ohm} to {open_above_ohm} Ω; are they in Ω? --limits gives \
                  other limits"
             ));
@@ -127,7 +128,7 @@ impl HealthArguments {
             is_faulty,
         };
         if health.frames_filled > 0 {
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: missing readings of {} were filled from the others (docs/reliability.md tells what that costs)",
                 of_lines(health.frames_filled, lines)
             ));
@@ -140,9 +141,7 @@ impl HealthArguments {
                 format!("more than 1 in {MOST_MISSING} of a frame")
             };
             let count = of_lines(faulty - health.frames_filled, lines);
-            stderr::remark(format_args!(
-                "note: missing readings of {count} were not filled: {why}"
-            ));
+            common.remark(format_args!("note: missing readings of {count} were not filled: {why}"));
         }
         Ok(health)
     }
@@ -175,9 +174,9 @@ impl HealthArguments {
 }
 
 /// Notes on stderr which wires of a device are open or shorted, by the `readings` that it scanned.
-pub fn note_faults(readings: &Table) {
+pub fn note_faults(readings: &Table, common: &Common) {
     let faults = diagnose(readings, Limits::USUAL, None);
-    notes(&[], &faults, readings.len()).iter().for_each(stderr::remark);
+    notes(&[], &faults, readings.len()).iter().for_each(|it| common.remark(it));
 }
 
 /// Faulty `columns` and `faults` that are worth a note: all but those of columns `left_out` of the ones called `names`.

@@ -27,9 +27,9 @@ pub struct Arguments {
     model: PathBuf,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let blob = ModelBlob::read(&arguments.model)?;
-    print::sections(common, &sections_of(&blob))
+    Ok(print::sections(common, &sections_of(&blob)))
 }
 
 fn sections_of(blob: &ModelBlob) -> Sections {

@@ -52,7 +52,7 @@ pub struct Arguments {
     to: arguments::OutputFolder,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let scenes = arguments.scenes.iter().map(|scene| prepared(scene, arguments, common));
     let scenes: Vec<Prepared> = scenes.collect::<Result<_>>()?;
     let names: BTreeSet<&str> = scenes.iter().map(|it| it.scene.name.as_str()).collect();
@@ -70,10 +70,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     let mut results = Vec::new();
     for Prepared { scene, noise_levels, frames, models } in &scenes {
         let plan = Plan { noise_levels, frames: *frames, models };
-        results.push(limit::compute(scene, &plan, &Terminal::new())?);
+        results.push(limit::compute(scene, &plan, &Terminal::new(common))?);
     }
     let written = scenes.iter().zip(&results).filter_map(|(it, result)| {
-        folder_of(&it.scene).map(|folder| written_files(&folder, result))
+        folder_of(&it.scene).map(|folder| written_files(&folder, result, common))
     });
     Written::put_in_place(written.collect::<Result<_>>()?)?;
     let folder = arguments.to.output.as_deref();
@@ -83,8 +83,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     };
     let names = [FILES.files, &["figures/"]].concat().join(", ");
     let written = folder.map(|it| format!("\nwritten to {}{place}: {names}", it.display()));
-    print::sections_above(common, &sections, &Vec::from_iter(written))?;
-    results.iter().try_for_each(refusal)
+    let outcome = print::sections_above(common, &sections, &Vec::from_iter(written));
+    Ok(outcome.and(results.iter().try_for_each(refusal)))
 }
 
 /// Scene with what is to be computed of it.
@@ -139,10 +139,10 @@ fn refusal(result: &LimitResult) -> Result<()> {
     }
 }
 
-fn written_files(folder: &Path, result: &LimitResult) -> Result<Written> {
+fn written_files(folder: &Path, result: &LimitResult, common: &Common) -> Result<Written> {
     let command = command_line::of_this_process("limit", &["-o", "--output"], Some(result.seed));
     let sections = report::of_limit(result);
-    let (json, page) = (print::file_of(&sections), sections.page(&command));
+    let (json, page) = (print::file_of(common, &sections), sections.page(&command));
     let mut files = vec![("limit.json", json.as_bytes()), ("limit.html", page.html.as_bytes())];
     files.extend(page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes())));
     Ok(FILES.written(folder, &files)?)

@@ -12,7 +12,7 @@ use taxel_rig::device::{Device, DeviceIdentity, serial, upload};
 use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::device_arguments::BaudArgument;
 use super::progress::Terminal;
-use super::{Common, interruption, stderr};
+use super::{Common, interruption};
 
 /// Talk to a device on a serial port: identify, upload, record, configure, recalibrate.
 #[derive(Args)]
@@ -124,7 +124,7 @@ struct UploadArguments {
     trial: Option<u32>,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<crate::commands::print::Outcome> {
     let open = || -> Result<_> {
         let mut device = Device::new(serial::open(
             &arguments.port,
@@ -142,8 +142,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let model = ModelBlob::read(&action.model)?;
             let mut device = open()?;
             let before = device.identify()?;
-            let after = activate(&mut device, &model)?;
-            note_another_sensor(&before, &after);
+            let after = activate(&mut device, &model, common)?;
+            note_another_sensor(&before, &after, common);
             match action.trial {
                 Some(minutes) => upload::prolong_trial(&mut device, minutes)?,
                 None => drop(upload::confirm(&mut device)?),
@@ -170,21 +170,21 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let Checked { frames, model, .. } = action.load(common)?;
             let mut device = open()?;
             let plan = action.plan(1);
-            let findings = check(&mut device, &frames, &model, &plan, &Terminal::new())?;
+            let findings = check(&mut device, &frames, &model, &plan, &Terminal::new(common))?;
             conclude(&findings, common)
         }
     }
 }
 
 /// Uploads `model` while the device goes on, puts it on trial, and waits until the device has decoded frames with it.
-fn activate(device: &mut Device, model: &ModelBlob) -> Result<DeviceIdentity> {
-    let identity = upload::start_trial(device, model.bytes(), &Terminal::new())?;
+fn activate(device: &mut Device, model: &ModelBlob, common: &Common) -> Result<DeviceIdentity> {
+    let identity = upload::start_trial(device, model.bytes(), &Terminal::new(common))?;
     upload::see_frames(device)?;
     Ok(identity)
 }
 
 /// Notes on stderr whatever tells that the new model may be one of another sensor.
-fn note_another_sensor(before: &DeviceIdentity, after: &DeviceIdentity) {
+fn note_another_sensor(before: &DeviceIdentity, after: &DeviceIdentity, common: &Common) {
     let (Some(old), Some(new)) = (&before.model, &after.model) else { return };
     let mut differences = Vec::new();
     if old.inputs_crc_32 != new.inputs_crc_32 {
@@ -197,7 +197,7 @@ fn note_another_sensor(before: &DeviceIdentity, after: &DeviceIdentity) {
         differences.push("it was trained on another scene or data set");
     }
     if !differences.is_empty() {
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "note: the previous model was {:?}, this one is {:?}: {}",
             before.model_name,
             after.model_name,

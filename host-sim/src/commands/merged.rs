@@ -7,7 +7,7 @@ use crate::sweep::Merged;
 use crate::{Error, Result};
 use taxel_data::output::{self, check_writable};
 
-use super::print;
+use super::{Common, print};
 
 /// Ends of the files' names, after the table's name.
 const ENDS: [&str; 3] = [".csv", ".json", ".html"];
@@ -43,9 +43,15 @@ impl Files {
     }
 
     /// Writes the results and their `sections`; `command` is what the user typed.
-    pub fn write(&self, merged: &Merged, sections: &Sections, command: &str) -> Result<()> {
+    pub fn write(
+        &self,
+        merged: &Merged,
+        sections: &Sections,
+        command: &str,
+        common: &Common,
+    ) -> Result<()> {
         let page = sections.page(command);
-        let texts = [report::points(merged).csv(), print::file_of(sections), page.html];
+        let texts = [report::points(merged).csv(), print::file_of(common, sections), page.html];
         let files = ENDS.iter().zip(texts).map(|(end, text)| (format!("{}{end}", self.stem), text));
         let files: Vec<_> = files.chain(page.figures).collect();
         Ok(output::write_folder(&self.folder, &files)?)

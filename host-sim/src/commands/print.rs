@@ -1,11 +1,9 @@
-//! Printing of results on stdout: aligned tables for people, JSON for programs.
+//! Results of commands as they are printed: aligned tables for people, JSON for programs.
 
 use std::fmt::{Display, Write as _};
 use std::io::{self, ErrorKind, Write as _};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
 use crate::report::Sections;
 use crate::{Error, Result};
@@ -13,7 +11,7 @@ use serde::Serialize;
 use taxel_data::error::printable;
 use taxel_data::output;
 
-use super::{Common, captured, stdout};
+use super::{Common, stdout};
 
 /// Page of text for people, printed as a whole.
 #[derive(Default)]
@@ -38,9 +36,9 @@ impl Page {
         Self(sections.text())
     }
 
-    /// Prints the page.
-    pub fn print(self) -> Result<()> {
-        show(&printable(&self.0))
+    /// The page as what a command found.
+    pub fn outcome(self) -> Outcome {
+        Outcome::of(printable(&self.0).into())
     }
 }
 
@@ -59,40 +57,49 @@ pub fn check_output(path: &Path, inputs: &[&Path]) -> Result<()> {
     Ok(output::check_writable(path, inputs)?)
 }
 
-/// Shows a result; a reader who has seen enough (`| head`) is no failure.
-pub fn show(text: &str) -> Result<()> {
-    if captured::keep_result(text) {
-        return Ok(());
+/// What a command found, as it is to be printed.
+#[derive(Default)]
+pub struct Outcome {
+    pub text: String,
+    /// Reason why the command failed, though it found something.
+    pub failure: Option<Error>,
+}
+
+impl Outcome {
+    /// Outcome with this text.
+    pub fn of(text: String) -> Self {
+        Self { text, failure: None }
     }
-    let (place, written) = if STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
-        ("stderr", io::stderr().write_all(text.as_bytes()))
-    } else {
-        ("stdout", io::stdout().write_all(text.as_bytes()))
-    };
-    match written {
-        Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
-            Err(Error::failed(format!("cannot write to {place}: {cause}")))
+
+    /// This outcome of a command that failed, if `outcome` is an error.
+    #[must_use]
+    pub fn and(self, outcome: Result<()>) -> Self {
+        Self { failure: outcome.err(), ..self }
+    }
+
+    /// Prints it; a reader who has seen enough (`| head`) is no failure.
+    ///
+    /// # Errors
+    /// The failure of the command, and an error of the write.
+    pub fn print(self) -> Result<()> {
+        let text = self.text.as_bytes();
+        let (place, written) = if STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
+            ("stderr", io::stderr().write_all(text))
+        } else {
+            ("stdout", io::stdout().write_all(text))
+        };
+        match written {
+            Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
+                Err(Error::failed(format!("cannot write to {place}: {cause}")))
+            }
+            _ => self.failure.map_or(Ok(()), Err),
         }
-        _ => Ok(()),
     }
 }
 
-/// Command that was begun last, and when.
-static BEGUN: Mutex<(String, Option<Instant>)> = Mutex::new((String::new(), None));
-
-/// Notes that `command` begins, for what [`json`] says of it.
-pub fn begin(command: &str) {
-    *BEGUN.lock().unwrap_or_else(PoisonError::into_inner) = (command.into(), Some(Instant::now()));
-}
-
 /// Result as JSON for a file, which is the same whenever it is written.
-pub fn json_text(result: &impl Serialize) -> Result<String> {
-    Ok(document(&object(result)?, false))
-}
-
-/// Result as JSON for a file, which is the same whenever it is written.
-pub fn file_of(sections: &Sections) -> String {
-    document(&sections.json(), false)
+pub fn file_of(common: &Common, sections: &Sections) -> String {
+    document(common, &sections.json(), false)
 }
 
 fn object(result: &impl Serialize) -> Result<String> {
@@ -101,36 +108,41 @@ fn object(result: &impl Serialize) -> Result<String> {
 }
 
 /// Object of a result with what all commands say (docs/json.md): the time since the command began only if it is `timed`.
-fn document(object: &str, timed: bool) -> String {
-    let (command, begun) = BEGUN.lock().unwrap_or_else(PoisonError::into_inner).clone();
+fn document(common: &Common, object: &str, timed: bool) -> String {
+    let begun = common.begun.as_ref();
+    let command = begun.map_or("", |(command, _)| command);
     let version = env!("CARGO_PKG_VERSION");
-    let seconds = begun.filter(|_| timed).map(|begun| begun.elapsed().as_secs_f64());
+    let seconds = begun.filter(|_| timed).map(|(_, begun)| begun.elapsed().as_secs_f64());
     let seconds = seconds.map_or(String::new(), |it| format!("\n  \"seconds\": {it},"));
     let head = format!("{{\n  \"version\": \"{version}\",\n  \"command\": \"{command}\",{seconds}");
     object.replacen('{', &head, 1) + "\n"
 }
 
-/// Prints the result of the command as JSON.
-pub fn json(result: &impl Serialize) -> Result<()> {
-    show(&document(&object(result)?, true))
+/// Result of the command as JSON.
+pub fn json(common: &Common, result: &impl Serialize) -> Result<Outcome> {
+    Ok(Outcome::of(document(common, &object(result)?, true)))
 }
 
-/// Prints the result of the command: as JSON if that was asked for, else as text.
-pub fn sections(common: &Common, sections: &Sections) -> Result<()> {
+/// Result of the command: as JSON if that was asked for, else as text.
+pub fn sections(common: &Common, sections: &Sections) -> Outcome {
     sections_above(common, sections, &[])
 }
 
-/// Prints the result of the command: as JSON if that was asked for, else as text above `more` lines.
-pub fn sections_above(common: &Common, sections: &Sections, more: &[String]) -> Result<()> {
+/// Result of the command: as JSON if that was asked for, else as text above `more` lines.
+pub fn sections_above(common: &Common, sections: &Sections, more: &[String]) -> Outcome {
     if common.json {
-        return show(&document(&sections.json(), true));
+        return Outcome::of(document(common, &sections.json(), true));
     }
     let mut page = Page::of_sections(sections);
     more.iter().for_each(|line| page.line(line));
-    page.print()
+    page.outcome()
 }
 
-/// Prints the result of the command: as JSON if that was asked for, else as a page.
-pub fn result(common: &Common, result: &impl Serialize, page: impl FnOnce() -> Page) -> Result<()> {
-    if common.json { json(result) } else { page().print() }
+/// Result of the command: as JSON if that was asked for, else as a page.
+pub fn result(
+    common: &Common,
+    result: &impl Serialize,
+    page: impl FnOnce() -> Page,
+) -> Result<Outcome> {
+    if common.json { json(common, result) } else { Ok(page().outcome()) }
 }

@@ -9,8 +9,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use taxel_data::Progress;
 
-use super::captured::{self, Stopped};
-use super::stderr;
+use super::Common;
 
 /// Least time between two lines of the same stage.
 const LINE_EVERY: Duration = Duration::from_secs(10);
@@ -21,12 +20,14 @@ pub enum Terminal {
     Bar(ProgressBar),
     /// Lines in a log, where stderr is no terminal.
     Log(Mutex<Log>),
-    /// Nothing, for a caller in this process, who may want it to stop.
+    /// Nothing, for a caller in this process, who may want it to stop, or for who wants to hear nothing.
     Called(Arc<AtomicBool>),
 }
 
 /// Stage that runs, for lines in a log.
 pub struct Log {
+    /// Whether it says how long each stage took.
+    is_verbose: bool,
     stage: String,
     steps: usize,
     done: usize,
@@ -37,14 +38,16 @@ pub struct Log {
 }
 
 impl Terminal {
-    /// Display of progress on stderr.
-    pub fn new() -> Self {
-        if let Some(stop) = captured::stop() {
-            return Self::Called(stop);
+    /// Display of progress for a command: on stderr, or for its caller.
+    pub fn new(common: &Common) -> Self {
+        if let Some(caller) = &common.caller {
+            return Self::Called(Arc::clone(&caller.stop));
         }
-        let is_log = stderr::is_quiet() || stderr::is_verbose();
-        if is_log || ProgressDrawTarget::stderr().is_hidden() {
-            return Self::Log(Mutex::new(Log::new(Instant::now())));
+        if common.quiet {
+            return Self::Called(Arc::default());
+        }
+        if common.verbose || ProgressDrawTarget::stderr().is_hidden() {
+            return Self::Log(Mutex::new(Log::new(common.verbose, Instant::now())));
         }
         let bar = ProgressBar::new(0);
         let template = "{msg:<28} {bar:32} {percent:>3} %  {elapsed}, {eta} left";
@@ -54,6 +57,14 @@ impl Terminal {
         bar.enable_steady_tick(Duration::from_millis(100));
         Self::Bar(bar)
     }
+}
+
+/// What long work unwinds with when its caller wants it to stop.
+pub struct Stopped;
+
+/// Says a line of a log.
+fn say(line: impl std::fmt::Display) {
+    eprintln!("{line}");
 }
 
 /// The log, also after a panic of another thread that held it.
@@ -80,7 +91,7 @@ impl Progress for Terminal {
             Self::Log(log) => {
                 let mut log = locked(log);
                 log.end(Instant::now());
-                log.stage(name, steps, Instant::now()).into_iter().for_each(stderr::remark);
+                log.stage(name, steps, Instant::now()).into_iter().for_each(say);
             }
             Self::Called(stop) => unwind_if(stop),
         }
@@ -90,7 +101,7 @@ impl Progress for Terminal {
         match self {
             Self::Bar(bar) => bar.inc(1),
             Self::Log(log) => {
-                locked(log).step(Instant::now()).into_iter().for_each(stderr::remark);
+                locked(log).step(Instant::now()).into_iter().for_each(say);
             }
             Self::Called(stop) => unwind_if(stop),
         }
@@ -108,16 +119,16 @@ impl Drop for Terminal {
 }
 
 impl Log {
-    fn new(now: Instant) -> Self {
-        let known = BTreeSet::new();
-        Self { stage: String::new(), steps: 0, done: 0, started: now, written: now, known }
+    fn new(is_verbose: bool, now: Instant) -> Self {
+        let (stage, known) = (String::new(), BTreeSet::new());
+        Self { is_verbose, stage, steps: 0, done: 0, started: now, written: now, known }
     }
 
     /// Says how long the stage took that ends, if that is wanted.
     fn end(&self, now: Instant) {
-        if stderr::is_verbose() && !self.stage.is_empty() {
+        if self.is_verbose && !self.stage.is_empty() {
             let elapsed_s = now.duration_since(self.started).as_secs_f64();
-            stderr::remark(format_args!("{}: took {elapsed_s:.2} s", self.stage));
+            say(format!("{}: took {elapsed_s:.2} s", self.stage));
         }
     }
 

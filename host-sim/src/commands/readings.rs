@@ -12,8 +12,7 @@ use taxel_data::{DataFile, Dataset, Table, columns};
 use taxel_learn::health::judge;
 use taxel_learn::{PreparedModel, outliers, relative};
 
-use super::data_notes;
-use super::stderr;
+use super::{Common, data_notes};
 
 use super::data_file::FieldArguments;
 
@@ -33,10 +32,10 @@ impl BaselineArgument {
         &self,
         model: PreparedModel<'b>,
         path: &Path,
-        fields: &FieldArguments,
-        limits: Option<Limits>,
+        (fields, limits): (&FieldArguments, Option<Limits>),
+        common: &Common,
     ) -> Result<PreparedModel<'b>> {
-        Ok(match self.values(model.model().metadata(), (path, ""), fields, limits)? {
+        Ok(match self.values(model.model().metadata(), (path, ""), (fields, limits), common)? {
             Some(baseline) => model.with_baseline(&baseline),
             None => model,
         })
@@ -48,8 +47,8 @@ impl BaselineArgument {
         &self,
         metadata: &Metadata<'_>,
         (path, or): (&Path, &str),
-        fields: &FieldArguments,
-        limits: Option<Limits>,
+        (fields, limits): (&FieldArguments, Option<Limits>),
+        common: &Common,
     ) -> Result<Option<Vec<f64>>> {
         let unfit =
             |message: &str| Err(Error::Unfit { path: path.into(), message: message.into() });
@@ -64,12 +63,12 @@ impl BaselineArgument {
             ),
             (Some(file), true) => {
                 let names = metadata.input_names.iter();
-                let untouched = fields.read(file)?;
-                warn_of_touches(&untouched, metadata);
-                let baseline = baseline(&untouched, names, limits)?;
+                let untouched = fields.read(file, common)?;
+                warn_of_touches(&untouched, metadata, common);
+                let baseline = baseline(&untouched, names, limits, common)?;
                 let missing = unusable(&baseline);
                 if !missing.is_empty() {
-                    stderr::remark(format_args!(
+                    common.remark(format_args!(
                         "note: {} has no baseline for {}: a mean that is missing, zero or negative, or no reading within the \
                          limits; these readings count as missing",
                         file.display(),
@@ -83,8 +82,8 @@ impl BaselineArgument {
 }
 
 /// Readings of the untouched sensor in `file`, in the columns called `inputs`, of which every one has a mean to divide by.
-pub fn at_rest(file: &DataFile, inputs: &[String]) -> Result<Table> {
-    let rest = usual_lines(file, inputs.iter().map(String::as_str))?;
+pub fn at_rest(file: &DataFile, inputs: &[String], common: &Common) -> Result<Table> {
+    let rest = usual_lines(file, inputs.iter().map(String::as_str), common)?;
     check_baseline(&rest, &file.path)?;
     Ok(rest)
 }
@@ -108,24 +107,29 @@ fn baseline<'n>(
     file: &DataFile,
     names: impl Iterator<Item = &'n str>,
     limits: Option<Limits>,
+    common: &Common,
 ) -> Result<Table> {
-    let mut frames = usual_lines(file, names)?;
+    let mut frames = usual_lines(file, names, common)?;
     judge(&mut frames, limits);
     Ok(Table { values: frames.means().into(), names: frames.names })
 }
 
 /// Columns called `names` of the lines of `file` that hold no outlier, which would move the mean.
-fn usual_lines<'n>(file: &DataFile, names: impl Iterator<Item = &'n str>) -> Result<Table> {
+fn usual_lines<'n>(
+    file: &DataFile,
+    names: impl Iterator<Item = &'n str>,
+    common: &Common,
+) -> Result<Table> {
     let inputs = table_of(file, names)?;
     let empty = Dataset::empty(vec![], vec![], 1, 0);
     let frames = Dataset { inputs, ..empty };
     let outliers = outliers::find(&frames, |line| file.line_number(line));
-    data_notes::print_outliers(&outliers, &file.path, frames.frames(), "the baseline");
+    data_notes::print_outliers(&outliers, &file.path, frames.frames(), "the baseline", common);
     Ok(frames.subset(&outliers.kept).inputs)
 }
 
 /// Warns of lines that are no baseline: `file` has outputs of a model with this `metadata`, and they are not zero there.
-fn warn_of_touches(file: &DataFile, metadata: &Metadata<'_>) {
+fn warn_of_touches(file: &DataFile, metadata: &Metadata<'_>, common: &Common) {
     /// Share of an output's full scale from which on the sensor is touched.
     const TOUCHED: f64 = 0.05;
     let mut touched = vec![false; file.lines()];
@@ -140,7 +144,7 @@ fn warn_of_touches(file: &DataFile, metadata: &Metadata<'_>) {
     }
     let count = touched.iter().filter(|touched| **touched).count();
     if count > 0 {
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "warning: the sensor is touched in {count} of {} lines of {}, by its outputs: errors will be large. Leave those \
              lines out of a baseline",
             file.lines(),
@@ -163,6 +167,7 @@ pub fn related<'b>(
     readings: Table,
     baselines: Option<&Table>,
     is_faulty: &mut [bool],
+    common: &Common,
 ) -> (PreparedModel<'b>, Table) {
     let Some(baselines) = baselines else { return (model, readings) };
     let inputs = relative::inputs(&readings, baselines);
@@ -179,7 +184,7 @@ pub fn related<'b>(
     if let Some(most) = lost.iter().max().filter(|count| of_log && **count > 0) {
         let columns = inputs.names.iter().zip(&lost).filter(|(_, count)| **count > 0);
         let names: Vec<String> = columns.map(|(name, _)| name.clone()).collect();
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "warning: {} cannot be divided by its baseline in {most} of {} lines: at rest it is zero, negative or missing, as of a \
              dead cell. Nothing that needs it is decoded there; a model trained without it needs none (--inputs)",
             columns::some_names(&names),

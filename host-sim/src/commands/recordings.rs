@@ -9,7 +9,7 @@ use taxel_data::DataFile;
 use taxel_data::output::{Scratch, write_whole};
 use taxel_recording::{Extras, Frame, Layout, Reader, Replace, Writer, recover};
 
-use super::stderr;
+use super::Common;
 use crate::{Error, Result};
 
 /// Name of the column with the time of each frame in s.
@@ -26,7 +26,7 @@ fn unfit(path: &Path, cause: &taxel_recording::Error) -> Error {
 }
 
 /// Opens a recording. One that was cut is mended first, or read as far as it is whole where it cannot be written.
-pub fn open(path: &Path) -> Result<Reader> {
+pub fn open(path: &Path, common: &Common) -> Result<Reader> {
     let error = |cause| unfit(path, &cause);
     let reader = Reader::open(path).map_err(error)?;
     if !reader.was_cut() {
@@ -36,13 +36,13 @@ pub fn open(path: &Path) -> Result<Reader> {
     match recover(path) {
         Ok(mended) => {
             let frames = mended.map_or(0, |mended| mended.frames);
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: {name} had no end, since whoever wrote it was killed: mended, with {frames} frames"
             ));
             Reader::open(path).map_err(error)
         }
         Err(cause) => {
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: {name} has no end, and is read as far as it is whole: {cause}"
             ));
             Ok(reader)
@@ -52,8 +52,8 @@ pub fn open(path: &Path) -> Result<Reader> {
 
 /// Reads a recording as a table: the time of each frame, its readings, and its true outputs where these are known. Estimates are not
 /// taken for the truth: they stay out. Parts that are damaged stay out too, each with a note.
-pub fn read(path: &Path) -> Result<DataFile> {
-    let reader = open(path)?;
+pub fn read(path: &Path, common: &Common) -> Result<DataFile> {
+    let reader = open(path, common)?;
     let layout = reader.layout().clone();
     let mut header = vec![TIME.to_owned()];
     header.extend(layout.readings.iter().map(|column| column.name.clone()));
@@ -64,7 +64,7 @@ pub fn read(path: &Path) -> Result<DataFile> {
             Ok(frame) => frame,
             Err(cause @ taxel_recording::Error::Read(_)) => return Err(unfit(path, &cause)),
             Err(cause) => {
-                stderr::remark(format_args!("note: {}: left out: {cause}", path.display()));
+                common.remark(format_args!("note: {}: left out: {cause}", path.display()));
                 continue;
             }
         };
@@ -87,7 +87,7 @@ pub fn read(path: &Path) -> Result<DataFile> {
     if has_truth == Some(true) {
         header.extend(layout.outputs.iter().map(|column| column.name.clone()));
     } else if !layout.outputs.is_empty() {
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "note: {} holds no true outputs; its estimates are not taken for these",
             path.display()
         ));

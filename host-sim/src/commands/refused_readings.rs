@@ -1,6 +1,6 @@
 //! Note on readings that a model is trained on, and that a device would take for missing.
 
-use super::{health, stderr};
+use super::{Common, health};
 use crate::subject::Subject;
 use taxel_core::health::Limits;
 use taxel_data::{Stream, Table};
@@ -13,17 +13,17 @@ const FRAMES_OF_SCENE: usize = 200;
 
 /// Notes on stderr which readings of a scene a device would take for missing, by its usual limits. Those of measurements
 /// are noted when their files are read.
-pub fn note_scene(subject: &Subject) {
+pub fn note_scene(subject: &Subject, common: &Common) {
     if let Some(scene) = subject.scene() {
         let frames = scene.frames.min(FRAMES_OF_SCENE);
         let readings = Synthesis::new(&scene.world).frames(Stream::Training, frames).inputs;
-        note(&readings, &format!("scene {}", scene.name));
+        note(&readings, &format!("scene {}", scene.name), common);
     }
 }
 
 /// Notes on stderr which `readings` of a `source` a device would take for missing, by its usual limits.
-pub fn note(readings: &Table, source: &str) {
-    notes(readings, source).iter().for_each(stderr::remark);
+pub fn note(readings: &Table, source: &str, common: &Common) {
+    notes(readings, source).iter().for_each(|it| common.remark(it));
 }
 
 fn notes(readings: &Table, source: &str) -> Vec<String> {

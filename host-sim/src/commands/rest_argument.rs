@@ -12,9 +12,9 @@ use taxel_data::{DataFile, Dataset, Rest, Table, columns};
 use taxel_learn::health::judge;
 use taxel_learn::outliers;
 
+use super::Common;
 use super::data_file::{DATA_FILES, FieldArguments};
 use super::readings::BaselineArgument;
-use super::stderr;
 
 /// Which lines of a log are those of the untouched sensor.
 #[derive(Clone, Args, Default, Serialize, Deserialize)]
@@ -40,6 +40,7 @@ impl RestArgument {
         file: &DataFile,
         (inputs, complete): (&[String], bool),
         outputs: impl Iterator<Item = &'n str>,
+        common: &Common,
     ) -> Result<Option<Rest>> {
         let columns = match self.rest.as_deref() {
             Some("none") => return Ok(None),
@@ -78,7 +79,7 @@ impl RestArgument {
             return Ok(None);
         }
         let names: Vec<String> = columns.iter().map(|it| file.header[*it].clone()).collect();
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "note: {} of {} lines of {} are at rest ({} {} about 0)",
             lines.len(),
             file.lines(),
@@ -111,9 +112,10 @@ impl UntouchedArguments {
         file: &DataFile,
         metadata: &Metadata<'_>,
         limits: Option<Limits>,
+        common: &Common,
     ) -> Result<Option<Rest>> {
         if metadata.relative_inputs && self.path().is_none() {
-            return self.rest(file, metadata, limits);
+            return self.rest(file, metadata, limits, common);
         }
         if !metadata.relative_inputs {
             self.refuse("the model takes readings as they are")?;
@@ -136,10 +138,11 @@ impl UntouchedArguments {
         file: &DataFile,
         metadata: &Metadata<'_>,
         limits: Option<Limits>,
+        common: &Common,
     ) -> Result<Option<Rest>> {
         let inputs: Vec<String> = metadata.input_names.iter().map(String::from).collect();
         let outputs = metadata.output_names.iter();
-        let mut rest = self.rest.find(file, (&inputs, false), outputs)?;
+        let mut rest = self.rest.find(file, (&inputs, false), outputs, common)?;
         if let Some(rest) = &mut rest {
             judge(&mut rest.readings, limits);
         }
@@ -156,13 +159,14 @@ impl UntouchedArguments {
         (rest, lines): (Option<&Rest>, usize),
         fields: &FieldArguments,
         limits: Option<Limits>,
+        common: &Common,
     ) -> Result<Option<Table>> {
         if let (Some(rest), true, None) = (rest, metadata.relative_inputs, self.path()) {
             return Ok(Some(rest.baselines(&(0..lines).collect::<Vec<_>>())));
         }
         let names = || metadata.input_names.iter().map(String::from).collect();
         let or = ", or a log with columns that are zero while nothing touches it (--rest)";
-        let baseline = self.baseline.values(metadata, (path, or), fields, limits)?;
+        let baseline = self.baseline.values(metadata, (path, or), (fields, limits), common)?;
         Ok(baseline.map(|values| Table { names: names(), values: values.into() }))
     }
 }

@@ -14,7 +14,7 @@ use taxel_learn::{ModelBlob, Options};
 
 use super::format_note::note_format;
 use super::subject_argument::SubjectArgument;
-use super::{Common, arguments, command_line, print, refused_readings, stderr};
+use super::{Common, arguments, command_line, print, refused_readings};
 
 /// All files that a run may write.
 const FILES: FileSet = FileSet {
@@ -51,22 +51,27 @@ pub struct Arguments {
     subject: SubjectArgument,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let subject = arguments.subject.load(common)?;
     let options = subject.options();
     let folder = arguments.to.in_out().join(subject.name());
     FILES.check(&folder, &arguments.subject.paths())?;
-    refused_readings::note_scene(&subject);
+    refused_readings::note_scene(&subject, common);
     run_into(&folder, &subject, &options, common)
 }
 
-fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common) -> Result<()> {
+fn run_into(
+    folder: &Path,
+    subject: &Subject,
+    options: &Options,
+    common: &Common,
+) -> Result<print::Outcome> {
     let started = std::time::Instant::now();
-    let (result, blob) = run::run(subject, options, &Terminal::new())?;
+    let (result, blob) = run::run(subject, options, &Terminal::new(common))?;
     let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
-    note_format(&blob.parse(), options, result.device_cost.cycles);
+    note_format(&blob.parse(), options, result.device_cost.cycles, common);
     let mut sections = report::of_run(&result);
-    let files = write_files(folder, &result, &blob, (&mut sections, &command))?;
+    let files = write_files(folder, &result, &blob, (&mut sections, &command), common)?;
     let mut more = vec![
         format!("written to {}: {}", folder.display(), files.join(", ")),
         format!("Next: open {}", folder.join("report.html").display()),
@@ -74,9 +79,8 @@ fn run_into(folder: &Path, subject: &Subject, options: &Options, common: &Common
     if result.scene.is_some() && result.subject == "press" {
         more.push("The paper's own scene is `run paper`, and its Table 1 `table1`.".into());
     }
-    print::sections_above(common, &sections, &more)?;
-    stderr::remark(format_args!("done in {:.1} s", started.elapsed().as_secs_f64()));
-    Ok(())
+    common.remark(format_args!("done in {:.1} s", started.elapsed().as_secs_f64()));
+    Ok(print::sections_above(common, &sections, &more))
 }
 
 fn write_files(
@@ -84,8 +88,9 @@ fn write_files(
     result: &RunResult,
     blob: &ModelBlob,
     (sections, command): (&mut Sections, &str),
+    common: &Common,
 ) -> Result<Vec<&'static str>> {
-    let metrics = print::file_of(sections);
+    let metrics = print::file_of(common, sections);
     let table = result.table1.as_ref().map(Table1::to_csv);
     let mut files = vec![("model.bin", blob.bytes()), ("metrics.json", metrics.as_bytes())];
     files.extend(table.as_ref().map(|table| ("table1.csv", table.as_bytes())));

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use crate::experiment::Experiment;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::{Progress, columns};
-use taxel_learn::ModelBlob;
+use taxel_data::columns;
 
-use super::{Common, stderr};
+use super::Common;
 
 /// Scene that stands for none.
 pub const DEFAULT_SCENE: &str = "press";
@@ -139,36 +138,4 @@ impl NoiseArgument {
     pub fn is_given(&self) -> bool {
         self.noise.is_some()
     }
-}
-
-/// Loads the blob at `path`, whose columns must be those of `scene`; without a path, trains the model that
-/// the scene describes.
-pub fn model(
-    path: Option<&Path>,
-    scene: &Experiment,
-    progress: &dyn Progress,
-) -> Result<ModelBlob> {
-    let Some(path) = path else { return scene.train(progress) };
-    let blob = ModelBlob::read(path)?;
-    let model = blob.parse();
-    let metadata = model.metadata();
-    let fits = metadata.input_names.iter().eq(scene.world.reading_names())
-        && metadata.output_names.iter().eq(scene.world.output_names());
-    if fits {
-        if metadata.name != scene.name {
-            stderr::remark(format_args!(
-                "note: {} was trained on {:?}, not on {:?}; give --model a model of the scene's own, or leave \
-                 it out to train one",
-                path.display(),
-                metadata.name,
-                scene.name
-            ));
-        }
-        return Ok(blob);
-    }
-    let message = format!(
-        "its columns are not those of scene {}; train one with `taxel train` on this scene",
-        scene.name
-    );
-    Err(Error::Unfit { path: path.into(), message })
 }

@@ -70,9 +70,14 @@ impl PlannedData {
     }
 
     /// Loads the measurements, for models trained as `training` says, with this `seed`.
-    pub fn load(&self, training: &TrainingOptions, seed: u64) -> Result<Measurements> {
+    pub fn load(
+        &self,
+        training: &TrainingOptions,
+        seed: u64,
+        common: &Common,
+    ) -> Result<Measurements> {
         let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
-        self.options.load(&self.file, (training, seed), judged)
+        self.options.load(&self.file, (training, seed), judged, common)
     }
 }
 
@@ -218,7 +223,7 @@ impl SubjectOptions {
                 return Err(Error::Usage(message.into()));
             }
             let how = (training, common.seed.unwrap_or(1));
-            Subject::Measured(Box::new(self.data.load(Path::new(source), how, judged)?))
+            Subject::Measured(Box::new(self.data.load(Path::new(source), how, judged, common)?))
         };
         let checked = subject.options().check(subject.training_frames());
         checked.map_err(|bad| of_option(named(bad, training)))?;

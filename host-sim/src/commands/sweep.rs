@@ -13,7 +13,7 @@ use taxel_data::digest::digest;
 use super::merged::Files;
 use super::progress::Terminal;
 use super::subject_argument::PlannedData;
-use super::{Common, arguments, command_line, print, stderr};
+use super::{Common, arguments, command_line, print};
 
 mod schedule;
 mod estimate;
@@ -58,13 +58,13 @@ pub struct Arguments {
     dry_run: bool,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     if common.seed.is_some() {
         let message = "--seed: a plan has its own seeds; give `repeats`, or `seed` in [set]";
         return Err(Error::Usage(message.into()));
     }
     let load = |data: &toml::Table, training: &TrainingOptions, seed| {
-        PlannedData::read(data, &arguments.plan)?.load(training, seed)
+        PlannedData::read(data, &arguments.plan)?.load(training, seed, common)
     };
     let plan = Plan::read(&arguments.plan, &build()?, &load)?;
     let points = plan.points()?;
@@ -75,7 +75,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let table = arguments.to.output.clone().unwrap_or_else(|| folder.join(RESULTS));
         return merge(&plan, &points, folder, &table, arguments, common);
     }
-    let shard = schedule::shard(arguments.shard, arguments.shards)?;
+    let shard = schedule::shard(arguments.shard, arguments.shards, common)?;
     if arguments.list {
         return list(&plan, &points, shard, common);
     }
@@ -84,14 +84,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if shard.is_none() {
         Files::of(&table)?.check(&[&arguments.plan])?;
     }
-    let worked = work(&plan, &points, shard.unwrap_or(Shard::WHOLE), &folder)?;
+    let worked = work(&plan, &points, shard.unwrap_or(Shard::WHOLE), &folder, common)?;
     match shard {
         None => merge(&plan, &points, &folder, &table, arguments, common),
         Some(shard) => {
             worked
                 .failed
                 .iter()
-                .for_each(|failed| stderr::remark(format_args!("warning: {failed}")));
+                .for_each(|failed| common.remark(format_args!("warning: {failed}")));
             let summary = ShardSummary {
                 plan: &plan.name,
                 shard: shard.to_string(),
@@ -107,17 +107,23 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
 
 /// Results of all points of a plan, each of which is kept in `folder` as soon as it is done; those that are there already
 /// are not computed again.
-pub fn all(plan: &Plan, points: &[Point], folder: &Path) -> Result<Merged> {
-    work(plan, points, Shard::WHOLE, folder)?;
+pub fn all(plan: &Plan, points: &[Point], folder: &Path, common: &Common) -> Result<Merged> {
+    work(plan, points, Shard::WHOLE, folder, common)?;
     Merged::read(plan, points, &store(folder))
 }
 
 /// Computes a shard's points into `folder`, and remarks on files that are replaced.
-fn work(plan: &Plan, points: &[Point], shard: Shard, folder: &Path) -> Result<work::Worked> {
+fn work(
+    plan: &Plan,
+    points: &[Point],
+    shard: Shard,
+    folder: &Path,
+    common: &Common,
+) -> Result<work::Worked> {
     let groups = shard.groups(points);
-    let worked = work::run(plan, points, &groups, &store(folder), &Terminal::new())?;
+    let worked = work::run(plan, points, &groups, &store(folder), &Terminal::new(common))?;
     for replaced in &worked.replaced {
-        stderr::remark(format_args!("note: {replaced}; it is computed anew"));
+        common.remark(format_args!("note: {replaced}; it is computed anew"));
     }
     Ok(worked)
 }
@@ -174,7 +180,12 @@ struct ListedPoint<'l> {
     values: std::collections::BTreeMap<&'l str, &'l toml::Value>,
 }
 
-fn list(plan: &Plan, points: &[Point], shard: Option<Shard>, common: &Common) -> Result<()> {
+fn list(
+    plan: &Plan,
+    points: &[Point],
+    shard: Option<Shard>,
+    common: &Common,
+) -> Result<print::Outcome> {
     let shown: Vec<&Point> = match shard {
         None => points.iter().collect(),
         Some(shard) => shard.groups(points).concat().into_iter().map(|i| &points[i]).collect(),
@@ -201,7 +212,7 @@ fn merge(
     table: &Path,
     arguments: &Arguments,
     common: &Common,
-) -> Result<()> {
+) -> Result<print::Outcome> {
     const NAMED: usize = 10;
     let files = Files::of(table)?;
     files.check(&[&arguments.plan])?;
@@ -216,7 +227,7 @@ fn merge(
     let others = store.others(points);
     if !others.is_empty() {
         let first = others.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "note: {} files in {} belong to no point of this plan and program, and are left out: {first}{}",
             others.len(),
             folder.join("points").display(),
@@ -225,24 +236,25 @@ fn merge(
     }
     for failed in merged.failed().take(NAMED) {
         let why = failed.failed.as_deref().unwrap_or_default();
-        stderr::remark(format_args!("warning: point {} failed: {why}", failed.id));
+        common.remark(format_args!("warning: point {} failed: {why}", failed.id));
     }
     if merged.points.iter().all(|point| point.failed.is_some()) && !merged.points.is_empty() {
         return Err(Error::failed("every point failed; the warnings say why"));
     }
     let command = command_line::of_this_process("sweep", &[], None);
     let sections = report::of_sweep(&merged, files.stem());
-    files.write(&merged, &sections, &command)?;
-    print::sections_above(common, &sections, &[format!("\nwritten: {}", files.names())])?;
+    files.write(&merged, &sections, &command, common)?;
+    let written = format!("\nwritten: {}", files.names());
+    let outcome = print::sections_above(common, &sections, &[written]);
     let missing = merged.missing.len();
     if missing == 0 {
-        return Ok(());
+        return Ok(outcome);
     }
     let first =
         merged.missing.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
-    Err(Error::failed(format!(
+    Ok(outcome.and(Err(Error::failed(format!(
         "{missing} of {} points are missing, and the files have only the others: {first}{}; run their shards, then merge again",
         points.len(),
         if missing > NAMED { ", …" } else { "" }
-    )))
+    )))))
 }

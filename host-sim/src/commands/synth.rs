@@ -12,7 +12,7 @@ use taxel_simulate::timetable::Timetable;
 use super::decoder_arguments::ScanTimeArgument;
 use super::recordings::{self, is_recording};
 use super::scene_argument::{FrameRateArgument, FramesArgument, NoiseArgument, SceneArgument};
-use super::{Common, arguments, print, stderr};
+use super::{Common, arguments, print};
 use crate::device::{Device, Wires};
 use crate::experiment::Experiment;
 use crate::live::replay::USUAL_RATE;
@@ -93,7 +93,7 @@ impl Arguments {
     }
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let mut scene = arguments.scene.load_world(common)?;
     arguments.noise.apply(&mut scene)?;
     scene.world.check_frames("-n", arguments.count.frames)?;
@@ -138,7 +138,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             csv_file::write(&arguments.to.output, names, lines)?;
         }
     }
-    conclude(arguments, &scene, &dataset, common)
+    Ok(conclude(arguments, &scene, &dataset, common))
 }
 
 /// Time of the start of a frame since the first one in s.
@@ -154,7 +154,7 @@ fn recorded(
     dataset: &Dataset,
     timetable: Option<&Timetable>,
     common: &Common,
-) -> Result<()> {
+) -> Result<print::Outcome> {
     let columns = |names: &[String]| sheet::columns(names.iter().map(String::as_str), []);
     let (readings, outputs) = (columns(&dataset.inputs.names), columns(&dataset.outputs.names));
     let layout = sheet::layout(&scene.name, readings, outputs, Some(&scene.world.sensor));
@@ -177,7 +177,7 @@ fn recorded(
         }
     });
     recordings::write(&arguments.to.output, &layout, &extras, frames)?;
-    conclude(arguments, scene, dataset, common)
+    Ok(conclude(arguments, scene, dataset, common))
 }
 
 /// Says what was written.
@@ -186,9 +186,9 @@ fn conclude(
     scene: &Experiment,
     dataset: &Dataset,
     common: &Common,
-) -> Result<()> {
+) -> print::Outcome {
     if let Some(warning) = Warning::not_positive(&dataset.inputs) {
-        stderr::remark(warning);
+        common.remark(warning);
     }
     let mut result = Sections::new("Synthesised frames");
     result.fact("subject", "scene", "", &scene.name);

@@ -41,7 +41,7 @@ struct Summary {
     table: Table1,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let argument = SceneArgument::new(&arguments.scene);
     let scene = argument.load(common)?;
     if scene.table1.is_some() {
@@ -50,13 +50,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(path) = &arguments.output {
         print::check_output(path, &[argument.path()])?;
     }
-    let table = table1::compute(&scene, &Terminal::new())?;
+    let table = table1::compute(&scene, &Terminal::new(common))?;
     if let Some(path) = &arguments.output {
         output::write_bytes(path, table.to_csv().as_bytes())?;
     }
     if common.json {
-        return print::json(&Summary { subject: scene.name, seed: scene.world.seed, table });
+        return print::json(
+            common,
+            &Summary { subject: scene.name, seed: scene.world.seed, table },
+        );
     }
-    print::Page::of(report::of_table1(&scene.name, &table, &arguments.group).text().trim_end())
-        .print()
+    let text = report::of_table1(&scene.name, &table, &arguments.group).text();
+    Ok(print::Page::of(text.trim_end()).outcome())
 }

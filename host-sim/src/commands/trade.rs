@@ -20,7 +20,7 @@ use taxel_learn::Options;
 use super::arguments::{self, of_option};
 use super::decoder_arguments::{DecoderArguments, ScanTimeArgument};
 use super::subject_argument::SubjectArgument;
-use super::{Common, command_line, print, stderr, sweep};
+use super::{Common, command_line, print, sweep};
 
 mod files;
 
@@ -87,10 +87,10 @@ pub struct Arguments {
     subject: SubjectArgument,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     arguments.subject.refuse_in_trade()?;
     let subject = arguments.subject.load_to_trade(common)?;
-    let asked = asked(arguments, &subject)?;
+    let asked = asked(arguments, &subject, common)?;
     let bounds = bounds(arguments, &asked)?;
     let is_timed = arguments.frame_rate.is_some() || arguments.tried.max_latency_ms.is_some();
     if is_timed && asked.device.scan_ms(wires(&subject, 1), 1).is_none() {
@@ -106,7 +106,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         }
     }
     if arguments.plan {
-        return print::show(&arguments.subject.plan_text(subject.name(), &wanted)?);
+        return Ok(print::Outcome::of(arguments.subject.plan_text(subject.name(), &wanted)?));
     }
     let folder = arguments.to.in_out().join(subject.name());
     files::FILES.check(&folder, &arguments.subject.paths())?;
@@ -127,7 +127,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
     if let Some(cause) = trade::impossible(&plan, &points, &bounds, &asked)? {
         return Err(refused(&cause));
     }
-    let merged = sweep::all(&plan, &points, &folder)?;
+    let merged = sweep::all(&plan, &points, &folder, common)?;
     let mut trade = Trade::new(&subject, &asked, merged)?;
     let choice = trade.choose(&bounds);
     let shown = trade.shown(&subject, &plan, &points)?;
@@ -137,15 +137,15 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let with = TradeWith { shown: shown.as_ref(), all, command: &without_bounds };
         report::of_trade(&trade, with)
     };
-    files::write(&folder, (&trade, shown.as_ref()), (&with(false), &command))?;
+    files::write(&folder, (&trade, shown.as_ref()), (&with(false), &command), common)?;
     let mut written = vec![];
     if trade.chosen.is_some() {
         written.push(format!("the blob: {}", folder.join("chosen.bin").display()));
     }
     written.push(format!("open {}", folder.join("trade.html").display()));
-    print::sections_above(common, &with(arguments.all), &written)?;
     // Measurements are kept and shown even if no point is within the bounds.
-    choice.map_err(|cause| refused(&cause))
+    let choice = choice.map_err(|cause| refused(&cause));
+    Ok(print::sections_above(common, &with(arguments.all), &written).and(choice))
 }
 
 /// Command line that tries the same points, without a bound.
@@ -195,7 +195,7 @@ fn bounds(arguments: &Arguments, asked: &Asked) -> Result<Bounds> {
 }
 
 /// What is varied, and what decides.
-fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked> {
+fn asked(arguments: &Arguments, subject: &Subject, common: &Common) -> Result<Asked> {
     let names = subject.output_names();
     let groups: Vec<&str> = columns::groups(&names).into_iter().map(|(group, _)| group).collect();
     let all_of_one = (groups.len() == 1).then(|| groups[0]);
@@ -216,7 +216,7 @@ fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked> {
     };
     device.check().map_err(of_option)?;
     let asked = Asked {
-        centres: centres(arguments.subject.centres(), subject)?,
+        centres: centres(arguments.subject.centres(), subject, common)?,
         column_steps: column_steps(arguments, subject)?,
         samples_averaged: match arguments.tried.average.as_slice() {
             [] => vec![1],
@@ -231,7 +231,7 @@ fn asked(arguments: &Arguments, subject: &Subject) -> Result<Asked> {
     if let Some(scene) = subject.scene() {
         let left = |n| device.averaged(scene.world.noise, wires(subject, 1), n);
         let idle = |n: &usize| Warning::idle_averaging(*n, left);
-        asked.samples_averaged.iter().filter_map(idle).for_each(stderr::remark);
+        asked.samples_averaged.iter().filter_map(idle).for_each(|it| common.remark(it));
     }
     Ok(asked)
 }
@@ -284,7 +284,7 @@ fn check(subject: &Subject, asked: &Asked) -> std::result::Result<(), BadValue> 
 const CENTRES: [usize; 5] = [16, 32, 64, 128, 256];
 
 /// Centres that are asked for, or of the usual ones those that so many training frames allow.
-fn centres(given: &[usize], subject: &Subject) -> Result<Vec<usize>> {
+fn centres(given: &[usize], subject: &Subject, common: &Common) -> Result<Vec<usize>> {
     if !given.is_empty() {
         return distinct("--centres", given);
     }
@@ -299,7 +299,7 @@ fn centres(given: &[usize], subject: &Subject) -> Result<Vec<usize>> {
     if !too_many.is_empty() {
         let names: Vec<String> = too_many.iter().map(ToString::to_string).collect();
         let names = names.join(", ");
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "note: K = {names} is not tried: there must be fewer centres than the {frames} training frames"
         ));
     }

@@ -54,13 +54,13 @@ pub struct Arguments {
     subject: SubjectOptions,
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let source = Path::new(&arguments.source);
     let baseline = arguments.subject.data.baseline().unwrap_or(source);
     let inputs = [source, baseline];
     print::check_output(&arguments.to.output, &inputs)?;
     let subject = load(arguments, common)?;
-    refused_readings::note_scene(&subject);
+    refused_readings::note_scene(&subject, common);
     let mut options = subject.options();
     let set = subject.training_set(None);
     set.check()?;
@@ -68,18 +68,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
         let message = "--select chooses for networks that are given readings: add --each-row, or leave it out";
         return Err(Error::Usage(message.into()));
     }
-    let (features, selection) = choice::choose(arguments, &subject, &set, &mut options)?;
+    let (features, selection) = choice::choose(arguments, &subject, &set, &mut options, common)?;
 
-    let progress = Terminal::new();
+    let progress = Terminal::new(common);
     let blob = set.blob(&options, &progress)?;
     output::write_bytes(&arguments.to.output, blob.bytes())?;
 
-    note_format(&blob.parse(), &options, DeviceCost::new(&blob).cycles);
+    note_format(&blob.parse(), &options, DeviceCost::new(&blob).cycles, common);
     let trained = Trained { subject: &subject, set: &set, options: &options, blob: &blob };
-    print::sections(
-        common,
-        &trained.sections(&arguments.to.output, features.as_ref(), selection.as_ref()),
-    )
+    let sections = trained.sections(&arguments.to.output, features.as_ref(), selection.as_ref());
+    Ok(print::sections(common, &sections))
 }
 
 /// Scene or CSV file that is trained on: all frames of a file, or so many of a scene.

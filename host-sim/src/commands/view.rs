@@ -18,7 +18,7 @@ use super::arguments::refuse;
 use super::data_file::DataFileArguments;
 use super::device_arguments::{BaudArgument, ScanPeriodArgument};
 use super::scene_argument::{DEFAULT_SCENE, FrameRateArgument, ModelArgument};
-use super::{Common, interruption, print, recordings, stderr};
+use super::{Common, interruption, print, recordings};
 use crate::experiment::{Experiment, names_a_scene};
 use crate::live::device::{DeviceFeed, Line, Protocol};
 use crate::live::feed::Feed;
@@ -114,9 +114,9 @@ enum Source {
     Data(PathBuf),
 }
 
-pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
     let blob = arguments.of.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
-    let source = source(arguments)?;
+    let source = source(arguments, common)?;
     check_options(arguments, &source)?;
     let view = View::start(arguments.http_port, arguments.token.as_deref());
     let (view, commands) = view.map_err(|cause| {
@@ -152,7 +152,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             let blob = if let Some(blob) = blob {
                 blob
             } else {
-                stderr::remark("training a small model; --model takes a better one …");
+                common.remark("training a small model; --model takes a better one …");
                 simulation::small_model(&scene)?
             };
             let rate = arguments.rate.frame_rate.unwrap_or(SIMULATED_RATE);
@@ -167,15 +167,15 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<()> {
             )
         }
         Source::Recording(path) => {
-            let reader = recordings::open(&path)?;
+            let reader = recordings::open(&path, common)?;
             let mut feed = ReplayFeed::of_recording(reader, &path, blob.as_ref())?;
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
         }
         Source::Data(path) => {
-            let file = arguments.file.read(&path)?;
+            let file = arguments.file.read(&path, common)?;
             let clock = Clock::of(&file, None)?;
             if let Some(why) = clock.why_counted(&file) {
-                stderr::remark(format_args!(
+                common.remark(format_args!(
                     "note: {why}; frames follow one another {USUAL_RATE} times a second, or by --frame-rate"
                 ));
             }
@@ -205,12 +205,12 @@ fn check_options(arguments: &Arguments, source: &Source) -> Result<()> {
 }
 
 /// What the argument names, or what there is without one.
-fn source(arguments: &Arguments) -> Result<Source> {
+fn source(arguments: &Arguments, common: &Common) -> Result<Source> {
     let Some(text) = &arguments.source else {
         if let Some(port) = serial::only_usb()? {
             return Ok(Source::Port(port));
         }
-        stderr::remark("no device is plugged in: this is a simulation");
+        common.remark("no device is plugged in: this is a simulation");
         return Ok(Source::Scene(DEFAULT_SCENE.into()));
     };
     let path = Path::new(text);
@@ -255,16 +255,18 @@ fn show(
     (view, commands): (&View, &Receiver<Command>),
     arguments: &Arguments,
     common: &Common,
-) -> Result<()> {
+) -> Result<print::Outcome> {
     let address = view.address();
-    print::result(common, &BTreeMap::from([("address", &address)]), || print::Page::of(&address))?;
+    print::result(common, &BTreeMap::from([("address", &address)]), || print::Page::of(&address))?
+        .print()?;
     // Whoever reads the address waits for it.
     let _ = std::io::stdout().flush();
     if !arguments.no_browser && !open_browser(&address) {
-        stderr::remark("no browser was found: open the address yourself");
+        common.remark("no browser was found: open the address yourself");
     }
-    stderr::remark("Ctrl-C ends it");
-    watch(feed, view, commands, watched, &interruption::flag())
+    common.remark("Ctrl-C ends it");
+    watch(feed, view, commands, watched, &interruption::flag())?;
+    Ok(print::Outcome::default())
 }
 
 /// Opens `address` in the user's browser. Returns whether a program took it.

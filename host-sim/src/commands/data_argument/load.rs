@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{DataOptions, JudgedBy, check_level, with_options};
 use crate::commands::arguments::{named, of_option};
 use crate::commands::mat_cells::MatCells;
-use crate::commands::{data_notes, readings, refused_readings, stderr};
+use crate::commands::{Common, data_notes, readings, refused_readings};
 use crate::measurements::{Frames, Judged, Log, Measurements, Split, Spread};
 use crate::over_time::is_log;
 use crate::training_options::{Training, TrainingOptions};
@@ -28,29 +28,32 @@ impl DataOptions {
         path: &Path,
         (given, seed): (&TrainingOptions, u64),
         judged: JudgedBy<'_>,
+        common: &Common,
     ) -> Result<Measurements> {
         let named = |bad| of_option(named(bad, given));
         let how = given.over(&Training::default()).map_err(named)?;
-        let file = self.file.read(path)?;
+        let file = self.file.read(path, common)?;
         let [inputs, outputs] = self.patterns();
         let unused = UnusedInputs::find(&file, inputs, outputs).map_err(with_options)?;
-        data_notes::print_unused(&unused, path);
+        data_notes::print_unused(&unused, path, common);
         let cells = MatCells::of(&file, inputs, self.grid)?;
         if let Some(mat) = cells.found.filter(|_| self.grid.is_none()) {
-            stderr::remark(format_args!(
+            common.remark(format_args!(
                 "note: inputs are taken for a mat of {mat} wires, row by row (--grid none: they are not)"
             ));
         }
         for wire in cells.silent_wires(&unused.names()) {
-            stderr::remark(format_args!("note: {wire}: none of its readings tells anything"));
+            common.remark(format_args!("note: {wire}: none of its readings tells anything"));
         }
         let Usual { all, outliers, left_out, digest, folds: given_folds } = self.usual_frames(
             file,
             (&unused, &cells),
             self.fold_column.as_deref(),
             how.relative_inputs,
+            common,
         )?;
-        let judged_by = self.judged(judged, &all.frames, &unused, digest, how.relative_inputs)?;
+        let judged_by =
+            self.judged(judged, &all.frames, &unused, digest, how.relative_inputs, common)?;
         let Split { training: kept, test, choice } =
             Split::new(&all, given_folds.as_deref(), judged_by);
         if kept.is_empty() {
@@ -115,7 +118,7 @@ impl DataOptions {
         };
         measurements.train_with(given).map_err(named)?;
         let constant = measurements.constant_inputs();
-        data_notes::print_constant(&constant, path);
+        data_notes::print_constant(&constant, path, common);
         Ok(measurements)
     }
 
@@ -136,6 +139,7 @@ impl DataOptions {
         (unused, cells): (&UnusedInputs, &MatCells),
         fold_column: Option<&str>,
         relative_inputs: bool,
+        common: &Common,
     ) -> Result<Usual> {
         let [inputs, outputs] = self.patterns();
         let mut chosen =
@@ -145,21 +149,21 @@ impl DataOptions {
         let digest = file.digest(&names)?;
         let clock = Clock::of(&file, self.clock.time.as_deref())?;
         let why_counted = clock.why_counted(&file);
-        let rest = self.rest(&file, &chosen.names, relative_inputs)?.map(Arc::new);
+        let rest = self.rest(&file, &chosen.names, relative_inputs, common)?.map(Arc::new);
         let column = fold_column.map(|name| file.column(name)).transpose()?;
         let fold_values: Option<Vec<f64>> =
             column.map(|column| (0..file.lines()).map(|line| file.value(line, column)).collect());
         let path = file.path.clone();
 
         let (mut frames, kept) = Dataset::from_file(file, chosen).map_err(with_options)?;
-        data_notes::print_left_out(&kept.left_out, &path, kept.of);
+        data_notes::print_left_out(&kept.left_out, &path, kept.of, common);
         let outliers = self.outliers(&frames, |frame| kept.numbers[frame]);
         let left_out = "training and judging (--keep-outliers keeps them)";
-        data_notes::print_outliers(&outliers, &path, frames.frames(), left_out);
+        data_notes::print_outliers(&outliers, &path, frames.frames(), left_out, common);
         frames.keep(&outliers.kept);
-        refused_readings::note(&frames.inputs, &path.display().to_string());
+        refused_readings::note(&frames.inputs, &path.display().to_string(), common);
         if let Some(why) = why_counted {
-            stderr::remark(format_args!("note: {why}; lines are counted instead (--time)"));
+            common.remark(format_args!("note: {why}; lines are counted instead (--time)"));
         }
         let log = Log { clock, lines: outliers.kept.iter().map(|it| kept.lines[*it]).collect() };
         let of_log = rest.as_ref().filter(|rest| relative_inputs && rest.lines.is_some());
@@ -168,7 +172,7 @@ impl DataOptions {
             readings::check_baseline(&rest.readings, &path)?;
         }
         if rest.is_none() && !self.rest.is_given() && is_log(&log, &frames.outputs) {
-            data_notes::print_no_rest(&frames.outputs, &path);
+            data_notes::print_no_rest(&frames.outputs, &path, common);
         }
         let folds = fold_values.map(|values| {
             let values: Vec<f64> = log.lines.iter().map(|line| values[*line]).collect();
@@ -193,15 +197,16 @@ impl DataOptions {
         unused: &UnusedInputs,
         digest: u64,
         relative_inputs: bool,
+        common: &Common,
     ) -> Result<Judged> {
         let path = match judged {
             JudgedBy::None => return Ok(Judged::None),
             JudgedBy::HeldOut => return Ok(Judged::HeldOut),
             JudgedBy::File(path) => path,
         };
-        let file = self.file.fields().read(path)?;
+        let file = self.file.fields().read(path, common)?;
         let cells = MatCells::of(&file, self.inputs.as_deref(), self.grid)?;
-        let own = self.usual_frames(file, (unused, &cells), None, relative_inputs)?;
+        let own = self.usual_frames(file, (unused, &cells), None, relative_inputs, common)?;
         if own.digest == digest {
             let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
             return Err(Error::Unfit { path: path.into(), message: message.into() });

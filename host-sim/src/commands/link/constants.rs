@@ -49,7 +49,11 @@ impl Numbers {
     }
 }
 
-pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(
+    device: &mut Device,
+    arguments: &Arguments,
+    common: &Common,
+) -> Result<print::Outcome> {
     let constants = read_constants(&arguments.file, &device.constants()?)?;
     device.set_constants(&constants)?;
     device.keep(Setting::Constants)?;
@@ -57,7 +61,7 @@ pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> R
     let mut result = Sections::new("Constants of the circuit, kept over restarts");
     result.value("constants", &constants);
     constants_lines(&mut result, &constants);
-    print::sections(common, &result)
+    Ok(print::sections(common, &result))
 }
 
 /// Constants of a file, in place of those `before`.

@@ -7,6 +7,7 @@ use taxel_data::Progress;
 use taxel_rig::device::Device;
 use taxel_rig::scans::{Assembler, Scan};
 
+use super::super::Common;
 use super::super::progress::Terminal;
 use super::scan::{Wanted, check_length};
 
@@ -27,9 +28,10 @@ pub fn hear_scans(
     patience: Duration,
     wanted: Wanted,
     width: usize,
+    common: &Common,
     mut take: impl FnMut(&Scan) -> Result<()>,
 ) -> Result<Vec<Scan>> {
-    let progress = Terminal::new();
+    let progress = Terminal::new(common);
     progress.stage("recording", count);
     let mut scans: Vec<Scan> = Vec::new();
     let mut assembler = Assembler::new(wanted.sent());

@@ -37,7 +37,11 @@ pub struct Arguments {
     scan: ScanArguments,
 }
 
-pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> Result<()> {
+pub fn execute(
+    device: &mut Device,
+    arguments: &Arguments,
+    common: &Common,
+) -> Result<print::Outcome> {
     arguments.scan.timing.period.check()?;
     if let Some(path) = &arguments.output {
         let read = [&arguments.model, &arguments.presses].map(PathBuf::as_path);
@@ -47,7 +51,7 @@ pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> R
     let blob = ModelBlob::read(&arguments.model)?;
     let (fields, limits) = (FieldArguments::default(), Some(Limits::USUAL));
     let model = blob.prepare();
-    let model = arguments.baseline.apply(model, &arguments.model, &fields, limits)?;
+    let model = arguments.baseline.apply(model, &arguments.model, (&fields, limits), common)?;
     recalibration::check(model.model())?;
     let metadata = model.model().metadata();
     let file = DataFile::read(&arguments.presses)?;
@@ -68,15 +72,15 @@ pub fn execute(device: &mut Device, arguments: &Arguments, common: &Common) -> R
         judge(&mut readings, limits);
         readings
     } else {
-        record_presses(device, &identity, model.model(), &arguments.scan, &outputs)?
+        record_presses(device, &identity, (model.model(), &outputs), &arguments.scan, common)?
     };
     let found = recalibration::recalibrate(&model, &readings, &outputs)?;
     if let Some(path) = &arguments.output {
         output::write_bytes(path, found.blob.bytes())?;
     }
-    activate(device, &found.blob)?;
+    activate(device, &found.blob, common)?;
     upload::confirm(device)?;
-    conclude(&found, outputs.len(), common)
+    Ok(conclude(&found, outputs.len(), common))
 }
 
 /// Checks that every press of a `file` states all `outputs`; a place may be empty, as where nothing touches.
@@ -101,9 +105,9 @@ fn check_stated(file: &DataFile, outputs: &Table) -> Result<()> {
 fn record_presses(
     device: &mut Device,
     identity: &DeviceIdentity,
-    model: &Model<'_>,
+    (model, outputs): (&Model<'_>, &Table),
     scan: &ScanArguments,
-    outputs: &Table,
+    common: &Common,
 ) -> Result<Table> {
     let (names, patience) =
         (reading_names(identity, Some(model))?, patience_for_next(scan, identity, 1));
@@ -113,9 +117,15 @@ fn record_presses(
         // Paused first, so that no frame is from before the press.
         let scans = device.while_paused(|device| -> Result<_> {
             configure(device, scan, Wanted::Readings, Configuration::DEFAULT)?;
-            hear_scans(device, scan.frames.into(), patience, Wanted::Readings, names.len(), |_| {
-                Ok(())
-            })
+            hear_scans(
+                device,
+                scan.frames.into(),
+                patience,
+                Wanted::Readings,
+                names.len(),
+                common,
+                |_| Ok(()),
+            )
         })?;
         let scanned = scans.iter().flat_map(frames::values).collect();
         let mut scanned = Table { names: names.clone(), values: scanned };
@@ -128,7 +138,7 @@ fn record_presses(
     Ok(Table { names, values: values.into() })
 }
 
-fn conclude(found: &Recalibrated, given: usize, common: &Common) -> Result<()> {
+fn conclude(found: &Recalibrated, given: usize, common: &Common) -> print::Outcome {
     let mut result = Sections::new("Recalibration");
     result.fact("presses", "presses that were used", "", found.presses);
     result.fact("presses_unusable", "presses that miss a reading", "", given - found.presses);

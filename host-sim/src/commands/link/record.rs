@@ -74,7 +74,11 @@ fn check_usage(action: &RecordArguments) -> Result<()> {
     Ok(())
 }
 
-pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) -> Result<()> {
+pub fn record(
+    device: &mut Device,
+    action: &RecordArguments,
+    common: &Common,
+) -> Result<print::Outcome> {
     let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
     check_usage(action)?;
     let identity = device.identify()?;
@@ -129,7 +133,8 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let scans = device.while_paused(|device| -> Result<_> {
         configure(device, &action.scan, wanted, decoding)?;
         let count = action.scan.frames.into();
-        hear_scans(device, count, patience, wanted, names.len(), |scan| match &mut recorder {
+        hear_scans(device, count, patience, wanted, names.len(), common, |scan| match &mut recorder
+        {
             Some(recorder) => recorder.write_scan(scan),
             None => Ok(()),
         })
@@ -137,7 +142,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let lines: Vec<Vec<f64>> = scans.iter().map(values).collect();
     let missing = missing(lines.iter().flat_map(|line| &line[..outputs]), wanted)?;
     if wanted == Wanted::Readings {
-        note_faults(&Table { names: names.clone(), values: lines.concat().into() });
+        note_faults(&Table { names: names.clone(), values: lines.concat().into() }, common);
     }
     let time = action.time.then_some("time_s");
     let first_us = scans.first().map_or(0, |scan| scan.start_us);
@@ -159,7 +164,7 @@ pub fn record(device: &mut Device, action: &RecordArguments, common: &Common) ->
     let is_novel = |it: &&ScanEstimate| it.flags & EstimateReport::NOVEL != 0;
     let frames_novel = estimates.filter(is_novel).count();
     let saved = Saved { frames: scans.len(), frames_per_s, frames_lost, missing, frames_novel };
-    saved.print((&action.to.output, action.scan.period_us()), common)
+    Ok(saved.outcome((&action.to.output, action.scan.period_us()), common))
 }
 
 /// A recording of what a device sends: of the model in `blob`, or of all its readings, called `names`.
@@ -217,7 +222,11 @@ fn confidence_names(
     Ok(names)
 }
 
-pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common) -> Result<()> {
+pub fn baseline(
+    device: &mut Device,
+    action: &BaselineArguments,
+    common: &Common,
+) -> Result<print::Outcome> {
     action.scan.timing.period.check()?;
     let inputs: Vec<&Path> = action.of.model.iter().map(PathBuf::as_path).collect();
     print::check_output(&action.to.output, &inputs)?;
@@ -253,7 +262,7 @@ pub fn baseline(device: &mut Device, action: &BaselineArguments, common: &Common
         missing: values_missing,
         frames_novel: 0,
     };
-    saved.print((&action.to.output, action.scan.period_us()), common)
+    Ok(saved.outcome((&action.to.output, action.scan.period_us()), common))
 }
 
 /// Frames that were saved.
@@ -270,8 +279,8 @@ struct Saved {
 }
 
 impl Saved {
-    /// Prints what is in a `file`, of frames that were asked for every `period_us`.
-    fn print(&self, (file, period_us): (&Path, u32), common: &Common) -> Result<()> {
+    /// Says what is in a `file`, of frames that were asked for every `period_us`.
+    fn outcome(&self, (file, period_us): (&Path, u32), common: &Common) -> print::Outcome {
         let mut result = Sections::new("Frames of the device");
         result.fact("frames", "frames", "", self.frames);
         result.fact("frames_per_s", "scanned", "frames a second", self.frames_per_s);

@@ -64,7 +64,11 @@ enum Forget {
     All,
 }
 
-pub fn configure(device: &mut Device, action: &ConfigureArguments, common: &Common) -> Result<()> {
+pub fn configure(
+    device: &mut Device,
+    action: &ConfigureArguments,
+    common: &Common,
+) -> Result<print::Outcome> {
     // What another host has left behind is not kept.
     let configuration = action.changed(device.resume()?);
     device.configure(configuration)?;
@@ -72,7 +76,11 @@ pub fn configure(device: &mut Device, action: &ConfigureArguments, common: &Comm
     show(device, common)
 }
 
-pub fn settings(device: &mut Device, action: &SettingsArguments, common: &Common) -> Result<()> {
+pub fn settings(
+    device: &mut Device,
+    action: &SettingsArguments,
+    common: &Common,
+) -> Result<print::Outcome> {
     let forget: &[Setting] = match action.forget {
         None => &[],
         Some(Forget::Configuration) => &[Setting::Configuration],
@@ -87,7 +95,7 @@ pub fn settings(device: &mut Device, action: &SettingsArguments, common: &Common
 }
 
 /// Shows what is active, and what is kept.
-fn show(device: &mut Device, common: &Common) -> Result<()> {
+fn show(device: &mut Device, common: &Common) -> Result<print::Outcome> {
     let constants = match device.constants() {
         Err(taxel_rig::Error::Refused(_)) => None,
         constants => Some(constants?),
@@ -157,7 +165,7 @@ fn show(device: &mut Device, common: &Common) -> Result<()> {
         None => result.line("baseline", "none is kept"),
     }
     result.line("writes left", format!("{} until the next restart", kept.writes_left));
-    print::sections(common, &result)
+    Ok(print::sections(common, &result))
 }
 
 /// Adds the circuit's constants.

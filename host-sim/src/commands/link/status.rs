@@ -7,7 +7,7 @@ use taxel_rig::device::Device;
 use super::super::check_arguments::memory_lines;
 use super::super::{Common, print};
 
-pub fn show(device: &mut Device, common: &Common) -> Result<()> {
+pub fn show(device: &mut Device, common: &Common) -> Result<print::Outcome> {
     let (d, configuration, s) = (device.identify()?, device.configuration()?, device.statistics()?);
     let mut result = Sections::new(format!("Device {}, firmware {}", d.board, d.firmware));
     result.value("device", &d);
@@ -103,5 +103,5 @@ pub fn show(device: &mut Device, common: &Common) -> Result<()> {
     );
     result.line("slots erased", format!("{} since the start", s.slot_erases));
     memory_lines(&mut result, &d.memory);
-    print::sections(common, &result)
+    Ok(print::sections(common, &result))
 }

@@ -31,10 +31,10 @@ struct Estimate<'e> {
     peak_mb: Option<f64>,
 }
 
-pub fn execute(plan: &Plan, points: &[Point], common: &Common) -> Result<()> {
+pub fn execute(plan: &Plan, points: &[Point], common: &Common) -> Result<print::Outcome> {
     let tried = TRIED.min(points.len());
     let last = points.len().saturating_sub(1);
-    let terminal = Terminal::new();
+    let terminal = Terminal::new(common);
     taxel_data::Progress::stage(&terminal, "a few points", tried);
     let (mut tried_s, mut failed) = (Vec::new(), Vec::new());
     for place in 0..tried {

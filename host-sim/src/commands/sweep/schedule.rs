@@ -3,7 +3,7 @@
 use crate::sweep::Shard;
 use crate::{Error, Result};
 
-use super::super::stderr;
+use super::super::Common;
 
 /// Variables in which schedulers say which task this is; one that may run inside another stands before it.
 const INDICES: [&str; 3] = ["PARALLEL_SEQ", "HQ_TASK_ID", "SLURM_ARRAY_TASK_ID"];
@@ -12,11 +12,15 @@ const INDICES: [&str; 3] = ["PARALLEL_SEQ", "HQ_TASK_ID", "SLURM_ARRAY_TASK_ID"]
 ///
 /// # Errors
 /// [`Error::Usage`] for a number of shards without a task, and for an array of Slurm that is not 1 to N.
-pub fn shard(given: Option<Shard>, shards: Option<usize>) -> Result<Option<Shard>> {
+pub fn shard(
+    given: Option<Shard>,
+    shards: Option<usize>,
+    common: &Common,
+) -> Result<Option<Shard>> {
     let found = chosen(given, shards, &|name| std::env::var(name).ok())?;
     Ok(found.map(|(shard, from)| {
         if let Some(from) = from {
-            stderr::remark(format_args!("shard {shard}, by {from}"));
+            common.remark(format_args!("shard {shard}, by {from}"));
         }
         shard
     }))

@@ -7,7 +7,7 @@ use crate::report::{self, Sections};
 use crate::trade::{Shown, Trade};
 use taxel_data::output::FileSet;
 
-use super::super::print;
+use super::super::{Common, print};
 
 /// All files that the command may write.
 pub const FILES: FileSet = FileSet {
@@ -20,9 +20,10 @@ pub fn write(
     folder: &Path,
     (trade, shown): (&Trade, Option<&Shown>),
     (sections, command): (&Sections, &str),
+    common: &Common,
 ) -> Result<()> {
     let csv = report::points(&trade.merged).csv();
-    let json = print::file_of(sections);
+    let json = print::file_of(common, sections);
     let page = sections.page(command);
     let mut files = vec![
         ("trade.csv", csv.as_bytes()),

@@ -1,7 +1,6 @@
 //! Centres, spread and penalty: as given, or chosen among candidates by cross-validation.
 
 use crate::Result;
-use crate::commands::stderr;
 use crate::subject::Subject;
 use crate::training_options::TrainingOptions;
 use crate::training_set::TrainingSet;
@@ -12,6 +11,7 @@ use taxel_learn::select::{self, Candidates, Edge, Selection};
 use taxel_learn::train::Refinement;
 
 use super::Arguments;
+use crate::commands::Common;
 use crate::commands::progress::Terminal;
 
 /// Spreads that are tried for centres of K-means. Refinement moves the width itself.
@@ -28,6 +28,7 @@ pub fn choose(
     subject: &Subject,
     set: &TrainingSet<'_>,
     options: &mut Options,
+    common: &Common,
 ) -> Result<(Option<Choice>, Option<Selection>)> {
     let usual = Options::default().centres;
     if arguments.subject.training.centres.is_none()
@@ -35,16 +36,16 @@ pub fn choose(
         && options.centres < usual
     {
         let (frames, centres) = (set.frames.fewest_values(), options.centres);
-        stderr::remark(format_args!(
+        common.remark(format_args!(
             "note: {frames} lines are few for {usual} centres, so the default is {centres}; \
              choose with --centres"
         ));
     }
     if !arguments.select {
-        return Ok((set.choose(options, &Terminal::new()), None));
+        return Ok((set.choose(options, &Terminal::new(common)), None));
     }
     // Settings are compared with the features that the model will have.
-    let features = set.choose(options, &Terminal::new());
+    let features = set.choose(options, &Terminal::new(common));
     let fold_of = match subject {
         Subject::Measured(data) => data.fold_of.clone(),
         Subject::Scene(_) => arguments.subject.data.folds_of(&set.frames.outputs, options.seed)?,
@@ -60,12 +61,12 @@ pub fn choose(
         ),
         options,
         set.refine.then(Refinement::default).as_ref(),
-        &Terminal::new(),
+        &Terminal::new(common),
     )?;
     let best = selection.best();
     (options.centres, options.spread) = (best.centres, best.spread);
     options.penalty = best.penalty;
-    selection.edges.iter().for_each(|edge| stderr::remark(format_args!("note: {}", beyond(edge))));
+    selection.edges.iter().for_each(|edge| common.remark(format_args!("note: {}", beyond(edge))));
     Ok((features, Some(selection)))
 }
 
