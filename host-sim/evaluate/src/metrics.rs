@@ -1,14 +1,18 @@
 //! Errors of estimates, by every definition in use. No figure stands alone: the definitions differ by
 //! more than the decoders do, so all of them are always given.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 use taxel_core::blob::Model;
 use taxel_data::{Dataset, Table, columns};
 use taxel_learn::Decoder;
 use taxel_limit::reference::GroupLimit;
 use taxel_limit::{Reference, Refusal};
+
+mod blocks;
+mod definition;
+
+pub use blocks::{Blocks, standard_error, with_blocks};
+pub use definition::Definition;
 
 /// Share of full scale that the truth must exceed to count in the mean relative error.
 pub const RELATIVE_THRESHOLD: f64 = 0.1;
@@ -197,95 +201,6 @@ pub fn judge(decoder: &dyn Decoder, test: &Dataset, measure: &Measure) -> Decode
     DecoderErrors { decoder: decoder.name().into(), errors }
 }
 
-/// Definition of error, as tables, their legends and files know it.
-#[derive(Debug, Clone, Copy)]
-pub struct Definition {
-    /// Name in CSV and JSON, with the unit.
-    pub name: &'static str,
-    /// Heading of a column, and its unit; empty for none, or for that of the output.
-    pub heading: &'static str,
-    pub unit: &'static str,
-    /// Decimals to show; `None` for three digits.
-    pub decimals: Option<usize>,
-    /// What it is, in symbols: error e, truth Δ.
-    pub formula: &'static str,
-    value: fn(&Errors) -> Option<f64>,
-    /// Standard error of the value, where it is known.
-    pub standard_error: fn(&Errors) -> Option<f64>,
-}
-
-impl Definition {
-    /// All definitions: first what matters most, since narrow windows show that.
-    pub const ALL: [Self; 7] = [
-        Self::new("rmse", "RMSE", "", None, "√mean(e²), in the output’s unit", |it| {
-            Some(it.rmse)
-        }),
-        Self {
-            standard_error: |it| it.ratio_standard_error,
-            ..Self::new(
-                "ratio_to_limit",
-                "× limit",
-                "",
-                Some(2),
-                "RMSE/least possible RMSE",
-                |it| it.ratio_to_limit,
-            )
-        },
-        Self::new("r_squared", "R²", "", Some(3), "1 − Σe²/Σ(Δ − mean Δ)²", |it| {
-            it.r_squared
-        }),
-        Self::new(
-            "full_scale_percent",
-            "%FS",
-            "",
-            Some(2),
-            "mean|e|/full scale, in per cent of what the scene allows or a measured column spans",
-            |it| it.full_scale_percent,
-        ),
-        Self::new("relative_l2_percent", "relative L2", "%", Some(2), "‖e‖/‖Δ‖", |it| {
-            it.relative_l2_percent
-        }),
-        Self::new(
-            "positional_percent",
-            "positional",
-            "%",
-            Some(2),
-            "mean|e|/(H − Δz) with the sensor’s thickness H",
-            |it| it.positional_percent,
-        ),
-        Self::new(
-            "mean_relative_percent",
-            "mean relative",
-            "%",
-            Some(2),
-            "mean(|e|/|Δ|) where |Δ| > 10 % of full scale",
-            |it| it.mean_relative_percent,
-        ),
-    ];
-
-    const fn new(
-        name: &'static str,
-        heading: &'static str,
-        unit: &'static str,
-        decimals: Option<usize>,
-        formula: &'static str,
-        value: fn(&Errors) -> Option<f64>,
-    ) -> Self {
-        Self { name, heading, unit, decimals, formula, value, standard_error: |_| None }
-    }
-
-    /// Error by this definition, where it is defined.
-    pub fn of(&self, errors: &Errors) -> Option<f64> {
-        (self.value)(errors)
-    }
-
-    /// Heading, unit and formula, for captions.
-    pub fn in_words(&self) -> String {
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
-        format!("{}{unit} = {}", self.heading, self.formula)
-    }
-}
-
 /// Errors of every group of columns, in the order in which groups first appear.
 ///
 /// `estimate` is laid out like `truth`, `lines × columns`. Pairs with a missing value (NaN) on either
@@ -299,65 +214,6 @@ pub fn by_group(truth: &Table, estimate: &[f64], measure: &Measure) -> Vec<Error
         .iter()
         .map(|(group, members)| of_columns(group, members, truth, estimate, measure))
         .collect()
-}
-
-/// Parts that successive frames have in the RMSE of a group, by its name: what the squares of a block's errors sum to beyond as
-/// many mean squares, over twice the RMSE and the mean number of values in a block. The standard error of their mean is that
-/// of the RMSE, and the one of their differences that of a difference between decoders of the same frames. A group without
-/// errors has none.
-pub type Blocks = BTreeMap<String, Vec<f64>>;
-
-/// Number of blocks of frames.
-const BLOCKS: usize = 50;
-
-/// Errors as [`by_group`] has them, with the parts of blocks of frames in them. [`ALL`] has those of its groups, by their
-/// shares.
-pub fn with_blocks(truth: &Table, estimate: &[f64], measure: &Measure) -> (Vec<Errors>, Blocks) {
-    let errors = by_group(truth, estimate, measure);
-    let estimate = truth.with_places(estimate.to_vec());
-    let (frames, columns) = (truth.len(), truth.names.len());
-    let length = frames.div_ceil(BLOCKS).max(1);
-    let mut blocks = Blocks::new();
-    for (errors, (group, members)) in errors.iter().zip(columns::groups(&truth.names)) {
-        let mean_square = errors.rmse.powi(2);
-        let squares = truth.values.chunks(length * columns).zip(estimate.chunks(length * columns));
-        let squares = squares.map(|(truth, estimate)| {
-            let lines = truth.chunks_exact(columns).zip(estimate.chunks_exact(columns));
-            let errors = lines.flat_map(|(truth, estimate)| {
-                members.iter().map(|column| (estimate[*column] - truth[*column]).powi(2))
-            });
-            let beyond = errors.filter(|it| !it.is_nan()).map(|square| square - mean_square);
-            beyond.sum::<f64>()
-        });
-        let squares: Vec<f64> = squares.collect();
-        let mean = errors.count as f64 / squares.len().max(1) as f64;
-        let part = |square: f64| square / mean / (2.0 * errors.rmse);
-        if errors.rmse > 0.0 {
-            blocks.insert(group.into(), squares.into_iter().map(part).collect());
-        }
-    }
-    let shares = errors.iter().filter_map(|errors| {
-        let deviation = errors.rmse / (1.0 - errors.r_squared?).sqrt();
-        Some((blocks.get(&errors.group)?, deviation))
-    });
-    let shares: Vec<(&Vec<f64>, f64)> = shares.collect();
-    if let (true, [(first, _), ..]) = (errors.len() > 1, shares.as_slice()) {
-        let of_block = |block: usize| {
-            shares.iter().map(|(of, deviation)| of[block] / deviation).sum::<f64>()
-                / shares.len() as f64
-        };
-        let all = (0..first.len()).map(of_block).collect();
-        blocks.insert(ALL.into(), all);
-    }
-    (errors, blocks)
-}
-
-/// Standard error of the mean of `parts`, which are those of blocks; 0 where there are not two.
-pub fn standard_error(parts: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
-    let count = parts.len() as f64;
-    let mean = parts.clone().sum::<f64>() / count;
-    let squares: f64 = parts.map(|part| (part - mean).powi(2)).sum();
-    if count > 1.0 { (squares / (count - 1.0) / count).sqrt() } else { 0.0 }
 }
 
 #[derive(Default)]
@@ -473,30 +329,6 @@ mod tests {
         close(z.r_squared, 1.0 - 0.25 / 0.5); // means are 0.5 and 1
         close(z.mean_relative_percent, 0.0); // the wrong one has truth 0
         assert_eq!((x.rmse, x.positional_percent), (0.0, None));
-    }
-
-    #[test]
-    fn a_standard_error_is_that_of_what_was_measured() {
-        // Errors of 1 and 3 mm by turns: squares of 1 and 9 mm², whose means over 20 frames are all 5 mm².
-        let columns = ["a_mm", "b_mm", "c_mm"];
-        let truth = |kept: &dyn Fn(usize) -> bool| {
-            let line = |i| [if kept(i) { 0.0 } else { f64::NAN }, f64::NAN, (i % 7) as f64];
-            let names = columns.map(String::from).to_vec();
-            Table { names, values: (0..1010).flat_map(line).collect::<Vec<_>>().into() }
-        };
-        let estimate: Vec<f64> = (0..1010)
-            .flat_map(|i| [if i % 2 == 0 { 1.0 } else { 3.0 }, 0.0, f64::from(i % 7)])
-            .collect();
-        let measure = Measure { full_scale: vec![1.0; 3], thickness_mm: None, limit: None };
-        for kept in [|_| true, |i| i >= 420] {
-            let (errors, blocks) = with_blocks(&truth(&kept), &estimate, &measure);
-            assert!((errors[0].rmse - 5.0_f64.sqrt()).abs() < 1e-12);
-            let error = standard_error(blocks["a_mm"].iter().copied());
-            // An odd number of frames in a block is what it differs by.
-            assert!(error < 0.01, "{error}");
-            // Without a value, or an error, there is none.
-            assert_eq!(blocks.keys().collect::<Vec<_>>(), ["a_mm"]);
-        }
     }
 
     #[test]

@@ -145,9 +145,8 @@ impl CheckArguments {
 }
 
 /// Prints the findings. Wrong answers are a failure.
-pub fn conclude(findings: &Findings, common: &Common) -> Result<print::Outcome> {
-    let outcome =
-        print::result(common, findings, || print::Page::of_sections(&sections_of(findings)))?;
+pub fn conclude(findings: &Findings, common: &Common) -> print::Outcome {
+    let outcome = print::sections(common, &sections_of(findings));
     let sound = if findings.all_good() {
         Ok(())
     } else {
@@ -160,11 +159,16 @@ pub fn conclude(findings: &Findings, common: &Common) -> Result<print::Outcome> 
             "the device failed a check: see above".into()
         }))
     };
-    Ok(outcome.and(sound))
+    outcome.and(sound)
 }
 
 fn sections_of(f: &Findings) -> Sections {
     let mut result = Sections::new("The device beside the host");
+    result.value("device", &f.device);
+    result.value("statistics", &f.statistics);
+    result.value("frames", &f.frames);
+    result.value("repeated", &f.repeated);
+    result.value("damaged", &f.damaged);
     let d = &f.device;
     result.line(
         "device",

@@ -75,5 +75,5 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
             output::write_bytes(wanted, &logged)?;
         }
     }
-    conclude(&outcome?, common)
+    Ok(conclude(&outcome?, common))
 }

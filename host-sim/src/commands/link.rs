@@ -171,7 +171,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<crate::commands
             let mut device = open()?;
             let plan = action.plan(1);
             let findings = check(&mut device, &frames, &model, &plan, &Terminal::new(common))?;
-            conclude(&findings, common)
+            Ok(conclude(&findings, common))
         }
     }
 }

@@ -137,12 +137,3 @@ pub fn sections_above(common: &Common, sections: &Sections, more: &[String]) -> 
     more.iter().for_each(|line| page.line(line));
     page.outcome()
 }
-
-/// Result of the command: as JSON if that was asked for, else as a page.
-pub fn result(
-    common: &Common,
-    result: &impl Serialize,
-    page: impl FnOnce() -> Page,
-) -> Result<Outcome> {
-    if common.json { json(common, result) } else { Ok(page().outcome()) }
-}

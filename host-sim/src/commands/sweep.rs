@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::report::{self, format::counted};
+use crate::report::{self, Sections, TableOf};
 use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
 use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
 use clap::Args;
-use serde::Serialize;
 use taxel_data::digest::digest;
 
 use super::merged::Files;
@@ -77,7 +76,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     }
     let shard = schedule::shard(arguments.shard, arguments.shards, common)?;
     if arguments.list {
-        return list(&plan, &points, shard, common);
+        return Ok(list(&plan, &points, shard, common));
     }
     let folder = arguments.to.output.clone().unwrap_or_else(|| Path::new("out").join(&plan.name));
     let table = folder.join(RESULTS);
@@ -92,15 +91,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
                 .failed
                 .iter()
                 .for_each(|failed| common.remark(format_args!("warning: {failed}")));
-            let summary = ShardSummary {
-                plan: &plan.name,
-                shard: shard.to_string(),
-                points: worked.computed + worked.skipped,
-                computed: worked.computed,
-                there_already: worked.skipped,
-                failed: worked.failed.len(),
-            };
-            print::result(common, &summary, || print::Page::of(&summary))
+            let mut sections = Sections::new(format!("Shard {shard} of the sweep {}", plan.name));
+            sections.value("plan", &plan.name);
+            sections.value("shard", &shard.to_string());
+            sections.fact("points", "points", "", worked.computed + worked.skipped);
+            sections.fact("computed", "computed", "", worked.computed);
+            sections.fact("there_already", "there already", "", worked.skipped);
+            sections.fact("failed", "failed", "", worked.failed.len());
+            Ok(print::sections(common, &sections))
         }
     }
 }
@@ -135,32 +133,6 @@ fn store(folder: &Path) -> Store {
     Store::new(&folder.join("points"))
 }
 
-/// What came of a shard.
-#[derive(Serialize)]
-struct ShardSummary<'s> {
-    plan: &'s str,
-    shard: String,
-    points: usize,
-    computed: usize,
-    there_already: usize,
-    failed: usize,
-}
-
-impl std::fmt::Display for ShardSummary<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{}, shard {}: {}, {} computed, {} there already, {} failed",
-            self.plan,
-            self.shard,
-            counted(self.points, "point"),
-            self.computed,
-            self.there_already,
-            self.failed
-        )
-    }
-}
-
 /// Version of this program, and a digest of it: another one may compute something else.
 pub fn build() -> Result<String> {
     let failed = |cause| Error::failed(format!("cannot read the program's own file: {cause}"));
@@ -168,40 +140,31 @@ pub fn build() -> Result<String> {
     Ok(format!("taxel {} {:016x}", env!("CARGO_PKG_VERSION"), digest(&bytes)))
 }
 
-#[derive(Serialize)]
-struct Listed<'l> {
-    plan: &'l str,
-    points: Vec<ListedPoint<'l>>,
-}
-
-#[derive(Serialize)]
-struct ListedPoint<'l> {
-    id: &'l str,
-    values: std::collections::BTreeMap<&'l str, &'l toml::Value>,
-}
-
-fn list(
-    plan: &Plan,
-    points: &[Point],
-    shard: Option<Shard>,
-    common: &Common,
-) -> Result<print::Outcome> {
+/// Prints the points of the plan, or of a shard.
+fn list(plan: &Plan, points: &[Point], shard: Option<Shard>, common: &Common) -> print::Outcome {
     let shown: Vec<&Point> = match shard {
         None => points.iter().collect(),
         Some(shard) => shard.groups(points).concat().into_iter().map(|i| &points[i]).collect(),
     };
-    let all = shown.iter().map(|point| ListedPoint {
-        id: &point.id,
-        values: point.values.iter().map(|(field, value)| (field.as_str(), value)).collect(),
-    });
-    let listed = Listed { plan: &plan.name, points: all.collect() };
-    print::result(common, &listed, || {
+    if !common.json {
         let mut page = print::Page::default();
         shown
             .iter()
             .for_each(|point| page.line(format_args!("{}  {}", point.id, plan.in_words(point))));
-        page
-    })
+        return page.outcome();
+    }
+    let mut sections = Sections::default();
+    sections.value("plan", &plan.name);
+    let value = |point: &Point, field: &String| {
+        let value = point.values.iter().find(|(known, _)| known == field);
+        value.and_then(|(_, value)| serde_json::to_value(value).ok()).unwrap_or_default()
+    };
+    let mut table = TableOf::new(&shown, "Points.").values("id", |point| point.id.as_str().into());
+    for field in &plan.fields {
+        table = table.values(field, |point| value(point, field));
+    }
+    sections.rows("points", table);
+    print::sections(common, &sections)
 }
 
 /// Writes the results of all points that are there, and names those that are not.

@@ -1,6 +1,5 @@
 //! Command `view`: a sensor in the browser, live.
 
-use std::collections::BTreeMap;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::{self, Stdio};
@@ -25,6 +24,7 @@ use crate::live::feed::Feed;
 use crate::live::replay::{ReplayFeed, USUAL_RATE};
 use crate::live::simulation::{self, SimulationFeed};
 use crate::live::watch::{Watched, watch};
+use crate::report::Sections;
 use crate::{Error, Result};
 
 /// Frames a second of a simulation.
@@ -257,8 +257,9 @@ fn show(
     common: &Common,
 ) -> Result<print::Outcome> {
     let address = view.address();
-    print::result(common, &BTreeMap::from([("address", &address)]), || print::Page::of(&address))?
-        .print()?;
+    let mut sections = Sections::new(&address);
+    sections.value("address", &address);
+    print::sections(common, &sections).print()?;
     // Whoever reads the address waits for it.
     let _ = std::io::stdout().flush();
     if !arguments.no_browser && !open_browser(&address) {

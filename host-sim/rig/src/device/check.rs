@@ -22,7 +22,7 @@ pub struct Plan {
 }
 
 /// Findings of a check.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Findings {
     /// Identity of the device at the end, with the deepest use of its stack.
     pub device: DeviceIdentity,
