@@ -10,7 +10,7 @@ use crate::sweep::file::Wanted;
 use crate::sweep::plan::SEED;
 use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
-use clap::{Args, Command};
+use clap::{Arg, Args, Command};
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
@@ -52,11 +52,20 @@ impl PlannedData {
         let of_plan = |cause: &str| {
             taxel_data::Error::unfit(format!("plan {}: data: {cause}", path.display()))
         };
-        let options = DataOptions::augment_args(Command::new("data"));
-        let options = options.get_arguments().map(|option| option.get_id().as_str());
-        let known: Vec<&str> = ["file", "test"].into_iter().chain(options).collect();
+        let mut command = DataOptions::augment_args(Command::new("data"));
+        command.build();
+        let fields = command.get_arguments().map(|option| option.get_id().as_str());
+        let known: Vec<&str> = ["file", "test"].into_iter().chain(fields).collect();
         let fields = data.keys().try_for_each(|field| require_known("field", field, &known));
         fields.map_err(|bad| of_plan(&bad.to_string()))?;
+        let is_given = |option: &&Arg| data.contains_key(option.get_id().as_str());
+        for option in command.get_arguments().filter(is_given) {
+            let other = command.get_arg_conflicts_with(option).into_iter().find(is_given);
+            if let Some(other) = other {
+                let (field, other) = (option.get_id(), other.get_id());
+                return Err(of_plan(&format!("{field} and {other}: give one of them")).into());
+            }
+        }
         let read = data.clone().try_into();
         let mut read: Self = read.map_err(|cause: toml::de::Error| of_plan(cause.message()))?;
         let files = [Some(&mut read.file), read.test.as_mut(), read.options.baseline_mut()];

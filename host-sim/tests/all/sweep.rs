@@ -343,6 +343,11 @@ fn measurements_are_swept_by_the_settings_of_training() {
         ("inputs = ", "input = ", "data: field = input: the nearest are `inputs`"),
         ("folds = 4", "folds = \"four\"", "data: invalid type: string \"four\""),
         ("file = \"data.csv\"", "", "data: missing field `file`"),
+        (
+            "folds = 4",
+            "folds = 4\nfold_blocks = 4",
+            "data: fold_blocks and folds: give one of them",
+        ),
     ] {
         folder.write("plan.toml", plan.replace(from, to));
         let message = folder.fail(&["sweep", "plan.toml"], 2);
