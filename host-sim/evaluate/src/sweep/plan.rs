@@ -122,7 +122,7 @@ fn in_words(values: &[(String, Value)]) -> String {
 
 impl Plan {
     /// Reads a plan for the program `build`. Scenes stand beside it. `load` makes measurements of its `[data]`, for options of
-    /// training and a seed, which [set] gives.
+    /// training and a seed, which `[set]` gives.
     ///
     /// # Errors
     /// [`Error::Data`] for a file that cannot be read, and for its content.
