@@ -247,11 +247,11 @@ fn r_squared(errors: &[Errors], group: &str) -> Option<f64> {
 }
 
 fn by_row(sections: &mut Sections, rows: &[RowErrors]) {
-    let Some(first) = rows.first() else { return };
+    let groups = rows.first().map_or(&[][..], |row| &row.errors);
     let table =
         TableOf::new(rows, "RMSE of the model by row-wire.")
             .names("row_wire", "row-wire", |row| row.row_wire.to_string());
-    sections.table(with_rmse(table, &first.errors, |row| &row.errors));
+    sections.table_as("by_row", with_rmse(table, groups, |row| &row.errors));
 }
 
 fn by_load(sections: &mut Sections, ranges: &[LoadErrors]) {

@@ -232,7 +232,7 @@ fn settings(merged: &Merged) -> TableOf<'_, Setting> {
     table
         .values("is_within", |it| it.is_within.into())
         .values("on_front", |it| it.on_front.into())
-        .values("scene", |it| it.scene.clone().map_or(Value::Null, Value::from))
+        .values("scene_toml", |it| it.scene.clone().map_or(Value::Null, Value::from))
 }
 
 /// Adds what programs read of a plan's results.

@@ -211,6 +211,27 @@ mod tests {
     }
 
     #[test]
+    fn csv_and_json_have_the_columns_of_text_unrounded_and_those_that_programs_read() {
+        let rows = [("d,z", Some([0.037_123, 0.0002]), 7), ("dx", None, 8)];
+        let table = TableOf::new(&rows, "Errors.")
+            .names("output", "output", |row| row.0.into())
+            .estimates(["rmse_mm", "error_mm"], "RMSE", "mm", Digits::Significant(2), |row| row.1)
+            .values("count", |row| row.2.into());
+        let mut sections = Sections::new("A");
+        sections.table_as("errors", table);
+        let json: serde_json::Value = serde_json::from_str(&sections.json()).unwrap();
+        let of = |value: serde_json::Value, error: serde_json::Value, output: &str, count: i32| serde_json::json!({ "output": output, "rmse_mm": value, "error_mm": error, "count": count });
+        let none = serde_json::Value::Null;
+        let expected =
+            [of(0.037_123.into(), 0.0002.into(), "d,z", 7), of(none.clone(), none, "dx", 8)];
+        assert_eq!(json["errors"], serde_json::json!(expected));
+        let Some(Section::Table(table)) = sections.sections.first() else { panic!("a table") };
+        let csv = "output,rmse_mm,error_mm,count\n\"d,z\",0.037123,0.0002,7\ndx,,,8\n";
+        assert_eq!(table.csv(), csv);
+        assert!(sections.text().contains("0.037 ± 0.000") && !sections.text().contains("count"));
+    }
+
+    #[test]
     fn columns_that_do_not_fit_stand_below_behind_the_names() {
         let mut table =
             TableOf::new(&["row 1"], "Many.").names("wire", "wire", |row| (*row).into());

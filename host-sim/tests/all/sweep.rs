@@ -72,7 +72,7 @@ fn any_shards_give_what_one_process_gives() {
     let merged: Value = serde_json::from_str(&read(&folder, "merged.json")).unwrap();
     let front =
         merged["settings"].as_array().unwrap().iter().find(|it| it["on_front"] == true).unwrap();
-    folder.write("best.toml", front["scene"].as_str().unwrap());
+    folder.write("best.toml", front["scene_toml"].as_str().unwrap());
     folder.succeed(&["synth", "best.toml", "-n", "2", "-o", "best.csv"]);
 }
 

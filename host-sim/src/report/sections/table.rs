@@ -170,6 +170,8 @@ impl<'r, R> TableOf<'r, R> {
         (key, heading, is_name): (&str, Option<String>, bool),
         cell: impl Fn(&'r R) -> (String, Value),
     ) -> Self {
+        let is_new = self.table.columns.iter().all(|column| column.key != key);
+        debug_assert!(is_new, "two columns have the key {key}");
         let (cells, values): (Vec<String>, Vec<Value>) = self.rows.iter().map(cell).unzip();
         let is_told = |cell: &String| !cell.is_empty() && cell != UNDEFINED;
         let heading = heading.filter(|_| cells.iter().any(is_told));
