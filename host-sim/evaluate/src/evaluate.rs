@@ -5,6 +5,5 @@ pub mod device_cost;
 pub mod worth;
 pub mod limit;
 pub mod confidence;
-pub mod printed;
-pub mod table1;
+pub mod paper_networks;
 pub mod moving_contacts;

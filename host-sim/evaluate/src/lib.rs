@@ -23,8 +23,9 @@ pub mod training_set;
 pub mod subject;
 pub mod others;
 pub mod evaluate;
-pub mod run;
 pub mod sweep;
+pub mod table1;
+pub mod run;
 pub mod trade;
 
 pub use error::{Error, Result};

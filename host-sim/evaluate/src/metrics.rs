@@ -1,7 +1,7 @@
 //! Errors of estimates, by every definition in use. No figure stands alone: the definitions differ by
 //! more than the decoders do, so all of them are always given.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use taxel_core::blob::Model;
 use taxel_data::{Dataset, Table, columns};
 use taxel_learn::Decoder;
@@ -32,7 +32,7 @@ pub struct Measure {
 }
 
 /// Errors of one group of outputs (an axis, or a column of measured data).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Errors {
     /// Name of the group: `dz_mm`, or a column's name.
     pub group: String,
@@ -155,7 +155,7 @@ pub fn linear_at_training(model: &Model<'_>) -> Vec<GroupRmse> {
 }
 
 /// Limit of a scene that results are given beside.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LimitSummary {
     /// Number of frames that it was computed on, and ratios to it are formed on: the first test frames.
     pub frames: usize,

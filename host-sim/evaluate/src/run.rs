@@ -18,13 +18,13 @@ use crate::error::Result;
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
 use crate::evaluate::moving_contacts::MovingContacts;
-use crate::evaluate::table1::{self, Table1};
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 use crate::others::{self, Others};
 use crate::over_time::{Decoded, OverTime, RestOverTime, is_log};
 use crate::subject::Subject;
+use crate::table1::Table1;
 use crate::training_set::TrainingSet;
 use crate::verdict::{Verdict, Warning};
 
@@ -66,7 +66,7 @@ pub struct RunResult {
     pub moving: Option<MovingContacts>,
     /// Distribution of the network's errors on the test frames, and frames to look at.
     pub distribution: Distribution,
-    /// Table 1, if the scene asks for it.
+    /// Table 1, if the scene asks for it and it [was computed](crate::table1::compute).
     pub table1: Option<Table1>,
 }
 
@@ -219,9 +219,6 @@ pub fn run(
         Subject::Scene(scene) => {
             result.moving = MovingContacts::new(scene, &blob, &baselines)?;
             result.scene = Some(scene_summary(scene));
-            if scene.table1.is_some() {
-                result.table1 = Some(table1::compute(scene, progress)?);
-            }
         }
         Subject::Measured(data) => {
             result.data = Some(DataSummary {

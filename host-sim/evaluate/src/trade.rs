@@ -379,7 +379,7 @@ impl Trade {
         let readings = judge::Readings::new(plan, point, &of_point, &mut KnownLimit::default())?;
         let frames = Frames::new(plan, &readings)?;
         let blob = frames.blob(plan, point)?;
-        let judged = frames.judge(&blob)?;
+        let judged = frames.judge(&blob, &frames.options(plan, point)?)?;
         let decoders: Vec<DecoderErrors> = frames.decoders(&judged, point.on_device.filter);
         let verdict = Verdict::new(&decoders, &readings.limit)
             .with(Warning::other_image(&blob.parse()))

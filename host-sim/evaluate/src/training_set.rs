@@ -26,6 +26,9 @@ pub struct TrainingSet<'s> {
     more: More<'s>,
 }
 
+/// Packs a model that was trained on frames of this origin.
+type Pack = fn(&Trained, &Dataset, &Origin) -> taxel_learn::error::Result<ModelBlob>;
+
 /// Frames that are looked at besides those that weights are fitted to.
 enum More<'s> {
     /// New frames of a scene, where there is no end of them.
@@ -90,7 +93,7 @@ impl<'s> TrainingSet<'s> {
         self.check()?;
         let mut options = *options;
         let _ = self.choose(&mut options, progress);
-        self.packed(&self.train(&options, progress)?, &options, progress)
+        self.packed(pack, &self.train(&options, progress)?, &options, progress)
     }
 
     /// Layers for `options`, refined if that is asked for, from each of `starts` and its own `layers` with K-means centres.
@@ -108,9 +111,10 @@ impl<'s> TrainingSet<'s> {
         Ok(Found::new(starts, layers, options, penalties, refinement, progress)?)
     }
 
-    /// Blob of a trained model, with a reading model if one is asked for.
+    /// Blob of a trained model as `pack` makes it, with a reading model if one is asked for.
     pub fn packed(
         &self,
+        pack: Pack,
         trained: &Trained,
         options: &Options,
         progress: &dyn Progress,

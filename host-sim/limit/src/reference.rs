@@ -1,6 +1,6 @@
 //! Limit of a scene's test frames, and the ratio of any decoder's error to it.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use taxel_data::{Progress, Stream, Table, columns};
 use taxel_simulate::{Synthesis, World};
 
@@ -33,7 +33,7 @@ pub struct Reference {
 }
 
 /// Limit of one group of outputs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GroupLimit {
     /// Name of the group, such as `dz_mm`.
     pub group: String,

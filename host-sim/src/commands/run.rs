@@ -4,13 +4,14 @@ use std::path::Path;
 
 use super::progress::Terminal;
 use crate::Result;
-use crate::evaluate::table1::Table1;
+use crate::experiment::Experiment;
 use crate::report::{self, Sections};
 use crate::run::{self, RunResult};
-use crate::subject::Subject;
+
 use clap::Args;
 use taxel_data::output::FileSet;
-use taxel_learn::{ModelBlob, Options};
+use taxel_evaluate::table1::{self, Table1};
+use taxel_learn::ModelBlob;
 
 use super::format_note::note_format;
 use super::subject_argument::SubjectArgument;
@@ -57,21 +58,17 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let folder = arguments.to.in_out().join(subject.name());
     FILES.check(&folder, &arguments.subject.paths())?;
     refused_readings::note_scene(&subject, common);
-    run_into(&folder, &subject, &options, common)
-}
-
-fn run_into(
-    folder: &Path,
-    subject: &Subject,
-    options: &Options,
-    common: &Common,
-) -> Result<print::Outcome> {
     let started = std::time::Instant::now();
-    let (result, blob) = run::run(subject, options, &Terminal::new(common))?;
+    let progress = Terminal::new(common);
+    let (mut result, blob) = run::run(&subject, &options, &progress)?;
+    if let Some(scene) = subject.scene().filter(|scene| scene.table1.is_some()) {
+        let text = Experiment::text(arguments.subject.source())?;
+        result.table1 = Some(table1::compute(scene, &text, &progress)?);
+    }
     let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
-    note_format(&blob.parse(), options, result.device_cost.cycles, common);
+    note_format(&blob.parse(), &options, result.device_cost.cycles, common);
     let mut sections = report::of_run(&result);
-    let files = write_files(folder, &result, &blob, (&mut sections, &command), common)?;
+    let files = write_files(&folder, &result, &blob, (&mut sections, &command), common)?;
     let mut more = vec![
         format!("written to {}: {}", folder.display(), files.join(", ")),
         format!("Next: open {}", folder.join("report.html").display()),

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use super::progress::Terminal;
 use crate::Result;
-use crate::evaluate::table1::{self, Table1};
+use crate::experiment::Experiment;
 use crate::report;
 use clap::Args;
 use serde::Serialize;
 use taxel_data::output;
+use taxel_evaluate::table1::{self, Table1};
 
 use super::scene_argument::{SceneArgument, group_of_scene};
 use super::{Common, print};
@@ -50,7 +51,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     if let Some(path) = &arguments.output {
         print::check_output(path, &[argument.path()])?;
     }
-    let table = table1::compute(&scene, &Terminal::new(common))?;
+    let text = Experiment::text(&arguments.scene)?;
+    let table = table1::compute(&scene, &text, &Terminal::new(common))?;
     if let Some(path) = &arguments.output {
         output::write_bytes(path, table.to_csv().as_bytes())?;
     }

@@ -11,13 +11,13 @@ use taxel_evaluate::by_load::LoadErrors;
 use taxel_evaluate::evaluate::confidence::{Coverage, Covered};
 use taxel_evaluate::evaluate::device_cost::DeviceCost;
 use taxel_evaluate::evaluate::moving_contacts::{MovingContacts, MovingWay};
-use taxel_evaluate::evaluate::table1::Table1;
 use taxel_evaluate::metrics::{
     self, DecoderErrors, Definition, Errors, GroupRmse, LimitSummary, NETWORK, rmse_of,
 };
 use taxel_evaluate::others::Others;
 use taxel_evaluate::over_time::OverTime;
 use taxel_evaluate::run::RowErrors;
+use taxel_evaluate::table1::Table1;
 use taxel_evaluate::verdict::Verdict;
 
 /// Digits of an error in the unit of its output.

@@ -9,8 +9,8 @@ use super::figures::Figure;
 use super::format::{noise, symbol, with_unit};
 use super::svg::Shape;
 use super::ticks;
-use taxel_evaluate::evaluate::table1::{Column, NETWORK, Table1};
 use taxel_evaluate::metrics::rmse_of;
+use taxel_evaluate::table1::{Column, NETWORK, Table1};
 
 const WIDE: [f64; 2] = [920.0, 340.0];
 const NARROW: [f64; 2] = [360.0, 270.0];

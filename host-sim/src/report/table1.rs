@@ -4,9 +4,9 @@ use taxel_learn::decoders::{mean, standard};
 use taxel_simulate::noise::NoiseKind;
 
 use super::sections::{Digits, Sections, TableOf};
-use taxel_evaluate::evaluate::printed::{CELLS, NOISE_LEVELS, Nearness, SPREADS};
-use taxel_evaluate::evaluate::table1::{Comparison, NETWORK, Table1};
 use taxel_evaluate::metrics::{Definition, Errors};
+use taxel_evaluate::table1::printed::{CELLS, NOISE_LEVELS, Nearness, SPREADS};
+use taxel_evaluate::table1::{Comparison, NETWORK, Table1};
 
 /// Sections of Table 1: the errors of a `group` of outputs by every definition.
 pub fn sections(subject: &str, table: &Table1, group: &str) -> Sections {

@@ -5,10 +5,10 @@ use std::sync::OnceLock;
 use taxel_data::Silent;
 use taxel_data::table::Table as Values;
 use taxel_evaluate::evaluate::distribution::{Distribution, Reference};
-use taxel_evaluate::evaluate::table1::{Column, Entry, NETWORK, Table1};
 use taxel_evaluate::experiment::Experiment;
 use taxel_evaluate::run::{RunResult, run};
 use taxel_evaluate::subject::Subject;
+use taxel_evaluate::table1::{Column, Entry, NETWORK, Table1};
 use taxel_evaluate::verdict::{Verdict, Warning};
 
 use super::{Judged, Page, Pictures, Sections};

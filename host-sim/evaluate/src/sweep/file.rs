@@ -89,6 +89,9 @@ pub enum Also {
     Baselines,
     /// Errors on contacts that models are not trained on.
     OtherContacts,
+    /// All errors of what the scene's Table 1 compares: the network, whose centres are those of the table, the baselines, and
+    /// the paper's networks that no blob holds.
+    Table1,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]

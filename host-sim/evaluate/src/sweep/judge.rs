@@ -9,9 +9,10 @@ use taxel_core::filter::{Settings, Track};
 use taxel_data::{Dataset, Silent, columns};
 use taxel_learn::cost::{Cost, DecoderRam, Design};
 use taxel_learn::decoders::BASELINES;
+use taxel_learn::packing::pack_to_judge;
 use taxel_learn::train::projection::features_at_most;
 use taxel_learn::train::{Found, Kinds, Layers, Start, resolution};
-use taxel_learn::{ModelBlob, Options, PreparedModel};
+use taxel_learn::{Decoder, ModelBlob, Options, PreparedModel, pack};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::{Synthesis, World};
 
@@ -20,7 +21,8 @@ use super::plan::{Plan, Point};
 use super::point::{self, Results};
 use crate::device::{Device, Wires};
 use crate::error::Result;
-use crate::experiment::Experiment;
+use crate::evaluate::paper_networks::{self, Cell, Entry};
+use crate::experiment::{Experiment, Table1};
 use crate::metrics::{self, Blocks, DecoderErrors, Definition, Errors, LimitSummary, Measure};
 use crate::others::{self, OtherFrames};
 use crate::subject::Subject;
@@ -122,7 +124,9 @@ fn train_each(
                             let trained = trained[place.unwrap_or(0)].as_ref();
                             let trained =
                                 trained.map_err(|why| crate::Error::failed(why.to_string()))?;
-                            frames.judge(&frames.set.packed(trained, options, &Silent)?)
+                            let blob =
+                                frames.set.packed(pack_to_judge, trained, options, &Silent)?;
+                            frames.judge(&blob, options)
                         });
                         for Member { index, point, .. } in of_model {
                             let results = |model: &Judged| model.results(point.on_device.filter);
@@ -261,6 +265,8 @@ pub struct Frames<'s> {
     others: OtherFrames,
     /// Errors of the baselines, if the plan wants them.
     baselines: Vec<DecoderErrors>,
+    /// Settings of Table 1 and the baselines in it, if the plan wants it.
+    table: Option<(Table1, Vec<Entry>)>,
 }
 
 impl<'s> Frames<'s> {
@@ -279,11 +285,35 @@ impl<'s> Frames<'s> {
         } else {
             vec![]
         };
-        let mut frames = Self { readings, set, test, touches, others, baselines: vec![] };
+        let baselines = vec![];
+        let mut frames = Self { readings, set, test, touches, others, baselines, table: None };
         if plan.has(Also::Baselines) {
             frames.baselines = frames.baselines()?;
         }
+        let table1 = readings.subject.scene().and_then(|scene| scene.table1.clone());
+        frames.table = table1.filter(|_| plan.has(Also::Table1)).map(|settings| {
+            let fitted = BASELINES.iter().filter_map(|it| it.fit(&frames.set.frames));
+            (settings, fitted.map(|it| frames.entry(it.as_ref(), None)).collect())
+        });
         Ok(frames)
+    }
+
+    /// Errors of a decoder in Table 1.
+    fn entry(&self, decoder: &dyn Decoder, spread: Option<f64>) -> Entry {
+        let estimates = decoder.decode_all(&self.test.inputs.values, 1).values;
+        Entry::new((decoder.name(), spread), &estimates, &self.test, &self.readings.measure)
+    }
+
+    /// Cell of Table 1 with the `estimates` of a network that was trained with `options`, if the plan wants it.
+    fn cell(&self, estimates: &[f64], options: &Options) -> Option<Cell> {
+        let (settings, baselines) = self.table.as_ref()?;
+        let Options { seed, spread, .. } = *options;
+        let others = paper_networks::fit(settings, seed, spread, &self.set.frames);
+        let others = others.iter().map(|decoder| self.entry(decoder.as_ref(), Some(spread)));
+        let name = (metrics::NETWORK, Some(spread));
+        let network = Entry::new(name, estimates, &self.test, &self.readings.measure);
+        let entries = baselines.iter().cloned().chain([network]).chain(others).collect();
+        Some(Cell { entries, limit: self.readings.limit.clone() })
     }
 
     /// Errors of the baselines. On contacts that move, decoding takes them no time.
@@ -309,6 +339,9 @@ impl<'s> Frames<'s> {
             let possible = |wanted| features_at_most(&self.set.frames, wanted).max(1);
             options.features = options.features.map(possible);
         }
+        if self.table.is_some() {
+            options.search = paper_networks::search();
+        }
         options.check_for(&self.set.frames)?;
         Ok(options)
     }
@@ -324,28 +357,31 @@ impl<'s> Frames<'s> {
         let of_usual = Options { format: point.usual.format, ..options };
         let found = centred.found(&of_usual, &[options.penalty])?;
         let trained = found.fit(options.format, options.or_f32, &Silent).remove(0)?;
-        self.set.packed(&trained, &options, &Silent)
+        self.set.packed(pack, &trained, &options, &Silent)
     }
 
-    /// Errors and cost of a model.
-    pub fn judge(&self, blob: &ModelBlob) -> Result<Judged> {
+    /// Errors and cost of a model that was trained with `options`.
+    pub fn judge(&self, blob: &ModelBlob, options: &Options) -> Result<Judged> {
         let Readings { measure, device, scan_ms, .. } = self.readings;
         let model = blob.prepare().of_inputs();
         let design = Design::new(blob);
         let cost = Cost::of_frame(&design);
+        let decoded = || model.decode_lines(&self.test.inputs.values);
+        let mut before = self.readings.results.clone();
         let ways = match &self.touches {
             None => {
-                let estimates = model.decode_lines(&self.test.inputs.values);
+                let estimates = decoded();
+                before.cell = self.cell(&estimates, options);
                 let (errors, blocks) =
                     metrics::with_blocks(&self.test.outputs, &estimates, measure);
                 let (filter, times) = (Settings::default(), device.times(*scan_ms, &cost));
                 vec![Way { filter, cost, times, errors, blocks }]
             }
             Some(touches) => {
+                before.cell = self.table.as_ref().and_then(|_| self.cell(&decoded(), options));
                 touches.judge((blob, &model), cost, (device, *scan_ms), measure)?.ways.into()
             }
         };
-        let mut before = self.readings.results.clone();
         for decoder in &self.baselines {
             for (group, rmse) in rmse_of_groups(&decoder.errors) {
                 before.add(&format!("{}_rmse_{group}", decoder.decoder), Some(rmse));

@@ -395,7 +395,9 @@ impl Plan {
             Some(Value::Table(training)) => training,
             _ => Table::new(),
         };
-        shared.remove("table1");
+        if !self.has(Also::Table1) {
+            shared.remove("table1");
+        }
         let on_device = OnDevice::new(document.device)?;
         let OnDevice { device, samples, column_step, filter } = on_device;
         let (limit_frames, train, also) = (self.limit_frames, self.train, &self.also);

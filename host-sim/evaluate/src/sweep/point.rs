@@ -12,6 +12,7 @@ use super::fields;
 use super::file::Also;
 use super::plan::Plan;
 use crate::error::Result;
+use crate::evaluate::paper_networks::Cell;
 use crate::experiment::Experiment;
 use crate::measurements::Measurements;
 use crate::metrics::{self, Blocks, Definition};
@@ -24,6 +25,8 @@ pub struct Results {
     /// Parts of blocks of frames in errors, by their names: what tells how sure their differences are.
     pub blocks: Blocks,
     pub notes: Vec<String>,
+    /// Errors of a cell of Table 1, if the plan wants it.
+    pub cell: Option<Cell>,
 }
 
 impl Results {

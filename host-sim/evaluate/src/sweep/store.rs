@@ -16,6 +16,7 @@ use super::judge::Outcome;
 use super::plan::{Plan, Point};
 use super::point::Results;
 use crate::error::{Error, Result};
+use crate::evaluate::paper_networks::Cell;
 use crate::metrics::Blocks;
 
 /// Result of a point, as its file has it.
@@ -32,6 +33,9 @@ pub struct Record {
     pub blocks: Blocks,
     /// Remarks on them.
     pub notes: Vec<String>,
+    /// Errors of a cell of Table 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cell: Option<Cell>,
     /// Reason why there are none.
     pub failed: Option<String>,
 }
@@ -64,6 +68,7 @@ impl Record {
             results: outcome.values,
             blocks: outcome.blocks,
             notes: outcome.notes,
+            cell: outcome.cell,
             failed,
         }
     }
