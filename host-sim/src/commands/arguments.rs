@@ -84,6 +84,14 @@ pub fn of_option(bad: BadValue) -> Error {
     bad.into()
 }
 
+/// An `error` of training, in which a value is named by the option that gave it, if one of `options` did.
+pub fn blamed(error: Error, options: &TrainingOptions) -> Error {
+    match error {
+        Error::Data(taxel_data::Error::Setting(bad)) => of_option(named(bad, options)),
+        error => error,
+    }
+}
+
 /// Values as files have them: by the names that options have.
 pub mod as_text {
     use std::fmt::Display;

@@ -60,7 +60,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     refused_readings::note_scene(&subject, common);
     let started = std::time::Instant::now();
     let progress = Terminal::new(common);
-    let (mut result, blob) = run::run(&subject, &options, &progress)?;
+    let outcome = run::run(&subject, &options, &progress);
+    let (mut result, blob) =
+        outcome.map_err(|error| arguments::blamed(error, arguments.subject.training()))?;
     if let Some(scene) = subject.scene().filter(|scene| scene.table1.is_some()) {
         let text = Experiment::text(arguments.subject.source())?;
         result.table1 = Some(table1::compute(scene, &text, &progress)?);

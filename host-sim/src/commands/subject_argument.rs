@@ -141,6 +141,11 @@ impl SubjectArgument {
         self.source.as_deref().unwrap_or(DEFAULT_SCENE)
     }
 
+    /// Options of training.
+    pub fn training(&self) -> &TrainingOptions {
+        &self.options.training
+    }
+
     /// Centres that are given, or candidates for them.
     pub fn centres(&self) -> &[usize] {
         self.options.training.centres.as_deref().unwrap_or_default()

@@ -71,7 +71,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let (features, selection) = choice::choose(arguments, &subject, &set, &mut options, common)?;
 
     let progress = Terminal::new(common);
-    let blob = set.blob(&options, &progress)?;
+    let blob = set
+        .blob(&options, &progress)
+        .map_err(|error| arguments::blamed(error, &arguments.subject.training))?;
     output::write_bytes(&arguments.to.output, blob.bytes())?;
 
     note_format(&blob.parse(), &options, DeviceCost::new(&blob).cycles, common);
