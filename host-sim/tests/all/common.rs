@@ -46,6 +46,11 @@ impl Folder {
         path
     }
 
+    /// Text of a file in the folder.
+    pub fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap_or_else(|cause| panic!("{name}: {cause}"))
+    }
+
     /// Names of everything in the folder, hidden files too.
     pub fn names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(&self.0).unwrap();
@@ -114,6 +119,12 @@ impl Drop for Folder {
 pub fn shell_status(status: ExitStatus) -> Option<i32> {
     use std::os::unix::process::ExitStatusExt;
     status.code().or(status.signal().map(|signal| 128 + signal))
+}
+
+/// RMSE of a group of outputs in the `errors` of a decoder.
+pub fn rmse(errors: &serde_json::Value, group: &str) -> f64 {
+    let of_group = errors.as_array().unwrap().iter().find(|errors| errors["group"] == group);
+    of_group.unwrap()["rmse"].as_f64().unwrap()
 }
 
 /// Printed JSON without the time that the command took, which differs from run to run.

@@ -2,10 +2,6 @@
 
 use crate::common::{Folder, small_scene};
 
-fn json(text: &str) -> serde_json::Value {
-    serde_json::from_str(text).unwrap()
-}
-
 #[test]
 fn a_full_reading_model_is_judged_and_writes_it_beside_the_outputs() {
     let folder = Folder::new("confidence");
@@ -21,12 +17,12 @@ fn a_full_reading_model_is_judged_and_writes_it_beside_the_outputs() {
     let inspected = folder.succeed(&["inspect", "asked.bin"]);
     assert!(inspected.contains("novelty and deviations by"), "{inspected}");
     folder.succeed(&["synth", "scene.toml", "-n", "300", "--seed", "9", "-o", "test.csv"]);
-    let evaluated = json(&folder.succeed(&["eval", "model.bin", "test.csv", "--json"]));
+    let evaluated = folder.json(&["eval", "model.bin", "test.csv"]);
     assert_eq!(evaluated["coverage"].as_array().unwrap().len(), 9, "three parts of three groups");
     assert!(evaluated["percent_novel"].as_f64().unwrap() < 4.0);
     let page = folder.succeed(&["eval", "model.bin", "test.csv"]);
     assert!(page.contains("surest quarter") && page.contains("are novel: unlike"));
-    let without = json(&folder.succeed(&["eval", "without.bin", "test.csv", "--json"]));
+    let without = folder.json(&["eval", "without.bin", "test.csv"]);
     assert!(
         without["coverage"].as_array().unwrap().is_empty() && without["percent_novel"].is_null()
     );
@@ -36,8 +32,7 @@ fn a_full_reading_model_is_judged_and_writes_it_beside_the_outputs() {
     let plain = ["decode", "model.bin", "test.csv", "-o", "plain.csv"];
     folder.succeed(&plain);
     folder.succeed(&["decode", "model.bin", "test.csv", "--confidence", "-o", "with.csv"]);
-    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
-    let (plain, with) = (read("plain.csv"), read("with.csv"));
+    let (plain, with) = (folder.read("plain.csv"), folder.read("with.csv"));
     let header: Vec<&str> = with.lines().next().unwrap().split(',').collect();
     assert_eq!(header.len(), 36 + 36 + 1 + 1);
     assert_eq!(

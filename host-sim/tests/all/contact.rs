@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::common::Folder;
+use crate::common::{Folder, rmse};
 
 /// The scene `contact` with few frames, which is quick to train.
 fn small_contact() -> String {
@@ -12,28 +12,19 @@ fn small_contact() -> String {
         .replace("centres = 64", "centres = 24\nrefine = false")
 }
 
-fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap()
-}
-
-fn rmse(errors: &Value, group: &str) -> f64 {
-    let of_group = errors.as_array().unwrap().iter().find(|errors| errors["group"] == group);
-    of_group.unwrap()["rmse"].as_f64().unwrap()
-}
-
 #[test]
 fn the_contact_is_trained_evaluated_inspected_and_run() {
     let folder = Folder::new("contact");
     folder.write("scene.toml", small_contact());
     folder.succeed(&["synth", "scene.toml", "-n", "500", "--seed", "9", "-o", "test.csv"]);
-    let header = std::fs::read_to_string(folder.path("test.csv")).unwrap();
+    let header = folder.read("test.csv");
     let header = header.lines().next().unwrap();
     let columns = "r8c18_ohm,contact_x_mm,contact_y_mm,contact_depth_mm,contact_force_n";
     assert!(header.ends_with(columns), "{header}");
 
     let train = ["train", "scene.toml", "--format", "fixed16", "-o", "m.bin"];
     folder.succeed(&train);
-    let evaluated = json(&folder.succeed(&["eval", "m.bin", "test.csv", "--json"]));
+    let evaluated = folder.json(&["eval", "m.bin", "test.csv"]);
     for (group, most) in [
         ("contact_x_mm", 3.5),
         ("contact_y_mm", 3.0),
@@ -51,7 +42,7 @@ fn the_contact_is_trained_evaluated_inspected_and_run() {
     let (shallow, deep) = (&ranges[0], &ranges[ranges.len() - 2]);
     assert!(x(shallow) > 2.0 * x(deep), "where a shallow contact is can hardly be known");
 
-    let model = json(&folder.succeed(&["inspect", "m.bin", "--json"]));
+    let model = folder.json(&["inspect", "m.bin"]);
     let shape = ["rows", "inputs_per_row", "outputs_per_row", "projected_features"];
     assert_eq!(shape.map(|field| model[field].as_u64().unwrap()), [1, 144, 4, 10]);
     assert!(model["blob_bytes"].as_u64().unwrap() < 10_000);
@@ -60,6 +51,6 @@ fn the_contact_is_trained_evaluated_inspected_and_run() {
     let printed = folder.succeed(&["run", "scene.toml"]);
     assert!(printed.contains("RMSE by the true contact depth") && !printed.contains("row-wire"));
     assert!(printed.contains("144 readings → 10 features → K = 24 → 4 outputs"), "{printed}");
-    let page = std::fs::read_to_string(folder.path("out/contact/report.html")).unwrap();
+    let page = folder.read("out/contact/report.html");
     assert!(!page.contains("NaN"));
 }

@@ -94,16 +94,6 @@ impl std::io::Write for Patient {
 }
 
 #[test]
-fn another_model_on_the_device_is_replaced_by_the_one_checked_with() {
-    let mut device = device(SOUND, &model(3));
-    let wanted = model(5);
-    let plan = Plan { window: 1, filter: Settings::default() };
-    let findings = check(&mut device, &frames_of(20), &wanted, &plan, &Silent).unwrap();
-    assert!(findings.all_good(), "{findings:#?}");
-    assert_eq!(findings.device.model.unwrap().crc_32, wanted.parse().crc());
-}
-
-#[test]
 fn over_a_line_that_spoils_bytes_everything_still_arrives() {
     let old = model(3);
     // One byte in some 3000 is lost, changed or turned into the end of a frame: this spoils a fifth of
@@ -238,7 +228,7 @@ pub mod serial_port {
         let (port, near) = port_with(&old, frames);
         drop(near);
         folder.succeed(&["synth", "press", "--seed", "5", "-n", "30", "-o", "all.csv"]);
-        let text = std::fs::read_to_string(folder.path("all.csv")).unwrap();
+        let text = folder.read("all.csv");
         let outputs = |line: &str| line.split(',').skip(144).collect::<Vec<_>>().join(",");
         assert!(text.lines().next().unwrap().split(',').nth(144) == Some("r1e1_dx_mm"));
         folder.write("outputs.csv", text.lines().map(outputs).collect::<Vec<_>>().join("\n"));
@@ -277,7 +267,7 @@ pub mod serial_port {
         let decode = ["decode", "model.bin", "log.csv", "-o", "estimate.csv"];
         folder.succeed(&[&decode[..], &["--filter-ms", "30", "--lead-ms", "4"]].concat());
         let read = |name: &str| {
-            let text = std::fs::read_to_string(folder.path(name)).unwrap();
+            let text = folder.read(name);
             let (header, lines) = text.split_once('\n').unwrap();
             let values = lines.lines().flat_map(|line| line.split(','));
             let values = values.map(|value| value.parse().unwrap()).collect();
@@ -302,6 +292,7 @@ pub mod serial_port {
     fn a_device_is_used_from_the_command_line() {
         let folder = Folder::new("link");
         let (old, new) = (model(3), model(4));
+        folder.write("old.bin", old.bytes());
         let new_file = folder.write("new.bin", new.bytes());
         let new_file = new_file.to_str().unwrap();
         let (port, near) = port(&old);
@@ -316,20 +307,20 @@ pub mod serial_port {
         // Recording under another model's names is refused, before anything is written.
         let wrong = folder.run(&["link", &port, "record", new_file, "-o", "estimate.csv"]);
         assert_eq!(wrong.status.code(), Some(2));
-        assert_eq!(folder.names(), ["new.bin"]);
+        assert_eq!(folder.names(), ["new.bin", "old.bin"]);
 
         let page = folder.succeed(&["link", &port, "upload", new_file]);
         assert!(page.contains(&format!("CRC-32 {:08x}, slot 1", new.parse().crc())), "{page}");
 
         folder.succeed(&["link", &port, "record", new_file, "-n", "10", "-o", "estimate.csv"]);
-        let text = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();
+        let text = folder.read("estimate.csv");
         assert_eq!(text.lines().count(), 11);
         assert!(text.starts_with("r1e1_dx_mm,r1e1_dy_mm,r1e1_dz_mm,"), "{text}");
 
         // Without a model, readings are recorded, which can be trained on. Here they are ideal, five in
         // turn.
         folder.succeed(&["link", &port, "record", "-n", "6", "-o", "readings.csv"]);
-        let text = std::fs::read_to_string(folder.path("readings.csv")).unwrap();
+        let text = folder.read("readings.csv");
         assert!(text.starts_with("r1c1_ohm,r1c2_ohm,"), "{text}");
         let lines: Vec<&str> = text.lines().skip(1).collect();
         assert!(lines.len() == 6 && lines[0] == lines[5] && lines[0] != lines[1]);
@@ -337,7 +328,7 @@ pub mod serial_port {
         assert!(frames().iter().any(|frame| frame.as_flattened() == ohm), "{ohm:?}");
 
         folder.succeed(&["link", &port, "baseline", "-n", "5", "-o", "rest.csv"]);
-        let text = std::fs::read_to_string(folder.path("rest.csv")).unwrap();
+        let text = folder.read("rest.csv");
         let (header, line) = text.trim_end().split_once('\n').unwrap();
         assert!(header.ends_with("r8c18_ohm"));
         let frames = frames();
@@ -345,14 +336,17 @@ pub mod serial_port {
         let found: f64 = line.split(',').next().unwrap().parse().unwrap();
         assert!((found / mean - 1.0).abs() < 1e-5, "{found} instead of {mean}");
 
-        let page =
-            folder.succeed(&["link", &port, "check", "press", "--model", new_file, "-n", "50"]);
+        // Another model on the device is replaced by the one that it is checked with.
+        let check = ["link", &port, "check", "press", "--model", "old.bin", "-n", "50"];
+        let page = folder.succeed(&check);
         assert!(page.contains("50 of 50 bit-identical"), "{page}");
+        let page = folder.succeed(&["link", &port, "identify"]);
+        assert!(page.contains(&format!("CRC-32 {:08x}", old.parse().crc())), "{page}");
 
         for (arguments, text) in [
             (&["upload", "none.bin"][..], "none.bin"),
             (
-                &["record", new_file, "-o", "x.csv", "--confidence", "novelty"],
+                &["record", "old.bin", "-o", "x.csv", "--confidence", "novelty"],
                 "--confidence: MODEL has none",
             ),
         ] {
@@ -361,7 +355,8 @@ pub mod serial_port {
             assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
             assert!(message.contains(text), "{message}");
         }
-        assert_eq!(folder.names(), ["estimate.csv", "new.bin", "readings.csv", "rest.csv"]);
+        let names = ["estimate.csv", "new.bin", "old.bin", "readings.csv", "rest.csv"];
+        assert_eq!(folder.names(), names);
     }
 
     #[test]
@@ -377,22 +372,5 @@ pub mod serial_port {
             assert!(message.contains("not a single reading"), "{message}");
         }
         assert!(folder.names().is_empty());
-    }
-}
-
-#[test]
-fn a_device_filters_in_time_as_the_host_does() {
-    let model = model(3);
-    let filter = Settings { time_constant_us: 5000, lead_us: 2000 };
-    let plan = Plan { window: 4, filter };
-    let mut frames = frames_of(160);
-    frames.start_us.iter_mut().for_each(|us| *us *= 1000);
-    frames.start_us[140..].iter_mut().for_each(|us| *us += 60_000); // a gap
-    frames.readings.values[144 * 20] = f64::NAN; // a row starts anew
-    let mut device = device(SOUND, &model);
-    // The second time the filter starts anew.
-    for _ in 0..2 {
-        let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
-        assert!(findings.all_good(), "{findings:#?}");
     }
 }

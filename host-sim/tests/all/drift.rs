@@ -1,6 +1,6 @@
 //! A gain that drifts: what it costs models of readings, and that it costs relative inputs nothing.
 
-use crate::common::{Folder, small_scene};
+use crate::common::{Folder, rmse, small_scene};
 
 #[test]
 fn a_user_trains_on_a_csv_file_and_decodes_a_drifted_sensor_with_its_own_baseline() {
@@ -15,24 +15,23 @@ fn a_user_trains_on_a_csv_file_and_decodes_a_drifted_sensor_with_its_own_baselin
     synth("2", "1.02", "drifted.csv", "drifted_rest.csv");
     let train = ["train", "train.csv", "--centres", "24", "--no-refine"];
     folder.succeed(&[&train[..], &["-o", "readings.bin"]].concat());
-    let relative = ["--relative-inputs", "--baseline", "rest.csv", "-o", "relative.bin", "--json"];
-    let trained = folder.succeed(&[&train[..], &relative[..]].concat());
-    assert!(trained.contains("\"relative_inputs\": true"), "{trained}");
+    let relative = ["--relative-inputs", "--baseline", "rest.csv", "-o", "relative.bin"];
+    assert_eq!(folder.json(&[&train[..], &relative[..]].concat())["relative_inputs"], true);
+    let input = &folder.json(&["inspect", "relative.bin"])["inputs"][0];
+    assert_eq!((&input["name"], &input["unit"]), (&"r4c1_ohm".into(), &"".into()));
     let inspected = folder.succeed(&["inspect", "relative.bin"]);
     assert!(inspected.contains("relative to the baseline: yes"), "{inspected}");
     assert!(
         !folder.succeed(&["inspect", "readings.bin"]).contains("relative to the baseline: yes")
     );
 
-    let rmse = |arguments: &[&str]| {
-        let result = folder.succeed(&[&["eval", "--json"], arguments].concat());
-        let result: serde_json::Value = serde_json::from_str(&result).unwrap();
-        let groups = result["decoders"][0]["errors"].as_array().unwrap().clone();
-        groups.iter().find(|group| group["group"] == "dz_mm").unwrap()["rmse"].as_f64().unwrap()
+    let error = |arguments: &[&str]| {
+        let result = folder.json(&[&["eval"], arguments].concat());
+        rmse(&result["decoders"][0]["errors"], "dz_mm")
     };
-    let of_relative = rmse(&["relative.bin", "drifted.csv", "--baseline", "drifted_rest.csv"]);
-    let of_readings = rmse(&["readings.bin", "drifted.csv"]);
-    let with_old_baseline = rmse(&["relative.bin", "drifted.csv", "--baseline", "rest.csv"]);
+    let of_relative = error(&["relative.bin", "drifted.csv", "--baseline", "drifted_rest.csv"]);
+    let of_readings = error(&["readings.bin", "drifted.csv"]);
+    let with_old_baseline = error(&["relative.bin", "drifted.csv", "--baseline", "rest.csv"]);
     println!("{of_relative} {of_readings} {with_old_baseline} mm");
     assert!(2.0 * of_relative < of_readings.min(with_old_baseline));
 }

@@ -17,7 +17,7 @@ fn in_testdata(name: &str) -> String {
 
 fn exported(folder: &Folder, blob: &str) -> String {
     folder.succeed(&["export", &in_testdata(blob), "--rust", "model.rs"]);
-    fs::read_to_string(folder.path("model.rs")).unwrap()
+    folder.read("model.rs")
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn a_source_in_rust_has_functions_for_the_parts_of_its_model_alone() {
         folder.succeed(&[&["train", "scene.toml", "-o", "m.bin"], options].concat());
         let said = folder.succeed(&["export", "m.bin", "--rust", "m.rs"]);
         assert!(said.contains("rows: 2\n") && said.ends_with("m.rs\n"), "{said}");
-        let source = fs::read_to_string(folder.path("m.rs")).unwrap();
+        let source = folder.read("m.rs");
         assert_eq!(functions.map(|function| source.contains(function)), has);
         assert_eq!(source.contains("reciprocals: &[["), options.contains(&"--relative-inputs"));
     }

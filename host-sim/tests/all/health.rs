@@ -2,9 +2,7 @@
 
 use std::sync::OnceLock;
 
-use serde_json::Value;
-
-use crate::common::Folder;
+use crate::common::{Folder, rmse};
 
 /// Folder with a model of the whole array that fills missing readings, one that does not, and frames; made once for all tests.
 fn prepared(name: &str) -> Folder {
@@ -28,7 +26,7 @@ fn prepared(name: &str) -> Folder {
 
 /// Writes the sound frames with another value of the readings that `change` names.
 fn changed(folder: &Folder, file: &str, change: impl Fn(&str, usize) -> Option<&'static str>) {
-    let text = std::fs::read_to_string(folder.path("sound.csv")).unwrap();
+    let text = folder.read("sound.csv");
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     let mut out = vec![header.join(",")];
@@ -43,7 +41,7 @@ fn changed(folder: &Folder, file: &str, change: impl Fn(&str, usize) -> Option<&
 
 /// Values of a column of a CSV file.
 fn column(folder: &Folder, file: &str, name: &str) -> Vec<String> {
-    let text = std::fs::read_to_string(folder.path(file)).unwrap();
+    let text = folder.read(file);
     let mut lines = text.lines();
     let at = lines.next().unwrap().split(',').position(|one| one == name).unwrap();
     lines.map(|line| line.split(',').nth(at).unwrap().to_owned()).collect()
@@ -52,15 +50,12 @@ fn column(folder: &Folder, file: &str, name: &str) -> Vec<String> {
 #[test]
 fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
     let folder = prepared("health");
-    let rmse = |model: &str, data: &str, more: &[&str]| {
-        let text = folder.succeed(&[&["eval", model, data, "--json"], more].concat());
-        let result: Value = serde_json::from_str(&text).unwrap();
-        let groups = result["decoders"][0]["errors"].as_array().unwrap().clone();
-        let z = groups.iter().find(|group| group["group"] == "dz_mm").unwrap();
-        z["rmse"].as_f64().unwrap()
+    let error = |model: &str, data: &str, more: &[&str]| {
+        let result = folder.json(&[&["eval", model, data], more].concat());
+        rmse(&result["decoders"][0]["errors"], "dz_mm")
     };
-    let sound = rmse("fills.bin", "sound.csv", &[]);
-    assert_eq!(sound.to_bits(), rmse("plain.bin", "sound.csv", &[]).to_bits());
+    let sound = error("fills.bin", "sound.csv", &[]);
+    assert_eq!(sound.to_bits(), error("plain.bin", "sound.csv", &[]).to_bits());
     for (value, kind) in [("0.02", "shorted"), ("", "missing")] {
         changed(&folder, "faulty.csv", |name, _| (name == "r4c5_ohm").then_some(value));
         let said = folder.notes(&["decode", "fills.bin", "faulty.csv", "-o", "e.csv"]);
@@ -69,9 +64,9 @@ fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
         assert!(column(&folder, "e.csv", "status").iter().all(|flags| flags == "2"));
         assert!(column(&folder, "e.csv", "r4e1_dz_mm").iter().all(|value| !value.is_empty()));
         // Believed, such a reading multiplies the error.
-        assert!(rmse("fills.bin", "faulty.csv", &[]) < 1.1 * sound);
+        assert!(error("fills.bin", "faulty.csv", &[]) < 1.1 * sound);
         if !value.is_empty() {
-            assert!(rmse("fills.bin", "faulty.csv", &["--limits", "none"]) > 3.0 * sound);
+            assert!(error("fills.bin", "faulty.csv", &["--limits", "none"]) > 3.0 * sound);
         }
         let said = folder.notes(&["decode", "plain.bin", "faulty.csv", "-o", "e.csv"]);
         assert!(said.contains("r4c5") && !said.contains("filled"), "{said}");
@@ -94,9 +89,8 @@ fn wires_are_named_and_columns_can_be_left_out() {
     let said = folder.notes(&["decode", "fills.bin", "open.csv", "-o", "e.csv"]);
     assert!(said.contains("note: row-wire 4 open in 100 % of lines"), "{said}");
     assert!(!said.contains("r4c1_ohm"), "{said}");
-    let eval = ["eval", "fills.bin", "sound.csv", "--json", "--without"];
-    let text = folder.succeed(&[&eval[..], &["r4c*_ohm"]].concat());
-    let result: Value = serde_json::from_str(&text).unwrap();
+    let eval = ["eval", "fills.bin", "sound.csv", "--without"];
+    let result = folder.json(&[&eval[..], &["r4c*_ohm"]].concat());
     assert_eq!(result["health"]["readings_filled"], 18 * 200);
     assert_eq!(result["values_evaluated"], 144 * 200);
     let decode = ["decode", "fills.bin", "sound.csv", "-o", "e.csv", "--without"];
@@ -105,10 +99,7 @@ fn wires_are_named_and_columns_can_be_left_out() {
     let said = folder.notes(&[&decode[..], &["r4c5_ohm", "--no-fill"]].concat());
     assert!(said.contains("100 % of lines were not filled: by --no-fill"), "{said}");
     // Also by the names that notes give them.
-    let without = |names: &str| {
-        let text = folder.succeed(&[&eval[..], &[names]].concat());
-        serde_json::from_str::<Value>(&text).unwrap()["decoders"].clone()
-    };
+    let without = |names: &str| folder.json(&[&eval[..], &[names]].concat())["decoders"].clone();
     assert_eq!(without("r4c5,r2c1"), without("r4c5_ohm,r2c1_ohm"));
     let refused = folder.fail(&[&eval[..], &["r9c*_ohm"]].concat(), 2);
     assert!(refused.contains("--without r9c*_ohm"), "{refused}");

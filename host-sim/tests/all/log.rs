@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 
-use crate::common::Folder;
+use crate::common::{Folder, rmse};
 
 /// Log of four channels whose gains drift by 5 to 20 % in ten minutes: presses of one second with pauses of one second, ten
 /// lines a second, in which the place is missing.
@@ -32,10 +32,8 @@ fn log(drift: f64) -> String {
 const COLUMNS: [&str; 7] =
     ["--inputs", "ch*", "--outputs", "x_mm,f_n", "--no-refine", "--centres", "32"];
 
-/// RMSE of the force in the first decoder's errors.
 fn force_rmse(document: &Value) -> f64 {
-    let errors = document["decoders"][0]["errors"].as_array().unwrap();
-    errors.iter().find(|it| it["group"] == "f_n").unwrap()["rmse"].as_f64().unwrap()
+    rmse(&document["decoders"][0]["errors"], "f_n")
 }
 
 fn warnings(document: &Value) -> Vec<&str> {
@@ -67,7 +65,7 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
     assert_eq!(warnings(&relative), [""; 0]);
     let words = relative["verdict"]["sentence"].as_str().unwrap();
     assert!(words.contains("errors at the end of the log"), "{words}");
-    let page = std::fs::read_to_string(folder.path("out/log/report.html")).unwrap();
+    let page = folder.read("out/log/report.html");
     assert!(
         page.contains("Over time")
             && page.contains("time in min")
@@ -90,15 +88,14 @@ fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes(
     folder.succeed(&[&train[..], &["--relative-inputs"]].concat());
     let eval = ["eval", "m.bin", "log.csv", "--last-share", "0.2", "--html", "eval.html"];
     let judged = folder.json(&eval);
-    let run = [&["run", "log.csv", "--relative-inputs", "--json"], &COLUMNS[..]].concat();
-    let run: Value = serde_json::from_str(&folder.succeed(&run)).unwrap();
+    let run = folder.json(&[&["run", "log.csv", "--relative-inputs"], &COLUMNS[..]].concat());
     assert!(
         run["verdict"]["sentence"].as_str().unwrap().contains("renewed in each pause"),
         "{run}"
     );
     let ratio = force_rmse(&judged) / force_rmse(&run);
     assert!((0.8..1.25).contains(&ratio), "{ratio}");
-    assert!(std::fs::read_to_string(folder.path("eval.html")).unwrap().contains("Over time"));
+    assert!(folder.read("eval.html").contains("Over time"));
     // The model knows the first lines, and all of them together.
     for share in [&["--first-share", "0.8"][..], &["--last-share", "0.5"], &[]] {
         let flattered = folder.json(&[&eval[..3], share].concat());
@@ -108,7 +105,7 @@ fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes(
     // `decode` has the same baseline, and a file without the force has none.
     folder.succeed(&["decode", "m.bin", "log.csv", "-o", "estimates.csv"]);
     let of_force = |name: &str, column: usize| -> Vec<f64> {
-        let text = std::fs::read_to_string(folder.path(name)).unwrap();
+        let text = folder.read(name);
         let fields = text.lines().skip(1).map(|line| line.split(',').nth(column).unwrap().parse());
         fields.map(Result::unwrap).collect()
     };

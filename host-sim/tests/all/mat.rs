@@ -62,7 +62,7 @@ fn a_mat_of_numbered_columns_is_named_after_its_wires_and_told_its_image() {
     // The file calls its columns otherwise, and counts are not judged as Ω.
     let judged = folder.succeed(&["eval", "m.bin", "mat.csv", "--html", "eval.html"]);
     assert!(judged.contains("decodes"), "{judged}");
-    let page = std::fs::read_to_string(folder.path("eval.html")).unwrap();
+    let page = folder.read("eval.html");
     assert!(
         page.contains("row-wire 16, column-wire 16") && page.contains("column-wire 3: missing"),
         "{page}"

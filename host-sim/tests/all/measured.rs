@@ -53,7 +53,7 @@ fn outliers_are_named_left_out_and_listed_in_json() {
 
     let rmse = |name: &str, more: &[&str]| {
         train(&folder, name, &[&["--centres", "8"], more].concat());
-        let evaluated = json(&folder.succeed(&["eval", "m.bin", "clean.csv", "--json"]));
+        let evaluated = folder.json(&["eval", "m.bin", "clean.csv"]);
         evaluated["decoders"][0]["errors"][0]["rmse"].as_f64().unwrap()
     };
     let (of_clean, of_wild) = (rmse("clean.csv", &[]), rmse("wild.csv", &[]));
@@ -106,7 +106,7 @@ fn run_judges_a_csv_file_by_its_last_fifth_or_fold_or_another_file() {
             ["run", file, "--inputs", "a,b", "--outputs", "y", "--no-refine", "--centres", "8"];
         [&usual[..], more].concat()
     };
-    let result = json(&folder.succeed(&run("all.csv", &["--json"])));
+    let result = folder.json(&run("all.csv", &[]));
     assert_eq!(
         (&result["model"]["training_frames"], &result["model"]["test_frames"]),
         (&400.into(), &100.into())
@@ -114,10 +114,10 @@ fn run_judges_a_csv_file_by_its_last_fifth_or_fold_or_another_file() {
     assert_eq!(result["data"]["test_choice"], "the last fifth");
     let rmse = |decoder: usize| result["decoders"][decoder]["errors"][0]["rmse"].as_f64().unwrap();
     assert!(rmse(0) < 0.5 * rmse(1) && rmse(1) < rmse(2), "{result}");
-    let page = std::fs::read_to_string(folder.path("out/all/report.html")).unwrap();
+    let page = folder.read("out/all/report.html");
     assert!(page.contains("Data “all”") && page.contains("the last fifth"), "{page}");
 
-    let told = json(&folder.succeed(&run("all.csv", &["--test", "test.csv", "--json"])));
+    let told = folder.json(&run("all.csv", &["--test", "test.csv"]));
     assert_eq!(
         (&told["model"]["training_frames"], &told["model"]["test_frames"]),
         (&500.into(), &80.into())

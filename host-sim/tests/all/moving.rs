@@ -16,7 +16,7 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     assert_eq!((&ways[0]["decoder"], &ways[2]["decoder"]), (&"network".into(), &"linear".into()));
     assert!(rmse(&ways[0]) < rmse(&ways[2]), "{ways:?}");
     assert!(ways[0]["age_ms"].as_f64().unwrap() > 1.0);
-    let shown = std::fs::read_to_string(folder.path("out/small/figures/trajectory.csv")).unwrap();
+    let shown = folder.read("out/small/figures/trajectory.csv");
     assert_eq!(shown.lines().count(), 1 + 3 * 486);
     let text = folder.succeed(&["run", "small.toml"]);
     assert!(
@@ -25,7 +25,7 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
         ),
         "{text}"
     );
-    let page = std::fs::read_to_string(folder.path("out/small/report.html")).unwrap();
+    let page = folder.read("out/small/report.html");
     assert!(page.contains("Contacts that move") && page.contains("while a contact slides"));
     assert_eq!(folder.json(&["run", "still.toml"])["moving"], serde_json::json!([]));
 

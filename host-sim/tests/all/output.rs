@@ -61,7 +61,7 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
         let arguments = [&["--json"], &synth[..], &[path]].concat();
         let output = host(&folder, &arguments).stdout(log).stderr(Stdio::piped()).output().unwrap();
         assert!(output.status.success(), "{path}");
-        let text = fs::read_to_string(folder.path("log.csv")).unwrap();
+        let text = folder.read("log.csv");
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines[0] == "precious" && lines[1].starts_with("r4c1_ohm,"), "{path}: {text}");
         assert_eq!(lines.len(), 4, "{path}");
@@ -72,7 +72,7 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
     folder.write("log.csv", "precious\n");
     let script = "exec 3>> log.csv; exec \"$0\" synth scene.toml -n 2 -o /dev/fd/3";
     assert!(shell(&folder, script).stdout(Stdio::null()).status().unwrap().success());
-    let text = fs::read_to_string(folder.path("log.csv")).unwrap();
+    let text = folder.read("log.csv");
     assert!(text.starts_with("precious\nr4c1_ohm,") && text.lines().count() == 4, "{text}");
     assert!(!folder.names().contains(&"-".to_owned()));
 
@@ -133,11 +133,11 @@ fn an_open_file_that_is_read_is_not_written() {
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{script}: {stderr}");
         assert!(stderr.contains(says), "{script}: {stderr}");
-        assert_eq!(fs::read_to_string(folder.path("a.csv")).unwrap(), text, "{script}");
+        assert_eq!(folder.read("a.csv"), text, "{script}");
     }
     let good = format!("exec 3>> log.csv; {}", decode("a.csv", "/dev/fd/3"));
     assert!(shell(&folder, &good).stderr(Stdio::null()).status().unwrap().success());
-    assert_eq!(fs::read_to_string(folder.path("log.csv")).unwrap().lines().count(), 5);
+    assert_eq!(folder.read("log.csv").lines().count(), 5);
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn a_signal_leaves_the_old_file_and_no_temporary_and_a_kill_a_hidden_one() {
         }
         signal(&child, name);
         assert_eq!(shell_status(child.wait().unwrap()), Some(status), "{name}");
-        assert_eq!(fs::read_to_string(folder.path("y.csv")).unwrap(), "old");
+        assert_eq!(folder.read("y.csv"), "old");
         assert_eq!(folder.names().len(), if status == 137 { 2 } else { 1 }, "{name}");
     }
     let names = folder.names();

@@ -4,11 +4,11 @@ use std::fs;
 
 use taxel_recording::Reader;
 
-use crate::common::Folder;
+use crate::common::{Folder, rmse};
 
 /// Fields of a CSV file.
 fn csv(folder: &Folder, name: &str) -> Vec<Vec<f64>> {
-    let text = fs::read_to_string(folder.path(name)).unwrap();
+    let text = folder.read(name);
     let number = |field: &str| field.parse().unwrap_or(f64::NAN);
     text.lines().skip(1).map(|line| line.split(',').map(number).collect()).collect()
 }
@@ -39,15 +39,10 @@ fn frames_in_a_recording_are_those_of_a_csv_file() {
         let outputs = frame.unwrap().outputs.unwrap();
         assert!(line.iter().map(|value| *value as f32).take(144).eq(outputs));
     }
-    let [of_csv, of_mcap] =
-        ["a.csv", "a.mcap"].map(|file| folder.succeed(&["eval", "m.bin", file, "--json"]));
-    let rmse = |text: &str, group: usize| {
-        let json: serde_json::Value = serde_json::from_str(text).unwrap();
-        json["decoders"][0]["errors"][group]["rmse"].as_f64().unwrap()
-    };
+    let evaluated = ["a.csv", "a.mcap"].map(|file| folder.json(&["eval", "m.bin", file]));
     // A recording has readings as f32.
-    for group in 0..3 {
-        let [a, b] = [&of_csv, &of_mcap].map(|text| rmse(text, group));
+    for group in ["dx_mm", "dy_mm", "dz_mm"] {
+        let [a, b] = evaluated.each_ref().map(|it| rmse(&it["decoders"][0]["errors"], group));
         assert!((a - b).abs() < 1e-6, "{a} mm, {b} mm");
     }
     folder.succeed(&["train", "a.mcap", "--centres", "2", "--no-refine", "-o", "t.bin"]);

@@ -78,7 +78,7 @@ fn what_cannot_be_done_is_refused_by_name_and_with_the_fix() {
             refused(&folder, &words.collect::<Vec<_>>(), &case[1..]);
         }
         contents.iter().for_each(|(name, text)| {
-            let found = std::fs::read_to_string(folder.path(name)).unwrap();
+            let found = folder.read(name);
             assert!(found == *text, "{}: {name} has changed", group.name);
         });
         for case in &group.edited {
@@ -90,22 +90,6 @@ fn what_cannot_be_done_is_refused_by_name_and_with_the_fix() {
             refused(&folder, &words, &[says, std::slice::from_ref(&group.edits)].concat());
         }
     }
-}
-
-#[test]
-fn what_is_not_text_or_damaged_is_refused() {
-    let folder = Folder::new("damaged");
-    folder.write("data.csv", b"ch1,f_n\n1,\x002\n");
-    let train = ["train", "data.csv", "--inputs", "ch*", "--outputs", "f_n", "-o", "m.bin"];
-    refused(&folder, &train, &["data.csv", "it is no text", "save the table as CSV"]);
-    folder.write("scene.toml", small_scene());
-    folder.succeed(&["train", "scene.toml", "-n", "100", "-o", "m.bin"]);
-    folder.succeed(&["synth", "scene.toml", "-n", "10", "-o", "data.csv"]);
-    let mut blob = std::fs::read(folder.path("m.bin")).unwrap();
-    blob[500] ^= 1;
-    folder.write("corrupt.bin", &blob);
-    let decode = ["decode", "corrupt.bin", "data.csv", "-o", "e.csv"];
-    refused(&folder, &decode, &["corrupt.bin", "CRC-32"]);
 }
 
 /// Lines of two inputs and an output that follows from them. Names stand before what becomes of their values.
@@ -126,16 +110,8 @@ fn a_column_that_f32_does_not_hold_is_named() {
         let usual = ["train", "d.csv", "--inputs", "a,b", "--outputs", "y", "--centres", "12"];
         [&usual[..], &["--no-refine", "-o", "m.bin"], more].concat()
     };
-    for (content, says) in [
-        (columns(|a| a * 1e-30, |y| y), &["d.csv: column \"a\"", "multiply it by 1e31"][..]),
-        (columns(|a| a * 1e-300, |y| y), &["d.csv: column \"a\"", "range below 1e-28"]),
-        (columns(|a| a + 1e8, |y| y), &["d.csv: column \"a\"", "8.0 apart", "subtract 100000000"]),
-        (columns(|a| a, |y| y * 1e-36), &["d.csv: column \"y\"", "range below 1e-28"]),
-        (columns(|a| a, |y| y + 1e9), &["d.csv: column \"y\"", "64.0 apart", "subtract 99999999"]),
-        (columns(|a| a * 1e300, |y| y), &["column \"a\"", "beyond 1e30", "e299"]),
-    ] {
-        refused(&folder, &train(content, &[]), says);
-    }
+    let tiny = train(columns(|a| a * 1e-30, |y| y), &[]);
+    refused(&folder, &tiny, &["d.csv: column \"a\"", "multiply it by 1e31"]);
     let offset = train(columns(|a| a, |y| y + 1e5), &["--format", "fixed16"]);
     refused(&folder, &offset, &["fixed16 loses the output \"y\"", "Subtract 100000", "f32"]);
     let wide = train(columns(|a| a, |y| y), &["--format", "fixed16", "--spread", "1e6"]);
@@ -147,10 +123,5 @@ fn a_column_that_f32_does_not_hold_is_named() {
             &squares,
             &["column \"y\"", "from 1e-15 to 1e15", "leave the reading model"],
         );
-    }
-    // At any scale in between, nothing is lost, and `train` says how good the model is.
-    for content in [columns(|a| a * 1e-27, |y| y * 1e29), columns(|a| a * 1e30, |y| y * 1e-27)] {
-        let trained = folder.json(&train(content, &[]));
-        assert!(trained["decoders"][0]["errors"][0]["r_squared"].as_f64().unwrap() > 0.99);
     }
 }

@@ -22,7 +22,7 @@ fn training_tells_of_readings_that_a_device_would_refuse() {
     assert!(noted.contains(NOTE) && noted.contains("all readings shorted in 100 %"), "{noted}");
 
     folder.succeed(&["synth", "sound.toml", "-n", "300", "-o", "sound.csv"]);
-    let text = std::fs::read_to_string(folder.path("sound.csv")).unwrap();
+    let text = folder.read("sound.csv");
     let column = text.split(',').position(|name| name == "r4c5_ohm").unwrap();
     let line = |(number, line): (usize, &str)| {
         let mut fields: Vec<&str> = line.split(',').collect();

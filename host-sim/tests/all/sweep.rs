@@ -30,10 +30,6 @@ fn points(folder: &Folder, of: &str) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-fn read(folder: &Folder, name: &str) -> String {
-    fs::read_to_string(folder.path(name)).unwrap()
-}
-
 #[test]
 fn any_shards_give_what_one_process_gives() {
     let folder = prepared("sweep_shards");
@@ -52,9 +48,9 @@ fn any_shards_give_what_one_process_gives() {
         }
         assert_eq!(points(&folder, &of), whole);
         folder.succeed(&["sweep", "plan.toml", "--merge", &of, "-o", "merged.csv"]);
-        assert_eq!(read(&folder, "merged.csv"), read(&folder, "whole/results.csv"));
+        assert_eq!(folder.read("merged.csv"), folder.read("whole/results.csv"));
     }
-    let table = read(&folder, "merged.csv");
+    let table = folder.read("merged.csv");
     assert!(
         table.starts_with("id,noise.level,training.centres,rows,columns,area_cm2,scan_ms,"),
         "{table}"
@@ -63,13 +59,13 @@ fn any_shards_give_what_one_process_gives() {
     for name in
         ["merged.json", "merged.html", "figures/merged-front.svg", "figures/merged-effects.svg"]
     {
-        assert!(read(&folder, name).len() > 400, "{name}");
+        assert!(folder.read(name).len() > 400, "{name}");
     }
-    let page = read(&folder, "merged.html");
+    let page = folder.read("merged.html");
     assert!(page.contains("Pareto front") && page.contains("href=\"merged.csv\""));
     assert!(page.contains("href=\"figures/merged-front.svg\">SVG</a>"));
     // The scene of a setting on the front is a scene.
-    let merged: Value = serde_json::from_str(&read(&folder, "merged.json")).unwrap();
+    let merged: Value = serde_json::from_str(&folder.read("merged.json")).unwrap();
     let front =
         merged["settings"].as_array().unwrap().iter().find(|it| it["on_front"] == true).unwrap();
     folder.write("best.toml", front["scene_toml"].as_str().unwrap());
@@ -89,8 +85,7 @@ fn a_sweep_goes_on_where_it_was_stopped() {
     let begun =
         first.keys().map(|name| fs::metadata(folder.path("out/tiny/points").join(name)).unwrap());
     let begun: Vec<_> = begun.map(|it| it.modified().unwrap()).collect();
-    let text = folder.succeed(&["sweep", "plan.toml", "--shard", "1/1", "--json"]);
-    let text: Value = serde_json::from_str(&text).unwrap();
+    let text = folder.json(&["sweep", "plan.toml", "--shard", "1/1"]);
     assert_eq!((&text["computed"], &text["there_already"]), (&2.into(), &2.into()));
     let kept =
         first.keys().map(|name| fs::metadata(folder.path("out/tiny/points").join(name)).unwrap());
@@ -141,11 +136,10 @@ fn old_results_have_the_fields_of_the_plan_that_takes_them() {
     let level = tiny_scene();
     let level = level.lines().find_map(|line| line.strip_prefix("level = ")).unwrap();
     folder.write("plan.toml", PLAN.replace("[0.005, 0.02]", &format!("[{level}, 0.03]")));
-    let words = ["sweep", "plan.toml", "--shard", "1/1", "--json"];
-    let shard: Value = serde_json::from_str(&folder.succeed(&words)).unwrap();
+    let shard = folder.json(&["sweep", "plan.toml", "--shard", "1/1"]);
     assert_eq!((&shard["computed"], &shard["there_already"]), (&2.into(), &2.into()));
     folder.succeed(&["sweep", "plan.toml"]);
-    for line in read(&folder, "out/tiny/results.csv").lines().skip(1) {
+    for line in folder.read("out/tiny/results.csv").lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
         assert!([level, "0.03"].contains(&cells[1]) && ["4", "8"].contains(&cells[2]), "{line}");
     }
@@ -155,7 +149,7 @@ fn old_results_have_the_fields_of_the_plan_that_takes_them() {
 fn another_plan_does_not_take_old_results() {
     let folder = prepared("sweep_changed");
     folder.succeed(&["sweep", "plan.toml"]);
-    let old = read(&folder, "out/tiny/results.csv");
+    let old = folder.read("out/tiny/results.csv");
     // Half of the points stay the same, and are taken; the files of the others are left alone.
     folder.write("plan.toml", PLAN.replace("[4, 8]", "[4, 6]"));
     let out = folder.run(&["sweep", "plan.toml"]);
@@ -164,7 +158,7 @@ fn another_plan_does_not_take_old_results() {
         out.status.success() && remarks.contains("2 files in out/tiny/points belong to no point"),
         "{remarks}"
     );
-    let new = read(&folder, "out/tiny/results.csv");
+    let new = folder.read("out/tiny/results.csv");
     let same = new.lines().filter(|line| old.lines().any(|known| known == *line)).count();
     assert_eq!((same, points(&folder, "out/tiny").len()), (3, 6), "head and two points");
     // Settings of all points change all of them, and so does a scene.
@@ -191,48 +185,12 @@ fn points_that_cannot_be_are_named_and_the_others_computed() {
     let out = folder.run(&["sweep", "plan.toml"]);
     let remarks = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(out.status.success() && remarks.contains("20 % of the thickness"), "{remarks}");
-    let table = read(&folder, "out/tiny/results.csv");
+    let table = folder.read("out/tiny/results.csv");
     assert_eq!(
         table.lines().filter(|line| line.contains("20 % of the thickness")).count(),
         2,
         "{table}"
     );
-}
-
-#[test]
-fn plans_that_cannot_be_used_are_refused_with_what_is_near() {
-    let folder = prepared("sweep_refused");
-    folder.write(
-        "lists.toml",
-        tiny_scene().replace("row_wires = 8", "pitch_mm = [1, 2]\nrow_wires = 8"),
-    );
-    assert!(
-        folder.fail(&["limit", "lists.toml"], 2).contains("`compare` takes a scene with lists")
-    );
-    for (from, to, said) in [
-        ("training.centres", "training.centers", vec!["unknown field `centers`", "`centres`"]),
-        ("[4, 8]", "{from = 1, to = 8}", vec!["training.centres.count"]),
-        ("rmse_dz_mm", "rmse_z_mm", vec!["objectives", "`rmse_dz_mm`"]),
-        ("\"scene.toml\"", "\"lists.toml\"", vec!["scene = lists.toml", "`compare`"]),
-        ("name = \"tiny\"", "name = \"a/b\"", vec!["name"]),
-    ] {
-        folder.write("plan.toml", PLAN.replace(from, to));
-        let message = folder.fail(&["sweep", "plan.toml", "--list"], 2);
-        for said in said {
-            assert!(message.contains(said), "{to}: {message}");
-        }
-    }
-    folder.write("plan.toml", PLAN);
-    for (words, said) in [
-        (vec!["--shard", "0/4"], "1/8 to 8/8"),
-        (vec!["--shards", "4"], "--shard I/4"),
-        (vec!["--merge", "out", "-o", "x.txt"], ".csv"),
-        (vec!["--seed", "3"], "repeats"),
-    ] {
-        let message = folder.fail(&[&["sweep", "plan.toml"], &words[..]].concat(), 2);
-        assert!(message.contains(said), "{message}");
-    }
-    assert_eq!(folder.names(), ["lists.toml", "plan.toml", "scene.toml"]);
 }
 
 #[test]
@@ -242,8 +200,7 @@ fn repeats_are_put_together_and_draws_are_the_same_everywhere() {
                 [prices]\nfixed_eur = 5.0\nrow_eur = 2.0\ncolumn_eur = 0.5\ncm2_eur = 0.25\n[set]\ntraining.centres = 4\n\
                 [draw]\npoints = 3\n[draw.axes]\nsensor.pitch_mm = {from = 2.0, to = 4.0}\n";
     folder.write("plan.toml", plan);
-    let all: Value =
-        serde_json::from_str(&folder.succeed(&["sweep", "plan.toml", "--json"])).unwrap();
+    let all = folder.json(&["sweep", "plan.toml"]);
     let settings = all["settings"].as_array().unwrap();
     assert_eq!((all["points"].as_array().unwrap().len(), settings.len()), (6, 3));
     for setting in settings {
@@ -316,15 +273,14 @@ fn measurements_are_swept_by_the_settings_of_training() {
         "plan.toml",
         "name = \"log\"\n[data]\nfile = \"data.csv\"\ninputs = \"r4c*_ohm\"\noutputs = \"r4e*_dz_mm\"\nfolds = 4\n[set]\ntraining.refine = false\n[axes]\ntraining.centres = [4, 8]\ntraining.format = [\"f32\", \"fixed16\"]\n",
     );
-    let all: Value =
-        serde_json::from_str(&folder.succeed(&["sweep", "plan.toml", "--json"])).unwrap();
+    let all = folder.json(&["sweep", "plan.toml"]);
     assert_eq!(all["objectives"][0], "rmse_dz_mm");
     let points = all["points"].as_array().unwrap();
     assert_eq!(points.len(), 4);
     assert!(
         points.iter().all(|it| it["rmse_dz_mm"].as_f64().unwrap() > 0.0 && it["failed"].is_null())
     );
-    let plan = read(&folder, "plan.toml");
+    let plan = folder.read("plan.toml");
     // Whatever decides a result is in a point's identity, and what a file is called is not.
     folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "9", "-o", "test.csv"]);
     folder.succeed(&["synth", "scene.toml", "-n", "100", "--seed", "8", "-o", "other.csv"]);
@@ -338,9 +294,7 @@ fn measurements_are_swept_by_the_settings_of_training() {
         ("\"data.csv\"", "\"a-longer-name.csv\""),
     ] {
         folder.write("plan.toml", plan.replace(from, to));
-        let listed: Value =
-            serde_json::from_str(&folder.succeed(&["sweep", "plan.toml", "--list", "--json"]))
-                .unwrap();
+        let listed = folder.json(&["sweep", "plan.toml", "--list"]);
         seen.push(listed["points"][0]["id"].as_str().unwrap().to_owned());
     }
     assert_eq!(seen[0], seen[4]);
@@ -383,19 +337,18 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
         assert!(centres.is_some_and(|k| ["4", "8"].contains(&k)), "{said}");
     }
     assert!(said.lines().all(|line| line.chars().count() <= 120), "{said}");
-    let table = read(&folder, "out/compare.csv");
+    let table = folder.read("out/compare.csv");
     assert_eq!(table.lines().count(), 7, "{table}");
     // Page and JSON have the table as well, and JSON its numbers as they are.
-    let page = read(&folder, "out/compare.html");
+    let page = folder.read("out/compare.html");
     assert!(names.iter().all(|name| page.contains(&format!("<td>{name}</td>"))), "{page}");
-    let json: Value = serde_json::from_str(&read(&folder, "out/compare.json")).unwrap();
+    let json: Value = serde_json::from_str(&folder.read("out/compare.json")).unwrap();
     for (layout, name) in json["layouts"].as_array().unwrap().iter().zip(names) {
         assert_eq!(layout["layout"], name);
         let rmse = layout["rmse_dz_mm"].as_f64().unwrap().to_string();
         assert!(table.lines().any(|line| line.contains(name) && line.contains(&rmse)), "{rmse}");
     }
-    let limit = folder.succeed(&["compare", "lists.toml", "--limit-only", "--json"]);
-    let limit: Value = serde_json::from_str(&limit).unwrap();
+    let limit = folder.json(&["compare", "lists.toml", "--limit-only"]);
     assert_eq!(limit["objectives"][0], "limit_dz_mm");
     assert!(folder.fail(&["compare", "scene.toml", "scene.toml"], 2).contains("twice"));
     let none = folder.succeed(&["compare", "scene.toml", "--max-latency-ms", "0.001"]);

@@ -119,8 +119,13 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
     };
     let [once, often] = [1, 16].map(|samples| find("fixed16", 64, samples).rmse("dz_mm"));
     assert!(often < 0.8 * once, "{often} against {once}");
+    for group in ["dx_mm", "dy_mm", "dz_mm"] {
+        for (fixed, float) in [("fixed16", "f32"), ("fixed16 array", "f32 array")] {
+            let [fixed, float] = [fixed, float].map(|way| find(way, 64, 1).rmse(group));
+            assert!(fixed < 1.01 * float, "{group}: {fixed} against {float}");
+        }
+    }
     let (fixed, float) = (find("fixed16", 64, 1), find("f32", 64, 1));
-    assert!(fixed.rmse("dz_mm") < 1.01 * float.rmse("dz_mm"));
     assert!(fixed.cycles < float.cycles / 3);
     assert!(fixed.blob_bytes < 6 * float.blob_bytes / 10);
     // One network for the array has less error, in fewer cycles.
@@ -214,35 +219,18 @@ fn the_worst_case_counts_other_contacts_in_front_and_choice() {
 }
 
 #[test]
-fn a_trade_that_was_stopped_goes_on_and_its_plan_is_one_for_sweep() {
-    let folder = Folder::new("trade-stopped");
+fn the_plan_of_a_trade_is_one_for_sweep() {
+    let folder = Folder::new("trade-plan");
     folder.write("few.toml", few_frames_of_two_rows());
     let few = ["trade", "few.toml", "--no-refine", "--centres", "8,16"];
-    let whole = folder.succeed(&few);
-    let points = folder.path("out/few/points");
-    let names = || -> Vec<String> {
-        let entries = std::fs::read_dir(&points).unwrap().map(Result::unwrap);
-        let mut names: Vec<String> =
-            entries.map(|it| it.file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    };
-    let all = names();
-    assert_eq!(all.len(), 8);
-    let bytes = std::fs::read(points.join(&all[0])).unwrap();
-    let kept = std::fs::metadata(points.join(&all[1])).unwrap().modified().unwrap();
-    std::fs::remove_file(points.join(&all[0])).unwrap();
-    assert_eq!(folder.succeed(&few), whole);
-    assert!(std::fs::read(points.join(&all[0])).unwrap() == bytes, "the same bytes again");
-    assert_eq!(std::fs::metadata(points.join(&all[1])).unwrap().modified().unwrap(), kept);
+    folder.succeed(&few);
     // In shards on other machines, by its plan.
     folder.write("plan.toml", folder.succeed(&[&few[..], &["--plan"]].concat()));
     for shard in ["1/2", "2/2"] {
         folder.succeed(&["sweep", "plan.toml", "--shard", shard, "-o", "parts"]);
     }
     folder.succeed(&["sweep", "plan.toml", "--merge", "parts", "-o", "merged.csv"]);
-    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
-    assert_eq!(read("merged.csv"), read("out/few/trade.csv"));
+    assert_eq!(folder.read("merged.csv"), folder.read("out/few/trade.csv"));
 }
 
 /// The scene `press` with two rows and few frames.
@@ -284,17 +272,16 @@ fn the_files_and_the_table_tell_every_point() {
     assert!(front.ends_with("\nopen out/few/trade.html\n"), "{front}");
     assert!(!all.contains("--all"), "{all}");
     folder.succeed(&[&few[..], &["--max-cycles", "9000"]].concat());
-    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
-    let csv = read("out/few/trade.csv");
+    let csv = folder.read("out/few/trade.csv");
     let mut lines = csv.lines();
     let fields = "id,device.column_step,device.samples,training.centres,training.each_row,training.format,rows,";
     assert!(lines.next().unwrap().starts_with(fields));
     assert_eq!(lines.count(), every.len());
-    let json: serde_json::Value = serde_json::from_str(&read("out/few/trade.json")).unwrap();
-    let html = read("out/few/trade.html");
+    let json: serde_json::Value = serde_json::from_str(&folder.read("out/few/trade.json")).unwrap();
+    let html = folder.read("out/few/trade.html");
     // The picture has each point of the front.
     let front = json["points"].as_array().unwrap().iter().filter(|p| p["on_front"] == true).count();
-    let picture = read("out/few/figures/error-by-time.csv");
+    let picture = folder.read("out/few/figures/error-by-time.csv");
     assert_eq!(picture.lines().filter(|line| line.starts_with("Pareto front,")).count(), front);
     assert!(html.contains("<td>chosen</td><td>fixed16") && html.contains(">chosen: K"));
     assert!(html.contains("taxel trade few.toml --no-refine --centres 16"), "the command");
@@ -333,7 +320,7 @@ fn measurements_are_traded_as_they_are() {
     let is_there = |id: &str| folder.path(&format!("relative/data/points/{id}.json")).exists();
     assert!(points.lines().all(|line| is_there(&line[..16])), "{points}");
 
-    let csv = std::fs::read_to_string(folder.path("data.csv")).unwrap();
+    let csv = folder.read("data.csv");
     // An output without a value in the last fifth is not judged.
     let blank = |(i, line): (usize, &str)| match line.rsplit_once(',') {
         Some((line, _)) if i > 320 => format!("{line},\n"),
@@ -348,13 +335,4 @@ fn measurements_are_traded_as_they_are() {
     assert!(page.contains("scan is unknown (--scan-ms)") && page.contains("besides its scan"));
     let page = folder.succeed(&[&other[..], &["--scan-ms", "2", "--frame-rate", "400"]].concat());
     assert!(page.contains("(2.000 ms to scan"), "{page}");
-    let bad =
-        [("--average", "4"), ("--column-step", "3"), ("--scan-ms", "0"), ("--frame-rate", "0")];
-    for (option, value) in bad {
-        let output = folder.run(&[&other[..], &[option, value]].concat());
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{stderr}");
-        assert!(stderr.contains(&format!("{option} {value}: ")), "{stderr}");
-        assert_eq!(stderr.contains("choose --inputs"), option == "--column-step", "{stderr}");
-    }
 }

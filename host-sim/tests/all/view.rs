@@ -158,7 +158,7 @@ fn a_device_is_shown_under_the_names_that_its_checksums_tell_and_recorded_and_ze
     assert!(said.contains("Decoded frames"), "{said}");
     // The device's own estimates are in the recording, to the bit.
     let reader = taxel_recording::Reader::open(&folder.path("recording-1.mcap")).unwrap();
-    let text = std::fs::read_to_string(folder.path("estimate.csv")).unwrap();
+    let text = folder.read("estimate.csv");
     let mut lines = text.lines().skip(1);
     for frame in reader {
         let decoded = lines.next().unwrap().split(',').map(|field| field.parse::<f32>().unwrap());
