@@ -73,18 +73,6 @@ impl ScanSettings {
     /// Largest number of samples averaged for a reading.
     pub const MOST_OVERSAMPLING: u16 = 256;
 
-    /// Makes settings; `None` if a value is out of its range.
-    ///
-    /// ```
-    /// use taxel_firmware::readout::ScanSettings;
-    /// assert!(ScanSettings::try_new(46, 2).is_some());
-    /// assert!(ScanSettings::try_new(46, 0).is_none());
-    /// ```
-    pub fn try_new(settling_us: u32, oversampling: u16) -> Option<Self> {
-        let settings = Self { settling_us, oversampling };
-        (settings == settings.clamped()).then_some(settings)
-    }
-
     /// Replaces values out of range by the nearest ones within.
     #[must_use]
     pub fn clamped(self) -> Self {

@@ -144,32 +144,22 @@ impl<'a> Network<'a> {
         Ok(())
     }
 
-    /// Converts readings to the format's own unit of inputs: the first half of [`infer`](Self::infer).
+    /// Whether inference clamps one of the `reading`s, because it lies far beyond the training range
+    /// ([`Decoder::decode_into`](crate::Decoder::decode_into)), or is missing.
     ///
-    /// [`Format::F32`] clamps them here, [`Format::Fixed16`] when it infers.
+    /// `scaled` receives the readings in the format's own unit of inputs, as the first half of [`infer`](Self::infer)
+    /// makes them: [`Format::F32`] clamps them here, [`Format::Fixed16`] when it infers.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `scaled` is then untouched.
-    pub fn scale(&self, reading: &[f32], scaled: &mut [f32]) -> Result<(), NetworkError> {
-        check_length("reading", reading, self.shape().inputs)?;
-        check_length("scaled", scaled, self.shape().inputs)?;
-        let _ = each!(self, inner => inner.scale(reading, scaled));
-        Ok(())
-    }
-
-    /// Whether inference clamps one of the `reading`s, because it lies far beyond the training range
-    /// ([`Decoder::decode_into`](crate::Decoder::decode_into)), or is missing. `scaled` is working space.
-    ///
-    /// # Errors
-    /// [`NetworkError::Length`] if a buffer does not fit the shape.
     pub fn clamps(&self, reading: &[f32], scaled: &mut [f32]) -> Result<bool, NetworkError> {
         check_length("reading", reading, self.shape().inputs)?;
         check_length("scaled", scaled, self.shape().inputs)?;
         Ok(each!(self, inner => inner.scale(reading, scaled)))
     }
 
-    /// Infers `output` from inputs that [`scale`](Self::scale) gave: the second half of [`infer`](Self::infer). `scaled`
-    /// is overwritten.
+    /// Infers `output` from inputs that [`clamps`](Self::clamps) scaled: the second half of [`infer`](Self::infer).
+    /// `scaled` is overwritten.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if a buffer does not fit the shape; `output` is then untouched.

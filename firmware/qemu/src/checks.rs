@@ -195,7 +195,7 @@ fn clamping(blob: &[u8]) -> Option<[usize; 3]> {
             *frame.get_mut(row)?.get_mut(input)? =
                 f32::from_bits(reading.to_bits().wrapping_add_signed(step));
             let mut scaled = [0.0; COLS];
-            network.scale(frame.get(row)?, &mut scaled).ok()?;
+            network.clamps(frame.get(row)?, &mut scaled).ok()?;
             let found = Decoded::new(&decoder, &frame)?.clamped;
             frames += 1;
             clamped += usize::from(found);

@@ -168,14 +168,14 @@ fn is_as_its_twin(
         let readings = readings.get(..inputs)?;
         scaled.guard();
         found.guard();
-        network.scale(readings, scaled.first(inputs)).ok()?;
+        network.clamps(readings, scaled.first(inputs)).ok()?;
         twin.infer_scaled_portably(scaled.first(inputs), expected.first(outputs));
         for from_readings in [true, false] {
             found.first(outputs).fill(f32::NAN);
             if from_readings {
                 network.infer(readings, scaled.first(inputs), found.first(outputs)).ok()?;
             } else {
-                network.scale(readings, scaled.first(inputs)).ok()?;
+                network.clamps(readings, scaled.first(inputs)).ok()?;
                 network.infer_scaled(scaled.first(inputs), found.first(outputs)).ok()?;
             }
             same &= same_bits(found.first(outputs), expected.first(outputs));

@@ -315,35 +315,22 @@ mod tests {
     fn every_definition_by_hand() {
         let truth = Table {
             names: ["r1e1_dz_mm", "r1e1_dx_mm", "r1e2_dz_mm"].map(String::from).to_vec(),
-            values: vec![0.0, 1.0, 1.0, 1.0, -1.0, 0.5].into(),
+            values: vec![0.05, 1.0, 1.0, 1.0, -1.0, 0.5].into(),
         };
-        let estimate = [0.5, 1.0, 1.0, 1.0, -1.0, f64::NAN];
+        // Errors of both signs: +0.5 and −0.25 of three.
+        let estimate = [0.55, 1.0, 1.0, 0.75, -1.0, f64::NAN];
+        let squares: f64 = 0.25 + 0.0625;
         let measure = Measure { full_scale: vec![1.0; 3], thickness_mm: Some(5.0), limit: None };
         let [z, x] = &by_group(&truth, &estimate, &measure)[..] else { panic!("two groups") };
         assert_eq!((z.group.as_str(), z.count, z.unit.as_str()), ("dz_mm", 3, "mm"));
         let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
-        close(Some(z.rmse), (0.25_f64 / 3.0).sqrt());
-        close(z.relative_l2_percent, 100.0 * (0.25_f64 / 2.0).sqrt());
-        close(z.full_scale_percent, 50.0 / 3.0);
-        close(z.positional_percent, 10.0 / 3.0); // only the first is wrong: 0.5/(5 − 0)
-        close(z.r_squared, 1.0 - 0.25 / 0.5); // means are 0.5 and 1
-        close(z.mean_relative_percent, 0.0); // the wrong one has truth 0
+        close(Some(z.rmse), (squares / 3.0).sqrt());
+        close(z.relative_l2_percent, 100.0 * (squares / 2.0025).sqrt());
+        close(z.full_scale_percent, 75.0 / 3.0);
+        close(z.positional_percent, 100.0 * (0.5 / 4.95 + 0.25 / 4.0) / 3.0);
+        close(z.r_squared, 1.0 - squares / 0.45125); // means are 0.525 and 1
+        close(z.mean_relative_percent, 12.5); // the truth 0.05 is too small for one
         assert_eq!((x.rmse, x.positional_percent), (0.0, None));
-    }
-
-    #[test]
-    fn errors_of_both_signs_count_and_small_truths_have_no_relative_error() {
-        let truth = Table { names: vec!["dz_mm".into()], values: vec![1.0, 2.0, 0.05].into() };
-        let measure = Measure { full_scale: vec![1.0], thickness_mm: Some(5.0), limit: None };
-        let errors = &by_group(&truth, &[1.5, 1.5, 0.55], &measure)[0];
-        let found =
-            [errors.full_scale_percent, errors.positional_percent, errors.mean_relative_percent];
-        let positional = 50.0 * (1.0 / 4.0 + 1.0 / 3.0 + 1.0 / 4.95) / 3.0;
-        let expected = [50.0, positional, 50.0 * (1.0 + 0.5) / 2.0];
-        for (definition, (found, expected)) in found.iter().zip(expected).enumerate() {
-            let off = (found.unwrap() - expected).abs();
-            assert!(off < 1e-12, "definition {definition}: {found:?}, not {expected}");
-        }
     }
 
     #[test]

@@ -281,12 +281,17 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
     let packet = packet::encode(number, request, &mut buffer).ok_or_else(|| {
         Error::failed(format!("a request longer than {MOST_REQUEST_BYTES} bytes"))
     })?;
+    Ok(framed(packet))
+}
+
+/// A packet as bytes on the line.
+fn framed(packet: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(packet.len() + 8);
     cobs::encode(packet, |byte| {
         bytes.push(byte);
         true
     });
-    Ok(bytes)
+    bytes
 }
 
 #[cfg(test)]
@@ -294,7 +299,6 @@ mod tests {
     use std::io::Cursor;
 
     use taxel_core::checksum::CRC_32;
-    use taxel_firmware::link::cobs;
 
     use super::*;
 
@@ -302,16 +306,6 @@ mod tests {
         fn set_read_timeout(&mut self, _: Duration) -> std::io::Result<()> {
             Ok(())
         }
-    }
-
-    /// A packet as bytes on the line.
-    fn framed(packet: &[u8]) -> Vec<u8> {
-        let mut line = Vec::new();
-        cobs::encode(packet, |byte| {
-            line.push(byte);
-            true
-        });
-        line
     }
 
     fn report() -> Vec<u8> {

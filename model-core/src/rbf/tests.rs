@@ -3,7 +3,6 @@ mod formats;
 
 use super::float32::Parameters;
 use super::*;
-use crate::scale::CLAMP;
 
 const SHAPE: Shape = Shape { inputs: 5, centres: 3, outputs: 2 };
 
@@ -33,51 +32,6 @@ fn parameters() -> Parameters<'static> {
 
 fn network() -> float32::Network<'static> {
     float32::Network::try_new(SHAPE, parameters()).unwrap()
-}
-
-fn infer(network: &Network<'_>, reading: &[f32; 5]) -> [f32; 2] {
-    let mut output = [0.0; 2];
-    network.infer(reading, &mut [0.0; 5], &mut output).unwrap();
-    output
-}
-
-/// Outputs by the formula of the module's documentation, in f64.
-fn reference(p: &Parameters<'_>, shape: Shape, reading: &[f32]) -> Vec<f64> {
-    let x: Vec<f64> = (0..shape.inputs)
-        .map(|i| {
-            let span = f64::from(reading[i] - p.input_minimum[i]) * f64::from(p.input_per_span[i]);
-            span.clamp(f64::from(CLAMP[0]), f64::from(CLAMP[1]))
-        })
-        .collect();
-    (0..shape.outputs)
-        .map(|o| {
-            let mut y = f64::from(p.bias[o]);
-            for (i, x) in x.iter().enumerate() {
-                y += p.affine.get(i * shape.outputs + o).map_or(0.0, |a| f64::from(*a) * x);
-            }
-            for k in 0..shape.centres {
-                let d2: f64 = (0..shape.inputs)
-                    .map(|i| (x[i] - f64::from(p.centres[k * shape.inputs + i])).powi(2))
-                    .sum();
-                let decay = f64::from(p.decay[k]);
-                y += f64::from(p.output_weights[k * shape.outputs + o]) * (-decay * d2).exp();
-            }
-            y
-        })
-        .collect()
-}
-
-#[test]
-fn inference_follows_the_formula_with_any_exponential() {
-    for affine in [ramp(10, -0.3, 0.1), &[]] {
-        let p = Parameters { affine, ..parameters() };
-        let network = float32::Network::try_new(SHAPE, p).unwrap();
-        let reading = [55.0, 53.5, 60.0, 40.0, 1e6];
-        let truth = reference(&p, SHAPE, &reading);
-        for (y, t) in infer(&network.into(), &reading).iter().zip(&truth) {
-            assert!((f64::from(*y) - t).abs() <= 1e-6, "{y} against {t}");
-        }
-    }
 }
 
 #[test]
@@ -122,16 +76,4 @@ fn unusable_values_are_named() {
         assert_eq!(network(change), Err(error));
     }
     assert_eq!(network(|_| ()), Ok(SHAPE));
-}
-
-#[test]
-fn inference_from_scaled_inputs_is_the_rest_of_inference_bit_for_bit() {
-    let network = Network::from(network());
-    let reading = [50.0, 52.5, 55.0, 57.5, 60.0];
-    let (mut scaled, mut output) = ([0.0; 5], [0.0; 2]);
-    network.scale(&reading, &mut scaled).unwrap();
-    network.infer_scaled(&mut scaled, &mut output).unwrap();
-    assert_eq!(output, infer(&network, &reading));
-    let error = NetworkError::Length { what: "scaled", expected: 5, found: 4 };
-    assert_eq!(network.infer_scaled(&mut [0.0; 4], &mut output), Err(error));
 }

@@ -248,17 +248,6 @@ mod tests {
     }
 
     #[test]
-    fn the_same_points_give_the_same_mixture_on_any_number_of_threads() {
-        let points = points(3000);
-        let fit = || Mixture::fit(&points, 2, 5, 1);
-        let on = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(fit)
-        };
-        assert_eq!(on(1), on(3));
-    }
-
-    #[test]
     fn points_that_are_few_or_equal_still_make_a_mixture() {
         for points in [vec![1.0, 2.0], vec![1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0]] {
             let mixture = Mixture::fit(&points, 2, 4, 1);

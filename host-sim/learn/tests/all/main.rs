@@ -4,8 +4,6 @@
 mod table;
 
 mod cost;
-mod decoding;
 mod number_formats;
 mod random_models;
 mod extremes;
-mod relative;

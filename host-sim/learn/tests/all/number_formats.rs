@@ -3,11 +3,11 @@
 
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
-use taxel_data::{Dataset, Silent, Stream, Table, columns};
+use taxel_data::{Dataset, Stream, Table, columns};
+use taxel_learn::Options;
 use taxel_learn::infer::infer;
 use taxel_learn::train::least_squares::{Factor, Regressors};
-use taxel_learn::train::{InputScale, Samples, train};
-use taxel_learn::{Options, Origin, pack};
+use taxel_learn::train::{InputScale, Samples};
 use taxel_simulate::{World, synthesise};
 
 const NOISE_LEVELS: [f64; 2] = [0.0, 0.005];
@@ -105,28 +105,6 @@ fn check(name: &str) {
         let most = if noise >= 0.005 { 1.0 } else { 40.0 };
         assert!(fixed.iter().all(|growth| *growth <= most), "fixed16 at {noise}: {fixed:?}");
     }
-}
-
-/// RMSE in mm by axis of one network for the whole array.
-fn errors_of_array(format: Format) -> Vec<f64> {
-    let world = World::press();
-    let [training, test] = [(Stream::Training, 6000), (Stream::Test, 2000)]
-        .map(|(stream, frames)| synthesise(&world, stream, frames));
-    let options = Options { each_row: false, format, spread: 0.4, ..Options::of_rows() };
-    let trained = train(&training, &options, &Silent).unwrap();
-    let blob = pack(&trained, &training, &Origin::of_data("press", 0, 1, &training)).unwrap();
-    let estimate = blob.prepare().decode_table(&test.inputs);
-    let values = (test.outputs.values.len() / 3) as f64;
-    let squares = by_axis(&test.outputs, &estimate.values);
-    squares.iter().map(|square| (square / values).sqrt()).collect()
-}
-
-#[test]
-fn sixteen_bits_cost_no_more_than_a_hundredth_for_the_whole_array() {
-    let [float, fixed] = [Format::F32, Format::Fixed16].map(errors_of_array);
-    let growth = float.iter().zip(&fixed).map(|(float, fixed)| fixed / float - 1.0);
-    let growth: Vec<f64> = growth.collect();
-    assert!(growth.iter().all(|growth| *growth <= 0.01), "{growth:?}");
 }
 
 #[test]

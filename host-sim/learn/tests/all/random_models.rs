@@ -3,6 +3,7 @@
 use taxel_core::blob::{Front, Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::projection::Projection;
 use taxel_core::rbf::{Format, Network, Shape, fixed16, float32};
+use taxel_core::relative::reciprocal;
 use taxel_core::scale::{HALF_RANGE, UNITS};
 use taxel_core::touch::{Kind, Touch};
 use taxel_core::{Decoder, Frame};
@@ -138,10 +139,26 @@ impl Draw {
             _ => self.0.between(READINGS),
         }
     }
+
+    /// Baselines of so many readings: about 1, and some that are missing.
+    fn baseline(&mut self, readings: usize) -> Vec<f64> {
+        // A third of all baselines lack a level.
+        let one_in = 6 * readings;
+        let mut level = || match self.0.below(one_in) {
+            0 => f64::NAN,
+            1 => 0.0,
+            _ => self.0.between([0.7, 1.4]),
+        };
+        (0..readings).map(|_| level()).collect()
+    }
 }
 
-/// Compares the tables of a model of `networks` with frames that the device's code decodes. Returns how many outputs are
-/// numbers, and how many are NaN.
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// Compares the tables of a model of `networks`, of readings or of their ratios to a baseline, with frames that the
+/// device's code decodes. Returns how many outputs are numbers, and how many are NaN.
 fn compare(
     draw: &mut Draw,
     fronts: &[Front<'_>],
@@ -149,20 +166,29 @@ fn compare(
     shape: ModelShape,
 ) -> [usize; 2] {
     let row_network: Vec<u8> = (0..shape.rows).map(|row| row as u8).collect();
-    let metadata = Metadata::unnamed(shape);
+    let relative_inputs = draw.yes();
+    let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
     let parts = ModelParts { fronts, ..ModelParts::new(networks, &row_network, metadata) };
     let blob = ModelBlob::of_bytes(&encode_to_vec(&parts).unwrap()).unwrap();
     let decoder = Decoder::<4>::load(blob.bytes()).unwrap();
     let (width, frames) = (shape.rows * shape.inputs, draw.0.below(200));
     let readings: Vec<f64> = (0..frames * width).map(|_| draw.reading()).collect();
-    let prepared = blob.prepare();
+    let baseline = draw.baseline(width);
+    let reciprocals: Vec<f32> = baseline.iter().map(|ohm| reciprocal(*ohm as f32)).collect();
+    let prepared = blob.prepare().with_baseline(&baseline);
     let tables = prepared.decode_lines(&readings);
+    // The same ratios, computed outside.
+    let ratios = prepared.model_inputs(&readings);
+    let of_ratios = prepared.clone().of_inputs();
+    assert_eq!(bits(&of_ratios.decode_lines(&ratios)), bits(&tables));
+    assert_eq!(of_ratios.share_out_of_range(&ratios), prepared.share_out_of_range(&readings));
     let mut counts = [0; 2];
     let lines = tables.chunks_exact(shape.rows * shape.outputs);
     assert_eq!(lines.len(), frames);
     for (readings, outputs) in readings.chunks_exact(width).zip(lines) {
         let line: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
-        let expected = decoder.decode(Frame::from(&line[..])).unwrap().outputs;
+        let frame = Frame { readings_ohm: &line, reciprocals: &reciprocals };
+        let expected = decoder.decode(frame).unwrap().outputs;
         let alone = prepared.decode_lines(readings);
         for (found, expected) in outputs.iter().chain(&alone).zip(expected.iter().chain(&expected))
         {

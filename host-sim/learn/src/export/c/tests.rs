@@ -1,12 +1,7 @@
 use taxel_core::blob::{Model, ModelParts, encode_to_vec};
 use taxel_core::rbf::Network;
-use taxel_data::dataset::{AtRest, Dataset};
-use taxel_data::exp;
-use taxel_data::progress::Silent;
 
 use super::*;
-use crate::train::{Features, Kinds, train};
-use crate::{Options, Origin, pack};
 
 fn in_testdata(name: &str) -> ModelBlob {
     let path = format!("{}/../../testdata/{name}.bin", env!("CARGO_MANIFEST_DIR"));
@@ -16,10 +11,6 @@ fn in_testdata(name: &str) -> ModelBlob {
 /// The text of one file of a library.
 fn file(files: &[SourceFile], path: &str) -> String {
     files.iter().find(|(name, _)| name == path).unwrap().1.clone()
-}
-
-fn source_of(blob: &ModelBlob) -> String {
-    file(&library(blob, &Name::new("mat").unwrap()).unwrap(), "src/mat.c")
 }
 
 #[test]
@@ -97,34 +88,6 @@ fn every_file_is_filled_for_every_model() {
     }
 }
 
-#[test]
-fn only_what_a_model_needs_is_written() {
-    let parts = [
-        "struct float32",
-        "struct fixed16",
-        "exponential(",
-        "project(",
-        "mat_assess(",
-        "mat_fill(",
-        "square_root(",
-        "mat_set_baseline(",
-        "affine",
-        "give_up(outputs, NETWORK_OUTPUTS, status, MAT_OVERFLOW)",
-    ];
-    let of = |model: &str| -> Vec<&str> {
-        let source = source_of(&in_testdata(model));
-        parts.into_iter().filter(|part| source.contains(part)).collect()
-    };
-    let overflow = parts[parts.len() - 1];
-    assert_eq!(of("row4"), ["struct float32", "exponential(", "affine", overflow]);
-    assert_eq!(of("kernels-fixed16"), ["struct fixed16", "affine"]);
-    assert_eq!(of("array-fixed16-no-tail"), ["struct fixed16", "project("]);
-    // A model that assesses frames fills them, too.
-    let full =
-        ["struct fixed16", "exponential(", "project(", "mat_assess(", "mat_fill(", "square_root("];
-    assert_eq!(of("array-fixed16-confidence"), full);
-}
-
 /// A model with other metadata.
 fn changed<'m>(
     model: &Model<'m>,
@@ -156,52 +119,6 @@ fn a_model_of_ratios_has_a_baseline() {
     ] {
         assert!(file(&files, path).contains(text), "{path}");
     }
-}
-
-/// A model of a strip of eight cells, whose outputs are place and force of a touch.
-fn strip() -> ModelBlob {
-    const FRAMES: usize = 300;
-    let names = (1..=8).map(|cell| format!("adc_{cell}")).collect();
-    let mut data = Dataset::empty(names, vec!["x_mm".into(), "force_N".into()], 1, FRAMES);
-    for frame in 0..FRAMES {
-        let (x, force) = ((frame % 29) as f64 * 0.25, (frame % 11) as f64);
-        for cell in 0..8 {
-            let distance = cell as f64 - x;
-            let change = force * exp(-distance * distance / 2.0);
-            data.inputs.values[frame * 8 + cell] = 100.0 + change;
-        }
-        let place = if force > 0.0 { x } else { f64::NAN };
-        data.outputs.values[frame * 2..][..2].copy_from_slice(&[place, force]);
-    }
-    data.at_rest = Some(AtRest { level: vec![100.0; 8], deviation: vec![0.01; 8] });
-    let kinds = Some(Kinds::all(Features::Normalised { threshold: 3.0 }));
-    let options = Options { centres: 8, kinds, ..Options::default() };
-    let trained = train(&data, &options, &Silent).unwrap();
-    pack(&trained, &data, &Origin::of_data("strip", 0, 1, &data)).unwrap()
-}
-
-#[test]
-fn places_and_amounts_of_a_touch_have_parts_of_their_own() {
-    let source = source_of(&strip());
-    for part in [
-        "clamped |= decode_part_0(readings, outputs + 0, &worst, scratch);",
-        "clamped |= decode_part_1(readings, outputs + 1, &worst, scratch);",
-        "strength < touch_0[LEAST]",
-        "strength > touch_1[MOST]",
-        "static const float touch_1[21]",
-    ] {
-        assert!(source.contains(part), "{part}: {source}");
-    }
-    assert!(!source.contains("project("), "networks are given shape and strength themselves");
-    let tests = |name: &str| -> String {
-        let (_, text) = source.split_once(&format!("{name}[")).unwrap();
-        let (_, text) = text.split_once('=').unwrap();
-        let (text, _) = text.split_once(';').unwrap();
-        text.chars().filter(char::is_ascii_digit).collect()
-    };
-    // Two touches, of which the first is like those of training, a missing reading, and no touch.
-    assert_eq!(tests("test_status"), "0013");
-    assert!(tests("test_clamped").starts_with('0'));
 }
 
 #[test]

@@ -7,11 +7,11 @@ use std::rc::Rc;
 
 use taxel_data::Silent;
 use taxel_firmware::link::message::{Configuration, Identity, ModelIdentity, Statistics};
+use taxel_firmware::link::packet;
 use taxel_firmware::link::receive::{Received, Receiver};
-use taxel_firmware::link::{cobs, packet};
 
 use super::*;
-use crate::device::Wire;
+use crate::device::{Wire, framed};
 
 /// Line whose other end answers each request by `script`, not before it has had its `time_to_answer`.
 struct Scripted<S> {
@@ -31,10 +31,7 @@ impl<S: FnMut(&Request<'_>) -> Report<'static>> Write for Scripted<S> {
             let mut buffer = [0; 512];
             let report = (self.script)(&request.body);
             let answer = packet::encode(request.number, &report, &mut buffer).expect("room");
-            cobs::encode(answer, |byte| {
-                self.answers.push_back(byte);
-                true
-            });
+            self.answers.extend(framed(answer));
         }
         Ok(bytes.len())
     }
