@@ -41,11 +41,11 @@ fn table(sections: &mut Sections, merged: &Merged, first: &str) {
         |name: &&str| name.starts_with("limit_") && !name.starts_with("limit_standard_error_");
     let limits = merged.columns.iter().map(String::as_str).filter(is_limit);
     let error = merged.objectives.first().map(String::as_str);
-    let sizes = ["rows", "columns", "area_cm2"].into_iter();
+    let sizes = ["rows", "columns", "area_cm2"];
     let costs = ["scan_ms", "frame_ms", "blob_bytes"];
     // Layouts that cannot be have no error, and its place is taken by a time.
     let mut seen = BTreeSet::new();
-    let results: Vec<&str> = sizes.chain(limits).chain(error).chain(costs).collect();
+    let results: Vec<&str> = error.into_iter().chain(limits).chain(costs).chain(sizes).collect();
     let is_known = |name: &&str| merged.columns.iter().any(|known| known == name);
     let results: Vec<&str> =
         results.into_iter().filter(is_known).filter(|name| seen.insert(*name)).collect();
