@@ -9,18 +9,17 @@ use std::path::Path;
 use serde::Deserialize;
 use taxel_core::blob::NoiseKind as BlobNoiseKind;
 use taxel_data::digest::digest;
-use taxel_data::{AtRest, BadValue, Dataset, Progress, Stream, input, require};
+use taxel_data::{AtRest, BadValue, Dataset, Stream, input, require};
 use taxel_learn::train::{FreshFrames, Solver, check_penalty, check_spread};
 use taxel_learn::{Options, Origin, relative};
-use taxel_limit::Reference;
-use taxel_simulate::noise::{Noise, NoiseKind};
+use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::synth::BASELINE_FRAMES;
 use taxel_simulate::world::check_noise_level;
 use taxel_simulate::{Synthesis, World};
 
 use crate::error::{Error, Result};
-use crate::metrics::{LimitSummary, Measure};
+use crate::metrics::Measure;
 use crate::training_options::{Training, TrainingOptions};
 
 mod others;
@@ -228,24 +227,6 @@ impl Experiment {
             thickness_mm: Some(self.world.sensor.size_mm[2]),
             limit: None,
         }
-    }
-
-    /// Measure for errors of the scene's outputs, and of their ratio to the limit with this `noise`: that of all
-    /// readings of a frame. Ratios are formed on the first of so many `test_frames`.
-    ///
-    /// Where the limit is refused, its summary says why and there are no ratios.
-    pub fn measure_beside_limit(
-        &self,
-        noise: Noise,
-        test_frames: usize,
-        progress: &dyn Progress,
-    ) -> (Measure, LimitSummary) {
-        let mut world = self.world.clone();
-        world.noise = noise;
-        let frames = Reference::few_frames(&world).min(test_frames);
-        let limit = Reference::new(&world, frames, progress);
-        let summary = LimitSummary::new(&limit);
-        (Measure { limit: limit.ok(), ..self.measure() }, summary)
     }
 
     /// Data set of so many `frames` of `stream`, for training and for decoders that see what it saw.

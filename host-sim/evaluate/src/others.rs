@@ -3,7 +3,7 @@
 use taxel_data::{Dataset, Stream};
 use taxel_learn::decoders::mean;
 use taxel_learn::{Decoder, PreparedModel};
-use taxel_simulate::noise::Noise;
+use taxel_simulate::Synthesis;
 
 use crate::experiment::OtherContact;
 use crate::metrics::{self, DecoderErrors, Errors, Measure, of_decoder, rmse_of};
@@ -44,13 +44,11 @@ pub struct OtherErrors {
 /// Frames of other contacts, by name.
 pub type OtherFrames = Vec<(String, Dataset)>;
 
-/// Frames of all other contacts of a subject, with this noise or that of the scene. Measurements
-/// have none.
-pub fn frames(subject: &Subject, noise: Option<Noise>) -> OtherFrames {
+/// Frames of all other contacts of a subject. Measurements have none.
+pub fn frames(subject: &Subject) -> OtherFrames {
     let Some(scene) = subject.scene() else { return vec![] };
-    let synthesis = Subject::synthesis(scene, noise);
     let of = |other: &OtherContact| {
-        let moved = synthesis.clone().moved_by(&other.deformation);
+        let moved = Synthesis::new(&scene.world).moved_by(&other.deformation);
         (other.name.clone(), scene.dataset(&moved, Stream::Test, FRAMES))
     };
     scene.others.iter().map(of).collect()

@@ -147,7 +147,7 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<(RunResult, ModelBlob)> {
     progress.stage("read or synthesise", 1);
-    let (training, test) = subject.sets(None);
+    let (training, test) = subject.sets();
     progress.step();
 
     let mut options = *options;
@@ -156,7 +156,7 @@ pub fn run(
     let blob = training.blob(options, progress)?;
     let network = blob.prepare().of_inputs();
 
-    let (measure, limit) = subject.measure(None, progress);
+    let (measure, limit) = subject.measure(progress);
     progress.stage("decode and evaluate", 1);
     let baselines: Vec<Box<dyn Decoder>> =
         BASELINES.iter().filter_map(|b| b.fit(&training.frames)).collect();
@@ -168,7 +168,7 @@ pub fn run(
     let of_mean = Mean::fit(&training.frames);
     let of_centroid = baselines.iter().find(|it| it.name() == centroid::NAME);
     let of_centroid = of_centroid.map(|it| it.decode_all(&test.inputs.values, 1).values);
-    let others = others::frames(subject, None);
+    let others = others::frames(subject);
     let others = Others::new(&others, (&network, &of_mean), &test, &measure);
     progress.step();
 

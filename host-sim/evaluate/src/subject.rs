@@ -4,9 +4,8 @@ use std::borrow::Cow;
 
 use taxel_data::{Dataset, Progress, Stream, columns};
 use taxel_learn::{Options, Origin};
-use taxel_limit::Refusal;
+use taxel_limit::{Reference, Refusal};
 use taxel_simulate::Synthesis;
-use taxel_simulate::noise::Noise;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::path::Path;
 
@@ -138,15 +137,10 @@ impl Subject {
         }
     }
 
-    /// Synthesis of a scene's frames, with this noise or its own.
-    pub(crate) fn synthesis(scene: &Experiment, noise: Option<Noise>) -> Synthesis<'_> {
-        Synthesis::new(&scene.world).noise(noise.unwrap_or(scene.world.noise))
-    }
-
-    /// Frames to train on, with this `noise` or the scene's own. Measurements are as they are.
-    pub fn training_set(&self, noise: Option<Noise>) -> TrainingSet<'_> {
+    /// Frames to train on.
+    pub fn training_set(&self) -> TrainingSet<'_> {
         match self {
-            Self::Scene(scene) => TrainingSet::of_scene(scene, Self::synthesis(scene, noise)),
+            Self::Scene(scene) => TrainingSet::of_scene(scene, Synthesis::new(&scene.world)),
             Self::Measured(data) => {
                 let mut set = TrainingSet::of_folds(&data.training, &data.fold_of, data.origin());
                 (set.refine, set.reading_model) = (data.how.refine, data.how.reading_model);
@@ -155,30 +149,27 @@ impl Subject {
         }
     }
 
-    /// Frames to train on, and those to judge by, with this `noise` or the scene's own. Measurements are as they are.
-    pub fn sets(&self, noise: Option<Noise>) -> (TrainingSet<'_>, Cow<'_, Dataset>) {
+    /// Frames to train on, and those to judge by.
+    pub fn sets(&self) -> (TrainingSet<'_>, Cow<'_, Dataset>) {
         let test = match self {
             Self::Scene(scene) => {
-                let synthesis = Self::synthesis(scene, noise);
-                let frames = scene.test_frames;
-                Cow::Owned(scene.dataset(&synthesis, Stream::Test, frames))
+                let synthesis = Synthesis::new(&scene.world);
+                Cow::Owned(scene.dataset(&synthesis, Stream::Test, scene.test_frames))
             }
             Self::Measured(data) => Cow::Borrowed(&data.test),
         };
-        (self.training_set(noise), test)
+        (self.training_set(), test)
     }
 
-    /// Measure for errors on the test frames, with the limit at this `noise` or the scene's own where it is known, and a
-    /// summary of that limit or the reason why there is none.
-    pub fn measure(
-        &self,
-        noise: Option<Noise>,
-        progress: &dyn Progress,
-    ) -> (Measure, LimitSummary) {
+    /// Measure for errors on the test frames, with their ratio to the limit of all readings of a frame where it is known, and
+    /// a summary of that limit or the reason why there is none. Ratios are formed on the first test frames.
+    pub fn measure(&self, progress: &dyn Progress) -> (Measure, LimitSummary) {
         match self {
             Self::Scene(scene) => {
-                let noise = noise.unwrap_or(scene.world.noise);
-                scene.measure_beside_limit(noise, scene.test_frames, progress)
+                let frames = Reference::few_frames(&scene.world).min(scene.test_frames);
+                let limit = Reference::new(&scene.world, frames, progress);
+                let summary = LimitSummary::new(&limit);
+                (Measure { limit: limit.ok(), ..scene.measure() }, summary)
             }
             Self::Measured(data) => (data.measure(), LimitSummary::new(&Err(Refusal::Measured))),
         }

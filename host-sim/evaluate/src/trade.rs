@@ -21,7 +21,7 @@ use crate::sweep::bounds::{self, Bound, Bounds, Values};
 use crate::sweep::file::{Also, Wanted};
 use crate::sweep::front;
 use crate::sweep::judge::{self, Frames, KnownLimit};
-use crate::sweep::{self, Merged};
+use crate::sweep::{self, Merged, merge};
 use crate::verdict::{Verdict, Warning};
 
 mod line;
@@ -170,7 +170,11 @@ impl Trade {
         let left_out: Vec<String> = merged
             .failed()
             .map(|it| {
-                format!("{}: {}", Point::settings_of(it), it.failed.clone().unwrap_or_default())
+                format!(
+                    "{}: {}",
+                    merge::in_words(&it.values),
+                    it.failed.clone().unwrap_or_default()
+                )
             })
             .collect();
         if let (true, Some(cause)) = (points.is_empty(), left_out.first()) {

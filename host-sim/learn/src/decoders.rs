@@ -3,9 +3,7 @@
 use taxel_data::Dataset;
 
 use crate::decoder::{Decoder, Estimates, FrameDecoder, Frames};
-use crate::infer::infer;
 use crate::parallel;
-use crate::train::FittedNetwork;
 
 pub mod centroid;
 pub mod linear;
@@ -75,12 +73,6 @@ pub struct Rows<D> {
     name: &'static str,
     inputs: usize,
     decoders: Vec<D>,
-}
-
-impl RowDecoder for FittedNetwork {
-    fn predict(&self, readings: &[f64]) -> Vec<f64> {
-        infer(&self.network(), readings)
-    }
 }
 
 impl<D: RowDecoder + Send> Rows<D> {

@@ -255,23 +255,16 @@ impl Samples<'_> {
     ///
     /// # Errors
     /// [`Error`](crate::Error) if the format does not hold the network.
-    pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
-        self.fit_layer(&self.layer(centres.to_vec(), options), options)
-    }
-
-    /// Fits output weights to the samples as [`fit`](Self::fit) does, for a given `layer` with its own width.
-    ///
-    /// # Errors
-    /// [`Error`](crate::Error) if the format does not hold the network.
     ///
     /// # Panics
     /// Never: one penalty gives one network.
-    pub fn fit_layer(&self, layer: &HiddenLayer, options: &Options) -> Result<FittedNetwork> {
-        let mut fitted = self.fit_each(layer, options, &[options.penalty]).into_iter();
+    pub fn fit(&self, centres: &[f64], options: &Options) -> Result<FittedNetwork> {
+        let layer = self.layer(centres.to_vec(), options);
+        let mut fitted = self.fit_each(&layer, options, &[options.penalty]).into_iter();
         fitted.next().expect("one network a penalty")
     }
 
-    /// Fits output weights as [`fit_layer`](Self::fit_layer) does, with each of `penalties` instead of the options' own.
+    /// Fits output weights as [`fit`](Self::fit) does to a given `layer`, with each of `penalties` instead of the options' own.
     fn fit_each(
         &self,
         layer: &HiddenLayer,

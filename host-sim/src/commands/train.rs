@@ -62,7 +62,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let subject = load(arguments, common)?;
     refused_readings::note_scene(&subject, common);
     let mut options = subject.options();
-    let set = subject.training_set(None);
+    let set = subject.training_set();
     set.check()?;
     if arguments.select && options.projects(&set.frames) {
         let message = "--select chooses for networks that are given readings: add --each-row, or leave it out";

@@ -62,7 +62,7 @@ pub fn small_model(scene: &Experiment) -> Result<ModelBlob> {
     let subject = Subject::Scene(Box::new(scene));
     let usual = subject.options();
     let options = Options { centres: usual.centres.min(CENTRES), ..usual.for_each_row(each_row) };
-    let mut training: TrainingSet<'_> = subject.training_set(None);
+    let mut training: TrainingSet<'_> = subject.training_set();
     (training.refine, training.reading_model) = (false, Some(Extent::Full));
     let full = training.blob(&options, &Silent);
     full.or_else(|_| {

@@ -72,7 +72,7 @@ fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
     let model = blob.prepare();
     let measure = scene.measure();
     let subject = Subject::Scene(scene.into());
-    let frames = frames(&subject, None);
+    let frames = frames(&subject);
     let names: Vec<&str> = frames.iter().map(|(name, _)| name.as_str()).collect();
     let expected = [
         "smaller radii",
@@ -85,7 +85,7 @@ fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
         "two contacts",
     ];
     assert_eq!(names, expected);
-    let (training, own) = subject.sets(None);
+    let (training, own) = subject.sets();
     let own = Dataset::clone(&own);
     let found =
         Others::new(&frames, (&model, &Mean::fit(&training.frames)), &own, &measure).unwrap();
@@ -109,7 +109,7 @@ fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
 #[test]
 fn scenes_without_a_contact_have_no_others() {
     let subject = |scene: Experiment| Subject::Scene(scene.into());
-    assert!(frames(&subject(Experiment::load("paper").unwrap()), None).is_empty());
+    assert!(frames(&subject(Experiment::load("paper").unwrap())).is_empty());
     let contact = Experiment::load("contact").unwrap();
     // Two contacts have no one centre.
     assert!(contact.others.iter().all(|other| other.name != "two contacts"));

@@ -272,7 +272,7 @@ pub struct Frames<'s> {
 impl<'s> Frames<'s> {
     /// Frames of these `readings`.
     pub fn new(plan: &Plan, readings: &'s Readings<'s>) -> Result<Self> {
-        let (mut set, test) = readings.subject.sets(None);
+        let (mut set, test) = readings.subject.sets();
         set.check()?;
         // All models of these frames tell it.
         set.origin.linear_rmse = set.linear_rmse();
@@ -280,11 +280,8 @@ impl<'s> Frames<'s> {
         let last = columns::groups(names).last().map_or("", |(group, _)| *group).to_owned();
         let group = plan.group().map_or(last, str::to_owned);
         let touches = readings.touches(&group);
-        let others = if plan.has(Also::OtherContacts) {
-            others::frames(readings.subject, None)
-        } else {
-            vec![]
-        };
+        let others =
+            if plan.has(Also::OtherContacts) { others::frames(readings.subject) } else { vec![] };
         let baselines = vec![];
         let mut frames = Self { readings, set, test, touches, others, baselines, table: None };
         if plan.has(Also::Baselines) {

@@ -84,15 +84,17 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// Setting in words: its fields and their values.
+    /// Setting in words.
     pub fn in_words(&self) -> String {
-        let text = |value: &Value| match value {
-            Value::String(text) => text.clone(),
-            other => other.to_string(),
-        };
-        let fields = self.values.iter().map(|(field, value)| format!("{field} = {}", text(value)));
-        fields.collect::<Vec<_>>().join(", ")
+        in_words(&self.values)
     }
+}
+
+/// Fields and their values in words.
+pub fn in_words(values: &BTreeMap<String, Value>) -> String {
+    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+    let fields = values.iter().map(|(field, value)| format!("{field} = {}", text(value)));
+    fields.collect::<Vec<_>>().join(", ")
 }
 
 impl Merged {

@@ -97,15 +97,6 @@ impl Point {
         })
     }
 
-    /// Settings of a result that may have failed, in words.
-    pub fn settings_of(point: &PointResult) -> String {
-        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        let values = point.values.iter().map(|(field, value)| {
-            format!("{} = {}", field.rsplit('.').next().unwrap_or(field), text(value))
-        });
-        values.collect::<Vec<_>>().join(", ")
-    }
-
     /// Place among points: by readings, networks, centres, format and filter.
     pub(super) fn order(&self) -> impl Ord + use<> {
         let network = (!self.each_row, self.centres);
