@@ -11,6 +11,7 @@ pub mod on_device;
 pub mod plan;
 pub mod layouts;
 pub mod point;
+pub mod judged;
 pub mod judge;
 pub mod store;
 pub mod work;

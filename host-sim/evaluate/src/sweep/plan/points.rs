@@ -1,0 +1,191 @@
+//! Points of a plan: their fields, and the digests of what they share.
+
+use std::collections::HashSet;
+
+use taxel_data::BadValue;
+use taxel_data::digest::digest;
+use taxel_learn::Options;
+use toml::{Table, Value};
+
+use super::{Base, Checked, Plan, Point, SCENE, in_words};
+use crate::sweep::fields;
+use crate::sweep::file::Also;
+use crate::sweep::on_device::OnDevice;
+use crate::sweep::point::options;
+use crate::training_options::{Training, TrainingOptions};
+
+/// Fields of training that frames depend on, and what is held out of them.
+const FIELDS_OF_FRAMES: [&str; 5] =
+    ["frames", "test_frames", "relative_inputs", "refine", "reading_model"];
+
+impl Plan {
+    /// All points, each once.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a field that a scene of the plan cannot have.
+    pub fn points(&self) -> Checked<Vec<Point>> {
+        // Scenes with different names may be the same, and are then shown as two.
+        let mut seen = HashSet::new();
+        let mut points = Vec::new();
+        let mut places = vec![0; self.axes.len()];
+        loop {
+            let point = self.point(&places)?;
+            if seen.insert((point.id.clone(), in_words(&point.values))) {
+                points.push(point);
+            }
+            // The last axis is the fastest.
+            let Some(axis) =
+                (0..places.len()).rev().find(|axis| places[*axis] + 1 < self.axes[*axis].1.len())
+            else {
+                return Ok(points);
+            };
+            places[axis] += 1;
+            places[axis + 1..].fill(0);
+        }
+    }
+
+    fn point(&self, places: &[usize]) -> Checked<Point> {
+        let document = self.document_at(places)?;
+        let scene = text(&document.scene)?;
+        let base = self.base_of(&document.values);
+        let of_scene = base.map_or(0, |base| base.digest);
+        let usual = match base.and_then(|base| self.usual.get(&base.label)) {
+            Some(usual) => *usual,
+            None => self.usual_in(&scene).unwrap_or_default(),
+        };
+        let mut shared = document.scene;
+        let training = match shared.remove("training") {
+            Some(Value::Table(training)) => training,
+            _ => Table::new(),
+        };
+        if !self.has(Also::Table1) {
+            shared.remove("table1");
+        }
+        let on_device = OnDevice::new(document.device)?;
+        let OnDevice { device, samples, column_step, filter } = on_device;
+        let (limit_frames, train, also) = (self.limit_frames, self.train, &self.also);
+        let how = format!("{device:?} {samples} {column_step} {limit_frames:?} {train} {also:?}");
+        let filtered = self.group().filter(|_| filter);
+        let decides = format!(
+            "{}\n{how} {filtered:?} {usual:?} {of_scene:x}\n{:016x}\n{scene}",
+            self.build, self.data_digest
+        );
+        let shares = digest(format!("{how}\n{}", text(&shared)?).as_bytes());
+        let key = |is_shared: &dyn Fn(&str) -> bool| -> Checked<u64> {
+            let mut training = training.clone();
+            training.retain(|field, _| is_shared(field));
+            Ok(digest(format!("{shares:x} {usual:?}\n{}", text(&training)?).as_bytes()))
+        };
+        let of_frames = |field: &str| FIELDS_OF_FRAMES.contains(&field);
+        // Where centres move to depends on the penalty.
+        let of_layers: &[&str] =
+            if self.refines(&training) { &["format"] } else { &["format", "penalty"] };
+        let keys = [
+            key(&of_frames)?,
+            key(&|field| !["centres", "spread", "penalty", "format"].contains(&field))?,
+            key(&|field| !["spread", "penalty", "format"].contains(&field))?,
+            key(&|field| !of_layers.contains(&field))?,
+            key(&|field| field != "penalty")?,
+            key(&|_| true)?,
+        ];
+        let id = format!("{:016x}", digest(decides.as_bytes()));
+        let (values, digest) = (document.values, of_scene);
+        Ok(Point { id, values, scene, on_device, usual, digest, shares, keys })
+    }
+
+    /// Whether models with these fields of `training` may be refined.
+    fn refines(&self, training: &Table) -> bool {
+        let is_usual = self.data.as_deref().is_none_or(|data| data.how.refine);
+        training.get("refine").and_then(Value::as_bool).unwrap_or(is_usual)
+    }
+
+    pub(super) fn usual_of(&self, base: &Base) -> Option<Options> {
+        self.usual_in(&text(&self.changed(Some(base), &[]).ok()?.scene).ok()?)
+    }
+
+    fn usual_in(&self, scene: &str) -> Option<Options> {
+        options(self.data.as_deref(), scene).ok()
+    }
+
+    /// Fields of the point at these places of the axes.
+    pub(super) fn document_at(&self, places: &[usize]) -> Checked<Document> {
+        let chosen = self.axes.iter().zip(places);
+        let values = chosen.flat_map(|((fields, lines), place)| {
+            fields.iter().cloned().zip(lines[*place].iter().cloned())
+        });
+        let values: Vec<(String, Value)> = values.collect();
+        self.changed(self.base_of(&values), &values)
+    }
+
+    /// Gives networks of the other kind, for each row or for the array, their own spread, and those of rows no features, unless
+    /// the plan says which.
+    fn follow_each_row(
+        &self,
+        document: &mut Table,
+        base: Option<&Base>,
+        values: &[(String, Value)],
+    ) -> Checked<()> {
+        const FIELD: &str = "training.each_row";
+        if !self.set.iter().chain(values).any(|(field, _)| field == FIELD) {
+            return Ok(());
+        }
+        let mut training = self.data.as_ref().map_or(Training::default(), |data| data.how);
+        let mut layers = vec![base.map(|base| base.document.clone()).unwrap_or_default()];
+        for given in [&self.set, values] {
+            let mut layer = Table::new();
+            for (field, value) in given.iter().filter(|(field, _)| field.starts_with("training.")) {
+                fields::set(&mut layer, field, value.clone())?;
+            }
+            layers.push(layer);
+        }
+        for given in layers.iter().filter_map(|layer| layer.get("training")) {
+            // What is wrong with a value is told elsewhere.
+            let Ok(given) = given.clone().try_into::<TrainingOptions>() else { return Ok(()) };
+            training = given.over(&training)?;
+        }
+        fields::set(document, "training.spread", training.options.spread.into())?;
+        if let (None, Some(of)) = (training.options.features, document.get_mut("training")) {
+            of.as_table_mut().map(|of| of.remove("features"));
+        }
+        Ok(())
+    }
+
+    /// Scene that a point with these values changes.
+    pub(super) fn base_of(&self, values: &[(String, Value)]) -> Option<&Base> {
+        let label = values.iter().find(|(field, _)| field == SCENE);
+        let label = label.and_then(|(_, label)| label.as_str());
+        let is_it = |base: &&Base| label == Some(&base.label);
+        self.bases.iter().find(is_it).or(self.bases.first())
+    }
+
+    /// Fields of a scene with those in [set], and then these `values`.
+    pub(super) fn changed(
+        &self,
+        base: Option<&Base>,
+        values: &[(String, Value)],
+    ) -> Checked<Document> {
+        let mut document = base.map(|base| base.document.clone()).unwrap_or_default();
+        document.insert("device".into(), self.device.clone().into());
+        let changed = self.set.iter().chain(values).filter(|(field, _)| field != SCENE);
+        for (field, value) in changed {
+            fields::set(&mut document, field, value.clone())?;
+        }
+        self.follow_each_row(&mut document, base, values)?;
+        let device = match document.remove("device") {
+            Some(Value::Table(device)) => device,
+            _ => Table::new(),
+        };
+        Ok(Document { scene: document, device, values: values.to_vec() })
+    }
+}
+
+/// Fields of a point.
+pub(super) struct Document {
+    pub scene: Table,
+    pub device: Table,
+    pub values: Vec<(String, Value)>,
+}
+
+pub(super) fn text(table: &Table) -> Checked<String> {
+    toml::to_string(table).map_err(|cause| BadValue::new("axes", "values", cause.to_string()))
+}
