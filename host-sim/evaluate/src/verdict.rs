@@ -88,7 +88,7 @@ impl Verdict {
         if !lost.is_empty() {
             let with_name = |(name, it): &(&str, &Errors)| format!("{} ({name})", with_error(it));
             let better: Vec<String> = lost.iter().map(with_name).collect();
-            sentences.push(format!("Ten lines do better: {}.", listed(&better)));
+            sentences.push(format!("A simpler decoder does better: {}.", listed(&better)));
         }
         // What is no better than the mean, or lost, need not be compared with the linear decoder.
         let useless = others.without_gain(model, |it| it.mean);

@@ -107,7 +107,7 @@ fn a_model_that_loses_to_a_baseline_is_told_so_by_output() {
     let rows = rows.map(|(name, rmse)| (name, [0, 1, 2, 3].map(|at| (groups[at], rmse[at]))));
     let all = decoders(&rows.each_ref().map(|(name, errors)| (*name, &errors[..])));
     let verdict = Verdict::new(&all, &no_limit());
-    let better = "Ten lines do better: x_mm to 0.300 mm (centroid), y_mm to 0.400 mm (centroid) and z_mm to 0.200 mm (linear).";
+    let better = "A simpler decoder does better: x_mm to 0.300 mm (centroid), y_mm to 0.400 mm (centroid) and z_mm to 0.200 mm (linear).";
     assert!(verdict.sentence.ends_with(better), "{}", verdict.sentence);
     assert_eq!(names(&verdict), ["no-gain-over-mean", "worse-than-baseline"]);
     assert!(verdict.warnings[1].text.starts_with("x_mm, y_mm, z_mm: a simpler decoder is better"));
