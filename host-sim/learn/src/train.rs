@@ -113,12 +113,10 @@ pub struct Options {
     /// Features for outputs of either kind; `None` for those that training [chooses](crate::kinds::choose), or readings as they
     /// are where it does not.
     pub kinds: Option<Kinds>,
-    /// Memory in bytes that training may take, about. More is refused before it is taken.
-    pub most_memory_bytes: u64,
 }
 
-/// Memory in bytes that training may take unless a user says otherwise: 8 GB.
-pub const USUAL_MEMORY_BYTES: u64 = 8_000_000_000;
+/// Memory in bytes that training may take, about: 8 GB. More is refused before it is taken.
+pub const MOST_MEMORY_BYTES: u64 = 8_000_000_000;
 
 impl Default for Options {
     fn default() -> Self {
@@ -135,7 +133,6 @@ impl Default for Options {
             each_row: false,
             features: None,
             kinds: None,
-            most_memory_bytes: USUAL_MEMORY_BYTES,
         }
     }
 }

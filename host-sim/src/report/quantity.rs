@@ -5,6 +5,7 @@ use super::format::{grouped, symbol, with_unit};
 use super::sections::Digits;
 use taxel_evaluate::metrics::{Definition, unit_of_rmse};
 use taxel_evaluate::sweep::bounds::{Bound, Bounds};
+use taxel_evaluate::sweep::point::{GENERAL, General};
 
 /// Result of a point, by the name that files give it.
 pub struct Quantity {
@@ -19,32 +20,11 @@ pub struct Quantity {
     pub digits: Digits,
 }
 
-/// Results that belong to no group of outputs: name, heading, unit, name in full, what stands behind the number of a bound.
-const GENERAL: [[&str; 5]; 17] = [
-    ["rows", "rows", "", "rows", "rows"],
-    ["columns", "columns", "", "columns", "columns"],
-    ["area_cm2", "area", "cm²", "area", "cm² of area"],
-    ["cost_eur", "cost", "€", "cost", "€"],
-    ["scan_ms", "scan", "ms", "time of a scan", "ms for a scan"],
-    ["centres", "K", "", "number of centres K", "centres"],
-    ["spread", "spread", "", "spread", "of spread"],
-    ["filter_ms", "filter", "ms", "time constant of the filter", "ms of the filter"],
-    ["lead_ms", "lead", "ms", "time by which the filter leads", "ms of lead"],
-    ["decode_ms", "decoding", "ms", "time of decoding", "ms for decoding"],
-    ["frame_ms", "frame", "ms", "time of a frame, from scan to estimate", "ms for a frame"],
-    ["frames_per_s", "frames/s", "", "frames a second", "frames/s"],
-    ["age_ms", "age", "ms", "age of an estimate when it is used", "ms of age"],
-    ["instructions", "instructions", "", "instructions of decoding", "instructions"],
-    ["cycles", "cycles", "", "cycles of decoding", "cycles"],
-    ["blob_bytes", "flash", "B", "flash of the blob", "bytes of flash"],
-    ["ram_bytes", "RAM", "B", "RAM for decoding, without weights", "bytes of RAM for decoding"],
-];
-
 impl Quantity {
     /// The result called `name`.
     pub fn of(name: &str) -> Self {
-        if let Some([_, heading, unit, in_full, bounded]) = GENERAL.iter().find(|it| it[0] == name)
-        {
+        let general = GENERAL.iter().find(|it| it.name == name);
+        if let Some(General { heading, unit, in_full, bounded, .. }) = general {
             let is_count = unit.is_empty() && *heading != "spread" || *unit == "B";
             return Self {
                 heading: (*heading).into(),

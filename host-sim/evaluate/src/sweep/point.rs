@@ -54,26 +54,57 @@ impl Results {
     }
 }
 
-/// Results that do not belong to a group of outputs, in the order of tables. Those from `centres` on only a model has.
-const GENERAL: [&str; 17] = [
-    "rows",
-    "columns",
-    "area_cm2",
-    "cost_eur",
-    "scan_ms",
-    "centres",
-    "spread",
-    "filter_ms",
-    "lead_ms",
-    "decode_ms",
-    "frame_ms",
-    "frames_per_s",
-    "age_ms",
-    "instructions",
-    "cycles",
-    "blob_bytes",
-    "ram_bytes",
+/// Result that belongs to no group of outputs, and its words.
+#[derive(Debug)]
+pub struct General {
+    pub name: &'static str,
+    /// Heading of a column.
+    pub heading: &'static str,
+    /// Unit; empty for none, or if the heading has it.
+    pub unit: &'static str,
+    /// Name in full, without a unit.
+    pub in_full: &'static str,
+    /// What stands behind the number of a bound.
+    pub bounded: &'static str,
+}
+
+/// All of them, in the order of tables. Those from `centres` on only a model has.
+pub static GENERAL: [General; 17] = [
+    general("rows", ["rows", ""], ["rows", "rows"]),
+    general("columns", ["columns", ""], ["columns", "columns"]),
+    general("area_cm2", ["area", "cm²"], ["area", "cm² of area"]),
+    general("cost_eur", ["cost", "€"], ["cost", "€"]),
+    general("scan_ms", ["scan", "ms"], ["time of a scan", "ms for a scan"]),
+    general("centres", ["K", ""], ["number of centres K", "centres"]),
+    general("spread", ["spread", ""], ["spread", "of spread"]),
+    general("filter_ms", ["filter", "ms"], ["time constant of the filter", "ms of the filter"]),
+    general("lead_ms", ["lead", "ms"], ["time by which the filter leads", "ms of lead"]),
+    general("decode_ms", ["decoding", "ms"], ["time of decoding", "ms for decoding"]),
+    general(
+        "frame_ms",
+        ["frame", "ms"],
+        ["time of a frame, from scan to estimate", "ms for a frame"],
+    ),
+    general("frames_per_s", ["frames/s", ""], ["frames a second", "frames/s"]),
+    general("age_ms", ["age", "ms"], ["age of an estimate when it is used", "ms of age"]),
+    general("instructions", ["instructions", ""], ["instructions of decoding", "instructions"]),
+    general("cycles", ["cycles", ""], ["cycles of decoding", "cycles"]),
+    general("blob_bytes", ["flash", "B"], ["flash of the blob", "bytes of flash"]),
+    general(
+        "ram_bytes",
+        ["RAM", "B"],
+        ["RAM for decoding, without weights", "bytes of RAM for decoding"],
+    ),
 ];
+
+const fn general(
+    name: &'static str,
+    [heading, unit]: [&'static str; 2],
+    [in_full, bounded]: [&'static str; 2],
+) -> General {
+    General { name, heading, unit, in_full, bounded }
+}
+
 /// Results of each group of outputs, in the order of tables: the limit, errors by all definitions, and of the baselines.
 static OF_GROUP: LazyLock<Vec<String>> = LazyLock::new(|| {
     let errors = Definition::ALL.iter().map(|definition| definition.name);
@@ -109,7 +140,7 @@ pub fn columns_of(plan: &Plan, groups: &[&str]) -> Vec<String> {
     let of_groups = groups.iter().copied().chain(all);
     let of_groups =
         of_groups.flat_map(|group| OF_GROUP.iter().map(move |name| format!("{name}_{group}")));
-    let all = GENERAL.iter().map(|name| (*name).into()).chain(of_groups);
+    let all = GENERAL.iter().map(|it| it.name.into()).chain(of_groups);
     all.filter(|name| not_computed(plan, name).is_none()).collect()
 }
 
@@ -118,8 +149,8 @@ pub fn columns_of(plan: &Plan, groups: &[&str]) -> Vec<String> {
 pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
     let what = of_group(name).map_or(name, |(place, _)| &OF_GROUP[place]);
     let is_of_limit = what.starts_with("limit") || what.starts_with("ratio_to_limit");
-    let first_of_model = GENERAL.iter().position(|it| *it == "centres").unwrap_or(0);
-    let is_of_model = GENERAL[first_of_model..].contains(&what)
+    let of_model = GENERAL.iter().skip_while(|it| it.name != "centres");
+    let is_of_model = of_model.map(|it| it.name).any(|it| it == what)
         || (of_group(name).is_some() && !what.starts_with("limit"));
     let of_baseline =
         BASELINES.iter().any(|it| what.strip_suffix("_rmse").is_some_and(|name| name == it.name));
@@ -147,7 +178,7 @@ pub fn not_computed(plan: &Plan, name: &str) -> Option<&'static str> {
 
 /// Place of a result in tables.
 pub fn place_of(name: &str) -> (usize, &str, usize) {
-    if let Some(place) = GENERAL.iter().position(|known| *known == name) {
+    if let Some(place) = GENERAL.iter().position(|known| known.name == name) {
         return (place, "", 0);
     }
     of_group(name).map_or((usize::MAX, name, 0), |(place, group)| (GENERAL.len(), group, place))

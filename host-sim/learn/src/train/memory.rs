@@ -4,7 +4,7 @@
 use taxel_data::error::in_words;
 use taxel_data::{BadValue, Dataset, require};
 
-use super::{Options, projection, touch};
+use super::{MOST_MEMORY_BYTES, Options, projection, touch};
 
 /// Copies of what networks are given that are held at once: two, before and after refinement, and a scaled one.
 const COPIES: f64 = 3.0;
@@ -47,7 +47,7 @@ pub fn peak_bytes(dataset: &Dataset, options: &Options, pieces: Option<usize>) -
     (samples + most.into_iter().fold(0.0, f64::max)) as u64
 }
 
-/// Checks that training takes no more memory than the options allow.
+/// Checks that training takes no more than [`MOST_MEMORY_BYTES`].
 ///
 /// # Errors
 /// [`BadValue`] that tells how much it would take.
@@ -56,11 +56,11 @@ pub(super) fn check(
     options: &Options,
     pieces: Option<usize>,
 ) -> Result<(), BadValue> {
-    let (needed, most) = (peak_bytes(dataset, options, pieces), options.most_memory_bytes);
+    let (needed, most) = (peak_bytes(dataset, options, pieces), MOST_MEMORY_BYTES);
     require(needed <= most, "memory", format!("about {}", in_words(needed)), || {
         format!(
             "training may take at most {}; memory grows with the square of the number of centres and of inputs: give \
-             fewer, or allow more memory",
+             fewer",
             in_words(most)
         )
     })
