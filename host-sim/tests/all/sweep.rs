@@ -236,6 +236,23 @@ fn points_share_what_is_found_for_the_same_settings() {
     assert_ne!(few.keys[1], more.keys[1]);
 }
 
+/// The paper's method refines nothing, whatever else a scene says.
+#[test]
+fn points_of_both_methods_have_the_results_that_each_has_alone() {
+    let folder = prepared("sweep_methods");
+    let text = tiny_scene().replace("refine = false\n", "").replace("frames = 200", "frames = 60");
+    let scene = folder.write("scene.toml", text);
+    let wanted = "limit_frames = 0\n[axes]\ntraining.method = [\"best\", \"paper\"]\n";
+    let base = Base::of_scene("scene", &scene.display().to_string()).unwrap();
+    let wanted: Wanted = toml::from_str(wanted).unwrap();
+    let plan = Plan::new("methods", (vec![base], None), wanted, "a test").unwrap();
+    let points = plan.points().unwrap();
+    let computed = |points: &[Point]| work::in_memory(&plan, points, &Silent).unwrap();
+    for (point, record) in points.iter().zip(computed(&points)) {
+        assert_eq!(record, computed(std::slice::from_ref(point))[0]);
+    }
+}
+
 /// Centres do not depend on the spread, and unless they are refined neither on the penalty.
 #[test]
 fn points_that_share_centres_and_decompositions_have_the_results_that_each_has_alone() {

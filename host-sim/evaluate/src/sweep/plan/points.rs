@@ -15,8 +15,8 @@ use crate::sweep::point::options;
 use crate::training_options::{Training, TrainingOptions};
 
 /// Fields of training that frames depend on, and what is held out of them.
-const FIELDS_OF_FRAMES: [&str; 5] =
-    ["frames", "test_frames", "relative_inputs", "refine", "reading_model"];
+const FIELDS_OF_FRAMES: [&str; 6] =
+    ["frames", "test_frames", "relative_inputs", "method", "refine", "reading_model"];
 
 impl Plan {
     /// All points, each once.
@@ -96,7 +96,8 @@ impl Plan {
     /// Whether models with these fields of `training` may be refined.
     fn refines(&self, training: &Table) -> bool {
         let is_usual = self.data.as_deref().is_none_or(|data| data.how.refine);
-        training.get("refine").and_then(Value::as_bool).unwrap_or(is_usual)
+        let is_paper = training.get("method").and_then(Value::as_str) == Some("paper");
+        !is_paper && training.get("refine").and_then(Value::as_bool).unwrap_or(is_usual)
     }
 
     pub(super) fn usual_of(&self, base: &Base) -> Option<Options> {
