@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
+use host_sim::experiment::Experiment;
 use host_sim::sweep::file::Wanted;
 use host_sim::sweep::plan::Base;
 use host_sim::sweep::{Plan, Point, work};
 use serde_json::Value;
 use taxel_data::Silent;
 
-use crate::common::{Folder, tiny_scene};
+use crate::common::{Folder, small_scene, tiny_scene};
 
 /// Plan of four points of `scene.toml`, two of which share their limit.
 pub const PLAN: &str = "name = \"tiny\"\nscene = \"scene.toml\"\nlimit_frames = 4\nobjectives = [\"rmse_dz_mm\", \"frame_ms\"]\n\
@@ -251,6 +252,36 @@ fn points_of_both_methods_have_the_results_that_each_has_alone() {
     for (point, record) in points.iter().zip(computed(&points)) {
         assert_eq!(record, computed(std::slice::from_ref(point))[0]);
     }
+}
+
+#[test]
+fn a_plan_trains_as_the_same_options_of_a_command_do() {
+    let small = small_scene();
+    let with_solver = small.replace("each_row = true", "solver = \"qr\"");
+    let contact = Experiment::text("contact").unwrap().into_owned();
+    for (scene, given) in [
+        (&small, "features = 9"),
+        (&small.replace("each_row = true", ""), "method = \"paper\""),
+        (&with_solver.replace("\"f32\"", "\"fixed16\""), "method = \"paper\""),
+        (&with_solver, "method = \"paper\"\nsolver = \"qr\"\nspread = 0.3"),
+        (&contact, "method = \"paper\""),
+        (&contact, "each_row = true"),
+    ] {
+        let own = Experiment::parse("scene", scene).unwrap();
+        let own = own.trained_with(&toml::from_str(given).unwrap()).unwrap();
+        let base = Base { label: "scene".into(), document: scene.parse().unwrap(), digest: 0 };
+        let wanted: Wanted = toml::from_str(&format!("[set.training]\n{given}")).unwrap();
+        let plan = Plan::new("options", (vec![base], None), wanted, "a test").unwrap();
+        let point = Experiment::parse("point", &plan.points().unwrap()[0].scene).unwrap();
+        assert_eq!(point.training, own.training, "{given}");
+    }
+    // A plan's method replaces that of the scene.
+    let wanted: Wanted = toml::from_str("[set.training]\nmethod = \"best\"").unwrap();
+    let document = small.replace("each_row = true", "method = \"paper\"").parse().unwrap();
+    let base = Base { label: "scene".into(), document, digest: 0 };
+    let plan = Plan::new("best", (vec![base], None), wanted, "a test").unwrap();
+    let point = Experiment::parse("point", &plan.points().unwrap()[0].scene).unwrap();
+    assert!(point.training.options.affine_tail && !point.training.options.each_row);
 }
 
 /// Centres do not depend on the spread, and unless they are refined neither on the penalty.

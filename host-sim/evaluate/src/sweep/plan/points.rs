@@ -96,8 +96,7 @@ impl Plan {
     /// Whether models with these fields of `training` may be refined.
     fn refines(&self, training: &Table) -> bool {
         let is_usual = self.data.as_deref().is_none_or(|data| data.how.refine);
-        let is_paper = training.get("method").and_then(Value::as_str) == Some("paper");
-        !is_paper && training.get("refine").and_then(Value::as_bool).unwrap_or(is_usual)
+        !is_paper(training) && training.get("refine").and_then(Value::as_bool).unwrap_or(is_usual)
     }
 
     pub(super) fn usual_of(&self, base: &Base) -> Option<Options> {
@@ -118,19 +117,19 @@ impl Plan {
         self.changed(self.base_of(&values), &values)
     }
 
-    /// Gives networks of the other kind, for each row or for the array, their own spread, and those of rows no features, unless
-    /// the plan says which.
-    fn follow_each_row(
+    /// Trains as the scene, [set] and `values` say one after another, where the later ones choose the kind of networks: fields
+    /// that the earlier ones give follow it, as with options of a command.
+    fn follow_kind(
         &self,
         document: &mut Table,
         base: Option<&Base>,
         values: &[(String, Value)],
     ) -> Checked<()> {
-        const FIELD: &str = "training.each_row";
-        if !self.set.iter().chain(values).any(|(field, _)| field == FIELD) {
+        const OF_KIND: [&str; 3] = ["training.method", "training.each_row", "training.features"];
+        let mut given = self.set.iter().chain(values);
+        if !given.any(|(field, _)| OF_KIND.contains(&field.as_str())) {
             return Ok(());
         }
-        let mut training = self.data.as_ref().map_or(Training::default(), |data| data.how);
         let mut layers = vec![base.map(|base| base.document.clone()).unwrap_or_default()];
         for given in [&self.set, values] {
             let mut layer = Table::new();
@@ -139,14 +138,33 @@ impl Plan {
             }
             layers.push(layer);
         }
+        let training = document.get("training").and_then(Value::as_table);
+        let is_paper = training.is_some_and(is_paper);
+        let mut training = self.data.as_ref().map_or(Training::default(), |data| data.how);
         for given in layers.iter().filter_map(|layer| layer.get("training")) {
             // What is wrong with a value is told elsewhere.
-            let Ok(given) = given.clone().try_into::<TrainingOptions>() else { return Ok(()) };
+            let Ok(mut given) = given.clone().try_into::<TrainingOptions>() else {
+                return Ok(());
+            };
+            // The last method holds.
+            given.method = given.method.filter(|_| is_paper);
             training = given.over(&training)?;
         }
-        fields::set(document, "training.spread", training.options.spread.into())?;
-        if let (None, Some(of)) = (training.options.features, document.get_mut("training")) {
-            of.as_table_mut().map(|of| of.remove("features"));
+        let Options { spread, each_row, features, solver, format, .. } = training.options;
+        fields::set(document, "training.spread", spread.into())?;
+        let Some(Value::Table(of)) = document.get_mut("training") else { return Ok(()) };
+        if features.is_none() {
+            of.remove("features");
+        }
+        let followed: [(&str, Value); 3] = [
+            ("each_row", each_row.into()),
+            ("solver", solver.name().into()),
+            ("format", format.name().into()),
+        ];
+        for (field, value) in followed {
+            if let Some(given) = of.get_mut(field) {
+                *given = value;
+            }
         }
         Ok(())
     }
@@ -171,13 +189,18 @@ impl Plan {
         for (field, value) in changed {
             fields::set(&mut document, field, value.clone())?;
         }
-        self.follow_each_row(&mut document, base, values)?;
+        self.follow_kind(&mut document, base, values)?;
         let device = match document.remove("device") {
             Some(Value::Table(device)) => device,
             _ => Table::new(),
         };
         Ok(Document { scene: document, device, values: values.to_vec() })
     }
+}
+
+/// Whether models with these fields of `training` are trained as the paper does.
+fn is_paper(training: &Table) -> bool {
+    training.get("method").and_then(Value::as_str) == Some("paper")
 }
 
 /// Fields of a point.
