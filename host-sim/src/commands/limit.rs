@@ -84,7 +84,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let names = [FILES.files, &["figures/"]].concat().join(", ");
     let written = folder.map(|it| format!("\nwritten to {}{place}: {names}", it.display()));
     let outcome = print::sections_above(common, &sections, &Vec::from_iter(written));
-    Ok(outcome.and(results.iter().try_for_each(refusal)))
+    Ok(outcome.and(refusal(&results)))
 }
 
 /// Scene with what is to be computed of it.
@@ -128,8 +128,9 @@ fn of_noise(level: f64, rule: &str) -> Error {
 }
 
 /// Failure if no figure could be given at all.
-fn refusal(result: &LimitResult) -> Result<()> {
-    let mut all = result.levels.iter().flat_map(|level| &level.limits);
+fn refusal(results: &[LimitResult]) -> Result<()> {
+    let levels = results.iter().flat_map(|result| &result.levels);
+    let mut all = levels.flat_map(|level| &level.limits);
     let first = all.clone().find_map(|figures| figures.refused.as_ref());
     match first {
         Some(refused) if all.all(|figures| figures.refused.is_some()) => {

@@ -106,6 +106,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         }
     }
     if arguments.plan {
+        wanted.bounds.extend(bounds);
         return Ok(print::Outcome::of(arguments.subject.plan_text(subject.name(), &wanted)?));
     }
     let folder = arguments.to.in_out().join(subject.name());

@@ -69,6 +69,12 @@ fn several_scenes_stand_in_one_table_with_the_figures_of_each_alone() {
         let line = table.lines().find(|line| line.starts_with(name));
         assert!(line.unwrap().contains(&format!("{z:.4} ± ")), "{table}");
     }
+    // One that has no limit takes nothing from the others.
+    let drifts = "[drift]\ngain = 0.02\n\n[noise]";
+    folder.write("drifts.toml", small_scene().replace("[noise]", drifts));
+    let table = folder.succeed(&["limit", "one.toml", "drifts.toml", "-n", "8"]);
+    assert!(table.lines().any(|line| line.starts_with("one ")), "{table}");
+    assert!(table.contains("not given"), "{table}");
     let twice = folder.fail(&["limit", "one.toml", "one.toml"], 2);
     assert!(twice.contains("two scenes have the same name"), "{twice}");
 }

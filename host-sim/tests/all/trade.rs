@@ -231,6 +231,11 @@ fn the_plan_of_a_trade_is_one_for_sweep() {
     }
     folder.succeed(&["sweep", "plan.toml", "--merge", "parts", "-o", "merged.csv"]);
     assert_eq!(folder.read("merged.csv"), folder.read("out/few/trade.csv"));
+    let bounded = [&few[..], &["--max-cycles", "9000", "--max-error", "0.1", "--plan"]].concat();
+    let plan: toml::Table = folder.succeed(&bounded).parse().unwrap();
+    let bounds = plan["bounds"].as_table().unwrap();
+    assert_eq!(bounds["cycles"].as_float(), Some(9000.0));
+    assert_eq!(bounds["rmse_dz_mm"].as_float(), Some(0.1));
 }
 
 /// The scene `press` with two rows and few frames.
