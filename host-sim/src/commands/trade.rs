@@ -14,10 +14,12 @@ use crate::trade::{self, Asked, Trade};
 use crate::verdict::{SLOT_BYTES, Warning};
 use crate::{Error, Result};
 use clap::Args;
-use taxel_data::{BadValue, columns};
+use taxel_data::{BadValue, Stream, columns};
 use taxel_learn::Options;
+use taxel_learn::train::projection;
+use taxel_simulate::Synthesis;
 
-use super::arguments::{self, of_option};
+use super::arguments::{self, blamed, of_option};
 use super::decoder_arguments::{DecoderArguments, ScanTimeArgument};
 use super::subject_argument::SubjectArgument;
 use super::{Common, command_line, print, sweep};
@@ -229,12 +231,29 @@ fn asked(arguments: &Arguments, subject: &Subject, common: &Common) -> Result<As
         most_bytes: arguments.max_flash.unwrap_or(SLOT_BYTES),
     };
     check(subject, &asked).map_err(of_option)?;
+    check_features(subject).map_err(|error| blamed(error, arguments.subject.training()))?;
     if let Some(scene) = subject.scene() {
         let left = |n| device.averaged(scene.world.noise, wires(subject, 1), n);
         let idle = |n: &usize| Warning::idle_averaging(*n, left);
         asked.samples_averaged.iter().filter_map(idle).for_each(|it| common.remark(it));
     }
     Ok(asked)
+}
+
+/// Checks the number of features, which is the same for all networks of the array.
+fn check_features(subject: &Subject) -> Result<()> {
+    /// Frames that tell which outputs there are.
+    const FEW_FRAMES: usize = 64;
+    let features = subject.options().features;
+    match subject {
+        Subject::Scene(scene) => {
+            let synthesis = Synthesis::new(&scene.world);
+            let few = scene.dataset(&synthesis, Stream::Training, FEW_FRAMES);
+            projection::check(&few, features)?;
+        }
+        Subject::Measured(data) => projection::check(&data.training, features)?,
+    }
+    Ok(())
 }
 
 /// Checks what is varied against the subject.
