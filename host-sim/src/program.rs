@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use taxel_data::DataFile;
 
 use crate::Result;
@@ -86,7 +86,7 @@ impl Command {
 
 /// Runs the command line with these arguments, of which the first is the program's name, and returns its exit status.
 pub fn main_from<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> u8 {
-    let cli = Cli::try_parse_from(arguments).unwrap_or_else(|error| advised(error).exit());
+    let cli = parsed(arguments).unwrap_or_else(|error| error.exit());
     commands::run_to_end(|| execute(cli, None).0)
 }
 
@@ -109,8 +109,7 @@ pub fn call(
     stop: &Arc<AtomicBool>,
 ) -> std::result::Result<Called, (String, u8)> {
     let all = ["taxel", "--json"].into_iter().chain(arguments.iter().map(String::as_str));
-    let cli = Cli::try_parse_from(all)
-        .map_err(|error| (advised(error).to_string().trim_end().to_owned(), 2))?;
+    let cli = parsed(all).map_err(|error| (error.to_string().trim_end().to_owned(), 2))?;
     let caller = Caller { tables, stop: Arc::clone(stop), remarks: Mutex::default() };
     let (outcome, common) = execute(cli, Some(caller));
     let remarks = common.caller.map_or(vec![], Caller::into_remarks);
@@ -120,6 +119,24 @@ pub fn call(
             Err((commands::message(&error), commands::exit_status(&error)))
         }
     }
+}
+
+/// Command line that is read from its words; a negative number is a value of the option before it, and not an option.
+fn parsed<A: Into<OsString> + Clone>(
+    words: impl IntoIterator<Item = A>,
+) -> std::result::Result<Cli, clap::Error> {
+    let matches = with_negative_numbers(Cli::command()).try_get_matches_from(words);
+    matches.and_then(|matches| Cli::from_arg_matches(&matches)).map_err(advised)
+}
+
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let takes = |option: Arg| {
+        let has_value = option.get_long().is_some()
+            && option.get_action().takes_values()
+            && option.get_num_args().is_none_or(|count| count.takes_values());
+        option.allow_negative_numbers(has_value)
+    };
+    command.mut_args(takes).mut_subcommands(with_negative_numbers)
 }
 
 /// A usage error with advice, where an option was taken for one with a similar name.

@@ -62,7 +62,7 @@ pub struct TrainingOptions {
     /// Ridge penalty on squared weights, for each frame: 1 is as strong as an input that is always 1. More of it
     /// generalises better from few or noisy frames, or to another day. With `train --select`, candidates [default: 1e-6 for all
     /// frames together, or 1e-7 a frame if refined].
-    #[arg(long, value_name = "P", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "P", value_delimiter = ',')]
     #[serde(default, with = "one_or_more")]
     pub penalty: Option<Vec<f64>>,
     /// Train as the paper does: a network for each row in f32 without an affine tail, centres by K-means, weights by
@@ -75,7 +75,7 @@ pub struct TrainingOptions {
     pub each_row: Option<bool>,
     /// Features that all readings are projected to: no more than outputs and products of two or three of these [default:
     /// as many as a row has readings; none for outputs that belong to no row].
-    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    #[arg(long, value_name = "F")]
     pub features: Option<usize>,
     /// Features: `plain`, made of readings as they are; or `normalised`, the shape of a touch apart from its strength, made of
     /// what exceeds 3 standard deviations of a reading at rest (normalised:K: K of them) [default: those with the least error

@@ -28,15 +28,10 @@ pub struct DataFileArguments {
     #[serde(flatten)]
     fields: FieldArguments,
     /// Use the first lines alone, this share of all: 0.8 leaves out the last fifth.
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE")]
     first_share: Option<f64>,
     /// Use the last lines alone, this share of all: 0.2 is what --first-share 0.8 leaves out.
-    #[arg(
-        long,
-        value_name = "SHARE",
-        conflicts_with = "first_share",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "SHARE", conflicts_with = "first_share")]
     last_share: Option<f64>,
 }
 
@@ -59,7 +54,7 @@ pub struct FieldArguments {
     #[serde(default, skip_serializing_if = "Not::not")]
     header: bool,
     /// Numbers that stand for a missing value, such as -1.
-    #[arg(long, value_name = "VALUE", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "VALUE", value_delimiter = ',')]
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     missing: Vec<f64>,
     /// Separator between the fields of a text file, which is otherwise found: comma, semicolon, tab, space, or another

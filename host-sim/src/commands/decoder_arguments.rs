@@ -14,7 +14,7 @@ pub struct DecoderArguments {
     #[arg(long, value_enum, default_value_t = ReadoutOption::Spi)]
     pub readout: ReadoutOption,
     /// Choose among decoders that take at most so many ms, from the start of a scan to its estimate.
-    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS")]
     pub max_latency_ms: Option<f64>,
     /// Outputs that determine the choice, such as dz_mm; in trade also all, by the mean of RMSE/standard deviation
     /// [default: the last of a scene, all of a data file].
@@ -26,7 +26,7 @@ pub struct DecoderArguments {
 #[derive(Args)]
 pub struct ScanTimeArgument {
     /// Time in ms of a scan of one sample a reading, which reads rows one after the other [default: what the board's takes].
-    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS")]
     pub scan_ms: Option<f64>,
 }
 

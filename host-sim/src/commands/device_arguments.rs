@@ -17,7 +17,7 @@ pub struct BaudArgument {
 #[derive(Args, Serialize)]
 pub struct ScanPeriodArgument {
     /// Time from one scan of a device to the next [default: the device's own].
-    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=1_000_000_000), allow_negative_numbers = true)]
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=1_000_000_000))]
     pub period_us: Option<u32>,
 }
 

@@ -10,10 +10,10 @@ use taxel_data::{Clock, DataFile};
 #[derive(Args, Serialize)]
 pub struct FilterArguments {
     /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/filter.md).
-    #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub filter_ms: Option<u32>,
     /// Time in ms by which the filter extrapolates outputs: their age when they are used.
-    #[arg(long, value_name = "MS", requires = "filter_ms", value_parser = milliseconds, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", requires = "filter_ms", value_parser = milliseconds)]
     pub lead_ms: Option<u32>,
 }
 
@@ -31,7 +31,7 @@ impl FilterArguments {
 #[derive(Args)]
 pub struct PeriodArgument {
     /// Time in ms from one frame to the next, for the filter; without it a file's column with the time tells.
-    #[arg(long, value_name = "MS", requires = "filter_ms", value_parser = period, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", requires = "filter_ms", value_parser = period)]
     period_ms: Option<u32>,
 }
 

@@ -19,7 +19,7 @@ const MOST_NAMED: usize = 5;
 pub struct HealthArguments {
     /// Readings in Ω outside of these limits count as missing (shorted or open), as on a device, and those of --baseline
     /// too. `none` believes all. Columns whose names do not end with _ohm have no limits.
-    #[arg(long, value_name = "LOW,HIGH", value_parser = limits, default_value = "5,1000", allow_negative_numbers = true)]
+    #[arg(long, value_name = "LOW,HIGH", value_parser = limits, default_value = "5,1000")]
     limits: Believed,
     /// Columns whose readings are taken for missing in every line.
     #[arg(long, value_name = "GLOB,…")]

@@ -37,13 +37,13 @@ pub struct Arguments {
     #[arg(value_name = "SCENE", default_value = DEFAULT_SCENE)]
     scenes: Vec<String>,
     /// Levels of the white noise, instead of the scene's: fractions (0.01 is 1 %), or in ohm for absolute noise.
-    #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "LEVEL,…", value_delimiter = ',')]
     noise: Vec<f64>,
     /// Row-wire (from 1) that is read, instead of all that the scene reads.
-    #[arg(long, value_name = "ROW", allow_negative_numbers = true)]
+    #[arg(long, value_name = "ROW")]
     row: Option<usize>,
     /// Test frames [default: 400, or 400 posteriors of rows where rows move independently].
-    #[arg(short = 'n', long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
     /// Models of the scenes to judge on the same frames: their errors, and the ratios of these to the limit.
     #[arg(long, value_name = "FILE,…", value_delimiter = ',')]

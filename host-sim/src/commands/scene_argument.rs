@@ -82,13 +82,7 @@ pub fn group_of_scene(scene: &Experiment, group: &str) -> Result<()> {
 #[derive(Args)]
 pub struct FramesArgument {
     /// Frames to synthesise; lines of a CSV file are repeated.
-    #[arg(
-        short = 'n',
-        long,
-        value_name = "N",
-        default_value_t = 1000,
-        allow_negative_numbers = true
-    )]
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 1000)]
     pub frames: usize,
 }
 
@@ -119,7 +113,7 @@ pub struct ModelArgument {
 #[derive(Args, Default)]
 pub struct NoiseArgument {
     /// Level of the white noise, instead of the scene's: a fraction (0.01 is 1 %), or in ohm for absolute noise.
-    #[arg(long, value_name = "LEVEL", allow_negative_numbers = true)]
+    #[arg(long, value_name = "LEVEL")]
     noise: Option<f64>,
 }
 

@@ -50,7 +50,7 @@ pub struct Arguments {
     #[command(flatten)]
     scan: ScanTimeArgument,
     /// Multiply all readings by this, as a sensor does whose gain has drifted: 1.02 is 2 % more.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     scale: f64,
     #[command(flatten)]
     to: arguments::OutputFile,

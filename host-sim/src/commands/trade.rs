@@ -59,7 +59,7 @@ pub struct Arguments {
     #[arg(long, value_name = "STEP", value_delimiter = ',')]
     column_step: Vec<usize>,
     /// Choose the cheapest point with an RMSE of at most this, in the group's unit.
-    #[arg(long, value_name = "RMSE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "RMSE")]
     max_error: Option<f64>,
     /// Choose within so many cycles a frame, at zero wait. Unless --max-error is given,
     /// the most accurate point within all bounds is chosen (of errors that test frames do not tell apart, the cheapest).
@@ -69,10 +69,10 @@ pub struct Arguments {
     #[arg(long, value_name = "BYTES")]
     max_flash: Option<usize>,
     /// Choose among points that scan and decode at least so many frames a second.
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ")]
     frame_rate: Option<f64>,
     /// Clock of the device.
-    #[arg(long, value_name = "MHZ", default_value_t = BOARD_CLOCK_MHZ, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MHZ", default_value_t = BOARD_CLOCK_MHZ)]
     clock_mhz: f64,
     #[command(flatten)]
     scan: ScanTimeArgument,
@@ -320,7 +320,7 @@ fn centres(given: &[usize], subject: &Subject, common: &Common) -> Result<Vec<us
         let names: Vec<String> = too_many.iter().map(ToString::to_string).collect();
         let names = names.join(", ");
         common.remark(format_args!(
-            "note: K = {names} is not tried: there must be fewer centres than the {frames} training frames"
+            "note: K = {names} left out: there must be fewer centres than the {frames} training frames"
         ));
     }
     Ok(fit)

@@ -18,7 +18,7 @@ use super::super::filter_arguments::FilterArguments;
 #[derive(Args)]
 pub struct ScanArguments {
     /// Frames to scan.
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u16).range(1..), allow_negative_numbers = true)]
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u16).range(1..))]
     pub frames: u16,
     #[command(flatten)]
     pub timing: TimingArguments,
@@ -30,10 +30,10 @@ pub struct TimingArguments {
     #[command(flatten)]
     pub period: ScanPeriodArgument,
     /// Wait after a row is driven.
-    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=10_000), allow_negative_numbers = true)]
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=10_000))]
     settling_us: Option<u32>,
     /// Samples averaged for a reading.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=256), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=256))]
     oversampling: Option<u16>,
 }
 

@@ -24,7 +24,7 @@ pub struct ConfigureArguments {
     #[arg(long, value_name = "OHM")]
     open_above_ohm: Option<f32>,
     /// Relative change against the baseline that counts as contact.
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE")]
     contact_threshold: Option<f32>,
     #[command(flatten)]
     reports: ReportArguments,
