@@ -151,9 +151,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     Ok(print::sections_above(common, &with(arguments.all), &written).and(choice))
 }
 
-/// Command line that tries the same points, without a bound.
+/// Command line that tries the same points, without a bound but that of a blob's size, which the front keeps to.
 fn without_bounds(arguments: &Arguments, asked: &Asked) -> String {
-    let bounds = ["--max-error", "--max-cycles", "--max-flash", "--max-latency-ms", "--frame-rate"];
+    let bounds = ["--max-error", "--max-cycles", "--max-latency-ms", "--frame-rate"];
     let command = command_line::of_this_process("trade", &bounds, None);
     // Bounds on time try more steps.
     if arguments.column_step.is_empty() && asked.column_steps.len() > 1 {

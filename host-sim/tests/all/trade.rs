@@ -314,6 +314,9 @@ fn measurements_are_traded_as_they_are() {
     assert!(page.contains("80 measured test frames (the last fifth)"), "{page}");
     assert!(page.contains("1.425 ms to scan") && page.contains("2 × 18 wires"), "{page}");
     assert!(folder.path("out/data/chosen.bin").exists());
+    // What to type for a point of the front keeps the bound that the front was made with.
+    let html = folder.read("out/data/trade.html");
+    assert!(html.contains("<span>--max-flash</span> <span>40000</span>"), "{html}");
 
     // All that is said of the data stands in a plan for it.
     folder.succeed(&["synth", "small.toml", "-n", "9", "--untouched", "-o", "rest.csv"]);
