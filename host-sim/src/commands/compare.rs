@@ -8,7 +8,7 @@ use crate::sweep::fields::require_known;
 use crate::sweep::file::Wanted;
 use crate::sweep::plan::{Base, SEED};
 use crate::sweep::{Merged, Plan, layouts, work};
-use crate::training_options::TrainingOptions;
+use crate::training_options::{Training, TrainingOptions};
 use crate::{Error, Result, report};
 use clap::Args;
 use toml::Value;
@@ -61,6 +61,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     if labels.len() < bases.len() {
         return Err(Error::Usage("a scene is given twice; give each once".into()));
     }
+    check(&arguments.training)?;
     let first = bases.first().map_or(String::new(), |base| base.label.clone());
     let build = super::sweep::build()?;
     let mut plan = Plan::new("compare", (bases, None), wanted(arguments, common)?, &build)?;
@@ -88,6 +89,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         written.push(format!("\nwritten: {}", files.names()));
     }
     Ok(print::sections_above(common, &sections, &written))
+}
+
+/// Checks what holds for all layouts, so that a refusal names an option, and not a field of the plan.
+fn check(training: &TrainingOptions) -> Result<()> {
+    let check_one = |centres| {
+        let one = TrainingOptions { centres: Some(vec![centres]), ..training.clone() };
+        // The number of frames is that of each scene.
+        one.over(&Training::default())?.options.check(usize::MAX)
+    };
+    let centres = training.centres.clone().unwrap_or(vec![1]);
+    let checked = centres.into_iter().try_for_each(check_one);
+    checked.map_err(|bad| arguments::of_option(arguments::named(bad, training)))
 }
 
 /// What is wanted of the layouts.

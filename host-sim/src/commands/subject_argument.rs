@@ -187,7 +187,9 @@ impl SubjectArgument {
         refuse(
             &self.options.training,
             |field| field == "method",
-            |option| format!("{option} is no way that a device would choose: leave it out"),
+            |option| {
+                format!("trade compares its own ways to train, and takes no {option}: leave it out")
+            },
         )
     }
 

@@ -49,6 +49,7 @@ mod files;
   taxel trade moving --readout onchip --average 1,4,12 --max-latency-ms 2
   taxel trade press --plan > plan.toml
   taxel trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
+#[command(mut_arg("method", |it| it.hide(true)))]
 pub struct Arguments {
     #[command(flatten)]
     to: arguments::OutputFolder,
