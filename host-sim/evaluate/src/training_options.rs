@@ -31,6 +31,13 @@ pub struct Training {
     pub reading_model: Option<Extent>,
 }
 
+impl Training {
+    /// Whether training takes folds of its frames.
+    pub fn takes_folds(&self) -> bool {
+        self.refine || self.reading_model == Some(Extent::Full)
+    }
+}
+
 impl Default for Training {
     fn default() -> Self {
         let options = Options::default();

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, Command};
@@ -64,8 +63,8 @@ pub fn refuse<A: Args + Serialize>(
     refused.map_or(Ok(()), |(_, option)| Err(Error::Usage(message(&option))))
 }
 
-/// A `bad` value of training, named by the option that gave it, if one of `options` did.
-pub fn named(mut bad: BadValue, options: &TrainingOptions) -> BadValue {
+/// A `bad` value, named by the option that gave it, if one of `options` did.
+pub fn named<A: Args + Serialize>(mut bad: BadValue, options: &A) -> BadValue {
     for (field, option) in given(options) {
         let path = format!("training.{field}");
         bad.rule = bad.rule.replace(&path, &option);
@@ -84,8 +83,8 @@ pub fn of_option(bad: BadValue) -> Error {
     bad.into()
 }
 
-/// An `error` of training, in which a value is named by the option that gave it, if one of `options` did.
-pub fn blamed(error: Error, options: &TrainingOptions) -> Error {
+/// An `error`, in which a bad value is named by the option that gave it, if one of `options` did.
+pub fn blamed<A: Args + Serialize>(error: Error, options: &A) -> Error {
     match error {
         Error::Data(taxel_data::Error::Setting(bad)) => of_option(named(bad, options)),
         error => error,

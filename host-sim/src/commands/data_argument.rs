@@ -102,8 +102,8 @@ impl DataOptions {
             |field| field.starts_with("fold"),
             |option| {
                 format!(
-                    "{option} has no effect without refinement, --select or --reading-model full: leave it out, or leave \
-                 out --no-refine"
+                    "{option} has no effect: refinement, `train --select` and --reading-model full take folds, and none is \
+                     asked for; leave it out, or add one of these"
                 )
             },
         )

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::Common;
-use super::arguments::{named, of_option, refuse};
+use super::arguments::{blamed, named, of_option, refuse};
 use super::data_argument::{DataOptions, JudgedBy};
 use super::data_file::DATA_FILES;
 use super::scene_argument::{DEFAULT_SCENE, NoiseArgument};
@@ -118,20 +118,10 @@ impl SubjectArgument {
         let source = self.source.as_deref().unwrap_or(DEFAULT_SCENE);
         let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
         let subject = self.options.load(source, (training, false), common, judged)?;
-        match &subject {
-            Subject::Scene(_) if self.test.is_some() => {
-                let message =
-                    "--test is for a CSV file; a scene has test frames of its own: leave it out";
-                return Err(Error::Usage(message.into()));
-            }
-            // A fold column may tell which frames to judge by.
-            Subject::Measured(data)
-                if !(data.how.refine
-                    || self.options.data.has_fold_column() && self.test.is_none()) =>
-            {
-                self.options.data.refuse_folds()?;
-            }
-            Subject::Scene(_) | Subject::Measured(_) => {}
+        if subject.scene().is_some() && self.test.is_some() {
+            let message =
+                "--test is for a CSV file; a scene has test frames of its own: leave it out";
+            return Err(Error::Usage(message.into()));
         }
         Ok(subject)
     }
@@ -239,7 +229,14 @@ impl SubjectOptions {
                 return Err(Error::Usage(message.into()));
             }
             let how = (training, common.seed.unwrap_or(1));
-            Subject::Measured(Box::new(self.data.load(Path::new(source), how, judged, common)?))
+            let data = self.data.load(Path::new(source), how, judged, common);
+            let data = data.map_err(|error| blamed(blamed(error, training), &self.data))?;
+            // A fold column may tell which frames to judge by.
+            let judges = self.data.has_fold_column() && matches!(judged, JudgedBy::HeldOut);
+            if !(selects || judges || data.how.takes_folds()) {
+                self.data.refuse_folds()?;
+            }
+            Subject::Measured(Box::new(data))
         };
         let checked = subject.options().check(subject.training_frames());
         checked.map_err(|bad| of_option(named(bad, training)))?;

@@ -97,18 +97,8 @@ fn load(arguments: &Arguments, common: &Common) -> Result<Subject> {
     }
     let how = (&training, arguments.select);
     let subject = options.load(&arguments.source, how, common, JudgedBy::None)?;
-    match &subject {
-        Subject::Measured(data)
-            if !(data.how.refine
-                || data.how.reading_model == Some(Extent::Full)
-                || arguments.select) =>
-        {
-            options.data.refuse_folds()?;
-        }
-        Subject::Measured(data) if data.training.relative_inputs => {
-            options.data.refuse_time("train --relative-inputs")?;
-        }
-        Subject::Scene(_) | Subject::Measured(_) => {}
+    if subject.measurements().is_some_and(|data| data.training.relative_inputs) {
+        options.data.refuse_time("train --relative-inputs")?;
     }
     Ok(subject)
 }
