@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use taxel_data::clock::neighbours_alike;
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::Grid;
-use taxel_data::{DataFile, Rest, Table};
+use taxel_data::{DataFile, Rest, Table, require};
 use taxel_learn::select;
 
 use super::Common;
@@ -153,14 +153,13 @@ impl DataOptions {
     pub fn folds_of(&self, outputs: &Table, seed: u64) -> Result<Vec<usize>> {
         const USUAL: usize = 5;
         let frames = outputs.len();
-        let (option, folds) = match (self.fold_blocks, self.folds) {
-            (Some(folds), _) => ("--fold-blocks", folds),
-            (None, Some(folds)) => ("--folds", folds),
-            (None, None) => ("--folds", frames.min(USUAL)),
+        let (field, folds) = match (self.fold_blocks, self.folds) {
+            (Some(folds), _) => ("fold_blocks", folds),
+            (None, Some(folds)) => ("folds", folds),
+            (None, None) => ("folds", frames.min(USUAL)),
         };
-        if !(2..=frames).contains(&folds) {
-            return Err(Error::Usage(format!("{option} {folds}: give from 2 to {frames}")));
-        }
+        let is_possible = (2..=frames).contains(&folds);
+        require(is_possible, field, folds, || format!("give from 2 to {frames}"))?;
         let in_blocks =
             self.fold_blocks.is_some() || self.folds.is_none() && neighbours_alike(outputs);
         Ok(if in_blocks {

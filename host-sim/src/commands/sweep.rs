@@ -63,7 +63,14 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         return Err(Error::Usage(message.into()));
     }
     let load = |data: &toml::Table, training: &TrainingOptions, seed| {
-        PlannedData::read(data, &arguments.plan)?.load(training, seed, common)
+        let data = PlannedData::read(data, &arguments.plan)?.load(training, seed, common);
+        data.map_err(|error| match error {
+            Error::Data(taxel_data::Error::Setting(bad)) => {
+                let plan = arguments.plan.display();
+                taxel_data::Error::unfit(format!("plan {plan}: {bad}")).into()
+            }
+            error => error,
+        })
     };
     let plan = Plan::read(&arguments.plan, &build()?, &load)?;
     let points = plan.points()?;

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{DataOptions, JudgedBy, check_level, with_options};
-use crate::commands::arguments::{named, of_option};
 use crate::commands::mat_cells::MatCells;
 use crate::commands::{Common, data_notes, readings, refused_readings};
 use crate::measurements::{Frames, Judged, Log, Measurements, Split, Spread};
@@ -22,7 +21,8 @@ use taxel_learn::train::{projection, resolution};
 use taxel_learn::{Options, select};
 
 impl DataOptions {
-    /// Measurements in the CSV file at `path`, for models trained as `given` says, with this `seed`.
+    /// Measurements in the CSV file at `path`, for models trained as `given` says, with this `seed`. Errors name bad values
+    /// by their fields, whether options or a plan gave them.
     pub fn load(
         &self,
         path: &Path,
@@ -30,8 +30,7 @@ impl DataOptions {
         judged: JudgedBy<'_>,
         common: &Common,
     ) -> Result<Measurements> {
-        let named = |bad| of_option(named(bad, given));
-        let how = given.over(&Training::default()).map_err(named)?;
+        let how = given.over(&Training::default())?;
         let file = self.file.read(path, common)?;
         let [inputs, outputs] = self.patterns();
         let unused = UnusedInputs::find(&file, inputs, outputs).map_err(with_options)?;
@@ -116,7 +115,7 @@ impl DataOptions {
             rest,
             how: Training { options, relative_inputs: how.relative_inputs, ..Training::default() },
         };
-        measurements.train_with(given).map_err(named)?;
+        measurements.train_with(given)?;
         let constant = measurements.constant_inputs();
         data_notes::print_constant(&constant, path, common);
         Ok(measurements)

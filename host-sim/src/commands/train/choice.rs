@@ -12,6 +12,7 @@ use taxel_learn::train::Refinement;
 
 use super::Arguments;
 use crate::commands::Common;
+use crate::commands::arguments::blamed;
 use crate::commands::progress::Terminal;
 
 /// Spreads that are tried for centres of K-means. Refinement moves the width itself.
@@ -48,7 +49,11 @@ pub fn choose(
     let features = set.choose(options, &Terminal::new(common));
     let fold_of = match subject {
         Subject::Measured(data) => data.fold_of.clone(),
-        Subject::Scene(_) => arguments.subject.data.folds_of(&set.frames.outputs, options.seed)?,
+        Subject::Scene(_) => {
+            let data = &arguments.subject.data;
+            let folds = data.folds_of(&set.frames.outputs, options.seed);
+            folds.map_err(|error| blamed(error, data))?
+        }
     };
     let selection = select::cross_validate(
         &set.frames,
