@@ -1,6 +1,7 @@
 //! Command `view`: a sensor in the browser, live.
 
 use std::io::{ErrorKind, Write};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::{self, Stdio};
 use std::sync::mpsc::Receiver;
@@ -27,6 +28,8 @@ use crate::live::watch::{Watched, watch};
 use crate::report::Sections;
 use crate::{Error, Result};
 
+/// Frames a second that can be shown of a simulation or a data file.
+const SHOWN_RATES: RangeInclusive<f64> = 0.01..=10_000.0;
 /// Frames a second of a simulation.
 const SIMULATED_RATE: f64 = 100.0;
 /// Speed of FlexiTac's line in bits a second.
@@ -203,6 +206,10 @@ fn check_options(arguments: &Arguments, source: &Source) -> Result<()> {
     }
     if matches!(source, Source::Data(_)) { Ok(()) } else { arguments.file.refuse() }
 }
+    if let Some(rate) = arguments.rate.frame_rate.filter(|rate| !SHOWN_RATES.contains(rate)) {
+        let message = format!("--frame-rate {rate}: give frames a second from 0.01 to 10000");
+        return Err(Error::Usage(message));
+    }
 
 /// What the argument names, or what there is without one.
 fn source(arguments: &Arguments, common: &Common) -> Result<Source> {
