@@ -155,7 +155,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<crate::commands
             upload::confirm(&mut device)?;
             status::show(&mut device, common)
         }
-        Action::Record(action) => record::record(&mut open()?, action, common),
+        Action::Record(action) => {
+            action.check()?;
+            record::record(&mut open()?, action, common)
+        }
         Action::Baseline(action) => record::baseline(&mut open()?, action, common),
         Action::Configure(action) => settings::configure(&mut open()?, action, common),
         Action::Constants(action) => constants::execute(&mut open()?, action, common),

@@ -59,19 +59,28 @@ pub struct BaselineArguments {
 /// Share of the frames that were asked for below which the device misses some.
 const MISSED: f64 = 0.98;
 
-/// Checks before long work that the options go together, and that the file can be written.
-fn check_usage(action: &RecordArguments) -> Result<()> {
-    action.scan.timing.period.check()?;
-    let inputs: Vec<&Path> = action.model.iter().map(PathBuf::as_path).collect();
-    if is_recording(&action.to.output) {
-        if action.time {
+impl RecordArguments {
+    /// Checks, before a device is asked, that the options go together, and that the file can be written.
+    pub fn check(&self) -> Result<()> {
+        self.scan.timing.period.check()?;
+        if self.model.is_none() || self.readings {
+            let of_estimates = |option: &str| {
+                format!(
+                    "{option} is of estimates, and readings are saved: name the MODEL, without --readings"
+                )
+            };
+            refuse(&self.reports, |_| true, of_estimates)?;
+        }
+        if !is_recording(&self.to.output) {
+            let inputs: Vec<&Path> = self.model.iter().map(PathBuf::as_path).collect();
+            return print::check_output(&self.to.output, &inputs);
+        }
+        if self.time {
             let message = "-o: a recording has the times of all scans; leave --time out";
             return Err(Error::Usage(message.into()));
         }
-    } else {
-        print::check_output(&action.to.output, &inputs)?;
+        Ok(())
     }
-    Ok(())
 }
 
 pub fn record(
@@ -80,7 +89,6 @@ pub fn record(
     common: &Common,
 ) -> Result<print::Outcome> {
     let model = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
-    check_usage(action)?;
     let identity = device.identify()?;
     let blob = model.as_ref();
     let model = blob.map(ModelBlob::parse);
@@ -101,17 +109,6 @@ pub fn record(
         }
         _ => (Wanted::Readings, reading_names(&identity, model.as_ref())?),
     };
-    if wanted == Wanted::Readings {
-        refuse(
-            &action.reports,
-            |_| true,
-            |option| {
-                format!(
-                    "{option} is of estimates, and readings are saved: name the MODEL, without --readings"
-                )
-            },
-        )?;
-    }
     let confidence = action.reports.confidence.unwrap_or(Confidence::Nothing);
     let outputs = names.len();
     if let Some(model) = &model {
