@@ -97,7 +97,7 @@ pub fn sections(result: &LimitResult) -> Sections {
     }
     sections.heading("Least possible errors");
     let lines = lines(slice::from_ref(result));
-    sections.table_as("limits", limits(&lines, |line| name(&line.of.row_wires)));
+    sections.table_as("limits", limits(&lines));
     refusals(&mut sections, &lines, |line| name(&line.of.row_wires));
     models(&mut sections, slice::from_ref(result));
     sections.heading("Directions of the deformation");
@@ -111,9 +111,9 @@ pub fn several(results: &[LimitResult]) -> Sections {
     let mut sections = Sections::new("What the sensors can know");
     let name_of = |line: &Line<'_>| line.result.subject.clone();
     let mut lines = lines(results);
-    sections.rows("limits", limits(&lines, name_of));
+    sections.rows("limits", limits(&lines));
     lines.retain(|line| line.is_whole);
-    sections.table(limits(&lines, name_of));
+    sections.table(limits(&lines));
     refusals(&mut sections, &lines, name_of);
     models(&mut sections, results);
     sections.rows("directions", directions_table(&directions_of(results)));
@@ -148,19 +148,22 @@ fn lines(results: &[LimitResult]) -> Vec<Line<'_>> {
     lines
 }
 
-/// Table of limits, with columns for each group of outputs. Lines have a name.
-fn limits<'r>(
-    lines: &'r [Line<'r>],
-    name_of: impl Fn(&'r Line<'r>) -> String,
-) -> TableOf<'r, Line<'r>> {
+/// Table of limits, with columns for each group of outputs.
+fn limits<'r>(lines: &'r [Line<'r>]) -> TableOf<'r, Line<'r>> {
     let caption = "Least possible RMSE of any decoder, ± its standard error over the frames: root of the posteriors' mean variance. \
                    Prior: always predicting the mean. ESS: smallest and median effective sample size of the posteriors. Own error: \
                    largest share of the squared error that is the sample's own; it is subtracted.";
-    let mut table = TableOf::new(lines, caption)
-        .values("scene", |line| line.result.subject.as_str().into())
+    let scene = |line: &Line<'r>| line.result.subject.clone();
+    let table = TableOf::new(lines, caption);
+    let mut table = if lines.iter().all(|line| scene(line) == scene(&lines[0])) {
+        table.values("scene", |line| scene(line).into())
+    } else {
+        table.names("scene", "scene", scene)
+    };
+    table = table
         .values("noise_level", |line| number_value(Some(line.level.noise_level)))
         .values("row_wires", |line| line.of.row_wires.clone().into())
-        .names("readings", "readings", name_of)
+        .names("readings", "readings", |line| name(&line.of.row_wires))
         .names("noise", "noise", Line::noise);
     let mut names: Vec<&GroupLimit> = vec![];
     for group in lines.iter().flat_map(|line| &line.of.groups) {
@@ -192,6 +195,7 @@ fn limits<'r>(
         .cells("effective_samples", "ESS", |line| {
             (text(line), number_value(samples(line).map(|it| it.least)))
         })
+        .values("effective_samples_median", |line| number_value(samples(line).map(|it| it.median)))
         .numbers("monte_carlo_percent", "own error", "%", Digits::Decimals(2), own)
         .values("refused", |line| line.of.refused.clone().map_or(Value::Null, Value::from))
 }
