@@ -250,7 +250,7 @@ fn by_row(sections: &mut Sections, rows: &[RowErrors]) {
     let groups = rows.first().map_or(&[][..], |row| &row.errors);
     let table =
         TableOf::new(rows, "RMSE of the model by row-wire.")
-            .names("row_wire", "row-wire", |row| row.row_wire.to_string());
+            .named("row_wire", "row-wire", |row| (row.row_wire.to_string(), row.row_wire.into()));
     sections.table_as("by_row", with_rmse(table, groups, |row| &row.errors));
 }
 

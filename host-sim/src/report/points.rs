@@ -34,13 +34,27 @@ fn result_text(setting: &Setting, name: &str) -> String {
     }
 }
 
-/// Text of a setting's value of a field.
-fn field_text(setting: &Setting, field: &str) -> String {
-    match setting.values.get(field) {
-        Some(Value::String(text)) => text.clone(),
-        Some(value) => value.to_string(),
-        None => UNDEFINED.into(),
-    }
+/// Setting's value of a field, and its text.
+fn field_value(setting: Option<&Setting>, field: &str) -> (String, Value) {
+    let value = setting.and_then(|it| it.values.get(field)).cloned().unwrap_or_default();
+    let text = match &value {
+        Value::Null => UNDEFINED.into(),
+        Value::String(text) => text.clone(),
+        value => value.to_string(),
+    };
+    (text, value)
+}
+
+/// Headings of `fields`: their last names, or the whole paths of those whose last names are alike.
+fn headings(fields: &[&str]) -> Vec<String> {
+    let is_name = |part: &&str| part.parse::<usize>().is_err();
+    let last = |field: &&str| field.rsplit('.').find(is_name).unwrap_or(field).replace('_', " ");
+    let last: Vec<String> = fields.iter().map(last).collect();
+    let is_one = |name: &String| last.iter().filter(|it| *it == name).count() == 1;
+    let heading = |(name, field): (&String, &&str)| {
+        if is_one(name) { name.clone() } else { (*field).to_owned() }
+    };
+    last.iter().zip(fields).map(heading).collect()
 }
 
 /// Adds columns of the fields that settings differ in, and of these results. A row without a setting has none of them.
@@ -49,12 +63,8 @@ pub fn with_results<'r, R>(
     (fields, results): (&[&str], &[&str]),
     setting: impl Fn(&'r R) -> Option<&'r Setting>,
 ) -> TableOf<'r, R> {
-    let is_name = |part: &&str| part.parse::<usize>().is_err();
-    for field in fields {
-        let heading = field.rsplit('.').find(is_name).unwrap_or(field).replace('_', " ");
-        table = table.names(field, &heading, |row| {
-            setting(row).map_or(UNDEFINED.into(), |it| field_text(it, field))
-        });
+    for (field, heading) in fields.iter().zip(headings(fields)) {
+        table = table.named(field, &heading, |row| field_value(setting(row), field));
     }
     for result in results {
         let Quantity { heading, unit, .. } = Quantity::of(result);
@@ -395,4 +405,16 @@ fn levels(sections: &mut Sections, merged: &Merged) -> Section {
     let table = table.table();
     sections.value("levels", &table);
     Section::Table(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_whose_last_names_are_alike_have_their_paths_for_headings() {
+        let fields = ["sensor.size_mm.0", "sensor.size_mm.2", "training.each_row"];
+        assert_eq!(headings(&fields), ["sensor.size_mm.0", "sensor.size_mm.2", "each row"]);
+        assert_eq!(headings(&fields[1..]), ["size mm", "each row"]);
+    }
 }

@@ -227,3 +227,10 @@ fn names_are_escaped() {
     assert!(page.contains("&lt;i&gt;") && !page.contains("<i>"));
     assert!(page.contains("&lt;b&gt;&quot;&amp;") && !page.contains("<b>\"&"));
 }
+
+#[test]
+fn rows_are_named_by_numbers_where_programs_read_them() {
+    let json: serde_json::Value = serde_json::from_str(&super::of_run(&result()).json()).unwrap();
+    let rows = json["by_row"].as_array().unwrap().iter().map(|row| row["row_wire"].as_u64());
+    assert_eq!(rows.collect::<Vec<_>>(), [Some(2), Some(3), Some(4)]);
+}

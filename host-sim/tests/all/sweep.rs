@@ -393,6 +393,7 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
     let json: Value = serde_json::from_str(&folder.read("out/compare.json")).unwrap();
     for (layout, name) in json["layouts"].as_array().unwrap().iter().zip(names) {
         assert_eq!(layout["layout"], name);
+        assert!(layout["training.centres"].is_u64(), "{layout}");
         let rmse = layout["rmse_dz_mm"].as_f64().unwrap().to_string();
         assert!(table.lines().any(|line| line.contains(name) && line.contains(&rmse)), "{rmse}");
     }

@@ -105,7 +105,13 @@ impl<'r, R> TableOf<'r, R> {
     /// Adds a column of names, which say what rows are about.
     #[must_use]
     pub fn names(self, key: &str, heading: &str, name: impl Fn(&'r R) -> String) -> Self {
-        self.column((key, Some(heading.into()), true), |row| of_text(name(row)))
+        self.named(key, heading, |row| of_text(name(row)))
+    }
+
+    /// Adds a column of names with their text and their value, such as numbers of row-wires.
+    #[must_use]
+    pub fn named(self, key: &str, heading: &str, name: impl Fn(&'r R) -> (String, Value)) -> Self {
+        self.column((key, Some(heading.into()), true), name)
     }
 
     /// Adds a column of a quantity as text.
