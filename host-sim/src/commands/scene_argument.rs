@@ -15,8 +15,7 @@ pub const DEFAULT_SCENE: &str = "press";
 /// Scene, with the settings that are changed in it.
 #[derive(Args)]
 pub struct SceneArgument {
-    /// A built-in scene (paper, press, contact, moving) or the path of a scene file. A check also takes a CSV file with the
-    /// readings of --model.
+    /// A built-in scene (paper, press, contact, moving) or the path of a scene file.
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
 }
@@ -81,7 +80,7 @@ pub fn group_of_scene(scene: &Experiment, group: &str) -> Result<()> {
 /// Number of frames of a command that draws or repeats them.
 #[derive(Args)]
 pub struct FramesArgument {
-    /// Frames to synthesise; lines of a CSV file are repeated.
+    /// Frames to synthesise.
     #[arg(short = 'n', long, value_name = "N", default_value_t = 1000)]
     pub frames: usize,
 }
@@ -104,7 +103,7 @@ fn rate(text: &str) -> std::result::Result<f64, String> {
 /// Model that decodes.
 #[derive(Args)]
 pub struct ModelArgument {
-    /// Weight blob. It names what a device decodes, and decodes what nobody has decoded; a scene without one trains its own.
+    /// Weight blob.
     #[arg(long, value_name = "BLOB")]
     pub model: Option<PathBuf>,
 }

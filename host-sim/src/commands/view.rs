@@ -43,6 +43,8 @@ const FLEXITAC_SHAPE: [usize; 2] = [16, 32];
 /// fixed scales, the contact over time, what is wrong, and how old the picture is. It zeroes, pauses, records and takes
 /// screenshots. docs/live.md tells more.
 #[derive(Args)]
+#[command(mut_arg("model", |it| it.help("Weight blob. It names what a device decodes, and decodes what nobody has decoded; a \
+                                         scene without one trains its own")))]
 #[command(after_help = "Examples:
   taxel view                          # the device that is plugged in, or else a simulation
   taxel view /dev/ttyACM0 --model press.bin
@@ -204,12 +206,12 @@ fn check_options(arguments: &Arguments, source: &Source) -> Result<()> {
         let message = "--frame-rate is for a simulation or a data file: leave it out";
         return Err(Error::Usage(message.into()));
     }
-    if matches!(source, Source::Data(_)) { Ok(()) } else { arguments.file.refuse() }
-}
     if let Some(rate) = arguments.rate.frame_rate.filter(|rate| !SHOWN_RATES.contains(rate)) {
         let message = format!("--frame-rate {rate}: give frames a second from 0.01 to 10000");
         return Err(Error::Usage(message));
     }
+    if matches!(source, Source::Data(_)) { Ok(()) } else { arguments.file.refuse() }
+}
 
 /// What the argument names, or what there is without one.
 fn source(arguments: &Arguments, common: &Common) -> Result<Source> {

@@ -21,3 +21,23 @@ fn quiet_work_says_nothing_and_verbose_work_the_time_of_each_stage() {
     // Errors are said.
     assert!(folder.fail(&["-q", "inspect", "none.bin"], 2).contains("none.bin"));
 }
+
+#[test]
+fn help_says_what_holds_for_its_command() {
+    let folder = Folder::new("help");
+    let help = |command: &[&str]| {
+        let text = folder.succeed(&[command, &["--help"]].concat());
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let (repeated, readings) = ("lines of a CSV file are repeated", "a CSV file with the readings");
+    for check in [&["emulate"][..], &["link", "port", "check"]] {
+        assert!(help(check).contains(repeated) && help(check).contains(readings));
+    }
+    let synth = help(&["synth"]);
+    assert!(!synth.contains(repeated) && !synth.contains(readings), "{synth}");
+    let decodes = "decodes what nobody has decoded";
+    assert!(help(&["view"]).contains(decodes));
+    assert!(!help(&["link", "port", "baseline"]).contains(decodes));
+    // An option that is refused.
+    assert!(!help(&["trade"]).contains("--paper"));
+}

@@ -47,6 +47,7 @@ pub struct RecordArguments {
 }
 
 #[derive(Args)]
+#[command(mut_arg("model", |it| it.help("Weight blob of the device: its readings are saved, by the names that it has for them")))]
 pub struct BaselineArguments {
     #[command(flatten)]
     scan: ScanArguments,
