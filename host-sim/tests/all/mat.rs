@@ -72,3 +72,21 @@ fn a_mat_of_numbered_columns_is_named_after_its_wires_and_told_its_image() {
             && !page.contains("href=\"figures")
     );
 }
+
+/// Statistics of readings are calibrated on folds that are held out, by models with the features that were chosen.
+#[test]
+fn a_trade_calibrates_its_model_as_run_does() {
+    let folder = Folder::new("mat_calibrated");
+    folder.write("mat.csv", log([6, 6], 600));
+    let of = |command: &str| {
+        let words = format!(
+            "{command} mat.csv --inputs adc_* --outputs x_mm,y_mm,force_n --no-refine --centres 8 \
+             --format f32 --reading-model full -o {command}"
+        );
+        let more = if command == "trade" { " --average 1 --max-cycles 100000000" } else { "" };
+        folder.succeed(&(words + more).split_whitespace().collect::<Vec<_>>())
+    };
+    ["run", "trade"].iter().for_each(|command| drop(of(command)));
+    let blob = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert!(blob("run/mat/model.bin") == blob("trade/mat/chosen.bin"));
+}

@@ -125,8 +125,10 @@ fn train_each(
                             let trained = trained[place.unwrap_or(0)].as_ref();
                             let trained =
                                 trained.map_err(|why| crate::Error::failed(why.to_string()))?;
+                            let starts = starts.as_ref().map_err(crate::Error::failed)?;
+                            let chosen = starts.chosen(options);
                             let blob =
-                                frames.set.packed(pack_to_judge, trained, options, &Silent)?;
+                                frames.set.packed(pack_to_judge, trained, &chosen, &Silent)?;
                             frames.judge(&blob, options)
                         });
                         for Member { index, point, .. } in of_model {
@@ -355,7 +357,7 @@ impl<'s> Frames<'s> {
         let of_usual = Options { format: point.usual.format, ..options };
         let found = centred.found(&of_usual, &[options.penalty])?;
         let trained = found.fit(options.format, options.or_f32, &Silent).remove(0)?;
-        self.set.packed(pack, &trained, &options, &Silent)
+        self.set.packed(pack, &trained, &starts.chosen(&options), &Silent)
     }
 
     /// Errors and cost of a model that was trained with `options`.
@@ -436,6 +438,11 @@ impl<'s> Starts<'s> {
         Ok(Self { set, kinds: options.kinds, all: Start::all(&set.frames, &options)? })
     }
 
+    /// These `options` with the features that are chosen.
+    fn chosen(&self, options: &Options) -> Options {
+        Options { kinds: self.kinds, ..*options }
+    }
+
     /// Starts with K-means centres for `options`, whatever their spread.
     pub fn centred(&self, options: &Options) -> Centred<'_> {
         Centred { starts: self, layers: self.all.iter().map(|it| it.layers(options)).collect() }
@@ -451,8 +458,8 @@ pub struct Centred<'s> {
 impl Centred<'_> {
     /// Layers for `options`, to which weights will be fitted with each of `penalties`.
     pub fn found(&self, options: &Options, penalties: &[Option<f64>]) -> Result<Found<'_>> {
-        let Starts { set, kinds, all } = self.starts;
-        let options = Options { kinds: *kinds, ..*options };
+        let Starts { set, all, .. } = self.starts;
+        let options = self.starts.chosen(options);
         set.found(all, self.layers.clone(), &options, penalties, &Silent)
     }
 }
