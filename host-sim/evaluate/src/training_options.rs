@@ -118,10 +118,14 @@ impl TrainingOptions {
     /// for all.
     ///
     /// # Errors
-    /// [`BadValue`] for several values where one is trained with.
+    /// [`BadValue`] for several values where one is trained with, and for features beside the paper's method.
     pub fn over(&self, usual: &Training) -> Result<Training, BadValue> {
         let Training { mut options, mut refine, .. } = *usual;
         let is_paper = self.method == Some(Method::Paper);
+        if let Some(features) = self.features.filter(|_| is_paper) {
+            let rule = "networks as the paper trains them (method = \"paper\", --paper) have no features; leave one of them out";
+            return Err(BadValue::new("training.features", features, rule));
+        }
         if is_paper {
             options = options.as_in_paper();
             refine = false;
