@@ -236,6 +236,7 @@ impl Plan {
             return Err(BadValue::new("set", field, "it is an axis as well; give it once"));
         }
         plan.check_fields()?;
+        plan.check_table1()?;
         let usual = |base: &Base| Some((base.label.clone(), plan.usual_of(base)?));
         plan.usual = plan.bases.iter().filter_map(usual).collect();
         plan.choose_objectives()?;
@@ -258,6 +259,26 @@ impl Plan {
                 let mut places = first.clone();
                 places[axis] = line;
                 check(&places)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that every scene has a Table 1, if it is wanted.
+    fn check_table1(&self) -> Checked<()> {
+        let is_axis = self.fields.iter().any(|field| field.starts_with("table1."));
+        if !self.has(Also::Table1) || is_axis {
+            return Ok(());
+        }
+        let rule = |what: &str| {
+            BadValue::new("also", "table1", format!("{what} no [table1]: leave it out"))
+        };
+        if self.data.is_some() {
+            return Err(rule("measurements have"));
+        }
+        for base in &self.bases {
+            if !self.changed(Some(base), &[])?.scene.contains_key("table1") {
+                return Err(rule(&format!("{} has", base.label)));
             }
         }
         Ok(())
