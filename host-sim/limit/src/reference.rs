@@ -244,8 +244,8 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Standard error of the mean of `values`.
-fn standard_error(values: &[f64]) -> f64 {
+/// Standard error of the mean of `values`; NaN where there are not two.
+pub fn standard_error(values: &[f64]) -> f64 {
     let (mean, count) = (mean(values), values.len() as f64);
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (squares / (count - 1.0) / count).sqrt()

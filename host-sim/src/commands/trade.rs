@@ -246,6 +246,9 @@ fn check_features(subject: &Subject) -> Result<()> {
     /// Frames that tell which outputs there are.
     const FEW_FRAMES: usize = 64;
     let features = subject.options().features;
+    if features.is_none() {
+        return Ok(());
+    }
     match subject {
         Subject::Scene(scene) => {
             let synthesis = Synthesis::new(&scene.world);

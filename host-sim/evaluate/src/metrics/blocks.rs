@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use taxel_data::{Table, columns};
+use taxel_limit::reference;
 
 use super::{ALL, Errors, Measure, by_group};
 
@@ -58,11 +59,9 @@ pub fn with_blocks(truth: &Table, estimate: &[f64], measure: &Measure) -> (Vec<E
 }
 
 /// Standard error of the mean of `parts`, which are those of blocks; 0 where there are not two.
-pub fn standard_error(parts: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
-    let count = parts.len() as f64;
-    let mean = parts.clone().sum::<f64>() / count;
-    let squares: f64 = parts.map(|part| (part - mean).powi(2)).sum();
-    if count > 1.0 { (squares / (count - 1.0) / count).sqrt() } else { 0.0 }
+pub fn standard_error(parts: impl Iterator<Item = f64>) -> f64 {
+    let parts: Vec<f64> = parts.collect();
+    if parts.len() > 1 { reference::standard_error(&parts) } else { 0.0 }
 }
 
 #[cfg(test)]
