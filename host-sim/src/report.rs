@@ -41,7 +41,7 @@ pub use limit::{sections as of_limit, several as of_limits};
 pub use points::{points, sections as of_sweep};
 pub use run::{in_words, reasons, sections as of_run};
 pub use sections::{Digits, Sections, Table, TableOf};
-pub use table1::sections as of_table1;
+pub use table1::{csv as table1_csv, sections as of_table1};
 pub use trade::{With as TradeWith, sections as of_trade};
 
 /// Files of figures of these names.

@@ -8,7 +8,6 @@ use std::path::Path;
 
 use serde::Deserialize;
 use taxel_core::blob::NoiseKind as BlobNoiseKind;
-use taxel_data::digest::digest;
 use taxel_data::{AtRest, BadValue, Dataset, Stream, input, require};
 use taxel_learn::train::{FreshFrames, Solver, check_penalty, check_spread};
 use taxel_learn::{Options, Origin, relative};
@@ -55,7 +54,9 @@ pub(crate) fn check_name(name: &str) -> Check {
 pub struct Experiment {
     /// Name of the scene, which names the output folder and the model.
     pub name: String,
-    /// CRC-64/XZ of the scene's text.
+    /// The scene's text.
+    pub text: String,
+    /// CRC-64/XZ of the text.
     pub digest: u64,
     pub world: World,
     /// Number of frames to train on.
@@ -162,7 +163,7 @@ impl Experiment {
             let advice = if is_list { "; `compare` takes a scene with lists" } else { "" };
             Error::of_scene(origin, shortened(cause.to_string().trim_end()) + advice)
         })?;
-        let experiment = file.into_experiment(digest(text.as_bytes()));
+        let experiment = file.into_experiment(text);
         experiment
             .and_then(|experiment| experiment.check().map(|()| experiment))
             .map_err(|cause| Error::of_scene(origin, cause))

@@ -2,9 +2,9 @@
 
 use std::fmt::Display;
 
-use serde::Serialize;
 use taxel_data::{Progress, columns};
 use taxel_learn::decoders::{BASELINES, mean, standard};
+use taxel_learn::train::resolution;
 use taxel_simulate::motion::Kind;
 use taxel_simulate::noise::NoiseKind;
 use taxel_simulate::sensor::Sensor;
@@ -13,21 +13,22 @@ use toml::{Table, Value};
 use crate::error::{Error, Result};
 use crate::evaluate::paper_networks::{Cell, TEXTBOOK};
 use crate::experiment::{Experiment, Table1 as Settings};
-use crate::metrics::{Definition, Errors, LimitSummary};
+use crate::metrics::{Errors, LimitSummary};
 use crate::sweep::file::{Also, Wanted};
+use crate::sweep::plan::Point;
 use crate::sweep::plan::{Base, SEED};
-use crate::sweep::{Plan, Record, work};
+use crate::sweep::{Plan, Record, judge, work};
 use crate::training_options::{Method, TrainingOptions};
 
 pub mod printed;
 
-use printed::{CELLS, Cells, NOISE_LEVELS, Nearness, SPREADS};
+use printed::{Cells, Nearness, SPREADS};
 
 pub use crate::evaluate::paper_networks::Entry;
 pub use crate::metrics::NETWORK;
 
 /// Table 1 of a scene: errors of every decoder at every noise level.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Table1 {
     /// Number of centres of each row-wire's network.
     pub centres: usize,
@@ -47,10 +48,10 @@ pub struct Table1 {
 }
 
 /// Table 1 by one formula of the error beside the printed one, along z.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// Formula of the error, in per cent.
-    pub formula: String,
+    pub formula: &'static str,
     /// Errors of the network in per cent, by spread and noise level.
     pub cells: Cells,
     /// Errors of always predicting the mean in per cent, by noise level.
@@ -60,7 +61,7 @@ pub struct Comparison {
 }
 
 /// Errors of all decoders at one noise level.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     /// Noise level p: a fraction, or in Ω for absolute noise.
     pub noise_level: f64,
@@ -108,24 +109,34 @@ impl Column {
     }
 }
 
-/// Computes Table 1 of the scene in `text`, with the seed and the inputs of the `experiment` that was made of it.
+/// Computes Table 1 of a scene, with the seed and the inputs of its `experiment`.
 ///
 /// # Errors
-/// [`Error`] for a scene without `[table1]`, or an error of [`train`](taxel_learn::train::train).
-pub fn compute(experiment: &Experiment, text: &str, progress: &dyn Progress) -> Result<Table1> {
+/// [`Error`] for a scene without `[table1]`, for readings or outputs that f32 does not hold, and for the first cell that fails.
+pub fn compute(experiment: &Experiment, progress: &dyn Progress) -> Result<Table1> {
     let settings = experiment.table1.as_ref().ok_or_else(|| {
         let cause =
             "it has no [table1]: add one, or use a scene that has (paper, paper-as-printed)";
         Error::of_scene(&experiment.name, cause)
     })?;
-    let plan = plan(experiment, settings, text)?;
-    let records = work::in_memory(&plan, &plan.points()?, progress)?;
-    let cell = |record: Record| match (record.failed, record.cell) {
-        (None, Some(cell)) => Ok(cell),
-        (failed, _) => Err(Error::failed(failed.unwrap_or_default())),
+    let plan = plan(experiment, settings)?;
+    let points = plan.points()?;
+    let of_level = settings.spreads.len();
+    let noise = |level: usize| {
+        format!("{} noise", experiment.world.noise.kind.in_words(settings.noise_levels[level]))
     };
-    let cells = records.into_iter().flatten().map(cell).collect::<Result<Vec<_>>>()?;
-    let columns = settings.noise_levels.iter().zip(cells.chunks(settings.spreads.len()));
+    for (level, points) in points.chunks(of_level).enumerate() {
+        let of_level = |why| Error::of_scene(&experiment.name, format!("{}: {why}", noise(level)));
+        check(&plan, &points[0]).map_err(of_level)?;
+    }
+    let accept = |cell: usize, record: &Record| {
+        let Some(why) = &record.failed else { return Ok(()) };
+        let (noise, spread) = (noise(cell / of_level), settings.spreads[cell % of_level]);
+        Err(Error::failed(format!("{noise}, spread {spread:?}: {why}")))
+    };
+    let records = work::until(&plan, &points, &accept, progress)?;
+    let cells: Vec<Cell> = records.into_iter().filter_map(|record| record?.cell).collect();
+    let columns = settings.noise_levels.iter().zip(cells.chunks(of_level));
     let columns: Vec<Column> = columns.map(|(level, cells)| Column::new(*level, cells)).collect();
     let comparison = if is_comparable(experiment, settings) {
         compare(&columns, experiment.world.sensor.size_mm[2])
@@ -144,10 +155,16 @@ pub fn compute(experiment: &Experiment, text: &str, progress: &dyn Progress) -> 
     })
 }
 
+/// Checks that f32 holds the frames of a `point`, which those of its noise level share.
+fn check(plan: &Plan, point: &Point) -> Result<()> {
+    let subject = judge::subject_of(plan, point)?;
+    Ok(resolution::check(&subject.training_set().frames)?)
+}
+
 /// Plan of Table 1: the network of the paper at every noise level and spread.
-fn plan(experiment: &Experiment, settings: &Settings, text: &str) -> Result<Plan> {
+fn plan(experiment: &Experiment, settings: &Settings) -> Result<Plan> {
     let failed = |cause: &dyn Display| Error::of_scene(&experiment.name, cause.to_string());
-    let mut document: Table = toml::from_str(text).map_err(|cause| failed(&cause))?;
+    let mut document: Table = toml::from_str(&experiment.text).map_err(|cause| failed(&cause))?;
     let training = TrainingOptions {
         frames: Some(settings.frames),
         test_frames: Some(settings.test_frames),
@@ -214,44 +231,12 @@ fn compare(columns: &[Column], thickness_mm: f64) -> Vec<Comparison> {
             }
         }
         let nearness = Nearness::new(&cells);
-        Some(Comparison { formula: (*formula).into(), cells, mean_percent, nearness })
+        Some(Comparison { formula, cells, mean_percent, nearness })
     };
     FORMULAS.iter().filter_map(by).collect()
 }
 
 impl Table1 {
-    /// Table as CSV: one line a noise level, decoder, spread, group and definition. Undefined values are
-    /// empty.
-    pub fn to_csv(&self) -> String {
-        use std::fmt::Write as _;
-        let mut csv = String::from("noise_level,decoder,spread,group,definition,value\n");
-        for column in &self.columns {
-            for Entry { decoder, spread, errors, .. } in &column.decoders {
-                let spread = spread.map_or(String::new(), |s| s.to_string());
-                for group in errors {
-                    for definition in Definition::ALL {
-                        let value = definition.of(group);
-                        let value = value.map_or(String::new(), |v| v.to_string());
-                        let (level, name) = (column.noise_level, definition.name);
-                        // Writing to a string cannot fail.
-                        let _ = writeln!(
-                            csv,
-                            "{level},{decoder},{spread},{},{name},{value}",
-                            group.group
-                        );
-                    }
-                }
-            }
-        }
-        let printed = SPREADS.iter().zip(&CELLS).filter(|_| !self.comparison.is_empty());
-        for (spread, line) in printed {
-            for (noise_level, percent) in NOISE_LEVELS.iter().zip(line) {
-                let _ = writeln!(csv, "{noise_level},paper,{spread},dz_mm,as_printed,{percent}");
-            }
-        }
-        csv
-    }
-
     /// Formula by which the table is nearest to the printed one.
     pub fn nearest_formula(&self) -> Option<&Comparison> {
         let gap = |it: &Comparison| it.nearness.gap;
@@ -261,10 +246,13 @@ impl Table1 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use taxel_data::Silent;
     use taxel_simulate::World;
 
     use super::*;
+    use crate::metrics::Definition;
 
     #[test]
     fn only_a_table_that_the_papers_could_be_stands_beside_the_printed_cells() {
@@ -283,6 +271,24 @@ mod tests {
     }
 
     #[test]
+    fn the_first_cell_that_fails_ends_the_work() {
+        let paper = Experiment::load("paper-as-printed").unwrap();
+        let plan = plan(&paper, paper.table1.as_ref().unwrap()).unwrap();
+        // A scene that cannot be read fails at once.
+        let mut points = plan.points().unwrap();
+        points.iter_mut().for_each(|point| point.scene.clear());
+        let judged = AtomicUsize::new(0);
+        let accept = |cell: usize, record: &Record| {
+            judged.fetch_add(1, Ordering::Relaxed);
+            let why = record.failed.clone().unwrap_or_default();
+            Err(Error::failed(format!("cell {cell}: {why}")))
+        };
+        let error = work::until(&plan, &points, &accept, &Silent).unwrap_err().to_string();
+        assert!(error.starts_with("cell ") && error.contains("missing field"), "{error}");
+        assert!(judged.into_inner() <= work::threads());
+    }
+
+    #[test]
     fn no_cell_of_the_papers_table_is_worse_than_the_mean_by_more_than_two_per_cent() {
         // Two rows of eight that are alike, and the least and the greatest of the table's widths and noise levels.
         let mut text = Experiment::text("paper").unwrap().into_owned();
@@ -298,7 +304,7 @@ mod tests {
             text = text.replace(from, to);
         }
         let paper = Experiment::parse("paper", &text).unwrap();
-        let mut plan = plan(&paper, paper.table1.as_ref().unwrap(), &text).unwrap();
+        let mut plan = plan(&paper, paper.table1.as_ref().unwrap()).unwrap();
         plan.limit_frames = Some(0);
         let records = work::in_memory(&plan, &plan.points().unwrap(), &Silent).unwrap();
         let (mut worst, mut cells) = (0.0_f64, 0);

@@ -6,7 +6,9 @@ use crate::{Error, Result};
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, Command};
 use serde::Serialize;
-use taxel_data::BadValue;
+use taxel_data::{BadValue, output};
+
+use super::print;
 
 /// File that a command writes.
 #[derive(Args)]
@@ -14,6 +16,26 @@ pub struct OutputFile {
     /// File to write; - is stdout.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+}
+
+/// File that a command writes if it is wanted.
+#[derive(Args)]
+pub struct WantedFile {
+    /// File to write; - is stdout.
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+impl WantedFile {
+    /// Checks before long work that it can be written, and would replace none of the `inputs`.
+    pub fn check(&self, inputs: &[&Path]) -> Result<()> {
+        self.output.as_ref().map_or(Ok(()), |path| print::check_output(path, inputs))
+    }
+
+    /// Writes these `bytes`, if it is wanted.
+    pub fn write(&self, bytes: &[u8]) -> Result<()> {
+        Ok(self.output.as_ref().map_or(Ok(()), |path| output::write_bytes(path, bytes))?)
+    }
 }
 
 /// Folder that a command writes to.

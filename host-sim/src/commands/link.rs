@@ -70,7 +70,8 @@ enum Action {
     /// Mend the device's model after the sensor has changed, from reference presses, and upload it.
     ///
     /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, these are taken;
-    /// otherwise the device scans, and you are asked for one press after the other. docs/drift.md says more.
+    /// otherwise the device scans, and you are asked for one press after the other. -o saves the mended model too: `record` and
+    /// the next recalibration take it. docs/drift.md says more.
     #[command(
         after_help = "Example: taxel link /dev/ttyACM0 recalibrate press.bin presses.csv -o mended.bin"
     )]

@@ -4,13 +4,12 @@ use std::path::Path;
 
 use super::progress::Terminal;
 use crate::Result;
-use crate::experiment::Experiment;
 use crate::report::{self, Sections};
 use crate::run::{self, RunResult};
 
 use clap::Args;
 use taxel_data::output::FileSet;
-use taxel_evaluate::table1::{self, Table1};
+use taxel_evaluate::table1;
 use taxel_learn::ModelBlob;
 
 use super::format_note::note_format;
@@ -64,8 +63,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let (mut result, blob) =
         outcome.map_err(|error| arguments::blamed(error, arguments.subject.training()))?;
     if let Some(scene) = subject.scene().filter(|scene| scene.table1.is_some()) {
-        let text = Experiment::text(arguments.subject.source())?;
-        result.table1 = Some(table1::compute(scene, &text, &progress)?);
+        result.table1 = Some(table1::compute(scene, &progress)?);
     }
     let command = command_line::of_this_process("run", &["-o", "--output"], Some(result.seed));
     note_format(&blob.parse(), &options, result.device_cost.cycles, common);
@@ -90,7 +88,7 @@ fn write_files(
     common: &Common,
 ) -> Result<Vec<&'static str>> {
     let metrics = print::file_of(common, sections);
-    let table = result.table1.as_ref().map(Table1::to_csv);
+    let table = result.table1.as_ref().map(report::table1_csv);
     let mut files = vec![("model.bin", blob.bytes()), ("metrics.json", metrics.as_bytes())];
     files.extend(table.as_ref().map(|table| ("table1.csv", table.as_bytes())));
     let mut names: Vec<&'static str> = files.iter().map(|(name, _)| *name).collect();

@@ -158,8 +158,7 @@ fn recorded(
     let columns = |names: &[String]| sheet::columns(names.iter().map(String::as_str), []);
     let (readings, outputs) = (columns(&dataset.inputs.names), columns(&dataset.outputs.names));
     let layout = sheet::layout(&scene.name, readings, outputs, Some(&scene.world.sensor));
-    let text = Experiment::text(&arguments.scene.path().to_string_lossy())?.into_owned();
-    let extras = Extras { scene: Some(text), ..Extras::default() };
+    let extras = Extras { scene: Some(scene.text.clone()), ..Extras::default() };
     let duration_s = scene.world.path.as_ref().map_or(0.0, |path| path.duration_s);
     let floats = |line: &[f64]| line.iter().map(|value| *value as f32).collect();
     let lines = dataset.inputs.lines().zip(dataset.outputs.lines());

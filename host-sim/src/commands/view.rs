@@ -162,10 +162,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
             };
             let rate = arguments.rate.frame_rate.unwrap_or(SIMULATED_RATE);
             let mut feed = SimulationFeed::new(&scene, &blob, rate)?;
-            let text = Experiment::text(&name)?.into_owned();
             show(
                 &mut feed,
-                &Watched { blob: Some(&blob), scene: Some(text) },
+                &Watched { blob: Some(&blob), scene: Some(scene.text.clone()) },
                 view,
                 arguments,
                 common,

@@ -8,6 +8,7 @@ use super::errors::Pictures;
 use super::format::{counted, grouped, noise, percent, significant};
 use super::judged::{self, Judged};
 use super::sections::Sections;
+use super::table1;
 
 /// Sections of a run.
 pub fn sections(result: &RunResult) -> Sections {
@@ -20,7 +21,10 @@ pub fn sections(result: &RunResult) -> Sections {
     sections.value("model", &result.model);
     sections.value("features", &result.features);
     sections.value("distribution", &result.distribution);
-    sections.value("table1", &result.table1);
+    match &result.table1 {
+        Some(table) => sections.object("table1", &table1::values(table)),
+        None => sections.value("table1", &()),
+    }
     sections
 }
 

@@ -1,16 +1,75 @@
 //! Table 1 of the paper: errors by spread and noise, and the printed cells beside them.
 
+use serde_json::json;
+use taxel_data::columns;
 use taxel_learn::decoders::{mean, standard};
 use taxel_simulate::noise::NoiseKind;
 
-use super::sections::{Digits, Sections, TableOf};
+use super::sections::{Digits, Sections, Table, TableOf, number_value};
 use taxel_evaluate::metrics::{Definition, Errors};
-use taxel_evaluate::table1::printed::{CELLS, NOISE_LEVELS, Nearness, SPREADS};
-use taxel_evaluate::table1::{Comparison, NETWORK, Table1};
+use taxel_evaluate::table1::printed::{self, CELLS, NOISE_LEVELS, Nearness, SPREADS};
+use taxel_evaluate::table1::{Comparison, Entry, NETWORK, Table1};
+
+/// Values of Table 1, which programs read.
+pub fn values(table: &Table1) -> Sections {
+    let mut sections = Sections::default();
+    sections.value("centres", &table.centres);
+    sections.value("noise_kind", &table.noise_kind);
+    sections.value("training_frames", &table.training_frames);
+    sections.value("test_frames", &table.test_frames);
+    sections.value("standard_frames", &table.standard_frames);
+    sections.value("solver", &table.solver);
+    sections.value("errors", &all_errors(table));
+    let limits = TableOf::new(&table.columns, "")
+        .values("noise_level", |column| number_value(Some(column.noise_level)))
+        .values("limit", |column| json!(column.limit));
+    sections.rows("limits", limits);
+    sections.rows("comparison", nearness_table(&nearness(&table.comparison)));
+    sections
+}
+
+/// Text of a CSV file with all errors.
+pub fn csv(table: &Table1) -> String {
+    all_errors(table).csv()
+}
+
+/// Errors of all decoders and groups of outputs by every definition, beside the printed cells.
+fn all_errors(table: &Table1) -> Table {
+    let entries = table
+        .columns
+        .iter()
+        .flat_map(|column| column.decoders.iter().map(move |entry| (column.noise_level, entry)));
+    let rows: Vec<(f64, &Entry, &Errors)> = entries
+        .flat_map(|(level, entry)| entry.errors.iter().map(move |errors| (level, entry, errors)))
+        .collect();
+    let is_along_z = |errors: &Errors| columns::is_compression(&errors.group);
+    let mut cells = TableOf::new(&rows, "")
+        .values("noise_level", |row| number_value(Some(row.0)))
+        .values("decoder", |row| row.1.decoder.as_str().into())
+        .values("spread", |row| number_value(row.1.spread))
+        .values("group", |row| row.2.group.as_str().into())
+        .values("unit", |row| row.2.unit.as_str().into())
+        .values("count", |row| row.2.count.into());
+    for definition in Definition::ALL {
+        cells = cells.values(definition.name, |row| number_value(definition.of(row.2)));
+    }
+    cells
+        .values("ratio_standard_error", |row| number_value(row.2.ratio_standard_error))
+        .values("largest_positional_percent", |(_, entry, errors)| {
+            number_value(entry.largest_positional_percent.filter(|_| is_along_z(errors)))
+        })
+        .values("printed_percent", |(level, entry, errors)| {
+            let is_printed = !table.comparison.is_empty() && is_along_z(errors);
+            let spread = entry.spread.filter(|_| is_printed && entry.decoder == NETWORK);
+            number_value(spread.and_then(|spread| printed::cell(spread, *level)))
+        })
+        .table()
+}
 
 /// Sections of Table 1: the errors of a `group` of outputs by every definition.
 pub fn sections(subject: &str, table: &Table1, group: &str) -> Sections {
     let mut sections = Sections::new(format!("Table 1, {subject}: {group}"));
+    sections.extend(values(table));
     sections.note(format!(
         "K = {}, {} training and {} test frames, weights by {}. In brackets: the standard network, K = N = {}.",
         table.centres,
@@ -77,13 +136,22 @@ pub fn compare(sections: &mut Sections, by_formula: &[Comparison], nearest: &Com
         cells = cells.texts(&noise, &noise, |(_, line)| line[place].clone());
     }
     sections.table(cells);
-    let constant = ("a constant".to_owned(), Nearness::of_a_constant());
-    let formulas = by_formula.iter().map(|it| (it.formula.clone(), it.nearness));
-    let rows: Vec<(String, Nearness)> = [constant].into_iter().chain(formulas).collect();
+    sections.table(nearness_table(&nearness(by_formula)));
+}
+
+/// How near the table comes to the printed one by each formula, and a table of equal cells.
+fn nearness(by_formula: &[Comparison]) -> Vec<(&str, Nearness)> {
+    if by_formula.is_empty() {
+        return vec![];
+    }
+    let formulas = by_formula.iter().map(|it| (it.formula, it.nearness));
+    [("a constant", Nearness::of_a_constant())].into_iter().chain(formulas).collect()
+}
+
+fn nearness_table<'r>(rows: &'r [(&'r str, Nearness)]) -> TableOf<'r, (&'r str, Nearness)> {
     let caption = "How near each formula comes. Gap: root of the mean square over all cells, in points. docs/paper.md says what is open.";
-    let table = TableOf::new(&rows, caption)
-        .names("formula", "formula", |(name, _)| name.clone())
+    TableOf::new(rows, caption)
+        .names("formula", "formula", |(name, _)| (*name).into())
         .numbers("gap", "gap", "", Digits::Decimals(2), |(_, it)| Some(it.gap))
-        .numbers("correlation", "correlation", "", Digits::Decimals(2), |(_, it)| it.correlation);
-    sections.table(table);
+        .numbers("correlation", "correlation", "", Digits::Decimals(2), |(_, it)| it.correlation)
 }

@@ -1,6 +1,7 @@
 //! Scene as it stands in its file, before defaults are filled in.
 
 use serde::Deserialize;
+use taxel_data::digest::digest;
 use taxel_data::{BadValue, require};
 use taxel_simulate::World;
 use taxel_simulate::drift::Drift;
@@ -120,7 +121,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// [`BadValue`] for counts of wires and electrodes that are not held: memory is taken for as many.
-    pub(super) fn into_experiment(self, digest: u64) -> Result<Experiment, BadValue> {
+    pub(super) fn into_experiment(self, text: &str) -> Result<Experiment, BadValue> {
         let s = self.sensor;
         let of_columns = (s.column_wires, s.electrodes_per_column_wire);
         check_counts((s.row_wires, s.electrodes_per_row_wire), of_columns)?;
@@ -174,8 +175,9 @@ impl SceneFile {
         };
         let (name, table1, training) = (self.name, self.table1, Training::default());
         let (frames, test_frames) = (USUAL_FRAMES, USUAL_TEST_FRAMES);
+        let (text, digest) = (text.to_owned(), digest(text.as_bytes()));
         let usual =
-            Experiment { name, digest, world, frames, test_frames, training, table1, others };
+            Experiment { name, text, digest, world, frames, test_frames, training, table1, others };
         usual.trained_with(&self.training)
     }
 }

@@ -80,9 +80,23 @@ pub fn in_memory(
     points: &[Point],
     progress: &dyn Progress,
 ) -> Result<Vec<Option<Record>>> {
+    until(plan, points, &|_, _| Ok(()), progress)
+}
+
+/// Computes all points as [`in_memory`] does, until `accept` refuses the record of one.
+///
+/// # Errors
+/// The refusal, and [`Error`] for threads that cannot be started.
+pub fn until(
+    plan: &Plan,
+    points: &[Point],
+    accept: &(dyn Fn(usize, &Record) -> Result<()> + Sync),
+    progress: &dyn Progress,
+) -> Result<Vec<Option<Record>>> {
     let records = Mutex::new(vec![None; points.len()]);
     progress.stage("train and measure", points.len());
     let keep = |index: usize, record: &Record| {
+        accept(index, record)?;
         progress.step();
         records.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(record.clone());
         Ok(())

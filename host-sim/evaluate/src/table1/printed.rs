@@ -1,7 +1,5 @@
 //! Table 1 as the paper prints it, and how near other tables come to it.
 
-use serde::Serialize;
-
 /// Spreads of the lines of the paper's Table 1.
 pub const SPREADS: [f64; 10] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 /// Noise levels of its columns, as fractions.
@@ -30,8 +28,15 @@ pub const CELLS: Cells = [
     [9.31, 11.11, 10.67, 11.39],
 ];
 
+/// Printed cell of a spread and a noise level, in per cent.
+pub fn cell(spread: f64, noise_level: f64) -> Option<f64> {
+    let line = SPREADS.iter().position(|it| *it == spread)?;
+    let column = NOISE_LEVELS.iter().position(|it| *it == noise_level)?;
+    Some(CELLS[line][column])
+}
+
 /// How near a table comes to the printed one.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearness {
     /// Root mean square of the gaps, in points (per cent of error).
     pub gap: f64,

@@ -8,7 +8,7 @@ use crate::{Error, Result};
 use clap::Args;
 use taxel_core::blob::Model;
 use taxel_core::health::Limits;
-use taxel_data::{DataFile, Table, columns, output};
+use taxel_data::{DataFile, Table, columns};
 use taxel_firmware::link::message::{Configuration, Refusal};
 use taxel_learn::ModelBlob;
 use taxel_learn::health::judge;
@@ -17,7 +17,7 @@ use taxel_rig::device::{Device, DeviceIdentity, upload};
 
 use super::super::data_file::FieldArguments;
 use super::super::readings::{BaselineArgument, table_of};
-use super::super::{Common, print};
+use super::super::{Common, arguments, print};
 use super::activate;
 use super::frames::{self, hear_scans};
 use super::scan::{ScanArguments, Wanted, configure, patience_for_next, reading_names};
@@ -28,9 +28,8 @@ pub struct Arguments {
     model: PathBuf,
     /// CSV file with a line for each press: columns of the model's outputs, and of its readings if they are known.
     presses: PathBuf,
-    /// Save the recalibrated model too: `record` and the next recalibration take it.
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    to: arguments::WantedFile,
     #[command(flatten)]
     baseline: BaselineArgument,
     #[command(flatten)]
@@ -43,11 +42,9 @@ pub fn execute(
     common: &Common,
 ) -> Result<print::Outcome> {
     arguments.scan.timing.period.check()?;
-    if let Some(path) = &arguments.output {
-        let read = [&arguments.model, &arguments.presses].map(PathBuf::as_path);
-        let baseline = arguments.baseline.baseline.as_deref();
-        print::check_output(path, &read.into_iter().chain(baseline).collect::<Vec<_>>())?;
-    }
+    let read = [&arguments.model, &arguments.presses].map(PathBuf::as_path);
+    let baseline = arguments.baseline.baseline.as_deref();
+    arguments.to.check(&read.into_iter().chain(baseline).collect::<Vec<_>>())?;
     let blob = ModelBlob::read(&arguments.model)?;
     let (fields, limits) = (FieldArguments::default(), Some(Limits::USUAL));
     let model = blob.prepare();
@@ -75,9 +72,7 @@ pub fn execute(
         record_presses(device, &identity, (model.model(), &outputs), &arguments.scan, common)?
     };
     let found = recalibration::recalibrate(&model, &readings, &outputs)?;
-    if let Some(path) = &arguments.output {
-        output::write_bytes(path, found.blob.bytes())?;
-    }
+    arguments.to.write(found.blob.bytes())?;
     activate(device, &found.blob, common)?;
     upload::confirm(device)?;
     Ok(conclude(&found, outputs.len(), common))
