@@ -178,11 +178,8 @@ fn plan(experiment: &Experiment, settings: &Settings) -> Result<Plan> {
     let seed = i64::try_from(experiment.world.seed).map_err(|cause| failed(&cause))?;
     document.extend([("training".to_owned(), training.into()), (SEED.to_owned(), seed.into())]);
     let values = |values: &[f64]| Value::from(values.to_vec());
-    let level = match experiment.world.noise.kind {
-        NoiseKind::Absolute => "noise.level_ohm",
-        NoiseKind::Relative | NoiseKind::Span => "noise.level",
-    };
-    let axes = [(level, &settings.noise_levels), ("training.spread", &settings.spreads)];
+    let level = format!("noise.level{}", experiment.world.noise.kind.unit_of_fields());
+    let axes = [(level.as_str(), &settings.noise_levels), ("training.spread", &settings.spreads)];
     let wanted = Wanted {
         also: vec![Also::Table1],
         axes: axes.map(|(field, of)| (field.to_owned(), values(of))).into_iter().collect(),

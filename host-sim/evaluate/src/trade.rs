@@ -66,26 +66,24 @@ impl Asked {
             ..Wanted::default()
         };
         let mut axis = |field: &str, values: Value| wanted.axes.insert(field.into(), values);
-        // One network for each row, and one for the array of several rows; that alone where outputs belong to no row.
-        let rows = subject.rows();
+        // One network for each row, and one for the array of several rows; that alone where outputs belong to no row. The
+        // paper's networks, which have no affine tail, are those of rows.
+        let kinds = match subject.rows() {
+            _ if !subject.options().affine_tail => vec![true],
+            1 => vec![false],
+            _ => vec![true, false],
+        };
         let formats = Format::ALL.iter().rev().map(|format| Value::from(format.name()));
         axis("training.format", formats.collect::<Vec<_>>().into());
-        axis("training.each_row", if rows > 1 { vec![true, false] } else { vec![false] }.into());
+        axis("training.each_row", kinds.into());
         axis("training.centres", whole(&self.centres));
         axis("device.samples", whole(&self.samples_averaged));
         axis("device.column_step", whole(&self.column_steps));
         if subject.moving_scene().is_some() {
             axis("device.filter", vec![false, true].into());
         }
-        if let Subject::Scene(scene) = subject {
-            if !scene.others.is_empty() {
-                wanted.also.push(Also::OtherContacts);
-            }
-            // The paper's own way is none that a device would choose.
-            if !scene.training.options.affine_tail {
-                wanted.set.insert("training.method".into(), "best".into());
-                wanted.set.insert("training.refine".into(), false.into());
-            }
+        if subject.scene().is_some_and(|scene| !scene.others.is_empty()) {
+            wanted.also.push(Also::OtherContacts);
         }
         wanted
     }

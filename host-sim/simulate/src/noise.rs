@@ -38,10 +38,11 @@ impl TryFrom<Table> for Noise {
         let Table { kind, time_constant_ms, .. } = table;
         let fractions = [table.level, table.correlated_level];
         let in_ohm = [table.level_ohm, table.correlated_level_ohm];
-        let (own, others, unit) = match kind {
-            NoiseKind::Absolute => (in_ohm, fractions, "_ohm"),
-            NoiseKind::Relative | NoiseKind::Span => (fractions, in_ohm, ""),
+        let (own, others) = match kind {
+            NoiseKind::Absolute => (in_ohm, fractions),
+            NoiseKind::Relative | NoiseKind::Span => (fractions, in_ohm),
         };
+        let unit = kind.unit_of_fields();
         if others.iter().any(Option::is_some) {
             return Err(format!(
                 "{} noise has level{unit} and correlated_level{unit} instead",
@@ -130,6 +131,14 @@ impl NoiseKind {
             Self::Relative => "relative",
             Self::Span => "span",
             Self::Absolute => "absolute",
+        }
+    }
+
+    /// End of the names of fields that have levels of this kind, such as `noise.level_ohm`: empty for fractions.
+    pub fn unit_of_fields(self) -> &'static str {
+        match self {
+            Self::Relative | Self::Span => "",
+            Self::Absolute => "_ohm",
         }
     }
 

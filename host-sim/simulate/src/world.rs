@@ -189,7 +189,7 @@ pub fn check_noise_level(field: &str, kind: NoiseKind, level: f64) -> Check {
 }
 
 fn noise(noise: &Noise) -> Check {
-    let unit = if noise.kind == NoiseKind::Absolute { "_ohm" } else { "" };
+    let unit = noise.kind.unit_of_fields();
     for (field, level) in [("level", noise.level), ("correlated_level", noise.correlated_level)] {
         check_noise_level(&format!("noise.{field}{unit}"), noise.kind, level)?;
     }

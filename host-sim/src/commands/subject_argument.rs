@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::Common;
-use super::arguments::{blamed, named, of_option, refuse};
+use super::arguments::{blamed, named, of_option};
 use super::data_argument::{DataOptions, JudgedBy};
 use super::data_file::DATA_FILES;
 use super::scene_argument::{DEFAULT_SCENE, NoiseArgument};
@@ -108,16 +108,17 @@ impl SubjectArgument {
         self.load_for(&self.options.training, common)
     }
 
-    /// Loads the scene or the CSV file for a trade, whose points have the centres that are given.
+    /// Loads the scene or the CSV file for a trade, whose points have their own centres: a scene has one here, whatever it
+    /// says.
     pub fn load_to_trade(&self, common: &Common) -> Result<Subject> {
-        let training = &self.options.training;
-        self.load_for(&TrainingOptions { centres: None, ..training.clone() }, common)
+        self.options.data.refuse_time("trade")?;
+        let centres = names_a_scene(self.source()).then(|| vec![1]);
+        self.load_for(&TrainingOptions { centres, ..self.options.training.clone() }, common)
     }
 
     fn load_for(&self, training: &TrainingOptions, common: &Common) -> Result<Subject> {
-        let source = self.source.as_deref().unwrap_or(DEFAULT_SCENE);
         let judged = self.test.as_deref().map_or(JudgedBy::HeldOut, JudgedBy::File);
-        let subject = self.options.load(source, (training, false), common, judged)?;
+        let subject = self.options.load(self.source(), (training, false), common, judged)?;
         if subject.scene().is_some() && self.test.is_some() {
             let message =
                 "--test is for a CSV file; a scene has test frames of its own: leave it out";
@@ -141,15 +142,18 @@ impl SubjectArgument {
         self.options.training.centres.as_deref().unwrap_or_default()
     }
 
-    /// Fields that its options set in every point of a plan, but for centres.
+    /// Fields that its options set in every point of a plan for the `subject`, but for centres.
     ///
     /// # Errors
     /// [`Error::Usage`] for a seed beyond those of a scene.
-    pub fn set(&self, common: &Common) -> Result<Table> {
+    pub fn set(&self, subject: &Subject, common: &Common) -> Result<Table> {
         let mut set = fields_of(&self.options.training)?;
         set.remove("training.centres");
         set.extend(common.seed_in_scene()?.map(|seed| (SEED.into(), seed)));
-        set.extend(self.options.noise.level().map(|it| ("noise.level".into(), it.into())));
+        if let (Some(scene), Some(level)) = (subject.scene(), self.options.noise.level()) {
+            let field = format!("noise.level{}", scene.world.noise.kind.unit_of_fields());
+            set.insert(field, level.into());
+        }
         Ok(set)
     }
 
@@ -171,22 +175,9 @@ impl SubjectArgument {
         toml::to_string(&plan).map_err(|cause| text(cause.to_string()))
     }
 
-    /// Error for an option that tells a trade nothing.
-    pub fn refuse_in_trade(&self) -> Result<()> {
-        self.options.data.refuse_time("trade")?;
-        refuse(
-            &self.options.training,
-            |field| field == "method",
-            |option| {
-                format!("trade compares its own ways to train, and takes no {option}: leave it out")
-            },
-        )
-    }
-
     /// Paths of all files that are read, which must not be replaced.
     pub fn paths(&self) -> Vec<&Path> {
-        let source = Path::new(self.source.as_deref().unwrap_or(DEFAULT_SCENE));
-        [source]
+        [Path::new(self.source())]
             .into_iter()
             .chain(self.test.as_deref())
             .chain(self.options.data.baseline())

@@ -49,7 +49,6 @@ mod files;
   taxel trade moving --readout onchip --average 1,4,12 --max-latency-ms 2
   taxel trade press --plan > plan.toml
   taxel trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
-#[command(mut_arg("method", |it| it.hide(true)))]
 pub struct Arguments {
     #[command(flatten)]
     to: arguments::OutputFolder,
@@ -91,7 +90,6 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
-    arguments.subject.refuse_in_trade()?;
     let subject = arguments.subject.load_to_trade(common)?;
     let asked = asked(arguments, &subject, common)?;
     let bounds = bounds(arguments, &asked)?;
@@ -102,10 +100,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         return Err(Error::Usage(message.into()));
     }
     let mut wanted = asked.wanted(&subject);
-    for (field, value) in arguments.subject.set(common)? {
-        match wanted.axes.get_mut(&field) {
-            Some(axis) => *axis = vec![value].into(),
-            None => drop(wanted.set.insert(field, value)),
+    for (field, value) in arguments.subject.set(&subject, common)? {
+        // A spread that is set would follow the kind of networks, which is an axis.
+        if field == "training.spread" || wanted.axes.contains_key(&field) {
+            wanted.axes.insert(field, vec![value].into());
+        } else {
+            wanted.set.insert(field, value);
         }
     }
     if arguments.plan {

@@ -38,6 +38,4 @@ fn help_says_what_holds_for_its_command() {
     let decodes = "decodes what nobody has decoded";
     assert!(help(&["view"]).contains(decodes));
     assert!(!help(&["link", "port", "baseline"]).contains(decodes));
-    // An option that is refused.
-    assert!(!help(&["trade"]).contains("--paper"));
 }

@@ -238,6 +238,37 @@ fn the_plan_of_a_trade_is_one_for_sweep() {
     assert_eq!(bounds["rmse_dz_mm"].as_float(), Some(0.1));
 }
 
+#[test]
+fn options_of_training_mean_what_they_do_in_train() {
+    let folder = Folder::new("trade-options");
+    let absolute = few_frames_of_two_rows()
+        .replace("kind = \"relative\"\nlevel = 0.005", "kind = \"absolute\"\nlevel_ohm = 0.5")
+        .replace("[training]", "[training]\nmethod = \"paper\"");
+    assert!(absolute.contains("level_ohm") && absolute.contains("paper"));
+    folder.write("absolute.toml", absolute);
+    folder.write("few.toml", few_frames_of_two_rows());
+    // The scenes' own K is more than these frames allow, and nothing is trained with it.
+    let few = "-n 40 --no-refine --centres 8 --format f32 --seed 1";
+    for (options, train, each_row) in [
+        ("absolute.toml --noise 0.3", "", true),
+        ("few.toml --paper", "", true),
+        ("few.toml --spread 0.5", "--each-row", true),
+        ("few.toml --spread 0.5", "", false),
+    ] {
+        let words = |command: &str, more: &str| -> serde_json::Value {
+            let line = format!("{command} {options} {few} {more}");
+            folder.json(&line.split_whitespace().collect::<Vec<_>>())
+        };
+        let trained = words("train -o m.bin", train);
+        let rmse = crate::common::rmse(&trained["decoders"][0]["errors"], "dz_mm");
+        let traded = words("trade", "");
+        let mut points = traded["points"].as_array().unwrap().iter();
+        let point = points.find(|it| it["each_row"] == each_row).unwrap();
+        assert_eq!(point["rmse_dz_mm"].as_f64(), Some(rmse), "{options}: {point} {trained}");
+        assert_eq!(point["spread"], trained["spread"], "{options}");
+    }
+}
+
 /// The scene `press` with two rows and few frames.
 fn few_frames_of_two_rows() -> String {
     include_str!("../../../scenes/press.toml")
