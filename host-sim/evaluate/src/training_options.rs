@@ -118,15 +118,12 @@ impl TrainingOptions {
     /// for all.
     ///
     /// # Errors
-    /// [`BadValue`] for several values where one is trained with, and for features beside the paper's method.
+    /// [`BadValue`] for several values where one is trained with, and for what the paper's method does not do.
     pub fn over(&self, usual: &Training) -> Result<Training, BadValue> {
         let Training { mut options, mut refine, .. } = *usual;
         let is_paper = self.method == Some(Method::Paper);
-        if let Some(features) = self.features.filter(|_| is_paper) {
-            let rule = "networks as the paper trains them (method = \"paper\", --paper) have no features; leave one of them out";
-            return Err(BadValue::new("training.features", features, rule));
-        }
         if is_paper {
+            self.check_beside_paper()?;
             options = options.as_in_paper();
             refine = false;
         }
@@ -150,6 +147,23 @@ impl TrainingOptions {
             relative_inputs: self.relative_inputs.unwrap_or(usual.relative_inputs),
             reading_model: self.reading_model.or(usual.reading_model),
         })
+    }
+
+    /// Checks that nothing is asked for which the paper's method does not do.
+    fn check_beside_paper(&self) -> Result<(), BadValue> {
+        let kind = self.features_kind.as_ref().map(ToString::to_string);
+        let others = [
+            ("features", self.features.map(|it| it.to_string()), "have no features"),
+            ("features_kind", kind, "have no features"),
+            ("each_row", self.each_row.filter(|it| !it).map(|it| it.to_string()), "are for each row"),
+            ("refine", self.refine.filter(|it| *it).map(|it| it.to_string()), "are not refined"),
+        ];
+        let given = others.into_iter().find_map(|(field, value, why)| Some((field, value?, why)));
+        let Some((field, value, why)) = given else { return Ok(()) };
+        let rule = format!(
+            "networks as the paper trains them (method = \"paper\", --paper) {why}; leave one of them out"
+        );
+        Err(BadValue::new(format!("training.{field}"), value, rule))
     }
 }
 

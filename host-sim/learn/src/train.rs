@@ -169,8 +169,8 @@ impl Options {
             (false, true) => self.spread / WHOLE_ARRAY_SPREAD,
             _ => self.spread,
         };
-        let features = self.features.filter(|_| !each_row);
-        Self { spread, each_row, features, ..self }
+        let (features, kinds) = if each_row { (None, None) } else { (self.features, self.kinds) };
+        Self { spread, each_row, features, kinds, ..self }
     }
 
     /// Whether the network of `dataset` stands behind a projection of all readings. A single row needs more readings than

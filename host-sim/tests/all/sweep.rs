@@ -265,6 +265,10 @@ fn a_plan_trains_as_the_same_options_of_a_command_do() {
         (&with_solver.replace("\"f32\"", "\"fixed16\""), "method = \"paper\""),
         (&with_solver, "method = \"paper\"\nsolver = \"qr\"\nspread = 0.3"),
         (&contact, "method = \"paper\""),
+        (
+            &contact.replace("[training]", "[training]\nrefine = true\nfeatures_kind = \"plain\""),
+            "method = \"paper\"",
+        ),
         (&contact, "each_row = true"),
     ] {
         let own = Experiment::parse("scene", scene).unwrap();

@@ -156,8 +156,12 @@ impl Plan {
         if features.is_none() {
             of.remove("features");
         }
-        let followed: [(&str, Value); 3] = [
+        if is_paper {
+            of.remove("features_kind");
+        }
+        let followed: [(&str, Value); 4] = [
             ("each_row", each_row.into()),
+            ("refine", training.refine.into()),
             ("solver", solver.name().into()),
             ("format", format.name().into()),
         ];
