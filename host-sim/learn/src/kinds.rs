@@ -7,7 +7,7 @@ use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Progress, Silent, columns};
 
 use crate::train::kmeans::Search;
-use crate::train::{Features, Kinds, Options, THRESHOLD, train};
+use crate::train::{Features, Kinds, Options, Solver, THRESHOLD, train};
 
 /// Most frames that are trained on, and most that are judged by, for each part that is held out.
 const MOST_FRAMES: [usize; 2] = [4000, 2000];
@@ -137,6 +137,8 @@ fn judge(training: &Dataset, held: &Dataset, features: Features, options: &Optio
     let options = Options {
         centres: options.centres.min(MOST_CENTRES),
         format: Format::F32,
+        // So that solvers differ in their weights alone.
+        solver: Solver::Qr,
         search: Search { restarts: 1, ..options.search },
         kinds: Some(Kinds::all(features)),
         ..*options
