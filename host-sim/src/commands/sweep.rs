@@ -7,6 +7,7 @@ use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
 use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
 use clap::Args;
+use taxel_data::BadValue;
 use taxel_data::digest::digest;
 
 use super::merged::Files;
@@ -62,18 +63,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         let message = "--seed: a plan has its own seeds; give `repeats`, or `seed` in [set]";
         return Err(Error::Usage(message.into()));
     }
+    let of_plan = |bad: BadValue| {
+        Error::from(taxel_data::Error::unfit(format!("plan {}: {bad}", arguments.plan.display())))
+    };
     let load = |data: &toml::Table, training: &TrainingOptions, seed| {
         let data = PlannedData::read(data, &arguments.plan)?.load(training, seed, common);
         data.map_err(|error| match error {
-            Error::Data(taxel_data::Error::Setting(bad)) => {
-                let plan = arguments.plan.display();
-                taxel_data::Error::unfit(format!("plan {plan}: {bad}")).into()
-            }
+            Error::Data(taxel_data::Error::Setting(bad)) => of_plan(bad),
             error => error,
         })
     };
     let plan = Plan::read(&arguments.plan, &build()?, &load)?;
-    let points = plan.points()?;
+    let points = plan.points().map_err(of_plan)?;
     if arguments.dry_run {
         return estimate::execute(&plan, &points, common);
     }

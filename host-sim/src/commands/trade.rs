@@ -108,19 +108,26 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
             wanted.set.insert(field, value);
         }
     }
+    let base = match &subject {
+        Subject::Scene(_) => Base::of_scene(subject.name(), arguments.subject.source())?,
+        Subject::Measured(_) => Base::measured(subject.name()),
+    };
+    let data = subject.measurements().map(Measurements::unnamed);
+    let build = sweep::build()?;
+    let plan = Plan::new(subject.name(), (vec![base], data), wanted.clone(), &build);
+    let plan = plan.map_err(of_field)?;
+    let points = plan.points().map_err(of_field)?;
+    if let Some(scene) = subject.scene() {
+        let left = |n| asked.device.averaged(scene.world.noise, wires(&subject, 1), n);
+        let idle = |n: &usize| Warning::idle_averaging(*n, left);
+        asked.samples_averaged.iter().filter_map(idle).for_each(|it| common.remark(it));
+    }
     if arguments.plan {
         wanted.bounds.extend(bounds);
         return Ok(print::Outcome::of(arguments.subject.plan_text(subject.name(), &wanted)?));
     }
     let folder = arguments.to.in_out().join(subject.name());
     files::FILES.check(&folder, &arguments.subject.paths())?;
-    let base = match &subject {
-        Subject::Scene(_) => Base::of_scene(subject.name(), arguments.subject.source())?,
-        Subject::Measured(_) => Base::measured(subject.name()),
-    };
-    let data = subject.measurements().map(Measurements::unnamed);
-    let plan = Plan::new(subject.name(), (vec![base], data), wanted, &sweep::build()?)?;
-    let points = plan.points()?;
     let refused = |cause: &str| {
         let way =
             in_the_way(arguments, &subject, &asked).map_or(String::new(), |way| format!("; {way}"));
@@ -233,11 +240,6 @@ fn asked(arguments: &Arguments, subject: &Subject, common: &Common) -> Result<As
     };
     check(subject, &asked).map_err(of_option)?;
     check_features(subject).map_err(|error| blamed(error, arguments.subject.training()))?;
-    if let Some(scene) = subject.scene() {
-        let left = |n| device.averaged(scene.world.noise, wires(subject, 1), n);
-        let idle = |n: &usize| Warning::idle_averaging(*n, left);
-        asked.samples_averaged.iter().filter_map(idle).for_each(|it| common.remark(it));
-    }
     Ok(asked)
 }
 
@@ -269,39 +271,22 @@ fn check(subject: &Subject, asked: &Asked) -> std::result::Result<(), BadValue> 
             _ => bad,
         })?;
     }
-    let refuse = |option, value: String, rule: String| Err(BadValue::new(option, value, rule));
-    if let Some(samples) = asked.samples_averaged.iter().find(|it| !(1..=256).contains(*it)) {
-        return refuse(
-            "--average",
-            samples.to_string(),
-            "the firmware averages 1 to 256 samples".into(),
-        );
-    }
-    let (columns, rule) = match subject {
-        Subject::Scene(scene) => {
-            let columns = scene.world.sensor.column_wires;
-            (columns, format!("give steps from 1 to {columns}, the columns of the scene"))
-        }
-        Subject::Measured(_) => {
-            (1, "only a scene has columns to leave out; of a data file, choose --inputs".into())
-        }
-    };
-    if let Some(step) = asked.column_steps.iter().find(|step| !(1..=columns).contains(*step)) {
-        return refuse("--column-step", step.to_string(), rule);
-    }
     let has_others = subject.scene().is_some_and(|scene| !scene.others.is_empty());
     if asked.worst_case && !has_others {
         let rule =
             "there are no other contacts to judge by; leave it out, or give a scene of contacts";
-        return refuse("--worst-case", "true".into(), rule.into());
-    }
-    if let Subject::Measured(_) = subject
-        && let Some(samples) = asked.samples_averaged.iter().find(|samples| **samples != 1)
-    {
-        let rule = "measured readings are averaged already: give 1, or a scene";
-        return refuse("--average", samples.to_string(), rule.into());
+        return Err(BadValue::new("--worst-case", true, rule));
     }
     Ok(())
+}
+
+/// Error for a `bad` field of the plan, which names the option that gave it.
+fn of_field(bad: BadValue) -> Error {
+    of_option(match bad.field.as_str() {
+        "device.samples" => bad.named("--average"),
+        "device.column_step" => bad.named("--column-step"),
+        _ => bad,
+    })
 }
 
 /// Centres to try unless a user says otherwise.

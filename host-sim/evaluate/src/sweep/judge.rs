@@ -132,7 +132,8 @@ fn train_each(
                             frames.judge(&blob, options)
                         });
                         for Member { index, point, .. } in of_model {
-                            let results = |model: &Judged| model.results(point.on_device.filter);
+                            let results =
+                                |model: &Judged| Ok(model.results(point.on_device.filter));
                             keep(*index, after(&model, results))?;
                         }
                     }
@@ -413,8 +414,7 @@ impl<'s> Frames<'s> {
 
     /// Errors of the `model` of a still subject, and of the baselines.
     pub fn decoders(&self, judged: &Judged, filter: bool) -> Vec<DecoderErrors> {
-        let way = judged.way(filter).map_or(vec![], |way| way.errors.clone());
-        let network = DecoderErrors::new(metrics::NETWORK, way);
+        let network = DecoderErrors::new(metrics::NETWORK, judged.way(filter).errors.clone());
         std::iter::once(network).chain(self.baselines.iter().cloned()).collect()
     }
 }

@@ -3,7 +3,6 @@
 use taxel_core::filter::Settings;
 
 use super::point::Results;
-use crate::error::Result;
 use crate::metrics::{self, Blocks, Definition, Errors};
 use crate::touches::Way;
 
@@ -42,16 +41,13 @@ pub struct Judged {
 }
 
 impl Judged {
-    pub(super) fn way(&self, filter: bool) -> Result<&Way> {
-        self.ways.get(usize::from(filter)).ok_or_else(|| {
-            let fix = "leave device.filter out, or give the scene a [motion]";
-            crate::Error::failed(format!("a filter is judged on contacts that move: {fix}"))
-        })
+    pub(super) fn way(&self, filter: bool) -> &Way {
+        &self.ways[usize::from(filter)]
     }
 
     /// Results by their names.
-    pub(super) fn results(&self, filter: bool) -> Result<Results> {
-        let way = self.way(filter)?;
+    pub(super) fn results(&self, filter: bool) -> Results {
+        let way = self.way(filter);
         let mut results = self.before.clone();
         for errors in &way.errors {
             for definition in Definition::ALL {
@@ -85,6 +81,6 @@ impl Judged {
             results.add("filter_ms", Some(f64::from(time_constant_us) / 1000.0));
             results.add("lead_ms", Some(f64::from(lead_us) / 1000.0));
         }
-        Ok(results)
+        results
     }
 }

@@ -24,15 +24,14 @@ impl OnDevice {
     /// # Errors
     /// [`BadValue`] for a field that it has not, or a value that it cannot take.
     pub fn new(mut table: Table) -> Result<Self, BadValue> {
-        let mut count = |field: &str| {
+        let mut count = |field: &str, most: usize, rule: &str| {
             let value = table.remove(field).unwrap_or(Value::Integer(1));
             let count = value.as_integer().and_then(|count| usize::try_from(count).ok());
-            count.filter(|count| (1..=usize::from(u16::MAX)).contains(count)).ok_or_else(|| {
-                let rule = "give a whole number, at least 1";
-                BadValue::new(format!("device.{field}"), value, rule)
-            })
+            let count = count.filter(|count| (1..=most).contains(count));
+            count.ok_or_else(|| BadValue::new(format!("device.{field}"), value, rule))
         };
-        let (samples, column_step) = (count("samples")?, count("column_step")?);
+        let samples = count("samples", 256, "the firmware averages 1 to 256 samples")?;
+        let column_step = count("column_step", usize::MAX, "give a whole number, at least 1")?;
         let filter = table.remove("filter").unwrap_or(Value::Boolean(false));
         let filter = filter
             .as_bool()

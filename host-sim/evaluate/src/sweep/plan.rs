@@ -203,6 +203,10 @@ impl Plan {
         require(wanted.limit_frames != Some(1), "limit_frames", 1, || {
             "give at least 2, or 0 for no limit".into()
         })?;
+        if let (Some(frames), Some(_)) = (wanted.limit_frames, &data) {
+            let rule = "the limit of measurements is not known: leave it out";
+            return Err(BadValue::new("limit_frames", frames, rule));
+        }
         let axes = axes(&bases, &wanted)?;
         let mut plan = Self {
             name: name.into(),
@@ -247,9 +251,11 @@ impl Plan {
     fn check_fields(&self) -> Checked<()> {
         let check = |places: &[usize]| {
             let document = self.document_at(places)?;
-            match self.check_scene(&document.scene) {
+            match self.check_scene(&text(&document.scene)?) {
                 Ok(()) => OnDevice::new(document.device).map(drop),
-                Err(message) => Err(self.blamed(&document, &message)),
+                Err(message) => {
+                    Err(self.blamed(&document, &message, &|scene| self.check_scene(scene)))
+                }
             }
         };
         let first = vec![0; self.axes.len()];
@@ -285,18 +291,33 @@ impl Plan {
     }
 
     /// Checks that a scene has only fields that it may have, with values of their kinds; the reason is in serde's words.
-    fn check_scene(&self, scene: &Table) -> std::result::Result<(), String> {
-        let scene = text(scene).map_err(|bad| bad.to_string())?;
+    fn check_scene(&self, scene: &str) -> std::result::Result<(), String> {
         match &self.data {
-            None => Experiment::check_fields(&scene),
-            Some(data) => super::point::measured(data, &scene).map(drop),
+            None => Experiment::check_fields(scene),
+            Some(data) => super::point::measured(data, scene).map(drop),
         }
     }
 
-    /// Error for what is wrong with a point's fields, by who gave them: the scene, [set] or the axes.
-    fn blamed(&self, document: &Document, message: &str) -> BadValue {
+    /// Checks that a scene's values hold as well, and options of training those for measurements.
+    fn check_values(&self, scene: &str) -> std::result::Result<(), String> {
+        let data = self.data.as_deref();
+        let options = super::point::options(data, scene);
+        let options = options.map_err(|why| why.to_string().replace("scene of the point: ", ""))?;
+        let checked = data.map_or(Ok(()), |data| options.check(data.training.frames()));
+        checked.map_err(|bad| bad.to_string())
+    }
+
+    /// Error for what is wrong with a point's fields, by who gave them: the scene, [set] or the axes; `check` tells it.
+    fn blamed(
+        &self,
+        document: &Document,
+        message: &str,
+        check: &dyn Fn(&str) -> std::result::Result<(), String>,
+    ) -> BadValue {
         let base = self.base_of(&document.values);
-        let is_wrong = |scene: &Table| self.check_scene(scene).is_err_and(|it| it == message);
+        let is_wrong = |scene: &Table| {
+            text(scene).is_ok_and(|scene| check(&scene).is_err_and(|it| it == message))
+        };
         let is_list = message.contains("invalid type: sequence");
         let (field, shown, advice) = match base {
             Some(base) if is_wrong(&base.document) => (

@@ -2,12 +2,13 @@
 
 use std::collections::HashSet;
 
-use taxel_data::BadValue;
 use taxel_data::digest::digest;
+use taxel_data::{BadValue, require};
 use taxel_learn::Options;
 use toml::{Table, Value};
 
 use super::{Base, Checked, Plan, Point, SCENE, in_words};
+use crate::experiment::Experiment;
 use crate::sweep::fields;
 use crate::sweep::file::Also;
 use crate::sweep::on_device::OnDevice;
@@ -37,7 +38,7 @@ impl Plan {
             let Some(axis) =
                 (0..places.len()).rev().find(|axis| places[*axis] + 1 < self.axes[*axis].1.len())
             else {
-                return Ok(points);
+                return self.check_any(&points).map(|()| points);
             };
             places[axis] += 1;
             places[axis + 1..].fill(0);
@@ -62,6 +63,7 @@ impl Plan {
             shared.remove("table1");
         }
         let on_device = OnDevice::new(document.device)?;
+        self.check_readings(&on_device, &scene)?;
         let OnDevice { device, samples, column_step, filter } = on_device;
         let (limit_frames, train, also) = (self.limit_frames, self.train, &self.also);
         let how = format!("{device:?} {samples} {column_step} {limit_frames:?} {train} {also:?}");
@@ -91,6 +93,49 @@ impl Plan {
         let id = format!("{:016x}", digest(decides.as_bytes()));
         let (values, digest) = (document.values, of_scene);
         Ok(Point { id, values, scene, on_device, usual, digest, shares, keys })
+    }
+
+    /// Checks that some of all `points` can be; of the others, each has its reason as a result.
+    fn check_any(&self, points: &[Point]) -> Checked<()> {
+        let check = |scene: &str| self.check_values(scene);
+        let mut refusals = points.iter().map(|point| check(&point.scene).err());
+        match refusals.next() {
+            Some(Some(first)) if refusals.all(|refusal| refusal.is_some()) => {
+                let document = self.document_at(&vec![0; self.axes.len()])?;
+                Err(self.blamed(&document, &first, &check))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that measurements, or a point's `scene`, have what the device asks of them.
+    fn check_readings(&self, on_device: &OnDevice, scene: &str) -> Checked<()> {
+        let OnDevice { samples, column_step, filter, .. } = *on_device;
+        let scene = match &self.data {
+            Some(_) => {
+                require(samples == 1, "device.samples", samples, || {
+                    "measured readings are averaged already: give 1, or a scene".into()
+                })?;
+                None
+            }
+            None if column_step == 1 && !filter => return Ok(()),
+            // A scene that cannot be is a failure of its point.
+            None => match Experiment::parse(&self.name, scene) {
+                Ok(scene) => Some(scene.world),
+                Err(_) => return Ok(()),
+            },
+        };
+        let columns = scene.as_ref().map_or(1, |scene| scene.sensor.column_wires);
+        require(column_step <= columns, "device.column_step", column_step, || match &self.data {
+            Some(_) => {
+                "only a scene has columns to leave out; of a data file, choose inputs".into()
+            }
+            None => format!("give steps from 1 to {columns}, the columns of the scene"),
+        })?;
+        let moves = scene.is_some_and(|scene| scene.path.is_some());
+        require(moves || !filter, "device.filter", filter, || {
+            "a filter is judged on contacts that move: leave it out, or give a scene with a [motion]".into()
+        })
     }
 
     /// Whether models with these fields of `training` may be refined.
