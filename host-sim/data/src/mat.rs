@@ -71,7 +71,7 @@ impl Mat {
 
 /// Name of each of the `chosen` columns of a `header` in a model: of a cell, if they are a mat.
 ///
-/// They are one if they are named after their wires (`r0c0`, `m_r1c1` are not, `r3c4` is); if their names differ in a number
+/// They are one if they are named after their wires (`r0c0`, `m_r1c1` are not, `r3c4` is), which a grid must agree with; if their names differ in a number
 /// alone, and these numbers run over a square of at least 8 × 8 cells, from which some may be missing; or if `given` says
 /// so. Then numbers count the cells row by row; without numbers the columns are in that order. The mat is returned if
 /// numbers told it.
@@ -85,13 +85,18 @@ pub fn cell_names(
 ) -> Result<(Vec<String>, Option<Mat>), String> {
     let own: Vec<&str> = chosen.iter().map(|column| header[*column].as_str()).collect();
     let as_they_are = || own.iter().map(ToString::to_string).collect();
-    if given == Some(Grid::None) || own.iter().all(|name| cell_of(name).is_some()) {
-        return Ok((as_they_are(), None));
-    }
-    let given = given.and_then(|grid| if let Grid::Of(mat) = grid { Some(mat) } else { None });
-    if let (None, Some(names)) = (given, named_after_wires(&own)) {
-        return Ok((names, None));
-    }
+    let are_cells = !own.is_empty() && own.iter().all(|name| cell_of(name).is_some());
+    let named = if are_cells { Some(as_they_are()) } else { named_after_wires(&own) };
+    let given = match (given, named) {
+        (Some(Grid::None), _) if !are_cells => return Ok((as_they_are(), None)),
+        (Some(grid), Some(names)) => {
+            check_agrees(grid, &names)?;
+            return Ok((names, None));
+        }
+        (None, Some(names)) => return Ok((names, None)),
+        (Some(Grid::Of(mat)), None) => Some(mat),
+        (_, None) => None,
+    };
     let found = numbers(&own).and_then(|(stem, numbers)| {
         let of_file: Vec<usize> = header.iter().filter_map(|name| number(name, stem)).collect();
         let (mat, first) = numbered(&numbers, &of_file, given)?;
@@ -111,6 +116,18 @@ pub fn cell_names(
             own.len()
         )),
     }
+}
+
+/// Checks that a `grid` is given which has the wires that `names` of cells tell.
+fn check_agrees(grid: Grid, names: &[String]) -> Result<(), String> {
+    let is_in = |mat: Mat, [row, column]: [usize; 2]| row <= mat.rows && column <= mat.columns;
+    let mut cells = names.iter().filter_map(|name| Some((name, cell_of(name)?.0)));
+    let beside = cells.find(|(_, cell)| !matches!(grid, Grid::Of(mat) if is_in(mat, *cell)));
+    beside.map_or(Ok(()), |(name, [row, column])| {
+        Err(format!(
+            "--grid {grid}: {name} tells its own wires, row {row} and column {column}: leave --grid out, or rename the inputs"
+        ))
+    })
 }
 
 /// Names of cells for columns called `r0c0`, `r1c1` or `r1c1x`.
@@ -234,6 +251,14 @@ mod tests {
         assert_eq!(names(&["r1c1_ohm", "r1c2_ohm"]), ["r1c1_ohm", "r1c2_ohm"]);
         assert_eq!(names(&["r0c0", "r0c1"]), ["r1c1_r0c0", "r1c2_r0c1"]);
         assert_eq!(names(&["r1c1_adc", "r2c7_adc"]), ["r1c1_adc", "r2c7_adc"]);
+        let of_grid = |names: [&str; 2], grid| {
+            named(&header(names.map(String::from)), "r*", Some(grid)).map_err(|why| why[..22].to_owned())
+        };
+        assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "2x7").unwrap()[1], "r2c7_adc");
+        assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "7x2"), Err("--grid 7x2: r2c7_adc t".into()));
+        assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "none"), Err("--grid none: r1c1_adc ".into()));
+        assert_eq!(of_grid(["r0c1", "r0c0"], "1x2").unwrap()[0], "r1c2_r0c1");
+        assert_eq!(of_grid(["r0c1", "r0c0"], "none").unwrap()[0], "r0c1");
     }
 
     #[test]
