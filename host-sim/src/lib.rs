@@ -20,5 +20,5 @@ pub mod program;
 
 pub use taxel_evaluate::{
     Error, Result, by_load, device, error, evaluate, experiment, measurements, metrics, others,
-    over_time, run, subject, sweep, trade, training_options, training_set, verdict,
+    over_time, run, select, subject, sweep, trade, training_options, training_set, verdict, worth,
 };

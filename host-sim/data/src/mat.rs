@@ -252,7 +252,8 @@ mod tests {
         assert_eq!(names(&["r0c0", "r0c1"]), ["r1c1_r0c0", "r1c2_r0c1"]);
         assert_eq!(names(&["r1c1_adc", "r2c7_adc"]), ["r1c1_adc", "r2c7_adc"]);
         let of_grid = |names: [&str; 2], grid| {
-            named(&header(names.map(String::from)), "r*", Some(grid)).map_err(|why| why[..22].to_owned())
+            named(&header(names.map(String::from)), "r*", Some(grid))
+                .map_err(|why| why[..22].to_owned())
         };
         assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "2x7").unwrap()[1], "r2c7_adc");
         assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "7x2"), Err("--grid 7x2: r2c7_adc t".into()));

@@ -2,7 +2,6 @@
 
 pub mod distribution;
 pub mod device_cost;
-pub mod worth;
 pub mod limit;
 pub mod confidence;
 pub mod paper_networks;

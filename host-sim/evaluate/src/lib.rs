@@ -24,6 +24,8 @@ pub mod subject;
 pub mod others;
 pub mod evaluate;
 pub mod sweep;
+pub mod select;
+pub mod worth;
 pub mod table1;
 pub mod run;
 pub mod trade;

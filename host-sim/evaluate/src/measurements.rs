@@ -5,7 +5,7 @@ use std::sync::Arc;
 use taxel_data::dataset::{LeftOut, UnusedInputs};
 use taxel_data::{AtRest, BadValue, Clock, Dataset, Rest, Table, require};
 use taxel_learn::outliers::Outliers;
-use taxel_learn::{Origin, relative};
+use taxel_learn::{Origin, folds, relative};
 
 use crate::metrics::Measure;
 use crate::training_options::{Training, TrainingOptions};
@@ -181,6 +181,57 @@ impl Measurements {
     /// These measurements without the name of their file, which is in the blob: no result of a plan depends on it.
     pub fn unnamed(&self) -> Arc<Self> {
         Arc::new(Self { name: "data".into(), ..self.clone() })
+    }
+
+    /// Measurements that are these frames alone, which a model is trained on as `how` says.
+    pub fn of_frames(name: &str, frames: Dataset, fold_of: Vec<usize>, how: Training) -> Self {
+        let nothing = frames.subset(&[]);
+        let log = |frames: &Dataset| {
+            let at = (0..frames.frames()).map(|frame| frame as f64).collect();
+            let clock = Clock { column: None, unit: "", at };
+            Log { clock, lines: (0..frames.frames()).collect() }
+        };
+        Self {
+            name: name.into(),
+            digest: 0,
+            log: log(&frames),
+            fold_of,
+            folds_flatter: false,
+            test_log: log(&nothing),
+            test: nothing,
+            test_rest: None,
+            is_one_log: true,
+            spread: Spread::of(&frames.inputs),
+            test_choice: "none".into(),
+            outliers: Outliers::default(),
+            left_out: LeftOut::default(),
+            unused: UnusedInputs::default(),
+            rest: None,
+            how,
+            training: frames,
+        }
+    }
+
+    /// Number of folds.
+    pub fn folds(&self) -> usize {
+        self.fold_of.iter().max().map_or(0, |last| last + 1)
+    }
+
+    /// These measurements without the frames of `fold` (from 0), which are to judge by.
+    #[must_use]
+    pub fn without_fold(self, fold: usize) -> Self {
+        let (held, kept) = folds::split(&self.fold_of, fold);
+        Self {
+            fold_of: folds::without(&self.fold_of, fold),
+            test: self.training.subset(&held),
+            test_log: self.log.subset(&held),
+            test_rest: self.rest.clone(),
+            is_one_log: true,
+            test_choice: format!("fold {fold}"),
+            training: self.training.subset(&kept),
+            log: self.log.subset(&kept),
+            ..self
+        }
     }
 
     /// Trains on these measurements as `given` says from now on.

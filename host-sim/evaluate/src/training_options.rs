@@ -155,7 +155,11 @@ impl TrainingOptions {
         let others = [
             ("features", self.features.map(|it| it.to_string()), "have no features"),
             ("features_kind", kind, "have no features"),
-            ("each_row", self.each_row.filter(|it| !it).map(|it| it.to_string()), "are for each row"),
+            (
+                "each_row",
+                self.each_row.filter(|it| !it).map(|it| it.to_string()),
+                "are for each row",
+            ),
             ("refine", self.refine.filter(|it| *it).map(|it| it.to_string()), "are not refined"),
         ];
         let given = others.into_iter().find_map(|(field, value, why)| Some((field, value?, why)));

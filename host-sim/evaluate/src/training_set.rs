@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use taxel_data::{BadValue, Dataset, Progress, Stream};
 use taxel_learn::decoders::LINEAR;
+use taxel_learn::folds;
 use taxel_learn::kinds::{self, Choice};
 use taxel_learn::reading_model::{self, Extent, HeldOut, Statistics};
-use taxel_learn::select;
 use taxel_learn::train::{Examples, Found, Layers, Refinement, Start, resolution, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
 use taxel_simulate::Synthesis;
@@ -83,7 +83,7 @@ impl<'s> TrainingSet<'s> {
     fn folds(&self) -> Cow<'_, [usize]> {
         const FOLDS: usize = 5;
         match &self.more {
-            More::Scene(_) => Cow::Owned(select::block_folds(self.frames.frames(), FOLDS)),
+            More::Scene(_) => Cow::Owned(folds::block_folds(self.frames.frames(), FOLDS)),
             More::Folds(fold_of) => Cow::Borrowed(*fold_of),
         }
     }
@@ -151,7 +151,7 @@ impl<'s> TrainingSet<'s> {
         if fold_of.iter().all(|fold| *fold == 0) {
             return vec![];
         }
-        let rmse = select::baseline_rmse(&LINEAR, &self.frames, &fold_of).unwrap_or_default();
+        let rmse = folds::baseline_rmse(&LINEAR, &self.frames, &fold_of).unwrap_or_default();
         if rmse.iter().all(|error| error.is_finite()) { rmse } else { vec![] }
     }
 

@@ -26,7 +26,7 @@ pub mod reading_model;
 pub mod recalibration;
 pub mod faults;
 pub mod decoders;
-pub mod select;
+pub mod folds;
 pub mod cost;
 
 pub use decoder::{Decoder, Estimates, FrameDecoder, Frames, Timing};

@@ -59,7 +59,7 @@ pub struct Outlier {
 }
 
 /// Outliers of a data set, and the frames without any.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Outliers {
     /// All outliers, by line and then column.
     pub found: Vec<Outlier>,

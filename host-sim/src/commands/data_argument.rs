@@ -11,7 +11,7 @@ use taxel_data::clock::neighbours_alike;
 use taxel_data::error::{Problem, Role};
 use taxel_data::mat::Grid;
 use taxel_data::{DataFile, Rest, Table, require};
-use taxel_learn::select;
+use taxel_learn::folds;
 
 use super::Common;
 use super::arguments::{as_text, refuse};
@@ -163,9 +163,9 @@ impl DataOptions {
         let in_blocks =
             self.fold_blocks.is_some() || self.folds.is_none() && neighbours_alike(outputs);
         Ok(if in_blocks {
-            select::block_folds(frames, folds)
+            folds::block_folds(frames, folds)
         } else {
-            select::random_folds(frames, folds, seed)
+            folds::random_folds(frames, folds, seed)
         })
     }
 }

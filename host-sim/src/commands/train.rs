@@ -4,20 +4,20 @@ use std::path::Path;
 
 use super::progress::Terminal;
 use crate::evaluate::device_cost::DeviceCost;
-use crate::evaluate::worth::Worth;
 use crate::measurements::Measurements;
 use crate::metrics::{self, NETWORK};
 use crate::report::format::symbol;
 use crate::report::{self, Digits, Sections, TableOf};
+use crate::select::{Scored, Selection};
 use crate::subject::Subject;
 use crate::training_options::TrainingOptions;
 use crate::training_set::TrainingSet;
+use crate::worth::Worth;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_data::{columns, output};
 use taxel_learn::kinds::Choice;
 use taxel_learn::reading_model::Extent;
-use taxel_learn::select::{Scored, Selection};
 use taxel_learn::{ModelBlob, Options};
 
 use super::data_argument::JudgedBy;
@@ -64,10 +64,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let mut options = subject.options();
     let set = subject.training_set();
     set.check()?;
-    if arguments.select && options.projects(&set.frames) {
-        let message = "--select chooses for networks that are given readings: add --each-row, or leave it out";
-        return Err(Error::Usage(message.into()));
-    }
     let (features, selection) = choice::choose(arguments, &subject, &set, &mut options, common)?;
 
     let progress = Terminal::new(common);

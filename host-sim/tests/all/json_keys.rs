@@ -12,7 +12,7 @@ const COMMANDS: [&str; 19] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --reading-model full -o m.bin",
-    "train data.csv --each-row --select --no-refine --centres 4,8 --spread 0.5,1 -o d.bin",
+    "train data.csv --select --no-refine --centres 4,8 --spread 0.5,1 -o d.bin",
     "train scene.toml --solver rls -o r.bin",
     "decode m.bin data.csv --confidence -o e.csv",
     "eval m.bin data.csv --without r4c5_ohm",

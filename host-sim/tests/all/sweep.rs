@@ -363,11 +363,52 @@ fn measurements_are_swept_by_the_settings_of_training() {
             "folds = 4\nfold_blocks = 4",
             "data: fold_blocks and folds: give one of them",
         ),
+        ("training.centres", "data.fold", "data.fold = 4: give a fold, 0 to 3"),
+        (
+            "training.centres",
+            "data.folds",
+            "data.folds = 4: points of the same data differ in data.fold",
+        ),
     ] {
         folder.write("plan.toml", plan.replace(from, to));
         let message = folder.fail(&["sweep", "plan.toml"], 2);
         assert!(message.contains(says), "{message}");
     }
+    folder
+        .write("plan.toml", "name = \"folds\"\nscene = \"scene.toml\"\n[axes]\ndata.fold = [0]\n");
+    let message = folder.fail(&["sweep", "plan.toml"], 2);
+    assert!(message.contains("data.fold = 0: a scene is judged by fresh frames"), "{message}");
+}
+
+#[test]
+fn folds_of_a_plan_are_those_that_train_selects_by() {
+    let folder = prepared("sweep_folds");
+    folder.succeed(&["synth", "scene.toml", "-n", "300", "-o", "data.csv"]);
+    folder.succeed(&["synth", "scene.toml", "-n", "20", "--seed", "9", "-o", "test.csv"]);
+    folder.write(
+        "plan.toml",
+        "name = \"log\"\n[data]\nfile = \"data.csv\"\ntest = \"test.csv\"\nfolds = 4\n\
+         [set]\ntraining = { refine = false, each_row = true, centres = 6, spread = 0.7 }\n\
+         [axes]\ndata.fold = { from = 0, to = 3, count = 4 }\n",
+    );
+    let of_plan = folder.json(&["sweep", "plan.toml"]);
+    let words = "train data.csv --folds 4 --select --no-refine --each-row --centres 6 --spread 0.7 -o m.bin";
+    let selected = folder.json(&words.split(' ').collect::<Vec<_>>());
+    let scored = &selected["selection"]["scored"][0];
+    assert!(scored["penalty"].is_null());
+    let rms = |values: Vec<f64>| {
+        (values.iter().map(|it| it * it).sum::<f64>() / values.len() as f64).sqrt()
+    };
+    let outputs = selected["outputs"].as_array().unwrap().iter();
+    let of_outputs = outputs.zip(scored["rmse"].as_array().unwrap());
+    let is_z = |name: &Value| name.as_str().unwrap().ends_with("dz_mm");
+    let of_outputs = of_outputs.filter(|(output, _)| is_z(&output["name"]));
+    let points = of_plan["points"].as_array().unwrap().iter();
+    let [folds, outputs] = [
+        rms(points.map(|it| it["rmse_dz_mm"].as_f64().unwrap()).collect()),
+        rms(of_outputs.map(|(_, rmse)| rmse.as_f64().unwrap()).collect()),
+    ];
+    assert!(outputs > 0.0 && (folds / outputs - 1.0).abs() < 1e-9, "{folds} {outputs}");
 }
 
 #[test]

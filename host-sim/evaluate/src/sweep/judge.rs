@@ -165,6 +165,10 @@ fn caught<T>(stage: impl FnOnce() -> Result<T>) -> Stage<T> {
 pub fn subject_of(plan: &Plan, point: &Point) -> Result<Subject> {
     if let Some(data) = &plan.data {
         let data = point::measured(data, &point.scene).map_err(taxel_data::Error::unfit)?;
+        let data = match point.fold {
+            Some(fold) => data.without_fold(fold),
+            None => data,
+        };
         return Ok(Subject::Measured(Box::new(data)));
     }
     let scene = Subject::Scene(Box::new(Experiment::parse("of the point", &point.scene)?));
@@ -204,6 +208,8 @@ pub struct Readings<'s> {
     subject: &'s Subject,
     device: Device,
     samples: usize,
+    /// Whether frames to judge by are a fold that is held out.
+    of_fold: bool,
     pub scan_ms: Option<f64>,
     measure: Measure,
     pub limit: LimitSummary,
@@ -248,8 +254,9 @@ impl<'s> Readings<'s> {
             results.add(&format!("{name}_{}", limit.group), Some(limit.limit));
             results.add(&format!("{error}_{}", limit.group), Some(limit.limit_standard_error));
         }
-        let (device, samples) = (point.on_device.device, point.on_device.samples);
-        Ok(Self { subject, device, samples, scan_ms, measure, limit, results })
+        let (device, samples, of_fold) =
+            (point.on_device.device, point.on_device.samples, point.fold.is_some());
+        Ok(Self { subject, device, samples, of_fold, scan_ms, measure, limit, results })
     }
 
     /// Test frames of contacts that move, for filters that are set for the errors of `group`.
@@ -373,6 +380,11 @@ impl<'s> Frames<'s> {
             None => {
                 let estimates = decoded();
                 before.cell = self.cell(&estimates, options);
+                if self.readings.of_fold {
+                    let outputs = &self.test.outputs;
+                    before.squares =
+                        outputs.squared_errors(&outputs.with_places(estimates.as_slice()));
+                }
                 let (errors, blocks) =
                     metrics::with_blocks(&self.test.outputs, &estimates, measure);
                 let (filter, times) = (Settings::default(), device.times(*scan_ms, &cost));

@@ -35,6 +35,8 @@ type Checked<T> = std::result::Result<T, BadValue>;
 const MOST_POINTS: usize = 100_000;
 /// Field of a point that says which scene it is of, where a plan has several.
 pub const SCENE: &str = "scene";
+/// Field of the fold (from 0) of measured frames that a point's model is judged by, and not trained on.
+pub const FOLD: &str = "data.fold";
 /// Field of a point's seed, which repeats differ in.
 pub const SEED: &str = "seed";
 
@@ -108,6 +110,8 @@ pub struct Point {
     /// Scene's text; of measurements, the fields of training.
     pub scene: String,
     pub on_device: OnDevice,
+    /// Fold of measured frames that its model is judged by, and not trained on.
+    pub fold: Option<usize>,
     /// Options of the plan's scene, whatever the axes say, for which points find what they share.
     pub usual: Options,
     /// Digest of the scene's text, whatever is changed in it.
@@ -252,7 +256,10 @@ impl Plan {
         let check = |places: &[usize]| {
             let document = self.document_at(places)?;
             match self.check_scene(&text(&document.scene)?) {
-                Ok(()) => OnDevice::new(document.device).map(drop),
+                Ok(()) => {
+                    self.fold(document.data)?;
+                    OnDevice::new(document.device).map(drop)
+                }
                 Err(message) => {
                     Err(self.blamed(&document, &message, &|scene| self.check_scene(scene)))
                 }
@@ -283,7 +290,7 @@ impl Plan {
             return Err(rule("measurements have"));
         }
         for base in &self.bases {
-            if !self.changed(Some(base), &[])?.scene.contains_key("table1") {
+            if !self.changed(Some(base), vec![])?.scene.contains_key("table1") {
                 return Err(rule(&format!("{} has", base.label)));
             }
         }
@@ -325,7 +332,7 @@ impl Plan {
                 base.label.clone(),
                 "; `compare` takes a scene with lists, and in a plan they stand in [axes]",
             ),
-            _ if self.changed(base, &[]).is_ok_and(|it| is_wrong(&it.scene)) => {
+            _ if self.changed(base, vec![]).is_ok_and(|it| is_wrong(&it.scene)) => {
                 ("set", in_words(&self.set), "; several values stand in [axes]")
             }
             _ => ("axes", in_words(&document.values), ""),
@@ -350,7 +357,7 @@ impl Plan {
     fn output_names(&self) -> Option<Vec<String>> {
         let parse = |table: &Table| Experiment::parse(&self.name, &text(table).ok()?).ok();
         let of_base = |base: &Base| {
-            let changed = self.changed(Some(base), &[]).ok()?;
+            let changed = self.changed(Some(base), vec![]).ok()?;
             parse(&changed.scene).or_else(|| parse(&base.document))
         };
         let document = self.document_at(&vec![0; self.axes.len()]).ok()?;

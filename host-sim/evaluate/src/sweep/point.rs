@@ -27,6 +27,8 @@ pub struct Results {
     pub notes: Vec<String>,
     /// Errors of a cell of Table 1, if the plan wants it.
     pub cell: Option<Cell>,
+    /// Sum of the squared errors of each output, if a fold is held out.
+    pub squares: Vec<f64>,
 }
 
 impl Results {
@@ -211,6 +213,7 @@ pub(super) fn set(set: &Table) -> std::result::Result<MeasuredFile, String> {
         fields::set(&mut document, &field, value).map_err(|bad| bad.to_string())?;
     }
     document.remove("device");
+    document.remove("data");
     document.try_into().map_err(|cause| fields::with_nearest(cause.message()))
 }
 

@@ -75,6 +75,7 @@ mod tests {
             values: vec![],
             scene: String::new(),
             on_device: OnDevice::new(toml::Table::new()).unwrap(),
+            fold: None,
             usual: Options::default(),
             digest: 0,
             shares: *shares,

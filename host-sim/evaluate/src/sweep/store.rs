@@ -36,6 +36,9 @@ pub struct Record {
     /// Errors of a cell of Table 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cell: Option<Cell>,
+    /// Sum of the squared errors of each output on a fold that is held out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub squares: Vec<f64>,
     /// Reason why there are none.
     pub failed: Option<String>,
 }
@@ -69,6 +72,7 @@ impl Record {
             blocks: outcome.blocks,
             notes: outcome.notes,
             cell: outcome.cell,
+            squares: outcome.squares,
             failed,
         }
     }

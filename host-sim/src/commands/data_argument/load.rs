@@ -18,7 +18,7 @@ use taxel_data::{Clock, DataFile, Dataset};
 use taxel_learn::outliers::{self, Outliers};
 use taxel_learn::train::refine::LEAST_FOLDS;
 use taxel_learn::train::{projection, resolution};
-use taxel_learn::{Options, select};
+use taxel_learn::{Options, folds};
 
 impl DataOptions {
     /// Measurements in the CSV file at `path`, for models trained as `given` says, with this `seed`. Errors name bad values
@@ -182,7 +182,7 @@ impl DataOptions {
                 let problem = Problem::MissingValue { line, rule };
                 return Err(taxel_data::Error::file(&path, problem));
             }
-            Ok(select::number_folds(&values))
+            Ok(folds::number_folds(&values))
         });
         let all = Frames { frames, log, rest };
         Ok(Usual { all, outliers, left_out: kept.left_out, digest, folds: folds.transpose()? })

@@ -1,14 +1,16 @@
 //! Centres, spread and penalty: as given, or chosen among candidates by cross-validation.
 
+use std::sync::Arc;
+
 use crate::Result;
+use crate::measurements::Measurements;
+use crate::select::{Candidates, Edge, Selection, cross_validate};
 use crate::subject::Subject;
-use crate::training_options::TrainingOptions;
+use crate::training_options::{Training, TrainingOptions};
 use crate::training_set::TrainingSet;
-use taxel_data::Table;
 use taxel_learn::Options;
+use taxel_learn::folds::smallest_training_part;
 use taxel_learn::kinds::Choice;
-use taxel_learn::select::{self, Candidates, Edge, Selection};
-use taxel_learn::train::Refinement;
 
 use super::Arguments;
 use crate::commands::Common;
@@ -47,27 +49,20 @@ pub fn choose(
     }
     // Settings are compared with the features that the model will have.
     let features = set.choose(options, &Terminal::new(common));
-    let fold_of = match subject {
-        Subject::Measured(data) => data.fold_of.clone(),
-        Subject::Scene(_) => {
-            let data = &arguments.subject.data;
-            let folds = data.folds_of(&set.frames.outputs, options.seed);
-            folds.map_err(|error| blamed(error, data))?
+    // No reading model changes an error.
+    let (refine, relative_inputs) = (set.refine, set.frames.relative_inputs);
+    let how = Training { options: *options, refine, relative_inputs, reading_model: None };
+    let data = match subject {
+        Subject::Measured(data) => Measurements { how, ..(**data).clone() },
+        Subject::Scene(scene) => {
+            let given = &arguments.subject.data;
+            let fold_of = given.folds_of(&set.frames.outputs, options.seed);
+            let fold_of = fold_of.map_err(|error| blamed(error, given))?;
+            Measurements::of_frames(&scene.name, set.frames.as_ref().clone(), fold_of, how)
         }
     };
-    let selection = select::cross_validate(
-        &set.frames,
-        &fold_of,
-        &candidates(
-            &arguments.subject.training,
-            (&fold_of, &set.frames.outputs),
-            set.refine,
-            options,
-        ),
-        options,
-        set.refine.then(Refinement::default).as_ref(),
-        &Terminal::new(common),
-    )?;
+    let candidates = candidates(&arguments.subject.training, &data);
+    let selection = cross_validate(&Arc::new(data), &candidates, &Terminal::new(common))?;
     let best = selection.best();
     (options.centres, options.spread) = (best.centres, best.spread);
     options.penalty = best.penalty;
@@ -76,17 +71,14 @@ pub fn choose(
 }
 
 /// Candidates as given, and usual ones for the rest. Only grids of usual ones grow.
-fn candidates(
-    given: &TrainingOptions,
-    (fold_of, outputs): (&[usize], &Table),
-    refine: bool,
-    options: &Options,
-) -> Candidates {
+fn candidates(given: &TrainingOptions, data: &Measurements) -> Candidates {
+    let Training { options, refine, .. } = &data.how;
     let centres = if let Some(centres) = &given.centres {
         centres.clone()
     } else {
         // K around the usual one, as far as the smallest training part allows.
-        let largest = select::smallest_training_part(fold_of, outputs).saturating_sub(1).max(1);
+        let fewest = smallest_training_part(&data.fold_of, &data.training.outputs);
+        let largest = fewest.saturating_sub(1).max(1);
         let usual = [options.centres / 2, options.centres, options.centres * 2];
         let mut candidates = usual.map(|k| k.clamp(1, largest)).to_vec();
         candidates.dedup();

@@ -7,7 +7,7 @@ use taxel_data::{BadValue, require};
 use taxel_learn::Options;
 use toml::{Table, Value};
 
-use super::{Base, Checked, Plan, Point, SCENE, in_words};
+use super::{Base, Checked, FOLD, Plan, Point, SCENE, in_words};
 use crate::experiment::Experiment;
 use crate::sweep::fields;
 use crate::sweep::file::Also;
@@ -30,7 +30,7 @@ impl Plan {
         let mut points = Vec::new();
         let mut places = vec![0; self.axes.len()];
         loop {
-            let point = self.point(&places)?;
+            let point = self.point(self.values_at(&places))?;
             if seen.insert((point.id.clone(), in_words(&point.values))) {
                 points.push(point);
             }
@@ -45,8 +45,12 @@ impl Plan {
         }
     }
 
-    fn point(&self, places: &[usize]) -> Checked<Point> {
-        let document = self.document_at(places)?;
+    /// Point with these values of fields.
+    ///
+    /// # Errors
+    /// [`BadValue`] for a field that the plan's scene cannot have.
+    pub fn point(&self, values: Vec<(String, Value)>) -> Checked<Point> {
+        let document = self.changed(self.base_of(&values), values)?;
         let scene = text(&document.scene)?;
         let base = self.base_of(&document.values);
         let of_scene = base.map_or(0, |base| base.digest);
@@ -62,11 +66,13 @@ impl Plan {
         if !self.has(Also::Table1) {
             shared.remove("table1");
         }
-        let on_device = OnDevice::new(document.device)?;
+        let (on_device, fold) = (OnDevice::new(document.device)?, self.fold(document.data)?);
         self.check_readings(&on_device, &scene)?;
         let OnDevice { device, samples, column_step, filter } = on_device;
         let (limit_frames, train, also) = (self.limit_frames, self.train, &self.also);
-        let how = format!("{device:?} {samples} {column_step} {limit_frames:?} {train} {also:?}");
+        let how = format!(
+            "{device:?} {samples} {column_step} {fold:?} {limit_frames:?} {train} {also:?}"
+        );
         let filtered = self.group().filter(|_| filter);
         let decides = format!(
             "{}\n{how} {filtered:?} {usual:?} {of_scene:x}\n{:016x}\n{scene}",
@@ -92,7 +98,32 @@ impl Plan {
         ];
         let id = format!("{:016x}", digest(decides.as_bytes()));
         let (values, digest) = (document.values, of_scene);
-        Ok(Point { id, values, scene, on_device, usual, digest, shares, keys })
+        Ok(Point { id, values, scene, on_device, fold, usual, digest, shares, keys })
+    }
+
+    /// Fold that is held out, as the `data` of a point say.
+    pub(super) fn fold(&self, mut data: Table) -> Checked<Option<usize>> {
+        let fold = data.remove("fold");
+        if let Some((field, value)) = data.iter().next() {
+            let rule = "points of the same data differ in data.fold alone; give others in [data]";
+            return Err(BadValue::new(format!("data.{field}"), value, rule));
+        }
+        let Some(value) = fold else { return Ok(None) };
+        let refused = |rule: String| BadValue::new(FOLD, &value, rule);
+        let Some(data) = &self.data else {
+            return Err(refused("a scene is judged by fresh frames: leave it out".into()));
+        };
+        let fold = value.as_integer().and_then(|fold| usize::try_from(fold).ok());
+        let fold = fold.filter(|fold| *fold < data.folds());
+        fold.map(Some).ok_or_else(|| {
+            refused(match data.folds() {
+                0 | 1 => {
+                    "the frames are in no folds: give folds, fold_blocks or fold_column in [data]"
+                        .into()
+                }
+                folds => format!("give a fold, 0 to {}", folds - 1),
+            })
+        })
     }
 
     /// Checks that some of all `points` can be; of the others, each has its reason as a result.
@@ -145,7 +176,7 @@ impl Plan {
     }
 
     pub(super) fn usual_of(&self, base: &Base) -> Option<Options> {
-        self.usual_in(&text(&self.changed(Some(base), &[]).ok()?.scene).ok()?)
+        self.usual_in(&text(&self.changed(Some(base), vec![]).ok()?.scene).ok()?)
     }
 
     fn usual_in(&self, scene: &str) -> Option<Options> {
@@ -154,12 +185,16 @@ impl Plan {
 
     /// Fields of the point at these places of the axes.
     pub(super) fn document_at(&self, places: &[usize]) -> Checked<Document> {
+        let values = self.values_at(places);
+        self.changed(self.base_of(&values), values)
+    }
+
+    fn values_at(&self, places: &[usize]) -> Vec<(String, Value)> {
         let chosen = self.axes.iter().zip(places);
         let values = chosen.flat_map(|((fields, lines), place)| {
             fields.iter().cloned().zip(lines[*place].iter().cloned())
         });
-        let values: Vec<(String, Value)> = values.collect();
-        self.changed(self.base_of(&values), &values)
+        values.collect()
     }
 
     /// Trains as the scene, [set] and `values` say one after another, where the later ones choose the kind of networks: fields
@@ -230,20 +265,21 @@ impl Plan {
     pub(super) fn changed(
         &self,
         base: Option<&Base>,
-        values: &[(String, Value)],
+        values: Vec<(String, Value)>,
     ) -> Checked<Document> {
         let mut document = base.map(|base| base.document.clone()).unwrap_or_default();
         document.insert("device".into(), self.device.clone().into());
-        let changed = self.set.iter().chain(values).filter(|(field, _)| field != SCENE);
+        let changed = self.set.iter().chain(&values).filter(|(field, _)| field != SCENE);
         for (field, value) in changed {
             fields::set(&mut document, field, value.clone())?;
         }
-        self.follow_kind(&mut document, base, values)?;
-        let device = match document.remove("device") {
-            Some(Value::Table(device)) => device,
+        self.follow_kind(&mut document, base, &values)?;
+        let mut table = |name: &str| match document.remove(name) {
+            Some(Value::Table(table)) => table,
             _ => Table::new(),
         };
-        Ok(Document { scene: document, device, values: values.to_vec() })
+        let (device, data) = (table("device"), table("data"));
+        Ok(Document { scene: document, device, data, values })
     }
 }
 
@@ -256,6 +292,7 @@ fn is_paper(training: &Table) -> bool {
 pub(super) struct Document {
     pub scene: Table,
     pub device: Table,
+    pub data: Table,
     pub values: Vec<(String, Value)>,
 }
 

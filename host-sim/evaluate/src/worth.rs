@@ -4,12 +4,12 @@ use serde::Serialize;
 use taxel_data::{Dataset, Stream, columns};
 use taxel_learn::ModelBlob;
 use taxel_learn::decoders::{BASELINES, mean};
-use taxel_learn::select::Selection;
 use taxel_limit::Refusal;
 use taxel_simulate::Synthesis;
 
 use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure};
 use crate::over_time::RestOverTime;
+use crate::select::Selection;
 use crate::subject::Subject;
 use crate::training_set::TrainingSet;
 use crate::verdict::{Verdict, Warning};

@@ -1,6 +1,12 @@
 //! Folds of measured frames, for cross-validation and for refinement.
 
-use taxel_data::{Purpose, Random, Stream, Table};
+use taxel_data::{Dataset, Purpose, Random, Stream, Table};
+
+use crate::decoders::Baseline;
+use crate::parallel;
+
+/// Frames that baselines decode at once.
+const FRAMES_AT_ONCE: usize = 8192;
 
 /// Assigns `frames` to `folds` at random, in equal numbers: the fold of each frame, from 0.
 pub fn random_folds(frames: usize, folds: usize, seed: u64) -> Vec<usize> {
@@ -41,9 +47,66 @@ pub fn smallest_training_part(fold_of: &[usize], outputs: &Table) -> usize {
     left.min().unwrap_or(0)
 }
 
+/// RMSE of a baseline on folds that it was not fitted to, for each output, in its unit. `fold_of` gives each frame's fold,
+/// numbered from 0. It is NaN for an output without a value. `None` for a baseline that cannot be fitted.
+pub fn baseline_rmse(
+    baseline: &Baseline,
+    dataset: &Dataset,
+    fold_of: &[usize],
+) -> Option<Vec<f64>> {
+    let folds = fold_of.iter().max().map_or(0, |last| last + 1);
+    let squares = parallel::map(folds, &|fold| baseline_squares(baseline, dataset, fold_of, fold));
+    let squares: Vec<Vec<f64>> = squares.into_iter().collect::<Option<_>>()?;
+    Some(pooled_rmse(&squares, &dataset.outputs))
+}
+
+/// RMSE of each of `outputs` over all folds, in its unit, from the sums of squared errors on each fold, `[fold][output]`. It is
+/// NaN for an output without a value.
+pub fn pooled_rmse(squares: &[Vec<f64>], outputs: &Table) -> Vec<f64> {
+    let of = |(output, count): (usize, usize)| {
+        let sum: f64 = squares.iter().map(|fold| fold[output]).sum();
+        (sum / count as f64).sqrt()
+    };
+    outputs.counts().into_iter().enumerate().map(of).collect()
+}
+
+/// Sums of squared errors of a baseline on one fold, `[output]`, after fitting it to the others.
+fn baseline_squares(
+    baseline: &Baseline,
+    dataset: &Dataset,
+    fold_of: &[usize],
+    fold: usize,
+) -> Option<Vec<f64>> {
+    let (held, kept) = split(fold_of, fold);
+    let decoder = baseline.fit_to(dataset, &kept)?;
+    let mut sums = vec![0.0; dataset.outputs.names.len()];
+    for lines in held.chunks(FRAMES_AT_ONCE) {
+        let test = dataset.subset(lines);
+        let predicted = decoder.decode_all(&test.inputs.values, 1);
+        test.outputs.add_squared_errors(&predicted.values, &mut sums);
+    }
+    Some(sums)
+}
+
+/// Frames that are held out, and all others, for one fold: indices from 0.
+pub fn split(fold_of: &[usize], fold: usize) -> (Vec<usize>, Vec<usize>) {
+    (0..fold_of.len()).partition(|frame| fold_of[*frame] == fold)
+}
+
+/// Folds of the frames that are not in `fold`, numbered without a gap.
+pub fn without(fold_of: &[usize], fold: usize) -> Vec<usize> {
+    let others = fold_of.iter().filter(|f| **f != fold);
+    others.map(|f| if *f > fold { f - 1 } else { *f }).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn folds_are_numbered_without_the_one_that_is_held_out() {
+        assert_eq!(without(&[0, 1, 2, 3, 1, 0], 1), [0, 1, 2, 0]);
+    }
 
     #[test]
     fn blocks_are_equal_in_number_and_follow_one_another() {

@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 use taxel_data::BadValue;
+use taxel_learn::Options;
+use taxel_learn::train::{check_penalty, check_spread};
 
 use super::Scored;
-use crate::train::{Options, check_penalty, check_spread};
 
 /// Values of each setting that selection tries, in all combinations.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,22 +1,24 @@
-//! Selection of K, spread and ridge penalty by k-fold cross-validation.
+//! Selection of K, spread and ridge penalty by k-fold cross-validation: a [plan](crate::sweep) whose points differ in these
+//! and in the fold that is held out.
+
+use std::sync::Arc;
 
 use serde::Serialize;
-use taxel_data::{BadValue, Dataset, Progress, Silent};
+use taxel_data::{BadValue, Progress, Table};
+use taxel_learn::decoders::{BASELINES, Baseline};
+use taxel_learn::folds::{baseline_rmse, pooled_rmse, smallest_training_part};
+use taxel_learn::train::refine::LEAST_FOLDS;
+use toml::Value;
 
-use crate::decoders::{BASELINES, Baseline};
-use crate::error::Result;
-use crate::parallel;
-use crate::train::refine::LEAST_FOLDS;
-use crate::train::{Examples, Found, Layers, Options, Refinement, Start};
+use crate::error::{Error, Result};
+use crate::measurements::Measurements;
+use crate::sweep::file::Wanted;
+use crate::sweep::plan::{Base, FOLD, Plan};
+use crate::sweep::{Record, work};
 
-mod folds;
 mod grid;
 
-pub use folds::{block_folds, number_folds, random_folds, smallest_training_part};
 pub use grid::{Candidates, Edge};
-
-/// Frames that baselines decode at once.
-const FRAMES_AT_ONCE: usize = 8192;
 
 /// Result of one candidate on the folds that it was not trained on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -25,7 +27,7 @@ pub struct Scored {
     pub centres: usize,
     /// Width σ on scaled inputs.
     pub spread: f64,
-    /// Penalty on squared weights for each frame ([`Options::penalty`]); `None` for the usual one.
+    /// Penalty on squared weights for each frame ([`Options::penalty`](taxel_learn::Options::penalty)); `None` for the usual one.
     pub penalty: Option<f64>,
     /// RMSE of each output over all held-out samples, in the output's unit.
     pub rmse: Vec<f64>,
@@ -71,39 +73,45 @@ impl Selection {
     }
 }
 
-/// Scores every combination of `candidates` by cross-validation.
-///
-/// `fold_of` gives each frame's fold, numbered from 0; all other options come from `options`. With a `refinement`,
-/// spreads are where it starts, and it takes the folds that are not held out as its own.
+/// Scores every combination of `candidates` on the frames of `data`, each fold judged by models that were trained on the
+/// others. All other options are those of `data`. Where it refines, spreads are where that starts, and it takes the folds that
+/// are not held out as its own.
 ///
 /// A grid is extended one value at a time, at the best values of the other settings.
 ///
 /// # Errors
-/// [`Error::Setting`](crate::Error::Setting) for fewer than two folds (with a refinement, one more than
-/// it needs), no candidate, or a candidate that
-/// does not fit the data; otherwise the errors of [`train`](crate::train::train).
+/// [`BadValue`] for fewer than two folds (with a refinement, one more than it needs), no candidate, or a candidate that does
+/// not fit the data; otherwise the errors of training.
 pub fn cross_validate(
-    dataset: &Dataset,
-    fold_of: &[usize],
+    data: &Arc<Measurements>,
     candidates: &Candidates,
-    options: &Options,
-    refinement: Option<&Refinement>,
     progress: &dyn Progress,
 ) -> Result<Selection> {
-    let judge = Judge::new(dataset, fold_of, options, refinement)?;
-    candidates.check(|options| options.check(judge.smallest_training_part()), options)?;
-    let Candidates { centres, spreads, penalties, .. } = candidates;
-    let mut scored = judge.scores(centres, spreads, penalties, progress)?;
+    let (how, outputs) = (&data.how, &data.training.outputs);
+    let folds = data.folds();
+    let least = if how.refine { LEAST_FOLDS + 1 } else { 2 };
+    if folds < least {
+        let of = if how.refine { " of refined training" } else { "" };
+        let rule = format!("cross-validation{of} needs at least {least}");
+        return Err(BadValue::new("folds", folds, rule).into());
+    }
+    let fewest = smallest_training_part(&data.fold_of, outputs);
+    candidates.check(|options| options.check(fewest), &how.options)?;
+    let subject = (vec![Base::measured("data")], Some(data.clone()));
+    let plan = Plan::new("selection", subject, Wanted::default(), "")?;
+    let scores = |candidates: &Candidates| scores(&plan, candidates, (folds, outputs), progress);
+    let mut scored = scores(candidates)?;
     let mut best = lowest(&scored)
         .ok_or_else(|| BadValue::new("candidates", 0, "give at least one value of each setting"))?;
     let mut grown = candidates.clone();
     while let Some((spread, penalty)) = grown.grow(&scored[best]) {
-        let more = judge.scores(&[scored[best].centres], &[spread], &[penalty], progress)?;
-        scored.extend(more);
+        let centres = vec![scored[best].centres];
+        let (spreads, penalties) = (vec![spread], vec![penalty]);
+        scored.extend(scores(&Candidates { centres, spreads, penalties, ..*candidates })?);
         best = lowest(&scored).unwrap_or(best);
     }
     let edges = grown.edges(&scored[best]);
-    Ok(Selection { edges, chosen: best, scored, baselines: judge.baselines() })
+    Ok(Selection { edges, chosen: best, scored, baselines: baselines(data) })
 }
 
 /// Index of the lowest score, the first among equals.
@@ -111,133 +119,58 @@ fn lowest(scored: &[Scored]) -> Option<usize> {
     (0..scored.len()).min_by(|a, b| scored[*a].score.total_cmp(&scored[*b].score))
 }
 
-/// Frames in folds, on which candidates are judged.
-struct Judge<'d> {
-    dataset: &'d Dataset,
-    fold_of: &'d [usize],
-    folds: usize,
-    options: &'d Options,
-    refinement: Option<&'d Refinement>,
-}
-
-impl<'d> Judge<'d> {
-    fn new(
-        dataset: &'d Dataset,
-        fold_of: &'d [usize],
-        options: &'d Options,
-        refinement: Option<&'d Refinement>,
-    ) -> Result<Self> {
-        let folds = fold_of.iter().max().map_or(0, |last| last + 1);
-        let least = if refinement.is_some() { LEAST_FOLDS + 1 } else { 2 };
-        if folds < least {
-            let of = if refinement.is_some() { " of refined training" } else { "" };
-            let rule = format!("cross-validation{of} needs at least {least}");
-            return Err(BadValue::new("folds", folds, rule).into());
-        }
-        Ok(Self { dataset, fold_of, folds, options, refinement })
-    }
-
-    fn smallest_training_part(&self) -> usize {
-        smallest_training_part(self.fold_of, &self.dataset.outputs)
-    }
-
-    /// Scores of all combinations, by K, then spread, then penalty.
-    fn scores(
-        &self,
-        centres: &[usize],
-        spreads: &[f64],
-        penalties: &[Option<f64>],
-        progress: &dyn Progress,
-    ) -> Result<Vec<Scored>> {
-        let of_k = |k: &usize| (0..self.folds).map(|fold| (*k, fold)).collect::<Vec<_>>();
-        let tasks: Vec<(usize, usize)> = centres.iter().flat_map(of_k).collect();
-        progress.stage("cross-validate", tasks.len());
-        let squares = parallel::map(tasks.len(), &|task| {
-            let (centres, fold) = tasks[task];
-            let options = Options { centres, ..*self.options };
-            let squares = self.held_out_squares(fold, spreads, penalties, &options);
-            progress.step();
-            squares
-        });
-        let squares: Vec<Vec<Vec<f64>>> = squares.into_iter().collect::<Result<_>>()?;
-        let (deviations, counts) =
-            (self.dataset.outputs.deviations(), self.dataset.outputs.counts());
-        let mut scored = Vec::new();
-        for (k, of_folds) in centres.iter().zip(squares.chunks_exact(self.folds)) {
-            let pairs = spreads.iter().flat_map(|s| penalties.iter().map(move |p| (*s, *p)));
-            for (place, (spread, penalty)) in pairs.enumerate() {
-                let sum = |output: usize| of_folds.iter().map(|fold| fold[place][output]).sum();
-                let outputs = counts.iter().enumerate();
-                let rmse: Vec<f64> =
-                    outputs.map(|(output, count)| root_mean(sum(output), *count)).collect();
-                let score = score(&rmse, &deviations);
-                scored.push(Scored { centres: *k, spread, penalty, rmse, score });
-            }
-        }
-        Ok(scored)
-    }
-
-    /// Sums of squared errors on one fold, `[spread · penalty][output]`, after training on the others.
-    fn held_out_squares(
-        &self,
-        fold: usize,
-        spreads: &[f64],
-        penalties: &[Option<f64>],
-        options: &Options,
-    ) -> Result<Vec<Vec<f64>>> {
-        let (held, kept) = split(self.fold_of, fold);
-        let [test, training] = [held, kept].map(|frames| self.dataset.subset(&frames));
-        let inner = without(self.fold_of, fold);
-        let refinement = self.refinement.map(|settings| (settings, Examples::Folds(&inner)));
-        // Where centres move to depends on the penalty.
-        let together = if refinement.is_some() { 1 } else { penalties.len().max(1) };
-        let starts = Start::all(&training, options)?;
-        let layers: Vec<Layers> = starts.iter().map(|start| start.layers(options)).collect();
-        let mut squares = Vec::new();
+/// Scores of all combinations, by K, then spread, then penalty.
+fn scores(
+    plan: &Plan,
+    candidates: &Candidates,
+    (folds, outputs): (usize, &Table),
+    progress: &dyn Progress,
+) -> Result<Vec<Scored>> {
+    let Candidates { centres, spreads, penalties, .. } = candidates;
+    let mut tried = vec![];
+    for centres in centres {
         for spread in spreads {
-            for penalties in penalties.chunks(together) {
-                let options = Options { spread: *spread, penalty: penalties[0], ..*options };
-                let layers = layers.clone();
-                let found = Found::new(&starts, layers, &options, penalties, refinement, &Silent)?;
-                for trained in found.fit(options.format, options.or_f32, &Silent) {
-                    let decoded = trained?.decode(&test.inputs.values);
-                    let decoded = test.outputs.with_places(decoded);
-                    squares.push(test.outputs.squared_errors(&decoded));
-                }
-            }
+            tried.extend(penalties.iter().map(|penalty| (*centres, *spread, *penalty)));
         }
-        Ok(squares)
     }
-
-    /// Baselines on the same folds.
-    fn baselines(&self) -> Vec<BaselineScore> {
-        let deviations = self.dataset.outputs.deviations();
-        let score = |it: &Baseline| {
-            let rmse = baseline_rmse(it, self.dataset, self.fold_of)?;
-            Some(BaselineScore { decoder: it.name, score: score(&rmse, &deviations), rmse })
-        };
-        BASELINES.iter().filter_map(score).collect()
+    let whole = |number: usize| Value::Integer(i64::try_from(number).unwrap_or(i64::MAX));
+    let mut points = Vec::with_capacity(tried.len() * folds);
+    for (centres, spread, penalty) in &tried {
+        for fold in 0..folds {
+            let mut values = vec![
+                (FOLD, whole(fold)),
+                ("training.centres", whole(*centres)),
+                ("training.spread", Value::Float(*spread)),
+            ];
+            values.extend(penalty.map(|penalty| ("training.penalty", Value::Float(penalty))));
+            let values = values.into_iter().map(|(field, value)| (field.to_owned(), value));
+            points.push(plan.point(values.collect())?);
+        }
     }
-}
-
-/// RMSE of a baseline on folds that it was not fitted to, for each output, in its unit. `fold_of` gives each frame's fold,
-/// numbered from 0. It is NaN for an output without a value. `None` for a baseline that cannot be fitted.
-pub fn baseline_rmse(
-    baseline: &Baseline,
-    dataset: &Dataset,
-    fold_of: &[usize],
-) -> Option<Vec<f64>> {
-    let folds = fold_of.iter().max().map_or(0, |last| last + 1);
-    let squares = parallel::map(folds, &|fold| baseline_squares(baseline, dataset, fold_of, fold));
-    let squares: Vec<Vec<f64>> = squares.into_iter().collect::<Option<_>>()?;
-    let rmse = |(output, count): (usize, usize)| {
-        root_mean(squares.iter().map(|fold| fold[output]).sum(), count)
+    let squares = |record: Record| match record.failed {
+        None => Ok(record.squares),
+        Some(why) => Err(Error::failed(format!("cross-validation: {why}"))),
     };
-    Some(dataset.outputs.counts().into_iter().enumerate().map(rmse).collect())
+    let records = work::in_memory(plan, &points, progress)?.into_iter().flatten();
+    let squares = records.map(squares).collect::<Result<Vec<_>>>()?;
+    let deviations = outputs.deviations();
+    let scored = tried.into_iter().zip(squares.chunks_exact(folds));
+    let scored = scored.map(|((centres, spread, penalty), squares)| {
+        let rmse = pooled_rmse(squares, outputs);
+        let score = score(&rmse, &deviations);
+        Scored { centres, spread, penalty, rmse, score }
+    });
+    Ok(scored.collect())
 }
 
-fn root_mean(squares: f64, count: usize) -> f64 {
-    (squares / count as f64).sqrt()
+/// Baselines on the same folds.
+fn baselines(data: &Measurements) -> Vec<BaselineScore> {
+    let deviations = data.training.outputs.deviations();
+    let score = |it: &Baseline| {
+        let rmse = baseline_rmse(it, &data.training, &data.fold_of)?;
+        Some(BaselineScore { decoder: it.name, score: score(&rmse, &deviations), rmse })
+    };
+    BASELINES.iter().filter_map(score).collect()
 }
 
 /// Mean over the outputs of RMSE/standard deviation. Outputs that never change do not count.
@@ -248,52 +181,21 @@ fn score(rmse: &[f64], deviations: &[f64]) -> f64 {
     (relative.iter().sum::<f64>() + 0.0) / relative.len().max(1) as f64
 }
 
-/// Sums of squared errors of a baseline on one fold, `[output]`, after fitting it to the others.
-fn baseline_squares(
-    baseline: &Baseline,
-    dataset: &Dataset,
-    fold_of: &[usize],
-    fold: usize,
-) -> Option<Vec<f64>> {
-    let (held, kept) = split(fold_of, fold);
-    let decoder = baseline.fit_to(dataset, &kept)?;
-    let mut sums = vec![0.0; dataset.outputs.names.len()];
-    for lines in held.chunks(FRAMES_AT_ONCE) {
-        let test = dataset.subset(lines);
-        let predicted = decoder.decode_all(&test.inputs.values, 1);
-        test.outputs.add_squared_errors(&predicted.values, &mut sums);
-    }
-    Some(sums)
-}
-
-/// Frames that are held out, and all others, for one fold.
-fn split(fold_of: &[usize], fold: usize) -> (Vec<usize>, Vec<usize>) {
-    (0..fold_of.len()).partition(|frame| fold_of[*frame] == fold)
-}
-
-/// Folds of the frames that are not in `fold`, numbered without a gap.
-fn without(fold_of: &[usize], fold: usize) -> Vec<usize> {
-    let others = fold_of.iter().filter(|f| **f != fold);
-    others.map(|f| if *f > fold { f - 1 } else { *f }).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taxel_data::random::{Purpose, Random, Stream};
+    use taxel_data::{AtRest, Dataset, Silent};
+    use taxel_learn::Options;
+    use taxel_learn::folds::{block_folds, random_folds};
+    use taxel_learn::train::{Features, Kinds};
 
-    #[test]
-    fn folds_are_numbered_without_the_one_that_is_held_out() {
-        assert_eq!(without(&[0, 1, 2, 3, 1, 0], 1), [0, 1, 2, 0]);
-    }
+    use crate::training_options::Training;
 
     #[test]
     fn without_an_output_that_changes_the_score_is_0_and_not_minus_0() {
         assert!(score(&[0.5], &[0.0]).is_sign_positive());
     }
-    use crate::train::{Features, Kinds};
-    use taxel_data::AtRest;
-    use taxel_data::random::{Purpose, Random, Stream};
-    use taxel_data::table::Table;
 
     /// Data set whose output y follows two inputs, while `constant` never changes.
     fn dataset(outputs: &[&str]) -> Dataset {
@@ -313,6 +215,17 @@ mod tests {
         }
     }
 
+    fn selected(
+        dataset: &Dataset,
+        folds: &[usize],
+        candidates: &Candidates,
+        options: Options,
+    ) -> Selection {
+        let how = Training { options, refine: false, ..Training::default() };
+        let data = Measurements::of_frames("data", dataset.clone(), folds.to_vec(), how);
+        cross_validate(&Arc::new(data), candidates, &Silent).unwrap()
+    }
+
     /// What is selected of one number of centres, where no spread is tried beyond those given.
     fn select(
         dataset: &Dataset,
@@ -330,8 +243,9 @@ mod tests {
             most_spreads: 0,
             most_penalties,
         };
-        let options = Options { centres: 1, spread: 1.0, ..Options::of_rows() };
-        cross_validate(dataset, folds, &candidates, &options, None, &Silent).unwrap()
+        let kinds = Some(Kinds::all(Features::AsTheyAre));
+        let options = Options { centres: 1, spread: 1.0, kinds, ..Options::of_rows() };
+        selected(dataset, folds, &candidates, options)
     }
 
     /// Noisy outputs of few frames: a penalty keeps many centres from fitting the noise.
@@ -380,8 +294,7 @@ mod tests {
         };
         let rmse = |features: Features| {
             let options = Options { kinds: Some(Kinds::all(features)), ..Options::default() };
-            let selection = cross_validate(&data, &folds, &candidates, &options, None, &Silent);
-            selection.unwrap().best().rmse[0]
+            selected(&data, &folds, &candidates, options).best().rmse[0]
         };
         let [plain, normalised] =
             [Features::AsTheyAre, Features::Normalised { threshold: 0.0 }].map(rmse);
