@@ -14,5 +14,6 @@ pub mod device;
 pub mod simulation;
 pub mod replay;
 mod wires;
+mod shown;
 pub mod recorder;
 pub mod watch;

@@ -1,8 +1,8 @@
 //! Models in arrays of fixed size, for programs that never change their model.
 
 use crate::blob::ModelShape;
-use crate::decoder::{Frame, FrameDecoder, Networks};
 use crate::estimate::{Estimate, RowStatus};
+use crate::frame_decoder::{Frame, FrameDecoder, Networks};
 use crate::infer::Infer;
 use crate::reading_model::ReadingModel;
 

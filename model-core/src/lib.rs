@@ -38,6 +38,7 @@ pub mod projection;
 pub mod reading_model;
 pub mod blob;
 mod infer;
+mod frame_decoder;
 mod decoder;
 mod fixed;
 
@@ -46,10 +47,11 @@ pub use blob::Aligned;
 pub use blob::AlignedBytes;
 #[cfg(feature = "std")]
 pub use decoder::OwnedEstimate;
-pub use decoder::{Decoder, Frame, Networks, decoder_ram_bytes, scratch_floats};
+pub use decoder::{Decoder, decoder_ram_bytes, scratch_floats};
 pub use estimate::{Estimate, RowStatus};
 pub use fixed::{Decoded, Fixed};
 pub use frame::{ColumnWire, ColumnWires, RowWire, Wires};
+pub use frame_decoder::{Frame, Networks};
 
 /// The README's example is a test.
 #[cfg(doctest)]

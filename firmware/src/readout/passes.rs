@@ -253,3 +253,6 @@ fn failed(frame: &mut [f32]) -> ScanReport {
     count_failures(&mut report, frame.len());
     report
 }
+
+#[cfg(test)]
+mod tests;

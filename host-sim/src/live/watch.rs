@@ -7,14 +7,15 @@ use std::time::{Duration, Instant};
 
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::ModelBlob;
-use taxel_recording::{Frame, Layout, Status as RecordedStatus};
-use taxel_view::message::{self as page, Channel, Flag, Kind, State, Status};
+use taxel_recording::{Frame, Status as RecordedStatus};
+use taxel_view::message::{self as page, Kind, State, Status};
 use taxel_view::{Action, Command, View};
 
 use super::contact::{force_n, place_mm};
 use super::feed::{Feed, Next};
 use super::moment::Moment;
 use super::recorder::{Beside, Recorder};
+use super::shown;
 use super::touch::{Touch, mean, unsteady};
 use super::wires::Wires;
 use crate::{Error, Result};
@@ -27,8 +28,7 @@ const STATUS: Duration = Duration::from_millis(500);
 const ZERO_FRAMES: usize = 24;
 /// Time over which rates and errors are told.
 const WINDOW: Duration = Duration::from_secs(10);
-/// End of the colour scale in mm.
-const SCALE_MM: f32 = 1.0;
+
 /// What goes with what is watched.
 pub struct Watched<'b> {
     /// Model that decodes, if it is known: for its reading model, and for recordings.
@@ -186,7 +186,7 @@ impl<'w, 'b> Watch<'w, 'b> {
         self.find_contact(&mut moment.frame);
         let frame = &moment.frame;
         let outputs = frame.outputs.as_deref();
-        let (square, count) = errors(self.feed.layout(), outputs, frame.truth.as_deref());
+        let (square, count) = shown::errors(self.feed.layout(), outputs, frame.truth.as_deref());
         let has_outputs = outputs.is_some();
         if self.newest.len() == ZERO_FRAMES {
             self.newest.pop_front();
@@ -206,7 +206,7 @@ impl<'w, 'b> Watch<'w, 'b> {
         self.record(&mut moment);
         self.trouble = None;
         if !self.is_paused {
-            self.view.show(for_page(&moment));
+            self.view.show(shown::frame(&moment));
         }
     }
 
@@ -329,29 +329,7 @@ impl<'w, 'b> Watch<'w, 'b> {
     }
 
     fn show_layout(&self) {
-        let (layout, about) = (self.feed.layout(), self.feed.about());
-        let channel = |column: &taxel_recording::Column| Channel {
-            name: column.name.clone(),
-            unit: column.unit.clone(),
-        };
-        let electrode = |it: &taxel_recording::Electrode| page::Electrode {
-            name: it.name.clone(),
-            place_mm: it.place_mm.map(|place| place as f32),
-            outputs: it.outputs,
-        };
-        self.view.set_layout(page::Layout {
-            title: layout.title.clone(),
-            kind: about.kind,
-            source: about.source,
-            rows: layout.rows,
-            columns: layout.columns,
-            readings: layout.readings.iter().map(channel).collect(),
-            outputs: layout.outputs.iter().map(channel).collect(),
-            electrodes: layout.electrodes.iter().map(electrode).collect(),
-            scale_mm: SCALE_MM,
-            can: about.can,
-            duration_s: about.duration_s,
-        });
+        self.view.set_layout(shown::layout(self.feed));
         if let Some(baseline) = &self.baseline {
             self.view.set_baseline(baseline.clone());
         }
@@ -388,55 +366,9 @@ impl<'w, 'b> Watch<'w, 'b> {
     }
 }
 
-/// Sum of the squared errors in mm² of deformations, and their number.
-fn errors(layout: &Layout, outputs: Option<&[f32]>, truth: Option<&[f32]>) -> (f64, usize) {
-    let (Some(outputs), Some(truth)) = (outputs, truth) else { return (0.0, 0) };
-    let pairs = outputs.iter().zip(truth).zip(&layout.outputs);
-    let squares =
-        pairs.filter(|(_, column)| column.unit == "mm").map(|((a, b), _)| (a - b).powi(2));
-    let known: Vec<f64> = squares.filter(|it| it.is_finite()).map(f64::from).collect();
-    (known.iter().sum(), known.len())
-}
-
-/// What is to be said of a row, by how its decoding ended.
-fn row_flag(status: u8) -> Option<Flag> {
-    match status {
-        0 => None,
-        _ => Some(Flag::Missing),
-    }
-}
-
-/// A moment as the page takes it.
-fn for_page(moment: &Moment) -> page::Frame {
-    let frame = &moment.frame;
-    let flags = [
-        (EstimateReport::NOVEL, Flag::Novel),
-        (EstimateReport::CLAMPED, Flag::Clamped),
-        (EstimateReport::FAULTY_READING, Flag::Missing),
-    ];
-    page::Frame {
-        number: frame.number.into(),
-        time_us: frame.time_us,
-        age_ms: moment.heard.elapsed().as_secs_f32() * 1000.0,
-        readings: frame.readings.clone(),
-        outputs: frame.outputs.clone().unwrap_or_default(),
-        deviations: frame.deviations.clone(),
-        truth: frame.truth.clone(),
-        row_status: (!moment.row_status.is_empty())
-            .then(|| moment.row_status.iter().map(|status| row_flag(*status)).collect()),
-        novelty: moment.novelty,
-        flags: flags.into_iter().filter(|(flag, _)| moment.has(*flag)).map(|it| it.1).collect(),
-        contact: frame.contact_mm.map(|[x_mm, y_mm, depth_mm]| page::Contact {
-            x_mm,
-            y_mm,
-            depth_mm,
-        }),
-        force_n: frame.force_n.map(|force| force[2]),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use taxel_recording::Layout;
     use taxel_view::message::Can;
 
     use super::super::feed::About;
