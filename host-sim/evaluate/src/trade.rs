@@ -234,11 +234,8 @@ impl Trade {
             .collect();
         let Some(best) = self.best(&within) else {
             let results = self.points.iter().map(|point| &point.results);
-            let nearest = bounds::nearest(&bounds, results);
-            let nearest = nearest.map_or(String::new(), |(place, results)| {
-                format!("; the nearest is {} with {results}", self.points[place].name())
-            });
-            return Err(format!("no point is within {}{nearest}", bounds::in_words(&bounds)));
+            let none = bounds::none_within(&bounds, results, |place| self.points[place].name());
+            return Err(format!("no point is {}", none.unwrap_or_default()));
         };
         let Some((decoder, least)) = self.better_baseline(best) else { return Ok(Some(best)) };
         let kept: Vec<usize> =

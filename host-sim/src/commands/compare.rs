@@ -88,7 +88,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         files.write(&merged, &sections, &command, common)?;
         written.push(format!("\nwritten: {}", files.names()));
     }
-    Ok(print::sections_above(common, &sections, &written))
+    Ok(print::sections_above(common, &sections, &written).and(merged.check_bounds()))
 }
 
 /// Checks what holds for all layouts, so that a refusal names an option, and not a field of the plan.

@@ -219,7 +219,7 @@ fn merge(
     let outcome = print::sections_above(common, &sections, &[written]);
     let missing = merged.missing.len();
     if missing == 0 {
-        return Ok(outcome);
+        return Ok(outcome.and(merged.check_bounds()));
     }
     let first =
         merged.missing.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");

@@ -95,16 +95,20 @@ impl Sections {
     }
 
     pub fn table<R>(&mut self, table: TableOf<'_, R>) {
-        self.sections.push(Section::Table(table.table()));
+        self.show(table.table());
     }
 
-    /// Adds a table that programs read as well. People do not see one without lines.
-    pub fn table_as<R>(&mut self, key: &'static str, table: TableOf<'_, R>) {
-        let table = table.table();
-        self.value(key, &table);
+    fn show(&mut self, table: Table) {
         if !table.is_empty() {
             self.sections.push(Section::Table(table));
         }
+    }
+
+    /// Adds a table that programs read as well.
+    pub fn table_as<R>(&mut self, key: &'static str, table: TableOf<'_, R>) {
+        let table = table.table();
+        self.value(key, &table);
+        self.show(table);
     }
 
     /// Adds a table that programs read alone.

@@ -445,7 +445,9 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
     let limit = folder.json(&["compare", "lists.toml", "--limit-only"]);
     assert_eq!(limit["objectives"][0], "limit_dz_mm");
     assert!(folder.fail(&["compare", "scene.toml", "scene.toml"], 2).contains("twice"));
-    let none = folder.succeed(&["compare", "scene.toml", "--max-latency-ms", "0.001"]);
+    let none = folder.run(&["compare", "scene.toml", "--max-latency-ms", "0.001"]);
+    assert_eq!(none.status.code(), Some(2));
+    let none = String::from_utf8(none.stdout).unwrap();
     assert!(none.contains("has no decoder within the bound"), "{none}");
     assert!(none.contains("scene.toml") && !none.contains("the scene"), "{none}");
     // Two scenes may be the same, and one may be impossible.
@@ -457,6 +459,24 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
     assert!(said.contains(" RMSE of Δz (mm)") && said.contains("Failed: bad.toml: "), "{said}");
     let unknown = folder.fail(&["compare", "scene.toml", "--group", "dy"], 2);
     assert!(unknown.contains("--group = dy") && unknown.contains("`dz_mm`"), "{unknown}");
+}
+
+#[test]
+fn a_sweep_with_nothing_within_its_bounds_says_what_refuses_all() {
+    let folder = prepared("sweep_bounded");
+    let bounds = "[bounds]\nframe_ms = 0.001\ncycles = 1e9\n[axes]";
+    folder.write("plan.toml", PLAN.replace("[axes]", bounds));
+    let none = "no setting is within frame_ms at most 0.001; the nearest is noise.level = ";
+    for arguments in [&["sweep", "plan.toml"][..], &["sweep", "plan.toml", "--merge", "out/tiny"]] {
+        let output = folder.run(arguments);
+        let [page, error] =
+            [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(none) && page.contains(none), "{error}{page}");
+        assert!(!page.contains("The Pareto front."), "{page}");
+    }
+    // What was measured is written all the same.
+    assert_eq!(folder.read("out/tiny/results.csv").lines().count(), 5);
 }
 
 /// The project's own plans are read as they stand.

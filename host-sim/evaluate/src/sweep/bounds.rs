@@ -117,6 +117,25 @@ pub fn nearest<'r>(
     Some((place, results.collect::<Vec<_>>().join(", ")))
 }
 
+/// What refuses all `results`, which have these names, and the nearest of them, in words; `None` if some are within the
+/// bounds. It names the bounds that refuse each of them, or, if there are none, all.
+pub fn none_within<'r>(
+    bounds: &Bounds,
+    results: impl Iterator<Item = &'r Values> + Clone,
+    name: impl Fn(usize) -> String,
+) -> Option<String> {
+    let (place, of_nearest) = nearest(bounds, results.clone())?;
+    let mut refusing = bounds.clone();
+    refusing.retain(|name, bound| {
+        let only = Bounds::from([(name.clone(), *bound)]);
+        !results.clone().any(|results| are_within(&only, results))
+    });
+    let refusing = in_words(if refusing.is_empty() { bounds } else { &refusing });
+    let name = Some(name(place)).filter(|name| !name.is_empty());
+    let name = name.map_or(String::new(), |name| format!("{name} with "));
+    Some(format!("within {refusing}; the nearest is {name}{of_nearest}"))
+}
+
 /// Bounds in words, such as `frame_ms at most 10`.
 pub fn in_words(bounds: &Bounds) -> String {
     let bounds = bounds.iter().map(|(name, bound)| format!("{name} {bound}"));
@@ -141,6 +160,12 @@ mod tests {
         let found = nearest(&bounds(8.0, 20_000.0), results.iter());
         assert_eq!(found, Some((2, "cycles = 21000, frame_ms = 9".into())));
         assert_eq!(in_words(&bounds(8.0, 20_000.0)), "cycles at most 20000, frame_ms at most 8");
+        let said =
+            |ms, cycles| none_within(&bounds(ms, cycles), results.iter(), |i| format!("p{i}"));
+        let nearest_is = "the nearest is p2 with cycles = 21000, frame_ms = 9";
+        assert_eq!(said(8.0, 17_000.0), Some(format!("within cycles at most 17000; {nearest_is}")));
+        let both = "within cycles at most 20000, frame_ms at most 8";
+        assert_eq!(said(8.0, 20_000.0), Some(format!("{both}; {nearest_is}")));
         let rate = Bounds::from([("frames_per_s".to_owned(), Bound::Least { least: 1.0 })]);
         let unknown = nearest(&rate, results.iter()).unwrap();
         assert!(unknown.1.contains("no frames_per_s") && !are_within(&rate, &results[0]));

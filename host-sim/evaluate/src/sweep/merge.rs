@@ -215,13 +215,18 @@ impl Merged {
 
     /// Sentence for results none of which is within the bounds: it names the setting that misses the worst of them least.
     pub fn none_within(&self) -> Option<String> {
-        let (place, results) =
-            bounds::nearest(&self.bounds, self.settings.iter().map(|setting| &setting.results))?;
-        let words = match self.settings[place].in_words() {
-            words if words.is_empty() => results,
-            words => format!("{words} with {results}"),
-        };
-        Some(format!("no setting is within the bounds; the nearest is {words}"))
+        let results = self.settings.iter().map(|setting| &setting.results);
+        let of =
+            bounds::none_within(&self.bounds, results, |place| self.settings[place].in_words());
+        of.map(|of| format!("no setting is {of}"))
+    }
+
+    /// Checks that some setting is within the bounds.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with [the sentence](Self::none_within) if there is none.
+    pub fn check_bounds(&self) -> Result<()> {
+        self.none_within().map_or(Ok(()), |none| Err(Error::Usage(none)))
     }
 
     /// Fields whose axes have an effect that is known, in the plan's order.
