@@ -72,6 +72,10 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         plan.objectives[0] = format!("{error}_{group}");
     }
     let points = plan.points()?;
+    if plan.groups().is_empty() {
+        let message = "the scenes have no output in common, by whose error they could be compared: give others";
+        return Err(Error::Usage(message.into()));
+    }
     let merged = match &arguments.to.output {
         Some(folder) => super::sweep::all(&plan, &points, folder, common)?,
         None => {

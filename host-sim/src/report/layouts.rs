@@ -8,7 +8,7 @@ use taxel_evaluate::sweep::merge::{PointResult, layout_of};
 use taxel_evaluate::sweep::plan::{SCENE, SEED};
 
 use super::points;
-use super::quantity::in_bounds;
+use super::quantity::{Quantity, in_bounds};
 use super::sections::{Sections, TableOf};
 
 /// Sections of layouts, the `first` of which has no name in a plan of one alone.
@@ -62,8 +62,9 @@ fn table(sections: &mut Sections, merged: &Merged, first: &str) {
         ""
     };
     let caption = if merged.columns.iter().any(|name| name.starts_with("rmse_")) {
+        let error = error.map_or(String::new(), |name| Quantity::of(name).heading);
         format!(
-            "Layouts, each with its most accurate decoder{bounds}; of errors that count as equal, that of the fastest.{none}"
+            "Layouts, each with the decoder of the smallest {error}{bounds}; of errors that count as equal, that of the fastest.{none}"
         )
     } else {
         format!("Layouts, each with its least possible error of any decoder.{none}")

@@ -344,24 +344,34 @@ impl Plan {
         )
     }
 
-    /// Groups of outputs, such as `dz_mm`; none where only some points of the plan can be.
+    /// Groups of outputs that all scenes have, such as `dz_mm`; none where only some points of the plan can be.
     pub fn groups(&self) -> Vec<String> {
-        let names = match &self.data {
-            Some(data) => data.training.outputs.names.clone(),
-            None => self.output_names().unwrap_or_default(),
+        let of = |names: Vec<String>| -> Vec<String> {
+            columns::groups(&names).into_iter().map(|(group, _)| group.to_owned()).collect()
         };
-        columns::groups(&names).into_iter().map(|(group, _)| group.to_owned()).collect()
+        if let Some(data) = &self.data {
+            return of(data.training.outputs.names.clone());
+        }
+        let names = (0..self.bases.len()).filter_map(|base| self.output_names(base));
+        let common = |mut all: Vec<String>, more: Vec<String>| {
+            all.retain(|group| more.contains(group));
+            all
+        };
+        names.map(of).reduce(common).unwrap_or_default()
     }
 
-    /// Outputs of the first point's scene, or, if it is impossible, of the first scene that is not.
-    fn output_names(&self) -> Option<Vec<String>> {
+    /// Outputs of the first point of a base, or, if its scene is impossible, of the base.
+    fn output_names(&self, base: usize) -> Option<Vec<String>> {
         let parse = |table: &Table| Experiment::parse(&self.name, &text(table).ok()?).ok();
-        let of_base = |base: &Base| {
-            let changed = self.changed(Some(base), vec![]).ok()?;
-            parse(&changed.scene).or_else(|| parse(&base.document))
-        };
-        let document = self.document_at(&vec![0; self.axes.len()]).ok()?;
-        let scene = parse(&document.scene).or_else(|| self.bases.iter().find_map(of_base))?;
+        let mut first = vec![0; self.axes.len()];
+        // Several scenes are the first axis.
+        if let (Some(of_scene), true) = (first.first_mut(), self.bases.len() > 1) {
+            *of_scene = base;
+        }
+        let base = &self.bases[base];
+        let [first, changed] = [self.document_at(&first), self.changed(Some(base), vec![])];
+        let scenes = [first.ok()?.scene, changed.ok()?.scene];
+        let scene = scenes.iter().chain([&base.document]).find_map(parse)?;
         Some(scene.world.output_names())
     }
 
