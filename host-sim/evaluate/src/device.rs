@@ -102,7 +102,8 @@ impl Times {
 impl Device {
     /// Checks that the numbers are positive.
     pub fn check(&self) -> Result<(), BadValue> {
-        let numbers = [("--clock-mhz", Some(self.clock_mhz)), ("--scan-ms", self.scan_ms)];
+        let numbers =
+            [("device.clock_mhz", Some(self.clock_mhz)), ("device.scan_ms", self.scan_ms)];
         for (name, number) in numbers {
             if let Some(number) = number.filter(|number| !(number.is_finite() && *number > 0.0)) {
                 return Err(BadValue::new(name, number, "give a positive number"));
@@ -264,9 +265,9 @@ mod tests {
         assert!(given.check().is_ok());
         for bad in [0.0, -1.0, f64::NAN] {
             let message = Device { scan_ms: Some(bad), ..given }.check().unwrap_err().to_string();
-            assert!(message.contains("scan-ms"), "{message}");
+            assert!(message.contains("device.scan_ms"), "{message}");
             let message = Device { clock_mhz: bad, ..given }.check().unwrap_err().to_string();
-            assert!(message.contains("clock-mhz"), "{message}");
+            assert!(message.contains("device.clock_mhz"), "{message}");
         }
     }
 }

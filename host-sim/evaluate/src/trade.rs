@@ -234,7 +234,7 @@ impl Trade {
             .collect();
         let Some(best) = self.best(&within) else {
             let results = self.points.iter().map(|point| &point.results);
-            let none = bounds::none_within(&bounds, results, |place| self.points[place].name());
+            let none = bounds::none_within(&bounds, &results, |place| self.points[place].name());
             return Err(format!("no point is {}", none.unwrap_or_default()));
         };
         let Some((decoder, least)) = self.better_baseline(best) else { return Ok(Some(best)) };
@@ -462,7 +462,7 @@ pub fn impossible(
     let nearest = bounds::nearest(&known, best.iter());
     Ok(nearest.map(|(_, results)| {
         let bounds = bounds::in_words(&known);
-        format!("no point can be within {bounds}; the nearest is {results}, if decoding took no time; nothing was trained")
+        format!("no point can be within {bounds}; the nearest is {results}, if decoding took no time; nothing was trained or written")
     }))
 }
 

@@ -13,7 +13,7 @@ use crate::{Error, Result, report};
 use clap::Args;
 use toml::Value;
 
-use super::decoder_arguments::{DecoderArguments, ReadoutOption};
+use super::decoder_arguments::{DecoderArguments, ReadoutOption, of_field};
 use super::merged::Files;
 use super::progress::Terminal;
 use super::subject_argument::fields_of;
@@ -38,7 +38,7 @@ pub struct Arguments {
     #[command(flatten)]
     tried: DecoderArguments,
     /// Train nothing: the least possible error and the scan alone.
-    #[arg(long, conflicts_with_all = ["TrainingOptions", "max_latency_ms"])]
+    #[arg(long, conflicts_with = "max_latency_ms")]
     limit_only: bool,
     #[command(flatten)]
     to: arguments::OutputFolder,
@@ -61,10 +61,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     if labels.len() < bases.len() {
         return Err(Error::Usage("a scene is given twice; give each once".into()));
     }
+    if arguments.limit_only {
+        let message =
+            |option: &str| format!("{option}: --limit-only trains nothing; give one of them");
+        arguments::refuse(&arguments.training, |_| true, message)?;
+    }
     check(&arguments.training)?;
     let first = bases.first().map_or(String::new(), |base| base.label.clone());
     let build = super::sweep::build()?;
-    let mut plan = Plan::new("compare", (bases, None), wanted(arguments, common)?, &build)?;
+    let plan = Plan::new("compare", (bases, None), wanted(arguments, common)?, &build);
+    let mut plan = plan.map_err(of_field)?;
     if let Some(group) = &arguments.tried.group {
         let groups = plan.groups();
         require_known("--group", group, &groups.iter().map(String::as_str).collect::<Vec<_>>())?;

@@ -1,7 +1,11 @@
 //! Decoders and scans that `trade` and `compare` try, and what they choose by.
 
+use crate::Error;
 use crate::device::Readout;
 use clap::{Args, ValueEnum};
+use taxel_data::BadValue;
+
+use super::arguments::of_option;
 
 /// Decoders and scans to try, and the choice among them.
 #[derive(Args)]
@@ -28,6 +32,18 @@ pub struct ScanTimeArgument {
     /// Time in ms of a scan of one sample a reading, which reads rows one after the other [default: what the board's takes].
     #[arg(long, value_name = "MS")]
     pub scan_ms: Option<f64>,
+}
+
+/// Error for a `bad` field of a plan, which names the option that gave it.
+pub fn of_field(bad: BadValue) -> Error {
+    of_option(match bad.field.strip_prefix("device.") {
+        Some("samples") => bad.named("--average"),
+        Some(field) => {
+            let option = format!("--{}", field.replace('_', "-"));
+            bad.named(&option)
+        }
+        None => bad,
+    })
 }
 
 /// Value of `--readout`.

@@ -6,7 +6,7 @@ use crate::report::{self, Sections, TableOf};
 use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
 use crate::training_options::TrainingOptions;
 use crate::{Error, Result};
-use clap::Args;
+use clap::{Arg, Args, value_parser};
 use taxel_data::BadValue;
 use taxel_data::digest::digest;
 
@@ -29,6 +29,8 @@ mod estimate;
 /// and --merge reads what all of them wrote; -o is then the file for the table of results (.csv), beside which the others are
 /// written. Results do not depend on how the plan was cut.
 #[derive(Args)]
+// A plan has its own seeds.
+#[command(arg = Arg::new("seed").long("seed").value_parser(value_parser!(u64)).hide(true))]
 #[command(after_help = "Examples:
   taxel sweep cluster/plans/small.toml
   taxel sweep plan.toml --list

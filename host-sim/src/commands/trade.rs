@@ -20,7 +20,7 @@ use taxel_learn::train::projection;
 use taxel_simulate::Synthesis;
 
 use super::arguments::{self, blamed, of_option};
-use super::decoder_arguments::{DecoderArguments, ScanTimeArgument};
+use super::decoder_arguments::{DecoderArguments, ScanTimeArgument, of_field};
 use super::subject_argument::SubjectArgument;
 use super::{Common, command_line, print, sweep};
 
@@ -148,10 +148,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         let with = TradeWith { shown: shown.as_ref(), all, command: &without_bounds };
         report::of_trade(&trade, with)
     };
+    let chosen = folder.join("chosen.bin");
+    let is_of_earlier = trade.chosen.is_none() && chosen.exists();
     files::write(&folder, (&trade, shown.as_ref()), (&with(false), &command), common)?;
-    let mut written = vec![];
+    let (mut written, chosen) = (vec![], chosen.display());
     if trade.chosen.is_some() {
-        written.push(format!("the blob: {}", folder.join("chosen.bin").display()));
+        written.push(format!("the blob: {chosen}"));
+    } else if is_of_earlier {
+        common.remark(format_args!(
+            "note: {chosen} of an earlier trade is removed, since this one chose none; the earlier command writes it again"
+        ));
     }
     written.push(format!("open {}", folder.join("trade.html").display()));
     // Measurements are kept and shown even if no point is within the bounds.
@@ -225,7 +231,6 @@ fn asked(arguments: &Arguments, subject: &Subject, common: &Common) -> Result<As
         readout: arguments.tried.readout.into(),
         scan_ms: arguments.scan.scan_ms,
     };
-    device.check().map_err(of_option)?;
     let asked = Asked {
         centres: centres(arguments.subject.centres(), subject, common)?,
         column_steps: column_steps(arguments, subject)?,
@@ -278,15 +283,6 @@ fn check(subject: &Subject, asked: &Asked) -> std::result::Result<(), BadValue> 
         return Err(BadValue::new("--worst-case", true, rule));
     }
     Ok(())
-}
-
-/// Error for a `bad` field of the plan, which names the option that gave it.
-fn of_field(bad: BadValue) -> Error {
-    of_option(match bad.field.as_str() {
-        "device.samples" => bad.named("--average"),
-        "device.column_step" => bad.named("--column-step"),
-        _ => bad,
-    })
 }
 
 /// Centres to try unless a user says otherwise.

@@ -38,4 +38,6 @@ fn help_says_what_holds_for_its_command() {
     let decodes = "decodes what nobody has decoded";
     assert!(help(&["view"]).contains(decodes));
     assert!(!help(&["link", "port", "baseline"]).contains(decodes));
+    // An option that is refused.
+    assert!(!help(&["sweep"]).contains("--seed"));
 }

@@ -332,6 +332,9 @@ fn the_files_and_the_table_tell_every_point() {
     let page = String::from_utf8(output.stdout).unwrap();
     assert!(page.contains("\nfixed16 ") && page.contains("Nothing is chosen"), "{page}");
     assert!(!folder.path("out/few/chosen.bin").exists());
+    let removed = "out/few/chosen.bin of an earlier trade is removed";
+    assert!(stderr.contains(removed), "{stderr}");
+    assert!(!folder.notes(&few).contains(removed));
 }
 
 #[test]

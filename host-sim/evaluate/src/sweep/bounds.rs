@@ -121,7 +121,7 @@ pub fn nearest<'r>(
 /// bounds. It names the bounds that refuse each of them, or, if there are none, all.
 pub fn none_within<'r>(
     bounds: &Bounds,
-    results: impl Iterator<Item = &'r Values> + Clone,
+    results: &(impl Iterator<Item = &'r Values> + Clone),
     name: impl Fn(usize) -> String,
 ) -> Option<String> {
     let (place, of_nearest) = nearest(bounds, results.clone())?;
@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(found, Some((2, "cycles = 21000, frame_ms = 9".into())));
         assert_eq!(in_words(&bounds(8.0, 20_000.0)), "cycles at most 20000, frame_ms at most 8");
         let said =
-            |ms, cycles| none_within(&bounds(ms, cycles), results.iter(), |i| format!("p{i}"));
+            |ms, cycles| none_within(&bounds(ms, cycles), &results.iter(), |i| format!("p{i}"));
         let nearest_is = "the nearest is p2 with cycles = 21000, frame_ms = 9";
         assert_eq!(said(8.0, 17_000.0), Some(format!("within cycles at most 17000; {nearest_is}")));
         let both = "within cycles at most 20000, frame_ms at most 8";

@@ -182,6 +182,11 @@ fn check_top(text: &str) -> std::result::Result<(), String> {
         "draw",
     ];
     let Ok(table) = toml::from_str::<Table>(text) else { return Ok(()) };
+    if table.contains_key("sensor") {
+        return Err(
+            "it is a scene; give a plan, which names it by its field scene (docs/sweeps.md)".into(),
+        );
+    }
     let known = table.keys().try_for_each(|key| require_known("field", key, &KNOWN));
     known.map_err(|bad| bad.to_string())
 }

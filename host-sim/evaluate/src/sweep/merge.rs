@@ -217,7 +217,7 @@ impl Merged {
     pub fn none_within(&self) -> Option<String> {
         let results = self.settings.iter().map(|setting| &setting.results);
         let of =
-            bounds::none_within(&self.bounds, results, |place| self.settings[place].in_words());
+            bounds::none_within(&self.bounds, &results, |place| self.settings[place].in_words());
         of.map(|of| format!("no setting is {of}"))
     }
 

@@ -43,10 +43,7 @@ impl OnDevice {
             let message = cause.message().replace("expected one of ", own);
             BadValue::new("device", shown, fields::with_nearest(&message))
         })?;
-        device.check().map_err(|bad| {
-            let field = format!("device.{}", bad.field.replace('-', "_"));
-            bad.named(&field)
-        })?;
+        device.check()?;
         Ok(Self { device, samples, column_step, filter })
     }
 }
