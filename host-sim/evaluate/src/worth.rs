@@ -46,7 +46,7 @@ impl JudgedOn {
 }
 
 /// Errors of a model and of the baselines, and what they mean.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Worth {
     /// Frames that errors were measured on.
     pub judged_on: JudgedOn,

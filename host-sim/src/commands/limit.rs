@@ -144,7 +144,7 @@ fn written_files(folder: &Path, result: &LimitResult, common: &Common) -> Result
     let command = command_line::of_this_process("limit", &["-o", "--output"], Some(result.seed));
     let sections = report::of_limit(result);
     let (json, page) = (print::file_of(common, &sections), sections.page(&command));
-    let mut files = vec![("limit.json", json.as_bytes()), ("limit.html", page.html.as_bytes())];
-    files.extend(page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes())));
+    let mut files = vec![("limit.json", json.as_bytes())];
+    files.extend(page.files("limit.html"));
     Ok(FILES.written(folder, &files)?)
 }

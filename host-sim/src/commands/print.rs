@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::report::Sections;
 use crate::{Error, Result};
-use serde::Serialize;
 use taxel_data::error::printable;
 use taxel_data::output;
 
@@ -22,13 +21,6 @@ impl Page {
     pub fn line(&mut self, line: impl Display) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.0, "{line}");
-    }
-
-    /// Page of one line.
-    pub fn of(line: impl Display) -> Self {
-        let mut page = Self::default();
-        page.line(line);
-        page
     }
 
     /// Page of a result.
@@ -102,11 +94,6 @@ pub fn file_of(common: &Common, sections: &Sections) -> String {
     document(common, &sections.json(), false)
 }
 
-fn object(result: &impl Serialize) -> Result<String> {
-    let text = serde_json::to_string_pretty(result);
-    text.map_err(|cause| Error::failed(format!("cannot write JSON: {cause}")))
-}
-
 /// Object of a result with what all commands say (docs/json.md): the time since the command began only if it is `timed`.
 fn document(common: &Common, object: &str, timed: bool) -> String {
     let begun = common.begun.as_ref();
@@ -116,11 +103,6 @@ fn document(common: &Common, object: &str, timed: bool) -> String {
     let seconds = seconds.map_or(String::new(), |it| format!("\n  \"seconds\": {it},"));
     let head = format!("{{\n  \"version\": \"{version}\",\n  \"command\": \"{command}\",{seconds}");
     object.replacen('{', &head, 1) + "\n"
-}
-
-/// Result of the command as JSON.
-pub fn json(common: &Common, result: &impl Serialize) -> Result<Outcome> {
-    Ok(Outcome::of(document(common, &object(result)?, true)))
 }
 
 /// Result of the command: as JSON if that was asked for, else as text.

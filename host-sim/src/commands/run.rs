@@ -94,9 +94,8 @@ fn write_files(
     let mut names: Vec<&'static str> = files.iter().map(|(name, _)| *name).collect();
     sections.files = names.iter().map(|name| (*name).to_owned()).collect();
     let page = sections.page(command);
-    let figures = page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes()));
-    let page = [("report.html", page.html.as_bytes())];
-    FILES.write(folder, &files.into_iter().chain(page).chain(figures).collect::<Vec<_>>())?;
+    let files = files.into_iter().chain(page.files("report.html"));
+    FILES.write(folder, &files.collect::<Vec<_>>())?;
     names.extend(["report.html", "figures/"]);
     Ok(names)
 }

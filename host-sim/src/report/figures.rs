@@ -201,6 +201,14 @@ pub struct Page {
     pub figures: Vec<(String, String)>,
 }
 
+impl Page {
+    /// The page as the file `name`, and the files of its figures.
+    pub fn files<'p>(&'p self, name: &'p str) -> impl Iterator<Item = (&'p str, &'p [u8])> {
+        let figures = self.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes()));
+        [(name, self.html.as_bytes())].into_iter().chain(figures)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -25,12 +25,8 @@ pub fn write(
     let csv = report::points(&trade.merged).csv();
     let json = print::file_of(common, sections);
     let page = sections.page(command);
-    let mut files = vec![
-        ("trade.csv", csv.as_bytes()),
-        ("trade.json", json.as_bytes()),
-        ("trade.html", page.html.as_bytes()),
-    ];
-    files.extend(page.figures.iter().map(|(path, text)| (path.as_str(), text.as_bytes())));
+    let mut files = vec![("trade.csv", csv.as_bytes()), ("trade.json", json.as_bytes())];
+    files.extend(page.files("trade.html"));
     let chosen = shown.filter(|_| trade.chosen.is_some());
     files.extend(chosen.map(|shown| ("chosen.bin", shown.blob.as_slice())));
     Ok(FILES.write(folder, &files)?)
