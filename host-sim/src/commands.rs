@@ -22,6 +22,7 @@ mod filter_arguments;
 mod health;
 mod data_argument;
 mod subject_argument;
+mod device_lines;
 mod check_arguments;
 mod interruption;
 

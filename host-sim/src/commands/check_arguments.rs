@@ -8,7 +8,6 @@ use crate::{Error, Result};
 use clap::Args;
 use taxel_core::blob::Metadata;
 use taxel_data::{DataFile, Rest, Stream};
-use taxel_firmware::link::message::Memory;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::{Findings, Frames, Plan};
 use taxel_simulate::synth::BASELINE_FRAMES;
@@ -20,7 +19,7 @@ use super::progress::Terminal;
 use super::readings::model_inputs;
 use super::rest_argument::UntouchedArguments;
 use super::scene_argument::{FramesArgument, ModelArgument, SceneArgument};
-use super::{Common, print};
+use super::{Common, device_lines, print};
 
 /// Time in µs from one frame of a scene to the next.
 const PERIOD_US: u32 = 10_000;
@@ -170,7 +169,7 @@ pub fn conclude(findings: &Findings, common: &Common) -> print::Outcome {
 
 fn sections_of(f: &Findings) -> Sections {
     let mut result = Sections::new("The device beside the host");
-    result.value("device", &f.device);
+    device_lines::value(&mut result, &f.device);
     result.value("statistics", &f.statistics);
     result.value("frames", &f.frames);
     result.value("repeated", &f.repeated);
@@ -210,31 +209,6 @@ fn sections_of(f: &Findings) -> Sections {
             s.requests, s.bad_packets, s.lost_reports
         ),
     );
-    memory_lines(&mut result, &d.memory);
+    device_lines::memory(&mut result, &d.memory);
     result
-}
-
-/// Adds lines about the use of a device's memory.
-pub fn memory_lines(result: &mut Sections, m: &Memory) {
-    result.line(
-        "flash",
-        format!(
-            "{} bytes without the model: vector table {}, code {}, constants {}, start values {}",
-            m.flash_bytes(),
-            m.vector_table,
-            m.text,
-            m.rodata,
-            m.data
-        ),
-    );
-    result.line(
-        "RAM",
-        format!(
-            "{} bytes: variables {}, stack {} at its deepest (of {} reserved)",
-            m.ram_bytes(),
-            m.ram_bytes() - m.stack_high_water,
-            m.stack_high_water,
-            m.stack_reserved
-        ),
-    );
 }

@@ -206,6 +206,9 @@ pub mod serial_port {
         let is_old = format!("CRC-32 {:08x}", old.parse().crc());
         let page = folder.succeed(&["link", &port, "identify"]);
         assert!(page.contains("slot 1") && !page.contains(&is_old), "{page}");
+        let told = &folder.json(&["link", &port, "identify"])["device"];
+        let [crc, id] = [&told["model"]["model_crc"], &told["unique_id"]].map(|it| it.as_str());
+        assert_eq!((crc.unwrap().len(), id.unwrap().len()), (8, 24), "{told}");
         // The old blob names the new model's outputs, if that is said.
         let record = ["link", &port, "record", "old.bin", "-n", "2", "-o", "estimate.csv"];
         assert_eq!(folder.run(&record).status.code(), Some(2));

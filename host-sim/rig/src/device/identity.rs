@@ -1,6 +1,5 @@
 //! What a device says of itself.
 
-use serde::{Serialize, Serializer};
 use taxel_core::Wires;
 use taxel_core::blob::{Columns, Model, ModelShape};
 use taxel_core::checksum::CRC_32;
@@ -8,7 +7,7 @@ use taxel_firmware::capacity::Capacity;
 use taxel_firmware::link::message::{Identity, Memory, ModelIdentity};
 
 /// Identity that a device reports.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct DeviceIdentity {
     pub board: String,
     /// Version of its firmware.
@@ -19,8 +18,7 @@ pub struct DeviceIdentity {
     pub columns: usize,
     /// Largest number of outputs of a row.
     pub outputs: usize,
-    /// Active model, if there is one; checksums are text in JSON, as hexadecimal digits.
-    #[serde(serialize_with = "model_with_text")]
+    /// Active model, if there is one.
     pub model: Option<ModelIdentity>,
     /// Name of its scene or data set, cut after 40 bytes.
     pub model_name: String,
@@ -30,63 +28,16 @@ pub struct DeviceIdentity {
     pub chunk_bytes: usize,
     /// Use of its flash and RAM.
     pub memory: Memory,
-    /// Number that no other board of its kind has, as hexadecimal digits in JSON.
-    #[serde(serialize_with = "id_with_text")]
+    /// Number that no other board of its kind has.
     pub unique_id: [u8; 12],
     /// CRC-32 of the wires of its readings.
-    #[serde(skip)]
     pub wires_crc_32: u32,
-}
-
-/// Serialises a device's number as text.
-fn id_with_text<S: Serializer>(id: &[u8; 12], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(&hexadecimal(id))
-}
-
-fn hexadecimal(id: &[u8; 12]) -> String {
-    id.map(|byte| format!("{byte:02x}")).concat()
-}
-
-/// Serialises a model's identity with checksums as text: programs read large numbers as floats, which round them.
-#[expect(clippy::ref_option, reason = "serde passes a reference")]
-fn model_with_text<S: Serializer>(
-    model: &Option<ModelIdentity>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct WithText {
-        model_crc: String,
-        slot: u8,
-        generation: u32,
-        rows: u8,
-        inputs: u16,
-        outputs: u16,
-        in_ram: bool,
-        scene_digest: String,
-        inputs_crc: String,
-        outputs_crc: String,
-        on_trial: bool,
-    }
-    let with_text = model.map(|model| WithText {
-        model_crc: format!("{:08x}", model.crc_32),
-        slot: model.slot,
-        generation: model.generation,
-        rows: model.rows,
-        inputs: model.inputs,
-        outputs: model.outputs,
-        in_ram: model.in_ram,
-        scene_digest: format!("{:016x}", model.scene_digest),
-        inputs_crc: format!("{:08x}", model.inputs_crc_32),
-        outputs_crc: format!("{:08x}", model.outputs_crc_32),
-        on_trial: model.on_trial,
-    });
-    with_text.serialize(serializer)
 }
 
 impl DeviceIdentity {
     /// The device's number, as hexadecimal digits.
     pub fn unique_id_text(&self) -> String {
-        hexadecimal(&self.unique_id)
+        self.unique_id.map(|byte| format!("{byte:02x}")).concat()
     }
 
     /// Sensor and model that the device has room for.

@@ -4,13 +4,12 @@ use crate::Result;
 use crate::report::Sections;
 use taxel_rig::device::Device;
 
-use super::super::check_arguments::memory_lines;
-use super::super::{Common, print};
+use super::super::{Common, device_lines, print};
 
 pub fn show(device: &mut Device, common: &Common) -> Result<print::Outcome> {
     let (d, configuration, s) = (device.identify()?, device.configuration()?, device.statistics()?);
     let mut result = Sections::new(format!("Device {}, firmware {}", d.board, d.firmware));
-    result.value("device", &d);
+    device_lines::value(&mut result, &d);
     result.value("configuration", &configuration);
     result.value("statistics", &s);
     result.line(
@@ -102,6 +101,6 @@ pub fn show(device: &mut Device, common: &Common) -> Result<print::Outcome> {
         ),
     );
     result.line("slots erased", format!("{} since the start", s.slot_erases));
-    memory_lines(&mut result, &d.memory);
+    device_lines::memory(&mut result, &d.memory);
     Ok(print::sections(common, &result))
 }
