@@ -44,9 +44,10 @@ pub fn sections(trade: &Trade, with: With<'_>) -> Sections {
         let path = path.in_words();
         format!("; errors are those of the newest finished estimate, every ms, on {path}")
     });
+    let knee = trade.knee().map_or("", |_| " Knee: where the front bends most.");
     sections.note(format!(
         "Of {} ways to decode on a Cortex-M4F at {} MHz; {tested}{motion}. Most accurate: the fastest of those whose errors count \
-         as equal to the smallest. Knee: where the front bends most. Age: mean time from the middle of a scan until its estimate is \
+         as equal to the smallest.{knee} Age: mean time from the middle of a scan until its estimate is \
          used. {EQUAL_ERRORS}",
         trade.points.len(),
         trade.device.clock_mhz
@@ -80,12 +81,11 @@ fn values(sections: &mut Sections, trade: &Trade) {
     sections.value("group", &trade.group);
     sections.value("unit", &trade.unit);
     sections.value("worst_case", &trade.worst_case);
-    let mut table = TableOf::new(&trade.points, "All points.")
-        .values("id", |it| it.id.as_str().into())
-        .values("format", |it| it.format.name().into())
-        .values("each_row", |it| it.each_row.into())
-        .values("column_step", |it| it.column_step.into())
-        .values("samples_averaged", |it| it.samples_averaged.into());
+    let points = TableOf::new(&trade.points, "All points.");
+    let mut table = points.values("id", |it| it.id.as_str().into());
+    for field in &trade.merged.fields {
+        table = table.values(field, |it| it.values.get(field).cloned().unwrap_or_default());
+    }
     for name in &trade.merged.columns {
         table = table.values(name, |it| number_value(it.result(name)));
     }

@@ -33,5 +33,5 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     let traded = folder.json(&trade);
     assert_eq!(traded["motion"]["speed_mm_per_s"], serde_json::json!([50.0, 50.0]));
     let chosen = traded["chosen"].as_u64().unwrap() as usize;
-    assert_eq!(traded["points"][chosen]["samples_averaged"], 1);
+    assert_eq!(traded["points"][chosen]["device.samples"], 1);
 }

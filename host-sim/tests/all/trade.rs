@@ -263,7 +263,7 @@ fn options_of_training_mean_what_they_do_in_train() {
         let rmse = crate::common::rmse(&trained["decoders"][0]["errors"], "dz_mm");
         let traded = words("trade", "");
         let mut points = traded["points"].as_array().unwrap().iter();
-        let point = points.find(|it| it["each_row"] == each_row).unwrap();
+        let point = points.find(|it| it["training.each_row"] == each_row).unwrap();
         assert_eq!(point["rmse_dz_mm"].as_f64(), Some(rmse), "{options}: {point} {trained}");
         assert_eq!(point["spread"], trained["spread"], "{options}");
     }
@@ -307,13 +307,23 @@ fn the_files_and_the_table_tell_every_point() {
     assert!(front.lines().chain(all.lines()).all(|line| line.chars().count() <= 120), "{all}");
     assert!(front.ends_with("\nopen out/few/trade.html\n"), "{front}");
     assert!(!all.contains("--all"), "{all}");
-    folder.succeed(&[&few[..], &["--max-cycles", "9000"]].concat());
+    let page = folder.succeed(&[&few[..], &["--max-cycles", "9000"]].concat());
     let csv = folder.read("out/few/trade.csv");
     let mut lines = csv.lines();
     let fields = "id,device.column_step,device.samples,training.centres,training.each_row,training.format,rows,";
     assert!(lines.next().unwrap().starts_with(fields));
     assert_eq!(lines.count(), every.len());
     let json: serde_json::Value = serde_json::from_str(&folder.read("out/few/trade.json")).unwrap();
+    // One set of names, and nothing is explained that is not there.
+    let first = json["points"][0].as_object().unwrap();
+    assert!(
+        csv.lines()
+            .next()
+            .unwrap()
+            .split(',')
+            .all(|name| { ["notes", "failed"].contains(&name) || first.contains_key(name) })
+    );
+    assert_eq!(page.contains("Knee: "), !json["knee"].is_null(), "{page}");
     let html = folder.read("out/few/trade.html");
     // The picture has each point of the front.
     let front = json["points"].as_array().unwrap().iter().filter(|p| p["on_front"] == true).count();

@@ -31,6 +31,8 @@ impl From<Settings> for FilterSettings {
 pub struct Point {
     /// Identity of its settings.
     pub id: String,
+    /// Settings, by the fields of the plan.
+    pub values: BTreeMap<String, Value>,
     /// Number format.
     pub format: Format,
     /// Whether each row is decoded by a network of its own, instead of all by one behind a projection.
@@ -71,6 +73,7 @@ impl Point {
         let (time_constant_ms, lead_ms) = (result("filter_ms"), result("lead_ms"));
         Some(Self {
             id: point.id.clone(),
+            values: point.values.clone(),
             format: Format::from_name(setting("training.format")?.as_str()?)?,
             each_row: setting("training.each_row")?.as_bool()?,
             centres: count("centres")?,
