@@ -10,7 +10,7 @@ use taxel_learn::folds::{baseline_rmse, pooled_rmse, smallest_training_part};
 use taxel_learn::train::refine::LEAST_FOLDS;
 use toml::Value;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::measurements::Measurements;
 use crate::sweep::file::Wanted;
 use crate::sweep::plan::{Base, FOLD, Plan};
@@ -147,12 +147,12 @@ fn scores(
             points.push(plan.point(values.collect())?);
         }
     }
-    let squares = |record: Record| match record.failed {
-        None => Ok(record.squares),
-        Some(why) => Err(Error::failed(format!("cross-validation: {why}"))),
+    let accept = |_: usize, record: &Record| match &record.failed {
+        None => Ok(()),
+        Some(why) => Err(taxel_data::Error::unfit(format!("cross-validation: {why}")).into()),
     };
-    let records = work::in_memory(plan, &points, progress)?.into_iter().flatten();
-    let squares = records.map(squares).collect::<Result<Vec<_>>>()?;
+    let records = work::until(plan, &points, &accept, progress)?.into_iter().flatten();
+    let squares: Vec<Vec<f64>> = records.map(|record| record.squares).collect();
     let deviations = outputs.deviations();
     let scored = tried.into_iter().zip(squares.chunks_exact(folds));
     let scored = scored.map(|((centres, spread, penalty), squares)| {

@@ -66,10 +66,10 @@ impl Asked {
             ..Wanted::default()
         };
         let mut axis = |field: &str, values: Value| wanted.axes.insert(field.into(), values);
-        // One network for each row, and one for the array of several rows; that alone where outputs belong to no row. The
-        // paper's networks, which have no affine tail, are those of rows.
+        // One network for each row, and one for the array of several rows; that alone where outputs belong to no row. Without
+        // an affine tail, as in the paper, those that are asked for.
         let kinds = match subject.rows() {
-            _ if !subject.options().affine_tail => vec![true],
+            _ if !subject.options().affine_tail => vec![subject.options().each_row],
             1 => vec![false],
             _ => vec![true, false],
         };

@@ -73,7 +73,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let mut plan = plan.map_err(of_field)?;
     if let Some(group) = &arguments.tried.group {
         let groups = plan.groups();
-        require_known("--group", group, &groups.iter().map(String::as_str).collect::<Vec<_>>())?;
+        let known: Vec<&str> = groups.iter().map(String::as_str).collect();
+        require_known("--group", group, &known).map_err(arguments::of_option)?;
         let error = if plan.train { "rmse" } else { "limit" };
         plan.objectives[0] = format!("{error}_{group}");
     }

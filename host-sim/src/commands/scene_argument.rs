@@ -8,6 +8,7 @@ use clap::Args;
 use taxel_data::columns;
 
 use super::Common;
+use super::arguments::of_option;
 
 /// Scene that stands for none.
 pub const DEFAULT_SCENE: &str = "press";
@@ -119,7 +120,8 @@ pub struct NoiseArgument {
 impl NoiseArgument {
     /// Applies the level, if one was given.
     pub fn apply(&self, scene: &mut Experiment) -> Result<()> {
-        self.noise.map_or(Ok(()), |level| Ok(scene.world.set_noise_level(level)?))
+        let Some(level) = self.noise else { return Ok(()) };
+        scene.world.set_noise_level(level).map_err(|bad| of_option(bad.named("--noise")))
     }
 
     /// Level, if one was given.

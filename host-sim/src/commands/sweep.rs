@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::report::format::counted;
 use crate::report::{self, Sections, TableOf};
 use crate::sweep::{Merged, Plan, Point, Shard, Store, work};
 use crate::training_options::TrainingOptions;
@@ -201,8 +202,8 @@ fn merge(
     if !others.is_empty() {
         let first = others.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
         common.remark(format_args!(
-            "note: {} files in {} belong to no point of this plan and program, and are left out: {first}{}",
-            others.len(),
+            "note: {} in {}, of no point of this plan and program, left out: {first}{}",
+            counted(others.len(), "file"),
             folder.join("points").display(),
             if others.len() > NAMED { ", …" } else { "" }
         ));

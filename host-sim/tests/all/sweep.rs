@@ -156,7 +156,7 @@ fn another_plan_does_not_take_old_results() {
     let out = folder.run(&["sweep", "plan.toml"]);
     let remarks = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(
-        out.status.success() && remarks.contains("2 files in out/tiny/points belong to no point"),
+        out.status.success() && remarks.contains("2 files in out/tiny/points, of no point"),
         "{remarks}"
     );
     let new = folder.read("out/tiny/results.csv");
@@ -355,7 +355,7 @@ fn measurements_are_swept_by_the_settings_of_training() {
         ("training.centres", "sensor.row_wires", "unknown field `sensor`"),
         ("training.centres", "training.frames", "training.frames = 4: it sets a scene's frames"),
         ("training.centres = [4, 8]", "training.relative_inputs = [true]", "give it in [set]"),
-        ("inputs = ", "input = ", "data: field = input: the nearest are `inputs`"),
+        ("inputs = ", "input = ", "data: field = input: it is unknown; the nearest are `inputs`"),
         ("folds = 4", "folds = \"four\"", "data: invalid type: string \"four\""),
         ("file = \"data.csv\"", "", "data: missing field `file`"),
         (
@@ -458,7 +458,7 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
     assert!(lines[0].starts_with("scene.toml") && lines[1].starts_with("same.toml"), "{said}");
     assert!(said.contains(" RMSE of Δz (mm)") && said.contains("Failed: bad.toml: "), "{said}");
     let unknown = folder.fail(&["compare", "scene.toml", "--group", "dy"], 2);
-    assert!(unknown.contains("--group = dy") && unknown.contains("`dz_mm`"), "{unknown}");
+    assert!(unknown.contains("--group dy: ") && unknown.contains("`dz_mm`"), "{unknown}");
 }
 
 #[test]

@@ -81,7 +81,9 @@ pub fn nearest(given: &str, known: &[&str]) -> String {
 
 /// Checks that `name` is one of the `known` names.
 pub fn require_known(field: &str, name: &str, known: &[&str]) -> Result<(), BadValue> {
-    require(known.contains(&name), field, name, || nearest(name, known))
+    require(known.contains(&name), field, name, || {
+        format!("it is unknown; {}", nearest(name, known))
+    })
 }
 
 #[cfg(test)]

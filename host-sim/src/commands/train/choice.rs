@@ -62,7 +62,10 @@ pub fn choose(
         }
     };
     let candidates = candidates(&arguments.subject.training, &data);
-    let selection = cross_validate(&Arc::new(data), &candidates, &Terminal::new(common))?;
+    let selection = cross_validate(&Arc::new(data), &candidates, &Terminal::new(common));
+    let selection = selection.map_err(|error| {
+        blamed(blamed(error, &arguments.subject.training), &arguments.subject.data)
+    })?;
     let best = selection.best();
     (options.centres, options.spread) = (best.centres, best.spread);
     options.penalty = best.penalty;
