@@ -13,7 +13,7 @@ use serde_json::Value;
 use taxel_evaluate::sweep::Merged;
 use taxel_evaluate::sweep::effects::Level;
 use taxel_evaluate::sweep::merge::{PointResult, Setting};
-use taxel_evaluate::sweep::plan::SEED;
+use taxel_evaluate::sweep::plan::is_of_repeats;
 
 const WIDE: [f64; 2] = [920.0, 420.0];
 const NARROW: [f64; 2] = [480.0, 420.0];
@@ -226,7 +226,7 @@ pub fn points(merged: &Merged) -> Table {
 /// All settings, as files have them.
 fn settings(merged: &Merged) -> TableOf<'_, Setting> {
     let mut table = TableOf::new(&merged.settings, "All settings.");
-    for field in merged.fields.iter().filter(|field| *field != SEED) {
+    for field in merged.fields.iter().filter(|field| !is_of_repeats(field)) {
         table = table.values(field, |it| it.values.get(field).cloned().unwrap_or_default());
     }
     table = table.values("repeats", |it| it.repeats.into());
@@ -351,7 +351,7 @@ pub fn front_table(sections: &mut Sections, merged: &Merged) {
         String::new()
     };
     let caption = format!("The Pareto front.{some}{bounds}");
-    let fields = merged.fields.iter().map(String::as_str).filter(|field| *field != SEED);
+    let fields = merged.fields.iter().map(String::as_str).filter(|field| !is_of_repeats(field));
     let fields: Vec<&str> = fields.collect();
     let objectives: Vec<&str> = merged.objectives.iter().map(String::as_str).collect();
     let table = TableOf::new(&shown, caption);

@@ -392,6 +392,10 @@ fn folds_of_a_plan_are_those_that_train_selects_by() {
          [axes]\ndata.fold = { from = 0, to = 3, count = 4 }\n",
     );
     let of_plan = folder.json(&["sweep", "plan.toml"]);
+    // No fold is a choice.
+    let [setting] = of_plan["settings"].as_array().unwrap().as_slice() else { panic!("{of_plan}") };
+    assert_eq!(setting["repeats"], 4);
+    assert!(setting["deviation_rmse_dz_mm"].as_f64().unwrap() > 0.0 && setting["on_front"] == true);
     let words = "train data.csv --folds 4 --select --no-refine --each-row --centres 6 --spread 0.7 -o m.bin";
     let selected = folder.json(&words.split(' ').collect::<Vec<_>>());
     let scored = &selected["selection"]["scored"][0];

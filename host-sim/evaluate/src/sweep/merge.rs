@@ -8,7 +8,7 @@ use super::bounds::{self, Bounds};
 use super::effects::{Effect, Settings};
 use super::file::PartPrices;
 use super::front::{self, Offer, front};
-use super::plan::{Plan, Point, SCENE, SEED};
+use super::plan::{Plan, Point, SCENE, is_of_repeats};
 use super::point::{place_of, standard_error_of};
 use super::store::{Found, Record, Store};
 use crate::error::{Error, Result};
@@ -30,7 +30,7 @@ pub struct Merged {
     pub points: Vec<PointResult>,
     /// Identities of points without a result.
     pub missing: Vec<String>,
-    /// Settings: points that differ at most in their seed, put together.
+    /// Settings: points that differ at most in their seed or fold, put together.
     pub settings: Vec<Setting>,
     pub effects: Vec<Effect>,
 }
@@ -61,10 +61,10 @@ impl PointResult {
     }
 }
 
-/// Points that differ at most in their seed.
+/// Points that differ at most in their seed or fold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// Fields, without the seed.
+    /// Fields, without seed and fold.
     pub values: BTreeMap<String, Value>,
     /// Number of points with results.
     pub repeats: usize,
@@ -150,7 +150,7 @@ impl Merged {
             setting.scene = setting.on_front.then(|| scenes[point].to_owned());
         }
         let fields: Vec<String> =
-            plan.fields.iter().filter(|field| *field != SEED).cloned().collect();
+            plan.fields.iter().filter(|field| !is_of_repeats(field)).cloned().collect();
         let all = Settings {
             fields: &fields,
             is_drawn: plan.is_drawn,
@@ -261,10 +261,10 @@ pub fn layout_of<'l>(values: &'l BTreeMap<String, Value>, first: &'l str) -> &'l
     values.get(SCENE).and_then(Value::as_str).unwrap_or(first)
 }
 
-fn without_seed(values: &BTreeMap<String, Value>) -> BTreeMap<String, Value> {
+fn without_repeats(values: &BTreeMap<String, Value>) -> BTreeMap<String, Value> {
     values
         .iter()
-        .filter(|(field, _)| *field != SEED)
+        .filter(|(field, _)| !is_of_repeats(field))
         .map(|(field, value)| (field.clone(), value.clone()))
         .collect()
 }
@@ -274,7 +274,7 @@ fn settings(points: &[PointResult]) -> Vec<(Setting, usize)> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     let mut places: BTreeMap<String, usize> = BTreeMap::new();
     for (point, result) in points.iter().enumerate().filter(|(_, it)| it.failed.is_none()) {
-        let key = format!("{:?}", without_seed(&result.values));
+        let key = format!("{:?}", without_repeats(&result.values));
         let place = *places.entry(key).or_insert(groups.len());
         match groups.get_mut(place) {
             Some(group) => group.push(point),
@@ -311,7 +311,7 @@ fn settings(points: &[PointResult]) -> Vec<(Setting, usize)> {
         }
         let setting = Setting {
             blocks,
-            values: without_seed(&group[0].values),
+            values: without_repeats(&group[0].values),
             repeats: group.len(),
             results,
             deviations,
@@ -324,7 +324,7 @@ fn settings(points: &[PointResult]) -> Vec<(Setting, usize)> {
     groups.into_iter().map(setting).collect()
 }
 
-/// Means of the blocks of points that differ in their seed.
+/// Means of the blocks of points that differ in their seed or fold.
 fn mean_blocks(points: &[&PointResult]) -> Blocks {
     let mut means = points[0].blocks.clone();
     means.retain(|name, parts| {

@@ -40,6 +40,11 @@ pub const FOLD: &str = "data.fold";
 /// Field of a point's seed, which repeats differ in.
 pub const SEED: &str = "seed";
 
+/// Whether points that differ in this `field` alone are repeats of one setting, and not a choice.
+pub fn is_of_repeats(field: &str) -> bool {
+    [SEED, FOLD].contains(&field)
+}
+
 /// Scene, or measurements, that fields are changed in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Base {
