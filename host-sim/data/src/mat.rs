@@ -71,10 +71,10 @@ impl Mat {
 
 /// Name of each of the `chosen` columns of a `header` in a model: of a cell, if they are a mat.
 ///
-/// They are one if they are named after their wires (`r0c0`, `m_r1c1` are not, `r3c4` is), which a grid must agree with; if their names differ in a number
-/// alone, and these numbers run over a square of at least 8 × 8 cells, from which some may be missing; or if `given` says
-/// so. Then numbers count the cells row by row; without numbers the columns are in that order. The mat is returned if
-/// numbers told it.
+/// They are one if they are named after their wires (`r0c0`, `m_r1c1` are not, `r3c4` is), which a grid must agree with; if
+/// their names differ in a number alone, and these numbers run over a square of at least 8 × 8 cells, from which some may be
+/// missing; or if `given` says so. Then numbers count the cells row by row; without numbers the columns are in that order.
+/// The mat is returned if numbers told it.
 ///
 /// # Errors
 /// Reason why the columns are not the cells of the `given` mat.

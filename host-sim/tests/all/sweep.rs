@@ -381,6 +381,22 @@ fn measurements_are_swept_by_the_settings_of_training() {
 }
 
 #[test]
+fn a_point_fails_alone_whose_scene_has_not_what_its_device_asks_for() {
+    let folder = prepared("sweep_devices");
+    folder.write(
+        "plan.toml",
+        "name = \"devices\"\nscene = \"scene.toml\"\nlimit_frames = 0\n\
+         [axes]\nsensor.column_wires = [6, 18]\ndevice.column_step = [2, 9]\n",
+    );
+    let all = folder.json(&["sweep", "plan.toml"]);
+    let points = all["points"].as_array().unwrap().iter();
+    let reasons: Vec<_> = points.map(|point| point["failed"].as_str().unwrap_or("")).collect();
+    let why = "device.column_step = 9: give steps from 1 to 6, the columns of the scene";
+    assert_eq!(reasons.iter().filter(|it| **it == why).count(), 1, "{reasons:?}");
+    assert_eq!(reasons.iter().filter(|it| it.is_empty()).count(), 3, "{reasons:?}");
+}
+
+#[test]
 fn folds_of_a_plan_are_those_that_train_selects_by() {
     let folder = prepared("sweep_folds");
     folder.succeed(&["synth", "scene.toml", "-n", "300", "-o", "data.csv"]);

@@ -163,6 +163,7 @@ fn caught<T>(stage: impl FnOnce() -> Result<T>) -> Stage<T> {
 
 /// Subject of a point, whose readings are averaged as its device does.
 pub fn subject_of(plan: &Plan, point: &Point) -> Result<Subject> {
+    plan.check_readings(point)?;
     if let Some(data) = &plan.data {
         let data = point::measured(data, &point.scene).map_err(taxel_data::Error::unfit)?;
         let data = match point.fold {

@@ -38,7 +38,8 @@ impl Plan {
             let Some(axis) =
                 (0..places.len()).rev().find(|axis| places[*axis] + 1 < self.axes[*axis].1.len())
             else {
-                return self.check_any(&points).map(|()| points);
+                self.check_any(&points)?;
+                return self.check_devices(&points).map(|()| points);
             };
             places[axis] += 1;
             places[axis + 1..].fill(0);
@@ -67,7 +68,6 @@ impl Plan {
             shared.remove("table1");
         }
         let (on_device, fold) = (OnDevice::new(document.device)?, self.fold(document.data)?);
-        self.check_readings(&on_device, &scene)?;
         let OnDevice { device, samples, column_step, filter } = on_device;
         let (limit_frames, train, also) = (self.limit_frames, self.train, &self.also);
         let how = format!(
@@ -139,9 +139,23 @@ impl Plan {
         }
     }
 
-    /// Checks that measurements, or a point's `scene`, have what the device asks of them.
-    fn check_readings(&self, on_device: &OnDevice, scene: &str) -> Checked<()> {
-        let OnDevice { samples, column_step, filter, .. } = *on_device;
+    /// Checks that each device is one that some of the `points` can have.
+    fn check_devices(&self, points: &[Point]) -> Checked<()> {
+        let (mut possible, mut refused) = (vec![], vec![]);
+        for point in points {
+            match self.check_readings(point) {
+                Err(bad) => refused.push((&point.on_device, bad)),
+                Ok(()) if possible.contains(&&point.on_device) => (),
+                Ok(()) => possible.push(&point.on_device),
+            }
+        }
+        let refused = refused.into_iter().find(|(device, _)| !possible.contains(device));
+        refused.map_or(Ok(()), |(_, bad)| Err(bad))
+    }
+
+    /// Checks that measurements, or a point's scene, have what its device asks of them.
+    pub(in crate::sweep) fn check_readings(&self, point: &Point) -> Checked<()> {
+        let OnDevice { samples, column_step, filter, .. } = point.on_device;
         let scene = match &self.data {
             Some(_) => {
                 require(samples == 1, "device.samples", samples, || {
@@ -151,7 +165,7 @@ impl Plan {
             }
             None if column_step == 1 && !filter => return Ok(()),
             // A scene that cannot be is a failure of its point.
-            None => match Experiment::parse(&self.name, scene) {
+            None => match Experiment::parse(&self.name, &point.scene) {
                 Ok(scene) => Some(scene.world),
                 Err(_) => return Ok(()),
             },
