@@ -2,10 +2,11 @@
 
 use std::borrow::Cow;
 
-use taxel_data::{BadValue, Dataset, Progress, Stream};
+use taxel_data::{BadValue, Dataset, Progress, Silent, Stream};
 use taxel_learn::decoders::LINEAR;
 use taxel_learn::folds;
 use taxel_learn::kinds::{self, Choice};
+use taxel_learn::packing::pack_to_judge;
 use taxel_learn::reading_model::{self, Extent, HeldOut, Statistics};
 use taxel_learn::train::{Examples, Found, Layers, Refinement, Start, resolution, train_refined};
 use taxel_learn::{ModelBlob, Options, Origin, Trained, pack};
@@ -93,7 +94,7 @@ impl<'s> TrainingSet<'s> {
         self.check()?;
         let mut options = *options;
         let _ = self.choose(&mut options, progress);
-        self.packed(pack, &self.train(&options, progress)?, &options, progress)
+        self.packed(&self.train(&options, progress)?, &options, progress)
     }
 
     /// Layers for `options`, refined if that is asked for, from each of `starts` and its own `layers` with K-means centres.
@@ -111,23 +112,40 @@ impl<'s> TrainingSet<'s> {
         Ok(Found::new(starts, layers, options, penalties, refinement, progress)?)
     }
 
-    /// Blob of a trained model as `pack` makes it, with a reading model if one is asked for.
+    /// Blob of a trained model, with a reading model if one is asked for.
     pub fn packed(
         &self,
-        pack: Pack,
         trained: &Trained,
         options: &Options,
         progress: &dyn Progress,
     ) -> Result<ModelBlob> {
-        let mut origin = self.origin.clone();
-        if origin.linear_rmse.is_empty() {
-            origin.linear_rmse = self.linear_rmse();
-        }
+        self.packed_by(pack, self.linear_rmse(), (trained, options), progress)
+    }
+
+    /// Blob as [`packed`](Self::packed) makes it, but for errors on the training frames, which take many more fits and are all 0.
+    pub fn packed_to_judge(&self, trained: &Trained, options: &Options) -> Result<ModelBlob> {
+        let outputs = self.frames.outputs.names.len();
+        let linear_rmse = vec![0.0; if self.has_folds() { outputs } else { 0 }];
+        self.packed_by(pack_to_judge, linear_rmse, (trained, options), &Silent)
+    }
+
+    fn packed_by(
+        &self,
+        pack: Pack,
+        linear_rmse: Vec<f64>,
+        (trained, options): (&Trained, &Options),
+        progress: &dyn Progress,
+    ) -> Result<ModelBlob> {
+        let origin = Origin { linear_rmse, ..self.origin.clone() };
         let blob = pack(trained, &self.frames, &origin)?;
         match self.reading_model {
             Some(extent) => self.with_reading_model(&blob, extent, options, progress),
             None => Ok(blob),
         }
+    }
+
+    fn has_folds(&self) -> bool {
+        self.folds().iter().any(|fold| *fold > 0)
     }
 
     /// Checks before long work that the model can have the reading model that is asked for.
@@ -146,12 +164,11 @@ impl<'s> TrainingSet<'s> {
 
     /// RMSE of the best linear decoder for each output, one fold after the other held out. Empty with a single fold, or if an
     /// output has no value.
-    pub(crate) fn linear_rmse(&self) -> Vec<f64> {
-        let fold_of = self.folds();
-        if fold_of.iter().all(|fold| *fold == 0) {
+    fn linear_rmse(&self) -> Vec<f64> {
+        if !self.has_folds() {
             return vec![];
         }
-        let rmse = folds::baseline_rmse(&LINEAR, &self.frames, &fold_of).unwrap_or_default();
+        let rmse = folds::baseline_rmse(&LINEAR, &self.frames, &self.folds()).unwrap_or_default();
         if rmse.iter().all(|error| error.is_finite()) { rmse } else { vec![] }
     }
 

@@ -150,12 +150,12 @@ fn card(trade: &Trade, place: usize, title: String, command: &str) -> Card {
     facts.push(fact(rate, Digits::Count.text(Some(point.times.frames_per_s)), "frames/s"));
     facts.push(fact("flash", grouped(point.blob_bytes), "B"));
     facts.extend(point.times.age_ms.map(|ms| fact("age", significant(ms, 3), "ms")));
-    Card {
-        title,
-        name: point.name(),
-        facts,
-        command: format!("{command} --max-error {}", words::above(trade.counted_rmse(place))),
-    }
+    // A model that a baseline beats is not chosen.
+    let command = match trade.better_baseline(place) {
+        None => format!("{command} --max-error {}", words::above(trade.counted_rmse(place))),
+        Some(_) => String::new(),
+    };
+    Card { title, name: point.name(), facts, command }
 }
 
 /// Adds what is chosen, what it is worth, and how a device is configured for it; of no choice, why, and what the most accurate

@@ -178,6 +178,10 @@ fn a_point_that_loses_to_a_baseline_is_never_chosen() {
         assert_eq!(refused.is_err_and(|cause| cause.contains(beaten)), least == 0.001);
         assert_eq!(trade.chosen.is_none(), least == 0.001);
     }
+    // Nor does a card say how to choose one.
+    let with = host_sim::report::TradeWith { shown: None, all: false, command: "taxel trade" };
+    let text = host_sim::report::of_trade(&trade, with).text();
+    assert!(!text.contains("taxel trade"), "{text}");
 }
 
 #[test]

@@ -9,10 +9,9 @@ use taxel_core::filter::{Settings, Track};
 use taxel_data::{Dataset, Silent, columns};
 use taxel_learn::cost::{Cost, DecoderRam, Design};
 use taxel_learn::decoders::BASELINES;
-use taxel_learn::packing::pack_to_judge;
 use taxel_learn::train::projection::features_at_most;
 use taxel_learn::train::{Found, Kinds, Layers, Start, resolution};
-use taxel_learn::{Decoder, ModelBlob, Options, PreparedModel, pack};
+use taxel_learn::{Decoder, ModelBlob, Options, PreparedModel};
 use taxel_limit::{Reference, Refusal};
 use taxel_simulate::{Synthesis, World};
 
@@ -127,8 +126,7 @@ fn train_each(
                                 trained.map_err(|why| crate::Error::failed(why.to_string()))?;
                             let starts = starts.as_ref().map_err(crate::Error::failed)?;
                             let chosen = starts.chosen(options);
-                            let blob =
-                                frames.set.packed(pack_to_judge, trained, &chosen, &Silent)?;
+                            let blob = frames.set.packed_to_judge(trained, &chosen)?;
                             frames.judge(&blob, options)
                         });
                         for Member { index, point, .. } in of_model {
@@ -284,10 +282,8 @@ pub struct Frames<'s> {
 impl<'s> Frames<'s> {
     /// Frames of these `readings`.
     pub fn new(plan: &Plan, readings: &'s Readings<'s>) -> Result<Self> {
-        let (mut set, test) = readings.subject.sets();
+        let (set, test) = readings.subject.sets();
         set.check()?;
-        // All models of these frames tell it.
-        set.origin.linear_rmse = set.linear_rmse();
         let names = &set.frames.outputs.names;
         let last = columns::groups(names).last().map_or("", |(group, _)| *group).to_owned();
         let group = plan.group().map_or(last, str::to_owned);
@@ -366,7 +362,7 @@ impl<'s> Frames<'s> {
         let of_usual = Options { format: point.usual.format, ..options };
         let found = centred.found(&of_usual, &[options.penalty])?;
         let trained = found.fit(options.format, options.or_f32, &Silent).remove(0)?;
-        self.set.packed(pack, &trained, &starts.chosen(&options), &Silent)
+        self.set.packed(&trained, &starts.chosen(&options), &Silent)
     }
 
     /// Errors and cost of a model that was trained with `options`.
