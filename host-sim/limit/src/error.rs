@@ -20,14 +20,13 @@ pub enum Refusal {
         /// Largest number of latents.
         most: usize,
     },
-    /// Posteriors with too few effective samples.
-    #[error(
-        "{thin} of {of} posteriors have fewer than {least} effective samples: the sample does not carry the figure"
-    )]
+    /// Frames with a posterior of too few effective samples.
+    #[error("{} of {of} test frames {} fewer than {least} effective samples: the sample does not carry the figure",
+        numbered(frames), if frames.len() == 1 { "has" } else { "have" })]
     Thin {
-        /// Number of posteriors with too few.
-        thin: usize,
-        /// Number of posteriors.
+        /// Numbers of these frames, from 1.
+        frames: Vec<usize>,
+        /// Number of frames.
         of: usize,
         /// Smallest effective sample size that counts.
         least: f64,
@@ -56,4 +55,15 @@ pub enum Refusal {
     /// Measured data, of which neither the sensor nor the prior is known.
     #[error("the sensor and the prior of measured data are not known")]
     Measured,
+}
+
+/// Numbers of `frames`, the first few of them.
+fn numbered(frames: &[usize]) -> String {
+    const SHOWN: usize = 3;
+    let mut words: Vec<String> = frames.iter().take(SHOWN).map(ToString::to_string).collect();
+    if frames.len() > SHOWN {
+        words.push(format!("{} more", frames.len() - SHOWN));
+    }
+    let last = words.pop().unwrap_or_default();
+    if words.is_empty() { last } else { format!("{} and {last}", words.join(", ")) }
 }

@@ -149,6 +149,24 @@ impl Target for Frame<'_> {
         self.rows.log_likelihood(self.readings_ohm, self.rows.ideal_ohm(latents, memory))
     }
 
+    fn readings(&self) -> usize {
+        self.rows.readings()
+    }
+
+    fn residuals(&self, latents: &[Lanes], memory: &mut Memory, residuals: &mut [Lanes]) -> Lanes {
+        let (rows, readings_ohm) = (self.rows, self.readings_ohm);
+        let ideal_ohm = rows.ideal_ohm(latents, memory);
+        let level = rows.world.noise.total_level();
+        for (k, (residual, ideal_ohm)) in residuals.iter_mut().zip(ideal_ohm).enumerate() {
+            let reading = readings_ohm[k];
+            match rows.deviation_ohm.get(k) {
+                Some(deviation) => *residual = ideal_ohm.map(|ideal| (reading - ideal) / deviation),
+                None => *residual = ideal_ohm.map(|ideal| (reading / ideal - 1.0) / level),
+            }
+        }
+        rows.log_likelihood(readings_ohm, ideal_ohm)
+    }
+
     fn outputs(&self, latents: &[Lanes], memory: &mut Memory, outputs: &mut [Lanes]) {
         let Rows { world, wires, .. } = self.rows;
         let sensor = &world.sensor;

@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Cholesky, DMatrix};
 use taxel_data::{LANES, Lanes, Random, ln, widest};
 
-use crate::samples::Samples;
+use crate::samples::{Samples, resampled};
 use crate::weights::effective;
 
 /// Degrees of freedom of the kernels: tails heavier than the posterior's, but with a variance. It is even, which
@@ -69,19 +69,11 @@ impl Mixture {
             centres: Vec::with_capacity(KERNELS * n),
             width,
         };
-        // Systematic resampling: one uniform number, then equal steps through the sum of the weights.
-        let step = 1.0 / KERNELS as f64;
-        let (mut sum, mut next) = (0.0, step * random.unit());
         let towards_mean = (1.0 - width * width).sqrt();
-        for (sample, weight) in lines() {
-            sum += weight;
-            while next < sum && mixture.centres.len() < KERNELS * n {
-                let whitened = mixture.whiten(sample);
-                mixture.centres.extend(whitened.iter().map(|x| towards_mean * x));
-                next += step;
-            }
+        for number in resampled(weights, KERNELS, random) {
+            let whitened = mixture.whiten(samples.place(number));
+            mixture.centres.extend(whitened.iter().map(|x| towards_mean * x));
         }
-        mixture.centres.resize(KERNELS * n, 0.0); // rounding may leave the sum below 1
         mixture
     }
 

@@ -5,15 +5,21 @@
 //! power is the largest that leaves enough effective samples. Once it is 1, samples are kept. Their weight is
 //! likelihood × prior / proposal, whatever the earlier rounds did.
 
+use nalgebra::DVector;
 use taxel_data::{LANES, Lanes, Random};
 
+use crate::maps::Maps;
 use crate::mixture::Mixture;
-use crate::samples::Samples;
+use crate::samples::{Samples, resampled};
+use crate::slopes::tops;
 use crate::target::Target;
 use crate::weights::{effective, largest_power, normalised, tempered};
 
 /// Earlier rounds whose samples are weighted again with those of the last one.
 const REMEMBERED: usize = 3;
+
+/// Samples of the prior from which tops of the posterior are looked for.
+const STARTS: usize = 32;
 
 /// Work that is done for one posterior.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,8 +30,10 @@ pub struct Effort {
     pub fitted: f64,
     /// Effective sample size at which sampling ends.
     pub wanted: f64,
-    /// Largest number of rounds.
+    /// Largest number of rounds of the population.
     pub rounds: usize,
+    /// Largest number of rounds of draws that are solved for, where the population does not arrive.
+    pub solved: usize,
 }
 
 impl Effort {
@@ -33,7 +41,7 @@ impl Effort {
     pub fn new(latents: usize) -> Self {
         let round = (25 * latents * latents).max(1024).next_multiple_of(LANES);
         let fitted = (10 * latents / 3).max(10) as f64;
-        Self { round, fitted, wanted: 100.0, rounds: 40 }
+        Self { round, fitted, wanted: 100.0, rounds: 16, solved: 40 }
     }
 }
 
@@ -58,31 +66,52 @@ pub fn sample<T: Target>(
     random: &mut Random,
     memory: &mut T::Memory,
 ) -> Samples {
-    let mut population = prior;
+    let mut population = Samples::new(target.latents());
     let mut kept = Samples::new(target.latents());
-    for round in 0..effort.rounds {
-        let power = largest_power(&population.log_prior, &population.log_likelihood, effort.fitted);
-        let log = tempered(&population.log_prior, &population.log_likelihood, power);
-        let mixture = Mixture::fit(&population, &normalised(&log), random);
+    for _ in 0..effort.rounds {
+        // Samples of the prior are too far apart to be of use later.
+        let from = if population.len() == 0 { &prior } else { &population };
+        let power = largest_power(&from.log_prior, &from.log_likelihood, effort.fitted);
+        let log = tempered(&from.log_prior, &from.log_likelihood, power);
+        let mixture = Mixture::fit(from, &normalised(&log), random);
         let drawn = draw(target, &mixture, effort.round, random, memory);
         if power < 1.0 {
-            // Samples of the prior are too far apart to be of use later.
-            if round == 0 {
-                population = drawn;
-            } else {
-                population.append(&drawn);
-                population.keep_last(REMEMBERED * effort.round);
-            }
+            population.append(&drawn);
+            population.keep_last(REMEMBERED * effort.round);
             continue;
         }
         kept.append(&drawn);
-        let log = tempered(&kept.log_prior, &kept.log_likelihood, 1.0);
-        if effective(&normalised(&log)) >= effort.wanted {
-            break;
+        if is_enough(&kept, effort) {
+            return kept;
         }
         population = kept.clone();
     }
+    // The posterior is too thin, or bent, for a mixture of one shape.
+    let tops = tops(target, &starts(&prior, effort, random), memory);
+    let maps = Maps::new(target, tops, memory);
+    let mut kept = Samples::new(target.latents());
+    for _ in 0..effort.solved {
+        kept.append(&maps.draw(target, random, memory));
+        if is_enough(&kept, effort) {
+            break;
+        }
+    }
     kept
+}
+
+/// Whether samples at the power 1 are effective enough.
+fn is_enough(samples: &Samples, effort: &Effort) -> bool {
+    let log = tempered(&samples.log_prior, &samples.log_likelihood, 1.0);
+    effective(&normalised(&log)) >= effort.wanted
+}
+
+/// Samples of the prior near which tops of the posterior are looked for.
+fn starts(prior: &Samples, effort: &Effort, random: &mut Random) -> Vec<DVector<f64>> {
+    let power = largest_power(&prior.log_prior, &prior.log_likelihood, effort.fitted);
+    let weights = normalised(&tempered(&prior.log_prior, &prior.log_likelihood, power));
+    let mut numbers = resampled(&weights, STARTS, random);
+    numbers.dedup();
+    numbers.into_iter().map(|it| DVector::from_column_slice(prior.place(it))).collect()
 }
 
 fn draw<T: Target>(

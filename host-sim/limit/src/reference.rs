@@ -8,9 +8,7 @@ use crate::error::Refusal;
 use crate::limit::{Limit, Posterior};
 
 /// Least effective sample size of a posterior that counts as sampled.
-const LEAST_EFFECTIVE: f64 = 30.0;
-/// Largest share of posteriors with fewer effective samples.
-const MOST_THIN: f64 = 0.01;
+const LEAST_EFFECTIVE: f64 = 100.0;
 /// Largest share of the posterior means' squared error that may be their own Monte Carlo error. It is subtracted;
 /// a share this large would move the RMSE by 1.5 %.
 const MOST_MONTE_CARLO: f64 = 0.03;
@@ -215,11 +213,16 @@ impl Reference {
 
     /// Checks that the sample carries the figures.
     fn check(&self) -> Result<(), Refusal> {
-        let sizes = self.sorted_effective();
-        let (of, least) = (sizes.len(), LEAST_EFFECTIVE);
-        let thin = sizes.iter().filter(|size| **size < least).count();
-        if thin as f64 > MOST_THIN * of as f64 {
-            return Err(Refusal::Thin { thin, of, least });
+        let is_thin = |posterior: &Posterior| {
+            posterior.effective.iter().any(|size| size.is_nan() || *size < LEAST_EFFECTIVE)
+        };
+        let numbered = self.posteriors.iter().zip(1..);
+        let frames: Vec<usize> = numbered
+            .filter(|(posterior, _)| is_thin(posterior))
+            .map(|(_, number)| number)
+            .collect();
+        if !frames.is_empty() {
+            return Err(Refusal::Thin { frames, of: self.frames(), least: LEAST_EFFECTIVE });
         }
         for (group, members) in columns::groups(&self.truth.names) {
             let limit = self.limit(group, &members);
@@ -311,8 +314,8 @@ mod tests {
     #[test]
     fn a_sample_that_does_not_carry_the_figures_is_refused() {
         let refusal = |effective, off| reference(effective, off).check().unwrap_err();
-        assert!(matches!(refusal(20.0, 0.2), Refusal::Thin { thin: 100, of: 100, .. }));
-        assert!(matches!(refusal(32.0, 0.2), Refusal::MonteCarlo { .. }));
+        assert!(matches!(refusal(99.0, 0.2), Refusal::Thin { of: 100, .. }));
+        assert!(matches!(refusal(f64::NAN, 0.2), Refusal::Thin { of: 100, .. }));
         assert!(matches!(refusal(1e6, 0.3), Refusal::Inconsistent { .. }));
     }
 }

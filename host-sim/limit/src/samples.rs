@@ -1,5 +1,7 @@
 //! Samples of latents, with what their weights are made of.
 
+use taxel_data::Random;
+
 /// Samples of the latents.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Samples {
@@ -24,6 +26,11 @@ impl Samples {
         self.log_prior.len()
     }
 
+    /// Latents of a sample.
+    pub fn place(&self, number: usize) -> &[f64] {
+        &self.places[number * self.latents..][..self.latents]
+    }
+
     /// Latents of each sample.
     pub fn lines(&self) -> impl Iterator<Item = &[f64]> {
         self.places.chunks_exact(self.latents)
@@ -43,4 +50,21 @@ impl Samples {
         self.log_prior.drain(..dropped);
         self.log_likelihood.drain(..dropped);
     }
+}
+
+/// Numbers of `count` samples, drawn by `weights` whose sum is 1: one uniform number, then equal steps through the sum.
+pub fn resampled(weights: &[f64], count: usize, random: &mut Random) -> Vec<usize> {
+    let step = 1.0 / count as f64;
+    let (mut sum, mut next) = (0.0, step * random.unit());
+    let mut drawn = Vec::with_capacity(count);
+    for (number, weight) in weights.iter().enumerate() {
+        sum += weight;
+        while next < sum && drawn.len() < count {
+            drawn.push(number);
+            next += step;
+        }
+    }
+    let last = drawn.last().copied().unwrap_or(0);
+    drawn.resize(count, last); // rounding may leave the sum below 1
+    drawn
 }

@@ -1,8 +1,10 @@
 //! The limit against figures that were computed independently, and against what must not change it.
 
+use nalgebra::DMatrix;
 use taxel_learn::Decoder;
 use taxel_simulate::motion::{Dent, Kind, Mix, Part};
 use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::outputs::{ContactOutput, Outputs};
 use taxel_simulate::path::Path;
 use taxel_simulate::profile::Profile;
 use taxel_simulate::rubber::StandardLinearSolid;
@@ -39,6 +41,58 @@ fn limits_agree_with_independent_figures_within_two_standard_errors() {
             let off = z.limit - expected;
             assert!(off.abs() < allowed, "noise {level}, {} rows: {z:?}", read_rows.len());
             assert!(z.limit_standard_error < 0.06 * z.limit, "{z:?}");
+        }
+    }
+}
+
+/// Where noise is low, the posterior is normal, and its covariance that of Cramér and Rao with the prior (van Trees):
+/// G·(I + JᵀJ)⁻¹·Gᵀ, with the slopes J of readings over their noise, and G of outputs, over the latents.
+#[test]
+fn low_noise_comes_to_the_cramer_rao_bound() {
+    let depth_mm = [0.2, 1.0];
+    let dent = Dent::new(Profile::Press, &[[2.0, 5.0]], [depth_mm, [0.1, 0.5]]);
+    for level in [0.0002, 0.0005] {
+        let mut world = World { motion: dent.into(), ..World::press() };
+        world.outputs = Outputs::Contact(vec![ContactOutput::Centre, ContactOutput::Depth]);
+        world.noise.level = level;
+        let limit = Limit::new(&world).unwrap();
+        let rows = limit.rows(&limit.groups[0]);
+        let (n, mut memory) = (rows.latents(), rows.memory());
+        // A frame a lane: at least a radius from the edges. Differences of each latent stand in lanes of their own.
+        let mut random = Random::new(7, Stream::Test, Purpose::Contact, 0, 0);
+        let mut ratios = [0.0; 3];
+        for _ in 0..100 {
+            let near_the_middle = |i: usize| if i < 2 { 0.5 } else { 1.0 };
+            let truth: Vec<f64> = (0..n).map(|i| near_the_middle(i) * random.normal()).collect();
+            let mut latents: Vec<Lanes> = truth.iter().map(|x| [*x; LANES]).collect();
+            for i in 0..n {
+                latents[i][1 + 2 * i] += 1e-2;
+                latents[i][2 + 2 * i] -= 1e-2;
+            }
+            let ideal_ohm = rows.ideal_ohm(&latents, &mut memory).to_vec();
+            let slope = |of: &Lanes, i: usize| (of[1 + 2 * i] - of[2 + 2 * i]) / 2e-2;
+            let slopes = DMatrix::from_fn(ideal_ohm.len(), n, |k, i| {
+                slope(&ideal_ohm[k], i) / (level * ideal_ohm[k][0])
+            });
+            let covariance =
+                (DMatrix::identity(n, n) + slopes.tr_mul(&slopes)).try_inverse().unwrap();
+            let mut outputs = vec![[0.0; LANES]; 3];
+            let frame = Frame { rows: &rows, readings_ohm: &[] };
+            frame.outputs(&latents, &mut memory, &mut outputs);
+            let of_outputs = DMatrix::from_fn(3, n, |output, i| slope(&outputs[output], i));
+            let variances = (&of_outputs * covariance * of_outputs.transpose()).diagonal();
+            let noisy = ideal_ohm.iter().map(|ideal| ideal[0] * (1.0 + level * random.normal()));
+            let noisy: Vec<f64> = noisy.collect();
+            let posterior = &limit.posteriors(&noisy, &Silent)[0];
+            assert!(posterior.effective.iter().all(|size| *size >= 100.0), "{posterior:?}");
+            for output in 0..3 {
+                ratios[output] += posterior.variance[output] / variances[output] / 100.0;
+            }
+        }
+        for output in 0..3 {
+            let ratio = ratios[output].sqrt();
+            println!("noise {level}, output {output}: {ratio:.4} × the bound");
+            assert!((ratio - 1.0).abs() < 0.05, "noise {level}, output {output}: {ratio}");
         }
     }
 }

@@ -23,6 +23,19 @@ impl Target for Linear {
         self.slope.ncols()
     }
 
+    fn readings(&self) -> usize {
+        self.data.len()
+    }
+
+    fn residuals(&self, latents: &[Lanes], (): &mut (), residuals: &mut [Lanes]) -> Lanes {
+        for lane in 0..LANES {
+            let x = DVector::from_iterator(latents.len(), latents.iter().map(|l| l[lane]));
+            let off = (&self.data - &self.slope * x) / self.deviation;
+            residuals.iter_mut().zip(&off).for_each(|(to, off)| to[lane] = *off);
+        }
+        self.log_likelihood(latents, &mut ())
+    }
+
     fn log_likelihood(&self, latents: &[Lanes], (): &mut ()) -> Lanes {
         std::array::from_fn(|lane| {
             let x = DVector::from_iterator(latents.len(), latents.iter().map(|l| l[lane]));
@@ -52,6 +65,15 @@ impl Target for Square {
         2
     }
 
+    fn readings(&self) -> usize {
+        1
+    }
+
+    fn residuals(&self, latents: &[Lanes], (): &mut (), residuals: &mut [Lanes]) -> Lanes {
+        residuals[0] = latents[0].map(|x| (self.data - x * x) / self.deviation);
+        self.log_likelihood(latents, &mut ())
+    }
+
     fn log_likelihood(&self, latents: &[Lanes], (): &mut ()) -> Lanes {
         latents[0].map(|x| -0.5 * ((self.data - x * x) / self.deviation).powi(2))
     }
@@ -59,6 +81,46 @@ impl Target for Square {
     fn outputs(&self, latents: &[Lanes], (): &mut (), outputs: &mut [Lanes]) {
         outputs[0] = latents[0];
         outputs[1] = latents[0].map(f64::abs);
+    }
+}
+
+/// Two latents x and y, of which the data is y + x² with noise: a thin ridge along a parabola.
+struct Parabola {
+    data: f64,
+    deviation: f64,
+}
+
+impl Target for Parabola {
+    type Memory = ();
+
+    fn latents(&self) -> usize {
+        2
+    }
+
+    fn output_count(&self) -> usize {
+        2
+    }
+
+    fn readings(&self) -> usize {
+        1
+    }
+
+    fn log_likelihood(&self, latents: &[Lanes], (): &mut ()) -> Lanes {
+        let mut residuals = [[0.0; LANES]];
+        self.residuals(latents, &mut (), &mut residuals)
+    }
+
+    fn residuals(&self, latents: &[Lanes], (): &mut (), residuals: &mut [Lanes]) -> Lanes {
+        for lane in 0..LANES {
+            let reading = latents[1][lane] + latents[0][lane].powi(2);
+            residuals[0][lane] = (self.data - reading) / self.deviation;
+        }
+        residuals[0].map(|off| -0.5 * off * off)
+    }
+
+    fn outputs(&self, latents: &[Lanes], (): &mut (), outputs: &mut [Lanes]) {
+        outputs[0] = latents[0].map(|x| x * x);
+        outputs[1] = latents[1];
     }
 }
 
@@ -123,10 +185,34 @@ fn a_posterior_with_two_modes_is_that_of_a_fine_grid() {
 }
 
 #[test]
+fn a_posterior_on_a_thin_bent_ridge_is_that_along_the_ridge() {
+    for deviation in [1e-3, 1e-6] {
+        let target = Parabola { data: 0.4, deviation };
+        // Along the ridge, y is 0.4 − x²; the noise adds nothing that counts.
+        let [mut sum, mut sums] = [0.0, 0.0];
+        for i in -60_000..60_000 {
+            let x = (f64::from(i) + 0.5) * 1e-4;
+            let density = (-0.5 * (x * x + (target.data - x * x).powi(2))).exp();
+            sum += density;
+            sums += density * x * x;
+        }
+        let effort = Effort { wanted: 500.0, solved: 100, ..Effort::new(2) };
+        let found = posterior(&target, &effort, 0);
+        assert!(found.effective >= 500.0, "{}", found.effective);
+        let mean = sums / sum;
+        for (i, exact) in [mean, target.data - mean].into_iter().enumerate() {
+            let standard_error = (found.variance[i] / found.effective).sqrt();
+            let off = (found.mean[i] - exact) / standard_error;
+            assert!(off.abs() < 4.0, "deviation {deviation}, output {i}: {off} standard errors");
+        }
+    }
+}
+
+#[test]
 fn a_population_that_does_not_arrive_says_so() {
     let data = DVector::from_element(3, 3.0);
     let target = Linear { slope: DMatrix::identity(3, 3), data, deviation: 1e-6 };
-    let found = posterior(&target, &Effort { rounds: 2, ..Effort::new(3) }, 0);
+    let found = posterior(&target, &Effort { rounds: 2, solved: 0, ..Effort::new(3) }, 0);
     assert!(found.effective < 2.0, "{}", found.effective);
 }
 
