@@ -126,7 +126,8 @@ mod tests {
         // The shallow contact is 4 mm off, those that are deeper 1 mm and 0.
         let truth = Table { names, values: vec![10.0, 0.02, 10.0, 0.1, 10.0, 0.9].into() };
         let estimate = [14.0, 0.02, 9.0, 0.1, 10.0, 0.9];
-        let measure = Measure { full_scale: vec![20.0, 1.0], thickness_mm: None, limit: None };
+        let measure =
+            Measure { full_scale: vec![20.0, 1.0], thickness_mm: None, limit: None, noise: None };
         let found = by_load(&truth, &estimate, None, &measure);
         let of = |range: &LoadErrors| (range.range(), range.frames, range.errors[0].rmse);
         assert_eq!(of(&found[0]), ("0 to 0.05 mm".into(), 1, 4.0));

@@ -227,6 +227,7 @@ impl Experiment {
             full_scale: self.world.full_scales(),
             thickness_mm: Some(self.world.sensor.size_mm[2]),
             limit: None,
+            noise: None,
         }
     }
 

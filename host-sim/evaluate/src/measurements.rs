@@ -292,7 +292,13 @@ impl Measurements {
 
     /// Measure for errors on the test frames.
     pub fn measure(&self) -> Measure {
-        Measure { full_scale: self.origin().full_scale, thickness_mm: None, limit: None }
+        let rest = self.test_rest.as_ref().or(self.rest.as_ref());
+        let noise = rest.map(|rest| {
+            let noise = rest.noise().into_iter().zip(rest.readings.means());
+            let relative = self.training.relative_inputs;
+            noise.map(|(noise, mean)| if relative { noise / mean.abs() } else { noise }).collect()
+        });
+        Measure { full_scale: self.origin().full_scale, thickness_mm: None, limit: None, noise }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 use taxel_core::blob::Model;
-use taxel_data::{Dataset, Table, columns};
+use taxel_data::{Dataset, Purpose, Random, Stream, Table, columns};
 use taxel_learn::Decoder;
 use taxel_limit::reference::GroupLimit;
 use taxel_limit::{Reference, Refusal};
@@ -29,6 +29,8 @@ pub struct Measure {
     pub thickness_mm: Option<f64>,
     /// Limit on the first frames that are measured, for ratios to it.
     pub limit: Option<Reference>,
+    /// Standard deviation of the noise on each input, where measurements at rest tell it.
+    pub noise: Option<Vec<f64>>,
 }
 
 /// Errors of one group of outputs (an axis, or a column of measured data).
@@ -55,6 +57,8 @@ pub struct Errors {
     /// Ratio of the RMSE to the limit, formed on the frames of the [`Reference`]; scenes only.
     pub ratio_to_limit: Option<f64>,
     pub ratio_standard_error: Option<f64>,
+    /// RMSE that the noise of readings at rest makes of the estimates, in the unit; measured data only.
+    pub rmse_of_noise: Option<f64>,
 }
 
 #[cfg(test)]
@@ -73,6 +77,7 @@ impl Errors {
             mean_relative_percent: None,
             ratio_to_limit: None,
             ratio_standard_error: None,
+            rmse_of_noise: None,
         }
     }
 }
@@ -197,8 +202,37 @@ impl LimitSummary {
 /// Errors of `decoder` on the frames of `test`.
 pub fn judge(decoder: &dyn Decoder, test: &Dataset, measure: &Measure) -> DecoderErrors {
     let estimates = decoder.decode_all(&test.inputs.values, 1);
-    let errors = by_group(&test.outputs, &estimates.values, measure);
+    let mut errors = by_group(&test.outputs, &estimates.values, measure);
+    if let Some(noise) = &measure.noise {
+        for (errors, of_noise) in
+            errors.iter_mut().zip(rmse_of_noise(decoder, test, noise, measure))
+        {
+            errors.rmse_of_noise = Some(of_noise).filter(|it| it.is_finite());
+        }
+    }
     DecoderErrors { decoder: decoder.name().into(), errors }
+}
+
+/// RMSE of each group of outputs that normal `noise` of these standard deviations on the inputs of `test` makes of the
+/// decoder's estimates: from half the difference between estimates with the noise added and taken off, so that what the decoder is
+/// bent does not count.
+fn rmse_of_noise(
+    decoder: &dyn Decoder,
+    test: &Dataset,
+    noise: &[f64],
+    measure: &Measure,
+) -> Vec<f64> {
+    let mut random = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
+    let deviations = noise.iter().cycle();
+    let drawn = test.inputs.values.iter().zip(deviations);
+    let drawn: Vec<f64> = drawn.map(|(_, deviation)| deviation * random.normal()).collect();
+    let with = |sign: f64| {
+        let inputs = test.inputs.values.iter().zip(&drawn).map(|(input, it)| input + sign * it);
+        decoder.decode_all(&inputs.collect::<Vec<_>>(), 1).values
+    };
+    let below = Table { names: test.outputs.names.clone(), values: with(-1.0).into() };
+    let errors = by_group(&below, &with(1.0), measure);
+    errors.iter().map(|errors| 0.5 * errors.rmse).collect()
 }
 
 /// Errors of every group of columns, in the order in which groups first appear.
@@ -295,6 +329,7 @@ fn of_columns(
         mean_relative_percent: finite(100.0 * total.relative / total.relative_count as f64),
         ratio_to_limit: ratio.map(|ratio| ratio.ratio),
         ratio_standard_error: ratio.map(|ratio| ratio.standard_error),
+        rmse_of_noise: None,
     }
 }
 
@@ -320,7 +355,8 @@ mod tests {
         // Errors of both signs: +0.5 and −0.25 of three.
         let estimate = [0.55, 1.0, 1.0, 0.75, -1.0, f64::NAN];
         let squares: f64 = 0.25 + 0.0625;
-        let measure = Measure { full_scale: vec![1.0; 3], thickness_mm: Some(5.0), limit: None };
+        let measure =
+            Measure { full_scale: vec![1.0; 3], thickness_mm: Some(5.0), limit: None, noise: None };
         let [z, x] = &by_group(&truth, &estimate, &measure)[..] else { panic!("two groups") };
         assert_eq!((z.group.as_str(), z.count, z.unit.as_str()), ("dz_mm", 3, "mm"));
         let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
@@ -334,6 +370,32 @@ mod tests {
     }
 
     #[test]
+    fn noise_on_inputs_makes_the_errors_that_slopes_tell() {
+        let mut random = Random::new(5, Stream::Training, Purpose::Setup, 0, 0);
+        let names = |all: &[&str]| all.iter().map(|name| (*name).to_owned()).collect();
+        let mut data = Dataset::empty(names(&["a", "b"]), names(&["y_mm", "x_mm"]), 1, 4000);
+        data.inputs.values.iter_mut().for_each(|it| *it = random.unit());
+        let lines: Vec<f64> =
+            data.inputs.lines().flat_map(|it| [3.0 * it[0] - 4.0 * it[1], it[0]]).collect();
+        data.outputs.values.copy_from_slice(&lines);
+        let linear = taxel_learn::decoders::LINEAR.fit(&data).unwrap();
+        let measure = Measure {
+            full_scale: vec![1.0; 2],
+            thickness_mm: None,
+            limit: None,
+            noise: Some(vec![0.01, 0.02]),
+        };
+        let [y, x] = &judge(linear.as_ref(), &data, &measure).errors[..] else {
+            panic!("two groups")
+        };
+        // √(0.03² + 0.08²), but for a standard error of 1/√8000.
+        assert!((y.rmse_of_noise.unwrap() / 0.0073_f64.sqrt() - 1.0).abs() < 0.05, "{y:?}");
+        assert!((x.rmse_of_noise.unwrap() / 0.01 - 1.0).abs() < 0.05 && x.rmse < 1e-6, "{x:?}");
+        let without = Measure { noise: None, ..measure };
+        assert_eq!(judge(linear.as_ref(), &data, &without).errors[0].rmse_of_noise, None);
+    }
+
+    #[test]
     fn errors_of_a_group_are_pooled_by_the_mean_square() {
         let pooled = pooled(&[("dz_mm", vec![0, 2]), ("dx_mm", vec![1])], &[3.0, 5.0, 4.0]);
         assert_eq!(pooled, [12.5_f64.sqrt(), 5.0]);
@@ -344,7 +406,8 @@ mod tests {
         for values in [vec![0.1; 300], vec![0.1, 0.1_f64.next_up(), 0.1]] {
             let estimate: Vec<f64> = values.iter().map(|value| value + 0.01).collect();
             let truth = Table { names: vec!["b".into()], values: values.into() };
-            let measure = Measure { full_scale: vec![1.0], thickness_mm: None, limit: None };
+            let measure =
+                Measure { full_scale: vec![1.0], thickness_mm: None, limit: None, noise: None };
             assert_eq!(by_group(&truth, &estimate, &measure)[0].r_squared, None);
             assert_eq!(
                 by_group(&truth, &truth.means().repeat(truth.len()), &measure)[0].r_squared,
@@ -359,7 +422,8 @@ mod tests {
             let values: Vec<f64> = (0..1000).map(|i| offset + f64::from(i % 37)).collect();
             let truth = Table { names: vec!["b".into()], values: values.into() };
             let means = truth.means().repeat(truth.len());
-            let measure = Measure { full_scale: vec![1.0], thickness_mm: None, limit: None };
+            let measure =
+                Measure { full_scale: vec![1.0], thickness_mm: None, limit: None, noise: None };
             let r_squared = by_group(&truth, &means, &measure)[0].r_squared.unwrap();
             assert!(r_squared.abs() < 1e-9, "offset {offset}: {r_squared}");
         }

@@ -132,6 +132,7 @@ fn on_folds(selection: &Selection, set: &TrainingSet<'_>) -> Vec<DecoderErrors> 
                 mean_relative_percent: None,
                 ratio_to_limit: None,
                 ratio_standard_error: None,
+                rmse_of_noise: None,
             }
         });
         DecoderErrors { decoder: decoder.into(), errors: errors.collect() }

@@ -199,6 +199,7 @@ fn measure_of(metadata: &Metadata<'_>) -> Measure {
         full_scale: metadata.full_scale.iter().map(f64::from).collect(),
         thickness_mm: (thickness_mm > 0.0).then_some(thickness_mm),
         limit: None,
+        noise: None,
     }
 }
 

@@ -80,7 +80,8 @@ mod tests {
         let estimate: Vec<f64> = (0..1010)
             .flat_map(|i| [if i % 2 == 0 { 1.0 } else { 3.0 }, 0.0, f64::from(i % 7)])
             .collect();
-        let measure = Measure { full_scale: vec![1.0; 3], thickness_mm: None, limit: None };
+        let measure =
+            Measure { full_scale: vec![1.0; 3], thickness_mm: None, limit: None, noise: None };
         for kept in [|_| true, |i| i >= 420] {
             let (errors, blocks) = with_blocks(&truth(&kept), &estimate, &measure);
             assert!((errors[0].rmse - 5.0_f64.sqrt()).abs() < 1e-12);

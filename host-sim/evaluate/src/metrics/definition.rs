@@ -21,7 +21,7 @@ pub struct Definition {
 
 impl Definition {
     /// All definitions: first what matters most, since narrow windows show that.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::new("rmse", "RMSE", "", None, "√mean(e²), in the output’s unit", |it| {
             Some(it.rmse)
         }),
@@ -36,6 +36,14 @@ impl Definition {
                 |it| it.ratio_to_limit,
             )
         },
+        Self::new(
+            "rmse_of_noise",
+            "of noise",
+            "",
+            None,
+            "RMSE that the noise of readings at rest makes of the estimates, in the output’s unit",
+            |it| it.rmse_of_noise,
+        ),
         Self::new("r_squared", "R²", "", Some(3), "1 − Σe²/Σ(Δ − mean Δ)²", |it| {
             it.r_squared
         }),
