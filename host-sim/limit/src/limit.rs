@@ -147,7 +147,7 @@ impl Limit {
             start.log_likelihood.extend(rows.log_likelihood(readings_ohm, ideal_ohm));
         }
         let effort = Effort::new(rows.latents());
-        let samples = sample(&frame, start, &effort, &mut random, &mut memory);
+        let samples = sample(&frame, &start, &effort, &mut random, &mut memory);
         let moments = moments(&frame, &samples, &mut memory);
         posterior.effective.extend(std::iter::repeat_n(moments.effective, moments.mean.len()));
         posterior.mean.extend(moments.mean);

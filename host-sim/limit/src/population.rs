@@ -61,7 +61,7 @@ pub struct Moments {
 /// The result has the latest samples at the power 1: few or none if the population did not get there.
 pub fn sample<T: Target>(
     target: &T,
-    prior: Samples,
+    prior: &Samples,
     effort: &Effort,
     random: &mut Random,
     memory: &mut T::Memory,
@@ -70,7 +70,7 @@ pub fn sample<T: Target>(
     let mut kept = Samples::new(target.latents());
     for _ in 0..effort.rounds {
         // Samples of the prior are too far apart to be of use later.
-        let from = if population.len() == 0 { &prior } else { &population };
+        let from = if population.len() == 0 { prior } else { &population };
         let power = largest_power(&from.log_prior, &from.log_likelihood, effort.fitted);
         let log = tempered(&from.log_prior, &from.log_likelihood, power);
         let mixture = Mixture::fit(from, &normalised(&log), random);
@@ -87,7 +87,7 @@ pub fn sample<T: Target>(
         population = kept.clone();
     }
     // The posterior is too thin, or bent, for a mixture of one shape.
-    let tops = tops(target, &starts(&prior, effort, random), memory);
+    let tops = tops(target, &starts(prior, effort, random), memory);
     let maps = Maps::new(target, tops, memory);
     let mut kept = Samples::new(target.latents());
     for _ in 0..effort.solved {

@@ -85,13 +85,13 @@ fn low_noise_comes_to_the_cramer_rao_bound() {
             let noisy: Vec<f64> = noisy.collect();
             let posterior = &limit.posteriors(&noisy, &Silent)[0];
             assert!(posterior.effective.iter().all(|size| *size >= 100.0), "{posterior:?}");
-            for output in 0..3 {
-                ratios[output] += posterior.variance[output] / variances[output] / 100.0;
+            let bounded = posterior.variance.iter().zip(&variances);
+            for (ratio, (variance, bound)) in ratios.iter_mut().zip(bounded) {
+                *ratio += variance / bound / 100.0;
             }
         }
-        for output in 0..3 {
-            let ratio = ratios[output].sqrt();
-            println!("noise {level}, output {output}: {ratio:.4} × the bound");
+        for (output, ratio) in ratios.iter().enumerate() {
+            let ratio = ratio.sqrt();
             assert!((ratio - 1.0).abs() < 0.05, "noise {level}, output {output}: {ratio}");
         }
     }

@@ -136,7 +136,7 @@ fn posterior<T: Target<Memory = ()>>(target: &T, effort: &Effort, index: u64) ->
             prior.places.extend(latents.iter().map(|latent| latent[lane]));
         }
     }
-    let samples = sample(target, prior, effort, &mut random, &mut ());
+    let samples = sample(target, &prior, effort, &mut random, &mut ());
     moments(target, &samples, &mut ())
 }
 
