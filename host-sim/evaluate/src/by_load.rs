@@ -48,7 +48,7 @@ impl LoadErrors {
         match self.to {
             _ if self.told => "place told".into(),
             Some(to) => format!("{} to {to} {unit}", self.from),
-            None => format!("from {} {unit}", self.from),
+            None => format!("all from {} {unit}", self.from),
         }
         .trim_end()
         .into()
@@ -132,16 +132,16 @@ mod tests {
         let of = |range: &LoadErrors| (range.range(), range.frames, range.errors[0].rmse);
         assert_eq!(of(&found[0]), ("0 to 0.05 mm".into(), 1, 4.0));
         assert_eq!(of(&found[1]), ("0.1 to 0.2 mm".into(), 1, 1.0));
-        assert_eq!(of(&found[2]), ("from 0.5 mm".into(), 1, 0.0));
-        assert_eq!(of(&found[3]), ("from 0.1 mm".into(), 2, 0.5_f64.sqrt()));
+        assert_eq!(of(&found[2]), ("all from 0.5 mm".into(), 1, 0.0));
+        assert_eq!(of(&found[3]), ("all from 0.1 mm".into(), 2, 0.5_f64.sqrt()));
         assert_eq!(found.len(), 4, "no frame is between 0.05 and 0.1 mm");
         // Of a place and a force, from all frames to the firmest; a model of forces alone has no such table.
         let names = ["x_mm", "force_n"].map(String::from).to_vec();
         let truth = Table { names, values: vec![10.0, 0.05, 10.0, -0.2, 10.0, 0.9].into() };
         let found = by_load(&truth, &estimate, Some(&truth.values), &measure);
         let of = |range: &LoadErrors| (range.range(), range.frames, range.errors[0].rmse);
-        assert_eq!(of(&found[1]), ("from 0.1 N".into(), 2, 0.5_f64.sqrt()));
-        assert_eq!(of(&found[2]), ("from 0.3 N".into(), 1, 0.0));
+        assert_eq!(of(&found[1]), ("all from 0.1 N".into(), 2, 0.5_f64.sqrt()));
+        assert_eq!(of(&found[2]), ("all from 0.3 N".into(), 1, 0.0));
         assert_eq!((found[0].frames, found[0].centroid[0].rmse, found.len()), (3, 0.0, 3));
         // The faintest touch has no place: it counts as the mean, and then the others have a range of their own.
         let faint = [f64::NAN, 0.05, 9.0, -0.2, 10.0, 0.9];

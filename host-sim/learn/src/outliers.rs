@@ -12,7 +12,7 @@
 //!   and wider than the outliers' own range, unless it is thirty times that range. Tails of real data are not that sparse: in five recordings of 1860 to
 //!   4805 lines the widest such gap is 0.16 ranges, and in 3000 simulated frames of presses it is 0.44.
 //! - The line is no rare press. A log may be at rest for 99 % of its lines, where every press stands far out. What tells
-//!   a press is that readings and outputs leave their rest together: in such a line, a column of the other kind is far
+//!   a press is that readings and outputs change together: in such a line, a column of the other kind is far
 //!   from its own bulk too, as it is in some other lines. A value that is far out even among presses is an outlier.
 //! - The line is no rarer press that another one confirms: in two lines or more, readings and outputs are far from all
 //!   others together, and about as much further in the one as in the other. One such line has nothing that confirms it.

@@ -20,6 +20,8 @@ const NARROW: [f64; 2] = [480.0, 420.0];
 /// What tells errors apart.
 pub const EQUAL_ERRORS: &str = "Errors count as equal if they differ by at most two standard errors of their difference on the \
                                 same test frames, or by half a per cent.";
+/// Kinds of remarks on points that are written out.
+const NOTES: usize = 3;
 /// Settings on the front whose scenes are shown.
 const SHOWN: usize = 12;
 
@@ -297,9 +299,13 @@ pub fn counts(sections: &mut Sections, merged: &Merged) {
     let all = all.collect::<Vec<_>>().join(", ");
     sections.note(format!("{all}; {}.", merged.build));
     merged.none_within().into_iter().for_each(|sentence| sections.note(sentence));
-    for (note, count) in merged.notes() {
+    let notes = merged.notes();
+    for (note, count) in notes.iter().take(NOTES) {
+        sections.note(format!("{} with {note}.", counted(*count, "point")));
+    }
+    if let Some(more) = notes.len().checked_sub(NOTES).filter(|more| *more > 0) {
         sections
-            .note(format!("{} with {note}; the JSON says why of each", counted(count, "point")));
+            .note(format!("{more} more remarks on points stand in the CSV file and in the JSON."));
     }
 }
 
@@ -330,10 +336,22 @@ pub fn effects(sections: &mut Sections, merged: &Merged) -> Vec<Section> {
         .values("share", |it| number_value(Some(it.share)));
     sections.rows("effects", table);
     let drawings = [WIDE, NARROW].map(|size| bars(merged, size[0]));
-    let caption = "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of \
-                   its logarithm where all values are positive. What is left belongs to axes together, and to chance.";
+    let mut caption =
+        "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of its \
+         logarithm where all values are positive. What is left belongs to axes together, and to chance."
+            .to_owned();
+    let all = merged.points.len();
+    for name in &merged.objectives {
+        let known = merged.points.iter().filter(|it| it.results.contains_key(name)).count();
+        if known < all {
+            let heading = Quantity::of(name).heading;
+            caption += &format!(
+                " Only {known} of {all} points have a {heading}: what the axes would do at the others is not known."
+            );
+        }
+    }
     let data = shares(merged);
-    let bars = Section::Figure(Figure::of_drawings("effects", caption.into(), drawings, data));
+    let bars = Section::Figure(Figure::of_drawings("effects", caption, drawings, data));
     let levels = Section::Folded("Means by level".into(), vec![levels(sections, merged)]);
     vec![bars, shares_table(merged), levels]
 }

@@ -2,8 +2,9 @@
 
 /** Colours from one end of a scale to the other; both maps keep their order for colour-blind eyes. */
 const MAPS = {
-  light: ["#1d4f91", "#5d94c8", "#b5d3e7", "#f4f4f2", "#f6c39a", "#dc7a3c", "#94390c"],
-  dark: ["#9cc7f5", "#4f8fd0", "#27507c", "#1e252d", "#7a4420", "#d47c3d", "#ffd0a3"],
+  // Orange below zero and blue above it, as on the pages of reports.
+  light: ["#94390c", "#dc7a3c", "#f6c39a", "#f4f4f2", "#b5d3e7", "#5d94c8", "#1d4f91"],
+  dark: ["#ffd0a3", "#d47c3d", "#7a4420", "#1e252d", "#27507c", "#4f8fd0", "#9cc7f5"],
   // Cividis.
   sequential: ["#00224e", "#2a3f6d", "#575d6d", "#7d7c78", "#a59c74", "#d2c060", "#fee838"],
 };

@@ -51,10 +51,9 @@ function drawMatrix(canvas, layout, frame, wires) {
     if (change !== null) matrix.most = Math.max(matrix.most, roundUp(Math.abs(change)));
   });
   const span = matrix.high - matrix.low || 1;
-  // As in the sheet: the first row is the lowest.
-  const isUp = isMatrix && shape;
-  const topOf = (row) => top + (isUp ? rows - 1 - row : row) * tall;
-  matrix.boxes = { left, top, cell, tall, rows, columns, isMatrix, isUp };
+  // As in the sheet and on the pages of reports: the first row is the lowest.
+  const topOf = (row) => top + (isMatrix ? rows - 1 - row : row) * tall;
+  matrix.boxes = { left, top, cell, tall, rows, columns, isMatrix };
   for (let index = 0; index < layout.readings.length; index++) {
     const [x, y] = [left + (index % columns) * cell, topOf(Math.floor(index / columns))];
     const value = !frame ? null : isRelative ? relative(frame, index) : frame.readings[index] ?? null;
@@ -105,7 +104,7 @@ function matrixWords(layout, frame, wires, x, y) {
   const boxes = matrix.boxes;
   if (!boxes || !frame) return null;
   const column = Math.floor((x - boxes.left) / boxes.cell), down = Math.floor((y - boxes.top) / boxes.tall);
-  const row = boxes.isUp ? boxes.rows - 1 - down : down;
+  const row = boxes.isMatrix ? boxes.rows - 1 - down : down;
   const index = row * boxes.columns + column;
   if (column < 0 || row < 0 || column >= boxes.columns || row >= boxes.rows || index >= layout.readings.length) return null;
   const { name, unit } = layout.readings[index], value = frame.readings[index] ?? null;

@@ -119,7 +119,7 @@ function takeFrame(next) {
 const flags = new Map();
 const FLAG_WORDS = {
   novel: () => `Unlike anything the model was trained on${Number.isFinite(flags.get("nats")) ? ` (by ${plain(flags.get("nats"))} nats)` : ""}: do not trust the picture`,
-  clamped: () => "Out of range: readings were moved to the end of what the model knows",
+  clamped: () => "Out of range: readings outside the training range were clamped to its ends",
   missing: () => `${frame.readings.filter((value) => value === null).length} of ${frame.readings.length} readings are missing`,
 };
 

@@ -241,11 +241,11 @@ impl Merged {
         self.effects.iter().find(|effect| effect.field == field && effect.result == result)
     }
 
-    /// Remarks on points, without their reasons, such as `no limit`, and the number of points that have each.
+    /// Remarks on points, with their reasons, such as `no limit: …`, and the number of points that have each.
     pub fn notes(&self) -> BTreeMap<&str, usize> {
         let mut notes = BTreeMap::new();
         for note in self.points.iter().flat_map(|point| &point.notes) {
-            *notes.entry(note.split(':').next().unwrap_or(note)).or_default() += 1;
+            *notes.entry(note.as_str()).or_default() += 1;
         }
         notes
     }

@@ -67,7 +67,8 @@ pub fn check(dataset: &Dataset, features: Option<usize>) -> Result<()> {
         let possible = (1..=features_at_most(dataset, features)).contains(&features);
         require(possible, "features", features, || {
             format!(
-                "give from 1 to {}, fewer than the {readings} readings and no more than the {} outputs and their products",
+                "give from 1 to {}, fewer than the {readings} readings and no more than the {} outputs and their products of two or \
+                 three",
                 features_at_most(dataset, readings),
                 dataset.outputs.names.len()
             )

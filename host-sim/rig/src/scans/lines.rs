@@ -65,10 +65,14 @@ impl Source for NumberLines {
             let count = look::read(&mut *self.wire, &mut bytes)?;
             for byte in &bytes[..count] {
                 if *byte == b'\n' {
-                    if self.is_whole
-                        && let Some(scan) = self.scan()
-                    {
-                        take(scan);
+                    let is_known = self.count > 0;
+                    match self.is_whole.then(|| self.scan()).flatten() {
+                        Some(scan) => take(scan),
+                        // A line that is cut or garbled is a scan that is lost.
+                        None if self.is_whole && is_known && !self.line.trim_ascii().is_empty() => {
+                            self.scans = self.scans.wrapping_add(1);
+                        }
+                        None => {}
                     }
                     (self.is_whole, self.line) = (true, vec![]);
                 } else if self.line.len() < LONGEST {

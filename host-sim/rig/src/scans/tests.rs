@@ -35,8 +35,13 @@ fn lines_of_numbers_are_scans_and_all_other_lines_are_skipped() {
     let scans = heard(&mut source, 3);
     assert_eq!(scans[..2], [[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]]);
     assert!(scans[2][0] == 10.0 && scans[2][1].is_nan() && scans[2][2].is_nan());
-    far.write_all(b"13\n").unwrap();
-    assert_eq!(heard(&mut source, 1), [[11.0, 12.0, 13.0]]);
+    far.write_all(b"13\n14,15\n16,17,18\n").unwrap();
+    let mut numbers = vec![];
+    while numbers.len() < 2 {
+        source.hear(Instant::now(), &mut |scan| numbers.push(scan.number)).unwrap();
+    }
+    // The cut line between both counts as lost.
+    assert_eq!(numbers[1], numbers[0] + 2);
     drop(far);
     let ended = source.hear(Instant::now() + Duration::from_secs(9), &mut |_| {});
     assert!(matches!(ended, Err(Error::Closed)), "{ended:?}");
