@@ -17,7 +17,7 @@ from taxel._columns import matrix, names_of, numbered, pattern, place, untouched
 
 try:
     from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
-    from sklearn.utils.validation import check_is_fitted, validate_data
+    from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
     HAS_SKLEARN = True
 except ImportError:  # scikit-learn is optional
@@ -126,7 +126,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         """Trains on readings `X` (lines × features, Ω or whatever they are) and outputs `y` (lines × outputs, or lines).
 
         `groups` has a number for each line: one group after the other is held out to refine and to tell deviations, instead
-        of five folds. Columns of a pandas DataFrame keep their names. A value far from all others in its column leaves its
+        of five folds. An output may be NaN on some lines, as a place is where nothing touches. Columns of a pandas DataFrame keep their names. A value far from all others in its column leaves its
         line out (`report_["outliers"]`).
         """
         if y is None:
@@ -215,11 +215,13 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         *,
         baseline: ArrayLike | None = None,
     ) -> float:
-        """Coefficient of determination R², as a mean over the outputs. An estimate that is NaN counts as the mean, as a place
-        does where nothing touches."""
+        """Coefficient of determination R², as a mean over the outputs. An output that is NaN does not count, and an estimate that
+        is NaN counts as the mean, as a place does where nothing touches."""
         y, estimate = two_dimensional(y, "y"), two_dimensional(self.predict(X, baseline=baseline), "y")
-        estimate = np.where(np.isnan(estimate), np.mean(y, axis=0), estimate)
-        weights = None if sample_weight is None else np.asarray(sample_weight)
+        estimate = np.where(np.isnan(estimate), np.nanmean(y, axis=0), estimate)
+        weights = np.ones(len(y)) if sample_weight is None else np.asarray(sample_weight)
+        weights = weights[:, None] * ~np.isnan(y)
+        y = np.nan_to_num(y)
         left = np.average((y - estimate) ** 2, axis=0, weights=weights)
         mean = np.average(y, axis=0, weights=weights)
         return float(np.mean(1 - left / np.average((y - mean) ** 2, axis=0, weights=weights)))
@@ -283,7 +285,10 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             try:
                 if y is None:
                     return validate_data(self, X, reset=False, **checks)
-                return validate_data(self, X, y, multi_output=True, y_numeric=True, **checks)
+                outputs = {"dtype": np.float64, "ensure_2d": False, "ensure_all_finite": "allow-nan"}
+                X, y = validate_data(self, X, y, validate_separately=(checks, outputs))
+                check_consistent_length(X, y)
+                return X, y
             except ValueError as error:
                 if "Input X contains NaN" not in str(error):
                     raise

@@ -107,6 +107,9 @@ def test_a_place_is_none_without_a_touch_and_counts_as_the_mean():
     is_told = ~np.isnan(model.predict(x.T))
     assert is_told[force > 0].all() and is_told[:, 2].all() and is_told[force == 0, :2].mean() < 0.01
     assert model.score(x.T, y) > 0.99
+    y.loc[force == 0, ["x_mm", "y_mm"]] = np.nan
+    model = taxel.Model(16, refine=False, grid=(5, 5), features_kind="normalised").fit(x.T, y)
+    assert model.score(x.T, y) > 0.99
 
 
 def test_missing_readings_are_filled_by_a_model_that_can():

@@ -6,9 +6,12 @@ use crate::error::{Error, Problem, Result};
 use crate::table::Table;
 
 /// Names of columns that hold the time, without a unit and in lower case.
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 14] = [
     "time",
     "t",
+    "ts",
+    "elapsed",
+    "uptime",
     "timestamp",
     "time_stamp",
     "stamp",
@@ -21,7 +24,11 @@ const NAMES: [&str; 11] = [
 ];
 
 /// Names that say their unit, as those of Arduino's clocks do, with its length in seconds.
-const COUNTERS: [(&str, f64); 2] = [("millis", 1e-3), ("micros", 1e-6)];
+const COUNTERS: [(&[&str], f64); 3] = [
+    (&["seconds", "sec"], 1.0),
+    (&["millis", "milliseconds", "ms"], 1e-3),
+    (&["micros", "microseconds", "us", "µs"], 1e-6),
+];
 
 /// Units of time, with their length in seconds.
 const UNITS: [(&str, f64); 5] =
@@ -92,8 +99,8 @@ impl Clock {
         let first = at.first().copied().unwrap_or(0.0);
         let unit = columns::unit_of(name);
         let (bare, known) = (bare(name), UNITS.iter().find(|(known, _)| *known == unit));
-        let stated = known.or_else(|| COUNTERS.iter().find(|(counter, _)| *counter == bare));
-        let stated = stated.map(|(_, seconds)| *seconds);
+        let counter = || COUNTERS.iter().find(|(names, _)| names.contains(&&*bare));
+        let stated = known.map(|it| it.1).or_else(|| Some(counter()?.1));
         let since_1970 =
             || SINCE_1970.iter().find(|(least, _)| (*least..5.0 * least).contains(&first));
         let seconds = stated.or_else(|| since_1970().map(|(_, seconds)| *seconds));
@@ -118,7 +125,8 @@ impl Clock {
 fn time_columns(file: &DataFile) -> impl Iterator<Item = usize> {
     let is_time = |name: &str| {
         let (bare, unit) = (bare(name), columns::unit_of(name));
-        (NAMES.contains(&bare.as_str()) || COUNTERS.iter().any(|(counter, _)| *counter == bare))
+        (NAMES.contains(&bare.as_str())
+            || COUNTERS.iter().any(|(names, _)| names.contains(&&*bare)))
             && (unit.is_empty() || UNITS.iter().any(|(known, _)| *known == unit))
     };
     (0..file.header.len()).filter(move |column| is_time(&file.header[*column]))
@@ -194,6 +202,11 @@ mod tests {
             "t (s),a\n7,1\n8,2\n9,3\n",
             "millis,a\n500,1\n1500,2\n2500,3\n",
             "Micros,a\n1,1\n1000001,2\n2000001,3\n",
+            "time_ms,a\n500,1\n1500,2\n2500,3\n",
+            "a,ms\n1,500\n2,1500\n3,2500\n",
+            "us,a\n1,1\n1000001,2\n2000001,3\n",
+            "Elapsed [ms],a\n500,1\n1500,2\n2500,3\n",
+            "seconds,a\n7,1\n8,2\n9,3\n",
         ] {
             let clock = clock(text, None).unwrap();
             assert_eq!((clock.unit, &clock.at[..]), ("s", &[0.0, 1.0, 2.0][..]), "{text}");

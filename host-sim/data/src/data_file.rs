@@ -4,6 +4,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use crate::columns;
 use crate::digest;
 use crate::error::{Error, Problem, Result};
@@ -28,6 +30,8 @@ pub struct DataFile {
     pub names_columns: bool,
     /// Whether it is a CSV file without an end of its last line, which may be cut off in a number.
     pub lacks_last_line_end: bool,
+    /// Lines that are cut or garbled, and are skipped.
+    pub unreadable: Option<Unreadable>,
     /// What is not plain CSV in it, in words, such as "semicolons, decimal commas"; "" for a plain file.
     pub found: String,
     /// Lines of data (from 0) that are kept.
@@ -49,6 +53,22 @@ pub(crate) struct NotNumbers {
     /// Number of the first line with one, and that field.
     line: u64,
     field: String,
+}
+
+impl NotNumbers {
+    /// The problem that it is in a file with this `header`.
+    fn problem(&self, header: &[String]) -> Problem {
+        let (column, field) = (header[self.column].clone(), self.field.clone());
+        Problem::NotANumber { line: self.line, column, field }
+    }
+}
+
+/// Lines of a file that are cut or garbled: they have fewer or more fields than the others, or text in a column of numbers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unreadable {
+    pub lines: usize,
+    /// Where the first one is, and what is wrong with it.
+    pub first: String,
 }
 
 /// Fields as they are written, line after line, without spaces around.
@@ -94,6 +114,8 @@ pub struct Reading {
     /// Whether [`DataFile::texts`] gives the fields of a CSV file as they are written. This takes the memory of the file,
     /// and 8 bytes a field.
     pub keeps_text: bool,
+    /// Whether a line that is cut or garbled is an error. Otherwise it is skipped, if no more than 5 % of lines are.
+    pub is_strict: bool,
     /// What is stated of a text file, in place of what is found.
     pub stated: Stated,
 }
@@ -106,8 +128,8 @@ impl DataFile {
     ///
     /// # Errors
     /// [`Error::Read`] if the file cannot be read. [`Error::File`] for a file beyond
-    /// [`MOST_DATA_BYTES`], packed or not, an empty file, a repeated column name, or a line with too few or too
-    /// many fields; for text that can be read in two ways, and for files that hold no text.
+    /// [`MOST_DATA_BYTES`], packed or not, an empty file, a repeated column name, or if more than 5 % of lines are
+    /// [unreadable](Unreadable); for text that can be read in two ways, and for files that hold no text.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_as(path, &Reading::default())
     }
@@ -170,6 +192,17 @@ impl DataFile {
             marked += 1;
         }
         marked
+    }
+
+    /// Turns the values in these `lines` (from 0) and `columns` into missing ones.
+    ///
+    /// # Panics
+    /// If the file has no such line.
+    pub fn forget(&mut self, lines: &[usize], columns: &[usize]) {
+        for line in lines {
+            let first = (self.kept.start + line) * self.header.len();
+            columns.iter().for_each(|column| self.values[first + column] = f64::NAN);
+        }
     }
 
     /// Keeps the lines of data in `range` (from 0) alone.
@@ -264,9 +297,7 @@ impl DataFile {
         let Some(found) = self.not_numbers.iter().find(|it| columns.contains(&it.column)) else {
             return Ok(());
         };
-        let NotNumbers { line, field, .. } = found.clone();
-        let column = self.header[found.column].clone();
-        Err(Error::file(&self.path, Problem::NotANumber { line, column, field }))
+        Err(Error::file(&self.path, found.problem(&self.header)))
     }
 
     /// Indices (from 0) of the columns called `names`.

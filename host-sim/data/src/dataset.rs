@@ -6,7 +6,7 @@ use std::hash::{DefaultHasher, Hasher};
 use serde::Serialize;
 
 use crate::columns;
-use crate::data_file::DataFile;
+use crate::data_file::{DataFile, Unreadable};
 use crate::error::{Error, Problem, Result, Role};
 use crate::table::Table;
 
@@ -146,6 +146,7 @@ impl Dataset {
             without_reading: without_reading.len(),
             without_output: without_output.len(),
             missing_most: missing_most(&file, &inputs, &outputs),
+            unreadable: file.unreadable.clone(),
         };
         let numbers = lines.iter().map(|line| file.line_number(*line)).collect();
         let kept = Kept { numbers, of: file.lines(), left_out, lines };
@@ -233,7 +234,7 @@ pub struct Kept {
     pub left_out: LeftOut,
 }
 
-/// Lines of a file that lack a value, by reason.
+/// Lines of a file that cannot be used, by reason.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct LeftOut {
     /// Number of lines that lack a reading.
@@ -242,10 +243,12 @@ pub struct LeftOut {
     pub without_output: usize,
     /// The three columns that lack the most values, with how many they lack.
     pub missing_most: Vec<(String, usize)>,
+    /// Lines of the file that are cut or garbled.
+    pub unreadable: Option<Unreadable>,
 }
 
 impl LeftOut {
-    /// Number of all lines that are left out.
+    /// Number of all lines that are left out for a missing value.
     pub fn lines(&self) -> usize {
         self.without_reading + self.without_output
     }
@@ -258,6 +261,8 @@ pub struct UnusedInputs {
     pub dead: Vec<String>,
     /// Columns that never change.
     pub constant: Vec<String>,
+    /// Columns that change between two values, whatever the outputs and the other inputs are.
+    pub flickering: Vec<String>,
     /// Columns whose every value is that of another one, with the name of that one.
     pub duplicated: Vec<(String, String)>,
 }
@@ -270,12 +275,22 @@ impl UnusedInputs {
     /// As [`Dataset::from_file`].
     pub fn find(file: &DataFile, inputs: Option<&str>, outputs: Option<&str>) -> Result<Self> {
         let columns = chosen(file, inputs, Role::Inputs)?;
-        let (columns, _, rows) =
+        let (columns, outputs, rows) =
             by_rows(&file.header, columns, chosen(file, outputs, Role::Outputs)?);
         if rows > 1 {
             return Ok(Self::default());
         }
-        Ok(Self::among(file, columns))
+        let mut unused = Self::among(file, columns.iter().copied());
+        let named = unused.names();
+        let mut used = columns;
+        used.retain(|it| !named.contains(&file.header[*it]));
+        let others = [&used[..], &outputs].concat();
+        let flickering = used.iter().filter(|column| flickers(file, **column, &others));
+        let flickering: Vec<String> = flickering.map(|it| file.header[*it].clone()).collect();
+        if flickering.len() < used.len() {
+            unused.flickering = flickering;
+        }
+        Ok(unused)
     }
 
     /// Columns of `file`, among these, that can tell nothing. There are none if no other would be left.
@@ -311,8 +326,39 @@ impl UnusedInputs {
     /// Names of all of them.
     pub fn names(&self) -> Vec<String> {
         let duplicated = self.duplicated.iter().map(|(name, _)| name);
-        self.dead.iter().chain(&self.constant).chain(duplicated).cloned().collect()
+        let others = self.constant.iter().chain(&self.flickering);
+        self.dead.iter().chain(others).chain(duplicated).cloned().collect()
     }
+}
+
+/// Whether a column of `file` has two values, and none of the `others` is correlated with it by more than five standard
+/// errors.
+fn flickers(file: &DataFile, column: usize, others: &[usize]) -> bool {
+    const FEWEST_LINES: usize = 100;
+    const STANDARD_ERRORS: f64 = 5.0;
+    let values = |column| (0..file.lines()).map(move |line| file.value(line, column));
+    let mut found: Vec<f64> = vec![];
+    for value in values(column).filter(|value| !value.is_nan()) {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+        if found.len() > 2 {
+            return false;
+        }
+    }
+    let is_related = |other: &usize| {
+        let pairs = values(column).zip(values(*other));
+        let pairs: Vec<_> = pairs.filter(|(a, b)| !(a * b).is_nan()).collect();
+        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| {
+            pairs.iter().map(of).sum::<f64>() / pairs.len() as f64
+        };
+        let (a, b) = (mean(&|it| it.0), mean(&|it| it.1));
+        let covariance = mean(&|it| (it.0 - a) * (it.1 - b));
+        let variances = mean(&|it| (it.0 - a).powi(2)) * mean(&|it| (it.1 - b).powi(2));
+        let bound = STANDARD_ERRORS * STANDARD_ERRORS / pairs.len() as f64;
+        *other != column && covariance * covariance > bound * variances
+    };
+    file.lines() >= FEWEST_LINES && found.len() == 2 && !others.iter().any(is_related)
 }
 
 /// Indices of the columns of `file` that match `pattern`, or that have the project's own names.

@@ -206,6 +206,11 @@ pub enum Problem {
         /// Fields in the first line.
         columns: usize,
     },
+    /// More lines that are cut or garbled than are skipped.
+    #[error(
+        "{lines} of {of} lines are cut or garbled, and no more than 5 % are skipped; the first: {first}"
+    )]
+    Unreadable { lines: usize, of: usize, first: Box<Problem> },
     /// Field that is not a number.
     #[error(
         "line {line}, column {}: {} is not a number; {}",

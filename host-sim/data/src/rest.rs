@@ -39,21 +39,32 @@ pub fn is_zero_at_rest(name: &str) -> bool {
 /// value within 1 % of their largest values about their zero, which may be off by 5 %, and so have the lines before and
 /// after. Without such neighbours in at least ten lines, lines count by themselves; fewer than ten are none.
 pub fn lines_at_rest(file: &DataFile, columns: &[usize]) -> Vec<usize> {
-    let zeros: Vec<[f64; 2]> = columns.iter().map(|column| zero_of(file, *column)).collect();
-    if zeros.iter().all(|[_, bound]| *bound == 0.0) {
-        return vec![];
-    }
-    let is_zero = |line: usize| {
-        let mut values = columns.iter().zip(&zeros);
-        values.all(|(column, [zero, bound])| (file.value(line, *column) - zero).abs() <= *bound)
-    };
-    let zero: Vec<bool> = (0..file.lines()).map(is_zero).collect();
+    let zero = are_zero(file, columns);
     let at_rest = |reach: usize| -> Vec<usize> {
         let around = |line: usize| line.saturating_sub(reach)..(line + reach + 1).min(zero.len());
         (0..zero.len()).filter(|line| zero[around(*line)].iter().all(|zero| *zero)).collect()
     };
     let found = [1, 0].into_iter().map(at_rest).find(|lines| lines.len() >= FEWEST);
     found.unwrap_or_default()
+}
+
+/// Lines of `file` (from 0) on which all of the `columns` are zero, whatever the lines before and after are. There are none
+/// in a file without pauses: with fewer than ten such lines between two others.
+pub fn lines_without_load(file: &DataFile, columns: &[usize]) -> Vec<usize> {
+    let zero = are_zero(file, columns);
+    let between = zero.windows(3).filter(|it| !it.contains(&false)).count();
+    (0..zero.len()).filter(|line| between >= FEWEST && zero[*line]).collect()
+}
+
+/// Whether all of the `columns` are zero, for each line of `file`.
+fn are_zero(file: &DataFile, columns: &[usize]) -> Vec<bool> {
+    let zeros: Vec<[f64; 2]> = columns.iter().map(|column| zero_of(file, *column)).collect();
+    let are_known = zeros.iter().any(|[_, bound]| *bound != 0.0);
+    let is_zero = |line: usize| {
+        let mut values = columns.iter().zip(&zeros);
+        values.all(|(column, [zero, bound])| (file.value(line, *column) - zero).abs() <= *bound)
+    };
+    (0..file.lines()).map(|line| are_known && is_zero(line)).collect()
 }
 
 /// Zero of a column, and how far from it a value may be that counts as zero: the middle of the most values that lie so close
@@ -168,6 +179,8 @@ mod tests {
         // 20 is still near zero, and the line before a press is left out.
         let of_press = at_rest.iter().filter(|line| (40..80).contains(*line)).copied();
         assert_eq!(of_press.collect::<Vec<_>>(), (41..60).collect::<Vec<_>>());
+        let without_load = lines_without_load(&log, &[1]);
+        assert_eq!((without_load.len(), without_load[21]), (5 * 21, 40));
         // A scale that was not tared.
         let off: Vec<[f64; 2]> = (0..200).map(|line| [1.0, force(line) + 0.2]).collect();
         assert_eq!(lines_at_rest(&file(&off), &[1]), at_rest);
@@ -175,6 +188,7 @@ mod tests {
         let force = |line: usize| if line.is_multiple_of(3) { 0.0 } else { 5.0 };
         let shuffled = file(&(0..90).map(|line| [1.0, force(line)]).collect::<Vec<_>>());
         assert_eq!(lines_at_rest(&shuffled, &[1]).len(), 30);
+        assert_eq!(lines_without_load(&shuffled, &[1]), [0; 0]);
         for none in [vec![[1.0, 0.0]; 50], vec![[1.0, f64::NAN]; 50], vec![[1.0, 5.0]; 50]] {
             assert_eq!(lines_at_rest(&file(&none), &[1]), [0; 0]);
         }

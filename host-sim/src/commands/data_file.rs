@@ -10,7 +10,7 @@ use crate::{Error, Result};
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use taxel_data::DataFile;
-use taxel_data::data_file::{Reading, Separator, Stated};
+use taxel_data::data_file::{Reading, Separator, Stated, Unreadable};
 
 /// Heading of options for data files.
 pub const DATA_FILES: &str = "Data files (CSV, .mcap)";
@@ -65,6 +65,10 @@ pub struct FieldArguments {
     /// Decimal sign of a text file, which is otherwise found.
     #[arg(long, value_enum, value_name = "SIGN")]
     decimal: Option<Decimal>,
+    /// Refuse a text file with a line that is cut or garbled. Otherwise such lines are skipped, if no more than 5 % are.
+    #[arg(long)]
+    #[serde(default, skip_serializing_if = "Not::not")]
+    strict: bool,
 }
 
 /// Decimal sign.
@@ -146,7 +150,7 @@ impl FieldArguments {
             separator: self.separator,
             decimal_comma: self.decimal.map(|sign| sign == Decimal::Comma),
         };
-        Reading { has_header: self.header, stated, ..Reading::default() }
+        Reading { has_header: self.header, is_strict: self.strict, stated, ..Reading::default() }
     }
 
     /// Reads the file at `path`, and says on stderr what it made of it.
@@ -156,7 +160,7 @@ impl FieldArguments {
 
     fn read_as(&self, path: &Path, keeps_text: bool, common: &Common) -> Result<DataFile> {
         if is_recording(path) {
-            let of_text = |field: &str| ["separator", "decimal"].contains(&field);
+            let of_text = |field: &str| ["separator", "decimal", "strict"].contains(&field);
             refuse(self, of_text, |option| {
                 format!("{option} is for text files; {} is none: leave it out", path.display())
             })?;
@@ -170,6 +174,13 @@ impl FieldArguments {
         };
         note_found(&file, common);
         let name = path.display();
+        if let Some(Unreadable { lines, first }) = &file.unreadable {
+            common.remark(format_args!(
+                "note: {lines} of {} lines of {name} are cut or garbled and are skipped (--strict refuses them); the first: \
+                 {first}",
+                file.lines() + lines
+            ));
+        }
         if !file.names_columns {
             common.remark(format_args!(
                 "note: {name} names no columns: they are called c1 to c{} (c2..c5 stands for four of them)",

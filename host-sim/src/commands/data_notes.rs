@@ -103,6 +103,11 @@ fn notes_on_unused(unused: &UnusedInputs, name: &str) -> Vec<String> {
             "have no value in more than half of the lines",
         ),
         note(&unused.constant, "never changes", "never change"),
+        note(
+            &unused.flickering,
+            "flickers between two values, whatever the outputs are,",
+            "flicker between two values, whatever the outputs are",
+        ),
         note(&pairs, "in every line", "are the same as another in every line"),
     ];
     notes.into_iter().flatten().collect()

@@ -62,8 +62,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         print::check_output(html, &[&*arguments.model, &arguments.data, untouched])?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
-    let file = arguments.file.read(&arguments.data, common)?;
-    let mut sections = judged(arguments, &blob, &file, common)?;
+    let mut file = arguments.file.read(&arguments.data, common)?;
+    let mut sections = judged(arguments, &blob, &mut file, common)?;
     if let Some(html) = &arguments.html {
         sections.is_alone = true;
         let page = sections.page(&command_line::of_this_process("eval", &[], None));
@@ -76,15 +76,16 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
 fn judged(
     arguments: &Arguments,
     blob: &ModelBlob,
-    file: &DataFile,
+    file: &mut DataFile,
     common: &Common,
 ) -> Result<Sections> {
     let model = blob.prepare();
     let (fields, limits) = (arguments.file.fields(), arguments.health.limits());
     let parsed = blob.parse();
     let metadata = parsed.metadata();
+    let is_known = knows(metadata, file)?;
     let mut readings = model_inputs(&model, file)?;
-    let mut truth = table_of(file, metadata.output_names.iter())?;
+    let truth = table_of(file, metadata.output_names.iter())?;
     let clock = Clock::of(file, arguments.clock.time.as_deref())?;
     let log = Log { clock, lines: (0..file.lines()).collect() };
     let rest = if over_time::is_log(&log, &truth) {
@@ -92,6 +93,8 @@ fn judged(
     } else {
         arguments.untouched.rest_if_relative(file, metadata, limits, common)?
     };
+    arguments.untouched.rest.forget_places(file, metadata.output_names.iter(), common)?;
+    let mut truth = table_of(file, metadata.output_names.iter())?;
     let of_lines = (rest.as_ref(), file.lines());
     let baselines = arguments.untouched.baselines(
         metadata,
@@ -137,7 +140,7 @@ fn judged(
     let decoders = decoders_of(&truth, errors, of_centroid.as_deref(), &measure);
     let verdict = verdict_of(&decoders)
         .of_frames(None, frames_evaluated)
-        .with(Warning::trained_on(knows(metadata, file)?))
+        .with(Warning::trained_on(is_known))
         .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
         .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift));
     let coverage = assessed.map_or(vec![], |(deviations, _)| {

@@ -32,6 +32,60 @@ impl RestArgument {
         self.rest.is_some()
     }
 
+    /// Columns of `file` that are zero while nothing touches: those that a user named, or those of the `outputs` that tell it;
+    /// `None` if no line is to be taken for one at rest.
+    fn columns<'n>(
+        &self,
+        file: &DataFile,
+        outputs: impl Iterator<Item = &'n str>,
+    ) -> Result<Option<Vec<usize>>> {
+        match self.rest.as_deref() {
+            Some("none") => Ok(None),
+            Some(pattern) => {
+                let columns = columns::select(&file.header, pattern);
+                if let Some(part) = columns::unmatched(&file.header, pattern) {
+                    let known = columns::known_names(&file.header, part);
+                    let message =
+                        format!("no column matches {part:?}; the file has: {known} (--rest)");
+                    return Err(unfit(&file.path, message));
+                }
+                file.check_numbers(&columns)?;
+                Ok(Some(columns))
+            }
+            None => {
+                let tells =
+                    |name: &&str| rest::is_zero_at_rest(name) && file.column_of_any(name).is_ok();
+                Ok(Some(file.columns(outputs.filter(tells))?))
+            }
+        }
+    }
+
+    /// Makes places among the `outputs` of `file` missing on lines on which nothing touches, and says so, if most of these
+    /// lines have one.
+    pub fn forget_places<'n>(
+        &self,
+        file: &mut DataFile,
+        outputs: impl Iterator<Item = &'n str>,
+        common: &Common,
+    ) -> Result<()> {
+        let outputs: Vec<&str> = outputs.collect();
+        let Some(columns) = self.columns(file, outputs.iter().copied())? else { return Ok(()) };
+        let names: Vec<&str> = outputs.into_iter().filter(|it| columns::is_place(it)).collect();
+        let places = file.columns(names.iter().copied())?;
+        let lines = rest::lines_without_load(file, &columns);
+        let has_place = |line: &&usize| places.iter().any(|it| !file.value(**line, *it).is_nan());
+        let told = lines.iter().filter(has_place).count();
+        if 2 * told > lines.len() {
+            file.forget(&lines, &places);
+            common.remark(format_args!(
+                "note: on {told} lines of {} nothing touches: the place there ({}) counts as missing (--rest none: it is told)",
+                file.path.display(),
+                names.join(", "),
+            ));
+        }
+        Ok(())
+    }
+
     /// Readings of the untouched sensor in `file`, in the columns called `inputs`, if it was at rest in some lines. Unless
     /// a user named columns, those among the `outputs` tell it. Lines with an outlier do not count, nor, if `complete` says
     /// so, do those that lack a reading.
@@ -42,25 +96,7 @@ impl RestArgument {
         outputs: impl Iterator<Item = &'n str>,
         common: &Common,
     ) -> Result<Option<Rest>> {
-        let columns = match self.rest.as_deref() {
-            Some("none") => return Ok(None),
-            Some(pattern) => {
-                let columns = columns::select(&file.header, pattern);
-                if let Some(part) = columns::unmatched(&file.header, pattern) {
-                    let known = columns::known_names(&file.header, part);
-                    let message =
-                        format!("no column matches {part:?}; the file has: {known} (--rest)");
-                    return Err(unfit(&file.path, message));
-                }
-                file.check_numbers(&columns)?;
-                columns
-            }
-            None => {
-                let tells =
-                    |name: &&str| rest::is_zero_at_rest(name) && file.column_of_any(name).is_ok();
-                file.columns(outputs.filter(tells))?
-            }
-        };
+        let Some(columns) = self.columns(file, outputs)? else { return Ok(None) };
         let of_readings = file.columns(inputs.iter().map(String::as_str))?;
         let mut lines = rest::lines_at_rest(file, &columns);
         let is_missing = |line: usize, column: &usize| file.value(line, *column).is_nan();
@@ -97,7 +133,7 @@ pub struct UntouchedArguments {
     #[command(flatten)]
     baseline: BaselineArgument,
     #[command(flatten)]
-    rest: RestArgument,
+    pub rest: RestArgument,
 }
 
 impl UntouchedArguments {

@@ -15,7 +15,7 @@ use taxel_rig::device::serial;
 use taxel_view::{Command, View};
 
 use super::arguments::refuse;
-use super::data_file::DataFileArguments;
+use super::data_file::{DataFileArguments, TimeArgument, for_data};
 use super::device_arguments::{BaudArgument, ScanPeriodArgument};
 use super::scene_argument::{DEFAULT_SCENE, FrameRateArgument, ModelArgument};
 use super::{Common, interruption, print, recordings};
@@ -71,6 +71,8 @@ pub struct Arguments {
     /// Open no browser: print the page's address alone.
     #[arg(long)]
     no_browser: bool,
+    #[command(flatten)]
+    clock: TimeArgument,
     #[command(flatten)]
     file: DataFileArguments,
 }
@@ -177,8 +179,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         }
         Source::Data(path) => {
             let file = arguments.file.read(&path, common)?;
-            let clock = Clock::of(&file, None)?;
-            if let Some(why) = clock.why_counted(&file) {
+            let clock = Clock::of(&file, arguments.clock.time.as_deref())?;
+            let has_no_unit = clock.column.as_ref().filter(|_| clock.unit.is_empty());
+            let why = has_no_unit.map(|name| {
+                format!("the unit of {name} is not known (a name such as {name}_ms tells it)")
+            });
+            if let Some(why) = why.or_else(|| clock.why_counted(&file)) {
                 common.remark(format_args!(
                     "note: {why}; frames follow one another {USUAL_RATE} times a second, or by --frame-rate"
                 ));
@@ -209,7 +215,11 @@ fn check_options(arguments: &Arguments, source: &Source) -> Result<()> {
         let message = format!("--frame-rate {rate}: give frames a second from 0.01 to 10000");
         return Err(Error::Usage(message));
     }
-    if matches!(source, Source::Data(_)) { Ok(()) } else { arguments.file.refuse() }
+    if matches!(source, Source::Data(_)) {
+        return Ok(());
+    }
+    refuse(&arguments.clock, |_| true, for_data)?;
+    arguments.file.refuse()
 }
 
 /// What the argument names, or what there is without one.

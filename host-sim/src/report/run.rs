@@ -85,6 +85,7 @@ fn made(result: &RunResult) -> Sections {
         let missing = &data.lines_left_out;
         let outliers = if data.outliers.left_out { data.outliers.lines } else { 0 };
         let lines = [
+            (missing.unreadable.as_ref().map_or(0, |it| it.lines), "are cut or garbled"),
             (missing.without_reading, "lack a reading"),
             (missing.without_output, "lack all outputs"),
             (outliers, "hold a value far from all others"),
@@ -110,6 +111,7 @@ pub fn in_words(unused: &UnusedInputs) -> String {
     let inputs = [
         (&unused.dead, "without values"),
         (&unused.constant, "never change"),
+        (&unused.flickering, "flicker"),
         (&twins, "are copies"),
     ];
     let inputs = inputs.iter().filter(|(names, _)| !names.is_empty());

@@ -80,6 +80,23 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
 }
 
 #[test]
+fn places_that_are_logged_in_pauses_count_as_missing() {
+    let folder = Folder::new("log-idle");
+    let empty = log(0.0);
+    // A machine that stands idle has a place, too.
+    folder.write("empty.csv", &empty);
+    folder.write("idle.csv", empty.replace(",,", ",0.9,"));
+    let of = |name: &str| folder.json(&[&["run", name], &COLUMNS[..]].concat());
+    let [empty, idle] = ["empty.csv", "idle.csv"].map(of);
+    let x = |document: &Value| rmse(&document["decoders"][0]["errors"], "x_mm");
+    assert!((x(&idle) / x(&empty) - 1.0).abs() < 0.2, "{} {}", x(&idle), x(&empty));
+    let output = folder.run(&[&["run", "idle.csv"], &COLUMNS[..]].concat());
+    let notes = String::from_utf8(output.stderr).unwrap();
+    let says = "lines of idle.csv nothing touches: the place there (x_mm) counts as missing";
+    assert_eq!(notes.matches(says).count(), 1, "{notes}");
+}
+
+#[test]
 fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes() {
     let folder = Folder::new("log-relative");
     folder.write("log.csv", log(0.2));

@@ -64,10 +64,11 @@ fn outliers_are_named_left_out_and_listed_in_json() {
 #[test]
 fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing() {
     let folder = Folder::new("measured-unused");
-    let mut text = String::from("a,b,dead,flat,twin,y\n");
+    let mut text = String::from("a,b,dead,flat,twin,bit,y\n");
     for (i, [a, b, y]) in lines(200).into_iter().enumerate() {
         let dead = if i % 3 == 0 { "1.5" } else { "" };
-        let _ = writeln!(text, "{a},{b},{dead},7,{a},{y}");
+        let bit = i * i * 31 % 101 % 2;
+        let _ = writeln!(text, "{a},{b},{dead},7,{a},{bit},{y}");
     }
     folder.write("all.csv", &text);
     // The file to judge by has them all, and follows the columns of the file to train on.
@@ -75,7 +76,7 @@ fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing()
         text.lines().map(|line| format!("{}\n", line.replace(",7,", ",8,"))).collect();
     folder.write("test.csv", [&others[..1], &others[2..]].concat().concat());
     let usual =
-        ["--inputs", "a,b,dead,flat,twin", "--outputs", "y", "--no-refine", "--centres", "8"];
+        ["--inputs", "a,b,dead,flat,twin,bit", "--outputs", "y", "--no-refine", "--centres", "8"];
     let run = [&["run", "all.csv", "--test", "test.csv", "--json"], &usual[..]].concat();
     let output = folder.run(&run);
     let [printed, notes] = [output.stdout, output.stderr].map(|b| String::from_utf8(b).unwrap());
@@ -83,6 +84,7 @@ fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing()
     for note in [
         "note: dead has no value in more than half of the lines in all.csv; left out of the model",
         "note: flat never changes in all.csv; left out of the model",
+        "note: bit flickers between two values, whatever the outputs are, in all.csv; left out of the model",
         "note: twin = a in every line in all.csv; left out of the model",
     ] {
         assert!(notes.contains(note), "{notes}");
@@ -142,12 +144,17 @@ fn lines_left_out_are_counted_by_reason() {
         let z = if i % 20 == 1 { String::new() } else { y.to_string() };
         let _ = writeln!(text, "{a},{b},{y},{z}");
     }
+    text += "7,8\n7,8,9,10,11\n7,8,nine,10\n";
     folder.write("gaps.csv", text);
     let (printed, notes) = train(&folder, "gaps.csv", &["--json"]);
     let note = "note: 10 of 100 lines of gaps.csv have a missing value and are skipped: 10 lack a reading (most often \
                 missing: b 10)";
     assert!(notes.contains(note), "{notes}");
+    let cut = "note: 3 of 103 lines of gaps.csv are cut or garbled and are skipped (--strict refuses them); the first: \
+               line 102 has 2 fields; the header names 4\n";
+    assert!(notes.contains(cut), "{notes}");
     let left_out = &json(&printed)["lines_left_out"];
+    assert_eq!(left_out["unreadable"]["lines"], 3);
     assert_eq!(left_out["without_reading"], 10);
     assert_eq!(left_out["missing_most"], serde_json::json!([["b", 10]]));
 }

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::blocks::{BLOCK, Blocks};
-use super::{DataFile, NotNumbers, Reading, Texts, numbered, time};
+use super::{DataFile, NotNumbers, Reading, Texts, Unreadable, numbered, time};
 use crate::columns::some_names;
 use crate::error::{Error, Problem, Result};
 use crate::input::Source;
@@ -24,7 +24,8 @@ pub(super) fn parse(source: Source<'_>, reading: &Reading) -> Result<DataFile> {
     let has_names = reading.has_header || blocks.dialect.has_names();
     let start = read_header(&mut file, &block, has_names)?;
     let seen = file.header.iter().map(|_| Seen::default()).collect();
-    let mut body = Body { file, seen, line: 1 + line_ends(&block[..start]) };
+    let line = 1 + line_ends(&block[..start]);
+    let mut body = Body { file, seen, line, is_strict: reading.is_strict, cut: 0, first: None };
     block.drain(..start);
     loop {
         let next = blocks.next()?;
@@ -33,13 +34,12 @@ pub(super) fn parse(source: Source<'_>, reading: &Reading) -> Result<DataFile> {
         next.splice(..0, block.drain(used..));
         block = next;
     }
-    let Body { mut file, seen, .. } = body;
+    let mut file = body.without_unreadable()?;
     if file.values.is_empty() {
         return Err(Error::file(path, Problem::NoLines));
     }
     file.values.shrink_to_fit();
     file.kept = 0..file.line_numbers.len();
-    file.not_numbers = seen.into_iter().filter_map(|it| it.not_numbers).collect();
     file.lacks_last_line_end = !matches!(block[..], [.., b'\n' | b'\r']);
     file.add_found(&blocks.dialect.found);
     file.add_found(if is_packed { "gzip" } else { "" });
@@ -78,10 +78,26 @@ impl Texts {
         let (mut reader, mut record) = (reader(lines, false), csv::ByteRecord::new());
         while reader.read_byte_record(&mut record).unwrap_or(false) {
             for field in &record {
-                self.text += String::from_utf8_lossy(field).trim();
-                self.ends.push(self.text.len());
+                self.push(field);
             }
         }
+    }
+
+    fn push(&mut self, field: &[u8]) {
+        self.text += String::from_utf8_lossy(field).trim();
+        self.ends.push(self.text.len());
+    }
+
+    /// These texts of so many `columns` without those of `lines` (ascending).
+    fn without(&self, lines: &[usize], columns: usize) -> Self {
+        let (mut kept, mut start) = (Self::default(), 0);
+        for (field, end) in self.ends.iter().enumerate() {
+            if lines.binary_search(&(field / columns)).is_err() {
+                kept.push(&self.text.as_bytes()[start..*end]);
+            }
+            start = *end;
+        }
+        kept
     }
 }
 
@@ -140,21 +156,29 @@ struct Seen {
     number: bool,
     time: bool,
     not_numbers: Option<NotNumbers>,
+    /// Lines of data (from 0) with a field that is no number, or no time among times.
+    others: Vec<usize>,
 }
 
 impl Seen {
-    /// Value of a field of this column (from 0) on a line of this number: NaN for what is no number. Times count in
-    /// seconds, if there is nothing else in the column.
-    fn value(&mut self, field: &[u8], line: u64, column: usize) -> f64 {
+    /// Value of a field of this column (from 0) on a line of data (from 0) and of this number: NaN for what is no number.
+    /// Times count in seconds, if there is nothing else in the column.
+    fn value(&mut self, field: &[u8], (at, line): (usize, u64), column: usize) -> f64 {
         let found = number(field);
         let text = || String::from_utf8_lossy(field).trim().to_owned();
         let time = if found.is_none() { time::seconds(&text()) } else { None };
-        self.number |= found.is_some_and(|value| !value.is_nan());
-        self.time |= time.is_some();
-        if found.is_none() && time.is_none() || self.number && self.time {
+        let is_value = found.is_some_and(|value| !value.is_nan());
+        if found.is_none() && time.is_none()
+            || is_value && self.time
+            || time.is_some() && self.number
+        {
             let first = || NotNumbers { column, line, field: text() };
             self.not_numbers.get_or_insert_with(first);
+            self.others.push(at);
+            return f64::NAN;
         }
+        self.number |= is_value;
+        self.time |= time.is_some();
         found.or(time).unwrap_or(f64::NAN)
     }
 }
@@ -165,6 +189,12 @@ struct Body {
     seen: Vec<Seen>,
     /// Number of the next line.
     line: u64,
+    /// Whether a line that cannot be read is an error.
+    is_strict: bool,
+    /// Number of lines that are not in the file, as they have no fields like the others'.
+    cut: usize,
+    /// The first one: its number, and what is wrong with it.
+    first: Option<(u64, Problem)>,
 }
 
 impl Body {
@@ -175,10 +205,10 @@ impl Body {
         self.line += line_ends(&lines[..start]);
         let used = match self.add_plain(&lines[start..]) {
             Some(()) => lines.len(),
-            None => start + self.add_carefully(&lines[start..], are_last)?,
+            None => return Ok(start + self.add_carefully(&lines[start..], are_last)?),
         };
         if let Some(texts) = &mut self.file.texts {
-            texts.add(&lines[..used]);
+            texts.add(lines);
         }
         Ok(used)
     }
@@ -202,49 +232,111 @@ impl Body {
 
     /// Adds `lines` one by one, quotes, blank lines, text and times included; returns the bytes of what was added.
     fn add_carefully(&mut self, lines: &[u8], are_last: bool) -> Result<usize> {
-        let Self { file, seen, line } = self;
+        let Self { file, seen, line, is_strict, cut, first } = self;
         let path = file.path.clone();
         let error = |problem| Error::file(&path, problem);
         let columns = file.header.len();
-        let (mut reader, mut record) = (reader(lines, false), csv::ByteRecord::new());
-        let mut at = 0;
+        let (mut csv, mut record) = (reader(lines, false), csv::ByteRecord::new());
+        let (mut at, mut begin) = (0, 0);
         let read_error = |e: csv::Error| error(Problem::Line { cause: cause_of(&e) });
-        while reader.read_byte_record(&mut record).map_err(read_error)? {
-            let mut start = record.position().map_or(0, |position| position.byte() as usize);
+        while csv.read_byte_record(&mut record).map_err(read_error)? {
+            let mut start = begin + record.position().map_or(0, |it| it.byte() as usize);
             start += lines[start..].iter().take_while(|byte| ENDS.contains(byte)).count();
             *line += line_ends(&lines[at..start]);
             at = start;
             // A quoted field that goes on in the next block has taken the last line end.
-            let ends_block = !are_last && reader.position().byte() == lines.len() as u64;
-            if ends_block
+            let ends_block = !are_last && begin + csv.position().byte() as usize == lines.len();
+            let goes_on = ends_block
                 && record
                     .iter()
                     .next_back()
                     .and_then(<[u8]>::last)
-                    .is_some_and(|byte| ENDS.contains(byte))
-            {
-                if lines.len() - at > BLOCK {
-                    let cause = format!("line {line}: a quoted field does not end");
-                    return Err(error(Problem::Line { cause }));
-                }
+                    .is_some_and(|byte| ENDS.contains(byte));
+            if goes_on && lines.len() - at <= BLOCK {
                 return Ok(at);
             }
             let (line, fields) = (*line, record.len());
-            if fields != columns {
-                return Err(error(if file.names_columns {
-                    Problem::FieldCount { line, fields, columns }
-                } else {
-                    Problem::UnevenLine { line, fields, columns }
-                }));
+            let holds_lines = |field: &[u8]| field.iter().any(|byte| ENDS.contains(byte));
+            let problem = if goes_on
+                || record.iter().zip(&*seen).any(|(it, seen)| seen.number && holds_lines(it))
+            {
+                let cause = format!("line {line}: a quoted field does not end");
+                Some(Problem::Line { cause })
+            } else if fields == columns {
+                None
+            } else if file.names_columns {
+                Some(Problem::FieldCount { line, fields, columns })
+            } else {
+                Some(Problem::UnevenLine { line, fields, columns })
+            };
+            if let Some(problem) = problem {
+                if *is_strict {
+                    return Err(error(problem));
+                }
+                *cut += 1;
+                first.get_or_insert((line, problem));
+                if record.iter().any(holds_lines) {
+                    // A stray quote took the lines below, too.
+                    let end = lines[at..].iter().position(|byte| ENDS.contains(byte));
+                    begin = end.map_or(lines.len(), |end| at + end);
+                    csv = reader(&lines[begin..], false);
+                }
+                continue;
             }
+            let place = (file.line_numbers.len(), line);
             file.line_numbers.push(line);
             let fields = record.iter().zip(&mut *seen).enumerate();
-            let values = fields.map(|(column, (field, seen))| seen.value(field, line, column));
+            let values = fields.map(|(column, (field, seen))| seen.value(field, place, column));
             file.values.extend(values);
+            if let Some(texts) = &mut file.texts {
+                record.iter().for_each(|field| texts.push(field));
+            }
         }
         *line += line_ends(&lines[at..]);
         Ok(lines.len())
     }
+
+    /// The file without lines that hold text in a column of numbers, if they are few.
+    fn without_unreadable(self) -> Result<DataFile> {
+        let Self { mut file, seen, is_strict, cut, first, .. } = self;
+        let columns = file.header.len();
+        let (mut garbled, mut problems) = (vec![], Vec::from_iter(first));
+        for (column, seen) in seen.into_iter().enumerate() {
+            let Some(text) = seen.not_numbers else { continue };
+            let values = file.values.iter().skip(column).step_by(columns);
+            let values = values.filter(|value| !value.is_nan()).count();
+            if is_strict || !are_few(seen.others.len(), values) {
+                file.not_numbers.push(text);
+                continue;
+            }
+            problems.push((text.line, text.problem(&file.header)));
+            garbled.extend(seen.others);
+        }
+        garbled.sort_unstable();
+        garbled.dedup();
+        let first = problems.into_iter().min_by_key(|(line, _)| *line);
+        let Some((_, problem)) = first else { return Ok(file) };
+        let (lines, of) = (cut + garbled.len(), cut + file.line_numbers.len());
+        if !are_few(lines, of - lines) {
+            let many = || Problem::Unreadable { lines, of, first: Box::new(problem.clone()) };
+            return Err(Error::file(&file.path, if lines == 1 { problem } else { many() }));
+        }
+        let keep = |item: usize, each: usize| garbled.binary_search(&(item / each)).is_err();
+        let mut item = 0..;
+        file.values.retain(|_| item.next().is_some_and(|item| keep(item, columns)));
+        let mut item = 0..;
+        file.line_numbers.retain(|_| item.next().is_some_and(|item| keep(item, 1)));
+        file.texts = file.texts.map(|texts| texts.without(&garbled, columns));
+        let first = problem.to_string();
+        let first = first.rsplit_once("; ").map_or(&*first, |(reason, _)| reason).to_owned();
+        file.unreadable = Some(Unreadable { lines, first });
+        Ok(file)
+    }
+}
+
+/// Whether so many lines that cannot be read are no sign of a wrong file beside those that can: 5 % of all or fewer.
+fn are_few(unreadable: usize, others: usize) -> bool {
+    19 * unreadable <= others
 }
 
 /// Number of line ends in a text: LF, CR or both. The CSV reader's own count is one short where lines end in CR LF.

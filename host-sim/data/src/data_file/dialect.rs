@@ -81,7 +81,8 @@ impl Dialect {
         has_header: bool,
     ) -> Result<Self, Problem> {
         let sample = String::from_utf8_lossy(sample(bytes)).into_owned();
-        if sample.contains('\0') {
+        let with_zero = sample.lines().filter(|line| line.contains('\0')).count();
+        if with_zero * 20 > sample.lines().count() {
             return Err(Problem::NoText);
         }
         Self::of_sample(encoding, &sample, stated, has_header)
@@ -280,8 +281,17 @@ impl Encoding {
             [0, 0x01..=0x7f, 0, 0x01..=0x7f, ..] if zeros(1) == 0 && zeros(0) > most => {
                 Self::Utf16 { is_big_endian: true }
             }
-            _ if std::str::from_utf8(sample(bytes)).is_ok() => Self::Utf8,
-            _ => Self::Latin1,
+            _ => {
+                // A few bytes that are broken do not make Latin-1 of UTF-8.
+                let text = String::from_utf8_lossy(sample(bytes));
+                let mut special = text.chars().filter(|char| !char.is_ascii());
+                let is_utf8 = |char| char != char::REPLACEMENT_CHARACTER;
+                if special.clone().any(is_utf8) || special.next().is_none() {
+                    Self::Utf8
+                } else {
+                    Self::Latin1
+                }
+            }
         }
     }
 
@@ -387,7 +397,8 @@ fn ends_in_separator(table: &[Line<'_>], separator: Separator) -> bool {
     let ends = |fields: &[Cow<'_, str>]| fields.last().is_some_and(|field| field.is_empty());
     separator != Separator::Spaces
         && columns > 1
-        && lines.iter().all(|(_, fields)| fields.len() == columns && ends(fields))
+        && 19 * lines.iter().filter(|(_, fields)| fields.len() != columns || !ends(fields)).count()
+            <= lines.len()
         && (header.len() + 1 == columns || header.len() == columns && ends(header))
 }
 

@@ -134,7 +134,7 @@ impl DataOptions {
     /// folds that a column tells. The file's memory becomes theirs.
     fn usual_frames(
         &self,
-        file: DataFile,
+        mut file: DataFile,
         (unused, cells): (&UnusedInputs, &MatCells),
         fold_column: Option<&str>,
         relative_inputs: bool,
@@ -149,6 +149,7 @@ impl DataOptions {
         let clock = Clock::of(&file, self.clock.time.as_deref())?;
         let why_counted = clock.why_counted(&file);
         let rest = self.rest(&file, &chosen.names, relative_inputs, common)?.map(Arc::new);
+        self.rest.forget_places(&mut file, chosen.names[1].iter().map(String::as_str), common)?;
         let column = fold_column.map(|name| file.column(name)).transpose()?;
         let fold_values: Option<Vec<f64>> =
             column.map(|column| (0..file.lines()).map(|line| file.value(line, column)).collect());
