@@ -336,22 +336,10 @@ pub fn effects(sections: &mut Sections, merged: &Merged) -> Vec<Section> {
         .values("share", |it| number_value(Some(it.share)));
     sections.rows("effects", table);
     let drawings = [WIDE, NARROW].map(|size| bars(merged, size[0]));
-    let mut caption =
-        "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of its \
-         logarithm where all values are positive. What is left belongs to axes together, and to chance."
-            .to_owned();
-    let all = merged.points.len();
-    for name in &merged.objectives {
-        let known = merged.points.iter().filter(|it| it.results.contains_key(name)).count();
-        if known < all {
-            let heading = Quantity::of(name).heading;
-            caption += &format!(
-                " Only {known} of {all} points have a {heading}: what the axes would do at the others is not known."
-            );
-        }
-    }
+    let caption = "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of \
+                   its logarithm where all values are positive. What is left belongs to axes together, and to chance.";
     let data = shares(merged);
-    let bars = Section::Figure(Figure::of_drawings("effects", caption, drawings, data));
+    let bars = Section::Figure(Figure::of_drawings("effects", caption.into(), drawings, data));
     let levels = Section::Folded("Means by level".into(), vec![levels(sections, merged)]);
     vec![bars, shares_table(merged), levels]
 }
@@ -388,7 +376,14 @@ pub fn front_table(sections: &mut Sections, merged: &Merged) {
 /// Share of each objective's variance that each axis explains.
 fn shares_table(merged: &Merged) -> Section {
     let fields: Vec<&String> = merged.fields_with_effects().collect();
-    let caption = "Share of the variance that each axis explains, in per cent.";
+    let all = merged.points.len();
+    let few = merged.objectives.iter().filter_map(|name| {
+        let known = merged.points.iter().filter(|it| it.results.contains_key(name)).count();
+        let heading = Quantity::of(name).heading;
+        (known < all).then(|| format!(" Only {known} of {all} points have the result {heading}."))
+    });
+    let few: String = few.collect();
+    let caption = format!("Share of the variance that each axis explains, in per cent.{few}");
     let mut table = TableOf::new(&fields, caption).names("field", "axis", |field| (*field).clone());
     for objective in &merged.objectives {
         let heading = Quantity::of(objective).heading;

@@ -186,6 +186,8 @@ fn points_that_cannot_be_are_named_and_the_others_computed() {
     let out = folder.run(&["sweep", "plan.toml"]);
     let remarks = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(out.status.success() && remarks.contains("20 % of the thickness"), "{remarks}");
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(said.contains("Only 2 of 4 points have the result RMSE of Δz."), "{said}");
     let table = folder.read("out/tiny/results.csv");
     assert_eq!(
         table.lines().filter(|line| line.contains("20 % of the thickness")).count(),
@@ -462,6 +464,9 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
         let rmse = layout["rmse_dz_mm"].as_f64().unwrap().to_string();
         assert!(table.lines().any(|line| line.contains(name) && line.contains(&rmse)), "{rmse}");
     }
+    folder.write("drifts.toml", scene.replace("[noise]", "[drift]\ngain = 0.02\n\n[noise]"));
+    let said = folder.succeed(&["compare", "scene.toml", "drifts.toml", "--limit-only"]);
+    assert!(said.contains("1 point with no limit: "), "{said}");
     let limit = folder.json(&["compare", "lists.toml", "--limit-only"]);
     assert_eq!(limit["objectives"][0], "limit_dz_mm");
     assert!(folder.fail(&["compare", "scene.toml", "scene.toml"], 2).contains("twice"));
