@@ -76,26 +76,37 @@ pub struct Linearised {
 pub const TYPICAL_STIFFNESS_N_PER_MM: Vector3 = [1.0, 1.0, 2.0];
 
 /// Default upper electrodes: centres of equal cells on the top face, row-wires along x.
-pub fn default_upper_electrodes_mm(rows: usize, per_row: usize, size_mm: Vector3) -> Vec<Vector3> {
+///
+/// Each cell is cut into `stagger` equal parts along x, which the electrodes of neighbouring row-wires take in turn. With one
+/// part they stand in line.
+pub fn default_upper_electrodes_mm(
+    rows: usize,
+    per_row: usize,
+    stagger: usize,
+    size_mm: Vector3,
+) -> Vec<Vector3> {
     let [x_mm, y_mm, z_mm] = size_mm;
+    let along = move |m: usize, i: usize| cell(i * stagger + m % stagger, per_row * stagger, x_mm);
     (0..rows)
-        .flat_map(|m| {
-            (0..per_row).map(move |i| [cell(i, per_row, x_mm), cell(m, rows, y_mm), z_mm])
-        })
+        .flat_map(|m| (0..per_row).map(move |i| [along(m, i), cell(m, rows, y_mm), z_mm]))
         .collect()
 }
 
 /// Default lower electrodes: centres of equal cells on the bottom face, column-wires along y.
+///
+/// Each cell is cut into `stagger` equal parts along y, which the electrodes of neighbouring column-wires take in turn. With
+/// one part they stand in line.
 pub fn default_lower_electrodes_mm(
     columns: usize,
     per_column: usize,
+    stagger: usize,
     size_mm: Vector3,
 ) -> Vec<Vector3> {
     let [x_mm, y_mm, _] = size_mm;
+    let along =
+        move |k: usize, j: usize| cell(j * stagger + k % stagger, per_column * stagger, y_mm);
     (0..columns)
-        .flat_map(|k| {
-            (0..per_column).map(move |j| [cell(k, columns, x_mm), cell(j, per_column, y_mm), 0.0])
-        })
+        .flat_map(|k| (0..per_column).map(move |j| [cell(k, columns, x_mm), along(k, j), 0.0]))
         .collect()
 }
 
@@ -116,8 +127,8 @@ impl Sensor {
             column_wires: 18,
             read_columns: None,
             electrodes_per_column_wire: 3,
-            upper_electrodes_mm: default_upper_electrodes_mm(8, 6, size_mm),
-            lower_electrodes_mm: default_lower_electrodes_mm(18, 3, size_mm),
+            upper_electrodes_mm: default_upper_electrodes_mm(8, 6, 1, size_mm),
+            lower_electrodes_mm: default_lower_electrodes_mm(18, 3, 1, size_mm),
             size_mm,
             resistance_ohm_per_mm: 100.0,
             stiffness_n_per_mm: TYPICAL_STIFFNESS_N_PER_MM,

@@ -114,7 +114,7 @@ fn electrodes(outputs: &[Column], sensor: Option<&Sensor>) -> Vec<Electrode> {
     let places: Vec<Vec<[f64; 3]>> = match sensor.filter(holds) {
         Some(sensor) => (0..rows).map(|row| sensor.row_electrodes_mm(row).to_vec()).collect(),
         None if rows == 0 => vec![],
-        None => default_upper_electrodes_mm(rows, per_row, size_mm)
+        None => default_upper_electrodes_mm(rows, per_row, 1, size_mm)
             .chunks(per_row)
             .map(<[_]>::to_vec)
             .collect(),

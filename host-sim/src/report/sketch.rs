@@ -29,7 +29,8 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
     let size = if dense { 2.0 } else { 3.0 };
     for (k, column) in sensor.column_numbers.iter().zip(&sensor.column_wires_mm) {
         let points: Vec<[f64; 2]> = column.iter().map(|p| place(*p)).collect();
-        wire(&mut svg, &points, "c2 wire");
+        let across = |[x, _]: [f64; 2]| [[x, top], [x, bottom]];
+        wire(&mut svg, &points, across, "c2 wire");
         for [x, y] in points {
             let text = format!("column-wire {k}");
             svg.hovered_rect([x - size, y - size], [2.0 * size, 2.0 * size], "c2 mark", &text);
@@ -38,7 +39,8 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
     for (m, row) in sensor.row_wires.iter().enumerate() {
         let class = if row.read { "c1" } else { "muted" };
         let points: Vec<[f64; 2]> = row.electrodes_mm.iter().map(|p| place(*p)).collect();
-        wire(&mut svg, &points, if row.read { "c1 wire" } else { "muted wire broken" });
+        let across = |[_, y]: [f64; 2]| [[left, y], [right, y]];
+        wire(&mut svg, &points, across, if row.read { "c1 wire" } else { "muted wire broken" });
         let read = if row.read { "" } else { ", not read" };
         for (i, place) in points.iter().enumerate() {
             let title = format!("<title>row-wire {}, electrode {}{read}</title>", m + 1, i + 1);
@@ -69,8 +71,17 @@ fn draw(sensor: &SensorSketch, width: f64) -> String {
     svg.finish()
 }
 
-fn wire(svg: &mut Svg, points: &[[f64; 2]], class: &str) {
-    svg.path(&polyline(points), class);
+/// Draws a wire through its electrodes, or `across` the face if it has only one.
+fn wire(
+    svg: &mut Svg,
+    points: &[[f64; 2]],
+    across: impl Fn([f64; 2]) -> [[f64; 2]; 2],
+    class: &str,
+) {
+    match points {
+        [only] => svg.path(&polyline(&across(*only)), class),
+        _ => svg.path(&polyline(points), class),
+    }
 }
 
 fn legend(svg: &mut Svg, unread: bool) {

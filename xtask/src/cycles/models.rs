@@ -95,7 +95,7 @@ impl Shape {
         let per_column = paper.electrodes_per_column_wire;
         world.sensor = Sensor {
             column_wires: columns,
-            lower_electrodes_mm: default_lower_electrodes_mm(columns, per_column, paper.size_mm),
+            lower_electrodes_mm: default_lower_electrodes_mm(columns, per_column, 1, paper.size_mm),
             ..paper
         };
         world

@@ -64,6 +64,16 @@ struct SensorFile {
     size_mm: Option<Vector3>,
     /// Distance of neighbouring wires in mm, which gives the face's extent instead of `size_mm`.
     pitch_mm: Option<f64>,
+    /// Distance of neighbouring column-wires, along x, instead of `pitch_mm`.
+    pitch_x_mm: Option<f64>,
+    /// Distance of neighbouring row-wires, along y, instead of `pitch_mm`.
+    pitch_y_mm: Option<f64>,
+    /// Number of places along x that the electrodes of neighbouring row-wires take in turn.
+    #[serde(default = "one")]
+    upper_stagger: usize,
+    /// Number of places along y that the electrodes of neighbouring column-wires take in turn.
+    #[serde(default = "one")]
+    lower_stagger: usize,
     /// Thickness in mm, instead of that of `size_mm`.
     thickness_mm: Option<f64>,
     resistance_ohm_per_mm: f64,
@@ -76,26 +86,37 @@ struct SensorFile {
 impl SensorFile {
     /// Extent in mm, from `size_mm`, the pitch of the wires and the thickness.
     fn extent_mm(&self) -> Result<Vector3, BadValue> {
-        let missing = |field: &str| {
-            let rule = "it is missing; give it, or sensor.size_mm with all three extents";
+        let missing = |field: &str, give: &str| {
+            let rule =
+                format!("it is missing; give {give}, or sensor.size_mm with all three extents");
             BadValue::new(format!("sensor.{field}"), "nothing", rule)
         };
         let given = |at: usize| self.size_mm.map(|size_mm| size_mm[at]);
-        let face = |at: usize, wires: usize| match self.pitch_mm {
-            Some(pitch_mm) => {
-                let allowed = pitch_mm.is_finite() && pitch_mm > 0.0;
-                require(allowed, "sensor.pitch_mm", pitch_mm, || "give a positive length".into())?;
-                Ok(wires as f64 * pitch_mm)
+        let face = |at: usize, wires: usize, own: Option<f64>, own_field: &str| {
+            let field = if own.is_some() { own_field } else { "pitch_mm" };
+            match own.or(self.pitch_mm) {
+                Some(pitch_mm) => {
+                    let allowed = pitch_mm.is_finite() && pitch_mm > 0.0;
+                    let rule = || "give a positive length".into();
+                    require(allowed, format!("sensor.{field}"), pitch_mm, rule)?;
+                    Ok(wires as f64 * pitch_mm)
+                }
+                None => given(at).ok_or_else(|| missing(own_field, "it, sensor.pitch_mm")),
             }
-            None => given(at).ok_or_else(|| missing("pitch_mm")),
         };
         let thickness_mm = self.thickness_mm.or_else(|| given(2));
-        let thickness_mm = thickness_mm.ok_or_else(|| missing("thickness_mm"))?;
-        Ok([face(0, self.column_wires)?, face(1, self.row_wires)?, thickness_mm])
+        let thickness_mm = thickness_mm.ok_or_else(|| missing("thickness_mm", "it"))?;
+        let x_mm = face(0, self.column_wires, self.pitch_x_mm, "pitch_x_mm")?;
+        let y_mm = face(1, self.row_wires, self.pitch_y_mm, "pitch_y_mm")?;
+        Ok([x_mm, y_mm, thickness_mm])
     }
 }
 
 fn default_seed() -> u64 {
+    1
+}
+
+fn one() -> usize {
     1
 }
 
@@ -116,6 +137,22 @@ fn columns_from_0(columns: &[usize], most: usize) -> Result<Vec<usize>, BadValue
     Ok(columns.iter().map(|column| column - 1).collect())
 }
 
+/// Checks the number of places that a `layer` of so many wires is staggered to, beside a list of its electrodes.
+fn check_stagger(
+    layer: &str,
+    stagger: usize,
+    wires: usize,
+    listed: Option<&Vec<Vector3>>,
+) -> Result<(), BadValue> {
+    let field = format!("sensor.{layer}_stagger");
+    require((1..=wires).contains(&stagger), &field, stagger, || {
+        format!("give 1 for electrodes in line, or up to the number of the layer's wires, {wires}")
+    })?;
+    require(stagger == 1 || listed.is_none(), &field, stagger, || {
+        format!("sensor.{layer}_electrodes_mm says where each electrode is; give one of the two")
+    })
+}
+
 impl SceneFile {
     /// The experiment, with all defaults.
     ///
@@ -126,16 +163,17 @@ impl SceneFile {
         let of_columns = (s.column_wires, s.electrodes_per_column_wire);
         check_counts((s.row_wires, s.electrodes_per_row_wire), of_columns)?;
         let size_mm = s.extent_mm()?;
+        let (upper, lower) = (s.upper_electrodes_mm, s.lower_electrodes_mm);
+        check_stagger("upper", s.upper_stagger, s.row_wires, upper.as_ref())?;
+        check_stagger("lower", s.lower_stagger, s.column_wires, lower.as_ref())?;
         let sensor = Sensor {
-            upper_electrodes_mm: s.upper_electrodes_mm.unwrap_or_else(|| {
-                sensor::default_upper_electrodes_mm(s.row_wires, s.electrodes_per_row_wire, size_mm)
+            upper_electrodes_mm: upper.unwrap_or_else(|| {
+                let (rows, per_row) = (s.row_wires, s.electrodes_per_row_wire);
+                sensor::default_upper_electrodes_mm(rows, per_row, s.upper_stagger, size_mm)
             }),
-            lower_electrodes_mm: s.lower_electrodes_mm.unwrap_or_else(|| {
-                sensor::default_lower_electrodes_mm(
-                    s.column_wires,
-                    s.electrodes_per_column_wire,
-                    size_mm,
-                )
+            lower_electrodes_mm: lower.unwrap_or_else(|| {
+                let (columns, per_column) = (s.column_wires, s.electrodes_per_column_wire);
+                sensor::default_lower_electrodes_mm(columns, per_column, s.lower_stagger, size_mm)
             }),
             row_wires: s.row_wires,
             electrodes_per_row_wire: s.electrodes_per_row_wire,

@@ -41,6 +41,44 @@ fn listed_positions_replace_the_cells_and_must_not_touch() {
 }
 
 #[test]
+fn staggered_electrodes_are_those_that_a_list_gives() {
+    let of_columns = "column_wires = 18\nelectrodes_per_column_wire = 3";
+    let sensor = |fields: &str| {
+        let fields = format!("column_wires = 12\nelectrodes_per_column_wire = 1\n{fields}");
+        let text = crate::scenes::ALL[1].1.replace(of_columns, &fields);
+        Experiment::parse("test", &text).unwrap().world.sensor
+    };
+    let x_mm = |column: usize| (column as f64 + 0.5) * 20.0 / 12.0;
+    for (stagger, places_mm) in
+        [(1, &[9.0][..]), (2, &[4.5, 13.5]), (4, &[2.25, 6.75, 11.25, 15.75])]
+    {
+        let listed = (0..12).map(|k| format!("[{:?}, {}, 0.0]", x_mm(k), places_mm[k % stagger]));
+        let listed = listed.collect::<Vec<_>>().join(", ");
+        let expected = sensor(&format!("lower_electrodes_mm = [{listed}]"));
+        assert_eq!(sensor(&format!("lower_stagger = {stagger}")), expected);
+    }
+    // Places in units of half a cell, of which a row-wire has six along 20 mm.
+    let upper = sensor("upper_stagger = 2").upper_electrodes_mm;
+    let first_mm = |row: usize| upper[6 * row][0] * 12.0 / 20.0;
+    for row in 0..8 {
+        assert!((first_mm(row) - [0.5, 1.5][row % 2]).abs() < 1e-12, "row {row}");
+        assert_eq!(upper[6 * row][1], Sensor::paper().upper_electrodes_mm[6 * row][1]);
+    }
+}
+
+#[test]
+fn each_axis_may_have_a_pitch_of_its_own() {
+    let size_mm = |fields: &str| {
+        let text = crate::scenes::ALL[1].1.replace("size_mm = [20.0, 18.0, 5.0]", fields);
+        Experiment::parse("test", &text).unwrap().world.sensor.size_mm
+    };
+    let both = "pitch_x_mm = 1.5\npitch_y_mm = 2.5\nthickness_mm = 5";
+    assert_eq!(size_mm(both), [27.0, 20.0, 5.0]);
+    let one = "pitch_mm = 1.0\npitch_y_mm = 2.5\nthickness_mm = 5";
+    assert_eq!(size_mm(one), [18.0, 20.0, 5.0]);
+}
+
+#[test]
 fn forces_have_their_own_full_scale_and_values() {
     let text = crate::scenes::ALL[0]
         .1
