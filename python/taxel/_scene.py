@@ -15,7 +15,7 @@ from taxel import _native
 class Scene:
     """A sensor, what may happen to it, and how a model is trained for it (docs/scenes.md).
 
-    `Scene("press")` is one of the built-in ones (paper, press, contact, moving); `Scene("mine.toml")` a file.
+    `Scene("press")` is one of the built-in ones (paper, press, contact, moving, shear); `Scene("mine.toml")` a file.
     """
 
     def __init__(self, name_or_path: str | Path):

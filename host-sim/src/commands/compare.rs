@@ -32,7 +32,7 @@ use super::{Common, arguments, command_line, print};
   taxel compare thin.toml thick.toml
   taxel compare layouts.toml --centres 32,64,128 --average 1,4 --max-latency-ms 10 -o out/layouts")]
 pub struct Arguments {
-    /// Scenes: built-in ones (paper, press, contact, moving), or scene files (.toml).
+    /// Scenes: built-in ones (paper, press, contact, moving, shear), or scene files (.toml).
     #[arg(required = true)]
     scenes: Vec<String>,
     #[command(flatten)]

@@ -33,7 +33,7 @@ const FILES: FileSet = FileSet {
   taxel limit thin.toml thick.toml
   taxel limit press --model m.bin -n 2000")]
 pub struct Arguments {
-    /// Built-in scenes (paper, press, contact, moving) or paths of scene files. One table compares several.
+    /// Built-in scenes (paper, press, contact, moving, shear) or paths of scene files. One table compares several.
     #[arg(value_name = "SCENE", default_value = DEFAULT_SCENE)]
     scenes: Vec<String>,
     /// Levels of the white noise, instead of the scene's: fractions (0.01 is 1 %), or in ohm for absolute noise.

@@ -16,7 +16,7 @@ pub const DEFAULT_SCENE: &str = "press";
 /// Scene, with the settings that are changed in it.
 #[derive(Args)]
 pub struct SceneArgument {
-    /// A built-in scene (paper, press, contact, moving) or the path of a scene file.
+    /// A built-in scene (paper, press, contact, moving, shear) or the path of a scene file.
     #[arg(default_value = DEFAULT_SCENE)]
     scene: String,
 }

@@ -23,7 +23,7 @@ use super::scene_argument::{DEFAULT_SCENE, NoiseArgument};
 /// Scene or CSV file to train and to judge on.
 #[derive(Args, Default)]
 pub struct SubjectArgument {
-    /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a CSV file [default: press].
+    /// A built-in scene (paper, press, contact, moving, shear), a scene file (.toml) or a CSV file [default: press].
     source: Option<String>,
     #[command(flatten)]
     options: SubjectOptions,

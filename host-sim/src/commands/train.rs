@@ -42,7 +42,7 @@ mod choice;
   taxel train log.csv --inputs 'ch*' --outputs 'f?_n' --relative-inputs -o m.bin
   taxel train log.csv --missing -1 --first-share 0.8 --inputs c2..c16 --outputs c17 --fold-blocks 10 -o m.bin")]
 pub struct Arguments {
-    /// A built-in scene (paper, press, contact, moving), a scene file (.toml) or a data file (CSV, .mcap).
+    /// A built-in scene (paper, press, contact, moving, shear), a scene file (.toml) or a data file (CSV, .mcap).
     source: String,
     #[command(flatten)]
     to: arguments::OutputFile,

@@ -248,7 +248,7 @@ fn source(arguments: &Arguments, common: &Common) -> Result<Source> {
     let ports =
         if ports.is_empty() { "no port".into() } else { format!("ports {}", ports.join(", ")) };
     Err(Error::Usage(format!(
-        "SOURCE {text}: there is no such file, scene or port; there are {ports}, and the scenes paper, press, contact, moving"
+        "SOURCE {text}: there is no such file, scene or port; there are {ports}, and the scenes paper, press, contact, moving, shear"
     )))
 }
 

@@ -508,7 +508,7 @@ fn a_sweep_with_nothing_within_its_bounds_says_what_refuses_all() {
 #[test]
 fn the_plans_of_the_project_name_fields_that_exist() {
     let folder = Folder::new("sweep_own_plans");
-    let plans = ["plans/layouts.toml", "plans/small.toml", "test/plan64.toml"];
+    let plans = ["plans/layouts.toml", "plans/shear.toml", "plans/small.toml", "test/plan64.toml"];
     for plan in plans {
         let plan = format!("{}/../cluster/{plan}", env!("CARGO_MANIFEST_DIR"));
         let listed = folder.succeed(&["sweep", &plan, "--list"]);

@@ -9,8 +9,8 @@ fn embedded_scenes_are_sound_named_as_they_are_called_and_the_worlds_in_code() {
     for (name, _) in crate::scenes::ALL {
         let scene = Experiment::load(name).unwrap();
         assert_eq!(scene.name, name);
-        assert_eq!(scene.world.read_rows, (0..8).collect::<Vec<_>>());
-        assert_eq!(scene.world.sensor, Sensor::paper());
+        assert_eq!(scene.world.read_rows.len(), scene.world.sensor.row_wires);
+        assert_eq!(scene.world.sensor == Sensor::paper(), name != "shear", "{name}");
     }
     let worlds = [World::paper(), World::press(), World::contact()];
     for (name, world) in ["paper", "press", "contact"].into_iter().zip(worlds) {

@@ -124,6 +124,8 @@ mod tests {
         assert_eq!(layouts(str::to_owned).unwrap(), ["mat"]);
         let one = |text: &str| text.replace("row_wires = 8", "row_wires = 8\npitch_mm = [1, 2.5]");
         assert_eq!(layouts(one).unwrap(), ["mat pitch_mm=1", "mat pitch_mm=2.5"]);
+        let staggers = |text: &str| text.replace("[sensor]", "[sensor]\nlower_stagger = [1, 2]");
+        assert_eq!(layouts(staggers).unwrap(), ["mat lower_stagger=1", "mat lower_stagger=2"]);
         let two = |text: &str| one(text).replace("level = 0.005", "level = [0.01, 0.02]");
         let labels = layouts(two).unwrap();
         assert_eq!(labels.len(), 4);
