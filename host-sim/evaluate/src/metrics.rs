@@ -20,6 +20,12 @@ pub const RELATIVE_THRESHOLD: f64 = 0.1;
 /// Range of true values, relative to them, that rounding explains: they do not change.
 const CONSTANT: f64 = 4.0 * f64::EPSILON;
 
+/// Standard errors by which errors must differ for one to be surely larger.
+const SURE: f64 = 2.0;
+
+/// Successive blocks that count as one for it.
+const BLOCKS_AT_ONCE: usize = 5;
+
 /// Measure for errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measure {
@@ -110,12 +116,42 @@ pub struct DecoderErrors {
     /// Name of the decoder, such as `network`, `linear` or `mean`.
     pub decoder: String,
     pub errors: Vec<Errors>,
+    /// Parts of blocks of frames in the errors, which tell how sure a difference is; empty where they are not known.
+    #[serde(skip)]
+    pub blocks: Blocks,
 }
 
 impl DecoderErrors {
-    /// Errors of the decoder of that name.
+    /// Errors of the decoder of that name, without parts of blocks.
     pub fn new(decoder: &str, errors: Vec<Errors>) -> Self {
-        Self { decoder: decoder.into(), errors }
+        Self { decoder: decoder.into(), errors, blocks: Blocks::new() }
+    }
+
+    /// Errors of the decoder of that name, whose `estimate` is laid out like `truth`.
+    pub fn of_estimate(decoder: &str, truth: &Table, estimate: &[f64], measure: &Measure) -> Self {
+        let (errors, blocks) = with_blocks(truth, estimate, measure);
+        Self { decoder: decoder.into(), errors, blocks }
+    }
+
+    /// Errors in the group of that name.
+    pub fn of_group(&self, group: &str) -> Option<&Errors> {
+        self.errors.iter().find(|errors| errors.group == group)
+    }
+
+    /// Whether its RMSE in a `group` is above so large a `share` of that of an `other` decoder by more than chance makes on the
+    /// same frames. Where blocks of these are not known, any difference counts.
+    pub fn is_surely_above(&self, group: &str, share: f64, other: &Self) -> bool {
+        let [Some(own), Some(others)] = [self, other].map(|it| it.of_group(group)) else {
+            return false;
+        };
+        let [own_parts, other_parts] =
+            [self, other].map(|it| it.blocks.get(group).map_or(&[][..], Vec::as_slice));
+        let parts = own_parts.iter().zip(other_parts).map(|(own, other)| own - share * other);
+        let parts: Vec<f64> = parts.collect();
+        // Presses last over several blocks.
+        let at_once = parts.chunks(BLOCKS_AT_ONCE);
+        let means = at_once.map(|it| it.iter().sum::<f64>() / it.len() as f64);
+        own.rmse - share * others.rmse > SURE * standard_error(means)
     }
 }
 
@@ -202,15 +238,16 @@ impl LimitSummary {
 /// Errors of `decoder` on the frames of `test`.
 pub fn judge(decoder: &dyn Decoder, test: &Dataset, measure: &Measure) -> DecoderErrors {
     let estimates = decoder.decode_all(&test.inputs.values, 1);
-    let mut errors = by_group(&test.outputs, &estimates.values, measure);
+    let mut judged =
+        DecoderErrors::of_estimate(decoder.name(), &test.outputs, &estimates.values, measure);
     if let Some(noise) = &measure.noise {
         for (errors, of_noise) in
-            errors.iter_mut().zip(rmse_of_noise(decoder, test, noise, measure))
+            judged.errors.iter_mut().zip(rmse_of_noise(decoder, test, noise, measure))
         {
             errors.rmse_of_noise = Some(of_noise).filter(|it| it.is_finite());
         }
     }
-    DecoderErrors { decoder: decoder.name().into(), errors }
+    judged
 }
 
 /// RMSE of each group of outputs that normal `noise` of these standard deviations on the inputs of `test` makes of the

@@ -182,7 +182,6 @@ pub fn run(
     let mut verdict = Verdict::new(&decoders, &limit)
         .of_blob(&blob, training.frames.frames())
         .of_frames(subject.measurements().map(|data| &data.outliers), test.frames())
-        .with(Warning::out_of_range(network.share_out_of_range(&test.inputs.values)))
         .with(subject.scene().and_then(|_| Warning::not_positive(&test.inputs)))
         .with(others.as_ref().and_then(|it| it.warning(&decoders)));
     let mut over_time = None;

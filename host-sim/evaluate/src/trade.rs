@@ -22,7 +22,7 @@ use crate::sweep::file::{Also, Wanted};
 use crate::sweep::front;
 use crate::sweep::judge::{self, Frames, KnownLimit};
 use crate::sweep::{self, Merged, merge};
-use crate::verdict::{Verdict, Warning};
+use crate::verdict::Verdict;
 
 mod line;
 mod point;
@@ -381,7 +381,6 @@ impl Trade {
         let judged = frames.judge(&blob, &frames.options(plan, point)?)?;
         let decoders: Vec<DecoderErrors> = frames.decoders(&judged, point.on_device.filter);
         let verdict = Verdict::new(&decoders, &readings.limit)
-            .with(Warning::other_image(&blob.parse()))
             .of_blob(&blob, self.training_frames)
             .of_frames(self.outliers.as_ref(), self.test_frames);
         let others = judged.others.iter();

@@ -13,7 +13,7 @@ use crate::over_time::RestOverTime;
 
 mod warning;
 
-pub use warning::{FEW_TEST_FRAMES, FRAMES_A_WEIGHT, OUT_OF_RANGE, SLOT_BYTES, Warning};
+pub use warning::{FEW_TEST_FRAMES, FRAMES_A_WEIGHT, SLOT_BYTES, Warning};
 
 /// Share of the mean's RMSE above which an output counts as hardly decoded.
 pub const HARDLY: f64 = 0.85;
@@ -90,16 +90,10 @@ impl Verdict {
             let better: Vec<String> = lost.iter().map(with_name).collect();
             sentences.push(format!("A simpler decoder does better: {}.", listed(&better)));
         }
-        // What is no better than the mean, or lost, need not be compared with the linear decoder.
-        let useless = others.without_gain(model, |it| it.mean);
-        let mut plain = others.without_gain(model, |it| it.linear);
         let lost: Vec<&str> = lost.iter().map(|(_, errors)| errors.group.as_str()).collect();
-        plain.retain(|group| !useless.contains(group) && !lost.contains(group));
-        let warnings = [
-            Warning::no_gain_over_mean(&useless),
-            Warning::worse_than_baseline(&lost),
-            Warning::no_gain_over_linear(&plain),
-        ];
+        let useless = model.errors.iter().filter(|group| others.is_useless(model, group));
+        let useless: Vec<&str> = useless.map(|group| group.group.as_str()).collect();
+        let warnings = [Warning::no_gain_over_mean(&useless), Warning::worse_than_baseline(&lost)];
         Self { sentence: sentences.join(" "), warnings: warnings.into_iter().flatten().collect() }
     }
 
@@ -152,17 +146,14 @@ impl Verdict {
 /// Errors of the decoders that a model is compared with.
 #[derive(Clone, Copy)]
 struct Others<'e> {
-    mean: Option<&'e [Errors]>,
-    linear: Option<&'e [Errors]>,
-    centroid: Option<&'e [Errors]>,
+    mean: Option<&'e DecoderErrors>,
+    linear: Option<&'e DecoderErrors>,
+    centroid: Option<&'e DecoderErrors>,
 }
 
 impl<'e> Others<'e> {
     fn among(decoders: &'e [DecoderErrors]) -> Self {
-        let called = |name: &str| {
-            let found = decoders.iter().skip(1).find(|decoder| decoder.decoder == name);
-            found.map(|decoder| decoder.errors.as_slice())
-        };
+        let called = |name: &str| decoders.iter().skip(1).find(|decoder| decoder.decoder == name);
         let [mean, linear, centroid] = [mean::NAME, linear::NAME, centroid::NAME].map(called);
         Self { mean, linear, centroid }
     }
@@ -175,13 +166,13 @@ impl<'e> Others<'e> {
     /// Whether always predicting the mean makes no error, or one of rounding alone, which has no R²: the output does
     /// not change.
     fn mean_is_exact(&self, group: &Errors) -> bool {
-        let mean = self.mean.and_then(|mean| mean.iter().find(|it| it.group == group.group));
+        let mean = self.mean.and_then(|mean| mean.of_group(&group.group));
         mean.is_some_and(|mean| mean.rmse <= 0.0 || mean.r_squared.is_none())
     }
 
     /// Gains over the mean and the linear decoder, in words after the errors of `groups`.
     fn gains(&self, groups: &[&Errors]) -> String {
-        let gain = |of: Option<&[Errors]>, name: &str| {
+        let gain = |of: Option<&DecoderErrors>, name: &str| {
             let shares: Vec<f64> = groups.iter().filter_map(|group| share(group, of)).collect();
             let low = shares.iter().copied().fold(f64::INFINITY, f64::min);
             let high = shares.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -210,38 +201,33 @@ impl<'e> Others<'e> {
         if gains.is_empty() { String::new() } else { format!(": {}", gains.join(", and ")) }
     }
 
-    /// Errors smaller than those of `model`, each with the name of the best baseline; none that are no better than always
-    /// predicting the mean.
-    fn lost(&self, model: &DecoderErrors) -> Vec<(&'static str, &'e Errors)> {
+    /// Errors surely smaller than those of `model`, each with the name of the best baseline; none that are no better than
+    /// always predicting the mean.
+    fn lost(&self, model: &DecoderErrors) -> Vec<(&'e str, &'e Errors)> {
         let better = |group: &Errors| {
-            let of = |name, errors: Option<&'e [Errors]>| {
-                Some((name, errors?.iter().find(|it| it.group == group.group)?))
-            };
-            let all = [of(centroid::NAME, self.centroid), of(linear::NAME, self.linear)];
-            let least =
-                all.into_iter().flatten().min_by(|(_, a), (_, b)| a.rmse.total_cmp(&b.rmse));
+            let of = |other: &'e DecoderErrors| Some((other, other.of_group(&group.group)?));
+            let all = [self.centroid, self.linear].into_iter().flatten().filter_map(of);
+            let least = all.min_by(|(_, a), (_, b)| a.rmse.total_cmp(&b.rmse));
             let is_useful = |it: &Errors| self.of_mean(it).is_none_or(|share| share <= NO_GAIN);
-            least.filter(|(_, it)| it.rmse < group.rmse && is_useful(it))
+            let (other, errors) = least?;
+            let is_better = model.is_surely_above(&group.group, 1.0, other) && is_useful(errors);
+            is_better.then_some((other.decoder.as_str(), errors))
         };
         model.errors.iter().filter_map(better).collect()
     }
 
-    /// Groups of `model` without a gain over the decoder that `other` picks.
-    fn without_gain(
-        &self,
-        model: &'e DecoderErrors,
-        other: impl Fn(&Self) -> Option<&'e [Errors]>,
-    ) -> Vec<&'e str> {
-        let groups = model.errors.iter();
-        let gained_nothing =
-            |group: &&Errors| share(group, other(self)).is_some_and(|share| share > NO_GAIN);
-        groups.filter(gained_nothing).map(|group| group.group.as_str()).collect()
+    /// Whether `model` does not surely gain over always predicting the mean of this `group`.
+    fn is_useless(&self, model: &DecoderErrors, group: &Errors) -> bool {
+        let Some(mean) = self.mean.filter(|mean| share(group, Some(mean)).is_some()) else {
+            return false;
+        };
+        !mean.is_surely_above(&group.group, 1.0 / NO_GAIN, model)
     }
 }
 
-/// RMSE of `group` as a share of that of the same group among `others`.
-fn share(group: &Errors, others: Option<&[Errors]>) -> Option<f64> {
-    let other = others?.iter().find(|other| other.group == group.group)?;
+/// RMSE of `group` as a share of that of the same group of an `other` decoder.
+fn share(group: &Errors, other: Option<&DecoderErrors>) -> Option<f64> {
+    let other = other?.of_group(&group.group)?;
     Some(group.rmse / other.rmse).filter(|share| share.is_finite())
 }
 

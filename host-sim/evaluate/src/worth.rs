@@ -80,7 +80,6 @@ impl Worth {
         };
         let no_limit = LimitSummary::new(&Err(Refusal::Measured));
         let verdict = Verdict::new(&decoders, &no_limit)
-            .with(Warning::other_image(&blob.parse()))
             .of_blob(blob, set.frames.frames())
             .of_frames(subject.measurements().map(|data| &data.outliers), set.frames.frames())
             .with(subject.scene().and_then(|_| Warning::not_positive(&set.frames.inputs)));
@@ -135,7 +134,7 @@ fn on_folds(selection: &Selection, set: &TrainingSet<'_>) -> Vec<DecoderErrors> 
                 rmse_of_noise: None,
             }
         });
-        DecoderErrors { decoder: decoder.into(), errors: errors.collect() }
+        DecoderErrors::new(decoder, errors.collect())
     };
     let baselines = selection.baselines.iter().map(|it| of(it.decoder, &it.rmse));
     std::iter::once(of("network", &selection.best().rmse)).chain(baselines).collect()

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use crate::live::replay::times_s;
 use crate::live::sheet;
 use crate::report::Sections;
-use crate::verdict::Warning;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_core::filter::State;
@@ -155,6 +154,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
 
 /// Column of novelty, and what follows an output's name in the name of its deviation.
 const NOVELTY: &str = "novelty_nats";
+/// Share of inputs beyond the trained range above which it is said.
+const MOST_CLAMPED: f64 = 0.01;
 const DEVIATION: &str = "_deviation";
 
 /// Whether a row's outputs are no numbers though no reading is missing. `of_places` says which outputs are
@@ -315,8 +316,12 @@ fn kept<'k>(
 
 /// Remarks on stderr if many readings lie outside the range that the model was trained on.
 fn remark_on_range(model: &PreparedModel<'_>, readings: &Table, common: &Common) {
-    if let Some(warning) = Warning::out_of_range(model.share_out_of_range(&readings.values)) {
-        common.remark(warning);
+    let share = model.share_out_of_range(&readings.values);
+    if share > MOST_CLAMPED {
+        common.remark(format_args!(
+            "note: {:.1} % of the network's inputs lie outside the range that it was trained on, and are clamped",
+            100.0 * share
+        ));
     }
 }
 

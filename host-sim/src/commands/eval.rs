@@ -7,7 +7,7 @@ use crate::evaluate::confidence::coverage;
 use crate::evaluate::device_cost::DeviceCost;
 use crate::evaluate::distribution::{Distribution, Reference};
 use crate::measurements::{Log, Spread};
-use crate::metrics::{self, DecoderErrors, Errors, LimitSummary, Measure, NETWORK};
+use crate::metrics::{self, DecoderErrors, LimitSummary, Measure, NETWORK};
 use crate::others::percent_novel;
 use crate::over_time::{self, Decoded, OverTime, RestOverTime};
 use crate::report::format::grouped;
@@ -121,8 +121,8 @@ fn judged(
     let without_reading = estimate.lines().filter(is_empty).count();
     let judged = Decoded { log: &log, outputs: &truth, estimates: &estimate.values };
     let over_time = OverTime::new(None, &judged, at_rest);
-    let errors = metrics::by_group(&truth, &estimate.values, &measure);
-    if errors.iter().all(|group| group.count == 0) {
+    let network = DecoderErrors::of_estimate(NETWORK, &truth, &estimate.values, &measure);
+    if network.errors.iter().all(|group| group.count == 0) {
         return Err(Error::Unfit {
             path: arguments.data.clone(),
             message: nothing_counts(metadata.relative_inputs).into(),
@@ -134,14 +134,13 @@ fn judged(
     // A frame counts if any of its values does; what could not be decoded is missing in both.
     let frames_evaluated =
         truth.lines().filter(|line| line.iter().any(|value| !value.is_nan())).count();
-    let values_evaluated = errors.iter().map(|group| group.count).sum();
+    let values_evaluated = network.errors.iter().map(|group| group.count).sum();
     let at_rest = over_time.as_ref().and_then(|log| log.rest.as_ref());
     let of_centroid = centroid_of(&readings, &truth, lines_at_rest.as_deref());
-    let decoders = decoders_of(&truth, errors, of_centroid.as_deref(), &measure);
+    let decoders = decoders_of(&truth, network, of_centroid.as_deref(), &measure);
     let verdict = verdict_of(&decoders)
         .of_frames(None, frames_evaluated)
         .with(Warning::trained_on(is_known))
-        .with(Warning::out_of_range(model.share_out_of_range(&readings.values)))
         .with(at_rest.filter(|_| !metadata.relative_inputs).and_then(Warning::drift));
     let coverage = assessed.map_or(vec![], |(deviations, _)| {
         coverage(&truth, &estimate.values, &deviations, ratios_95)
@@ -154,7 +153,10 @@ fn judged(
         .is_some()
         .then(|| Distribution::new(&truth, &estimate, &readings, reference));
     let counts = [frames_evaluated, without_reading, values_evaluated, truth.values.len()];
-    let made = made(arguments, (blob, file), &health, counts)?;
+    let mut made = made(arguments, (blob, file), &health, counts)?;
+    let clamped = model.share_out_of_range(&readings.values);
+    let label = "Inputs beyond the trained range, clamped";
+    made.fact("inputs_clamped_percent", label, "%", (1e4 * clamped).round() / 100.0);
     let judged = Judged {
         verdict: &verdict,
         device: &DeviceCost::new(blob),
@@ -182,14 +184,13 @@ fn judged(
 /// The model's `errors`, and those of decoders that are fitted to the lines of `truth`: the centroid and the mean.
 fn decoders_of(
     truth: &Table,
-    errors: Vec<Errors>,
+    network: DecoderErrors,
     of_centroid: Option<&[f64]>,
     measure: &Measure,
 ) -> Vec<DecoderErrors> {
-    let of = |name: &str, estimate: &[f64]| {
-        DecoderErrors::new(name, metrics::by_group(truth, estimate, measure))
-    };
-    let mut decoders = vec![DecoderErrors::new(NETWORK, errors)];
+    let of =
+        |name: &str, estimate: &[f64]| DecoderErrors::of_estimate(name, truth, estimate, measure);
+    let mut decoders = vec![network];
     decoders.extend(of_centroid.map(|estimate| of(centroid::NAME, estimate)));
     decoders.push(of(mean::NAME, &truth.means().repeat(truth.len())));
     decoders

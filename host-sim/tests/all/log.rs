@@ -58,7 +58,7 @@ fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
     let most = rest["drifts"][0]["percent"].as_f64().unwrap();
     assert!((16.0..18.0).contains(&most), "{most}");
     let warning = plain["verdict"]["warnings"][0]["text"].as_str().unwrap();
-    assert!(warning.contains("try --relative-inputs"), "{warning}");
+    assert!(warning.contains("4 of 4 inputs drift in 5.0 minutes: ch4 by 1"), "{warning}");
     let relative = folder.json(&[&run[..], &["--relative-inputs"]].concat());
     let gained = force_rmse(&relative) / force_rmse(&plain);
     assert!(gained < 0.7, "{gained}");

@@ -14,6 +14,7 @@ fuzz_target!(|bytes: &[u8]| {
     let reading = Reading {
         has_header: bit(0),
         keeps_text: bit(1),
+        is_strict: bit(5),
         stated: Stated {
             separator: bit(2).then_some(Separator::Char(if bit(3) { ';' } else { '\t' })),
             decimal_comma: bit(4).then_some(bit(3)),

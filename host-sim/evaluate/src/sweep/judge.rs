@@ -423,7 +423,9 @@ impl<'s> Frames<'s> {
 
     /// Errors of the `model` of a still subject, and of the baselines.
     pub fn decoders(&self, judged: &Judged, filter: bool) -> Vec<DecoderErrors> {
-        let network = DecoderErrors::new(metrics::NETWORK, judged.way(filter).errors.clone());
+        let Way { errors, blocks, .. } = judged.way(filter);
+        let network = DecoderErrors::new(metrics::NETWORK, errors.clone());
+        let network = DecoderErrors { blocks: blocks.clone(), ..network };
         std::iter::once(network).chain(self.baselines.iter().cloned()).collect()
     }
 }

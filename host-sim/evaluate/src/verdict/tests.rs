@@ -7,9 +7,9 @@ use taxel_core::rbf::Format;
 use super::*;
 
 fn decoders(of: &[(&str, &[(&str, f64)])]) -> Vec<DecoderErrors> {
-    let decoder = |(name, groups): &(&str, &[(&str, f64)])| DecoderErrors {
-        decoder: (*name).into(),
-        errors: groups.iter().map(|(name, rmse)| Errors::of(name, *rmse, 0.0)).collect(),
+    let decoder = |(name, groups): &(&str, &[(&str, f64)])| {
+        let errors = groups.iter().map(|(name, rmse)| Errors::of(name, *rmse, 0.0));
+        DecoderErrors::new(name, errors.collect())
     };
     of.iter().map(decoder).collect()
 }
@@ -50,7 +50,6 @@ fn every_warning_is_raised_and_left_out() {
         (Warning::few_frames(829, 64, 18), "few-frames"),
         (Warning::few_test_frames(29), "few-test-frames"),
         (Warning::trained_on(true), "judged-by-training-data"),
-        (Warning::out_of_range(0.0101), "readings-out-of-range"),
         (Warning::larger_than_slot(131_073, &mat(64)), "larger-than-slot"),
         (Warning::outliers(&outliers(1)), "outliers"),
     ];
@@ -64,11 +63,10 @@ fn every_warning_is_raised_and_left_out() {
         Warning::few_frames(830, 64, 18),
         Warning::few_test_frames(30),
         Warning::trained_on(false),
-        Warning::out_of_range(0.0099),
         Warning::larger_than_slot(131_072, &mat(64)),
         Warning::outliers(&outliers(0)),
     ];
-    assert_eq!(left_out, [const { None }; 6]);
+    assert_eq!(left_out, [const { None }; 5]);
 }
 
 #[test]
@@ -80,10 +78,10 @@ fn a_verdict_tells_gains_and_losses_over_mean_and_linear() {
         let verdict = Verdict::new(&all, &no_limit());
         (names(&verdict).concat(), verdict.sentence)
     };
-    let (missing, gain, worse) = (f64::NAN, "no-gain-over-linear", "worse-than-baseline");
+    let (missing, worse) = (f64::NAN, "worse-than-baseline");
     for (network, mean, linear, warning, part) in [
-        ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], gain, "75 to 90 % below always predicting the mean"),
-        ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], gain, "0 to 67 % below the best linear decoder"),
+        ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], "", "75 to 90 % below always predicting the mean"),
+        ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], "", "0 to 67 % below the best linear decoder"),
         ([0.63, 0.3], [1.0, 1.0], [0.5, 0.5], worse, "26 % above to 40 % below the best linear"),
         ([0.63, 0.6], [1.0, 1.0], [0.5, 0.5], worse, "20 to 26 % above the best linear decoder"),
         ([0.0, 0.1], [0.0, 1.0], [0.0, 0.3], "", "f_n does not change in these frames"),
@@ -111,6 +109,23 @@ fn a_model_that_loses_to_a_baseline_is_told_so_by_output() {
     assert!(verdict.sentence.ends_with(better), "{}", verdict.sentence);
     assert_eq!(names(&verdict), ["no-gain-over-mean", "worse-than-baseline"]);
     assert!(verdict.warnings[1].text.starts_with("x_mm, y_mm, z_mm: a simpler decoder is better"));
+}
+
+#[test]
+fn errors_that_chance_explains_are_no_reason_to_warn() {
+    // Parts of 50 blocks, whose difference from none has a standard error of about a tenth of their size.
+    let with_parts = |size: f64| {
+        let mut all = decoders(&[("network", &[("f_n", 1.1)]), ("linear", &[("f_n", 1.0)])]);
+        let parts = (0..50).map(|block| size * f64::from(block / 5 * 7 % 10 - 4));
+        all[0].blocks.insert("f_n".into(), parts.collect());
+        all[1].blocks.insert("f_n".into(), vec![0.0; 50]);
+        all.extend(decoders(&[("mean", &[("f_n", 1.3)])]));
+        Verdict::new(&all, &no_limit())
+    };
+    assert_eq!(names(&with_parts(0.01)), ["worse-than-baseline"]);
+    let unsure = with_parts(0.1);
+    assert_eq!(names(&unsure), [""; 0]);
+    assert!(!unsure.sentence.contains("A simpler decoder"), "{}", unsure.sentence);
 }
 
 #[test]

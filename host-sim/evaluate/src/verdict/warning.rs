@@ -1,16 +1,13 @@
 //! Warnings, each by a name of its own.
 
 use serde::Serialize;
-use taxel_core::blob::Model;
 use taxel_core::rbf::Format;
 use taxel_core::reading_model::ReadingModel;
 use taxel_data::Table;
 use taxel_data::error::cut;
-use taxel_firmware::capacity::Capacity;
 use taxel_learn::cost::{Design, NetworkDesign};
 use taxel_learn::outliers::Outliers;
 use taxel_learn::train::projection;
-use taxel_rig::image;
 use taxel_simulate::noise::Noise;
 
 use super::significant;
@@ -27,9 +24,6 @@ pub const FEW_TEST_FRAMES: usize = 30;
 
 /// Number of training frames below which intervals cover noticeably more or fewer errors than they say.
 pub const FRAMES_FOR_CONFIDENCE: usize = 300;
-
-/// Share of readings outside the training range above which a warning is due.
-pub const OUT_OF_RANGE: f64 = 0.01;
 
 /// Least share by which averaging twice as many samples must lower the noise to pay.
 const PAYS: f64 = 0.1;
@@ -62,7 +56,7 @@ impl Warning {
         Self::when(!groups.is_empty(), "no-gain-over-mean", || {
             let groups = groups.join(", ");
             format!(
-                "{groups}: at most 2 % better than always predicting the mean; do not use these estimates"
+                "{groups}: not surely better than always predicting the mean; do not use these estimates"
             )
         })
     }
@@ -73,17 +67,6 @@ impl Warning {
             let groups = groups.join(", ");
             format!(
                 "{groups}: a simpler decoder is better, so the model is not worth its cost there (docs/trouble.md)"
-            )
-        })
-    }
-
-    /// Groups of outputs that a linear decoder decodes as well, or nearly.
-    pub fn no_gain_over_linear(groups: &[&str]) -> Option<Self> {
-        Self::when(!groups.is_empty(), "no-gain-over-linear", || {
-            let groups = groups.join(", ");
-            format!(
-                "{groups}: at most 2 % better than a linear decoder, so a network gains nothing there; a larger --penalty may \
-                 help"
             )
         })
     }
@@ -141,18 +124,6 @@ impl Warning {
         })
     }
 
-    /// More than [`OUT_OF_RANGE`] of a network's inputs outside the range that it was trained on: readings, or what a
-    /// projection makes of them.
-    pub fn out_of_range(share: f64) -> Option<Self> {
-        Self::when(share > OUT_OF_RANGE, "readings-out-of-range", || {
-            format!(
-                "{:.1} % of the network's inputs lie outside the range that it was trained on, and are clamped; is it \
-                 the right model for this sensor, and is every reading sound?",
-                100.0 * share
-            )
-        })
-    }
-
     /// Contacts that a model was not trained on and decodes much worse, the worst in words, and a number of `more`.
     pub fn other_contacts(worst: &[String], more: usize, has_novelty: bool) -> Option<Self> {
         Self::when(!worst.is_empty(), "other-contacts", || {
@@ -194,18 +165,12 @@ impl Warning {
         })
     }
 
-    /// Readings at rest that drift, and what may help.
+    /// Readings at rest that drift.
     pub fn drift(rest: &RestOverTime) -> Option<Self> {
         Self::when(!rest.drifts.is_empty(), "drift-at-rest", || {
-            let (of, help) = match rest.percent_of {
-                PercentOf::Rest => (
-                    "",
-                    "try --relative-inputs, which takes readings over the baseline of the pause before",
-                ),
-                PercentOf::Range => (
-                    " of its range",
-                    "subtract the mean of each pause before training (docs/drift.md)",
-                ),
+            let of = match rest.percent_of {
+                PercentOf::Rest => "",
+                PercentOf::Range => " of its range",
             };
             let named = rest.drifts.iter().take(MOST_NAMED);
             let named: Vec<String> = named
@@ -215,7 +180,11 @@ impl Warning {
                 1 => "an input drifts".to_owned(),
                 count => format!("{count} of {} inputs drift", rest.readings),
             };
-            format!("at rest, {count} {}: {}; {help}", rest.span, named.join(", "))
+            format!(
+                "at rest, {count} {}: {}; docs/drift.md tells what may help",
+                rest.span,
+                named.join(", ")
+            )
         })
     }
 
@@ -255,12 +224,6 @@ impl Warning {
                 "the blob takes {bytes} bytes, and a slot of the firmware's images holds {SLOT_BYTES}: {fix}"
             )
         })
-    }
-
-    /// Model that the images as they are have no room for, or whose readings they do not scan.
-    pub fn other_image(model: &Model<'_>) -> Option<Self> {
-        let needed = image::needed(model, Capacity::PAPER);
-        needed.and_then(|needed| Self::when(true, "other-image", || needed))
     }
 }
 
