@@ -1,14 +1,16 @@
-//! Keys of the results of every main command, which programs rely on, held to `testdata/json-keys.txt`.
+//! Results of every main command, held to two files: `testdata/json-keys.txt` has the keys of JSON, which programs rely on,
+//! and their first values; `testdata/printed.txt` has what people read. Whoever changes a number there says why.
 
-use std::collections::BTreeSet;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::common::{Folder, small_scene_with_table1, tiny_scene};
+use crate::common::{Folder, small_scene, small_scene_with_table1, tiny_scene};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 37] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --reading-model full -o m.bin",
@@ -28,49 +30,258 @@ const COMMANDS: [&str; 19] = [
     "sweep plan.toml --list",
     "sweep plan.toml --shard 1/2 -o out/tiny",
     "sweep plan.toml",
+    // A row and a column broken at once.
+    "train press -n 1440 --centres 6 --no-refine --reading-model full -o press.bin",
+    "synth press -n 30 --seed 4 -o press.csv",
+    "eval press.bin press.csv --without r4c*_ohm,r*c5_ohm --html eval.html",
+    // Pages and pictures of measurements, one of which drifts, and is touched now and then.
+    "run log.csv --inputs ch* --outputs f* --rest f* --no-refine --centres 6 -o log",
+    "train log.csv --inputs ch* --outputs f* --relative-inputs --each-row --no-refine --centres 6 --first-share 0.7 -o l.bin",
+    "eval l.bin log.csv --last-share 0.3 --html l.html",
+    "decode l.bin log.csv --keep time_s --filter-ms 40 --lead-ms 5 -o l.csv",
+    "run contact.toml -o places",
+    "run drifts.toml --relative-inputs -o drifts",
+    "run moving.toml -o moves",
+    "synth moving.toml -n 40 --frame-rate 200 --scan-ms 2 -o moves.csv",
+    "synth drifts.toml -n 20 --scale 1.5 --seed 3 -o scaled.csv",
+    "limit spans.toml --noise 0.01,0.03 -n 4 -o spans",
+    "trade scene.toml --centres 4,6 --average 1,4 --column-step 1,3 --frame-rate 50 --all -o rates",
+    "trade tiny.toml --centres 4 --readout onchip --average 1,4 --max-latency-ms 9 --clock-mhz 90 --worst-case -o slow",
+    "trade moving.toml --centres 4 --max-error 1 --scan-ms 3 -o moving-trade",
+    "sweep all.toml",
+    "sweep folds.toml",
 ];
 
-/// Adds the keys in `value`, each with those that it stands in.
-fn add_keys(value: &Value, path: &str, keys: &mut BTreeSet<String>) {
-    match value {
-        Value::Object(members) => {
-            for (key, member) in members {
-                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-                add_keys(member, &path, keys);
-                keys.insert(path);
-            }
-        }
-        Value::Array(items) => items.iter().for_each(|item| add_keys(item, path, keys)),
-        _ => {}
-    }
+/// Axes of all kinds, with prices, bounds and draws.
+const ALL: &str = "name = \"all\"\nscene = \"tiny.toml\"\nlimit_frames = 4\nrepeats = 2\nalso = [\"baselines\", \"other_contacts\"]\n\
+                   objectives = [\"rmse_dz_mm\", \"frame_ms\", \"cost_eur\"]\n\
+                   [axes]\ndevice.samples = [1, 3]\ntraining.relative_inputs = [false, true]\n\
+                   [draw]\npoints = 3\nseed = 5\n[draw.axes]\nnoise.level = { from = 0.002, to = 0.05, log = true }\n\
+                   [prices]\nfixed_eur = 1.5\nrow_eur = 0.25\ncolumn_eur = 0.125\ncm2_eur = 3.0\n\
+                   [bounds]\nframe_ms = 40\nframes_per_s = { least = 1 }\n";
+
+/// Folds of measurements, with results that repeat over them.
+const FOLDS: &str = "name = \"folds\"\n[data]\nfile = \"log.csv\"\ninputs = \"ch*\"\noutputs = \"f*\"\nfold_blocks = 3\n\
+                     [set]\ntraining.refine = false\n[axes]\ndata.fold = [0, 1, 2]\ntraining.centres = [3, 5]\n";
+
+/// Presses of different strengths on three channels that drift apart, with rest between them.
+fn log() -> String {
+    let line = |i: i32| {
+        let t = 0.01 * f64::from(i);
+        let press = (0.7 * t).sin().max(0.0) * (1.0 + (0.31 * t).cos());
+        let [x, z] = [press * (2.3 * t).sin(), 5.0 * press];
+        let drift = 1.0 + 0.002 * t;
+        let rough = f64::from((i * 7919) % 101) / 500.0;
+        let readings = [
+            90.0 * drift - 4.0 * z + x,
+            70.0 / drift + 2.0 * z * z + rough,
+            80.0 + 9.0 * x - rough,
+        ];
+        let [a, b, c] = readings;
+        format!("{t},{a},{b},{c},{x},{z}\n")
+    };
+    "time_s,ch1_ohm,ch2_ohm,ch3_ohm,fx_n,fz_n\n".to_owned()
+        + &(0..1500).map(line).collect::<String>()
 }
 
-#[test]
-fn keys_of_results_stay_as_they_are() {
+/// Scenes, plans and measurements of all commands.
+fn prepared() -> Folder {
     let folder = Folder::new("json_keys");
     let scene = small_scene_with_table1();
     folder.write("scene.toml", scene.replace("frames = 3000", "frames = 600"));
     let tiny = tiny_scene().replace("name = \"small\"", "name = \"tiny\"");
-    folder.write("tiny.toml", tiny);
     folder.write("plan.toml", crate::sweep::PLAN.replace("scene.toml", "tiny.toml"));
-    let mut found = String::from(
-        "# Keys of each command's JSON. TAXEL_ACCEPT=1 cargo test -p host-sim --test all json_keys writes them anew.\n",
+    let few = |scene: &str| {
+        let few =
+            scene.replace("frames = 20000", "frames = 400").replace("frames = 8000", "frames = 60");
+        few.replace("centres = 64", "centres = 8")
+            .replace("trajectories = 64", "trajectories = 2")
+            .replace("[training]", "[training]\nrefine = false")
+    };
+    folder.write("contact.toml", few(include_str!("../../../scenes/contact.toml")));
+    folder.write("moving.toml", few(include_str!("../../../scenes/moving.toml")));
+    let level = "kind = \"relative\"\nlevel = 0.005";
+    let drifts = "kind = \"absolute\"\nlevel_ohm = 0.4\ncorrelated_level_ohm = 0.3\ntime_constant_ms = 20.0\n\n[drift]\ngain = 0.03";
+    folder.write(
+        "drifts.toml",
+        small_scene().replace("frames = 3000", "frames = 300").replace(level, drifts),
     );
+    folder.write(
+        "spans.toml",
+        tiny.replace("\"relative\"", "\"span\"").replace("\"tiny\"", "\"spans\""),
+    );
+    folder.write("tiny.toml", tiny);
+    folder.write("all.toml", ALL);
+    folder.write("folds.toml", FOLDS);
+    folder.write("log.csv", log());
+    folder
+}
+
+/// Values in JSON by their keys, each key with those that it stands in.
+type Values = BTreeMap<String, Vec<String>>;
+
+fn add_values(value: &Value, path: &str, values: &mut Values) {
+    match value {
+        Value::Object(members) => {
+            for (key, member) in members {
+                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                values.entry(path.clone()).or_default();
+                // What differs from run to run, and from build to build.
+                if !["seconds", "version", "id", "points_per_s"].contains(&key.as_str()) {
+                    add_values(member, &path, values);
+                }
+            }
+        }
+        Value::Array(items) => items.iter().for_each(|item| add_values(item, path, values)),
+        Value::String(text) => values.entry(path.into()).or_default().push(text.replace('\n', " ")),
+        value => values.entry(path.into()).or_default().push(value.to_string()),
+    }
+}
+
+/// Text of a value: four digits of a number that is not whole.
+fn short(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(number) if number.fract() != 0.0 => format!("{number:.3e}"),
+        _ => text.chars().take(60).collect(),
+    }
+}
+
+/// All of up to three values; of more the first, the last, and their weighted mean, which tells an order from another.
+fn few(values: &[String]) -> String {
+    if let [first, _, _, .., last] = values {
+        let numbers = values.iter().map(|it| it.parse::<f64>().unwrap_or(0.0)).zip(1..);
+        let count = values.len() as f64;
+        let mean =
+            numbers.map(|(value, place)| value * f64::from(place)).sum::<f64>() / count / count;
+        return format!("{} … {} ({count}, {mean:.3e})", short(first), short(last));
+    }
+    values.iter().map(|value| short(value)).collect::<Vec<_>>().join(" | ")
+}
+
+/// Compares the cells of a CSV file of points with those that JSON has by the same keys.
+fn compare_points(name: &str, csv: &str, printed: &Value) {
+    let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let heads = lines.next().unwrap();
+    let points = printed["points"].as_array().unwrap();
+    for cells in lines {
+        let point = points.iter().find(|point| point["id"] == cells[0]).unwrap();
+        for (head, cell) in heads.iter().zip(cells) {
+            // Only CSV has notes, which are sentences.
+            let Some(value) = point.get(head) else { continue };
+            let same = match value {
+                Value::Null => cell.is_empty(),
+                Value::Bool(value) => value.to_string() == cell,
+                Value::String(text) => text == cell,
+                value => value.as_f64() == cell.parse().ok(),
+            };
+            assert!(same, "{name}, {head}: {cell}, and in JSON {value}");
+        }
+    }
+}
+
+/// Number of a content, by which a change is seen (FNV-1a).
+fn digest(content: &[u8]) -> u64 {
+    content.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
+    })
+}
+
+/// All files below a folder, but for points of sweeps, whose names tell the build.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut all = vec![];
+    for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        if entry.is_dir() {
+            all.extend(
+                files(&entry)
+                    .into_iter()
+                    .filter(|it| !it.components().any(|part| part.as_os_str() == "points")),
+            );
+        } else {
+            all.push(entry);
+        }
+    }
+    all.sort();
+    all
+}
+
+/// A digest of a file; JSON and points are what the command `printed`.
+fn read(path: &Path, content: &[u8], printed: &Value) -> String {
+    let name = path.to_string_lossy();
+    let text = String::from_utf8_lossy(content).replace(env!("CARGO_PKG_VERSION"), "");
+    let content = match path.extension().and_then(|end| end.to_str()) {
+        Some("json") => {
+            let file: Value = serde_json::from_slice(content).unwrap();
+            for (key, value) in file
+                .as_object()
+                .unwrap()
+                .iter()
+                .filter(|it| !["seconds", "version"].contains(&it.0.as_str()))
+            {
+                assert!(printed.get(key).is_none_or(|printed| printed == value), "{name}: {key}");
+            }
+            return String::new();
+        }
+        Some("csv") if text.starts_with("id,") => {
+            compare_points(&name, &text, printed);
+            return String::new();
+        }
+        Some("csv") => text.split([',', '\n']).map(short).collect::<Vec<_>>().join(","),
+        Some("html") => text.split_once("</style>").unwrap().1.into(),
+        _ => text,
+    };
+    format!("  {name} {:016x}\n", digest(content.as_bytes()))
+}
+
+/// Compares with a file in `testdata`, which `TAXEL_ACCEPT` writes anew.
+fn hold(name: &str, found: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name);
+    if std::env::var_os("TAXEL_ACCEPT").is_some() {
+        fs::write(&path, found).unwrap();
+    }
+    let accepted = fs::read_to_string(&path).unwrap();
+    let mut command = "";
+    for (found, accepted) in found.lines().zip(accepted.lines()) {
+        command = if COMMANDS.contains(&found) { found } else { command };
+        assert_eq!(
+            found, accepted,
+            "{name}, {command}: TAXEL_ACCEPT=1 accepts it; docs/json.md and CHANGELOG.md name changed keys"
+        );
+    }
+    assert_eq!(found.lines().count(), accepted.lines().count(), "{name}");
+}
+
+#[test]
+fn results_stay_as_they_are() {
+    let folder = prepared();
+    let mut known: BTreeSet<(PathBuf, Vec<u8>)> = BTreeSet::new();
+    let mut add_files = |printed: &Value| {
+        let root = folder.path("");
+        let all = files(&root)
+            .into_iter()
+            .map(|path| (path.strip_prefix(&root).unwrap().to_owned(), fs::read(&path).unwrap()));
+        let new: Vec<_> = all.filter(|file| known.insert(file.clone())).collect();
+        new.iter().map(|(path, content)| read(path, content, printed)).collect::<String>()
+    };
+    add_files(&Value::Null);
+    let first = "# TAXEL_ACCEPT=1 cargo test -p host-sim --test all json_keys writes this anew.\n";
+    let [mut keys, mut printed] = [
+        "# Keys of each command's JSON, and some of their values.\n",
+        "# What commands print, and the files that they write.\n",
+    ]
+    .map(|what| what.to_owned() + first);
     for command in COMMANDS {
         let arguments: Vec<&str> = command.split(' ').collect();
         let result = folder.json(&arguments);
         assert_eq!(result["command"], arguments[0]);
-        let mut keys = BTreeSet::new();
-        add_keys(&result, "", &mut keys);
-        found.extend(["\n", command, "\n"]);
-        found.extend(keys.iter().flat_map(|key| ["    ", key, "\n"]));
+        let text = folder.succeed(&arguments);
+        let mut values = Values::new();
+        add_values(&result, "", &mut values);
+        keys.extend(["\n", command, "\n"]);
+        keys.extend(values.iter().map(|(key, values)| {
+            format!("    {key}  {}", few(values)).trim_end().to_owned() + "\n"
+        }));
+        printed.extend(["\n", command, "\n", &text, &add_files(&result)]);
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata/json-keys.txt");
-    if std::env::var_os("TAXEL_ACCEPT").is_some() {
-        std::fs::write(&path, &found).unwrap();
-    }
-    let accepted = std::fs::read_to_string(&path).unwrap();
-    let changed = found.lines().zip(accepted.lines()).find(|(found, accepted)| found != accepted);
-    assert_eq!(changed, None, "keys changed: docs/json.md and CHANGELOG.md name them");
-    assert_eq!(found.lines().count(), accepted.lines().count());
+    hold("json-keys.txt", &keys);
+    hold("printed.txt", &printed);
 }
