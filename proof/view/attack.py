@@ -177,7 +177,7 @@ def crowds(feeder: Feeder) -> None:
 
     viewers = [feeder.events() for _ in range(30)]
     statuses = [viewer.recv(12)[-3:] for viewer in viewers]
-    check(statuses.count(b"200") == 7, f"of 30 more viewers {statuses.count(b'200')} are served (the good one is the eighth)")
+    check(statuses.count(b"200") == 4, f"of 30 more viewers {statuses.count(b'200')} are served (the good one is the fifth)")
     check(statuses.count(b"503") == 23, "and the rest told that there are too many")
     before = feeder.memory_kb()
     # They do not read: their threads wait, then let them go.

@@ -142,7 +142,7 @@ const reads = (page, id, pattern) => until(page, (id, pattern) => new RegExp(pat
   check(noticed.errors.length === 0, `no complaint in the console ${noticed.errors}`);
 
   await stop(feeder);
-  check(await reads(page, "banner", "does not answer"), `without the server: ${await text(page, "banner")}`);
+  check(await reads(page, "banner", `does not answer.*--http-port ${port} --token ${TOKEN}`), `without the server: ${await text(page, "banner")}`);
   await wait(2500);
   const stopped = Date.now();
   [feeder] = await feed("show=device", "rate=200", `port=${port}`);
@@ -151,6 +151,22 @@ const reads = (page, id, pattern) => until(page, (id, pattern) => new RegExp(pat
   const kinds = [...new Set(noticed.errors)];
   check(kinds.every((words) => /ERR_(CONNECTION|INCOMPLETE|EMPTY|SOCKET)/.test(words)), `complaints of the network alone while it was gone: ${kinds}`);
   await page.close();
+  await stop(feeder);
+}
+
+// ---- More tabs than a browser has connections to a host ----
+{
+  const [feeder, address] = await feed("show=device"), pages = [];
+  for (let count = 0; count < 8; count++) pages.push(await browser.newPage());
+  for (const page of pages) await page.goto(address, { waitUntil: "domcontentloaded" });
+  const page = pages[7];
+  await page.bringToFront();
+  check(await reads(page, "shown_rate", "[1-9]"), "the eighth tab shows pictures");
+  await page.keyboard.press("r");
+  check(await reads(page, "recording", "mcap"), "and records");
+  await page.keyboard.press(" ");
+  check(await reads(page, "state", "paused"), "and pauses");
+  for (const page of pages) await page.close();
   await stop(feeder);
 }
 

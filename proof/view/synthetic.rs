@@ -356,6 +356,7 @@ impl Source {
             .into(),
             scan_rate: is_live.then_some(self.rate as f32),
             decode_rate: is_live.then_some(self.rate as f32),
+            rest: String::new(),
             lost: u64::from(self.show == "fault") * since_start.as_secs(),
             wires: if self.show == "fault" {
                 vec![Wire {

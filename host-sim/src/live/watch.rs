@@ -66,6 +66,8 @@ struct Watch<'w, 'b> {
     view: &'w View,
     watched: &'w Watched<'b>,
     baseline: Option<Vec<f32>>,
+    /// What the baseline is of, in words; empty if the feed tells it.
+    rest: &'static str,
     /// The newest frames, whose mean can become the baseline.
     newest: VecDeque<Vec<f32>>,
     wires: Wires,
@@ -96,6 +98,7 @@ impl<'w, 'b> Watch<'w, 'b> {
             view,
             watched,
             baseline,
+            rest: "",
             newest: VecDeque::new(),
             wires,
             recorder: None,
@@ -126,7 +129,7 @@ impl<'w, 'b> Watch<'w, 'b> {
                 }
                 self.wires = Wires::new(&self.feed.layout().readings);
                 (self.baseline, self.newest) = (self.feed.baseline(), VecDeque::new());
-                (self.touch, self.is_touched) = (None, false);
+                (self.touch, self.is_touched, self.rest) = (None, false, "");
                 self.show_layout();
             }
         }
@@ -174,7 +177,10 @@ impl<'w, 'b> Watch<'w, 'b> {
         if let Some((state, message)) = &self.trouble {
             return (*state, message.clone());
         }
-        let said = self.feed.note().into_iter().chain(self.remark.clone());
+        let seeks_rest = self.touch.is_none() && self.newest.len() == ZERO_FRAMES;
+        let words = "no rest is known yet, since readings are not steady: let go of the sensor";
+        let said = seeks_rest.then(|| words.into()).into_iter();
+        let said = said.chain(self.feed.note()).chain(self.remark.clone());
         let said = said.chain((!wires.is_empty()).then(|| {
             let words: Vec<&str> = wires.iter().take(2).map(|wire| wire.words.as_str()).collect();
             words.join("; ")
@@ -196,6 +202,9 @@ impl<'w, 'b> Watch<'w, 'b> {
             && self.newest.len() == ZERO_FRAMES
             && unsteady(self.feed.layout(), self.newest.make_contiguous()).is_none()
         {
+            if self.baseline.is_none() {
+                self.rest = "first steady frames";
+            }
             self.set_rest(self.baseline.clone());
         }
         self.wires.push(&moment.frame.readings);
@@ -284,6 +293,7 @@ impl<'w, 'b> Watch<'w, 'b> {
             ));
         }
         self.set_rest(None);
+        self.rest = "last zero";
         let baseline = self.baseline.as_deref().unwrap_or_default();
         self.feed.zero(baseline)?;
         Ok(format!("zeroed by the mean of {ZERO_FRAMES} frames"))
@@ -355,6 +365,7 @@ impl<'w, 'b> Watch<'w, 'b> {
             message,
             scan_rate: rate(self.past.len()),
             decode_rate: rate(decoded).filter(|_| decoded > 0),
+            rest: self.rest.into(),
             lost: self.feed.lost(),
             wires,
             recording: self.recorder.as_ref().map(Recorder::for_page),
@@ -421,10 +432,12 @@ mod tests {
             assert_eq!(show(&mut watch, f32::from(step) * 0.05, Some(0.5)), (false, Some(0.5)));
         }
         assert!(watch.zero().unwrap_err().contains("not steady"));
+        assert!(watch.state(&[]).1.contains("let go of the sensor"));
         for _ in 0..ZERO_FRAMES {
             show(&mut watch, 0.0, Some(0.1));
         }
         assert!((watch.baseline.as_ref().unwrap()[1] - 7.0).abs() < 1e-3);
+        assert_eq!((watch.state(&[]).1.as_str(), watch.rest), ("", "first steady frames"));
         assert_eq!(show(&mut watch, 0.0, Some(0.1)), (false, Some(0.1)));
         assert_eq!(show(&mut watch, 0.5, Some(2.0)), (true, Some(2.0)));
         let refused = watch.zero().unwrap_err();

@@ -1,10 +1,12 @@
 // The readings: a cell each, in rows and columns of wires.
 
-const matrix = { isRelative: false, low: Infinity, high: -Infinity, most: 0.02, boxes: null };
+/** Least change at the ends of the scale: as large for all sources, so that their pictures compare. */
+const LEAST_CHANGE = 0.1;
+const matrix = { isRelative: false, low: Infinity, high: -Infinity, most: LEAST_CHANGE, boxes: null };
 
 /** Forgets the scales: they begin with the baseline again, and grow with what is seen. */
 function resetMatrix() {
-  Object.assign(matrix, { low: Infinity, high: -Infinity, most: 0.02 });
+  Object.assign(matrix, { low: Infinity, high: -Infinity, most: LEAST_CHANGE });
   for (const value of baseline ?? []) widen(value);
   // Room for a press that lowers every reading.
   const span = matrix.high - matrix.low;
@@ -50,7 +52,9 @@ function drawMatrix(canvas, layout, frame, wires) {
     widen(value);
     if (change !== null) matrix.most = Math.max(matrix.most, roundUp(Math.abs(change)));
   });
-  const span = matrix.high - matrix.low || 1;
+  // Round ends, which noise does not move.
+  const step = roundUp((matrix.high - matrix.low) / 4 || 1), low = Math.floor(matrix.low / step) * step;
+  const high = Math.ceil(matrix.high / step) * step, span = high - low || 1;
   // As in the sheet and on the pages of reports: the first row is the lowest.
   const topOf = (row) => top + (isMatrix ? rows - 1 - row : row) * tall;
   matrix.boxes = { left, top, cell, tall, rows, columns, isMatrix };
@@ -61,7 +65,7 @@ function drawMatrix(canvas, layout, frame, wires) {
       box(context, theme.hatched, x + 0.5, y + 0.5, cell - 1, tall - 1);
       continue;
     }
-    const colour = shade(isRelative, isRelative ? 0.5 + value / matrix.most / 2 : (value - matrix.low) / span);
+    const colour = shade(isRelative, isRelative ? 0.5 + value / matrix.most / 2 : (value - low) / span);
     box(context, colour.css, x + 0.5, y + 0.5, cell - 1, tall - 1);
     if (sheet.hasNumbers && cell > 19) {
       const text = isRelative ? digits(value * 100, Math.abs(value) < 0.0995 && cell > 24 ? 1 : 0) : short(value);
@@ -91,7 +95,7 @@ function drawMatrix(canvas, layout, frame, wires) {
   const unit = layout.readings[0]?.unit ?? "";
   const ticks = isRelative
     ? [-matrix.most, 0, matrix.most].map((value) => `${digits(value * 100, matrix.most < 0.05 ? 1 : 0)} %`)
-    : isFinite(matrix.low) ? [matrix.low, (matrix.low + matrix.high) / 2, matrix.high].map((value, index) => short(value) + (index === 2 ? ` ${unit}` : "")) : [];
+    : isFinite(low) ? [low, (low + high) / 2, high].map((value, index) => short(value) + (index === 2 ? ` ${unit}` : "")) : [];
   legend(context, isRelative, left, top + tall * rows + 10, Math.min(340, width - left), ticks, isRelative ? relativeName(layout) : absoluteName(layout));
 }
 

@@ -4,7 +4,8 @@ const byId = (id) => document.getElementById(id);
 /** Address of a path, with the page's token. */
 const address = (path, more = "") => path + location.search + more;
 const MOST_CHARTS = 12;
-const GONE = `The program at ${location.host} does not answer. Start it again: this page comes back by itself.`;
+const TOKEN = new URLSearchParams(location.search).get("token");
+const GONE = `The program at ${location.host} does not answer. Started again with --http-port ${location.port} --token ${TOKEN}, it is found by this page.`;
 /** Time in ms without an event after which the server is taken for gone. */
 const SILENCE_MS = 3500;
 /** Longest time in ms that events may be held up on their way. */
@@ -17,6 +18,8 @@ let arrived = 0, arrivedAge = 0;
 let drawn = [];
 let contact = { trace: new Trace(2), chart: null, wasSeen: false, hasForce: false };
 let values = { trace: new Trace(0), charts: [], numbers: [], outputs: [] };
+/** Whether a frame had outputs or their truth: without any, their panels are not shown. */
+let hasOutputs = false;
 
 // ---- Events ----
 
@@ -27,6 +30,9 @@ let clocks = { now: Infinity, before: Infinity, since: 0 };
 function connect() {
   clearTimeout(retry);
   source?.close();
+  source = null;
+  // A tab that nobody sees leaves its connection to others.
+  if (document.hidden) return;
   source = new EventSource(address("/events", rate ? `&rate=${rate}` : ""));
   lastEvent = performance.now();
   clocks = { now: Infinity, before: Infinity, since: lastEvent };
@@ -83,10 +89,10 @@ function takeLayout(next) {
   byId("position").max = layout.duration_s ?? 1;
   setText("absolute", readings[0]?.unit || "value");
   setText("relative", relativeName(layout));
-  const [rows, columns, isMatrix] = sizeOf(layout);
-  setText("matrix_words", isMatrix ? `${rows} rows × ${columns} columns` : `${readings.length} readings`);
   contact = { trace: new Trace(2), chart: contact.chart, wasSeen: false, hasForce: false };
+  hasOutputs = false;
   makeValues(others);
+  showSize();
   resetSheet();
   resetMatrix();
   requestDraw();
@@ -107,6 +113,7 @@ function takeFrame(next) {
   if (frame.flags.includes("novel")) flags.set("nats", frame.novelty);
   const time = frame.time_us / 1e6, at = frame.contact;
   contact.wasSeen ||= !!at;
+  hasOutputs ||= frame.outputs.length > 0 || !!frame.truth;
   contact.hasForce ||= Number.isFinite(frame.force_n);
   contact.trace.push(time, [frame.force_n, at ? at.depth_mm : 0]);
   values.trace.push(time, values.outputs.slice(0, MOST_CHARTS).map((index) => frame.outputs[index]));
@@ -159,8 +166,11 @@ function showStatus() {
   setText("decode_rate", digits(status.decode_rate, 0));
   setText("lost", status.lost);
   byId("lost").style.color = status.lost ? theme.warn : "";
-  setText("rmse", digits(status.rmse_mm, 3));
-  setText("times_limit", digits(status.times_limit));
+  if (layout) showSize();
+  if (!isPaused) {
+    setText("rmse", digits(status.rmse_mm, 3));
+    setText("times_limit", digits(status.times_limit));
+  }
   press("pause", isPaused);
   byId("pause").firstElementChild.textContent = isPaused ? "Go on" : "Pause";
   press("record", !!recording);
@@ -172,6 +182,12 @@ function showStatus() {
     setText("speed_words", `× ${plain(status.speed)}`);
   }
   showBanner();
+}
+
+function showSize() {
+  const [rows, columns, isMatrix] = sizeOf(layout), rest = status?.rest;
+  const size = isMatrix ? `${rows} rows × ${columns} columns` : `${layout.readings.length} readings`;
+  setText("matrix_words", rest ? `${size}, rest: ${rest}` : size);
 }
 
 function showWires(wires) {
@@ -235,7 +251,9 @@ function draw() {
 
 function showNumbers() {
   const at = frame.contact, { hasForce, trace } = contact;
-  byId("contact_card").hidden = !shape && !contact.wasSeen;
+  byId("sheet_card").hidden = !shape || !hasOutputs;
+  byId("values_card").hidden = !values.outputs.length || !hasOutputs;
+  byId("contact_card").hidden = !contact.wasSeen && byId("sheet_card").hidden;
   byId("force_item").hidden = !hasForce;
   setText("force", digits(frame.force_n ?? 0));
   setText("depth", digits(at?.depth_mm ?? 0));
@@ -249,7 +267,7 @@ function showNumbers() {
     number.textContent = short(value) + (Number.isFinite(deviation) ? ` ± ${short(deviation)}` : "") + (Number.isFinite(truth) ? ` (true ${short(truth)})` : "");
   });
   if (!frame.truth) return;
-  byId("error_card").hidden = !shape;
+  byId("error_card").hidden = !shape || !frame.outputs.length;
   const pairs = layout.electrodes.map(({ outputs }) => outputs[2]).filter((index) => index !== null);
   const sum = pairs.reduce((sum, index) => sum + (frame.outputs[index] - frame.truth[index]) ** 2, 0);
   setText("frame_rmse", digits(pairs.length ? Math.sqrt(sum / pairs.length) : null, 3));
@@ -499,4 +517,5 @@ readTheme();
 isDark.addEventListener("change", () => { readTheme(); fit(); });
 new ResizeObserver(fit).observe(document.body);
 setInterval(showRates, 250);
+document.addEventListener("visibilitychange", connect);
 connect();

@@ -33,8 +33,8 @@ const opacity = (deviation) => deviation === null ? 1 : Math.max(0.12, 1 - 2 * d
 const zShare = (dz) => 0.5 + dz / sheet.scale / 2;
 
 function drawSheet(canvas, layout, shape, frame) {
-  const panels = [["decoded", frame?.outputs ?? [], frame?.deviations ?? null]];
-  if (frame?.truth) panels.push(["truth", frame.truth, null]);
+  const panels = [["decoded", frame?.outputs ?? [], frame?.deviations ?? null], ["truth", frame?.truth, null]]
+    .filter(([, values], index) => values?.length || !index && !frame?.truth);
   const width = canvas.clientWidth, across = panels.length > 1 && width > 560 ? 2 : 1;
   const down = panels.length / across, panelWidth = width / across;
   const ratio = (shape.high[1] - shape.low[1]) / (shape.high[0] - shape.low[0]);
@@ -45,7 +45,7 @@ function drawSheet(canvas, layout, shape, frame) {
   sheet.spots = [];
   panels.forEach(([title, values, deviations], index) => {
     const area = { x: (index % across) * panelWidth, y: Math.floor(index / across) * panelHeight, width: panelWidth, height: panelHeight };
-    if (panels.length > 1) write(context, title, area.x + panelWidth / 2, area.y + 8, { colour: theme.text, weight: 600, size: 12.5 });
+    if (frame?.truth) write(context, title, area.x + panelWidth / 2, area.y + 8, { colour: theme.text, weight: 600, size: 12.5 });
     (sheet.is3d ? drawSolid : drawFlat)(context, area, layout, shape, frame, values, deviations, index === 0);
   });
   drawKey(context, width, height, shape, frame?.deviations);
@@ -138,7 +138,8 @@ function drawFlat(context, area, layout, shape, frame, values, deviations, isDec
   for (let y = lowY; y <= shape.high[1] + 1e-6; y += step) write(context, `${+y.toFixed(6)}`, toX(shape.low[0]) - 7, toY(y), { align: "right" });
   write(context, "x, mm", toX(shape.high[0]), originY + 25, { align: "right" });
   write(context, "y, mm", toX(shape.low[0]) - 3, area.y + 8, { align: "right" });
-  if (isDecoded && frame?.contact) {
+  // It would cover the numbers.
+  if (isDecoded && frame?.contact && !sheet.hasNumbers) {
     const { x_mm, y_mm } = frame.contact;
     context.strokeStyle = theme.text;
     context.lineWidth = 1.5;

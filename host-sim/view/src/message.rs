@@ -145,6 +145,8 @@ pub struct Status {
     pub scan_rate: Option<f32>,
     /// Frames a second that are decoded.
     pub decode_rate: Option<f32>,
+    /// What is taken for the sensor at rest, in words; empty if the source tells it.
+    pub rest: String,
     /// Number of frames that were lost on their way.
     pub lost: u64,
     /// Wires that are not good.

@@ -17,8 +17,8 @@ use crate::guard;
 use crate::http::{self, Head, Refusal, Timed};
 use crate::shared::{LEAST_INTERVAL, Seen, Shared};
 
-/// Largest number of viewers.
-pub const MOST_VIEWERS: usize = 8;
+/// Largest number of viewers. A browser has six connections to a host: one stays free for commands.
+pub const MOST_VIEWERS: usize = 5;
 /// Largest number of commands that wait for an answer.
 pub const MOST_COMMANDS: usize = 8;
 /// Largest number of connections that are neither viewers nor commands.

@@ -15,7 +15,7 @@ use crate::shared::Shared;
 /// A page in the browser that shows what it is given, until it is dropped.
 ///
 /// What gives it something only stores it: the newest wins, nothing waits for a browser, and memory does not grow. Only pages of this
-/// machine with the address's token are served, at most eight at a time.
+/// machine with the address's token are served, at most five at a time.
 pub struct View {
     shared: Arc<Shared>,
     socket: SocketAddr,
