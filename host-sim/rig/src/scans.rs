@@ -69,6 +69,11 @@ pub trait Source {
     /// If the line fails, or work is interrupted.
     fn hear(&mut self, deadline: Instant, take: &mut dyn FnMut(Scan)) -> Result<()>;
 
+    /// Number of bytes that came since the last scan and are none.
+    fn refused(&self) -> u64 {
+        0
+    }
+
     /// Tells the sensor its readings at rest, one a reading, if it can use them.
     ///
     /// # Errors

@@ -257,9 +257,14 @@ impl Feed for DeviceFeed<'_> {
             }
             Ok(None) if self.last.elapsed() > SILENCE => {
                 let silence = self.last.elapsed().as_secs();
-                let cause =
-                    format!("no data for {silence} s: is the cable in, and does the device scan?");
-                Ok(Next::Trouble(cause))
+                Ok(Next::Trouble(match listener.refused() {
+                    0 => format!(
+                        "no data for {silence} s: is the cable in, and does the device scan?"
+                    ),
+                    bytes => format!(
+                        "no scan for {silence} s, although {bytes} bytes came: are --protocol, --baud and --shape right?"
+                    ),
+                }))
             }
             Ok(None) => Ok(Next::Nothing),
             Err(cause) => {

@@ -267,7 +267,7 @@ fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wron
     let folder = Folder::new("view_reconnects");
     let port = folder.path("port");
     // A port that is unplugged and plugged in again: a link to one terminal after another.
-    let plug = || {
+    let plug = |line: &'static [u8]| {
         let (name, near, mut far) = terminal();
         drop(near);
         let _ = std::fs::remove_file(&port);
@@ -276,12 +276,12 @@ fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wron
         std::thread::spawn(move || {
             let wait = Duration::from_millis(5);
             while stopped.recv_timeout(wait) == Err(std::sync::mpsc::RecvTimeoutError::Timeout) {
-                let _ = far.write_all(b"1,2,3\n");
+                let _ = far.write_all(line);
             }
         });
         stop
     };
-    let plugged = plug();
+    let plugged = plug(b"1,2,3\n");
     let page = Page::of(&folder, &[port.to_str().unwrap(), "--protocol", "csv"]);
     let mut events = page.events();
     events.any("frame");
@@ -289,7 +289,12 @@ fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wron
     let status = events.next("status", |status| status["state"].as_str() == Some("no data"));
     let said = status["message"].as_str().unwrap();
     assert!(said.contains("no data from ") && said.contains("is the cable in"), "{said}");
-    let _plugged = plug();
+    let plugged = plug(b"of another speed");
+    let is_noise = |status: &Value| status["message"].as_str().unwrap().contains(" bytes came");
+    events.next("status", is_noise);
+    drop(plugged);
+    events.next("status", |status| status["message"].as_str().unwrap().contains("no data from "));
+    let _plugged = plug(b"1,2,3\n");
     events.next("status", |status| status["state"].as_str() == Some("live"));
     let frame = events.any("frame");
     assert_eq!(numbers(&frame["readings"]), [1.0, 2.0, 3.0]);

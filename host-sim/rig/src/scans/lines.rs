@@ -22,6 +22,7 @@ pub struct NumberLines {
     last: usize,
     start: Instant,
     scans: u32,
+    refused: u64,
 }
 
 impl NumberLines {
@@ -37,6 +38,7 @@ impl NumberLines {
             last: 0,
             start: Instant::now(),
             scans: 0,
+            refused: 0,
         })
     }
 
@@ -64,10 +66,14 @@ impl Source for NumberLines {
         loop {
             let count = look::read(&mut *self.wire, &mut bytes)?;
             for byte in &bytes[..count] {
+                self.refused += 1;
                 if *byte == b'\n' {
                     let is_known = self.count > 0;
                     match self.is_whole.then(|| self.scan()).flatten() {
-                        Some(scan) => take(scan),
+                        Some(scan) => {
+                            self.refused = 0;
+                            take(scan);
+                        }
                         // A line that is cut or garbled is a scan that is lost.
                         None if self.is_whole && is_known && !self.line.trim_ascii().is_empty() => {
                             self.scans = self.scans.wrapping_add(1);
@@ -83,6 +89,10 @@ impl Source for NumberLines {
                 return Ok(());
             }
         }
+    }
+
+    fn refused(&self) -> u64 {
+        self.refused
     }
 }
 

@@ -19,6 +19,8 @@ struct Heard {
     newest: Option<Scan>,
     /// Number of scans that never came, or were dropped because nobody took them.
     lost: u64,
+    /// Number of bytes that came since the last scan and are none.
+    refused: u64,
     /// Readings at rest that the sensor is to be told, and to whom it is told how that ended.
     baseline: Option<(Vec<f32>, mpsc::Sender<Result<()>>)>,
     /// Why the listener ended.
@@ -122,6 +124,11 @@ impl Listener {
         self.shared.heard().lost
     }
 
+    /// Number of bytes that came since the last scan and are none.
+    pub fn refused(&self) -> u64 {
+        self.shared.heard().refused
+    }
+
     /// Tells the sensor its readings at rest. Scans that come meanwhile may be lost.
     ///
     /// # Errors
@@ -181,6 +188,7 @@ fn listen(
             drop(heard);
             shared.came.notify_all();
         })?;
+        shared.heard().refused = source.refused();
     }
     Ok(())
 }

@@ -18,6 +18,7 @@ pub struct MarkedBytes {
     count: usize,
     start: Instant,
     scans: u32,
+    refused: u64,
 }
 
 impl MarkedBytes {
@@ -25,7 +26,7 @@ impl MarkedBytes {
     pub fn new(mut wire: impl Wire + 'static, count: usize) -> Result<Self> {
         wire.set_read_timeout(look::GLANCE)?;
         let wire = Box::new(wire);
-        Ok(Self { wire, pending: vec![], count, start: Instant::now(), scans: 0 })
+        Ok(Self { wire, pending: vec![], count, start: Instant::now(), scans: 0, refused: 0 })
     }
 
     /// Takes the next frame out of the bytes that came, and drops what is none.
@@ -40,6 +41,7 @@ impl MarkedBytes {
                 .map(|byte| f32::from(*byte))
                 .collect()
         });
+        self.refused += start.unwrap_or(last + 1) as u64;
         self.pending.drain(..start.map_or(last + 1, |start| start + length));
         frame
     }
@@ -52,6 +54,13 @@ impl Source for MarkedBytes {
             let count = look::read(&mut *self.wire, &mut bytes)?;
             self.pending.extend(&bytes[..count]);
             while let Some(readings) = self.next_frame() {
+                // Bytes before it are of frames that are lost, but for those before anybody listened.
+                if self.scans > 0 {
+                    let length = (MARK.len() + self.count) as f64;
+                    let lost = (self.refused as f64 / length).round();
+                    self.scans = self.scans.wrapping_add(lost as u32);
+                }
+                self.refused = 0;
                 let heard = Instant::now();
                 let start_us = heard.duration_since(self.start).as_micros() as u64;
                 take(Scan { number: self.scans, start_us, heard, readings, estimate: None });
@@ -61,5 +70,9 @@ impl Source for MarkedBytes {
                 return Ok(());
             }
         }
+    }
+
+    fn refused(&self) -> u64 {
+        self.refused
     }
 }

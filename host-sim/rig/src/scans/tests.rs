@@ -14,13 +14,13 @@ fn line() -> (TcpStream, TcpStream) {
     (far, listener.accept().unwrap().0)
 }
 
-/// Readings of `count` scans that `source` hears.
-fn heard(source: &mut dyn Source, count: usize) -> Vec<Vec<f32>> {
+/// Numbers and readings of `count` scans that `source` hears.
+fn heard(source: &mut dyn Source, count: usize) -> (Vec<u32>, Vec<Vec<f32>>) {
     let (mut scans, end) = (vec![], Instant::now() + Duration::from_secs(20));
     while scans.len() < count && Instant::now() < end {
-        source.hear(Instant::now(), &mut |scan| scans.push(scan.readings)).unwrap();
+        source.hear(Instant::now(), &mut |scan| scans.push((scan.number, scan.readings))).unwrap();
     }
-    scans
+    scans.into_iter().unzip()
 }
 
 #[test]
@@ -32,16 +32,16 @@ fn lines_of_numbers_are_scans_and_all_other_lines_are_skipped() {
         .unwrap();
     far.write_all(b"11\t12\t").unwrap();
     // Two successive lines of as many numbers tell the count.
-    let scans = heard(&mut source, 3);
+    let (_, scans) = heard(&mut source, 3);
     assert_eq!(scans[..2], [[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]]);
     assert!(scans[2][0] == 10.0 && scans[2][1].is_nan() && scans[2][2].is_nan());
-    far.write_all(b"13\n14,15\n16,17,18\n").unwrap();
-    let mut numbers = vec![];
-    while numbers.len() < 2 {
-        source.hear(Instant::now(), &mut |scan| numbers.push(scan.number)).unwrap();
-    }
+    far.write_all(b"13\n14,15\n16,17,18\nx,y\n").unwrap();
+    let (numbers, _) = heard(&mut source, 2);
     // The cut line between both counts as lost.
     assert_eq!(numbers[1], numbers[0] + 2);
+    while source.refused() < 4 {
+        source.hear(Instant::now(), &mut |_| panic!("no scan")).unwrap();
+    }
     drop(far);
     let ended = source.hear(Instant::now() + Duration::from_secs(9), &mut |_| {});
     assert!(matches!(ended, Err(Error::Closed)), "{ended:?}");
@@ -62,7 +62,7 @@ fn frames_between_marks_are_found_although_readings_look_like_marks() {
     far.write_all(&bytes).unwrap();
     let floats = |frame: [u8; 4]| frame.map(f32::from).to_vec();
     let expected: Vec<Vec<f32>> = [0, 1, 0, 1, 2].map(|at| floats(frames[at])).to_vec();
-    assert_eq!(heard(&mut source, 5), expected);
+    assert_eq!(heard(&mut source, 5), (vec![0, 1, 3, 4, 5], expected));
 }
 
 #[test]
