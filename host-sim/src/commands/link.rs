@@ -13,6 +13,7 @@ use super::check_arguments::{CheckArguments, Checked, conclude};
 use super::device_arguments::BaudArgument;
 use super::progress::Terminal;
 use super::{Common, interruption};
+use crate::live::device::Protocol;
 
 /// Talk to a device on a serial port: identify, upload, record, configure, recalibrate.
 #[derive(Args)]
@@ -31,6 +32,7 @@ mod status;
 mod scan;
 mod frames;
 mod record;
+mod record_lines;
 mod settings;
 mod constants;
 mod recalibrate;
@@ -51,7 +53,8 @@ enum Action {
     Confirm,
     /// Let the device scan, and save readings or estimates as CSV; or as a recording (.mcap), with both.
     ///
-    /// A recording is written while frames come, and survives a kill (docs/live.md).
+    /// A recording is written while frames come, and survives a kill (docs/live.md). With --protocol, another sensor is
+    /// recorded, and MODEL decodes on this computer.
     #[command(
         after_help = "Example: taxel link /dev/ttyACM0 record press.bin -n 1000 -o estimates.csv"
     )]
@@ -157,8 +160,12 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<crate::commands
             status::show(&mut device, common)
         }
         Action::Record(action) => {
-            action.check()?;
-            record::record(&mut open()?, action, common)
+            let line = action.sensor.line(arguments.port.clone(), &arguments.line)?;
+            action.check(line.protocol)?;
+            match line.protocol {
+                Protocol::Taxel => record::record(&mut open()?, action, common),
+                _ => record_lines::record(line, action, common),
+            }
         }
         Action::Baseline(action) => record::baseline(&mut open()?, action, common),
         Action::Configure(action) => settings::configure(&mut open()?, action, common),

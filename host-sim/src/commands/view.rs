@@ -6,21 +6,20 @@ use std::path::{Path, PathBuf};
 use std::process::{self, Stdio};
 use std::sync::mpsc::Receiver;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde::Serialize;
 use taxel_data::Clock;
-use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::serial;
 use taxel_view::{Command, View};
 
 use super::arguments::refuse;
 use super::data_file::{DataFileArguments, TimeArgument, for_data};
-use super::device_arguments::{BaudArgument, ScanPeriodArgument};
+use super::device_arguments::{BaudArgument, ScanPeriodArgument, SensorArguments};
 use super::scene_argument::{DEFAULT_SCENE, FrameRateArgument, ModelArgument};
 use super::{Common, interruption, print, recordings};
 use crate::experiment::{Experiment, names_a_scene};
-use crate::live::device::{DeviceFeed, Line, Protocol};
+use crate::live::device::{DeviceFeed, Line};
 use crate::live::feed::Feed;
 use crate::live::replay::{ReplayFeed, USUAL_RATE};
 use crate::live::simulation::{self, SimulationFeed};
@@ -32,10 +31,6 @@ use crate::{Error, Result};
 const SHOWN_RATES: RangeInclusive<f64> = 0.01..=10_000.0;
 /// Frames a second of a simulation.
 const SIMULATED_RATE: f64 = 100.0;
-/// Speed of FlexiTac's line in bits a second.
-const FLEXITAC_BAUD: u32 = 2_000_000;
-/// Rows and columns of FlexiTac's larger pad.
-const FLEXITAC_SHAPE: [usize; 2] = [16, 32];
 
 /// Watch a sensor in the browser, live: a device, a simulation, or a recording.
 ///
@@ -80,37 +75,15 @@ pub struct Arguments {
 /// How a sensor on a serial port is read.
 #[derive(Args, Serialize)]
 struct PortArguments {
-    /// How a sensor on a serial port tells its readings [default: taxel].
-    #[arg(long, value_enum, value_name = "NAME")]
-    protocol: Option<SerialProtocol>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    sensor: SensorArguments,
     #[command(flatten)]
     #[serde(flatten)]
     line: BaudArgument,
-    /// Rows and columns of a sensor that does not tell them, such as 16x32 [default of flexitac: 16x32].
-    #[arg(long, value_name = "ROWSxCOLUMNS", value_parser = shape)]
-    shape: Option<[usize; 2]>,
     #[command(flatten)]
     #[serde(flatten)]
     period: ScanPeriodArgument,
-}
-
-/// How a sensor on a serial port tells its readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-enum SerialProtocol {
-    /// Taxel's link (docs/link.md).
-    Taxel,
-    /// FlexiTac's firmware: 0xAA 0x55, then a byte a reading.
-    Flexitac,
-    /// A line of numbers a scan, between commas, semicolons, tabs or blanks.
-    Csv,
-}
-
-fn shape(text: &str) -> std::result::Result<[usize; 2], String> {
-    let counts = text.split_once('x').map(|(rows, columns)| [rows.parse(), columns.parse()]);
-    match counts {
-        Some([Ok(rows @ 1..=255), Ok(columns @ 1..=255)]) => Ok([rows, columns]),
-        _ => Err("give rows x columns, from 1 to 255 each, such as 16x32".into()),
-    }
 }
 
 /// What is watched.
@@ -136,20 +109,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let view = (&view, &commands);
     match source {
         Source::Port(port) => {
-            let (protocol, usual_baud) =
-                match arguments.port.protocol.unwrap_or(SerialProtocol::Taxel) {
-                    SerialProtocol::Taxel => (Protocol::Taxel, NUCLEO_BAUD),
-                    SerialProtocol::Flexitac => (Protocol::Flexitac, FLEXITAC_BAUD),
-                    SerialProtocol::Csv => (Protocol::Csv, NUCLEO_BAUD),
-                };
-            let usual = (protocol == Protocol::Flexitac).then_some(FLEXITAC_SHAPE);
-            let line = Line {
-                port,
-                baud: arguments.port.line.baud.unwrap_or(usual_baud),
-                protocol,
-                shape: arguments.port.shape.or(usual),
-                period_us: arguments.port.period.period_us,
-            };
+            let PortArguments { sensor, line, period } = &arguments.port;
+            let line = Line { period_us: period.period_us, ..sensor.line(port, line)? };
             let mut feed = DeviceFeed::open(line, blob.as_ref())?;
             show(&mut feed, &Watched { blob: blob.as_ref(), scene: None }, view, arguments, common)
         }

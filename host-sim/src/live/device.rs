@@ -4,6 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use clap::ValueEnum;
+use serde::Serialize;
 use taxel_firmware::link::message::{ConfidenceSent, Configuration};
 use taxel_learn::ModelBlob;
 use taxel_recording::Layout;
@@ -25,13 +27,13 @@ const SILENCE: Duration = Duration::from_secs(2);
 const RETRY: Duration = Duration::from_secs(1);
 
 /// How a sensor on a serial line tells its readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
 pub enum Protocol {
-    /// Taxel's own link (docs/link.md).
+    /// Taxel's link (docs/link.md).
     Taxel,
-    /// FlexiTac's firmware: two marking bytes, then a byte a reading.
+    /// FlexiTac's firmware: 0xAA 0x55, then a byte a reading.
     Flexitac,
-    /// A line of numbers for each scan.
+    /// A line of numbers a scan, between commas, semicolons, tabs or blanks.
     Csv,
 }
 

@@ -247,11 +247,9 @@ fn a_data_file_of_any_columns_is_decoded_by_its_model_and_a_line_of_numbers_too(
     let (name, near, mut far) = terminal();
     drop(near);
     let sender = std::thread::spawn(move || {
-        for _ in 0..2000 {
+        for _ in 0..4000 {
             std::thread::sleep(Duration::from_millis(5));
-            if far.write_all(b"10.5,20.5,15.25\n").is_err() {
-                break;
-            }
+            let _ = far.write_all(b"10.5,20.5,15.25\n");
         }
     });
     let page = Page::of(&folder, &[&name, "--protocol", "csv", "--model", "mat.bin"]);
@@ -259,6 +257,20 @@ fn a_data_file_of_any_columns_is_decoded_by_its_model_and_a_line_of_numbers_too(
     assert_eq!(numbers(&frame["readings"]), [10.5, 20.5, 15.25]);
     assert!((numbers(&frame["outputs"])[0] - 1.0).abs() < 0.1, "{frame}");
     page.end();
+    // The same line without a page: what is decoded, and a recording of both.
+    let record = ["link", &name, "record", "mat.bin", "--protocol", "csv", "-n", "20", "-o"];
+    folder.succeed(&[&record[..], &["force.csv", "--time"]].concat());
+    let forces = folder.read("force.csv");
+    let (header, lines) = forces.split_once('\n').unwrap();
+    assert_eq!((header, lines.lines().count()), ("time_s,force_n", 20));
+    folder.succeed(&[&record[..], &["force.mcap"]].concat());
+    folder.succeed(&["decode", "mat.bin", "force.mcap", "-o", "again.csv"]);
+    let again = folder.read("again.csv");
+    let fields = |text: &str| -> Vec<f64> {
+        text.lines().last().unwrap().split(',').map(|it| it.parse().unwrap()).collect()
+    };
+    let (recorded, decoded) = (fields(lines)[1], fields(&again)[0]);
+    assert!((recorded - decoded).abs() < 1e-6 && (recorded - 1.0).abs() < 0.1, "{recorded} N");
     drop(sender);
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::live::device::Protocol;
 use crate::live::recorder::{Beside, Recorder};
 use crate::live::sheet;
 use crate::report::Sections;
@@ -15,6 +16,7 @@ use taxel_rig::device::{Device, DeviceIdentity};
 use taxel_rig::scans::ScanEstimate;
 
 use super::super::arguments::refuse;
+use super::super::device_arguments::SensorArguments;
 use super::super::health::note_faults;
 use super::super::recordings::is_recording;
 use super::super::scene_argument::ModelArgument;
@@ -28,22 +30,24 @@ use super::scan::{
 #[derive(Args)]
 pub struct RecordArguments {
     /// Weight blob that is active on the device: its estimates are saved. Without it, readings are.
-    model: Option<PathBuf>,
+    pub model: Option<PathBuf>,
     /// MODEL has been recalibrated since: one of the same columns and scene is active.
     #[arg(long, requires = "model")]
     recalibrated: bool,
     /// Save the readings that MODEL takes, not its estimates.
     #[arg(long, requires = "model")]
-    readings: bool,
+    pub readings: bool,
     #[command(flatten)]
-    scan: ScanArguments,
+    pub sensor: SensorArguments,
+    #[command(flatten)]
+    pub scan: ScanArguments,
     /// Save the start of each scan too, in a column time_s: seconds since the first one. `decode --filter-ms` needs it.
     #[arg(long)]
     time: bool,
     #[command(flatten)]
     reports: ReportArguments,
     #[command(flatten)]
-    to: arguments::OutputFile,
+    pub to: arguments::OutputFile,
 }
 
 #[derive(Args)]
@@ -62,8 +66,16 @@ const MISSED: f64 = 0.98;
 
 impl RecordArguments {
     /// Checks, before a device is asked, that the options go together, and that the file can be written.
-    pub fn check(&self) -> Result<()> {
+    pub fn check(&self, protocol: Protocol) -> Result<()> {
         self.scan.timing.period.check()?;
+        if protocol != Protocol::Taxel {
+            let for_device = |option: &str| format!("{option} is for a Taxel device: leave it out");
+            refuse(&self.reports, |_| true, for_device)?;
+            refuse(&self.scan.timing, |_| true, for_device)?;
+            if self.recalibrated {
+                return Err(Error::Usage(for_device("--recalibrated")));
+            }
+        }
         if self.model.is_none() || self.readings {
             let of_estimates = |option: &str| {
                 format!(
@@ -81,6 +93,23 @@ impl RecordArguments {
             return Err(Error::Usage(message.into()));
         }
         Ok(())
+    }
+
+    /// Saves `lines` of columns called `names`, which began at these times in µs, as CSV.
+    pub fn save(
+        &self,
+        names: &[String],
+        starts_us: impl IntoIterator<Item = u64>,
+        lines: Vec<Vec<f64>>,
+    ) -> Result<()> {
+        let time = self.time.then_some("time_s");
+        let mut first_us = None;
+        let lines = starts_us.into_iter().zip(lines).map(|(start_us, line)| {
+            let since_us = start_us - *first_us.get_or_insert(start_us);
+            time.map(|_| since_us as f64 / 1e6).into_iter().chain(line)
+        });
+        let header = time.into_iter().chain(names.iter().map(String::as_str));
+        Ok(csv_file::write(&self.to.output, header, lines)?)
     }
 }
 
@@ -142,27 +171,20 @@ pub fn record(
     if wanted == Wanted::Readings {
         note_faults(&Table { names: names.clone(), values: lines.concat().into() }, common);
     }
-    let time = action.time.then_some("time_s");
-    let first_us = scans.first().map_or(0, |scan| scan.start_us);
-    let lines = scans.iter().zip(lines).map(|(scan, line)| {
-        let time = time.map(|_| (scan.start_us - first_us) as f64 / 1e6);
-        time.into_iter().chain(line)
-    });
-    let header = time.into_iter().chain(names.iter().map(String::as_str));
     match recorder {
         Some(recorder) => drop(recorder.finish()?),
-        None => csv_file::write(&action.to.output, header, lines)?,
+        None => action.save(&names, scans.iter().map(|scan| scan.start_us), lines)?,
     }
     let ends = scans.last().zip(scans.first());
     let steps = ends.map_or(0, |(last, first)| last.number.wrapping_sub(first.number));
-    let frames_lost = (steps / u32::from(every) + 1).saturating_sub(scans.len() as u32);
+    let frames_lost = u64::from(steps / u32::from(every) + 1).saturating_sub(scans.len() as u64);
     let elapsed_us = ends.map_or(0, |(last, first)| last.start_us - first.start_us);
     let frames_per_s = (elapsed_us > 0).then(|| f64::from(steps) / (elapsed_us as f64 * 1e-6));
     let estimates = scans.iter().filter_map(|scan| scan.estimate.as_ref());
     let is_novel = |it: &&ScanEstimate| it.flags & EstimateReport::NOVEL != 0;
     let frames_novel = estimates.filter(is_novel).count();
     let saved = Saved { frames: scans.len(), frames_per_s, frames_lost, missing, frames_novel };
-    Ok(saved.outcome((&action.to.output, action.scan.period_us()), common))
+    Ok(saved.outcome(&action.to.output, Some(action.scan.period_us()), common))
 }
 
 /// A recording of what a device sends: of the model in `blob`, or of all its readings, called `names`.
@@ -260,25 +282,25 @@ pub fn baseline(
         missing: values_missing,
         frames_novel: 0,
     };
-    Ok(saved.outcome((&action.to.output, action.scan.period_us()), common))
+    Ok(saved.outcome(&action.to.output, None, common))
 }
 
 /// Frames that were saved.
-struct Saved {
-    frames: usize,
+pub struct Saved {
+    pub frames: usize,
     /// Frames a second that the device scanned: fewer than it was asked for if it misses some. `None` for a baseline.
-    frames_per_s: Option<f64>,
+    pub frames_per_s: Option<f64>,
     /// Frame numbers missing between the first frame and the last: lost on the line.
-    frames_lost: u32,
+    pub frames_lost: u64,
     /// Readings or outputs that are empty.
-    missing: usize,
+    pub missing: usize,
     /// Frames that are unlike those of training, as far as the device was to tell.
-    frames_novel: usize,
+    pub frames_novel: usize,
 }
 
 impl Saved {
     /// Says what is in a `file`, of frames that were asked for every `period_us`.
-    fn outcome(&self, (file, period_us): (&Path, u32), common: &Common) -> print::Outcome {
+    pub fn outcome(&self, file: &Path, period_us: Option<u32>, common: &Common) -> print::Outcome {
         let mut result = Sections::new("Frames of the device");
         result.fact("frames", "frames", "", self.frames);
         result.fact("frames_per_s", "scanned", "frames a second", self.frames_per_s);
@@ -286,8 +308,10 @@ impl Saved {
         result.fact("values_missing", "missing values", "", self.missing);
         result.fact("frames_novel", "frames unlike those of training", "", self.frames_novel);
         result.fact("file", "file", "", file.display().to_string());
-        let asked = 1e6 / f64::from(period_us.max(1));
-        if self.frames_per_s.is_some_and(|rate| rate < MISSED * asked) {
+        if let Some(period_us) = period_us
+            && let asked = 1e6 / f64::from(period_us.max(1))
+            && self.frames_per_s.is_some_and(|rate| rate < MISSED * asked)
+        {
             result.warnings.push(format!(
                 "{asked:.1} frames a second were asked for: scanning and decoding take longer than --period-us {period_us}, at \
                  least in every 16th frame"

@@ -25,9 +25,10 @@ pub struct ScanArguments {
 }
 
 /// Times of a scan, where they are not the ones that hold already.
-#[derive(Args)]
+#[derive(Args, Serialize)]
 pub struct TimingArguments {
     #[command(flatten)]
+    #[serde(flatten)]
     pub period: ScanPeriodArgument,
     /// Wait after a row is driven.
     #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=10_000))]
