@@ -18,7 +18,8 @@ pub struct Frame {
     pub deviations: Option<Vec<f32>>,
     /// True outputs, where they are known.
     pub truth: Option<Vec<f32>>,
-    /// Place of the contact in mm: x, y and depth, while something touches.
+    /// Place of the contact in mm: x, y and depth, while something touches. A depth that is not known is NaN; one of 0 is
+    /// read as not known.
     pub contact_mm: Option<[f32; 3]>,
     /// Force on the sensor along x, y and z in N, if it is known; 0 when a contact ends.
     pub force_n: Option<[f32; 3]>,

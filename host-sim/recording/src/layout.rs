@@ -186,6 +186,12 @@ impl Layout {
         texts.map(|(name, text)| (name.to_string(), text)).into()
     }
 
+    /// Height in mm of the electrodes that are highest at rest; 0 without any.
+    pub(crate) fn surface_mm(&self) -> f64 {
+        let heights = self.electrodes.iter().map(|electrode| electrode.place_mm[2]);
+        heights.reduce(f64::max).unwrap_or(0.0)
+    }
+
     /// Layout of names and texts.
     ///
     /// # Errors

@@ -233,25 +233,37 @@ pub fn read_array(
     Some(has_deviations)
 }
 
-/// Place of a contact.
-pub fn point(ns: u64, place_mm: [f32; 3]) -> Vec<u8> {
+/// Place in m of a contact on the sheet, which it presses in from `surface_mm`; on the surface if its depth is not known.
+fn place_m([x, y, depth]: [f32; 3], surface_mm: f64) -> [f64; 3] {
+    let depth = if depth.is_nan() { 0.0 } else { f64::from(depth) };
+    [metres(x), metres(y), (surface_mm - depth) / 1000.0]
+}
+
+/// Place of a contact on the sheet.
+pub fn point(ns: u64, contact_mm: [f32; 3], surface_mm: f64) -> Vec<u8> {
     let mut message = Message::new();
     header(&mut message, ns, FRAME);
-    place_mm.iter().for_each(|&place| message.f64(metres(place)));
+    place_m(contact_mm, surface_mm).iter().for_each(|&place| message.f64(place));
     message.into_bytes()
 }
 
-/// Place of a contact in mm.
-pub fn read_point(bytes: &[u8]) -> Option<[f32; 3]> {
+/// Place of a contact in mm, x and y, and its depth below `surface_mm`.
+pub fn read_point(bytes: &[u8], surface_mm: f64) -> Option<[f32; 3]> {
     let mut bytes = Bytes::message(bytes)?;
     skip_header(&mut bytes)?;
-    Some([mm(bytes.f64()?), mm(bytes.f64()?), mm(bytes.f64()?)])
+    let (x, y, depth) = (mm(bytes.f64()?), mm(bytes.f64()?), surface_mm - bytes.f64()? * 1000.0);
+    Some([x, y, if depth == 0.0 { f32::NAN } else { depth as f32 }])
 }
 
 /// Force `force_n` on the sensor, and the torque of a contact about the origin of the sensor's frame; 0 without a contact.
-pub fn wrench(ns: u64, place_mm: Option<[f32; 3]>, force_n: [f32; 3]) -> Vec<u8> {
-    let ([x, y, z], [fx, fy, fz]) =
-        (place_mm.unwrap_or_default().map(metres), force_n.map(f64::from));
+pub fn wrench(
+    ns: u64,
+    contact_mm: Option<[f32; 3]>,
+    surface_mm: f64,
+    force_n: [f32; 3],
+) -> Vec<u8> {
+    let place_m = contact_mm.map_or([0.0; 3], |contact_mm| place_m(contact_mm, surface_mm));
+    let ([x, y, z], [fx, fy, fz]) = (place_m, force_n.map(f64::from));
     let torque = [y * fz - z * fy, z * fx - x * fz, x * fy - y * fx];
     let mut message = Message::new();
     header(&mut message, ns, FRAME);
@@ -299,10 +311,17 @@ mod tests {
 
     #[test]
     fn a_wrench_turns_about_the_origin() {
-        let bytes = wrench(0, Some([1000.0, 0.0, 0.0]), [0.0, 0.0, 2.0]);
-        let mut read = Bytes::message(&bytes).unwrap();
-        skip_header(&mut read).unwrap();
-        let values: Vec<f64> = std::iter::from_fn(|| read.f64()).collect();
-        assert_eq!(values, [0.0, 0.0, 2.0, 0.0, -2.0, 0.0]);
+        let values = |bytes: Vec<u8>| -> Vec<f64> {
+            let mut read = Bytes::message(&bytes).unwrap();
+            skip_header(&mut read).unwrap();
+            std::iter::from_fn(|| read.f64()).collect()
+        };
+        let bytes = wrench(0, Some([1000.0, 0.0, f32::NAN]), 5.0, [0.0, 0.0, 2.0]);
+        assert_eq!(values(bytes), [0.0, 0.0, 2.0, 0.0, -2.0, 0.0]);
+        // A contact is where the sheet is, pressed in from the electrodes at rest.
+        assert_eq!(values(point(0, [0.0, 0.0, 0.5], 5.0)), [0.0, 0.0, 0.0045]);
+        let unknown = point(0, [0.0, 0.0, f32::NAN], 5.0);
+        assert!(read_point(&unknown, 5.0).is_some_and(|[.., depth]| depth.is_nan()));
+        assert_eq!(values(unknown), [0.0, 0.0, 0.005]);
     }
 }

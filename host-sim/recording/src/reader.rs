@@ -234,7 +234,7 @@ fn add(
                 frame.deviations = Some(deviations);
             }
         }
-        Topic::Contact => frame.contact_mm = Some(message::read_point(data)?),
+        Topic::Contact => frame.contact_mm = Some(message::read_point(data, layout.surface_mm())?),
         Topic::Wrench => frame.force_n = Some(message::read_wrench(data)?),
         Topic::Diagnostics => {
             let mut status = None;

@@ -60,6 +60,27 @@ impl Topic {
         }
     }
 
+    /// What its messages hold, with the signs.
+    fn description(self) -> &'static str {
+        match self {
+            Self::Readings => "Readings of a frame, row by row, in the unit of their columns.",
+            Self::Points | Self::Truth => {
+                "Electrodes at rest (x y z, in m, z up), displaced by minus dx dy dz: dz is positive where the sheet is \
+                 compressed."
+            }
+            Self::Outputs | Self::TrueOutputs => "Outputs in the units of their columns.",
+            Self::Contact => {
+                "Place of a contact in m, on the sheet as it is pressed in: z is that of the highest electrodes at rest, less \
+                 the depth."
+            }
+            Self::Wrench => {
+                "Force in N with the signs of dx dy dz: z is positive for a press. Torque about the origin."
+            }
+            Self::Diagnostics => "Faults of wires, frames lost, novel, clamped.",
+            Self::Transform => "Place of the sensor.",
+        }
+    }
+
     /// Definition of its messages, with those of all types in them.
     pub fn definition(self) -> String {
         let (fields, types): (&str, &[&str]) = match self {
@@ -74,7 +95,9 @@ impl Topic {
             }
         };
         let line = "=".repeat(80);
-        types.iter().fold(fields.to_string(), |text, it| text + &line + "\nMSG: " + it)
+        types.iter().fold(format!("# {}\n{fields}", self.description()), |text, it| {
+            text + &line + "\nMSG: " + it
+        })
     }
 }
 

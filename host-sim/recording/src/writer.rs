@@ -16,8 +16,9 @@ use crate::topic::Topic;
 
 /// Longest time that a frame waits until it is safe from a kill and from loss of power, while frames come.
 const FLUSH: Duration = Duration::from_millis(500);
-/// Size of a chunk that is written at once.
+/// Size of a chunk that is written at once, and of one that may be shorter than [`FLUSH`] in the recording's time.
 const CHUNK_BYTES: usize = 1 << 20;
+const LEAST_CHUNK_BYTES: usize = 1 << 14;
 /// Longest time between two messages about the state of the wires.
 const STATUS_NS: u64 = 1_000_000_000;
 
@@ -44,6 +45,8 @@ pub struct Writer {
     start_ns: u64,
     status: Option<(Status, u64)>,
     flushed: Instant,
+    /// Time by the wall clock of the first frame in the chunk.
+    chunk_ns: u64,
 }
 
 impl Writer {
@@ -92,6 +95,7 @@ impl Writer {
             start_ns,
             status: None,
             flushed: Instant::now(),
+            chunk_ns: start_ns,
         })
     }
 
@@ -128,11 +132,12 @@ impl Writer {
                 put(array, message::array(layout, &self.free_outputs, outputs, deviations));
             }
         }
-        if let Some(place_mm) = frame.contact_mm {
-            put(Topic::Contact, message::point(ns, place_mm));
+        let surface_mm = layout.surface_mm();
+        if let Some(contact_mm) = frame.contact_mm {
+            put(Topic::Contact, message::point(ns, contact_mm, surface_mm));
         }
         if let Some(force_n) = frame.force_n {
-            put(Topic::Wrench, message::wrench(ns, frame.contact_mm, force_n));
+            put(Topic::Wrench, message::wrench(ns, frame.contact_mm, surface_mm, force_n));
         }
         if let Some(status) = &frame.status {
             let is_said = self
@@ -147,9 +152,11 @@ impl Writer {
         if is_first {
             put(Topic::Transform, message::transform(ns, &self.parent_frame));
         }
+        let (bytes, time_ns) = (self.output.pending_bytes(), ns - self.chunk_ns);
+        let is_long = u128::from(time_ns) >= FLUSH.as_nanos() && bytes >= LEAST_CHUNK_BYTES;
         if self.flushed.elapsed() >= FLUSH {
             self.flush()?;
-        } else if self.output.pending_bytes() >= CHUNK_BYTES {
+        } else if is_long || bytes >= CHUNK_BYTES {
             self.end_chunk()?;
         }
         Ok(())
@@ -167,6 +174,7 @@ impl Writer {
     }
 
     fn end_chunk(&mut self) -> Result<()> {
+        self.chunk_ns = self.last.map_or(self.start_ns, |(ns, _)| ns);
         // Each chunk tells the state of the wires anew, for those who begin to read at it.
         self.status = None;
         self.output.end_chunk()

@@ -35,9 +35,11 @@ pub fn open(path: &Path, common: &Common) -> Result<Reader> {
     let name = path.display();
     match recover(path) {
         Ok(mended) => {
-            let frames = mended.map_or(0, |mended| mended.frames);
+            let (frames, bytes) =
+                mended.map_or((0, 0), |mended| (mended.frames, mended.bytes_left_out));
             common.remark(format_args!(
-                "note: {name} had no end, since whoever wrote it was killed: mended, with {frames} frames"
+                "note: {name} had no end, since whoever wrote it was killed: mended, with {frames} frames; {bytes} bytes of \
+                 parts that are cut or damaged are left out"
             ));
             Reader::open(path).map_err(error)
         }

@@ -1,6 +1,6 @@
 //! Frames of a recording: an MCAP file, or a data file of readings.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -108,6 +108,8 @@ pub struct ReplayFeed<'b> {
     given: VecDeque<Duration>,
     /// Frames that are to be given at once, and paused after.
     steps: usize,
+    /// What was found of damaged parts, which are left out.
+    damage: BTreeSet<String>,
 }
 
 impl<'b> ReplayFeed<'b> {
@@ -229,6 +231,7 @@ impl<'b> ReplayFeed<'b> {
             period_s,
             given,
             steps,
+            damage: BTreeSet::new(),
         }
     }
 
@@ -286,7 +289,10 @@ impl Feed for ReplayFeed<'_> {
             match self.frames.next() {
                 Ok(next) => self.ahead = next,
                 // What follows a damaged part is played on.
-                Err(cause) => return Ok(Next::Trouble(cause.to_string())),
+                Err(cause) => {
+                    self.damage.insert(cause.to_string());
+                    return Ok(Next::Nothing);
+                }
             }
         }
         let Some((time, _)) = &self.ahead else {
@@ -379,7 +385,13 @@ impl Feed for ReplayFeed<'_> {
     }
 
     fn note(&self) -> Option<String> {
-        self.decoder.as_ref().and_then(|(decoder, _)| decoder.note())
+        let damage = self.damage.last().map(|last| {
+            let count = self.damage.len();
+            format!("damaged parts of the recording are left out, {count} so far, such as: {last}")
+        });
+        let of_decoder = self.decoder.as_ref().and_then(|(decoder, _)| decoder.note());
+        let notes: Vec<String> = damage.into_iter().chain(of_decoder).collect();
+        (!notes.is_empty()).then(|| notes.join("; "))
     }
 
     fn is_paused(&self) -> bool {

@@ -118,7 +118,10 @@ impl<'w, 'b> Watch<'w, 'b> {
             Next::Frame(moment) => self.take(*moment),
             Next::Nothing => {}
             Next::Trouble(cause) => self.say(State::NoData, cause),
-            Next::Ended => self.say(State::Ended, "the end of the recording".into()),
+            Next::Ended => {
+                let note = self.feed.note().map(|note| format!("; {note}")).unwrap_or_default();
+                self.say(State::Ended, format!("the end of the recording{note}"));
+            }
             Next::Anew => {
                 // A recording has one layout from its beginning to its end.
                 if self.recorder.is_some() {

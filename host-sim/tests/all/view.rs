@@ -195,6 +195,11 @@ fn a_simulation_shows_the_truth_beside_what_is_decoded() {
 fn a_recording_is_paused_sought_and_stepped_through() {
     let folder = Folder::new("view_recording");
     folder.succeed(&["synth", "press", "-n", "300", "-o", "press.mcap"]);
+    // Its second half second is damaged.
+    let mut bytes = std::fs::read(folder.path("press.mcap")).unwrap();
+    let quarter = bytes.len() / 4;
+    bytes[quarter] ^= 1;
+    folder.write("press.mcap", &bytes);
     let page = Page::of(&folder, &["press.mcap"]);
     let mut events = page.events();
     let layout = events.any("layout");
@@ -214,9 +219,13 @@ fn a_recording_is_paused_sought_and_stepped_through() {
     events.next("frame", |frame| frame["time_us"].as_u64() == Some(2_500_000));
     assert_eq!(page.ask(r#"{"action":"step","frames":-1}"#).0, 200);
     events.next("frame", |frame| frame["time_us"].as_u64() == Some(2_490_000));
+    assert_eq!(page.ask(r#"{"action":"seek","to_s":0.7}"#).0, 200);
+    events.next("frame", |frame| frame["time_us"].as_u64() > Some(900_000));
     assert_eq!(page.ask(r#"{"action":"speed","factor":10.0}"#).0, 200);
     assert_eq!(page.ask(r#"{"action":"resume"}"#).0, 200);
-    events.next("status", |status| status["state"].as_str() == Some("ended"));
+    let status = events.next("status", |status| status["state"].as_str() == Some("ended"));
+    let said = status["message"].as_str().unwrap();
+    assert!(said.contains("damaged parts of the recording are left out, 1 so far"), "{said}");
     let (status, said) = page.ask(r#"{"action":"record"}"#);
     assert_eq!(status, 409, "{said}");
     page.end();

@@ -104,7 +104,9 @@ pub fn frames(layout: &Layout, count: usize) -> Vec<Frame> {
             };
         }
         let has_outputs = number % 4 != 3;
-        let place = values(3);
+        let place = values(2);
+        // A depth comes back to the bit where it is one, and not beyond all places.
+        let depth_mm = [f32::NAN, 0.3, 1e-6][number % 3];
         Frame {
             time_us: 1_234_567 + 10_000 * number as u64,
             number: 7 + number as u32,
@@ -112,7 +114,7 @@ pub fn frames(layout: &Layout, count: usize) -> Vec<Frame> {
             outputs: has_outputs.then(|| values(outputs)),
             deviations: (has_outputs && number % 3 == 1).then(|| values(outputs)),
             truth: number.is_multiple_of(2).then(|| values(outputs)),
-            contact_mm: number.is_multiple_of(3).then(|| [place[0], place[1], place[2]]),
+            contact_mm: (number % 4 != 1).then(|| [place[0], place[1], depth_mm]),
             force_n: number.is_multiple_of(2).then_some([0.1, -0.0, 1e-40]),
             status: Some(status.clone()),
         }

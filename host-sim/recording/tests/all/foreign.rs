@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use crate::common::{assert_same, electrodes, frames, recording};
+use crate::common::{Folder, assert_same, electrodes, frames, recording, write};
 use taxel_recording::{Error, Frame, Reader, Writer};
 
 const _: fn() = || {
@@ -101,6 +101,16 @@ fn a_recording_that_a_tool_copied_is_read() {
         reader.seek(reader.duration()).unwrap();
         assert_eq!(reader.next().unwrap().unwrap().number, written[19].number);
     }
+}
+
+#[test]
+fn frames_that_are_written_at_once_have_chunks_of_half_a_second() {
+    let folder = Folder::new();
+    let path = folder.path("at_once");
+    write(&path, &electrodes(), &frames(&electrodes(), 300), 300);
+    let bytes = std::fs::read(&path).unwrap();
+    let chunks = records(&bytes[..bytes.len() - 8], 8).iter().filter(|it| it.1 == 6).count();
+    assert!((4..=7).contains(&chunks), "{chunks} of 3 s");
 }
 
 #[test]
