@@ -9,6 +9,7 @@ mod rust;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use taxel_core::health::Limits;
 use taxel_learn::export::c::{Name, library};
 
 use crate::process::{Outcome, first_line, target_dir, two_at_a_time};
@@ -107,7 +108,9 @@ fn missing(builds: &[Build]) -> Vec<&'static str> {
 fn export(model: &Model, folder: &Path, frames: usize) -> Outcome {
     let failed = |path: &Path, cause: std::io::Error| format!("{}: {cause}", path.display());
     let name = Name::new("model").map_err(|cause| cause.to_string())?;
-    for (path, text) in library(&model.blob, &name).map_err(|cause| cause.to_string())? {
+    for (path, text) in
+        library(&model.blob, &name, Some(Limits::USUAL)).map_err(|cause| cause.to_string())?
+    {
         let path: PathBuf = folder.join(path);
         let around = path.parent().unwrap_or(folder);
         fs::create_dir_all(around).map_err(|cause| failed(around, cause))?;

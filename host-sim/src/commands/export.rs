@@ -10,6 +10,7 @@ use taxel_learn::ModelBlob;
 use taxel_learn::export::c::{self, Name};
 use taxel_learn::export::{constant_bytes, rust};
 
+use super::health::LimitsArgument;
 use super::{Common, print};
 
 /// Write a model as source code in C or Rust, for a program that never changes its model.
@@ -34,6 +35,8 @@ pub struct Arguments {
     /// Name of the library, with which all that it declares begins, in small letters.
     #[arg(long, value_parser = Name::new, default_value = "taxel_model", conflicts_with = "rust")]
     name: Name,
+    #[command(flatten)]
+    limits: LimitsArgument,
     /// Rust source file to write.
     #[arg(long, value_name = "FILE", group = "language")]
     rust: Option<PathBuf>,
@@ -50,7 +53,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     } else {
         let folder = arguments.c.as_ref().ok_or_else(|| Error::Usage("--c or --rust".into()))?;
         (written, blob) = (folder, read()?);
-        c::write(&blob, &arguments.name, folder)?;
+        c::write(&blob, &arguments.name, arguments.limits.limits.0, folder)?;
     }
     let model = blob.parse();
     let mut result = Sections::new("Model as source code");

@@ -17,10 +17,8 @@ const MOST_NAMED: usize = 5;
 /// Readings that are believed.
 #[derive(Args)]
 pub struct HealthArguments {
-    /// Readings in Ω outside of these limits count as missing (shorted or open), as on a device, and those of --baseline
-    /// too. `none` believes all. Columns whose names do not end with _ohm have no limits.
-    #[arg(long, value_name = "LOW,HIGH", value_parser = limits, default_value = "5,1000")]
-    limits: Believed,
+    #[command(flatten)]
+    limits: LimitsArgument,
     /// Columns whose readings are taken for missing in every line.
     #[arg(long, value_name = "GLOB,…")]
     without: Option<String>,
@@ -29,9 +27,18 @@ pub struct HealthArguments {
     no_fill: bool,
 }
 
+/// Limits of readings in Ω.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct LimitsArgument {
+    /// Readings in Ω outside of these limits count as missing (shorted or open), as on a device, and those of a baseline
+    /// too. `none` believes all. Columns whose names do not end with _ohm have no limits.
+    #[arg(long, value_name = "LOW,HIGH", value_parser = limits, default_value = "5,1000")]
+    pub limits: Believed,
+}
+
 /// Readings that are believed: all of them, or those within limits.
 #[derive(Debug, Clone, Copy)]
-struct Believed(Option<Limits>);
+pub struct Believed(pub Option<Limits>);
 
 fn limits(text: &str) -> std::result::Result<Believed, String> {
     if text.trim() == "none" {
@@ -69,7 +76,7 @@ pub struct Health {
 impl HealthArguments {
     /// Limits of readings that are believed; `None` believes all.
     pub fn limits(&self) -> Option<Limits> {
-        self.limits.0
+        self.limits.limits.0
     }
 
     /// Makes faulty ones of the `readings` in the data file missing, notes them on stderr, and lets the `model` fill them,
@@ -82,7 +89,7 @@ impl HealthArguments {
         common: &Common,
     ) -> Result<Health> {
         let lines = readings.len();
-        let faults = match self.limits.0 {
+        let faults = match self.limits() {
             Some(limits) => diagnose(
                 readings,
                 limits,
@@ -96,10 +103,10 @@ impl HealthArguments {
             ));
         }
         let left_out = self.leave_out(readings)?;
-        let columns = judge(readings, self.limits.0);
+        let columns = judge(readings, self.limits());
         let told = told(&columns, &faults, &readings.names, &left_out);
         notes(&told.0, &told.1, lines).iter().for_each(|it| common.remark(it));
-        if let Some(limits) = self.limits.0
+        if let Some(limits) = self.limits()
             && columns.len() == readings.names.len()
             && columns.iter().all(|column| column.shorted + column.open == lines)
         {

@@ -78,7 +78,7 @@ fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
     ];
     let text = |file: &str| fs::read_to_string(folder.path("lib/mat").join(file)).unwrap();
     assert!(files.iter().all(|file| text(file).contains("mat") || *file == "LICENSE"));
-    assert!(text("src/mat.h").contains("float mat_assess(const float *readings"));
+    assert!(text("src/mat.h").contains("float mat_assess(float *readings"));
     // Again, with a file of the user's.
     fs::write(folder.path("lib/mat/notes.txt"), "mine").unwrap();
     fs::write(folder.path("lib/mat/src/mat.c"), "old").unwrap();
@@ -91,8 +91,13 @@ fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
     fs::write(folder.path("own/README.md"), "mine").unwrap();
     folder.fail(&["export", &blob, "--c", "own", "--name", "mat"], 2);
     assert_eq!(fs::read_dir(folder.path("own")).unwrap().count(), 1);
-    folder.succeed(&["export", &blob, "--c", "other"]);
-    assert!(folder.path("other/src/taxel_model.c").exists());
+    let row4 = in_testdata("row4.bin");
+    folder.succeed(&["export", &row4, "--c", "other", "--limits", "20,inf"]);
+    let header = folder.read("other/src/taxel_model.h");
+    let limits = "_SHORTED_BELOW_OHM 20.0f\n#define TAXEL_MODEL_OPEN_ABOVE_OHM 3.4028235e38f\n";
+    assert!(header.contains(limits), "{header}");
+    folder.succeed(&["export", &row4, "--c", "other", "--limits", "none"]);
+    assert!(!folder.read("other/src/taxel_model.h").contains("_OHM "));
 }
 
 #[test]

@@ -201,6 +201,17 @@ impl Build {
     }
 }
 
+/// Compiles the model in `folder` for a Cortex-M0+, which has no float unit. Returns the object's path.
+pub fn object_for_m0_plus(folder: &Path) -> Outcome<PathBuf> {
+    let object = folder.join("m0-plus.o");
+    let mut command = Command::new(ARM);
+    command
+        .args(["-std=c99", "-O2", "-mcpu=cortex-m0plus", "-mthumb", "-ffreestanding"])
+        .args(SILENT);
+    command.arg("-c").arg(folder.join("src/model.c")).arg("-o").arg(&object);
+    said(command.arg("-I").arg(root().join("xtask/src/c/harness/arm"))).map(|_| object)
+}
+
 /// Command that runs `program` in QEMU on the file of `frames`.
 pub fn machine(program: &Path, frames: &Path) -> Command {
     let mut command = Command::new(QEMU);

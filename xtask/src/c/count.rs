@@ -10,7 +10,7 @@ use std::time::Duration;
 use object::{Object, ObjectSymbol};
 use taxel_learn::cost::{Cost, Design};
 
-use super::build::{ARM, Build, machine};
+use super::build::{ARM, Build, machine, object_for_m0_plus};
 use super::frames;
 use super::models::Model;
 use crate::cycles::trace::{self, Marks};
@@ -29,6 +29,8 @@ struct Measured {
     instructions: u64,
     /// Bytes of code and of constants.
     flash: [u64; 2],
+    /// Bytes of code on a Cortex-M0+, without the compiler's routines for floats.
+    m0_plus_code: u64,
 }
 
 /// Prints what a frame of each model costs, as the way of `build` compiles it.
@@ -36,15 +38,17 @@ pub fn print(models: &[Model], folder: &Path, build: &Build) -> Outcome {
     let measured =
         two_at_a_time(models, |model| measure(model, &folder.join(model.name()), build))?;
     println!("\nA frame on a Cortex-M4F, by {}:\n", build.name());
-    println!("| model | instructions in C | of the firmware | times | code | constants |");
-    println!("|---|--:|--:|--:|--:|--:|");
+    println!(
+        "| model | instructions in C | of the firmware | times | code | on a Cortex-M0+ | constants |"
+    );
+    println!("|---|--:|--:|--:|--:|--:|--:|");
     let mut failed = Vec::new();
     for (model, measured) in models.iter().zip(measured) {
-        let Measured { instructions, flash: [code, constants] } = measured?;
+        let Measured { instructions, flash: [code, constants], m0_plus_code } = measured?;
         let own = Cost::of_frame(&Design::new(&model.blob)).instructions;
         let times = instructions as f64 / own as f64;
         println!(
-            "| {} | {instructions} | {own} | {times:.2} | {code} | {constants} |",
+            "| {} | {instructions} | {own} | {times:.2} | {code} | {m0_plus_code} | {constants} |",
             model.name()
         );
         if model.format == taxel_core::rbf::Format::Fixed16 && times > MOST_OF_FIXED16 {
@@ -77,7 +81,9 @@ fn measure(model: &Model, folder: &Path, build: &Build) -> Outcome<Measured> {
     let (regions, _) = counted.map_err(|cause| format!("{}: {cause}", model.name()))?;
     // Without the call at the end.
     let instructions = regions.last().ok_or("no frame was counted")? - 1;
-    Ok(Measured { instructions, flash: sizes(&program.with_file_name("model.o"))? })
+    let flash = sizes(&program.with_file_name("model.o"))?;
+    let [m0_plus_code, _] = sizes(&object_for_m0_plus(folder)?)?;
+    Ok(Measured { instructions, flash, m0_plus_code })
 }
 
 fn marks(program: &Path) -> Outcome<Marks> {

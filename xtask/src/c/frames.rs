@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use taxel_core::blob::ModelShape;
+use taxel_core::health::Limits;
 use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Frame, OwnedEstimate, RowStatus};
 
@@ -18,7 +19,7 @@ const MOST_ROWS: usize = 255;
 const GROUP: usize = 1000;
 
 /// Numbers that a reading may be instead of what it was.
-const HOSTILE: [f32; 12] = [
+const HOSTILE: [f32; 16] = [
     f32::NAN,
     f32::INFINITY,
     f32::NEG_INFINITY,
@@ -31,6 +32,10 @@ const HOSTILE: [f32; 12] = [
     -60.0,
     1e10,
     3e20,
+    4.999_999_5,
+    5.0,
+    1000.0,
+    1000.000_1,
 ];
 
 /// Numbers without order, by a linear congruence.
@@ -76,7 +81,9 @@ fn group_bytes(
 ) -> Outcome<Vec<u8>> {
     let model = model.blob.parse();
     let decoder = Decoder::<MOST_ROWS>::new(model).map_err(|cause| cause.to_string())?;
-    let reciprocals: Vec<f32> = baseline.iter().map(|it| reciprocal(*it)).collect();
+    let mut believed = baseline.to_vec();
+    believe(&mut believed);
+    let reciprocals: Vec<f32> = believed.iter().map(|it| reciprocal(*it)).collect();
     let mut scratch = vec![0.0; decoder.scratch_floats()];
     let ModelShape { rows, outputs, .. } = decoder.shape();
     let mut estimate = OwnedEstimate {
@@ -92,6 +99,7 @@ fn group_bytes(
             disturb(&mut readings, draw);
         }
         put(&mut bytes, &readings);
+        believe(&mut readings);
         let given = Frame { readings_ohm: &readings, reciprocals: &reciprocals };
         let clamped = decoder.decode_into(given, &mut scratch, &mut estimate.borrowed());
         bytes.extend(u32::from(clamped.map_err(|cause| cause.to_string())?).to_le_bytes());
@@ -112,6 +120,12 @@ fn group_bytes(
         }
     }
     Ok(bytes)
+}
+
+/// Makes readings missing that are outside the limits.
+fn believe(readings: &mut [f32]) {
+    let is_faulty = |it: &&mut f32| Limits::USUAL.fault(**it).is_some();
+    readings.iter_mut().filter(is_faulty).for_each(|it| *it = f32::NAN);
 }
 
 fn put(bytes: &mut Vec<u8>, values: &[f32]) {

@@ -15,8 +15,9 @@ pub use name::{BadName, Name};
 use std::fs;
 use std::path::Path;
 
-use taxel_data::BadValue;
+use taxel_core::health::Limits;
 use taxel_data::output::write_folder;
+use taxel_data::{BadValue, columns};
 
 use crate::error::Result;
 use crate::packing::ModelBlob;
@@ -47,21 +48,23 @@ fn header_path(name: &Name) -> String {
 }
 
 /// The files of a library that decodes as the model in `blob` does, to the bit; all that it declares begins with `name`.
+/// Readings in Ω outside of `limits` are missing.
 ///
 /// # Errors
 /// [`Error`](crate::Error) if the model does not decode the frames of its self-test.
-pub fn library(blob: &ModelBlob, name: &Name) -> Result<Vec<SourceFile>> {
+pub fn library(blob: &ModelBlob, name: &Name, limits: Option<Limits>) -> Result<Vec<SourceFile>> {
     let model = blob.parse();
-    let facts = Facts::new(blob);
-    let (flags, mut values) = (source::flags(&model), Values::default());
-    facts.tell(&mut values);
+    let limits =
+        limits.filter(|_| model.metadata().input_names.iter().any(columns::is_judged_in_ohm));
+    let (flags, mut values) = (source::flags(&model, limits), Values::default());
+    Facts::new(blob).tell(&mut values, name, limits);
     let filled = |text| template::fill(text, name, &flags, &values);
     let mut files: Vec<SourceFile> =
         LIBRARY.iter().map(|(path, text)| ((*path).to_owned(), filled(text))).collect();
     files.push((header_path(name), source::header(name, &flags, &values)));
     files.push((
         format!("src/{}.c", name.lower()),
-        source::code(&model, name, &flags, &mut values)?,
+        source::code(&model, name, limits, &flags, &mut values)?,
     ));
     Ok(files)
 }
@@ -71,7 +74,7 @@ pub fn library(blob: &ModelBlob, name: &Name) -> Result<Vec<SourceFile>> {
 /// # Errors
 /// [`Error`](crate::Error) if there are files in `folder` that no export under this `name` wrote, if it cannot be written, or as
 /// [`library`].
-pub fn write(blob: &ModelBlob, name: &Name, folder: &Path) -> Result<()> {
+pub fn write(blob: &ModelBlob, name: &Name, limits: Option<Limits>, folder: &Path) -> Result<()> {
     let is_empty = fs::read_dir(folder).is_ok_and(|mut files| files.next().is_none());
     let header = folder.join(header_path(name));
     let is_own = || fs::read_to_string(header).is_ok_and(|text| text.contains(WRITTEN_BY_EXPORT));
@@ -82,7 +85,7 @@ pub fn write(blob: &ModelBlob, name: &Name, folder: &Path) -> Result<()> {
         );
         return Err(BadValue::new("folder", folder.display(), rule).into());
     }
-    write_folder(folder, &library(blob, name)?)
+    write_folder(folder, &library(blob, name, limits)?)
 }
 
 #[cfg(test)]

@@ -13,6 +13,12 @@
 static float readings[MODEL_READINGS], baseline[MODEL_READINGS], outputs[MODEL_OUTPUTS];
 static float scratch[MODEL_SCRATCH + GUARD];
 static uint8_t status[MODEL_ROWS];
+#if MODEL_RELATIVE
+static model_t sensor;
+#define SENSOR &sensor,
+#else
+#define SENSOR
+#endif
 static uint32_t frame;
 
 #ifdef __cplusplus
@@ -56,19 +62,19 @@ static int decodes_as_expected(void)
     int returned, is_same;
     memset(outputs, 0x55, sizeof outputs);
     region_begin();
-    returned = model_decode(readings, outputs, status, scratch);
+    returned = model_decode(SENSOR readings, outputs, status, scratch);
     region_end();
     is_same = same_int("what decode returns", returned) && same("outputs", outputs, sizeof outputs)
         && same("status", status, sizeof status);
 #if MODEL_CONFIDENCE
     if (is_same) {
-        const float novelty = model_assess(readings, outputs, scratch);
+        const float novelty = model_assess(SENSOR readings, outputs, scratch);
         is_same = same("novelty", &novelty, sizeof novelty) && same("deviations", outputs, sizeof outputs);
     }
 #endif
 #if MODEL_FILL
     if (is_same) {
-        is_same = same_int("number of filled readings", model_fill(readings, scratch));
+        is_same = same_int("number of filled readings", model_fill(SENSOR readings, scratch));
         for (unsigned i = 0; i < MODEL_READINGS; i++) {
             /* Which of all NaN comes out is the processor's choice. */
             if (readings[i] != readings[i]) {
@@ -89,7 +95,8 @@ static int all_are_as_expected(void)
         report("self-test", 0);
         return 0;
     }
-    if (strcmp(model_output_name(0), "") == 0 || model_output_name(MODEL_OUTPUTS) != 0) {
+    if (strcmp(model_output_name(0), "") == 0 || model_output_name(MODEL_OUTPUTS) != 0
+        || model_reading_name(0)[0] != 'r' || model_reading_name(MODEL_READINGS) != 0) {
         report("names", 0);
         return 0;
     }
@@ -99,7 +106,12 @@ static int all_are_as_expected(void)
             break;
         }
 #if MODEL_RELATIVE
-        model_set_baseline(baseline);
+        model_set_baseline(&sensor, baseline);
+        /* The self-test has a sensor of its own. */
+        if (model_selftest() != 0) {
+            report("self-test", frame);
+            return 0;
+        }
 #endif
         for (; count > 0; count--, frame++) {
             if (!take(readings, sizeof readings) || !decodes_as_expected()) {

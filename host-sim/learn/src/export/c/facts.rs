@@ -1,8 +1,13 @@
 //! What a library says of its model: sizes, cost, columns.
 
+use std::collections::HashSet;
+use std::fmt::Write as _;
+
 use taxel_core::blob::Model;
+use taxel_core::health::Limits;
 use taxel_core::{RowStatus, scratch_floats};
 
+use super::name::Name;
 use super::numbers::comment;
 use super::template::Values;
 use crate::cost::{Cost, Design};
@@ -26,20 +31,19 @@ impl<'b> Facts<'b> {
         Self { model: blob.parse(), constant_bytes: constant_bytes(blob), cost }
     }
 
-    /// Bytes of RAM that a caller's arrays take; the self-test has such arrays of its own.
+    /// Bytes of RAM that a caller's arrays take, with the baseline; the self-test has such arrays of its own.
     fn arrays_bytes(&self) -> usize {
         let shape = self.model.shape();
         let (readings, outputs) = (shape.rows * shape.inputs, shape.rows * shape.outputs);
-        4 * (readings + outputs + scratch_floats(&self.model)) + shape.rows
+        let baseline = if self.model.metadata().relative_inputs { readings } else { 0 };
+        4 * (readings + baseline + outputs + scratch_floats(&self.model)) + shape.rows
     }
 
     /// Bytes of RAM that a caller and the library take.
     fn ram_bytes(&self) -> usize {
         let (shape, model) = (self.model.shape(), &self.model);
-        let baseline =
-            if model.metadata().relative_inputs { 4 * shape.rows * shape.inputs } else { 0 };
         let deviations = if model.assesses() { 4 * shape.rows * shape.outputs } else { 0 };
-        self.arrays_bytes() + baseline + deviations
+        self.arrays_bytes() + deviations
     }
 
     fn networks(&self) -> String {
@@ -62,8 +66,8 @@ impl<'b> Facts<'b> {
         times + &networks.join("; ")
     }
 
-    /// Sets the values that templates ask for.
-    pub fn tell(&self, values: &mut Values) {
+    /// Sets the values that templates of a library called `name` ask for. Readings in Ω have `limits`.
+    pub fn tell(&self, values: &mut Values, name: &Name, limits: Option<Limits>) {
         let (model, shape) = (&self.model, self.model.shape());
         let metadata = model.metadata();
         let has = |part: bool| i32::from(part);
@@ -80,9 +84,22 @@ impl<'b> Facts<'b> {
         values.set("RELATIVE", has(relative));
         values.set("CONFIDENCE", has(model.assesses()));
         values.set("FILL", has(model.reading_model().is_some()));
-        values.set("BUT_BASELINE", said(relative, " but the baseline"));
         values.set("AND_BASELINE", said(relative, ", baseline"));
-        values.set("FORGETS", said(relative, " It forgets the baseline."));
+        let sensor = format!("const {}_t *sensor, ", name.lower());
+        values.set("SENSOR", if relative { &sensor } else { "" });
+        values.set("GIVEN", said(relative, "sensor, "));
+        values.set("GIVE", said(relative, "&sensor, "));
+        if let Some(Limits { shorted_below_ohm, open_above_ohm }) = limits {
+            // Infinite readings are missing anyway.
+            let [low, high] =
+                [shorted_below_ohm, open_above_ohm].map(|it| it.clamp(f32::MIN, f32::MAX));
+            values.set("SHORTED_BELOW", format!("{low:?}f"));
+            values.set("OPEN_ABOVE", format!("{high:?}f"));
+            values.set("SHORTED_BELOW_OHM", low);
+            values.set("OPEN_ABOVE_OHM", high);
+        }
+        values.set("OR_BEYOND", said(limits.is_some(), ", or outside the limits"));
+        values.set("OUTPUT_NUMBERS", output_numbers(metadata.output_names.iter(), name));
         for (key, status) in [
             ("DECODED", RowStatus::Decoded),
             ("MISSING_READING", RowStatus::MissingReading),
@@ -126,6 +143,22 @@ impl<'b> Facts<'b> {
         values.set("WHAT_READINGS", first_and_last(metadata.input_names.iter()));
         values.set("WHAT_OUTPUTS", first_and_last(metadata.output_names.iter()));
     }
+}
+
+/// Macros of the numbers of outputs, by their names. One that is there already has its number behind it.
+fn output_numbers<'n>(names: impl Iterator<Item = &'n str>, library: &Name) -> String {
+    let (mut lines, mut taken) = (String::new(), HashSet::new());
+    for (number, name) in names.enumerate() {
+        let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_uppercase() } else { '_' };
+        let mut macro_name: String = name.chars().map(letter).collect();
+        if !taken.insert(macro_name.clone()) {
+            let _ = write!(macro_name, "_{number}");
+            taken.insert(macro_name.clone());
+        }
+        // Writing to a string cannot fail.
+        let _ = writeln!(lines, "#define {}_OUTPUT_{macro_name} {number}u", library.upper());
+    }
+    lines
 }
 
 /// A number of things, in words.

@@ -6,7 +6,7 @@ use std::fmt;
 const LONGEST: usize = 63;
 
 /// Words that no name may be: those of C and C++, headers that a file of the same name would hide, targets of CMake, and
-/// beginnings of the source's own macros.
+/// beginnings of the source's own macros, and types that end with `_t`.
 const TAKEN: &str = "\
     alignas alignof and asm auto bitand bitor bool break case catch char class compl concept const constexpr constinit \
     continue decltype default delete do double else enum explicit export extern false float for friend goto if import \
@@ -16,7 +16,9 @@ const TAKEN: &str = "\
     arduino assert complex ctype errno fenv inttypes iso646 limits locale math setjmp signal stdalign stdarg stdatomic \
     stdbool stddef stdint stdio stdlib stdnoreturn string strings tgmath threads time uchar unistd wchar wctype \
     all clean depend edit_cache help install list_install_components package package_source rebuild_cache test \
-    network row";
+    network row \
+    clock div imaxdiv int8 int16 int32 int64 intmax intptr ldiv lldiv max_align off pid ptrdiff size ssize uint8 uint16 \
+    uint32 uint64 uintmax uintptr";
 
 /// Name of a library, with which all names that it declares begin: an identifier of C, in small letters.
 #[derive(Debug, Clone, PartialEq, Eq)]

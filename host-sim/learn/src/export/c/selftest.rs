@@ -1,28 +1,30 @@
 //! Frames of a library's self-test, and what taxel-core makes of them.
 
 use taxel_core::blob::Model;
+use taxel_core::health::Limits;
 use taxel_core::rbf::NetworkError;
 use taxel_core::relative::reciprocal;
 use taxel_core::touch::{Strengths, Touch};
 use taxel_core::{Decoder, Frame, OwnedEstimate, RowStatus};
-use taxel_data::exp;
+use taxel_data::{columns, exp};
 
 use super::numbers::{array, table, word};
 use crate::error::{Error, Result};
+use crate::health::fault;
 use crate::prepared::MOST_ROWS;
 
 /// Sweeps that bring readings to given features.
 const SWEEPS: usize = 30;
 
-/// Definitions of the tests' arrays in C, and their number.
+/// Definitions of the tests' arrays in C, and their number. Readings in Ω have `limits`.
 ///
 /// # Errors
 /// Never, for a model that was checked.
-pub fn arrays(model: &Model<'_>) -> Result<String> {
+pub fn arrays(model: &Model<'_>, limits: Option<Limits>) -> Result<String> {
     let decoder =
         Decoder::<MOST_ROWS>::new(*model).map_err(|cause| Error::failed(cause.to_string()))?;
     let refused = |cause: NetworkError| Error::failed(cause.to_string());
-    let (baseline, frames) = frames(model);
+    let (baseline, frames) = frames(model, limits);
     let reciprocals: Vec<f32> = baseline.iter().map(|it| reciprocal(*it)).collect();
     let mut scratch = vec![0.0; decoder.scratch_floats()];
     let shape = model.shape();
@@ -34,7 +36,8 @@ pub fn arrays(model: &Model<'_>) -> Result<String> {
     let [mut outputs, mut deviations, mut filled, mut status] = [const { Vec::new() }; 4];
     let [mut clamped, mut novelty] = [const { Vec::new() }; 2];
     for frame in &frames {
-        let given = Frame { readings_ohm: frame, reciprocals: &reciprocals };
+        let believed = within(model, frame, limits);
+        let given = Frame { readings_ohm: &believed, reciprocals: &reciprocals };
         let any_clamped = decoder.decode_into(given, &mut scratch, &mut estimate.borrowed());
         clamped.push(u8::from(any_clamped.map_err(refused)?).to_string());
         status.push(estimate.status.iter().map(|it| (*it as u8).to_string()).collect());
@@ -42,9 +45,9 @@ pub fn arrays(model: &Model<'_>) -> Result<String> {
         let novel = decoder.assess_into(given, &mut scratch, &mut deviation).map_err(refused)?;
         novelty.extend(novel.map(|it| word(it.to_bits())));
         deviations.push(bits(&deviation));
-        let mut frame = frame.clone();
-        decoder.fill(&mut frame, &reciprocals, &mut scratch);
-        filled.push(bits(&frame));
+        let mut readings = believed.clone();
+        decoder.fill(&mut readings, &reciprocals, &mut scratch);
+        filled.push(bits(&readings));
     }
     let readings: Vec<Vec<String>> = frames.iter().map(|frame| bits(frame)).collect();
     let mut text = format!("#define TESTS {}\n", frames.len());
@@ -65,18 +68,30 @@ pub fn arrays(model: &Model<'_>) -> Result<String> {
     Ok(text)
 }
 
+/// Readings of a frame, those outside of `limits` missing.
+fn within(model: &Model<'_>, frame: &[f32], limits: Option<Limits>) -> Vec<f32> {
+    let names = model.metadata().input_names;
+    let believed = |(reading, name): (&f32, &str)| match fault(name, f64::from(*reading), limits) {
+        Some(_) if columns::is_judged_in_ohm(name) => f32::NAN,
+        _ => *reading,
+    };
+    frame.iter().zip(names.iter()).map(believed).collect()
+}
+
 fn bits(values: &[f32]) -> Vec<String> {
     values.iter().map(|value| word(value.to_bits())).collect()
 }
 
 /// A baseline, and frames: two within the range of training, the second with a reading far beyond it; the first one with
 /// a missing reading; and, if networks see the shape of a touch, one without a touch.
-fn frames(model: &Model<'_>) -> (Vec<f32>, Vec<Vec<f32>>) {
+fn frames(model: &Model<'_>, limits: Option<Limits>) -> (Vec<f32>, Vec<Vec<f32>>) {
     let shape = model.shape();
     let count = shape.rows * shape.inputs;
     let relative = model.metadata().relative_inputs;
-    let baseline: Vec<f32> =
-        (0..count).map(|i| if relative { 40.0 + (i % 7) as f32 } else { 1.0 }).collect();
+    let usual = limits
+        .map_or(40.0, |it| 40.0_f32.max(1.2 * it.shorted_below_ohm).min(0.8 * it.open_above_ohm));
+    let about = |i: usize| if relative { usual * (1.0 + 0.02 * (i % 7) as f32) } else { 1.0 };
+    let baseline: Vec<f32> = (0..count).map(about).collect();
     let readings = |inputs: Vec<f32>| -> Vec<f32> {
         inputs.iter().zip(&baseline).map(|(input, baseline)| input * baseline).collect()
     };

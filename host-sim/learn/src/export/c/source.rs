@@ -2,11 +2,13 @@
 
 use std::fmt::Write as _;
 
-use taxel_core::blob::{Front, Model};
+use taxel_core::blob::{Columns, Front, Model};
 use taxel_core::exp::{EXP_COEFFICIENTS, LN_2_PARTS};
+use taxel_core::health::Limits;
 use taxel_core::rbf::{Format, Network, fixed16, float32};
 use taxel_core::reading_model::ReadingModel;
 use taxel_core::touch::Kind;
+use taxel_data::columns;
 
 use super::name::Name;
 use super::numbers::{array, float, floats, string, word, words};
@@ -24,8 +26,9 @@ const DECODE: &str = include_str!("source/decode.c");
 const READING_MODEL: &str = include_str!("source/reading_model.c");
 const END: &str = include_str!("source/end.c");
 
-/// Flags of a model, by which parts of templates are chosen.
-pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
+/// Flags of a model whose readings in Ω have `limits`, by which parts of templates are chosen.
+pub fn flags(model: &Model<'_>, limits: Option<Limits>) -> Vec<&'static str> {
+    let names = model.metadata().input_names;
     let is_f32 = model.networks().any(|network| network.format() == Format::F32);
     let array = model.whole_frames();
     let (fill, assess) = (model.reading_model().is_some(), model.assesses());
@@ -44,6 +47,8 @@ pub fn flags(model: &Model<'_>) -> Vec<&'static str> {
         ("project", fill || model.fronts().any(|front| front.projection.is_some())),
         ("root", fill),
         ("exp", assess || is_f32),
+        ("ohm", limits.is_some()),
+        ("mixed", limits.is_some() && !names.iter().all(columns::is_judged_in_ohm)),
     ];
     those_set(&flags)
 }
@@ -114,15 +119,25 @@ pub fn header(name: &Name, flags: &[&str], facts: &Values) -> String {
 }
 
 /// The source file.
-pub fn code(model: &Model<'_>, name: &Name, flags: &[&str], facts: &mut Values) -> Result<String> {
+pub fn code(
+    model: &Model<'_>,
+    name: &Name,
+    limits: Option<Limits>,
+    flags: &[&str],
+    facts: &mut Values,
+) -> Result<String> {
+    let metadata = model.metadata();
     facts.set("SIZES", sizes(model));
     tell_constants(facts);
-    facts.set("TESTS", selftest::arrays(model)?);
-    let names = model.metadata().output_names.iter();
-    facts.set(
-        "NAMES",
-        names.map(|name| format!("        {},\n", string(name))).collect::<Vec<_>>().concat(),
-    );
+    facts.set("TESTS", selftest::arrays(model, limits)?);
+    let listed = |names: Columns<'_>| -> String {
+        names.iter().map(|name| format!("        {},\n", string(name))).collect::<Vec<_>>().concat()
+    };
+    facts.set("NAMES", listed(metadata.output_names));
+    facts.set("READING_NAMES", listed(metadata.input_names));
+    let in_ohm = metadata.input_names.iter().map(columns::is_judged_in_ohm);
+    facts.set("IN_OHM", array("uint8_t", "in_ohm", in_ohm.map(|is| u8::from(is).to_string())));
+    let sensor = if metadata.relative_inputs { "sensor, " } else { "" };
     let mut code = fill(START, name, flags, facts) + &fill(READINGS, name, flags, facts);
     let (mut calls, mut outputs, mut written) = (String::new(), 0, Vec::new());
     for part in Part::all(model) {
@@ -140,7 +155,7 @@ pub fn code(model: &Model<'_>, name: &Name, flags: &[&str], facts: &mut Values) 
         code += &tables(model, &part);
         code += &fill(PART, name, &[flags, &own].concat(), facts);
         if let Some(front) = part.front {
-            let given = format!("readings, outputs + {outputs}, &worst, scratch");
+            let given = format!("{sensor}readings, outputs + {outputs}, &worst, scratch");
             let _ = writeln!(calls, "    clamped |= decode_part{suffix}({given});");
             outputs += front.outputs;
         }

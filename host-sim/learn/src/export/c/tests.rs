@@ -3,6 +3,8 @@ use taxel_core::rbf::Network;
 
 use super::*;
 
+const LIMITS: Option<Limits> = Some(Limits::USUAL);
+
 fn in_testdata(name: &str) -> ModelBlob {
     let path = format!("{}/../../testdata/{name}.bin", env!("CARGO_MANIFEST_DIR"));
     ModelBlob::read(path.as_ref()).unwrap()
@@ -24,7 +26,9 @@ fn a_name_is_an_identifier_of_c_and_none_of_its_words_and_headers() {
     {
         assert_eq!(Name::new(name), Err(BadName::NoIdentifier), "{name}");
     }
-    for name in ["int", "class", "string", "arduino", "math", "while", "install", "row"] {
+    for name in
+        ["int", "class", "string", "arduino", "math", "while", "install", "row", "size", "uint8"]
+    {
         assert_eq!(Name::new(name), Err(BadName::Taken), "{name}");
     }
 }
@@ -70,7 +74,7 @@ fn every_file_is_filled_for_every_model() {
     let paths = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     for model in paths.filter(|path| path.extension().is_some_and(|end| end == "bin")) {
         let blob = ModelBlob::read(&model).unwrap();
-        let files = library(&blob, &Name::new("my_mat").unwrap()).unwrap();
+        let files = library(&blob, &Name::new("my_mat").unwrap(), LIMITS).unwrap();
         assert_eq!(files.len(), 11);
         for (path, text) in files {
             assert!(
@@ -108,12 +112,12 @@ fn changed<'m>(
 fn a_model_of_ratios_has_a_baseline() {
     let blob = in_testdata("row4");
     let relative = changed(&blob.parse(), |it| it.relative_inputs = true);
-    let files = library(&relative, &Name::new("mat").unwrap()).unwrap();
+    let files = library(&relative, &Name::new("mat").unwrap(), LIMITS).unwrap();
     for (path, text) in [
-        ("src/mat.h", "int mat_set_baseline(const float *baseline);"),
+        ("src/mat.h", "int mat_set_baseline(mat_t *sensor, const float *baseline);"),
         ("src/mat.h", "#define MAT_RELATIVE 1"),
         ("src/mat.c", "test_baseline"),
-        ("examples/Decode/Decode.ino", "mat_set_baseline(readings);"),
+        ("examples/Decode/Decode.ino", "mat_set_baseline(&sensor, readings);"),
         ("examples/posix/main.c", "./decode baseline.csv < readings.csv"),
         ("README.md", "mat_set_baseline"),
     ] {
@@ -131,7 +135,7 @@ fn names_of_a_model_are_harmless_wherever_they_are_written() {
         it.name = "??/ */ @CRC@\"\\";
         it.output_names = taxel_core::blob::Columns(&names);
     });
-    let files = library(&hostile, &Name::new("mat").unwrap()).unwrap();
+    let files = library(&hostile, &Name::new("mat").unwrap(), LIMITS).unwrap();
     let source = file(&files, "src/mat.c");
     assert!(source.contains(r#""*/ \042@CRC@\042 taxel_model","#), "{source}");
     let header = file(&files, "src/mat.h");
@@ -142,10 +146,12 @@ fn names_of_a_model_are_harmless_wherever_they_are_written() {
 
 #[test]
 fn the_header_tells_shape_columns_and_cost() {
-    let files = library(&in_testdata("row4"), &Name::new("mat").unwrap()).unwrap();
+    let files = library(&in_testdata("row4"), &Name::new("mat").unwrap(), LIMITS).unwrap();
     let header = file(&files, "src/mat.h");
     for part in [
         "#define MAT_READINGS 18u",
+        "#define MAT_OPEN_ABOVE_OHM 1000.0f\n",
+        "#define MAT_OUTPUT_R4E1_DZ_MM 0u\n",
         "MAT_OVERFLOW = 2",
         " *     r4c1_ohm, Ω\n",
         " *     r4e1_dz_mm, mm\n",

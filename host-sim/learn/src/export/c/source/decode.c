@@ -1,12 +1,15 @@
 //@if rows
-int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, float *scratch)
+int taxel_model_decode(@SENSOR@float *readings, float *outputs, uint8_t *status, float *scratch)
 {
     int clamped = 0;
+//@if ohm
+    drop_faulty(readings);
+//@end
     for (unsigned row = 0; row < ROWS; row++) {
         const float *inputs = readings + row * INPUTS;
 //@if relative
         for (unsigned i = 0; i < INPUTS; i++) {
-            scratch[INPUTS + i] = relative(readings, row * INPUTS + i);
+            scratch[INPUTS + i] = relative(sensor, readings, row * INPUTS + i);
         }
         inputs = scratch + INPUTS;
 //@end
@@ -17,10 +20,13 @@ int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, f
 
 //@end
 //@if array
-int taxel_model_decode(const float *readings, float *outputs, uint8_t *status, float *scratch)
+int taxel_model_decode(@SENSOR@float *readings, float *outputs, uint8_t *status, float *scratch)
 {
     uint8_t worst = TAXEL_MODEL_DECODED;
     int clamped = 0;
+//@if ohm
+    drop_faulty(readings);
+//@end
 @PARTS@    memset(status, worst, ROWS);
     return clamped && severity[worst] < severity[TAXEL_MODEL_OVERFLOW];
 }

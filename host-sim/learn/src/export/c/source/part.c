@@ -21,20 +21,20 @@ static int decode_inputs@OF@(unsigned network, const float *inputs, float *scrat
 /* Decodes the outputs that one network makes of a whole frame. Sets *worst to their status if that is worse. Returns
  * whether they were decoded, and an input was clamped.
  */
-static int decode_part@OF@(const float *readings, float *outputs, uint8_t *worst, float *scratch)
+static int decode_part@OF@(@SENSOR@const float *readings, float *outputs, uint8_t *worst, float *scratch)
 {
     const float *inputs = readings;
     uint8_t status;
     int clamped;
 //@if touch
     float *const seen = scratch + INPUTS + PROJECTED;
-    const float strength = shape_and_strength(touch@OF@, readings, seen);
+    const float strength = shape_and_strength(@GIVEN@touch@OF@, readings, seen);
     inputs = seen;
 //@end
 //@if ratios
     float *const seen = scratch + INPUTS + PROJECTED;
     for (unsigned i = 0; i < READINGS; i++) {
-        seen[i] = relative(readings, i);
+        seen[i] = relative(sensor, readings, i);
     }
     inputs = seen;
 //@end
@@ -46,7 +46,7 @@ static int decode_part@OF@(const float *readings, float *outputs, uint8_t *worst
     /* Features can overflow although no reading is missing. */
     if (status == TAXEL_MODEL_MISSING_READING && all_finite(readings, READINGS)
 //@if relative
-        && baseline_is_known && all_finite(reciprocals, READINGS)
+        && knows_all(sensor)
 //@end
     ) {
         status = TAXEL_MODEL_OVERFLOW;

@@ -4,7 +4,7 @@
 #define FEATURES (FACTORS + 1u)
 
 /* Writes standardised readings, and returns the sum of their squares. */
-static float standardise(const float *readings, float *z)
+static float standardise(@SENSOR@const float *readings, float *z)
 {
     float square = 0.0f;
     for (unsigned i = 0; i < READINGS; i++) {
@@ -54,15 +54,18 @@ static int solve(float *matrix, float *x)
     return 1;
 }
 
-int taxel_model_fill(float *readings, float *scratch)
+int taxel_model_fill(@SENSOR@float *readings, float *scratch)
 {
     float *const z = scratch, *const factors = z + READINGS, *const matrix = factors + FEATURES;
     unsigned missing = 0;
     int filled = 0;
+//@if ohm
+    drop_faulty(readings);
+//@end
     if (all_finite(readings, READINGS)) {
         return 0;
     }
-    standardise(readings, z);
+    standardise(@GIVEN@readings, z);
     fill_with(matrix, FACTORS * (FACTORS + 1u) / 2u, 0.0f);
     for (unsigned i = 0; i < FACTORS; i++) {
         matrix[i * (i + 1) / 2 + i] = 1.0f;
@@ -89,7 +92,7 @@ int taxel_model_fill(float *readings, float *scratch)
             const float moved = product_of(reading_parts + FACTORS + i * FACTORS, factors, FACTORS);
             const float expected = reading_mean[i] + (reading_scale[i] > 0.0f ? moved / reading_scale[i] : 0.0f);
 //@if relative
-            const float reading = expected / reciprocals[i];
+            const float reading = expected / sensor->reciprocals[i];
 //@end
 //@if !relative
             const float reading = expected;
@@ -148,14 +151,17 @@ static void set_deviations(const float *probabilities, float *deviations)
     }
 }
 
-float taxel_model_assess(const float *readings, float *deviations, float *scratch)
+float taxel_model_assess(@SENSOR@float *readings, float *deviations, float *scratch)
 {
     float *const z = scratch, *const features = z + READINGS, *const whitened = features + FEATURES;
     float *const densities = whitened + FEATURES;
     float sum = 0.0f, novelty;
     float best = float_of(0xff800000u); /* less than any number */
-    const float square = standardise(readings, z);
-    float explained = 0.0f;
+    float square, explained = 0.0f;
+//@if ohm
+    drop_faulty(readings);
+//@end
+    square = standardise(@GIVEN@readings, z);
     if (square != square) {
         fill_with(deviations, OUTPUTS, not_a_number());
         return not_a_number();

@@ -1,35 +1,71 @@
 
-//@if relative
-/* One over each reading of the sensor at rest; NaN where that is unknown. */
-static float reciprocals[READINGS];
-static uint8_t baseline_is_known;
+//@if ohm
+//@if mixed
+/* Whether each reading is a resistance: others have no limits. */
+@IN_OHM@
+//@end
+/* Whether the sensor can have this reading: wires are neither shorted nor open. */
+static int is_sound(unsigned reading, float value)
+{
+//@if mixed
+    if (!in_ohm[reading]) {
+        return 1;
+    }
+//@end
+    (void)reading;
+    return value >= TAXEL_MODEL_SHORTED_BELOW_OHM && value <= TAXEL_MODEL_OPEN_ABOVE_OHM;
+}
 
-int taxel_model_set_baseline(const float *baseline)
+static void drop_faulty(float *readings)
+{
+    for (unsigned i = 0; i < READINGS; i++) {
+        if (!is_sound(i, readings[i])) {
+            readings[i] = not_a_number();
+        }
+    }
+}
+
+//@end
+//@if relative
+int taxel_model_set_baseline(taxel_model_t *sensor, const float *baseline)
 {
     int unusable = 0;
     for (unsigned i = 0; i < READINGS; i++) {
-        reciprocals[i] = not_a_number();
         /* 1/x overflows for the smallest numbers. */
-        if (baseline[i] > 0.0f && is_finite(baseline[i]) && is_finite(1.0f / baseline[i])) {
-            reciprocals[i] = 1.0f / baseline[i];
-        } else {
-            unusable++;
-        }
+        const int usable = baseline[i] > 0.0f && is_finite(baseline[i]) && is_finite(1.0f / baseline[i])
+//@if ohm
+            && is_sound(i, baseline[i])
+//@end
+            ;
+        sensor->reciprocals[i] = usable ? 1.0f / baseline[i] : 0.0f;
+        unusable += !usable;
     }
-    baseline_is_known = 1;
     return unusable;
 }
 
 /* A reading relative to the baseline: a product, whose last bit may differ from that of a quotient. */
-static float relative(const float *readings, unsigned index)
+static float relative(const taxel_model_t *sensor, const float *readings, unsigned index)
 {
-    return baseline_is_known ? readings[index] * reciprocals[index] : not_a_number();
+    const float reciprocal = sensor->reciprocals[index];
+    return reciprocal > 0.0f ? readings[index] * reciprocal : not_a_number();
+}
+
+//@if array
+static int knows_all(const taxel_model_t *sensor)
+{
+    for (unsigned i = 0; i < READINGS; i++) {
+        if (!(sensor->reciprocals[i] > 0.0f)) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 //@end
+//@end
 //@if reading
 //@if relative
-#define READING(i) relative(readings, i)
+#define READING(i) relative(sensor, readings, i)
 //@end
 //@if !relative
 #define READING(i) readings[i]
@@ -76,7 +112,7 @@ static float binary_logarithm(float x)
 enum { FLOOR, LOGARITHM_FLOOR, LEAST, MOST, SIDE, OF_READINGS };
 
 /* Writes the shape of a touch and the logarithm of its strength to inputs [READINGS + 1], and returns the strength. */
-static float shape_and_strength(const float *touch, const float *readings, float *inputs)
+static float shape_and_strength(@SENSOR@const float *touch, const float *readings, float *inputs)
 {
     const float *const of_readings = touch + OF_READINGS, side = touch[SIDE];
     const int either = side == 0.0f;

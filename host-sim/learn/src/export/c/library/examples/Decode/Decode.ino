@@ -5,6 +5,9 @@ static float readings[TAXEL_MODEL_READINGS];
 static float outputs[TAXEL_MODEL_OUTPUTS];
 static float scratch[TAXEL_MODEL_SCRATCH];
 static uint8_t status[TAXEL_MODEL_ROWS];
+//@if relative
+static taxel_model_t sensor;
+//@end
 
 // Replace this by your own scan: @WHAT_READINGS@, row after row; NAN where one is missing.
 static void scan() {
@@ -21,16 +24,16 @@ void setup() {
 //@if relative
   // Nothing may touch the sensor now. A mean of some frames is better than one.
   scan();
-  taxel_model_set_baseline(readings);
+  taxel_model_set_baseline(&sensor, readings);
 //@end
 }
 
 void loop() {
   scan();
 //@if fill
-  taxel_model_fill(readings, scratch);
+  taxel_model_fill(@GIVE@readings, scratch);
 //@end
-  taxel_model_decode(readings, outputs, status, scratch);
+  taxel_model_decode(@GIVE@readings, outputs, status, scratch);
   for (unsigned i = 0; i < TAXEL_MODEL_OUTPUTS; i++) {
     Serial.print(taxel_model_output_name(i));
     Serial.print(':');

@@ -20,6 +20,9 @@
 
 static float readings[TAXEL_MODEL_READINGS], outputs[TAXEL_MODEL_OUTPUTS], scratch[TAXEL_MODEL_SCRATCH];
 static uint8_t status[TAXEL_MODEL_ROWS];
+//@if relative
+static taxel_model_t sensor;
+//@end
 
 /* Whether a line begins with a name, in quotes or not: a letter, but not that of "nan" or "inf". */
 static int holds_names(const char *line)
@@ -84,7 +87,7 @@ int main(int count, char **arguments)
         return 1;
     }
 //@if relative
-    taxel_model_set_baseline(readings);
+    taxel_model_set_baseline(&sensor, readings);
 //@end
     for (unsigned i = 0; i < TAXEL_MODEL_OUTPUTS; i++) {
         printf("%s%s", i == 0 ? "" : ",", taxel_model_output_name(i));
@@ -92,9 +95,9 @@ int main(int count, char **arguments)
     puts("");
     while ((found = read_frame(stdin, &number)) > 0) {
 //@if fill
-        taxel_model_fill(readings, scratch);
+        taxel_model_fill(@GIVE@readings, scratch);
 //@end
-        taxel_model_decode(readings, outputs, status, scratch);
+        taxel_model_decode(@GIVE@readings, outputs, status, scratch);
         for (unsigned i = 0; i < TAXEL_MODEL_OUTPUTS; i++) {
             printf("%s%.9g", i == 0 ? "" : ",", (double)outputs[i]);
         }
