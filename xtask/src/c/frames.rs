@@ -34,8 +34,8 @@ const HOSTILE: [f32; 16] = [
     3e20,
     4.999_999_5,
     5.0,
-    1000.0,
-    1000.000_1,
+    1_000.0,
+    1_000.000_1,
 ];
 
 /// Numbers without order, by a linear congruence.
