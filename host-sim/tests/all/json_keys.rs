@@ -64,24 +64,20 @@ const ALL: &str = "name = \"all\"\nscene = \"tiny.toml\"\nlimit_frames = 4\nrepe
 const FOLDS: &str = "name = \"folds\"\n[data]\nfile = \"log.csv\"\ninputs = \"ch*\"\noutputs = \"f*\"\nfold_blocks = 3\n\
                      [set]\ntraining.refine = false\n[axes]\ndata.fold = [0, 1, 2]\ntraining.centres = [3, 5]\n";
 
-/// Presses of different strengths on three channels that drift apart, with rest between them.
-fn log() -> String {
+/// Presses of different strengths on four channels that drift apart, with rest between them.
+pub fn log() -> String {
     let line = |i: i32| {
         let t = 0.01 * f64::from(i);
         let press = (0.7 * t).sin().max(0.0) * (1.0 + (0.31 * t).cos());
         let [x, z] = [press * (2.3 * t).sin(), 5.0 * press];
         let drift = 1.0 + 0.002 * t;
         let rough = f64::from((i * 7919) % 101) / 500.0;
-        let readings = [
-            90.0 * drift - 4.0 * z + x,
-            70.0 / drift + 2.0 * z * z + rough,
-            80.0 + 9.0 * x - rough,
-        ];
-        let [a, b, c] = readings;
-        format!("{t},{a},{b},{c},{x},{z}\n")
+        let [a, b] = [90.0 * drift - 4.0 * z + x, 70.0 / drift + 2.0 * z * z + rough];
+        let [c, d] = [80.0 + 9.0 * x - rough, 60.0 - 2.0 * z - 3.0 * x * z - 2.0 * rough];
+        format!("{t},{a},{b},{c},{d},{x},{z}\n")
     };
-    "time_s,ch1_ohm,ch2_ohm,ch3_ohm,fx_n,fz_n\n".to_owned()
-        + &(0..1500).map(line).collect::<String>()
+    let heads = "time_s,ch1_ohm,ch2_ohm,ch3_ohm,ch4_ohm,fx_n,fz_n\n".to_owned();
+    heads + &(0..1500).map(line).collect::<String>()
 }
 
 /// Scenes, plans and measurements of all commands.

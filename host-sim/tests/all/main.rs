@@ -22,6 +22,7 @@ mod mat;
 mod log;
 mod measured;
 mod moving;
+mod options;
 #[cfg(unix)]
 mod output;
 mod readout;
