@@ -5,14 +5,15 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
 use std::time::Duration;
+use std::{mem, process, thread};
 
 use host_sim::commands::Stopped;
 use host_sim::program;
 use numpy::PyReadonlyArray2;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use taxel_data::DataFile;
 
 /// Time between two looks for Ctrl-C.
@@ -23,19 +24,47 @@ pub fn error((message, status): (String, u8)) -> PyErr {
     if status == 2 { PyValueError::new_err(message) } else { PyRuntimeError::new_err(message) }
 }
 
-/// Does `work` in a thread of its own, while other threads of Python run and Ctrl-C is heard. `stop` is set by the latter,
-/// and the work is waited for.
+/// Pool that decodes, with its process and its number of threads.
+static KEPT: Mutex<Option<(u32, usize, Arc<ThreadPool>)>> = Mutex::new(None);
+
+fn new_pool(threads: usize) -> PyResult<ThreadPool> {
+    let built = ThreadPoolBuilder::new().num_threads(threads).stack_size(16 << 20).build();
+    built.map_err(|cause| PyRuntimeError::new_err(format!("cannot start threads: {cause}")))
+}
+
+/// Does short `work` on so many threads, or on all cores for 0. Their pool is kept, but not over a fork: a child has none of
+/// its parent's threads.
+pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let own = process::id();
+    // A parent may have held the lock at the fork: nobody waits for it.
+    let mut kept = KEPT.try_lock().ok();
+    let found = kept.as_deref().and_then(Option::as_ref);
+    let found = found.filter(|it| (it.0, it.1) == (own, threads)).map(|it| Arc::clone(&it.2));
+    let pool = found.map_or_else(|| new_pool(threads).map(Arc::new), Ok)?;
+    if let Some(kept) = kept.as_deref_mut()
+        && let Some(before) = kept.replace((own, threads, Arc::clone(&pool)))
+        && before.0 != own
+    {
+        mem::forget(before); // its end would wait for the parent's threads
+    }
+    drop(kept);
+    Ok(pool.install(work))
+}
+
+/// Does `work` in a thread of its own, and on so many others (0: one a core), while other threads of Python run and Ctrl-C is
+/// heard. `stop` is set by the latter, and the work is waited for.
 pub fn apart<T: Send + 'static>(
     py: Python<'_>,
     stop: &Arc<AtomicBool>,
+    threads: usize,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
+    let pool = new_pool(threads)?; // of this work alone, and of this process
     let (sender, receiver) = mpsc::channel();
-    let worker =
-        thread::Builder::new().name("taxel".into()).stack_size(16 << 20).spawn(move || {
-            // Nothing of what the work shares is used after a panic.
-            let _ = sender.send(catch_unwind(AssertUnwindSafe(work)));
-        })?;
+    let worker = thread::Builder::new().name("taxel".into()).spawn(move || {
+        // Nothing of what the work shares is used after a panic.
+        let _ = sender.send(catch_unwind(AssertUnwindSafe(|| pool.install(work))));
+    })?;
     let done = wait(py, stop, receiver);
     let _ = worker.join();
     match done? {
@@ -75,13 +104,14 @@ pub fn wait<T: Send>(
 /// A table: its path among the arguments of a command, the names of its columns, and its lines.
 type Table<'py> = (String, Vec<String>, PyReadonlyArray2<'py, f64>);
 
-/// Calls a command of `taxel` with these arguments, of which some are paths of `tables`. Returns its result as JSON, and
-/// its remarks.
+/// Calls a command of `taxel` with these arguments, of which some are paths of `tables`, on so many threads. Returns its
+/// result as JSON, and its remarks.
 #[pyfunction]
 pub fn call(
     py: Python<'_>,
     arguments: Vec<String>,
     tables: Vec<Table<'_>>,
+    threads: usize,
 ) -> PyResult<(String, Vec<String>)> {
     let table = |(path, header, lines): Table<'_>| {
         let table = DataFile::of_table(Path::new(&path), header, lines.as_slice()?.to_vec());
@@ -90,8 +120,8 @@ pub fn call(
     let tables = tables.into_iter().map(table).collect::<PyResult<Vec<_>>>()?;
     let stop = Arc::default();
     let flag = Arc::clone(&stop);
-    let called =
-        apart(py, &stop, move || program::call(&arguments, tables, &flag))?.map_err(error)?;
+    let called = apart(py, &stop, threads, move || program::call(&arguments, tables, &flag))?
+        .map_err(error)?;
     Ok((called.json, called.remarks))
 }
 

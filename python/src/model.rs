@@ -13,8 +13,13 @@ use taxel_core::{Decoder, Estimate, Frame, RowStatus, relative};
 use taxel_learn::reading_model::Extent;
 use taxel_learn::{ModelBlob, PreparedModel};
 
+use crate::call::with_threads;
+
 /// Most rows of a model, as many as the blob format has numbers for.
 const MOST_ROWS: usize = 255;
+
+/// Most lines that the calling thread decodes by itself.
+const FEW_LINES: usize = 64;
 
 /// Ways to decode with a blob.
 struct Ways<'b> {
@@ -141,51 +146,59 @@ impl Blob {
         model.reading_model().map(|it| Extent::ALL[usize::from(it.assesses())].name())
     }
 
-    /// Decodes readings (frames × inputs) to outputs (frames × outputs).
-    #[pyo3(signature = (readings, baseline=None))]
+    /// Decodes readings (frames × inputs) to outputs (frames × outputs) on so many threads; 0 is one a core.
+    #[pyo3(signature = (readings, baseline=None, threads=0))]
     fn decode<'py>(
         &self,
         py: Python<'py>,
         readings: PyReadonlyArray2<'py, f64>,
         baseline: Option<PyReadonlyArray1<'py, f64>>,
+        threads: usize,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (inputs, outputs) = self.counts();
         let (readings, model) = (lines(&readings, inputs)?, self.model(baseline)?);
-        let values = py.detach(|| {
+        let decode = || {
             let filled = model.filled(readings, None);
             model.decode_lines(filled.as_ref().map_or(readings, |(filled, _)| filled))
-        });
+        };
+        // Few lines take less time than to wake a thread.
+        let is_few = readings.len() <= FEW_LINES * inputs;
+        let values =
+            py.detach(|| if is_few { Ok(decode()) } else { with_threads(threads, decode) })?;
         two_dimensional(py, values, outputs)
     }
 
     /// Standard deviations (frames × outputs) and novelty (frames), in nats; None without a full reading model.
-    #[pyo3(signature = (readings, baseline=None))]
+    #[pyo3(signature = (readings, baseline=None, threads=0))]
     #[expect(clippy::type_complexity, reason = "two arrays")]
     fn assess<'py>(
         &self,
         py: Python<'py>,
         readings: PyReadonlyArray2<'py, f64>,
         baseline: Option<PyReadonlyArray1<'py, f64>>,
+        threads: usize,
     ) -> PyResult<Option<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)>> {
         let (inputs, outputs) = self.counts();
         let (readings, model) = (lines(&readings, inputs)?, self.model(baseline)?);
-        let assessed = py.detach(|| {
+        let assess = || {
             let filled = model.filled(readings, None);
             model.assess(filled.as_ref().map_or(readings, |(filled, _)| filled))
-        });
+        };
+        let assessed = py.detach(|| with_threads(threads, assess))?;
         let Some((deviations, novelty)) = assessed else { return Ok(None) };
         Ok(Some((two_dimensional(py, deviations, outputs)?, PyArray1::from_vec(py, novelty))))
     }
 
-    /// Share of the inputs that lie far outside the training range.
-    #[pyo3(signature = (readings, baseline=None))]
-    fn share_out_of_range(
+    /// Readings (frames × inputs) with missing ones filled, as far as the model can.
+    fn filled<'py>(
         &self,
-        readings: PyReadonlyArray2<'_, f64>,
-        baseline: Option<PyReadonlyArray1<'_, f64>>,
-    ) -> PyResult<f64> {
-        let (readings, model) = (lines(&readings, self.counts().0)?, self.model(baseline)?);
-        Ok(model.share_out_of_range(readings))
+        py: Python<'py>,
+        readings: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let inputs = self.counts().0;
+        let given = lines(&readings, inputs)?;
+        let filled = py.detach(|| with_threads(0, || self.ways().tables.filled(given, None)))?;
+        two_dimensional(py, filled.map_or_else(|| given.to_vec(), |(filled, _)| filled), inputs)
     }
 
     /// Reciprocals of a baseline, as a device computes them.

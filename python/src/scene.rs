@@ -101,7 +101,7 @@ impl Scene {
         experiment.world.seed = seed.unwrap_or(experiment.world.seed);
         experiment.world.check_frames("n", count).map_err(refused)?;
         let stream = if training { Stream::Training } else { Stream::Test };
-        let dataset = apart(py, &Arc::default(), move || {
+        let dataset = apart(py, &Arc::default(), 0, move || {
             let synthesis = Synthesis::new(&experiment.world);
             experiment.dataset(&synthesis, stream, count)
         })?;

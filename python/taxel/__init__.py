@@ -7,16 +7,17 @@ Readings are in Ω, lengths in mm, forces in N. Errors of what was given are `Va
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from taxel._native import __version__
+from taxel._native import __version__ as __version__
 
 if TYPE_CHECKING:
-    from taxel._call import TaxelWarning
-    from taxel._decoder import Decoder, Estimate
-    from taxel._link import Link, Reading, list_ports
-    from taxel._model import Model
-    from taxel._recording import Recording, read_recording
-    from taxel._results import Limit, Trade, evaluate, limit, trade
-    from taxel._scene import Frames, Scene, synth
+    from taxel._call import TaxelWarning as TaxelWarning
+    from taxel._decoder import Decoder as Decoder, Estimate as Estimate
+    from taxel._link import Link as Link, Reading as Reading, list_ports as list_ports
+    from taxel._model import Model as Model
+    from taxel._recording import Recording as Recording, read_recording as read_recording
+    from taxel._results import Limit as Limit, Trade as Trade
+    from taxel._results import evaluate as evaluate, limit as limit, trade as trade
+    from taxel._scene import Frames as Frames, Scene as Scene, synth as synth
 
 # Where each name stands: it is imported when it is used first. `Model` takes scikit-learn with it, which takes a second.
 _PLACES = {

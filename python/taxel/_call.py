@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 import tempfile
 import warnings
 from collections.abc import Iterator, Sequence
@@ -25,19 +26,59 @@ WORK = re.compile(r"\S*taxel-\w+/|data\.table: ")
 Table = tuple[str, list[str], np.ndarray]
 
 
+#: What commands say in words of the command line, and what it is in Python.
+WORDS = (
+    (re.compile(r"data\.table"), "the data"),
+    (re.compile(r" \(--(?:grid|rest|time)\b[^()]*\)"), ""),
+    (re.compile(r"--no-refine"), "refine=False"),
+    (re.compile(r"--seed"), "random_state"),
+    (re.compile(r"(?<![\w-])--([a-z]+(?:-[a-z]+)*)"), lambda found: found[1].replace("-", "_")),
+)
+#: Remarks on what Python does by itself.
+OWN = re.compile(r"lines are few for|drift is not looked for|^note: the best \w+, |is the \w+ that was tried")
+
+
 class TaxelWarning(UserWarning):
     """A note or a warning of a command."""
 
 
-def call(arguments: Sequence[object], *, tables: Sequence[Table] = (), warn: bool = True) -> dict[str, Any]:
+#: Kinds of warnings that were given within scikit-learn.
+_given: set[str] = set()
+
+
+def warn(text: str) -> None:
+    """Warns whoever called the module; where that is scikit-learn, which fits many models, once of each kind."""
+    level, frame = 1, sys._getframe(0)
+    while frame.f_back and str(frame.f_globals.get("__name__")).startswith("taxel."):
+        level, frame = level + 1, frame.f_back
+    kind = re.sub(r"[-+.\w]*\d[-+.\w]*", "", text)
+    if str(frame.f_globals.get("__name__")).partition(".")[0] in ("sklearn", "joblib"):
+        if kind in _given:
+            return
+        _given.add(kind)
+    warnings.warn(in_python(text), TaxelWarning, stacklevel=level)
+
+
+def in_python(text: str) -> str:
+    """What a command says, in words of Python."""
+    text = WORK.sub("", text)
+    for pattern, word in WORDS:
+        text = pattern.sub(word, text)
+    return text
+
+
+def call(
+    arguments: Sequence[object], *, tables: Sequence[Table] = (), threads: int = 0
+) -> dict[str, Any]:
     """Result of a command of `taxel`, as its `--json` has it. Its remarks become warnings."""
     try:
-        text, remarks = _native.call([str(argument) for argument in arguments], list(tables))
+        text, remarks = _native.call([str(argument) for argument in arguments], list(tables), threads)
     except (ValueError, RuntimeError) as error:
-        said = WORK.sub("", str(error)).split("\n\nFor more information")[0]
+        said = in_python(str(error)).split("\n\nFor more information")[0]
         raise type(error)(said) from None
-    for remark in remarks if warn else []:
-        warnings.warn(WORK.sub("", remark).replace("data.table", "the data"), TaxelWarning, stacklevel=3)
+    for remark in remarks:
+        if not OWN.search(remark):
+            warn(remark)
     return json.loads(text) if text else {}
 
 

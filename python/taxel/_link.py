@@ -48,9 +48,9 @@ class Reading:
 class Link:
     """A device, listened to in the background: an iterator over what it sends, and a context manager.
 
-    `port` None takes the one there is. `protocol` "flexitac" and "csv" listen to other sensors: FlexiTac's firmware, and lines of
-    numbers; they need `shape` (rows, columns), and know neither `zero` nor `upload`. `send` is "readings", "estimates" or "both"; None takes estimates from a device that
-    has a model, and readings from another. `buffer` readings wait to be taken; older ones are dropped and counted.
+    `port` None takes the one there is. `protocol` "flexitac" and "csv" listen to other sensors: FlexiTac's firmware, and lines
+    of numbers; they need `shape` (rows, columns), and know neither `zero` nor `upload`. `send` is "readings", "estimates" or
+    "both"; None takes estimates from a device that has a model, and readings from another. `buffer` readings wait to be taken; older ones are dropped and counted.
     """
 
     def __init__(

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 __version__: str
 
 def call(
-    arguments: list[str], tables: list[tuple[str, list[str], NDArray[np.float64]]]
+    arguments: list[str], tables: list[tuple[str, list[str], NDArray[np.float64]]], threads: int
 ) -> tuple[str, list[str]]: ...
 def main(arguments: list[str]) -> int: ...
 def ports() -> list[str]: ...
@@ -25,14 +25,12 @@ class Blob:
     relative_inputs: bool
     reading_model: str | None
     def decode(
-        self, readings: NDArray[np.float64], baseline: NDArray[np.float64] | None = None
+        self, readings: NDArray[np.float64], baseline: NDArray[np.float64] | None = None, threads: int = 0
     ) -> NDArray[np.float64]: ...
     def assess(
-        self, readings: NDArray[np.float64], baseline: NDArray[np.float64] | None = None
+        self, readings: NDArray[np.float64], baseline: NDArray[np.float64] | None = None, threads: int = 0
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None: ...
-    def share_out_of_range(
-        self, readings: NDArray[np.float64], baseline: NDArray[np.float64] | None = None
-    ) -> float: ...
+    def filled(self, readings: NDArray[np.float64]) -> NDArray[np.float64]: ...
     @staticmethod
     def reciprocals(baseline: NDArray[np.float32]) -> NDArray[np.float32]: ...
     def decode_frame(
@@ -62,7 +60,9 @@ class Line:
     def __init__(
         self,
         port: str,
+        protocol: str,
         baud: int,
+        shape: tuple[int, int],
         period_us: int | None,
         send: str | None,
         confidence: bool,

@@ -37,13 +37,13 @@ def frames():
 @pytest.mark.parametrize("parameters", [{}, {"format": "fixed16", "reading_model": "full"}])
 def test_the_blob_is_that_of_the_command_line(tmp_path, parameters):
     x, y = smooth()
-    model = taxel.Model(12, refine=False, **parameters).fit(x, y)
+    model = taxel.Model(12, refine=False, penalty=1e-6, **parameters).fit(x, y)
     names = [*(f"x{i}" for i in (1, 2, 3)), "y1", "y2"]
     pandas.DataFrame(np.column_stack([x, y]), columns=names).to_csv(tmp_path / "data.csv", index=False)
     options = ["--format", "fixed16", "--reading-model", "full"] if "format" in parameters else []
     command_line(
         *("train", tmp_path / "data.csv", "--inputs", "x1..x3", "--outputs", "y1,y2", "--no-refine"),
-        *("--centres", 12, *options, "-o", tmp_path / "model.bin"),
+        *("--centres", 12, "--penalty", 1e-6, *options, "-o", tmp_path / "model.bin"),
     )
     assert model.to_bytes() == (tmp_path / "model.bin").read_bytes()
     command_line("decode", tmp_path / "model.bin", tmp_path / "data.csv", "-o", tmp_path / "out.csv")
@@ -170,8 +170,8 @@ def test_a_model_survives_pickle_and_files(tmp_path):
 def test_fewer_lines_than_centres_take_fewer_with_a_warning():
     x, y = smooth(20)
     with pytest.warns(UserWarning, match="19 centres instead of 64"):
-        model = taxel.Model(64, refine=False).fit(x, y)
-    assert model.blob_.centres == 19
+        model = taxel.Model(64, refine=False, penalty=1e-6).fit(x, y)
+    assert model.blob_.centres == 19 and taxel.Model(64).fit(x, y).blob_.centres == 14 and taxel.Model().fit(x, y).blob_.centres <= 8
 
 
 @pytest.mark.parametrize(
@@ -232,7 +232,7 @@ def test_a_loaded_model_takes_columns_by_their_names(tmp_path):
     x, y = smooth(features=4)
     x[:, 0] = 50  # tells nothing, and is left out
     names = ["unused", "left, upper", "-b", "c [Ω] "]
-    model = taxel.Model(8, refine=False).fit(named(x, names), named(y, ["Fx, N", "!y"]))
+    model = taxel.Model(8, refine=False, penalty=1e-6).fit(named(x, names), named(y, ["Fx, N", "!y"]))
     assert (model.blob_.input_names, model.output_names_) == (names[1:], ["Fx, N", "!y"])
     model.save(tmp_path / "model.bin")
     loaded, known = taxel.Model.load(tmp_path / "model.bin"), model.predict(named(x, names))
@@ -278,7 +278,7 @@ def test_what_a_model_cannot_take_is_told_in_the_words_of_python(tmp_path):
             taxel.Model(**{"centres": 4, "refine": False, **parameters}).fit(x, y)
     for groups, says in [([1, 2], "400 lines and groups 2"), (np.arange(400), "groups has no effect")]:
         with pytest.raises(ValueError, match=says):
-            taxel.Model(4, refine=False).fit(x, y, groups=groups)
+            taxel.Model(4, refine=False, penalty=1e-6).fit(x, y, groups=groups)
     x[3, 1] = np.nan
     with pytest.raises(ValueError, match="NaN: missing readings take Model"):
         taxel.Model(4, refine=False).fit(x, y)
@@ -286,3 +286,89 @@ def test_what_a_model_cannot_take_is_told_in_the_words_of_python(tmp_path):
         taxel.trade(x)
     with pytest.raises(TypeError, match="a ndarray: give a Model"):
         taxel.evaluate(x, x, y)
+
+
+def test_few_noisy_lines_are_told_no_worse_than_by_ridge():
+    from sklearn.datasets import load_diabetes, load_linnerud
+    from sklearn.linear_model import RidgeCV
+    from sklearn.model_selection import ShuffleSplit, cross_val_score
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    ridge = make_pipeline(StandardScaler(), RidgeCV(np.logspace(-3, 4, 15)))
+    for data, splits, ways in ((load_diabetes, 3, (False, True)), (load_linnerud, 40, (False,))):
+        x, y = data(return_X_y=True)
+        split = ShuffleSplit(splits, test_size=0.3, random_state=0)
+        known = cross_val_score(ridge, x, y, cv=split, scoring="r2").mean()
+        for model in (taxel.Model(refine=False, select=select) for select in ways):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found = cross_val_score(model, x, y, cv=split).mean()
+            assert found > known - 0.02, (data, model)
+
+
+def test_outputs_may_be_missing_constant_or_called_like_a_feature():
+    x, y = smooth()
+    model = taxel.Model(8, refine=False, penalty=1e-6)
+    whole = model.fit(x, y).score(x, y)
+    y[::4, 1] = np.nan
+    assert abs(model.fit(x, y).score(x, y) - whole) < 0.1
+    constant = np.full(len(x), 3.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        model.fit(x, constant)
+    assert (model.score(x, constant), model.score(x, constant + 1)) == (1, 0)
+    model.fit(named(x, ["a", "b", "c"]), pandas.Series(y[:, 0], name="b"))
+    assert model.output_names_ == ["b_out"]
+
+
+def test_a_weight_is_a_number_of_lines_and_a_seed_may_be_drawn():
+    x, y = smooth(200)
+    counts = np.arange(200) % 3
+    groups = np.arange(200) // 20
+    model = taxel.Model(8, refine=False)
+    weighted = model.fit(x, y, sample_weight=2 * counts, groups=groups).to_bytes()
+    again = [np.repeat(it, counts, axis=0) for it in (x, y, groups)]
+    assert model.fit(again[0], again[1], groups=again[2]).to_bytes() == weighted
+    assert model.fit(x, y, sample_weight=RANDOM.random(200)).score(x, y, sample_weight=counts) > 0.5
+    for seed in (None, np.random.RandomState(3)):
+        assert taxel.Model(8, refine=False, random_state=seed).fit(x, y).score(x, y) > 0.5
+    with pytest.raises(ValueError, match="sample_weight"):
+        model.fit(x, y, sample_weight=np.ones(3))
+
+
+def test_lines_with_gaps_train_a_model_that_fills_them():
+    x, y = smooth(600, 4)
+    x[:, 3] = x[:, 0] + 0.5 * x[:, 1]
+    x[RANDOM.random(600) < 0.4, 3] = np.nan
+    x[7] = np.nan
+    with pytest.warns(taxel.TaxelWarning, match="1 of 600 lines"):
+        model = taxel.Model(8, refine=False, reading_model="fill").fit(x, y)
+    assert model.report_["training_frames"] == 599 and model.score(x, y) > 0.5
+
+
+def test_a_grid_warns_once_of_each_kind_in_words_of_python():
+    from sklearn.model_selection import GridSearchCV
+
+    x, y = smooth(60)
+    taxel._call._given.clear()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        GridSearchCV(taxel.Model(refine=False, penalty=1e-6), {"centres": [5, 10, 20]}, cv=3).fit(x, y)
+    said = [str(it.message) for it in caught if it.category is taxel.TaxelWarning]
+    assert 1 <= len(said) <= 3 and not any("--" in it for it in said)
+
+
+def test_a_picture_of_many_outputs_names_none_in_its_sentence():
+    x, _ = smooth()
+    y = np.column_stack([np.sin(x[:, 0] * factor / 8) for factor in range(1, 13)])
+    page = taxel.Model(8, refine=False, penalty=1e-6).fit(x, y)._repr_html_()
+    assert "12 groups of outputs, with R² from" in page and "y7" not in page
+
+
+def test_types_are_exported_to_strict_checkers(tmp_path):
+    pytest.importorskip("mypy")
+    code = "import taxel\nmodel: taxel.Model = taxel.Model(8, n_jobs=2)\nprint(taxel.synth('press', 2).readings, taxel.Link)\n"
+    (tmp_path / "user.py").write_text(code)
+    done = subprocess.run([sys.executable, "-m", "mypy", "--strict", "user.py"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout

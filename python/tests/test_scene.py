@@ -40,7 +40,7 @@ def test_a_trade_has_points_a_front_and_what_was_chosen():
     assert trade.chosen in trade.front and trade.chosen in trade.points
     assert trade.model.blob_.centres == trade.chosen["centres"]
     assert len(trade.to_pandas()) == len(trade.points) and "<svg" in trade._repr_html_()
-    with pytest.raises(ValueError, match="--max-error"):
+    with pytest.raises(ValueError, match="max_error"):
         taxel.trade(scene, centres=[4], refine=False, max_error=-1.0)
 
 

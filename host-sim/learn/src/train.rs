@@ -91,7 +91,7 @@ pub struct Options {
     /// Whether the network adds an affine tail A·x. Only the [paper's own way](Options::as_in_paper) has none.
     pub affine_tail: bool,
     /// Ridge penalty on squared weights, for each training frame: at 1 it is as strong as an input that is always 1,
-    /// and as strong as all activations that are fully on; on the affine tail it is at most 1e-7. `None` for the usual one:
+    /// and as strong as all activations that are fully on; on the affine tail it is at most 1e-7, or a thousandth of one above 1. `None` for the usual one:
     /// 1/[`INITIAL_COVARIANCE`] for all frames together, or [`Refinement::ridge`] if training is refined. That of places
     /// behind normalised features is chosen ([`Start::penalty`]).
     pub penalty: Option<f64>,
@@ -226,10 +226,10 @@ impl Options {
 /// Checks a penalty on squared weights for each frame.
 ///
 /// # Errors
-/// [`BadValue`] for a penalty beyond 1e-15 to 1.
+/// [`BadValue`] for a penalty beyond 1e-15 to 1000.
 pub fn check_penalty(penalty: f64) -> std::result::Result<(), BadValue> {
-    require((1e-15..=1.0).contains(&penalty), "penalty", format!("{penalty:?}"), || {
-        "give a number from 1e-15 to 1, such as 1e-7".into()
+    require((1e-15..=1e3).contains(&penalty), "penalty", format!("{penalty:?}"), || {
+        "give a number from 1e-15 to 1000, such as 1e-7".into()
     })
 }
 

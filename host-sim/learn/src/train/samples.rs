@@ -13,9 +13,11 @@ const FRAMES_AT_ONCE: usize = 8192;
 const FEW_FRAMES: usize = 50;
 /// Least error of a reading over its range, whatever few frames say.
 const LEAST_ERROR: f64 = 1e-3;
-/// Most penalty on the squared weights of the affine tail, for each frame. A larger one is for the Gaussians alone: a
-/// plane fits no noise.
+/// Most penalty on the squared weights of the affine tail, for each frame, where the Gaussians have one up to 1: a plane
+/// fits little noise.
 const MOST_OF_TAIL: f64 = 1e-7;
+/// Share of a penalty above 1 that the affine tail has. Such a one leaves nothing of the Gaussians.
+const SHARE_OF_TAIL: f64 = 1e-3;
 
 /// Hidden layer of a network: its Gaussians.
 #[derive(Debug, Clone, PartialEq)]
@@ -135,6 +137,9 @@ impl Ridge {
         let inputs = if self.options.affine_tail { self.inputs } else { 0 };
         let is_few = frames < FEW_FRAMES * regressors;
         match self.options.penalty {
+            Some(penalty) if penalty > 1.0 && (last - inputs..last).contains(&regressor) => {
+                (SHARE_OF_TAIL * penalty * frames as f64).sqrt()
+            }
             Some(penalty) if penalty > MOST_OF_TAIL && regressor >= last - inputs => {
                 (MOST_OF_TAIL * frames as f64).sqrt()
             }

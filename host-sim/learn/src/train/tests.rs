@@ -65,11 +65,19 @@ fn a_penalty_is_for_each_frame() {
     let with = |penalty| Options { penalty, ..Options::of_rows() };
     assert!((with(Some(1e-7)).initial_covariance(2000) * 2e-4 - 1.0).abs() < 1e-12);
     assert_eq!(with(None).initial_covariance(2000), INITIAL_COVARIANCE);
-    for penalty in [0.0, -1e-7, 2.0, f64::NAN] {
+    for penalty in [0.0, -1e-7, 2000.0, f64::NAN] {
         let message = with(Some(penalty)).check(1000).unwrap_err().to_string();
         assert!(message.starts_with("penalty = "), "{message}");
     }
     with(Some(1e-7)).check(1000).unwrap();
+    // On the affine tail of two inputs it is at most 1e-7, or a thousandth of one above 1; on the bias it stays small.
+    let roots = |penalty| {
+        [0, 6, 7].map(|it| Ridge::new(2, &with(Some(penalty))).root(100, it, 8).powi(2) / 100.0)
+    };
+    for (penalty, wanted) in [(0.1, [0.1, 1e-7, 1e-7]), (10.0, [10.0, 0.01, 1e-7])] {
+        let near = |(a, b): (f64, f64)| (a / b - 1.0).abs() < 1e-9;
+        assert!(roots(penalty).into_iter().zip(wanted).all(near), "{:?}", roots(penalty));
+    }
 }
 
 #[test]
