@@ -150,8 +150,8 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
         `groups` has a number for each line: one group after the other is held out to refine and to tell deviations, instead
         of five folds. A line of `sample_weight` 2 counts as two lines, and one of 0 as none; weights with fractions are rounded
-        to quarters of their mean. An output may be NaN on some lines, as a place is where nothing touches. Columns of a pandas DataFrame keep their
-        names; an output that is called like a feature gets `_out` behind its name. A value far from all others in its column
+        to quarters of their mean. An output may be NaN on some lines, as a place is where nothing touches. Columns of a
+        DataFrame keep their names; an output that is called like a feature gets `_out` behind its name. A value far from all others in its column
         leaves its line out (`report_["outliers"]`). Missing readings are filled by the others of their line.
         """
         if y is None:

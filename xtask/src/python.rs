@@ -7,7 +7,8 @@ use std::process::Command;
 use crate::process::{Outcome, root, run, target_dir};
 
 /// What the tests take, besides the module itself.
-const PACKAGES: [&str; 6] = ["maturin>=1.9,<2", "mypy", "numpy", "pandas", "pytest", "scikit-learn>=1.6"];
+const PACKAGES: [&str; 6] =
+    ["maturin>=1.9,<2", "mypy", "numpy", "pandas", "pytest", "scikit-learn>=1.6"];
 
 /// Builds the wheel, installs it, and runs its tests.
 pub fn test() -> Outcome {
