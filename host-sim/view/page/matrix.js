@@ -1,7 +1,7 @@
 // The readings: a cell each, in rows and columns of wires.
 
 /** Least change at the ends of the scale: as large for all sources, so that their pictures compare. */
-const LEAST_CHANGE = 0.1;
+const LEAST_CHANGE = 0.05;
 const matrix = { isRelative: false, low: Infinity, high: -Infinity, most: LEAST_CHANGE, boxes: null };
 
 /** Forgets the scales: they begin with the baseline again, and grow with what is seen. */

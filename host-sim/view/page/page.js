@@ -18,7 +18,7 @@ let arrived = 0, arrivedAge = 0;
 let drawn = [];
 let contact = { trace: new Trace(2), chart: null, wasSeen: false, hasForce: false };
 let values = { trace: new Trace(0), charts: [], numbers: [], outputs: [] };
-/** Whether a frame had outputs or their truth: without any, their panels are not shown. */
+/** Whether a frame had outputs: without any, their panels are not shown. */
 let hasOutputs = false;
 
 // ---- Events ----
@@ -113,7 +113,7 @@ function takeFrame(next) {
   if (frame.flags.includes("novel")) flags.set("nats", frame.novelty);
   const time = frame.time_us / 1e6, at = frame.contact;
   contact.wasSeen ||= !!at;
-  hasOutputs ||= frame.outputs.length > 0 || !!frame.truth;
+  hasOutputs ||= frame.outputs.length > 0;
   contact.hasForce ||= Number.isFinite(frame.force_n);
   contact.trace.push(time, [frame.force_n, at ? at.depth_mm : 0]);
   values.trace.push(time, values.outputs.slice(0, MOST_CHARTS).map((index) => frame.outputs[index]));
@@ -251,9 +251,10 @@ function draw() {
 
 function showNumbers() {
   const at = frame.contact, { hasForce, trace } = contact;
-  byId("sheet_card").hidden = !shape || !hasOutputs;
-  byId("values_card").hidden = !values.outputs.length || !hasOutputs;
-  byId("contact_card").hidden = !contact.wasSeen && byId("sheet_card").hidden;
+  const isEmpty = !hasOutputs && !frame.truth;
+  byId("sheet_card").hidden = !shape || isEmpty;
+  byId("values_card").hidden = !values.outputs.length || isEmpty;
+  byId("contact_card").hidden = !contact.wasSeen && !(shape && hasOutputs);
   byId("force_item").hidden = !hasForce;
   setText("force", digits(frame.force_n ?? 0));
   setText("depth", digits(at?.depth_mm ?? 0));
