@@ -123,7 +123,7 @@ fn add_values(value: &Value, path: &str, values: &mut Values) {
                 let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
                 values.entry(path.clone()).or_default();
                 // What differs from run to run, and from build to build.
-                if !["seconds", "version", "id", "points_per_s"].contains(&key.as_str()) {
+                if !["seconds", "version", "build", "id", "points_per_s"].contains(&key.as_str()) {
                     add_values(member, &path, values);
                 }
             }
