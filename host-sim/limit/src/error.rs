@@ -21,8 +21,10 @@ pub enum Refusal {
         most: usize,
     },
     /// Frames with a posterior of too few effective samples.
-    #[error("{} of {of} test frames {} fewer than {least} effective samples: the sample does not carry the figure",
-        numbered(frames), if frames.len() == 1 { "has" } else { "have" })]
+    #[error(
+        "{} of {of}: fewer than {least} effective samples, which do not carry the figure",
+        numbered(frames)
+    )]
     Thin {
         /// Numbers of these frames, from 1.
         frames: Vec<usize>,
@@ -65,5 +67,9 @@ fn numbered(frames: &[usize]) -> String {
         words.push(format!("{} more", frames.len() - SHOWN));
     }
     let last = words.pop().unwrap_or_default();
-    if words.is_empty() { last } else { format!("{} and {last}", words.join(", ")) }
+    if words.is_empty() {
+        format!("test frame {last}")
+    } else {
+        format!("test frames {} and {last}", words.join(", "))
+    }
 }

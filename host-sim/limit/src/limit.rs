@@ -53,6 +53,8 @@ pub struct Posterior {
     pub mean: Vec<f64>,
     /// Posterior variance of each output, in its unit squared.
     pub variance: Vec<f64>,
+    /// Fourth central moment of each output in the posterior.
+    pub fourth: Vec<f64>,
     /// Effective sample size behind each output.
     pub effective: Vec<f64>,
 }
@@ -152,6 +154,7 @@ impl Limit {
         posterior.effective.extend(std::iter::repeat_n(moments.effective, moments.mean.len()));
         posterior.mean.extend(moments.mean);
         posterior.variance.extend(moments.variance);
+        posterior.fourth.extend(moments.fourth);
     }
 }
 

@@ -54,6 +54,8 @@ pub struct Moments {
     pub mean: Vec<f64>,
     /// Variance of each output.
     pub variance: Vec<f64>,
+    /// Fourth central moment of each output.
+    pub fourth: Vec<f64>,
 }
 
 /// Samples the posterior `target`, from samples of the prior with their likelihoods.
@@ -134,13 +136,15 @@ fn draw<T: Target>(
     samples
 }
 
-/// Posterior mean and variance of every output of `target`, from weighted `samples`.
+/// Posterior mean, variance and fourth moment of every output of `target`, from weighted `samples`.
 ///
 /// The variance is that of the weights times n/(n − 1), with the effective sample size n.
 pub fn moments<T: Target>(target: &T, samples: &Samples, memory: &mut T::Memory) -> Moments {
     let weights = normalised(&tempered(&samples.log_prior, &samples.log_likelihood, 1.0));
     let outputs = target.output_count();
     let mut sums = vec![[0.0; 2]; outputs];
+    // Powers of what lies beyond a value of the posterior: fourth powers of the values themselves would cancel out.
+    let (mut origins, mut powers) = (None::<Vec<f64>>, vec![[0.0; 4]; outputs]);
     let mut latents: Vec<Lanes> = vec![[0.0; LANES]; samples.latents];
     let mut values = vec![[0.0; LANES]; outputs];
     let places = samples.places.chunks_exact(LANES * samples.latents);
@@ -152,20 +156,29 @@ pub fn moments<T: Target>(target: &T, samples: &Samples, memory: &mut T::Memory)
             latents.iter_mut().zip(place).for_each(|(latent, x)| latent[lane] = *x);
         }
         target.outputs(&latents, memory, &mut values);
-        for ([sum, squares], values) in sums.iter_mut().zip(&values) {
+        let origins = origins.get_or_insert_with(|| values.iter().map(|lanes| lanes[0]).collect());
+        let sums = sums.iter_mut().zip(&mut powers);
+        for ((([sum, squares], powers), values), origin) in sums.zip(&values).zip(origins) {
             for (weight, value) in weights.iter().zip(values) {
                 *sum += weight * value;
                 *squares += weight * value * value;
+                let mut term = *weight;
+                for power in &mut *powers {
+                    term *= value - *origin;
+                    *power += term;
+                }
             }
         }
     }
     let effective = effective(&weights);
     let unbiased = if effective > 1.0 { effective / (effective - 1.0) } else { f64::NAN };
     let variance = |[mean, squares]: &[f64; 2]| (squares - mean * mean).max(0.0) * unbiased;
+    let fourth = |[a, b, c, d]: &[f64; 4]| d - 4.0 * a * c + 6.0 * a * a * b - 3.0 * a.powi(4);
     Moments {
         effective,
         mean: sums.iter().map(|[mean, _]| *mean).collect(),
         variance: sums.iter().map(variance).collect(),
+        fourth: powers.iter().map(fourth).collect(),
     }
 }
 
