@@ -365,7 +365,7 @@ mod tests {
         let share: f64 = (3.7 + 15.65) / 10.0;
         close(ratio.ratio, (1.0 + share).sqrt());
         let off = [3.7 - 3.0 * share, 15.65 - 7.0 * share];
-        let error = ((off[0].powi(2) + off[1].powi(2)) / 2.0).sqrt() / 5.0;
+        let error = f64::midpoint(off[0].powi(2), off[1].powi(2)).sqrt() / 5.0;
         close(ratio.standard_error, 0.5 * error / ratio.ratio);
         let effective = reference.effective();
         assert_eq!(
