@@ -1,6 +1,9 @@
 """A node of ROS 2 that publishes a Taxel sensor: readings as an Image, and electrodes as a PointCloud2, in metres.
 
-    pip install taxel; python ros2_taxel.py [PORT]
+    python ros2_taxel.py [PORT]                        # a device whose model has Δx, Δy, Δz of each electrode
+    python ros2_taxel.py press.mcap recording          # a recording in its place
+
+Without ROS, `pip install ros-rclpy ros-rmw-fastrtps-cpp ros-sensor-msgs` has what it imports, besides taxel.
 """
 
 import sys
@@ -16,9 +19,9 @@ SIZE_M = (0.020, 0.018, 0.005)
 
 
 class Taxel(Node):
-    def __init__(self, port):
+    def __init__(self, port=None, protocol="taxel"):
         super().__init__("taxel")
-        self.link = taxel.Link(port, send="both")
+        self.link = taxel.Link(port, protocol=protocol, send="both")
         self.images = self.create_publisher(Image, "/taxel/readings", 10)
         self.points = self.create_publisher(PointCloud2, "/taxel/points", 10)
         self.create_timer(0.005, self.publish)
@@ -50,7 +53,7 @@ class Taxel(Node):
 
 def main():
     rclpy.init()
-    node = Taxel(sys.argv[1] if len(sys.argv) > 1 else None)
+    node = Taxel(*sys.argv[1:])
     try:
         rclpy.spin(node)
     finally:

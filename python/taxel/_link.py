@@ -11,6 +11,7 @@ import numpy as np
 
 from taxel import _native
 from taxel._call import call, folder
+from taxel._replay import Replay
 
 if TYPE_CHECKING:
     from taxel._model import Model
@@ -48,9 +49,10 @@ class Reading:
 class Link:
     """A device, listened to in the background: an iterator over what it sends, and a context manager.
 
-    `port` None takes the one there is. `protocol` "flexitac" and "csv" listen to other sensors: FlexiTac's firmware, and lines
-    of numbers; they need `shape` (rows, columns), and know neither `zero` nor `upload`. `send` is "readings", "estimates" or
-    "both"; None takes estimates from a device that has a model, and readings from another. `buffer` readings wait to be taken; older ones are dropped and counted.
+    `port` None takes the one there is. `protocol` "flexitac" and "csv" listen to other sensors: FlexiTac's firmware, and lines of
+    numbers; they need `shape` (rows, columns). "recording" plays the recording (.mcap) that `port` names, again and again. These
+    know neither `zero` nor `upload`. `send` is "readings", "estimates" or "both"; None takes estimates from a device that has a
+    model, and readings from another. `buffer` readings wait to be taken; older ones are dropped and counted.
     """
 
     def __init__(
@@ -66,15 +68,15 @@ class Link:
         buffer: int = 1024,
     ):
         self.port = port or only_port()
-        if protocol not in ("taxel", "flexitac", "csv"):
-            raise ValueError(f'protocol={protocol!r}: give "taxel", "flexitac" or "csv"')
-        if protocol != "taxel" and (shape is None or min(shape) < 1):
+        if protocol not in ("taxel", "flexitac", "csv", "recording"):
+            raise ValueError(f'protocol={protocol!r}: give "taxel", "flexitac", "csv" or "recording"')
+        if protocol in ("flexitac", "csv") and (shape is None or min(shape) < 1):
             raise ValueError(f"shape={shape}: protocol {protocol!r} does not tell rows and columns; give such as shape=(16, 32)")
         if buffer < 1 or (baud is not None and baud < 1):
             raise ValueError(f"buffer={buffer}, baud={baud}: give whole numbers from 1 on")
         usual_baud = 2_000_000 if protocol == "flexitac" else 921_600
         self._options = (protocol, baud or usual_baud, shape or (0, 0), period_us, send, confidence, buffer)
-        self._line: Any = _native.Line(self.port, *self._options)
+        self._line: Any = Replay(self.port, send) if protocol == "recording" else _native.Line(self.port, *self._options)
         self._has_read = False
 
     def __repr__(self) -> str:
