@@ -444,4 +444,19 @@ mod tests {
         let header = ["r1c1_ohm", "r2c1_ohm", "r3e1_dz_mm", "r4e1_dz_mm"].map(String::from);
         assert_eq!(by_rows(&header, vec![0, 1], vec![2, 3]), (vec![0, 1], vec![2, 3], 1));
     }
+
+    #[test]
+    fn columns_that_lack_most_are_named_the_emptiest_first() {
+        let (gap, header) = (f64::NAN, ["a", "b", "c", "d", "e"].map(String::from).to_vec());
+        #[rustfmt::skip]
+        let values = vec![
+            gap, gap, 1.0, gap, gap,
+            2.0, gap, 2.0, gap, gap,
+            3.0, 3.0, 3.0, gap, gap,
+            4.0, 4.0, 4.0, 4.0, gap,
+        ];
+        let file = DataFile::of_table("log.csv".as_ref(), header, values).unwrap();
+        let most = missing_most(&file, &[0, 1, 2], &[3, 4]);
+        assert_eq!(most, [("e", 4), ("d", 3), ("b", 2)].map(|(name, n)| (name.into(), n)));
+    }
 }

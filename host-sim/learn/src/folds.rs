@@ -130,6 +130,14 @@ mod tests {
     }
 
     #[test]
+    fn errors_of_all_folds_count_the_frames_that_have_the_output() {
+        let values = vec![1.0, 2.0, f64::NAN, 4.0, 5.0, f64::NAN];
+        let outputs = Table { names: ["f", "y"].map(String::from).to_vec(), values: values.into() };
+        let rmse = pooled_rmse(&[vec![6.0, 3.0], vec![2.0, 9.0]], &outputs);
+        assert_eq!(rmse, [2.0, 6.0_f64.sqrt()]);
+    }
+
+    #[test]
     fn random_folds_are_equal_in_number_and_seeded() {
         let folds = random_folds(103, 5, 7);
         for fold in 0..5 {
