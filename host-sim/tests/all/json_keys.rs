@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::common::{Folder, small_scene, small_scene_with_table1, tiny_scene};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
-const COMMANDS: [&str; 37] = [
+const COMMANDS: [&str; 39] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --reading-model full -o m.bin",
@@ -48,6 +48,8 @@ const COMMANDS: [&str; 37] = [
     "trade scene.toml --centres 4,6 --average 1,4 --column-step 1,3 --frame-rate 50 --all -o rates",
     "trade tiny.toml --centres 4 --readout onchip --average 1,4 --max-latency-ms 9 --clock-mhz 90 --worst-case -o slow",
     "trade moving.toml --centres 4 --max-error 1 --scan-ms 3 -o moving-trade",
+    "trade tiny.toml --centres 4,12 --max-flash 6000 --all -o small",
+    "synth spans_drift.toml -n 20 -o spans.csv",
     "sweep all.toml",
     "sweep folds.toml",
 ];
@@ -106,6 +108,8 @@ fn prepared() -> Folder {
         "spans.toml",
         tiny.replace("\"relative\"", "\"span\"").replace("\"tiny\"", "\"spans\""),
     );
+    let drifts = format!("{}\n[drift]\ngain = 0.2\n", tiny.replace("\"relative\"", "\"span\""));
+    folder.write("spans_drift.toml", drifts);
     folder.write("tiny.toml", tiny);
     folder.write("all.toml", ALL);
     folder.write("folds.toml", FOLDS);
