@@ -214,4 +214,19 @@ mod tests {
         assert_eq!(found.percent_of, PercentOf::Range);
         assert!((75.0..85.0).contains(&found.drifts[0].percent));
     }
+
+    #[test]
+    fn percentiles_of_the_change_at_rest_are_those_of_all_readings() {
+        let at = (0..800).map(f64::from).collect();
+        let clock = Clock { column: Some("time_s".into()), unit: "s", at };
+        let lines = (0..400).map(|line| line + 20 * (line / 20)).collect();
+        let names = (0..12).map(|k| format!("ch{k}")).collect();
+        let change = |line: usize, k: usize| (k * line) as f64 / 400.0;
+        let values = (0..400).flat_map(|line| (0..12).map(move |k| 1000.0 + change(line, k)));
+        let readings = Table { names, values: values.collect() };
+        let rest = Rest { readings: readings.clone(), lines: Some(lines) };
+        let found = RestOverTime::new(&rest, &clock, &Spread::of(&readings)).unwrap();
+        let [low, middle, high] = found.stretches.last().unwrap().percentiles_percent;
+        assert!((low / middle - 0.2).abs() < 0.01 && (high / middle - 1.8).abs() < 0.01);
+    }
 }
