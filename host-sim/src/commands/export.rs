@@ -53,7 +53,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     } else {
         let folder = arguments.c.as_ref().ok_or_else(|| Error::Usage("--c or --rust".into()))?;
         (written, blob) = (folder, read()?);
-        c::write(&blob, &arguments.name, arguments.limits.limits.0, folder)?;
+        c::write(&blob, &arguments.name, arguments.limits.believed(), folder)?;
     }
     let model = blob.parse();
     let mut result = Sections::new("Model as source code");

@@ -33,12 +33,19 @@ pub struct LimitsArgument {
     /// Readings in Ω outside of these limits count as missing (shorted or open), as on a device, and those of a baseline
     /// too. `none` believes all. Columns whose names do not end with _ohm have no limits.
     #[arg(long, value_name = "LOW,HIGH", value_parser = limits, default_value = "5,1000")]
-    pub limits: Believed,
+    limits: Believed,
+}
+
+impl LimitsArgument {
+    /// The limits; `None` believes all readings.
+    pub fn believed(self) -> Option<Limits> {
+        self.limits.0
+    }
 }
 
 /// Readings that are believed: all of them, or those within limits.
 #[derive(Debug, Clone, Copy)]
-pub struct Believed(pub Option<Limits>);
+struct Believed(Option<Limits>);
 
 fn limits(text: &str) -> std::result::Result<Believed, String> {
     if text.trim() == "none" {
@@ -76,7 +83,7 @@ pub struct Health {
 impl HealthArguments {
     /// Limits of readings that are believed; `None` believes all.
     pub fn limits(&self) -> Option<Limits> {
-        self.limits.limits.0
+        self.limits.believed()
     }
 
     /// Makes faulty ones of the `readings` in the data file missing, notes them on stderr, and lets the `model` fill them,

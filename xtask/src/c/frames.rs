@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use taxel_core::blob::ModelShape;
-use taxel_core::health::Limits;
+use taxel_core::health::{Health, Limits};
 use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Frame, OwnedEstimate, RowStatus};
 
@@ -82,7 +82,7 @@ fn group_bytes(
     let model = model.blob.parse();
     let decoder = Decoder::<MOST_ROWS>::new(model).map_err(|cause| cause.to_string())?;
     let mut believed = baseline.to_vec();
-    believe(&mut believed);
+    Health::new(&mut believed, baseline.len(), Limits::USUAL, &mut []);
     let reciprocals: Vec<f32> = believed.iter().map(|it| reciprocal(*it)).collect();
     let mut scratch = vec![0.0; decoder.scratch_floats()];
     let ModelShape { rows, outputs, .. } = decoder.shape();
@@ -99,7 +99,7 @@ fn group_bytes(
             disturb(&mut readings, draw);
         }
         put(&mut bytes, &readings);
-        believe(&mut readings);
+        Health::new(&mut readings, baseline.len(), Limits::USUAL, &mut []);
         let given = Frame { readings_ohm: &readings, reciprocals: &reciprocals };
         let clamped = decoder.decode_into(given, &mut scratch, &mut estimate.borrowed());
         bytes.extend(u32::from(clamped.map_err(|cause| cause.to_string())?).to_le_bytes());
@@ -120,12 +120,6 @@ fn group_bytes(
         }
     }
     Ok(bytes)
-}
-
-/// Makes readings missing that are outside the limits.
-fn believe(readings: &mut [f32]) {
-    let is_faulty = |it: &&mut f32| Limits::USUAL.fault(**it).is_some();
-    readings.iter_mut().filter(is_faulty).for_each(|it| *it = f32::NAN);
 }
 
 fn put(bytes: &mut Vec<u8>, values: &[f32]) {

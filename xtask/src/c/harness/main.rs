@@ -2,7 +2,7 @@
 //! files are what `xtask/src/c/frames.rs` writes; `main.c` reads them for C. The modules of the models stand before.
 
 use taxel_core::Decoded;
-use taxel_core::health::Limits;
+use taxel_core::health::{Health, Limits};
 use taxel_core::relative::reciprocal;
 
 /// What is left of a file.
@@ -38,12 +38,6 @@ struct Model<const R: usize, const I: usize, const O: usize> {
     fill: Option<fn(&mut Rows<I, R>, &Rows<I, R>) -> usize>,
 }
 
-/// Makes readings missing that are outside the limits, as a program with such a model does.
-fn believe<const I: usize, const R: usize>(readings: &mut Rows<I, R>) {
-    let is_faulty = |it: &&mut f32| Limits::USUAL.fault(**it).is_some();
-    readings.as_flattened_mut().iter_mut().filter(is_faulty).for_each(|it| *it = f32::NAN);
-}
-
 fn compare<const R: usize, const I: usize, const O: usize>(
     name: &str,
     model: &Model<R, I, O>,
@@ -57,11 +51,11 @@ fn compare<const R: usize, const I: usize, const O: usize>(
             return number == file.word();
         }
         let mut baseline: Rows<I, R> = file.floats();
-        believe(&mut baseline);
+        Health::new(baseline.as_flattened_mut(), I, Limits::USUAL, &mut []);
         let reciprocals = baseline.map(|row| row.map(reciprocal));
         for _ in 0..count {
-            let mut readings = file.floats();
-            believe(&mut readings);
+            let mut readings: Rows<I, R> = file.floats();
+            Health::new(readings.as_flattened_mut(), I, Limits::USUAL, &mut []);
             let Decoded { outputs, status, clamped } = (model.decode)(&readings, &reciprocals);
             let mut same = file.word() == u32::from(clamped) && file.same(outputs.as_flattened());
             same &= file.take(R) == status.map(|status| status as u8);

@@ -6,7 +6,7 @@ use taxel_core::rbf::NetworkError;
 use taxel_core::relative::reciprocal;
 use taxel_core::touch::{Strengths, Touch};
 use taxel_core::{Decoder, Frame, OwnedEstimate, RowStatus};
-use taxel_data::{columns, exp};
+use taxel_data::exp;
 
 use super::numbers::{array, table, word};
 use crate::error::{Error, Result};
@@ -71,9 +71,8 @@ pub fn arrays(model: &Model<'_>, limits: Option<Limits>) -> Result<String> {
 /// Readings of a frame, those outside of `limits` missing.
 fn within(model: &Model<'_>, frame: &[f32], limits: Option<Limits>) -> Vec<f32> {
     let names = model.metadata().input_names;
-    let believed = |(reading, name): (&f32, &str)| match fault(name, f64::from(*reading), limits) {
-        Some(_) if columns::is_judged_in_ohm(name) => f32::NAN,
-        _ => *reading,
+    let believed = |(reading, name): (&f32, &str)| {
+        fault(name, f64::from(*reading), limits).map_or(*reading, |_| f32::NAN)
     };
     frame.iter().zip(names.iter()).map(believed).collect()
 }
