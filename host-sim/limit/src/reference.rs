@@ -65,8 +65,6 @@ pub struct Ratio {
 pub struct EffectiveSamples {
     /// Smallest one.
     pub least: f64,
-    /// First percentile.
-    pub first_percentile: f64,
     /// Median.
     pub median: f64,
 }
@@ -199,7 +197,7 @@ impl Reference {
     pub fn effective(&self) -> EffectiveSamples {
         let sorted = self.sorted_effective();
         let at = |share: usize| sorted.get(sorted.len() * share / 100).copied().unwrap_or(0.0);
-        EffectiveSamples { least: at(0), first_percentile: at(1), median: at(50) }
+        EffectiveSamples { least: at(0), median: at(50) }
     }
 
     fn sorted_effective(&self) -> Vec<f64> {
@@ -368,10 +366,7 @@ mod tests {
         let error = f64::midpoint(off[0].powi(2), off[1].powi(2)).sqrt() / 5.0;
         close(ratio.standard_error, 0.5 * error / ratio.ratio);
         let effective = reference.effective();
-        assert_eq!(
-            (effective.least, effective.first_percentile, effective.median),
-            (10.0, 10.0, 20.0)
-        );
+        assert_eq!((effective.least, effective.median), (10.0, 20.0));
         // Of one output alone, the other does not count.
         let second = &reference.columns(1, 1).limits()[0];
         assert_eq!((second.limit, second.prior_rmse), (6.0_f64.sqrt(), 4.0));
