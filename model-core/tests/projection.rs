@@ -44,16 +44,17 @@ fn the_features_of_a_whole_frame_decide_all_rows() {
     }
 }
 
+fn clamps(decoder: &Decoder<'_, 2>, frame: [f32; 4]) -> bool {
+    let (mut outputs, mut status) = ([0.0; 2], [RowStatus::MissingReading; 2]);
+    let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
+    decoder.decode_into(Frame::from(&frame[..]), &mut [f32::MAX; 4], &mut estimate).unwrap()
+}
+
 #[test]
 fn features_are_clamped_and_not_readings() {
     let mut buffer = Aligned([0; 1024]);
     let decoder = Decoder::<2>::load(array(&mut buffer.0)).unwrap();
-    let clamps = |frame: [f32; 4]| {
-        let (mut outputs, mut status) = ([0.0; 2], [RowStatus::MissingReading; 2]);
-        let mut scratch = [f32::MAX; 4];
-        let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
-        decoder.decode_into(Frame::from(&frame[..]), &mut scratch, &mut estimate).unwrap()
-    };
+    let clamps = |frame: [f32; 4]| clamps(&decoder, frame);
     // In training the first feature was 50 to 58, and the second 5 to 15.
     assert!(!clamps(NEAR_CENTRE));
     assert!(!clamps([8.0, 100.0, 100.0, 8.0])); // far readings, but a usual mean
@@ -61,6 +62,24 @@ fn features_are_clamped_and_not_readings() {
     assert!(clamps([10.0, 10.0, 90.0, 90.0])); // a usual mean
     assert!(clamps([10.0, 10.0, 200.0, 200.0]));
     assert!(!clamps([f32::NAN, 10.0, 90.0, 90.0]));
+}
+
+#[test]
+fn a_frame_is_clamped_where_one_of_its_networks_is() {
+    const NEVER: [f32; 10] = [54.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    for blocks in [[PROJECTION, NEVER], [NEVER, PROJECTION]] {
+        let fronts = blocks.each_ref().map(|block| Front {
+            outputs: 1,
+            touch: None,
+            projection: Projection::new(4, 2, block).ok(),
+        });
+        let networks = [network(&[1.5]), network(&[3.0])];
+        let metadata = Metadata::unnamed(ModelShape { rows: 2, inputs: 2, outputs: 1 });
+        let mut buffer = Aligned([0; 1024]);
+        let parts = ModelParts { fronts: &fronts, ..ModelParts::new(&networks, &[0, 1], metadata) };
+        let decoder = Decoder::<2>::load(encode(&parts, &mut buffer.0).unwrap()).unwrap();
+        assert!(!clamps(&decoder, NEAR_CENTRE) && clamps(&decoder, [60.0; 4]));
+    }
 }
 
 #[test]

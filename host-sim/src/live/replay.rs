@@ -402,3 +402,45 @@ impl Feed for ReplayFeed<'_> {
         Some((self.at.as_secs_f64(), self.speed))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame each 10 ms, for ever; the number is of the next.
+    struct Endless(u32);
+
+    impl Still for Endless {
+        fn next(&mut self) -> Result<Option<(Duration, Frame)>> {
+            let time = 10 * self.0;
+            self.0 += 1;
+            Ok(Some((Duration::from_millis(time.into()), Frame::default())))
+        }
+
+        fn seek(&mut self, to: Duration) -> Result<()> {
+            self.0 = to.as_millis() as u32 / 10;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn another_speed_plays_on_from_where_the_replay_is() {
+        let layout = sheet::layout("", vec![], vec![], None);
+        let path = Path::new("endless.csv");
+        let hour = Duration::from_hours(1);
+        let mut feed = ReplayFeed::new(Box::new(Endless(0)), layout, path, hour, None, None);
+        // Frames until this place, or so many seconds of the clock.
+        let play = |feed: &mut ReplayFeed<'_>, to_s: u64, most_s: u64| {
+            let start = Instant::now();
+            while feed.at < Duration::from_secs(to_s) {
+                assert!(start.elapsed() < Duration::from_secs(most_s), "{:?}", feed.at);
+                feed.next(Duration::from_millis(50)).unwrap();
+            }
+        };
+        feed.act(Action::Speed { factor: 1000.0 }).unwrap();
+        play(&mut feed, 100, 60);
+        // From the start at the speed of the clock, it would be there in 100 s.
+        feed.act(Action::Speed { factor: 1.0 }).unwrap();
+        play(&mut feed, 101, 50);
+    }
+}

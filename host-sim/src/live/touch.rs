@@ -267,4 +267,21 @@ mod tests {
             assert!(!touch.update(&readings, frame * 10_000), "frame {frame}");
         }
     }
+
+    #[test]
+    fn means_beside_a_broken_wire_have_the_noise_of_those_at_rest() {
+        let (world, touch) = start("contact");
+        let frames = at_rest(&world, Stream::Test, 2000).into_iter().map(|mut readings| {
+            readings[18..36].fill(1e6);
+            touch.changes(&readings)
+        });
+        let scaled = frames.flat_map(|changes| {
+            let beside: Vec<f32> =
+                (0..18).map(|cell| changes[cell] / touch.deviations[cell]).collect();
+            beside
+        });
+        let squares: Vec<f32> = scaled.map(|it| it * it).collect();
+        let variance = squares.iter().sum::<f32>() / squares.len() as f32;
+        assert!((0.85..1.2).contains(&variance), "{variance}");
+    }
 }

@@ -266,6 +266,15 @@ pub mod serial_port {
         let (port, near) = port_with(&model, frames());
         drop(near);
         let record = ["link", &port, "record", "model.bin", "-n", "8", "--time", "-o", "log.csv"];
+        let json = folder.succeed(&[&record[..], &["--report-every", "2", "--json"]].concat());
+        let found: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let seconds = |line: &str| line.split_once(',').unwrap().0.parse::<f64>().unwrap();
+        let last_s = folder.read("log.csv").lines().last().map(seconds).unwrap();
+        let frames_per_s = 2.0 * 7.0 / last_s;
+        assert!(
+            (found["frames_per_s"].as_f64().unwrap() / frames_per_s - 1.0).abs() < 1e-3,
+            "{json}"
+        );
         folder.succeed(&[&record[..], &["--readings"]].concat());
         let decode = ["decode", "model.bin", "log.csv", "-o", "estimate.csv"];
         folder.succeed(&[&decode[..], &["--filter-ms", "30", "--lead-ms", "4"]].concat());

@@ -348,6 +348,14 @@ fn the_files_and_the_table_tell_every_point() {
     assert!(!folder.path("out/few/chosen.bin").exists());
     let removed = "out/few/chosen.bin of an earlier trade is removed";
     assert!(stderr.contains(removed), "{stderr}");
+    // What is three standard errors below the limit is refused before anything is trained.
+    let of_limit = |name: &str| first[&format!("limit_{name}dz_mm")].as_f64().unwrap();
+    for (below, says) in [(2.0, "no point is within"), (4.0, "no point can be within")] {
+        let most = of_limit("") - below * of_limit("standard_error_");
+        let output = folder.run(&[&few[..], &["--max-error", &most.to_string()]].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && stderr.contains(says), "{most} {stderr}");
+    }
     assert!(!folder.notes(&few).contains(removed));
 }
 

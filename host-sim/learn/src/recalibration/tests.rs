@@ -199,6 +199,15 @@ fn zeros_of_inputs_that_have_drifted_change_and_nothing_else() {
         assert_eq!((old.len(), differs.len()), (new.len(), 18 + 1), "{format:?}: {differs:?}");
         let zeros = differs[..18].windows(2);
         assert!(zeros.into_iter().all(|pair| pair[1] == pair[0] + 1), "one array, and the CRC");
+        // Errors of the presses that have all readings, in training errors.
+        let seen = frames.subset(&(1..80).collect::<Vec<_>>());
+        let decoded = model.decode_table(&readings).values;
+        let of_lines = decoded[seen.outputs.names.len()..].iter().zip(&*seen.outputs.values);
+        let training_errors = training_errors(model.model());
+        let errors = of_lines.zip(training_errors.iter().cycle());
+        let squares = errors.map(|((a, b), error)| ((a - b) / error).powi(2));
+        let before = mean(&squares.collect::<Vec<_>>()).sqrt();
+        assert!((found.error_before / before - 1.0).abs() < 0.05, "{found:?} {before}");
         let again = recalibrate(&model, &readings, &frames.outputs).unwrap();
         assert_eq!(again.blob.bytes(), new, "the same presses, the same bytes");
     }

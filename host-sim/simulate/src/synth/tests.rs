@@ -366,6 +366,14 @@ fn noise_with_a_memory_is_more_variance_on_still_frames_and_hardly_less_in_a_bas
     let baselines = still.baselines(Stream::Test, 400, 100);
     assert!((0.0036..0.0039).contains(&left), "{left}");
     assert!((squares(&baselines) / left - 1.0).abs() < 0.02, "{}", squares(&baselines));
+    // Of scans that follow one another slowly, less is left.
+    let timetable = Timetable::every(0.2, 0.005, 0.4).unwrap();
+    let slow = still.clone().along(Path::at(50.0, 2.0), timetable);
+    let left_of_slow = world.noise.averaged(100, 0.2).total_level();
+    let rest = slow.baselines(Stream::Test, 800, 100);
+    let rest = Table { values: rest.lines().step_by(2).flatten().copied().collect(), ..rest };
+    assert!(left_of_slow < 0.5 * left);
+    assert!((squares(&rest) / left_of_slow - 1.0).abs() < 0.02, "{}", squares(&rest));
     // Its draws are its own.
     let together: f64 = ratios(&noisy, &ideal)
         .flatten()
