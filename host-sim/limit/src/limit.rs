@@ -27,6 +27,8 @@ const PRIOR_SAMPLES: usize = 16_384;
 #[derive(Debug, Clone)]
 pub struct Limit {
     world: World,
+    /// Worlds of each kind of motion alone, with its share.
+    kinds: Vec<(f64, World)>,
     /// Rows that are sampled together, from 0; each group is independent of the others.
     groups: Vec<Group>,
 }
@@ -36,7 +38,8 @@ struct Group {
     rows: Vec<usize>,
     /// Standard deviation of each reading in Ω; empty for noise relative to the reading.
     deviation_ohm: Vec<f64>,
-    prior: Prior,
+    /// Samples of the prior of each kind of motion.
+    priors: Vec<Prior>,
 }
 
 /// Samples of the prior, in lanes, with their ideal readings.
@@ -73,7 +76,10 @@ impl Limit {
             return Err(Refusal::NoNoise);
         }
         let together = if motion.has_independent_rows() { 1 } else { world.read_rows.len() };
-        let latents = motion.latents(together * world.sensor.electrodes_per_row_wire);
+        let electrodes = together * world.sensor.electrodes_per_row_wire;
+        let kinds = world.kinds();
+        let latents = kinds.iter().map(|(_, kind)| kind.motion.latents(electrodes)).max();
+        let latents = latents.unwrap_or(0);
         if latents > MOST_LATENTS {
             return Err(Refusal::TooManyLatents { latents, most: MOST_LATENTS });
         }
@@ -88,10 +94,10 @@ impl Limit {
                 deviations_ohm[place * readings..][..rows.len() * world.sensor.column_wires]
                     .to_vec()
             };
-            let prior = prior(world, rows);
-            Group { rows: rows.to_vec(), deviation_ohm, prior }
+            let priors = kinds.iter().map(|(share, kind)| prior(kind, *share, rows)).collect();
+            Group { rows: rows.to_vec(), deviation_ohm, priors }
         });
-        Ok(Self { groups: groups.collect(), world: world.clone() })
+        Ok(Self { groups: groups.collect(), kinds, world: world.clone() })
     }
 
     /// World whose limit it is.
@@ -103,7 +109,7 @@ impl Limit {
     ///
     /// Draws depend on the world's seed and the frame's readings, not on its place or the number of threads.
     pub fn posteriors(&self, readings_ohm: &[f64], progress: &dyn Progress) -> Vec<Posterior> {
-        let rows: Vec<Rows<'_>> = self.groups.iter().map(|group| self.rows(group)).collect();
+        let rows: Vec<Vec<Rows<'_>>> = self.groups.iter().map(|group| self.rows(group)).collect();
         let width = FrameDecoder::inputs(self);
         let frames = readings_ohm.par_chunks_exact(width.max(1));
         progress.stage("least possible error", readings_ohm.len() / width.max(1));
@@ -111,9 +117,9 @@ impl Limit {
             let mut posterior = Posterior::default();
             let mut from = 0;
             for (group, rows) in self.groups.iter().zip(&rows) {
-                let readings_ohm = &readings_ohm[from..from + rows.readings()];
-                from += rows.readings();
-                self.decode_group(&group.prior, rows, readings_ohm, &mut posterior);
+                let readings_ohm = &readings_ohm[from..from + rows[0].readings()];
+                from += readings_ohm.len();
+                self.decode_group(&group.priors, rows, readings_ohm, &mut posterior);
             }
             progress.step();
             posterior
@@ -121,36 +127,42 @@ impl Limit {
         frames.map(decode).collect()
     }
 
-    fn rows<'l>(&'l self, group: &'l Group) -> Rows<'l> {
-        Rows {
-            world: &self.world,
-            model: LaneModel::new(&self.world.sensor),
+    /// Rows of a group, with each kind of motion.
+    fn rows<'l>(&'l self, group: &'l Group) -> Vec<Rows<'l>> {
+        let of_kind = |(_, world): &'l (f64, World)| Rows {
+            world,
+            model: LaneModel::new(&world.sensor),
             wires: &group.rows,
             deviation_ohm: &group.deviation_ohm,
-        }
+        };
+        self.kinds.iter().map(of_kind).collect()
     }
 
     /// Appends the posterior of one group of rows.
     fn decode_group(
         &self,
-        prior: &Prior,
-        rows: &Rows<'_>,
+        priors: &[Prior],
+        rows: &[Rows<'_>],
         readings_ohm: &[f64],
         posterior: &mut Posterior,
     ) {
-        let mut memory: Memory = rows.memory();
-        let frame = Frame { rows, readings_ohm };
+        let mut memory: Memory = rows[0].memory();
+        let frames: Vec<Frame<'_>> = rows.iter().map(|rows| Frame { rows, readings_ohm }).collect();
         let bytes: Vec<u8> = readings_ohm.iter().flat_map(|r| r.to_le_bytes()).collect();
-        let (seed, part) = (self.world.seed, rows.wires.first().map_or(0, |row| *row as u64 + 1));
+        let (seed, part) =
+            (self.world.seed, rows[0].wires.first().map_or(0, |row| *row as u64 + 1));
         let mut random = Random::new(seed, Stream::Test, Purpose::Posterior, digest(&bytes), part);
-        let mut start = prior.samples.clone();
-        start.log_likelihood.clear();
-        for ideal_ohm in prior.ideal_ohm.chunks_exact(rows.readings()) {
-            start.log_likelihood.extend(rows.log_likelihood(readings_ohm, ideal_ohm));
-        }
-        let effort = Effort::new(rows.latents());
-        let samples = sample(&frame, &start, &effort, &mut random, &mut memory);
-        let moments = moments(&frame, &samples, &mut memory);
+        let start = |(prior, rows): (&Prior, &Rows<'_>)| {
+            let mut start = prior.samples.clone();
+            for ideal_ohm in prior.ideal_ohm.chunks_exact(readings_ohm.len()) {
+                start.log_likelihood.extend(rows.log_likelihood(readings_ohm, ideal_ohm));
+            }
+            start
+        };
+        let starts: Vec<Samples> = priors.iter().zip(rows).map(start).collect();
+        let effort = Effort::new(rows.iter().map(Rows::latents).max().unwrap_or(0));
+        let samples = sample(&frames, &starts, &effort, &mut random, &mut memory);
+        let moments = moments(&frames, &samples, &mut memory);
         posterior.effective.extend(std::iter::repeat_n(moments.effective, moments.mean.len()));
         posterior.mean.extend(moments.mean);
         posterior.variance.extend(moments.variance);
@@ -158,8 +170,8 @@ impl Limit {
     }
 }
 
-/// Samples of the prior of `rows`, with their ideal readings.
-fn prior(world: &World, rows: &[usize]) -> Prior {
+/// Samples of the prior of `rows`, with their ideal readings, for a motion with this share.
+fn prior(world: &World, share: f64, rows: &[usize]) -> Prior {
     let model = LaneModel::new(&world.sensor);
     let rows = Rows { world, model, wires: rows, deviation_ohm: &[] };
     let n = rows.latents();
@@ -174,7 +186,7 @@ fn prior(world: &World, rows: &[usize]) -> Prior {
     };
     let numbers = (0..PRIOR_SAMPLES / LANES).into_par_iter();
     let drawn: Vec<(Vec<Lanes>, Vec<Lanes>)> = numbers.map_init(|| rows.memory(), draw).collect();
-    let mut samples = Samples::new(n);
+    let mut samples = Samples::new(n, share.ln());
     let mut ideal_ohm = Vec::with_capacity(drawn.len() * rows.readings());
     for (latents, readings) in drawn {
         for lane in 0..LANES {

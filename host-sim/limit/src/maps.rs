@@ -12,7 +12,7 @@ use taxel_data::{LANES, Random};
 use crate::samples::{Samples, resampled};
 use crate::slopes::{Local, locals};
 use crate::target::Target;
-use crate::weights::normalised;
+use crate::weights::{log_sum, normalised};
 
 /// Steps in which a draw is solved, or given up.
 const STEPS: usize = 60;
@@ -66,6 +66,11 @@ impl Maps {
         Self { maps, shares }
     }
 
+    /// Natural logarithm of the posterior's mass around all tops, but for a constant.
+    pub fn log_mass(&self) -> f64 {
+        log_sum(self.maps.iter().map(|map| map.log_mass))
+    }
+
     /// Draws [`LANES`] samples. One that cannot be solved has the weight 0.
     pub fn draw<T: Target>(
         &self,
@@ -90,16 +95,14 @@ impl Maps {
         let mut again: Vec<Draw<'_>> = again.collect();
         let ends = solve(target, &mut again, memory);
         let mut ends = ends.iter();
-        let mut samples = Samples::new(n);
+        let mut samples = Samples::new(n, 0.0);
         for ((&own, draw), local) in own.iter().zip(&drawn).zip(&found) {
             let mut logs = vec![self.log_density(own, local)];
             for map in others(own) {
                 let is_same = ends.next().is_some_and(|end| end.is_as(local));
                 logs.extend(is_same.then(|| self.log_density(map, local)));
             }
-            let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let log_density = most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln();
-            let log_prior = -0.5 * local.place.norm_squared() - log_density;
+            let log_prior = -0.5 * local.place.norm_squared() - log_sum(logs.iter().copied());
             samples.places.extend(&local.place);
             samples.log_prior.push(if draw.is_solved(local) {
                 log_prior

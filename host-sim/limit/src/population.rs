@@ -13,10 +13,13 @@ use crate::mixture::Mixture;
 use crate::samples::{Samples, resampled};
 use crate::slopes::tops;
 use crate::target::Target;
-use crate::weights::{effective, largest_power, normalised, tempered};
+use crate::weights::{effective, largest_power, log_sum, normalised, tempered};
 
 /// Earlier rounds whose samples are weighted again with those of the last one.
 const REMEMBERED: usize = 3;
+
+/// Logarithm of a share of the posterior below which a kind of motion is left out.
+const NEGLIGIBLE_MASS: f64 = -15.0;
 
 /// Samples of the prior from which tops of the posterior are looked for.
 const STARTS: usize = 32;
@@ -58,18 +61,51 @@ pub struct Moments {
     pub fourth: Vec<f64>,
 }
 
-/// Samples the posterior `target`, from samples of the prior with their likelihoods.
+/// Samples the posterior of each kind of motion, its `target`, from samples of its prior with their likelihoods.
 ///
-/// The result has the latest samples at the power 1: few or none if the population did not get there.
+/// The result has the latest samples at the power 1: none of a kind that the readings rule out, and too few of one whose
+/// posterior stayed too thin.
 pub fn sample<T: Target>(
+    targets: &[T],
+    priors: &[Samples],
+    effort: &Effort,
+    random: &mut Random,
+    memory: &mut T::Memory,
+) -> Vec<Samples> {
+    let kinds = || targets.iter().zip(priors);
+    let mut kept: Vec<Samples> =
+        kinds().map(|(target, prior)| populate(target, prior, effort, random, memory)).collect();
+    let mut thin = Vec::new();
+    for (kind, (target, prior)) in kinds().enumerate().filter(|(kind, _)| kept[*kind].len() == 0) {
+        let tops = tops(target, &starts(prior, effort, random), memory);
+        thin.push((kind, Maps::new(target, tops, memory)));
+    }
+    let log_mass = |(kind, maps): &(usize, Maps)| priors[*kind].log_share + maps.log_mass();
+    let masses = kept.iter().map(|it| log_sum(it.log_weights())).chain(thin.iter().map(log_mass));
+    let least = masses.fold(f64::NEG_INFINITY, f64::max) + NEGLIGIBLE_MASS;
+    thin.retain(|it| log_mass(it) >= least);
+    for _ in 0..effort.solved {
+        for (kind, maps) in &thin {
+            kept[*kind].append(&maps.draw(&targets[*kind], random, memory));
+        }
+        if thin.is_empty() || effective(&weights(&kept)) >= effort.wanted {
+            break;
+        }
+    }
+    kept
+}
+
+/// Samples the posterior `target` by a population. None if it does not arrive: the posterior is too thin, or bent, for a
+/// mixture of one shape.
+fn populate<T: Target>(
     target: &T,
     prior: &Samples,
     effort: &Effort,
     random: &mut Random,
     memory: &mut T::Memory,
 ) -> Samples {
-    let mut population = Samples::new(target.latents());
-    let mut kept = Samples::new(target.latents());
+    let none = Samples::new(target.latents(), prior.log_share);
+    let (mut population, mut kept) = (none.clone(), none.clone());
     for _ in 0..effort.rounds {
         // Samples of the prior are too far apart to be of use later.
         let from = if population.len() == 0 { prior } else { &population };
@@ -83,28 +119,17 @@ pub fn sample<T: Target>(
             continue;
         }
         kept.append(&drawn);
-        if is_enough(&kept, effort) {
+        if effective(&weights(std::slice::from_ref(&kept))) >= effort.wanted {
             return kept;
         }
         population = kept.clone();
     }
-    // The posterior is too thin, or bent, for a mixture of one shape.
-    let tops = tops(target, &starts(prior, effort, random), memory);
-    let maps = Maps::new(target, tops, memory);
-    let mut kept = Samples::new(target.latents());
-    for _ in 0..effort.solved {
-        kept.append(&maps.draw(target, random, memory));
-        if is_enough(&kept, effort) {
-            break;
-        }
-    }
-    kept
+    none
 }
 
-/// Whether samples at the power 1 are effective enough.
-fn is_enough(samples: &Samples, effort: &Effort) -> bool {
-    let log = tempered(&samples.log_prior, &samples.log_likelihood, 1.0);
-    effective(&normalised(&log)) >= effort.wanted
+/// Weights of all samples, those of one kind after those of another.
+fn weights(kinds: &[Samples]) -> Vec<f64> {
+    normalised(&kinds.iter().flat_map(Samples::log_weights).collect::<Vec<_>>())
 }
 
 /// Samples of the prior near which tops of the posterior are looked for.
@@ -123,7 +148,7 @@ fn draw<T: Target>(
     random: &mut Random,
     memory: &mut T::Memory,
 ) -> Samples {
-    let mut samples = Samples::new(target.latents());
+    let mut samples = Samples::new(target.latents(), 0.0);
     let mut latents = vec![[0.0; LANES]; target.latents()];
     for first in (0..count).step_by(LANES) {
         mixture.draw(first, random, &mut latents);
@@ -136,23 +161,26 @@ fn draw<T: Target>(
     samples
 }
 
-/// Posterior mean, variance and fourth moment of every output of `target`, from weighted `samples`.
+/// Posterior mean, variance and fourth moment of every output of `target`, from weighted `samples`
+/// of each kind of motion.
 ///
 /// The variance is that of the weights times n/(n − 1), with the effective sample size n.
-pub fn moments<T: Target>(target: &T, samples: &Samples, memory: &mut T::Memory) -> Moments {
-    let weights = normalised(&tempered(&samples.log_prior, &samples.log_likelihood, 1.0));
-    let outputs = target.output_count();
+pub fn moments<T: Target>(targets: &[T], kinds: &[Samples], memory: &mut T::Memory) -> Moments {
+    let weights = weights(kinds);
+    let outputs = targets[0].output_count();
     let mut sums = vec![[0.0; 2]; outputs];
     // Powers of what lies beyond a value of the posterior: fourth powers of the values themselves would cancel out.
     let (mut origins, mut powers) = (None::<Vec<f64>>, vec![[0.0; 4]; outputs]);
-    let mut latents: Vec<Lanes> = vec![[0.0; LANES]; samples.latents];
     let mut values = vec![[0.0; LANES]; outputs];
-    let places = samples.places.chunks_exact(LANES * samples.latents);
-    for (places, weights) in places.zip(weights.chunks_exact(LANES)) {
+    let blocks = targets.iter().zip(kinds).flat_map(|(target, samples)| {
+        samples.places.chunks_exact(LANES * samples.latents).map(move |it| (target, it))
+    });
+    for ((target, places), weights) in blocks.zip(weights.chunks_exact(LANES)) {
         if weights.iter().all(|weight| *weight < NEGLIGIBLE) {
             continue;
         }
-        for (lane, place) in places.chunks_exact(samples.latents).enumerate() {
+        let mut latents: Vec<Lanes> = vec![[0.0; LANES]; target.latents()];
+        for (lane, place) in places.chunks_exact(latents.len()).enumerate() {
             latents.iter_mut().zip(place).for_each(|(latent, x)| latent[lane] = *x);
         }
         target.outputs(&latents, memory, &mut values);

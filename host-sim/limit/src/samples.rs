@@ -7,6 +7,8 @@ use taxel_data::Random;
 pub struct Samples {
     /// Number of latents of a sample.
     pub latents: usize,
+    /// Natural logarithm of the share that its kind of motion has in the prior.
+    pub log_share: f64,
     /// Latents, sample after sample.
     pub places: Vec<f64>,
     /// Natural logarithm of prior over proposal, of each sample.
@@ -16,9 +18,10 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// No samples of so many `latents`.
-    pub fn new(latents: usize) -> Self {
-        Self { latents, places: Vec::new(), log_prior: Vec::new(), log_likelihood: Vec::new() }
+    /// No samples of so many `latents`, of a kind of motion with this share in the prior.
+    pub fn new(latents: usize, log_share: f64) -> Self {
+        let (places, log_prior, log_likelihood) = (Vec::new(), Vec::new(), Vec::new());
+        Self { latents, log_share, places, log_prior, log_likelihood }
     }
 
     /// Number of samples.
@@ -34,6 +37,13 @@ impl Samples {
     /// Latents of each sample.
     pub fn lines(&self) -> impl Iterator<Item = &[f64]> {
         self.places.chunks_exact(self.latents)
+    }
+
+    /// Natural logarithms of the weights, whose sum is the mass of prior times likelihood in its kind of motion.
+    pub fn log_weights(&self) -> impl Iterator<Item = f64> + Clone {
+        let constant = self.log_share - (self.len() as f64).ln();
+        let logs = self.log_prior.iter().zip(&self.log_likelihood);
+        logs.map(move |(prior, likelihood)| constant + prior + likelihood)
     }
 
     /// Appends samples.

@@ -15,6 +15,16 @@ pub fn normalised(logarithms: &[f64]) -> Vec<f64> {
     weights
 }
 
+/// Logarithm of the sum of the exponentials of `logarithms`.
+pub fn log_sum(logarithms: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = logarithms.clone().fold(f64::NEG_INFINITY, f64::max);
+    if most.is_finite() {
+        most + logarithms.map(|log| (log - most).exp()).sum::<f64>().ln()
+    } else {
+        most
+    }
+}
+
 /// Effective sample size of `weights`: (Σw)²/Σw² (Kong, 1992).
 pub fn effective(weights: &[f64]) -> f64 {
     let [sum, squares] = weights.iter().fold([0.0, 0.0], |[s, q], w| [s + w, q + w * w]);

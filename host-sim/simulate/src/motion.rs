@@ -35,8 +35,10 @@ pub trait Motion: Debug + Send + Sync {
     fn check(&self) -> Result<(), BadValue>;
 
     /// Number of independent standard normal numbers that fix a still frame of so many `electrodes`: the *latents*
-    /// of the motion.
-    fn latents(&self, electrodes: usize) -> usize;
+    /// of the motion. A mix has none: those of its parts differ.
+    fn latents(&self, _electrodes: usize) -> usize {
+        0
+    }
 
     /// Whether rows move independently, so that [`place`](Self::place) needs only the latents of one row's
     /// electrodes.

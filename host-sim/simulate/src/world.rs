@@ -111,6 +111,16 @@ impl World {
         }
     }
 
+    /// Worlds of each kind of contact of a mix alone, with its share in the frames; this one alone without a mix.
+    pub fn kinds(&self) -> Vec<(f64, World)> {
+        let motion::Kind::Mix(mix) = &self.motion else { return vec![(1.0, self.clone())] };
+        let whole: f64 = mix.parts.iter().map(|part| part.weight).sum();
+        let of_part = |part: &motion::Part| {
+            (part.weight / whole, World { motion: part.deformation.clone(), ..self.clone() })
+        };
+        mix.parts.iter().map(of_part).collect()
+    }
+
     /// Changes the level of the white noise: a fraction (0.005 is 0.5 %), or in Ω for absolute noise.
     pub fn set_noise_level(&mut self, level: f64) -> Check {
         check_noise_level("noise level", self.noise.kind, level)?;

@@ -126,7 +126,7 @@ impl Target for Parabola {
 
 fn posterior<T: Target<Memory = ()>>(target: &T, effort: &Effort, index: u64) -> Moments {
     let mut random = Random::new(1, Stream::Test, Purpose::Posterior, index, 0);
-    let mut prior = Samples::new(target.latents());
+    let mut prior = Samples::new(target.latents(), 0.0);
     for _ in 0..32 {
         let mut latents = vec![[0.0; LANES]; target.latents()];
         latents.as_flattened_mut().fill_with(|| random.normal());
@@ -136,7 +136,8 @@ fn posterior<T: Target<Memory = ()>>(target: &T, effort: &Effort, index: u64) ->
             prior.places.extend(latents.iter().map(|latent| latent[lane]));
         }
     }
-    let samples = sample(target, &prior, effort, &mut random, &mut ());
+    let target = std::slice::from_ref(target);
+    let samples = sample(target, &[prior], effort, &mut random, &mut ());
     moments(target, &samples, &mut ())
 }
 
@@ -221,13 +222,57 @@ fn the_variance_of_few_samples_is_unbiased() {
     let target = Linear { slope: DMatrix::zeros(1, 1), data: DVector::zeros(1), deviation: 1.0 };
     let samples = Samples {
         latents: 1,
+        log_share: 0.0,
         places: (0..LANES).map(|i| i as f64).collect(),
         log_prior: vec![0.0; LANES],
         log_likelihood: vec![0.0; LANES],
     };
-    let found = moments(&target, &samples, &mut ());
+    let found = moments(&[target], &[samples], &mut ());
     // Of 0, 1, … n − 1: n(n + 1)/12.
     let n = LANES as f64;
     assert!((found.effective - n).abs() < 1e-9 && (found.mean[0] - (n - 1.0) / 2.0).abs() < 1e-9);
     assert!((found.variance[0] - n * (n + 1.0) / 12.0).abs() < 1e-9, "{found:?}");
+}
+
+/// Readings that two kinds of motion explain, one of them better: the population arrives at the first noise, not at the second.
+#[test]
+fn kinds_of_motion_have_the_shares_of_bayes() {
+    for deviation in [0.2, 1e-6] {
+        let kind = |gain| Linear {
+            slope: DMatrix::identity(2, 2) * gain,
+            data: DVector::from_vec(vec![0.5, 1.0]),
+            deviation,
+        };
+        let (targets, shares) = ([kind(1.0), kind(3.0)], [0.25, 0.75]);
+        let mut random = Random::new(3, Stream::Test, Purpose::Posterior, 0, 0);
+        let priors = std::array::from_fn::<_, 2, _>(|kind| {
+            let places: Vec<f64> = (0..64 * LANES).map(|_| random.normal()).collect();
+            let mut prior = Samples::new(2, f64::ln(shares[kind]));
+            for places in places.chunks_exact(2 * LANES) {
+                let latents: [Lanes; 2] =
+                    std::array::from_fn(|i| std::array::from_fn(|lane| places[2 * lane + i]));
+                prior.log_likelihood.extend(targets[kind].log_likelihood(&latents, &mut ()));
+            }
+            prior.log_prior = vec![0.0; prior.log_likelihood.len()];
+            Samples { places, ..prior }
+        });
+        let effort = Effort { wanted: 1000.0, ..Effort::new(2) };
+        let samples = sample(&targets, &priors, &effort, &mut random, &mut ());
+        let found = moments(&targets, &samples, &mut ());
+        // The data are normal with the variance gain² + deviation², the mean latents gain·data over it.
+        let of_kind = [1.0, 3.0].map(|gain: f64| (gain, gain * gain + deviation * deviation));
+        let masses: Vec<f64> = of_kind
+            .iter()
+            .zip(shares)
+            .map(|((_, variance), share)| share / variance * (-0.625 / variance).exp())
+            .collect();
+        let means =
+            of_kind.iter().zip(&masses).map(|((gain, variance), mass)| mass * gain / variance);
+        let per_data = means.sum::<f64>() / masses.iter().sum::<f64>();
+        for (i, data) in [0.5, 1.0].into_iter().enumerate() {
+            let standard_error = (found.variance[i] / found.effective).sqrt();
+            let off = (found.mean[i] - data * per_data) / standard_error;
+            assert!(off.abs() < 4.0, "deviation {deviation}, latent {i}: {off} standard errors");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Motion by contacts of several kinds: each trajectory has one of them.
 
 use serde::Deserialize;
-use taxel_data::{BadValue, LANES, Lanes, Purpose, normal_share_below, require, widest};
+use taxel_data::{BadValue, LANES, Lanes, Purpose, require, widest};
 
 use super::{Dent, Draws, Kind, Motion};
 use crate::contact::Contact;
@@ -95,12 +95,6 @@ impl Motion for Mix {
         Ok(())
     }
 
-    /// There is a latent for the part, and as many more as any part has.
-    fn latents(&self, electrodes: usize) -> usize {
-        let of_parts = self.parts.iter().map(|part| part.deformation.latents(electrodes));
-        1 + of_parts.max().unwrap_or(0)
-    }
-
     /// Contact of the part with the largest weight.
     fn as_press(&self) -> Option<Dent> {
         let first = self.parts.iter().rev().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
@@ -110,11 +104,6 @@ impl Motion for Mix {
     fn largest_contact(&self, sensor: &Sensor) -> Option<Contact> {
         let which = std::array::from_fn(|lane| (lane % self.parts.len()) as u8);
         self.pick(which, |part| part.deformation.largest_contact(sensor))
-    }
-
-    fn place_contact(&self, sensor: &Sensor, latents: &[Lanes]) -> Option<Contact> {
-        let which = self.parts_of(&latents[0].map(normal_share_below));
-        self.pick(which, |part| part.deformation.place_contact(sensor, &latents[1..]))
     }
 
     fn draw_contact(&self, sensor: &Sensor, draws: &mut Draws) -> Option<Contact> {

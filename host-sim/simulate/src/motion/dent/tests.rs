@@ -238,7 +238,7 @@ fn a_mix_states_the_ranges_of_all_parts_and_refuses_what_is_no_contact() {
     mixed.parts[0].deformation = Dent::new(Profile::Press, &[[1.0, 2.0]], shallow).into();
     assert_eq!(mixed.range_mm(), [[-0.2, 0.2], [-0.2, 0.2], [0.0, 0.9]]);
     // A path may take every part no deeper than the shallowest goes.
-    assert_eq!((mixed.deepest_mm(), mixed.latents(48)), (0.5, 7));
+    assert_eq!(mixed.deepest_mm(), 0.5);
     assert_eq!(mixed.as_press().unwrap().dent_depth_mm, [0.5; 2]);
     let refused = |mix: Mix| mix.check().unwrap_err().to_string();
     assert!(refused(Mix { parts: vec![] }).contains("deformation.parts = 0 parts"));
