@@ -44,7 +44,7 @@ impl Effort {
     pub fn new(latents: usize) -> Self {
         let round = (25 * latents * latents).max(1024).next_multiple_of(LANES);
         let fitted = (10 * latents / 3).max(10) as f64;
-        Self { round, fitted, wanted: 100.0, rounds: 16, solved: 200 }
+        Self { round, fitted, wanted: 100.0, rounds: 16, solved: 400 }
     }
 }
 
