@@ -48,8 +48,10 @@ except ImportError:  # scikit-learn is optional
         """Several outputs."""
 
 
-#: Most lines for which five folds choose a penalty, and whether to refine, without being asked.
+#: Most lines for which five folds choose K, spread and penalty without being asked.
 FEW_LINES = 1000
+#: Least lines outside a fold for which they choose a spread.
+LEAST_FOR_SPREAD = 80
 #: Penalties that they try. Those above 1 leave a linear model.
 PENALTIES = (1e-7, 1e-5, 1e-3, 1e-2, 1e-1, 10, 100)
 
@@ -60,17 +62,19 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
     Parameters
     ----------
     centres : int or None
-        Largest number of Gaussians K; fewer distinct lines take fewer, with a warning. None for 64, and fewer for few lines.
+        Largest number of Gaussians K; fewer distinct lines take fewer, with a warning. None for 64, and fewer for few lines;
+        without refinement, folds of up to 1000 lines choose among half as many, as many and twice as many.
     spread : float or None
-        Width σ on scaled inputs, where refinement starts; None for 0.4, or 0.8 with `each_row`.
+        Width σ on scaled inputs, where refinement starts. None for 0.4 behind a projection and 0.8 elsewhere; without
+        refinement, for the one with the least error on folds of 100 to 1000 lines.
     penalty : float or None
         Ridge penalty on squared weights for each line; None for the one with the least error on folds of up to 1000 lines, and
         the usual one for more.
     refine : bool or None
-        Whether centres and widths are refined after K-means: better, and minutes instead of seconds. None for yes, but where
-        up to 1000 lines tell otherwise on folds.
+        Whether centres and widths are refined after K-means: better, and minutes instead of seconds. None for yes, but of
+        up to 1000 lines only where lines held out certainly gain.
     select : bool
-        Whether folds choose what of `centres`, `spread`, `penalty` and `refine` is None, for any number of lines.
+        Whether `centres`, `spread`, `penalty` and `refine`, where None, are chosen for any number of lines as for up to 1000.
     format : {"fixed16", "f32"} or None
         Number format of the weights; None for fixed16, or f32 where that does not hold the model.
     each_row : bool
@@ -213,15 +217,18 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
                 return report, blob.read_bytes()
 
         if is_judged:
-            spread = spread or ([] if self.select else option("--spread", 0.8 if self.each_row else 0.4))
             penalty = penalty or option("--penalty", PENALTIES)
-            found = trained("--select", "--no-refine", *option("--centres", centres), *spread, *penalty)
+            # Fewer lines tell no spread.
+            usual = [] if self.select or part >= LEAST_FOR_SPREAD else option("--spread", 0.8 if self.each_row else 0.4)
+            found = trained("--select", "--no-refine", *option("--centres", centres), *(spread or usual), *penalty)
             if self.refine is not False:
-                best = found[0]["selection"]["scored"][found[0]["selection"]["chosen"]]
-                usual = option("--penalty", self.penalty) + option("--spread", self.spread)
-                refined = trained("--select", "--centres", best["centres"], *usual)
-                # Few lines make scores noisy: less of a gain is chance.
-                if self.refine or least_score(refined[0]) < 0.95 * least_score(found[0]):
+                selection = found[0]["selection"]
+                best = selection["scored"][selection["chosen"]]
+                start = [*option("--centres", centres), *spread, "--penalty", best["penalty"]]
+                refined = trained(*start)
+                # It stays at its start where no lines held out certainly gain by it.
+                if self.refine or refined[1] != trained("--no-refine", *start)[1]:
+                    refined[0]["selection"] = selection
                     found = refined
         else:
             found = trained(*option("--no-refine", self.refine is False), *option("--centres", centres), *spread, *penalty)
@@ -296,9 +303,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         *,
         baseline: ArrayLike | None = None,
     ) -> float:
-        """Coefficient of determination R², as a mean over the outputs. An output that is NaN does not count, and an estimate that
-        is NaN counts as the mean, as a place does where nothing touches. An output that never changes has R² 1 if it is met,
-        and else 0."""
+        """Coefficient of determination R², as a mean over the outputs. An output that is NaN does not count. Estimates of a line
+        that cannot be filled, and of a place where nothing touches, are NaN and count as the mean. An output that never
+        changes has R² 1 if it is met, and else 0."""
         y, estimate = two_dimensional(y, "y"), two_dimensional(self.predict(X, baseline=baseline), "y")
         weights = np.ones(len(y)) if sample_weight is None else checked_weights(sample_weight, y)
         weights = weights[:, None] * ~np.isnan(y)
@@ -448,12 +455,6 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             known = [of["r_squared"] for of in errors if of.get("r_squared") is not None]
             sentence = f"{len(errors)} groups of outputs, with R² from {min(known, default=0):.3f} to {max(known, default=0):.3f}."
         return f"<p><code>{escape(repr(self))}</code></p><p>{escape(sentence)}</p>" + bars(decoders)
-
-
-def least_score(report: dict[str, Any]) -> float:
-    """Error on folds of the settings that were chosen."""
-    selection = report["selection"]
-    return selection["scored"][selection["chosen"]]["score"]
 
 
 def seed_of(random_state: Any) -> int:

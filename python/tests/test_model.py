@@ -288,7 +288,6 @@ def test_what_a_model_cannot_take_is_told_in_the_words_of_python(tmp_path):
         taxel.evaluate(x, x, y)
 
 
-def test_few_noisy_lines_are_told_no_worse_than_by_ridge():
     from sklearn.datasets import load_diabetes, load_linnerud
     from sklearn.linear_model import RidgeCV
     from sklearn.model_selection import ShuffleSplit, cross_val_score
@@ -305,6 +304,16 @@ def test_few_noisy_lines_are_told_no_worse_than_by_ridge():
                 warnings.simplefilter("ignore")
                 found = cross_val_score(model, x, y, cv=split).mean()
             assert found > known - 0.02, (data, model)
+
+
+def test_few_lines_are_told_with_a_spread_of_their_own_and_refined():
+    from sklearn.datasets import make_friedman1
+
+    x, y = make_friedman1(1750, noise=1.0, random_state=0)
+    for refine, least in ((False, 0.84), (None, 0.93)):
+        model = taxel.Model(refine=refine).fit(x[:750], y[:750])
+        assert model.score(x[750:], y[750:]) > least
+        assert len(model.report_["selection"]["scored"]) > 100
 
 
 def test_outputs_may_be_missing_constant_or_called_like_a_feature():
