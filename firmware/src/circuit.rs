@@ -95,8 +95,9 @@ const MOST_OHM: f32 = 1e6;
 /// measured, or their share is known. A lead in series with a column lets the idle rows feed it: it divides all currents of the column by
 /// 1 + s·Σ1/R, which [`correct`](Self::correct) undoes.
 ///
-/// A reading is NaN if its sample (or its idle sample) could not be taken, and [`f32::INFINITY`] if no current
-/// flows (open). It is 0 if the sample is saturated, or the resistance too small to be measured (short).
+/// A reading is [`f32::INFINITY`] if no current flows (open), and 0 if its sample is saturated: the resistance is too small to
+/// be measured, or shorted. It is NaN if its sample (or its idle sample) could not be taken, or another one of its row is
+/// shorted: nobody knows then how far the row's voltage drops.
 ///
 /// ```
 /// use taxel_firmware::circuit::{ScannedRow, ZeroPotential};
@@ -113,6 +114,8 @@ const MOST_OHM: f32 = 1e6;
 pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
     /// Number of the sensor's row-wires, read or not: all of them feed a column.
     pub sensor_rows: u16,
+    /// Output in V from which on an op-amp may be saturated. It comes close to its supply, and not up to it.
+    pub saturated_v: f32,
     /// Reference voltage of the converter, in V.
     pub reference_v: f32,
     /// Voltage in V by which the active row is pulled below the others.
@@ -127,9 +130,10 @@ pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
 
 impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
     /// Typical constants: 0.2 V and 560 Ω (3.6 mA a column, 65 mA a row, readings from 36 Ω), and a switch of 0.26
-    /// Ω.
+    /// Ω. At 5.5 mA an MCP6024 at 3.3 V is sure to reach 3.1 V.
     pub const TYPICAL: Self = Self {
         sensor_rows: ROWS as u16,
+        saturated_v: 3.1,
         reference_v: 3.3,
         drive_v: 0.2,
         row_source_ohm: [0.26; ROWS],
@@ -149,19 +153,35 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
         readings: &mut [f32],
     ) {
         let volt_per_count = self.reference_v / counts_at_reference(full_scale_counts);
+        let saturated = self.saturated_v / volt_per_count;
         let current = |n: f32, idle: f32, r: f32| (n - idle) * volt_per_count / r;
         let columns = || row.columns.pick(idle.iter().zip(&self.feedback_ohm));
         let currents = readings.iter().zip(columns()).map(|(n, (idle, r))| current(*n, *idle, *r));
-        let across = self.drive_v - voltage_drop(&self.row_source_ohm, row, currents);
+        let mut across = self.drive_v - voltage_drop(&self.row_source_ohm, row, currents);
+        // A column-wire at ground, which is saturated at rest too, takes no current from the row.
+        let mut shorts = readings.iter().zip(columns());
+        if shorts.any(|(n, (idle, _))| *n >= saturated && *idle < saturated) {
+            across = f32::NAN;
+        }
         for (reading, (idle, r)) in readings.iter_mut().zip(columns()) {
             let n = *reading;
-            *reading = reading_of(n, n - idle, full_scale_counts, across / current(n, *idle, *r));
+            *reading = reading_of(n, n - idle, saturated, across / current(n, *idle, *r));
         }
     }
 
     /// The [`load`](ScannedRow::load) of a row, from the `counts` of every column; what cannot be told is that of equal
-    /// columns.
-    pub fn load(&self, columns: ColumnWires, idle: &[f32], counts: &[f32]) -> f32 {
+    /// columns. NaN if one is saturated.
+    pub fn load(
+        &self,
+        columns: ColumnWires,
+        idle: &[f32],
+        full_scale_counts: u16,
+        counts: &[f32],
+    ) -> f32 {
+        let counts_per_volt = counts_at_reference(full_scale_counts) / self.reference_v;
+        if counts.iter().any(|n| *n >= self.saturated_v * counts_per_volt) {
+            return f32::NAN;
+        }
         let parts = || counts.iter().zip(idle.iter().zip(&self.feedback_ohm));
         load(columns, || parts().map(|(n, (idle, r))| (n - idle, (n - idle) / r)))
     }
@@ -250,16 +270,18 @@ fn load<I: Iterator<Item = (f32, f32)>>(columns: ColumnWires, all: impl Fn() -> 
     if load.is_finite() { load } else { equal }
 }
 
-/// The reading: `ohm`, or NaN, infinity or 0 if the sample is missing, open or short.
-fn reading_of(sampled: f32, due_to_current: f32, full_scale_counts: u16, ohm: f32) -> f32 {
+/// The reading: `ohm`, or NaN, infinity or 0 if the sample is missing, open or `saturated`.
+fn reading_of(sampled: f32, due_to_current: f32, saturated: f32, ohm: f32) -> f32 {
     if due_to_current.is_nan() {
         f32::NAN
-    } else if sampled > f32::from(full_scale_counts) - 0.5 {
+    } else if sampled >= saturated {
         0.0
     } else if due_to_current < NO_CURRENT_COUNTS {
         f32::INFINITY
+    } else if ohm < 0.0 {
+        0.0
     } else {
-        ohm.max(0.0)
+        ohm // NaN beside a saturated one
     }
 }
 
@@ -334,17 +356,24 @@ mod tests {
     }
 
     #[test]
-    fn open_short_and_missing_have_values_of_their_own_and_spare_the_others() {
+    fn open_and_missing_spare_the_others_and_a_short_spares_none() {
         let circuit = ZeroPotential { row_source_ohm: [0.0; 2], ..ZeroPotential::TYPICAL };
         let [mut sampled, idle] = zero_potential_counts(&circuit, &row());
-        (sampled[0], sampled[1], sampled[2]) = (f32::NAN, 4095.0, idle[2] + 3.0);
+        (sampled[0], sampled[2]) = (f32::NAN, idle[2] + 3.0);
         sampled[4] = idle[4] - 3.0; // noise may go below idle
         let mut no_idle = idle;
         no_idle[3] = f32::NAN;
         let ohm = read(&circuit, 1, &sampled, &no_idle);
         assert!(ohm[0].is_nan() && ohm[3].is_nan());
-        assert_eq!((ohm[1], ohm[2], ohm[4]), (0.0, f32::INFINITY, f32::INFINITY));
+        assert_eq!((ohm[2], ohm[4]), (f32::INFINITY, f32::INFINITY));
         assert!((f64::from(ohm[5]) / row()[5] - 1.0).abs() < 2e-6);
+        // 3.1 V is the end, wherever the converter's is. Nothing is known of a row with a short, but what is open.
+        sampled[1] = 3.1 / 3.3 * 4096.0 + 0.1;
+        let ohm = read(&circuit, 1, &sampled, &no_idle);
+        assert_eq!((ohm[1], ohm[2], ohm[4]), (0.0, f32::INFINITY, f32::INFINITY));
+        assert!(ohm[5..].iter().all(|ohm| ohm.is_nan()));
+        sampled[1] -= 0.2;
+        assert!(read(&circuit, 1, &sampled, &no_idle)[5..].iter().all(|ohm| *ohm > 50.0));
     }
 
     #[test]
@@ -372,7 +401,7 @@ mod tests {
             readings.into_iter().zip([2, 8, 14]).map(error).fold(0.0, f64::max)
         };
         let [sampled, idle] = zero_potential_counts(&circuit, &row());
-        let load = circuit.load(columns, &idle, &sampled);
+        let load = circuit.load(columns, &idle, 4095, &sampled);
         assert!(read(&sampled, &idle, load) < 2e-6);
         // Without the others' share readings are 7 % too high; with that of equal columns still a little off.
         assert!(read(&sampled, &idle, 1.0) > 0.05);
@@ -381,11 +410,14 @@ mod tests {
         let (mut missing, mut open) = (sampled, sampled);
         missing[5] = f32::NAN;
         open[5] = idle[5] + 3.0;
-        assert!((circuit.load(columns, &idle, &missing) / load - 1.0).abs() < 1e-2);
-        let without = circuit.load(columns, &idle, &open) / load;
+        assert!((circuit.load(columns, &idle, 4095, &missing) / load - 1.0).abs() < 1e-2);
+        let without = circuit.load(columns, &idle, 4095, &open) / load;
         assert!((without - 17.0 / 18.0).abs() < 1e-2, "{without}");
         // Nothing is known of a row without current.
-        assert_eq!(circuit.load(columns, &idle, &idle), 6.0);
+        assert_eq!(circuit.load(columns, &idle, 4095, &idle), 6.0);
+        // Nor of one with a short.
+        missing[5] = 4000.0;
+        assert!(circuit.load(columns, &idle, 4095, &missing).is_nan());
     }
 
     #[test]

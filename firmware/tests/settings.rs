@@ -21,6 +21,7 @@ fn refusal(session: &mut Running<'_, '_>, board: &Board, request: &Request<'_>) 
 /// Circuit with constants that are all different.
 fn circuit() -> ZeroPotential<ROWS, COLS> {
     ZeroPotential {
+        saturated_v: 3.1,
         sensor_rows: 2,
         reference_v: 3.25,
         drive_v: 0.21,

@@ -113,12 +113,13 @@ impl<'m, Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COL
         self.sequencer.start(self.started.lines(), settings.settling_us, samples);
     }
 
-    /// Turns the sums into readings in Ω.
-    fn convert(&mut self, frame: &mut [f32]) {
+    /// Turns the sums into readings in Ω. Returns how many were taken.
+    fn convert(&mut self, frame: &mut [f32]) -> usize {
         let Plan { columns, settings, .. } = self.ended;
         let (samples, all) = (f32::from(settings.oversampling), ColumnWires::first(COLUMNS));
         let lines = self.ended.lines().iter().zip(self.sums.iter());
         let mut readings = frame.chunks_mut(columns.count().max(1));
+        let mut taken = 0;
         for (line, sums) in lines {
             let mut counts = sums.map(|sum| sum as f32 / samples);
             let Some(row) = *line else {
@@ -130,9 +131,11 @@ impl<'m, Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COL
             let picked = columns.pick(counts);
             for (reading, ohm) in readings.next().unwrap_or_default().iter_mut().zip(picked) {
                 *reading = ohm;
+                taken += 1;
             }
         }
         self.circuit.correct(columns, frame);
+        taken
     }
 }
 
@@ -198,9 +201,9 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
             return failed(frame);
         }
         frame.fill(f32::NAN); // rows and columns that are not wired
-        self.convert(frame);
+        let taken = self.convert(frame);
         let mut report = ScanReport::default();
-        count_failures(&mut report, frame.iter().filter(|reading| reading.is_nan()).count());
+        count_failures(&mut report, frame.len().saturating_sub(taken));
         report
     }
 

@@ -110,7 +110,7 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, const ROWS: usize, const COLUMNS
         if let Some(known) = self.load.get_mut(row.0).filter(|_| columns != all) {
             if is_its_turn || known.is_nan() {
                 sample_others(&mut self.sampler, samples, columns, &mut counts);
-                *known = self.circuit.load(columns, &self.idle, &counts);
+                *known = self.circuit.load(columns, &self.idle, full_scale, &counts);
             }
             load = *known;
         }

@@ -392,7 +392,7 @@ fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its
     assert_eq!(asked, [1, 2, 0, 1, 2, 0]);
     let circuit = ZeroPotential::<2, 3>::TYPICAL;
     let (idle, counts) = ([250.0, 251.0, 252.0], [2000.0, 2001.0, 2002.0]);
-    let load = circuit.load(wires.columns, &idle, &counts);
+    let load = circuit.load(wires.columns, &idle, 4095, &counts);
     let mut expected = [2001.0, 2002.0];
     let row = ScannedRow { row: RowWire(1), columns: wires.columns, load };
     circuit.row_ohm(row, &idle, 4095, &mut expected);

@@ -98,7 +98,7 @@ fn name(place: Place) -> String {
 
 fn health(kind: Kind) -> Health {
     match kind {
-        Kind::Missing | Kind::IntermittentlyMissing => Health::Missing,
+        Kind::Missing | Kind::BesideShort | Kind::IntermittentlyMissing => Health::Missing,
         Kind::Open | Kind::IntermittentlyOpen => Health::Open,
         Kind::Shorted | Kind::AtGround | Kind::Touching | Kind::IntermittentlyShorted => {
             Health::Shorted
@@ -110,6 +110,7 @@ fn health(kind: Kind) -> Health {
 /// What helps.
 fn advice(kind: Kind) -> &'static str {
     match health(kind) {
+        _ if kind == Kind::BesideShort => "",
         Health::Open => ": look for a broken wire or a loose plug",
         Health::Shorted => ": look for wires that touch",
         Health::Noisy => ": look for a loose contact",

@@ -56,7 +56,7 @@ fn readings_that_a_device_refuses_are_noted_flagged_and_filled() {
     };
     let sound = error("fills.bin", "sound.csv", &[]);
     assert_eq!(sound.to_bits(), error("plain.bin", "sound.csv", &[]).to_bits());
-    for (value, kind) in [("0.02", "shorted"), ("", "missing")] {
+    for (value, kind) in [("0.02", "shorted (or too small)"), ("", "missing")] {
         changed(&folder, "faulty.csv", |name, _| (name == "r4c5_ohm").then_some(value));
         let said = folder.notes(&["decode", "fills.bin", "faulty.csv", "-o", "e.csv"]);
         assert!(said.contains(&format!("note: r4c5 {kind} in 100 % of lines")), "{said}");

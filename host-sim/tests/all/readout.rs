@@ -1,9 +1,12 @@
 //! The firmware's readout on the virtual board: how far a reading is off. docs/readout.md derives the equations.
 
 use taxel_core::ColumnWires;
+use taxel_core::health::Limits;
+use taxel_data::Table;
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::Configuration;
 use taxel_firmware::readout::{FrameSource, Selection};
+use taxel_learn::faults::diagnose;
 use taxel_simulate::World;
 
 use crate::virtual_board::{Series, VirtualBoard, WIRES, all_readings};
@@ -27,6 +30,39 @@ fn scanned(series: Series, wires: Selection<'_>, frames: usize) -> Vec<(f64, f64
         pairs.extend(frame.iter().map(|ohm| f64::from(*ohm)).zip(truth));
     }
     pairs
+}
+
+#[test]
+fn a_short_is_named_and_no_reading_beside_it_is_believed() {
+    let world = World::press();
+    let line = all_readings(&world, 1).values;
+    let names: Vec<String> =
+        (1..=8).flat_map(|m| (1..=18).map(move |k| format!("r{m}c{k}_ohm"))).collect();
+    let board = VirtualBoard::new(Series { row_switch: 0.26, lead: 0.0 });
+    for (cell, short_ohm) in
+        (0..10).flat_map(|cell| [0.0, 0.5, 5.0, 20.0, 33.0].map(|ohm| (cell * 15 + 2, ohm)))
+    {
+        let mut resistances = line.to_vec();
+        resistances[cell] = f64::max(short_ohm, 1e-3);
+        board.set_readings(&resistances);
+        let mut frame = vec![0.0; 144];
+        board.scanner().scan(Configuration::DEFAULT.scan, WIRES, &mut frame);
+        let row = cell / 18;
+        for (at, (ohm, truth)) in frame.iter().zip(&resistances).enumerate() {
+            let is_right = match at {
+                _ if at == cell => *ohm == 0.0,
+                _ if at / 18 == row => ohm.is_nan(),
+                _ => (f64::from(*ohm) / truth - 1.0).abs() < 2e-3,
+            };
+            assert!(is_right, "{short_ohm} Ω at {cell}: {ohm} for {truth} at {at}");
+        }
+        let values = frame.iter().map(|ohm| f64::from(*ohm)).collect::<Vec<_>>().repeat(5).into();
+        let faults = diagnose(&Table { names: names.clone(), values }, Limits::USUAL, None);
+        let faults: Vec<String> = faults.iter().map(|found| found.fault.to_string()).collect();
+        let (row, column) = (row + 1, cell % 18 + 1);
+        let short = format!("r{row}c{column} shorted (or too small)");
+        assert_eq!(faults, [format!("row-wire {row} unknown beside a short"), short]);
+    }
 }
 
 /// Root mean square of the relative errors.

@@ -1,5 +1,5 @@
 //! A board as a program: the firmware's readout against the sensor's wires as a network of resistors. Its op-amps are
-//! ideal, and its converters have 12 bits.
+//! ideal up to their supply, and its converters have 12 bits.
 
 use std::cell::RefCell;
 use std::convert::Infallible;
@@ -37,6 +37,9 @@ pub const WIRES: Selection<'static> = Selection {
     ],
     columns: ColumnWires::first(COLUMNS),
 };
+
+/// Largest output in V of an op-amp.
+const LARGEST_V: f64 = 3.2;
 
 const TYPICAL: ZeroPotential<ROWS, COLUMNS> = ZeroPotential::TYPICAL;
 
@@ -132,7 +135,7 @@ impl State {
         if let Some(known) = self.outputs_v[place] {
             return known;
         }
-        let (drive_v, reference_v) = (f64::from(TYPICAL.drive_v), f64::from(TYPICAL.reference_v));
+        let drive_v = f64::from(TYPICAL.drive_v);
         let lead = f64::from(self.series.lead);
         let through_ohm = f64::from(self.series.row_switch) + lead;
         // The active row is pulled to ground; all else is at V_b.
@@ -140,16 +143,32 @@ impl State {
             let volt = if Some(row) == active { 0.0 } else { drive_v };
             Tie { volt, through_ohm }
         });
-        let columns = [Tie { volt: drive_v, through_ohm: lead }; COLUMNS];
-        let potentials = potentials_v(&self.conductance_s, &rows, &columns);
-        let outputs = std::array::from_fn(|k| {
-            let current_a = |m: usize| {
-                (potentials[ROWS + k] - potentials[m]) * self.conductance_s[m * COLUMNS + k]
-            };
-            let sum_a: f64 = (0..ROWS).map(current_a).sum();
-            let volt = drive_v + f64::from(TYPICAL.feedback_ohm[k]) * sum_a;
-            volt.clamp(0.0, reference_v)
-        });
+        let mut columns = [Tie { volt: drive_v, through_ohm: lead }; COLUMNS];
+        let mut outputs = [LARGEST_V; COLUMNS];
+        // An op-amp that is at its end holds its column no longer: the column hangs from it by the feedback resistor.
+        loop {
+            let potentials = potentials_v(&self.conductance_s, &rows, &columns);
+            let mut has_changed = false;
+            for k in 0..COLUMNS {
+                if columns[k].volt == LARGEST_V {
+                    continue;
+                }
+                let current_a = |m: usize| {
+                    (potentials[ROWS + k] - potentials[m]) * self.conductance_s[m * COLUMNS + k]
+                };
+                let sum_a: f64 = (0..ROWS).map(current_a).sum();
+                let feedback_ohm = f64::from(TYPICAL.feedback_ohm[k]);
+                outputs[k] = drive_v + feedback_ohm * sum_a;
+                if outputs[k] > LARGEST_V {
+                    outputs[k] = LARGEST_V;
+                    columns[k] = Tie { volt: LARGEST_V, through_ohm: lead + feedback_ohm };
+                    has_changed = true;
+                }
+            }
+            if !has_changed {
+                break;
+            }
+        }
         self.outputs_v[place] = Some(outputs);
         outputs
     }

@@ -4,8 +4,8 @@ import math
 
 #: Voltages in V, resistances in Ω.
 REFERENCE_V, BIAS_V, FEEDBACK_OHM, ROW_SOURCE_OHM = 3.3, 0.2, 560.0, 0.26
-#: Largest output in V of an op-amp.
-LARGEST_V = 3.28
+#: Largest output in V of an op-amp that gives 5.5 mA.
+LARGEST_V = 3.2
 #: Gain-bandwidth product of the op-amps in Hz (MCP6024), and the converters' resolution in bits.
 OP_AMP_HZ, BITS = 10e6, 12
 

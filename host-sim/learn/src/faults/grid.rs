@@ -1,5 +1,7 @@
 //! Grid of wires whose readings are the columns of a table.
 
+use std::ops::Range;
+
 use taxel_data::columns;
 
 use super::Place;
@@ -103,6 +105,18 @@ impl Grid {
         }
         places.extend((0..left.len()).filter(|at| left[*at]).map(|at| self.place(at)));
         places
+    }
+
+    /// Readings of the rows of which some are `shorted`, and all others are `missing`.
+    pub fn rows_beside(&self, shorted: &[usize], missing: &[usize]) -> Vec<usize> {
+        let width = self.columns.len();
+        let are_beside = |row: &Range<usize>| {
+            let [shorted, missing] =
+                [shorted, missing].map(|them| them.iter().filter(|at| row.contains(at)).count());
+            shorted > 0 && missing > 0 && shorted + missing == width
+        };
+        let rows = (0..self.rows.len()).map(|row| row * width..(row + 1) * width);
+        rows.filter(are_beside).flatten().collect()
     }
 
     /// Wires of a column called `r4c5_ohm`.

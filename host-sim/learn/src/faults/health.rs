@@ -35,11 +35,19 @@ pub fn lasting(grid: &Grid, faulty: &[[usize; 3]], frames: usize) -> Vec<WireFau
             return vec![WireFault { place: Place::Row(row), kind: Kind::AtGround }];
         }
     }
-    let faults = KINDS.into_iter().flat_map(|fault| {
-        let places = grid.wires_of(&of_kind(fault));
-        places.into_iter().map(move |place| WireFault { place, kind: Kind::lasting(fault) })
+    let (mut missing, shorted) = (of_kind(Fault::Missing), of_kind(Fault::Shorted));
+    let beside = grid.rows_beside(&shorted, &missing);
+    missing.retain(|at| !beside.contains(at));
+    let of_kinds = [
+        (Kind::Missing, missing),
+        (Kind::Shorted, shorted),
+        (Kind::BesideShort, beside),
+        (Kind::Open, open),
+    ];
+    let named = of_kinds.into_iter().flat_map(|(kind, readings)| {
+        grid.wires_of(&readings).into_iter().map(move |place| WireFault { place, kind })
     });
-    faults.collect()
+    named.collect()
 }
 
 /// Whether a reading with so many faults by kind comes and goes in so many `frames`.
@@ -57,11 +65,21 @@ pub fn intermittent(
     lasting: &[bool],
 ) -> Vec<WireFault> {
     let least = FLICKERS * (window.len() / faulty.len()) as f64;
+    let of_kind = |fault: Fault| -> Vec<usize> {
+        let comes_and_goes =
+            |at: &usize| !lasting[*at] && faulty[*at][fault as usize] as f64 > least;
+        (0..faulty.len()).filter(comes_and_goes).collect()
+    };
     let mut faults = Vec::new();
     for fault in KINDS {
-        let readings: Vec<usize> = (0..faulty.len())
-            .filter(|at| !lasting[*at] && faulty[*at][fault as usize] as f64 > least)
-            .collect();
+        let mut readings = of_kind(fault);
+        if fault == Fault::Missing {
+            // Rows are missing as a whole beside a short.
+            let beside = grid.rows_beside(&of_kind(Fault::Shorted), &readings);
+            readings.extend(beside);
+            readings.sort_unstable();
+            readings.dedup();
+        }
         let mut name = |place| {
             faults.push(WireFault { place, kind: Kind::intermittent(fault) });
         };

@@ -42,6 +42,8 @@ fn struck(table: &Table, when: fn(usize) -> bool, readings: Range<usize>, ohm: f
     })
 }
 
+const SHORTED: &str = "shorted (or too small)";
+
 #[test]
 fn every_kind_of_fault_is_named_and_sound_frames_have_none() {
     let (sound, factors) = sensor();
@@ -51,9 +53,18 @@ fn every_kind_of_fault_is_named_and_sound_frames_have_none() {
     assert_eq!(named(&row(f64::NAN), &factors), ["row-wire 4 missing"]);
     let column =
         with(&sound, |_, frame| frame.iter_mut().skip(4).step_by(18).for_each(|r| *r = 0.0));
-    assert_eq!(named(&column, &factors), ["column-wire 5 shorted"]);
+    assert_eq!(named(&column, &factors), [format!("column-wire 5 {SHORTED}")]);
     let single = struck(&sound, |_| true, 58..59, 0.02);
-    assert_eq!(named(&single, &factors), ["r4c5 shorted"]);
+    assert_eq!(named(&single, &factors), [format!("r4c5 {SHORTED}")]);
+    // What a device reads: nothing is known of the row.
+    let beside = |when: fn(usize) -> bool| {
+        struck(&struck(&sound, when, 54..72, f64::NAN), when, 58..59, 0.0)
+    };
+    let expected = ["row-wire 4 unknown beside a short".into(), format!("r4c5 {SHORTED}")];
+    assert_eq!(named(&beside(|_| true), &factors), expected);
+    let now_and_then = told(&beside(|line| line % 5 == 0), Some(&factors));
+    let expected = ["row-wire 4 intermittently missing", "r4c5 intermittently shorted"];
+    assert_eq!(now_and_then, expected.map(|fault| (fault.to_string(), 40)));
     let ground = with(&sound, |_, frame| {
         frame.iter_mut().enumerate().for_each(|(at, r)| *r = if at / 18 == 6 { 1e9 } else { 0.0 });
     });

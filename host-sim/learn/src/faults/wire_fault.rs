@@ -43,8 +43,11 @@ pub enum Kind {
     Missing,
     /// No current flows: broken or not connected; or the converter is stuck at its lower end.
     Open,
-    /// The circuit is saturated: connected to ground, or the converter is stuck at its upper end.
+    /// The circuit is saturated: the resistance is too small to be measured, or shorted; or the converter is stuck at its
+    /// upper end.
     Shorted,
+    /// Missing, because a reading of the row-wire is shorted: nobody knows how far the row's voltage drops.
+    BesideShort,
     /// Connected to ground, which a row-wire shows by saturating all others.
     AtGround,
     /// Connected with each other.
@@ -63,7 +66,7 @@ impl Kind {
     /// Fault that the health of the place's readings has; `None` if they are within the limits.
     pub fn of_readings(self) -> Option<Fault> {
         match self {
-            Self::Missing | Self::IntermittentlyMissing => Some(Fault::Missing),
+            Self::Missing | Self::BesideShort | Self::IntermittentlyMissing => Some(Fault::Missing),
             Self::Open | Self::AtGround | Self::IntermittentlyOpen => Some(Fault::Open),
             Self::Shorted | Self::IntermittentlyShorted => Some(Fault::Shorted),
             Self::Touching | Self::Noisy => None,
@@ -111,7 +114,8 @@ impl fmt::Display for WireFault {
         f.write_str(match self.kind {
             Kind::Missing => " missing",
             Kind::Open => " open",
-            Kind::Shorted => " shorted",
+            Kind::Shorted => " shorted (or too small)",
+            Kind::BesideShort => " unknown beside a short",
             Kind::AtGround => " shorted to ground",
             Kind::Touching => " shorted together",
             Kind::IntermittentlyMissing => " intermittently missing",
