@@ -98,6 +98,16 @@ impl Capacity {
         longest
     }
 
+    /// Bytes of the largest chunk of an upload: it leaves room for the rest of the message, and every board can keep it
+    /// while it writes the previous chunk.
+    pub const fn chunk_bytes(self) -> usize {
+        /// Bytes of a message that are not the chunk's: those of packet and fields.
+        const AROUND_BYTES: usize = 24;
+        const MOST_BYTES: usize = 512;
+        let room = self.message_bytes().saturating_sub(AROUND_BYTES) / 4 * 4;
+        if room < MOST_BYTES { room } else { MOST_BYTES }
+    }
+
     /// About the bytes of RAM that an image's buffers take, a little too many.
     pub const fn buffer_bytes(self) -> usize {
         let (readings, outputs) = (self.rows * self.columns, self.all_outputs());

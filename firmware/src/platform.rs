@@ -33,6 +33,11 @@ pub trait Platform: Port {
     /// What survives a restart besides the slots.
     fn journal(&mut self) -> &mut Journal<Self::Page>;
 
+    /// Makes the chip reset while its supply is too low, from the next restart on and for good. Returns whether it does.
+    fn set_brown_out(&mut self) -> bool {
+        false
+    }
+
     /// Number that no other board of its kind has; zeros on a board without one.
     fn unique_id(&self) -> [u8; 12] {
         [0; 12]

@@ -32,14 +32,14 @@ const NUCLEO_ROW_NS: u32 = 17_300;
 const ONCHIP_TICKS_A_CYCLE: u32 = 8;
 
 /// Cycles of the converters' clock: to sample a column, which its 6 kΩ and 7 pF need 10 for; to convert it; and from one
-/// trigger to the next, three for the trigger itself.
+/// trigger to the next, three for the trigger itself, and three so that none comes before the converters have ended.
 const ONCHIP_SAMPLE_CYCLES: u32 = 15;
 const ONCHIP_COLUMN_CYCLES: u32 = ONCHIP_SAMPLE_CYCLES + 12;
-const ONCHIP_TRIGGER_CYCLES: u32 = 3 * ONCHIP_COLUMN_CYCLES + 3;
+const ONCHIP_TRIGGER_CYCLES: u32 = 3 * ONCHIP_COLUMN_CYCLES + 6;
 
 /// Cycles from a trigger until the last of its columns is sampled for certain: then the multiplexers may switch. They have
 /// 0.4 µs until the next trigger, and take 0.1.
-const ONCHIP_SAMPLED_CYCLES: u32 = ONCHIP_TRIGGER_CYCLES - 9;
+const ONCHIP_SAMPLED_CYCLES: u32 = ONCHIP_TRIGGER_CYCLES - 12;
 
 /// Number of columns that the NUCLEO-F446RE's own converters sample.
 pub const ONCHIP_COLUMNS: u16 = 18;
@@ -83,7 +83,7 @@ impl RowCounts {
     /// use taxel_firmware::timing::RowCounts;
     /// let counts = RowCounts::new(20, 12, 180);
     /// assert_eq!((counts.divider, counts.trigger), (1, 3_637)); // 20.2 µs
-    /// assert_eq!(counts.period, 19_781); // 110 µs
+    /// assert_eq!(counts.period, 20_357); // 113 µs
     /// ```
     pub fn new(settling_us: u32, samples: u16, clock_mhz: u32) -> Self {
         let trigger_ticks = u32::from(ONCHIP_TRIGGER_TICKS);
@@ -169,8 +169,8 @@ impl ScanPlan {
     ///
     /// ```
     /// use taxel_firmware::timing::ScanPlan;
-    /// assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).scan_us(), 224);
-    /// assert_eq!(ScanPlan::of_nucleo_onchip(8, 3, 12).scan_us(), 887);
+    /// assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).scan_us(), 226);
+    /// assert_eq!(ScanPlan::of_nucleo_onchip(8, 3, 12).scan_us(), 913);
     /// ```
     pub fn of_nucleo_onchip(rows: u16, columns: u16, oversampling: u16) -> Self {
         let columns = columns.max(ONCHIP_COLUMNS);
@@ -347,9 +347,9 @@ mod tests {
             let computed = ((plan.longest_us() - between_us) as f32) * 8.0 / 9.0;
             assert!((computed / us - 1.0).abs() < 0.01, "{samples}: {us} {computed}");
         }
-        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).longest_us(), 250);
-        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 12).longest_us(), 990);
-        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).most_oversampling(1000), Some(12));
+        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).longest_us(), 253);
+        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 12).longest_us(), 1019);
+        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).most_oversampling(1000), Some(11));
     }
 
     #[test]

@@ -107,7 +107,7 @@ fn identity() -> Report<'static> {
 }
 
 /// Messages about constants of the circuit and settings that are kept.
-fn about_settings() -> [(&'static str, Vec<u8>); 9] {
+fn about_settings() -> [(&'static str, Vec<u8>); 10] {
     let circuit = ZeroPotential::<1, 2>::TYPICAL;
     let constants = circuit.constants();
     let kept = Kept {
@@ -122,6 +122,7 @@ fn about_settings() -> [(&'static str, Vec<u8>); 9] {
         ("kept?", request_bytes(9, &Request::Kept)),
         ("keep the baseline", request_bytes(9, &Request::Keep(Setting::Baseline))),
         ("forget the constants", request_bytes(9, &Request::Forget(Setting::Constants))),
+        ("set the brown-out level", request_bytes(9, &Request::SetBrownOut)),
         ("constants", report_bytes(8, &Report::Constants(constants))),
         ("kept", report_bytes(9, &Report::Kept(kept))),
         ("refused: feedback", refused(9, Refusal::Constants(ConstantsFault::Feedback))),

@@ -81,11 +81,15 @@ fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_mo
         (16, 9, 3, ModelFault::Shape),
         (16, 10, 4, ModelFault::Shape),
         (16, 4, 9, ModelFault::NotABlob),
+        (16, 5, 16, ModelFault::Length),
         (11, 0, b'T', ModelFault::NotABlob),
         (1, 0, b'T', ModelFault::NotABlob),
     ] {
         let mut head = good[..length].to_vec();
         head[place] = byte;
+        if fault == ModelFault::Length {
+            head[6..9].fill(0); // no more than this head
+        }
         let (outcome, _) = upload(&mut session, &board, &[UploadStep::Begin { head: &head }]);
         assert_eq!(outcome, Err(Refusal::BadModel(fault)), "{head:?}");
     }
@@ -193,6 +197,8 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     }
     assert_eq!(one(&TRY), Err(Refusal::OutOfPlace { received }));
     assert_eq!(one(&UploadStep::Confirm), Err(Refusal::NoUpload));
+    let too_long = UploadStep::Chunk { offset: received, bytes: &[1; 236] };
+    assert_eq!(one(&too_long), Err(Refusal::Unknown));
     for bytes in [&[1; 3][..], &[1; 100]] {
         let chunk = UploadStep::Chunk { offset: received, bytes };
         let beyond = received as usize + bytes.len() > new.len() || bytes.len() == 3;

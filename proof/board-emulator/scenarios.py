@@ -23,9 +23,9 @@ JOURNAL, SLOT_A, SLOT_B = (1, 2), 6, 7
 RUBBISH = bytes(place % 251 for place in range(0x20000))
 #: First bytes of answers, by their variant.
 IDENTITY, UPLOAD, RESTARTING, REFUSED, KEPT = b"\x00", b"\x07", b"\x08", b"\x09", b"\x0b"
-COUNTERS, BASELINE, ESTIMATE = b"\x01", b"\x03", b"\x05"
-#: Requests for the counters, and for a baseline of some frames.
-STATISTICS, CAPTURE = b"\x01", b"\x04"
+COUNTERS, BASELINE, ESTIMATE, HEALTH = b"\x01", b"\x03", b"\x05", b"\x06"
+#: Requests for the counters, for a baseline of some frames, and for the brown-out level.
+STATISTICS, CAPTURE, SET_BROWN_OUT = b"\x01", b"\x04", b"\x10"
 #: That of an upload which is on trial.
 ON_TRIAL = b"\x07\x02"
 #: Slowest and fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
@@ -34,8 +34,8 @@ SLOWEST_LSI_HZ, FASTEST_LSI_HZ, SLOWEST_ERASE_S = 17_000, 47_000, 4.0
 SLOWEST_OP_AMP_HZ = 6e6
 #: By how much the internal oscillator may be off from -10 to 85 degrees, as a share (DS10693).
 LARGEST_HSI_ERROR = 0.04
-#: Supplies in V that are too low: for changing flash, and for running.
-LOW_V, TOO_LOW_V = 2.9, 2.6
+#: Supplies in V: a weak one, and ones that are too low for changing flash, and for running.
+WEAK_V, LOW_V, TOO_LOW_V = 3.0, 2.9, 2.6
 #: Writes of settings between two restarts, and such writes behind which both pages have been erased (docs/link.md).
 WRITES, MANY_WRITES = 100, 290
 #: Bytes that a device keeps while it is busy (docs/link.md).
@@ -262,18 +262,23 @@ def until_driven(bench):
 
 
 def brown_out(make, files):
-    """A chip as it comes: the first start sets the brown-out level, and no later one writes it again."""
+    """A chip as it comes: the brown-out level is set when a host asks for it, and not written again."""
     bench = make(options=FACTORY_OPTIONS)
     bench.run_for(0.6)
     store = bench.board.store
+    expect(store.options == FACTORY_OPTIONS, f"the option bytes are {store.options:#010x}")
+    bench.board.supply(LOW_V)
+    bench.ask(SET_BROWN_OUT, REFUSED)
+    bench.board.supply(WEAK_V)
+    for _ in range(2):
+        bench.ask(SET_BROWN_OUT, RESTARTING, ERASE_PATIENCE_S)
+        bench.run_for(0.05)
     expect(store.options == LEVEL_3_OPTIONS, f"the option bytes are {store.options:#010x}")
-    bench.ask(RESTART, RESTARTING)
-    bench.run_for(0.05)
     until_driven(bench)
     bench.board.supply(TOO_LOW_V)
     bench.run_for(0.05)
     expect(store.options_written == 1, f"the option bytes were written {store.options_written} times")
-    bench.finish(resets=["program", "brown-out"])
+    bench.finish(resets=["program", "program", "brown-out"])
 
 
 def sagging_supply(make, files):
@@ -282,11 +287,15 @@ def sagging_supply(make, files):
     fill(bench, SLOT_A, RUBBISH)
     bench.run_for(0.05)
     bench.scan_every(0.02)
+    bench.board.supply(WEAK_V)
+    bench.ask(KEEP_CONFIGURATION, KEPT, ERASE_PATIENCE_S)
+    bench.scan_every(0.03)
     before = bytes(bench.board.store.content)
+    erased = dict(bench.board.store.erased)
     bench.board.supply(LOW_V)
     for request in (begin(files.model.read_bytes()), KEEP_CONFIGURATION):
         bench.ask(request, REFUSED, ERASE_PATIENCE_S)
-    expect(bytes(bench.board.store.content) == before and not bench.board.store.erased, "flash was changed")
+    expect(bytes(bench.board.store.content) == before and bench.board.store.erased == erased, "flash was changed")
     bench.board.supply(TOO_LOW_V)
     bench.run_for(0.05)
     bench.scan_every(0.02)
@@ -434,8 +443,44 @@ def check_onchip_scans(bench, samples, mean_us, longest_us):
         off = computed / found - 1
         bench.board.note(f"scan with {samples} samples, {name}: {found:.1f} us, computed {computed} ({100 * off:+.1f} %)")
         expect(abs(off) <= 0.03, f"a scan takes {found:.0f} us, computed {computed} us")
-    most_us = 250 if samples == 1 else 1000
-    expect(max(scans) <= most_us, f"a scan takes {max(scans):.0f} us")
+
+
+def shorts(make, files):
+    """Shorts of 0 to 20 ohm at ten cells: each is named, no other reading of its row is believed, and sound frames have none."""
+    bench = onchip_bench(make, files)
+    for place in range(10):
+        row, column = place % 8, 7 * place % 18
+        sound = bench.ohm[row][column]
+        for ohm in (1e-3, 0.5, 5.0, 20.0):
+            bench.ohm[row][column] = ohm
+            bench.run_for(0.03)
+            bench.board.usart.to_host.clear()
+            bench.run_for(0.03)
+            faults = health(bench)
+            expect(faults, f"{ohm} ohm at r{row + 1}c{column + 1} are not told")
+            for missing, shorted, opened, words in faults:
+                is_row = [bits == ((1 << 18) - 1 if line == row else 0) for line, bits in enumerate(words)]
+                expect((missing, shorted, opened) == (17, 1, 0) and all(is_row),
+                       f"{ohm} ohm at r{row + 1}c{column + 1}: {missing}, {shorted}, {opened}, {words}")
+        bench.ohm[row][column] = sound
+        bench.run_for(0.03)
+        bench.board.usart.to_host.clear()
+        bench.run_for(0.03)
+        expect(not health(bench), f"r{row + 1}c{column + 1} is sound, and faults are told")
+    bench.finish()
+
+
+def health(bench):
+    """Health that the board has reported unasked: readings missing, shorted, open, and the faulty columns of each row."""
+    line, found = bench.board.usart.to_host, []
+    for _, message in packets(line[:line.rfind(0) + 1]):
+        if message[:1] == HEALTH:
+            rest, numbers = message[1:], []
+            for _ in range(6):
+                number, rest = taken(rest)
+                numbers.append(number)
+            found.append((*numbers[2:5], struct.unpack(f"<{numbers[5] // 4}I", rest)))
+    return found
 
 
 def onchip_stream(make, files):
@@ -516,5 +561,5 @@ SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
     for scenario in (session, sparse, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow,
                      no_clock, clock_stops, fault_restarts, panic_restarts, brown_out, sagging_supply, keep, burst, overrun,
-                     log_abandoned, restart, dead_host, onchip, onchip_stream)
+                     log_abandoned, restart, dead_host, onchip, shorts, onchip_stream)
 }

@@ -68,6 +68,10 @@ pub struct Options {
     /// The board has this revision's image already: do not flash it.
     #[arg(long)]
     flashed: bool,
+    /// Let the chip reset while its supply is below 2.7 to 2.9 V: it writes an option byte, for good. A power cut in that half
+    /// second may leave read protection on, which a mass erase removes.
+    #[arg(long)]
+    set_brown_out: bool,
     /// Speed of the serial line in bits a second: the image is built for it [default: TAXEL_BAUD of the environment, or 921600]
     #[arg(long, value_name = "N", conflicts_with = "emulated", value_parser = clap::value_parser!(u32).range(1..))]
     baud: Option<u32>,
@@ -92,6 +96,10 @@ pub fn run(options: &Options) -> Outcome {
     // Who flashed the board without a build has nothing to compare with.
     if image.exists() {
         check_image(&identity.memory, Size::new(&image)?.of_flash())?;
+    }
+    if options.set_brown_out {
+        device.set_brown_out().map_err(text)?;
+        println!("brown-out level 3 is set");
     }
     let unique_id = identity.unique_id_text();
     let decoding = decode_all(&mut device, &frames)?;

@@ -39,14 +39,13 @@ impl Options {
 const WIDE: &str = "wide";
 
 /// Texts that the log of a scenario must contain.
-const LOGGED: [(&str, &str); 7] = [
+const LOGGED: [(&str, &str); 6] = [
     ("session", "slot 0 holds a model that was flashed, not uploaded"),
     ("silent-sensor", "started by: Watchdog"),
     ("no-clock", "no 8 MHz from the ST-LINK"),
     ("clock-stops", "started by: Fault(Clock)"),
     ("fault-restarts", "started by: Fault(Exception)"),
     ("panic-restarts", "started by: Fault(Panic("),
-    ("brown-out", "brown-out level 3 is set"),
 ];
 
 /// Builds what is needed, and runs the scenarios that are named, or all.

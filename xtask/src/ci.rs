@@ -18,7 +18,7 @@ type Ended = (&'static str, Duration, Outcome<String>);
 
 /// Scenarios of the emulated board that CI runs: those of the main path, and of faults that restart the board. A release
 /// runs all.
-const SCENARIOS: [&str; 8] = [
+const SCENARIOS: [&str; 9] = [
     "session",
     "sparse",
     "silent-sensor",
@@ -27,6 +27,7 @@ const SCENARIOS: [&str; 8] = [
     "burst",
     "restart",
     "onchip",
+    "shorts",
 ];
 
 /// Runs every step of CI, even after a failure, and prints a summary.

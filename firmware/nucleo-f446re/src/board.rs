@@ -18,7 +18,6 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 use crate::bus::Bus;
 use crate::clock::Clock;
-use crate::flash::set_brown_out_level;
 use crate::held_pin::{ChipSelect, HeldPin};
 use crate::oscillator::{EXTERNAL_MHZ, INTERNAL_MHZ, Oscillator};
 use crate::power;
@@ -132,9 +131,6 @@ impl<R: Readout> Board<R> {
         core.DWT.enable_cycle_counter();
         let oscillator = Oscillator::find(&parts.RCC);
         power::watch(&parts.RCC, &parts.PWR);
-        if set_brown_out_level(&parts.FLASH) {
-            defmt::info!("brown-out level 3 is set: it holds from the next reset on");
-        }
         let source = match oscillator {
             Oscillator::External => {
                 Config::hse(8.MHz()).bypass_hse_oscillator().sysclk(EXTERNAL_MHZ.MHz())

@@ -16,6 +16,7 @@ use taxel_firmware::store::Journal;
 
 use crate::board::{Board, Readout};
 use crate::clock::Clock;
+use crate::flash::set_brown_out_level;
 use crate::oscillator::Oscillator;
 use crate::reset::restart;
 use crate::serial::Serial;
@@ -66,6 +67,10 @@ impl<R: Readout> Platform for Nucleo<R> {
 
     fn journal(&mut self) -> &mut Journal<Slot> {
         &mut self.journal
+    }
+
+    fn set_brown_out(&mut self) -> bool {
+        set_brown_out_level()
     }
 
     fn unique_id(&self) -> [u8; 12] {

@@ -108,9 +108,14 @@ impl Drop for Unlocked {
 }
 
 /// Makes the chip reset while its supply is too low for 180 MHz and for writing flash, from the next reset on. Returns
-/// whether it had to: the option byte stays for good. Other options stay as they are.
-pub(crate) fn set_brown_out_level(flash: &FLASH) -> bool {
-    if flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3 || power::is_low() {
+/// whether it does: not while the supply is too low. The option byte stays for good; other options stay as they are.
+pub(crate) fn set_brown_out_level() -> bool {
+    // SAFETY: what erases and writes flash has ended whenever a request is answered.
+    let flash = unsafe { FLASH::steal() };
+    if flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3 {
+        return true;
+    }
+    if power::is_low() {
         return false;
     }
     for key in OPTION_KEYS {

@@ -3,8 +3,9 @@
 use cortex_m::asm;
 use stm32f4xx_hal::pac::{PWR, RCC};
 
-/// Level 7 of the voltage detector, 2.9 V: writing 32 bits at once needs 2.7 V, to the end of an erase of 2 s.
-const DETECTOR_LEVEL: u8 = 7;
+/// Level 6 of the voltage detector, 2.85 to 2.99 V while the supply falls (DS10693): writing 32 bits at once needs 2.7 V, to
+/// the end of an erase of 2 s. Level 7 would refuse a supply of 3.05 V.
+const DETECTOR_LEVEL: u8 = 6;
 
 /// Cycles after which the detector is sure to work: 100 µs at 16 MHz.
 const DETECTOR_CYCLES: u32 = 1600;

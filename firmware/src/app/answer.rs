@@ -17,18 +17,6 @@ use crate::platform::Platform;
 use crate::readout::FrameSource;
 use crate::store::Slot;
 
-/// Largest chunk of an upload in bytes: it leaves room for the rest of the message, and every board can keep it
-/// while it writes the previous chunk.
-const LARGEST_CHUNK_BYTES: usize = 512;
-
-/// Bytes of a message that are not the chunk's: those of packet and fields.
-const AROUND_CHUNK_BYTES: usize = 24;
-
-const fn chunk_bytes(message_bytes: usize) -> usize {
-    let room = message_bytes.saturating_sub(AROUND_CHUNK_BYTES) / 4 * 4;
-    if room < LARGEST_CHUNK_BYTES { room } else { LARGEST_CHUNK_BYTES }
-}
-
 impl<P: Platform, F: FrameSource, S: Slot, const ROWS: usize> Session<'_, '_, P, F, S, ROWS> {
     /// Receives bytes until a frame is complete or no more bytes are there, and answers the frame's request.
     pub(super) fn serve_link(&mut self) -> Option<SessionEnd> {
@@ -101,6 +89,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 end = Some(SessionEnd::Restart);
                 Ok(Some(Report::Restarting))
             }
+            Request::SetBrownOut if link.platform().set_brown_out() => {
+                end = Some(SessionEnd::Restart);
+                Ok(Some(Report::Restarting))
+            }
+            Request::SetBrownOut => Err(Refusal::Flash),
             Request::Constants => {
                 let constants = sensor.source.constants().map(Report::Constants);
                 constants.map(Some).ok_or(Refusal::Constants(ConstantsFault::Fixed))
@@ -181,7 +174,7 @@ impl Models {
             model: model.identity,
             model_name: model.name(),
             slot_bytes: spare.bytes().len() as u32,
-            chunk_bytes: chunk_bytes(self.capacity.message_bytes()) as u16,
+            chunk_bytes: self.capacity.chunk_bytes() as u16,
             memory: link.platform().memory(),
             unique_id: link.platform().unique_id(),
             wires_crc_32,

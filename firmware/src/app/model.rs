@@ -81,10 +81,13 @@ fn crc_of(names: Columns<'_>, units: Columns<'_>) -> u32 {
     digest.finalize()
 }
 
-/// Checks the `head` of a blob: that it is one, and that the image has room for a model of its shape. Returns the
-/// blob's length.
+/// Checks the `head` of a blob: that it is one, that there is more of it, and that the image has room for a model of its shape.
+/// Returns the blob's length.
 pub fn check_head(capacity: Capacity, head: &[u8]) -> Result<usize, ModelFault> {
     let (length, shape) = Model::declared(head).ok_or(ModelFault::NotABlob)?;
+    if length <= Model::HEAD_BYTES {
+        return Err(ModelFault::Length);
+    }
     if capacity.has_room_for(shape) { Ok(length) } else { Err(ModelFault::Shape) }
 }
 

@@ -68,6 +68,9 @@ impl Models {
                 info!("upload of {=usize} bytes begins", length);
                 self.begin_upload((model.spare_slot(), spare), length, link)
             }
+            UploadStep::Chunk { bytes, .. } if bytes.len() > self.capacity.chunk_bytes() => {
+                Err(Refusal::Unknown)
+            }
             UploadStep::Chunk { offset, bytes } => self.upload.chunk(spare, offset, bytes),
             UploadStep::Abort => {
                 if self.end_trial() {

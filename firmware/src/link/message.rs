@@ -74,6 +74,9 @@ pub enum Request<'a> {
         /// CRC-32 of the model in force, which is left: a repeated request does not undo twice.
         crc_32: u32,
     },
+    /// Let the chip reset while its supply is too low, for good, and restart. Answered by [`Report::Restarting`], or by
+    /// [`Refusal::Flash`] if the supply is too low now, or the board cannot.
+    SetBrownOut,
 }
 
 /// Steps of uploading a model, in their order.

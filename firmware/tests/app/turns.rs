@@ -1,7 +1,7 @@
 //! Turns of the loop: scans in time, the watchdog, and a host that takes no bytes.
 
 use taxel_firmware::app::SessionEnd;
-use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request};
+use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 
 use crate::mock::*;
 
@@ -128,4 +128,7 @@ fn a_restart_is_answered_and_ends_the_session() {
     let (mut session, board) = started(quiet(), &blob(3, 4));
     let (answer, end) = ask(&mut session, &board, &Request::Restart, |r| r == Report::Restarting);
     assert_eq!((answer, end), (true, Some(SessionEnd::Restart)));
+    // A board without a brown-out level goes on.
+    let refused = |report: Report<'_>| report == Report::Refused(Refusal::Flash);
+    assert_eq!(ask(&mut session, &board, &Request::SetBrownOut, refused), (true, None));
 }

@@ -257,9 +257,16 @@ impl Device {
 
     /// Restarts the device and waits until it answers again.
     pub fn restart(&mut self) -> Result<DeviceIdentity> {
-        self.ask_plainly(&Request::Restart, |report| {
-            matches!(report, Report::Restarting).then_some(())
-        })?;
+        self.restart_by(&Request::Restart)
+    }
+
+    /// Lets the chip reset while its supply is too low, for good; and restarts it.
+    pub fn set_brown_out(&mut self) -> Result<DeviceIdentity> {
+        self.restart_by(&Request::SetBrownOut)
+    }
+
+    fn restart_by(&mut self, request: &Request<'_>) -> Result<DeviceIdentity> {
+        self.ask_plainly(request, |report| matches!(report, Report::Restarting).then_some(()))?;
         // Bytes that arrive while it starts are lost, which is no fault of the line. An emulated device may take longer
         // to answer than a board does to start.
         let (patience, repeated) = (self.patience, self.repeated);

@@ -9,7 +9,7 @@ use crate::circuit::ConstantsFault;
 pub enum Refusal {
     /// The device speaks another version of the protocol, which is given here.
     Version(u8),
-    /// The request is not one of this protocol.
+    /// The request is not one of this protocol, or its chunk is longer than the identity allows.
     Unknown,
     /// The frame does not have as many readings as are scanned for the model in force.
     FrameLength {
