@@ -35,7 +35,8 @@ pub struct Effort {
     pub wanted: f64,
     /// Largest number of rounds of the population.
     pub rounds: usize,
-    /// Largest number of rounds of draws that are solved for, where the population does not arrive.
+    /// Largest number of rounds of draws that are solved for, where the population does not arrive. A quarter of them, if
+    /// they have less than a tenth of the effective samples.
     pub solved: usize,
 }
 
@@ -84,11 +85,13 @@ pub fn sample<T: Target>(
     let masses = kept.iter().map(|it| log_sum(it.log_weights())).chain(thin.iter().map(log_mass));
     let least = masses.fold(f64::NEG_INFINITY, f64::max) + NEGLIGIBLE_MASS;
     thin.retain(|it| log_mass(it) >= least);
-    for _ in 0..effort.solved {
+    for round in 1..=effort.solved {
         for (kind, maps) in &thin {
             kept[*kind].append(&maps.draw(&targets[*kind], random, memory));
         }
-        if thin.is_empty() || effective(&weights(&kept)) >= effort.wanted {
+        let found = effective(&weights(&kept));
+        let is_hopeless = 4 * round >= effort.solved && 10.0 * found < effort.wanted;
+        if thin.is_empty() || found >= effort.wanted || is_hopeless {
             break;
         }
     }

@@ -276,3 +276,48 @@ fn kinds_of_motion_have_the_shares_of_bayes() {
         }
     }
 }
+
+/// Readings that no step of a draw leads along.
+struct Saw;
+
+impl Target for Saw {
+    type Memory = ();
+
+    fn latents(&self) -> usize {
+        1
+    }
+
+    fn output_count(&self) -> usize {
+        1
+    }
+
+    fn readings(&self) -> usize {
+        1
+    }
+
+    fn log_likelihood(&self, latents: &[Lanes], (): &mut ()) -> Lanes {
+        latents[0].map(|x| -0.5 * (1e6 * (1e3 * x).fract()).powi(2))
+    }
+
+    fn residuals(&self, latents: &[Lanes], (): &mut (), residuals: &mut [Lanes]) -> Lanes {
+        residuals[0] = latents[0].map(|x| 1e6 * (1e3 * x).fract());
+        self.log_likelihood(latents, &mut ())
+    }
+
+    fn outputs(&self, latents: &[Lanes], (): &mut (), outputs: &mut [Lanes]) {
+        outputs.copy_from_slice(latents);
+    }
+}
+
+#[test]
+fn draws_that_lead_nowhere_end_early() {
+    let mut random = Random::new(4, Stream::Test, Purpose::Posterior, 0, 0);
+    let mut prior = Samples::new(1, 0.0);
+    prior.places = (0..LANES).map(|_| random.normal()).collect();
+    prior.log_prior = vec![0.0; LANES];
+    let places = std::array::from_fn(|lane| prior.places[lane]);
+    prior.log_likelihood = Saw.log_likelihood(&[places], &mut ()).to_vec();
+    let effort = Effort { rounds: 0, solved: 40, ..Effort::new(1) };
+    let samples = sample(&[Saw], &[prior], &effort, &mut random, &mut ());
+    assert_eq!(samples[0].len(), 10 * LANES);
+}
