@@ -288,6 +288,7 @@ def test_what_a_model_cannot_take_is_told_in_the_words_of_python(tmp_path):
         taxel.evaluate(x, x, y)
 
 
+def test_few_noisy_lines_are_told_no_worse_than_by_ridge():
     from sklearn.datasets import load_diabetes, load_linnerud
     from sklearn.linear_model import RidgeCV
     from sklearn.model_selection import ShuffleSplit, cross_val_score
@@ -320,6 +321,8 @@ def test_outputs_may_be_missing_constant_or_called_like_a_feature():
     x, y = smooth()
     model = taxel.Model(8, refine=False, penalty=1e-6)
     whole = model.fit(x, y).score(x, y)
+    noisy = y[:, 0] + RANDOM.normal(size=len(y))
+    assert abs(model.fit(x, noisy + 3e5).score(x, noisy + 3e5) - model.fit(x, noisy).score(x, noisy)) < 0.01
     y[::4, 1] = np.nan
     assert abs(model.fit(x, y).score(x, y) - whole) < 0.1
     constant = np.full(len(x), 3.0)

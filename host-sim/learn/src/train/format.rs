@@ -23,6 +23,9 @@ mod float32;
 pub const MOST_LOST: f64 = 0.01;
 /// Factor on squared errors that rounding may cost where an output is hard to decode: its RMSE doubles.
 pub const MOST_GROWTH: f64 = 4.0;
+/// Standard deviations of an output that its mean is at least from 0, where [`MOST_LOST`] holds however hard it is to decode:
+/// subtracting the mean helps.
+const FAR: f64 = 1e3;
 
 /// Trained network with its parameters as the blob will hold them, owned.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +59,7 @@ impl FittedNetwork {
     ///
     /// # Errors
     /// [`Error`] if R² of an output is lower by more than [`MOST_LOST`], and its squared error larger by more
-    /// than [`MOST_GROWTH`].
+    /// than [`MOST_GROWTH`], or its mean beyond [`FAR`] deviations.
     pub(super) fn unless_lost(self, targets: &Targets<'_>, left: &[f64]) -> Result<Self> {
         let outputs = &targets.samples.table.outputs;
         let found = targets.samples.squared_errors(&self.network());
@@ -66,7 +69,8 @@ impl FittedNetwork {
         {
             let lost = (found - left) / total;
             let rounding = count as f64 * (4.0 * f64::EPSILON * mean).powi(2);
-            if total > rounding && lost > MOST_LOST && found > MOST_GROWTH * left {
+            let is_far = count as f64 * mean * mean > FAR * FAR * total;
+            if total > rounding && lost > MOST_LOST && (is_far || found > MOST_GROWTH * left) {
                 let (format, output) = (self.format.name(), &outputs.names[output]);
                 let other = match self.format {
                     Format::F32 => "",
