@@ -1,4 +1,4 @@
-"""Draws a circuit of docs/board.md: python3 wiring.py wiring.svg, or wiring-onchip.svg --onchip"""
+"""Draws the circuit of docs/board.md with converters around the board: python3 wiring.py wiring.svg"""
 
 import sys
 
@@ -35,11 +35,10 @@ def resistor(x, y, words, upright=False):
     text(x + 14 if upright else x, y + 5 if upright else y - 12, words, "start" if upright else "middle")
 
 
-def op_amp(x, y):
-    """Op-amp whose output is at (x + 46, y), its inputs − at (x, y − 12) and + at (x, y + 12)."""
-    parts.append(f'<polygon points="{x},{y - 26} {x},{y + 26} {x + 46},{y}" class="box"/>')
-    text(x + 5, y - 6, "−")
-    text(x + 5, y + 17, "+")
+def capacitor(x, y, words):
+    for plate in (y - 3, y + 3):
+        line("wire", (x - 10, plate), (x + 10, plate))
+    text(x - 14, y + 5, words, "end")
 
 
 def converters_around():
@@ -62,36 +61,14 @@ def converters_around():
         text(136, y - 4, pin, kind="small")
 
 
-def own_converters():
-    """Pins drive the rows, the board's own converters read the columns by three double-throw switches."""
-    box(0, 30, 130, 470, "NUCLEO-", "F446RE")
-    line("row", (130, 60), (480, 60))
-    text(136, 54, "PB5–PB10, PB12, PB13: to IN 1 … 8", kind="small")
-    dot(370, 60)
-    line("row", (370, 60), (370, 76))
-    resistor(370, 98, "10 kΩ each", upright=True)
-    line("wire", (370, 120), (370, 132))
-    ground(370, 132)
-    box(440, 285, 170, 130, "3 × 74HC4053", "X0 … Z0: odd columns", "X1 … Z1: even ones", "V_EE, /INH: ground")
-    pins = [
-        "PA0, PA1, PA4: X, Y, Z of the first, columns 1–6",
-        "PA6, PA7, PB0: of the second, columns 7–12",
-        "PC0, PC1, PC2: of the third, columns 13–18",
-        "PB14: A, B, C of each; 10 kΩ to ground",
-    ]
-    for at, pin in enumerate(pins):
-        y = 305 + 30 * at
-        line("wire", (130, y), (440, y))
-        text(136, y - 5, pin, kind="small")
-
-
-def main(path, onchip=False):
-    # The board, what drives the rows, and what reads the columns.
-    (own_converters if onchip else converters_around)()
+def draw(path, readout):
+    """Draws a circuit, in which `readout` draws the board, what drives the rows, and what reads the columns."""
+    readout()
     box(480, 30, 130, 110, "8 switches", "4 × TS3A24159", "COM to row-wire")
     line("wire", (545, 140), (545, 158))
     ground(545, 158)
     text(552, 154, "NO: active row", kind="small")
+    text(562, 170, "(own ground)", kind="small")
     line("bias", (500, 140), (500, 205))
     text(494, 200, "NC: idle rows", "end", "small")
     # The sensor: rows from the left, columns to below.
@@ -111,7 +88,7 @@ def main(path, onchip=False):
     line("column", (804, 240), (804, 318), (740, 318))
     dot(804, 268)
     line("column", (804, 268), (772, 268))
-    resistor(750, 268, "560 Ω")
+    resistor(750, 268, "560 Ω, 220 pF")
     line("wire", (728, 268), (668, 268), (668, 330))
     parts.append('<g transform="translate(1480 0) scale(-1 1)">')
     parts.append(f'<polygon points="740,304 740,356 786,330" class="box"/></g>')
@@ -120,8 +97,8 @@ def main(path, onchip=False):
     line("wire", (694, 330), (610, 330))
     dot(668, 330)
     text(806, 336, "18 of these:", kind="small")
-    text(806, 352, "5 × MCP6024", kind="small")
-    text(806, 368, "(2 are followers)", kind="small")
+    text(806, 352, "6 × MCP6024", kind="small")
+    text(806, 368, "(5 are followers)", kind="small")
     # V_b, from a divider and two followers.
     text(210, 445, "3.3 V", "end")
     line("wire", (214, 440), (234, 440))
@@ -134,9 +111,14 @@ def main(path, onchip=False):
     line("wire", (390, 440), (390, 454))
     line("wire", (390, 498), (390, 510))
     ground(390, 510)
+    dot(362, 440)
+    capacitor(362, 475, "1 µF")
+    line("wire", (362, 440), (362, 472))
+    line("wire", (362, 478), (362, 510))
+    ground(362, 510)
     line("wire", (440, 440), (470, 440))
     line("wire", (440, 468), (440, 500), (470, 500))
-    for y, words in ((440, "V_b of the columns: 0.200 V, to each +"), (500, "V_b of the idle rows, to each NC")):
+    for y, words in ((440, "V_b of the columns: 0.200 V, to each +"), (500, "V_b of idle rows, to NC of two: four of these")):
         parts.append(f'<polygon points="470,{y - 20} 470,{y + 20} 510,{y}" class="box"/>')
         line("bias", (510, y), (532, y))
         text(538, y + 5, words, kind="small")
@@ -155,4 +137,5 @@ def main(path, onchip=False):
         file.write("\n".join(parts) + "\n</svg>\n")
 
 
-main(sys.argv[1], onchip="--onchip" in sys.argv)
+if __name__ == "__main__":
+    draw(sys.argv[1], converters_around)

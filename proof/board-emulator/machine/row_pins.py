@@ -1,11 +1,7 @@
-"""Rows and multiplexers at pins of port B: switches with pull-downs, and three 74HC4053."""
+"""Rows and multiplexers at pins of port B, as wired: switches with pull-downs, and three 74HC4053."""
 
-from . import gpio
+from . import gpio, wired
 
-#: Pins of the rows, and the one that the multiplexers' select lines hang on.
-ROWS, SELECT = (5, 6, 7, 8, 9, 10, 12, 13), 14
-#: Pins of the multiplexers' commons, in the order of their columns: two neighbouring ones each.
-COMMONS = (("A", 0), ("A", 1), ("A", 4), ("A", 6), ("A", 7), ("B", 0), ("C", 0), ("C", 1), ("C", 2))
 #: Time in ns in which a 74HC4053 switches at 3.3 V (between the data sheet's figures for 2 V and 4.5 V).
 SWITCH_NS = 100
 #: Longest time in s that a row may be driven, besides its settling: 32 samples of half a reading.
@@ -28,8 +24,8 @@ class RowPins:
 
     def update(self, cycle):
         """The port has changed at this cycle."""
-        outputs = sum(1 << row for row, pin in enumerate(ROWS) if self._level(pin))
-        half = int(self._level(SELECT))
+        outputs = sum(1 << row for pin, row in wired.ROWS.items() if self._level(pin))
+        half = int(self._level(wired.SELECT))
         if half != self.half:
             self.half, self.half_changed_at = half, cycle
         if outputs == self.outputs:
@@ -51,9 +47,9 @@ class RowPins:
 
     def column(self, pin, cycle):
         """The column at a converter's pin, which is sampled from `cycle` on; `None` at one without a multiplexer."""
-        if pin not in COMMONS:
+        if pin not in wired.COLUMNS:
             return None
         ns = self._time.ns(cycle - self.half_changed_at)
         if ns < SWITCH_NS:
             self._rules.breach("mux-late", f"{ns:.0f} ns")
-        return 2 * COMMONS.index(pin) + self.half
+        return wired.COLUMNS[pin][self.half]
