@@ -49,6 +49,9 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         expect(session, board, &circuit());
         send(session, board, 1, &Request::Configure(scanning));
         send(session, board, 2, &Request::CaptureBaseline { frames: 3 });
+        let in_capture_us = board.pins.borrow().now_us + 1500;
+        run_until(session, board, in_capture_us);
+        assert_eq!(refusal(session, board, &Request::Keep(Setting::Baseline)), NOTHING);
         turn(session, 10_000);
         for setting in Setting::ALL {
             ask_kept(session, board, &Request::Keep(setting));

@@ -94,13 +94,17 @@ fn without_a_touch_places_alone_are_missing() {
 }
 
 #[test]
-fn a_missing_reading_leaves_no_output_of_any_network() {
+fn a_missing_reading_or_baseline_leaves_no_output_of_any_network() {
     for missing in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut frame = TOUCHED;
         frame[1] = missing;
-        let estimate = decoded(&three(-1.0, false), &frame[..]);
-        assert_eq!(estimate.status, [RowStatus::MissingReading]);
-        assert!(estimate.outputs.iter().all(|output| output.is_nan()));
+        let of_reading = decoded(&three(-1.0, false), &frame[..]);
+        let reciprocals = &[0.5, missing, 0.5, 0.5];
+        let of_baseline = decoded(&three(-1.0, true), Frame { reciprocals, ..TOUCHED[..].into() });
+        for estimate in [of_reading, of_baseline] {
+            assert_eq!(estimate.status, [RowStatus::MissingReading]);
+            assert!(estimate.outputs.iter().all(|output| output.is_nan()));
+        }
     }
 }
 
@@ -164,4 +168,18 @@ fn networks_that_do_not_fit_their_fronts_are_refused() {
     assert_eq!(refused(2, &[of_amount, plain]), unfit(1), "five readings instead of four");
     let most = DecodeError::Malformed { section: "list of networks" };
     assert_eq!(refused(5, &[of_amount; 5]), EncodeError::Refused(most));
+}
+
+#[test]
+fn a_network_of_places_clamps_nothing_without_a_touch() {
+    let place = linear(&[10.0, 0.0], &[0.25, 0.125], &[2.0, 1.0], 0.5);
+    let of_place = front(Kind::Place, Projection::new(5, 2, &CENTROID).ok());
+    let blob = encoded(&[place], &[of_place], false).unwrap();
+    let decoder = Decoder::<1>::load(&blob).unwrap();
+    let clamps = |frame: &[f32]| {
+        let mut estimate = OwnedEstimate { outputs: vec![0.0], status: vec![RowStatus::Decoded] };
+        let mut scratch = vec![0.0; decoder.scratch_floats()];
+        decoder.decode_into(frame.into(), &mut scratch, &mut estimate.borrowed()).unwrap()
+    };
+    assert!(clamps(&TOUCHED) && !clamps(&[10.0, 20.0, 30.0, 40.0]));
 }

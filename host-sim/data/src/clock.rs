@@ -242,6 +242,7 @@ mod tests {
     fn neighbours_are_alike_in_a_log_and_not_in_shuffled_lines() {
         let table = |values: Vec<f64>| Table { names: vec!["f_n".into()], values: values.into() };
         assert!(neighbours_alike(&table((0..200).map(|i| (f64::from(i) / 9.0).sin()).collect())));
+        assert!(neighbours_alike(&table((0..200).map(|i| (0.8 * f64::from(i)).sin()).collect())));
         assert!(!neighbours_alike(&table((0..200).map(|i| f64::from(i * 37 % 101)).collect())));
         // Pauses without a value do not count.
         let gaps = |i: i32| if i % 3 == 0 { (f64::from(i) / 20.0).sin() } else { f64::NAN };

@@ -286,6 +286,9 @@ mod tests {
         assert_eq!(table.counts(), [2, 2, 0]);
         assert_eq!(table.missing_together(), [[0], [1], [2]]);
         assert_eq!(table.squared_errors(&[0.0; 9]), [10.0, 20.0, 0.0]);
+        // A missing estimate is no error of zero.
+        let errors = table.squared_errors(&[nan; 9]);
+        assert!(errors[0].is_nan() && errors[1].is_nan() && errors[2] == 0.0);
         let values = vec![nan, 10.0, 1.0, 20.0, 3.0, nan, 5.0, 40.0];
         let table = Table { names: ["a", "b"].map(String::from).to_vec(), values: values.into() };
         // Missing values move none of the others into another column.

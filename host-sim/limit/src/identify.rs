@@ -207,6 +207,8 @@ mod tests {
             assert!(ratios[3] > 3.0 && ratios[5] < 1.5 && ratios[7] < 0.5, "{ratios:?}");
             let values = &found.singular_values_per_mm;
             assert!((0.1..0.25).contains(&values[0]) && values[17] < 1e-6, "{values:?}");
+            let places = world.sensor.row_electrodes_mm(row).iter().map(|at| [at[0], at[1]]);
+            assert!(found.electrodes.iter().map(|it| it.position_mm).eq(places), "row {row}");
         }
         // Rows are independent: the array shows what its rows show.
         let array = of_rows(&world, &[0, 1, 2, 3, 4, 5, 6, 7]);
@@ -223,5 +225,16 @@ mod tests {
             let ratio = predicted.rmse_mm / limit.limit;
             assert!((0.9..1.1).contains(&ratio), "{limit:?} {predicted:?}");
         }
+    }
+
+    #[test]
+    fn correlated_noise_hides_as_much_as_white_noise_of_its_level() {
+        let mut world = World { read_rows: vec![3], ..World::paper() };
+        world.noise.time_constant_ms = 5.0;
+        let mut ratio = |white: f64, correlated: f64| {
+            (world.noise.level, world.noise.correlated_level) = (white, correlated);
+            of_rows(&world, &[3]).signal_to_noise[0]
+        };
+        assert!((ratio(0.003, 0.004) / ratio(0.005, 0.0) - 1.0).abs() < 1e-9);
     }
 }

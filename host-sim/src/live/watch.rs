@@ -357,8 +357,6 @@ impl<'w, 'b> Watch<'w, 'b> {
             (span_s > 0.0 && is_recent).then(|| (count.saturating_sub(1) as f64 / span_s) as f32)
         };
         let decoded = self.past.iter().filter(|it| it.1).count();
-        let squares: f64 = self.past.iter().map(|it| it.2).sum();
-        let count: usize = self.past.iter().map(|it| it.3).sum();
         let judged = self.feed.judged();
         let (position_s, speed) = self.feed.position().unzip();
         let wires = self.wires.for_page();
@@ -372,12 +370,18 @@ impl<'w, 'b> Watch<'w, 'b> {
             lost: self.feed.lost(),
             wires,
             recording: self.recorder.as_ref().map(Recorder::for_page),
-            rmse_mm: (count > 0).then(|| (squares / count as f64).sqrt() as f32),
+            rmse_mm: rmse(self.past.iter().map(|it| (it.2, it.3))),
             times_limit: judged.map(|[best, decoded]| (decoded / best).sqrt() as f32),
             position_s,
             speed,
         });
     }
+}
+
+/// Root mean square of errors, of the sums of squares of several frames and the numbers of their values.
+fn rmse(frames: impl Iterator<Item = (f64, usize)>) -> Option<f32> {
+    let (squares, count) = frames.fold((0.0, 0), |all, it| (all.0 + it.0, all.1 + it.1));
+    (count > 0).then(|| (squares / count as f64).sqrt() as f32)
 }
 
 #[cfg(test)]
@@ -405,6 +409,12 @@ mod tests {
         fn next(&mut self, _within: Duration) -> Result<Next> {
             Ok(Next::Nothing)
         }
+    }
+
+    #[test]
+    fn the_error_is_of_values_and_not_of_frames() {
+        assert_eq!(rmse([(32.0, 1), (4.0, 3), (0.0, 0)].into_iter()), Some(3.0));
+        assert_eq!(rmse([(0.0, 0)].into_iter()), None);
     }
 
     #[test]

@@ -158,6 +158,9 @@ fn every_figure_is_a_picture_and_a_table_of_its_values() {
     assert!(csv.contains(&format!("RMSE of Δz,2,1,1.6666666666666667,3.375,{rmse},mm\n")), "{csv}");
     let csv = text("frames.csv");
     assert_eq!(csv.lines().count(), 1 + 12 * 3 * ELECTRODES);
+    let values = csv.lines().skip(1).map(|line| line.rsplit(',').nth(1).unwrap().parse().unwrap());
+    let values: Vec<f64> = values.step_by(ELECTRODES).take(3).collect();
+    assert_eq!(values[2], values[1] - values[0], "decoded − true");
     let csv = text("error-by-noise.csv");
     assert!(
         csv.starts_with("series,noise level p,RMSE of Δz (mm)\n")

@@ -18,7 +18,10 @@ fn a_full_reading_model_is_judged_and_writes_it_beside_the_outputs() {
     assert!(inspected.contains("novelty and deviations by"), "{inspected}");
     folder.succeed(&["synth", "scene.toml", "-n", "300", "--seed", "9", "-o", "test.csv"]);
     let evaluated = folder.json(&["eval", "model.bin", "test.csv"]);
-    assert_eq!(evaluated["coverage"].as_array().unwrap().len(), 9, "three parts of three groups");
+    let coverage = evaluated["coverage"].as_array().unwrap();
+    assert_eq!(coverage.len(), 9, "three parts of three groups");
+    let rmse_of_z = [7, 8].map(|row: usize| coverage[row]["rmse"].as_f64());
+    assert!(rmse_of_z[0] < rmse_of_z[1], "surest and least sure quarter: {rmse_of_z:?}");
     assert!(evaluated["percent_novel"].as_f64().unwrap() < 4.0);
     let page = folder.succeed(&["eval", "model.bin", "test.csv"]);
     assert!(page.contains("surest quarter") && page.contains("are novel: unlike"));

@@ -104,3 +104,17 @@ fn wires_are_named_and_columns_can_be_left_out() {
     let refused = folder.fail(&[&eval[..], &["r9c*_ohm"]].concat(), 2);
     assert!(refused.contains("--without r9c*_ohm"), "{refused}");
 }
+
+#[test]
+fn a_recording_has_what_was_read_of_lines_filled_and_not() {
+    let folder = prepared("health_recording");
+    let is_many = |name: &str| name.ends_with("_ohm") && name < "r4";
+    let is_faulty = |name: &str, line| name == "r4c5_ohm" || line % 4 == 0 && is_many(name);
+    changed(&folder, "faulty.csv", |name, line| is_faulty(name, line).then_some("0.5"));
+    let said = folder.notes(&["decode", "fills.bin", "faulty.csv", "-o", "d.mcap"]);
+    assert!(said.contains("75 % of lines were filled"), "{said}");
+    assert!(said.contains("25 % of lines were not filled"), "{said}");
+    let reader = taxel_recording::Reader::open(&folder.path("d.mcap")).unwrap();
+    let readings: Vec<f32> = reader.map(|frame| frame.unwrap().readings[3 * 18 + 4]).collect();
+    assert_eq!(readings, [0.5; 200]);
+}

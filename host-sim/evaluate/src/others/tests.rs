@@ -115,3 +115,8 @@ fn scenes_without_a_contact_have_no_others() {
     assert!(contact.others.iter().all(|other| other.name != "two contacts"));
     assert_eq!(contact.others.len(), 7);
 }
+
+#[test]
+fn frames_without_a_novelty_count_neither_as_novel_nor_as_known() {
+    assert_eq!(percent_novel(&[1.0, -1.0, f64::NAN, f64::NAN]), 50.0);
+}

@@ -186,6 +186,13 @@ mod tests {
     }
 
     #[test]
+    fn chance_is_taken_off_the_share_of_drawn_levels() {
+        // Squares within and between are 4 of 8 each; those within have two degrees of freedom.
+        let of = |is_drawn| share(is_drawn, &[0.0, 2.0, 4.0, 2.0], &[vec![0, 1], vec![2, 3]]);
+        assert_eq!([true, false].map(|is_drawn| of(is_drawn).unwrap().0), [0.25, 0.5]);
+    }
+
+    #[test]
     fn many_values_are_put_together_in_about_equal_numbers() {
         let settings: Vec<BTreeMap<String, Value>> = (0..80)
             .map(|i| BTreeMap::from([("a".to_owned(), Value::from(f64::from((i * 37) % 80)))]))

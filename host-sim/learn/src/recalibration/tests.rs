@@ -99,6 +99,14 @@ impl Sensor {
     }
 }
 
+/// Root mean square of the errors of presses, in training errors.
+fn error(model: &PreparedModel<'_>, [readings, outputs]: &[Table; 2]) -> f64 {
+    let (decoded, training_errors) = (model.decode_table(readings), training_errors(model.model()));
+    let pairs = decoded.values.iter().zip(&*outputs.values).zip(training_errors.iter().cycle());
+    let squares = pairs.map(|((a, b), error)| ((a - b) / error).powi(2));
+    mean(&squares.collect::<Vec<_>>()).sqrt()
+}
+
 const NORMALISED: Kinds = Kinds::all(Features::Normalised { threshold: 3.0 });
 
 #[test]
@@ -121,9 +129,9 @@ fn presses_bring_every_model_near_fresh_training() {
         };
         assert!(z_ratio(&old) > 3.0, "the drift must hurt");
         for (count, untouched, most) in [(200, 0, 1.03), (25, 0, 1.06)] {
-            let [readings, outputs] = sensor.presses(count, untouched);
+            let presses = sensor.presses(count, untouched);
             let model = old.prepare().with_baseline(&baseline);
-            let found = recalibrate(&model, &readings, &outputs).unwrap();
+            let found = recalibrate(&model, &presses[0], &presses[1]).unwrap();
             let ratio = z_ratio(&found.blob);
             let [before, after, afresh] = [&old, &found.blob, &fresh]
                 .map(|blob| sensor.statistics(&blob.prepare().with_baseline(&baseline)));
@@ -137,6 +145,9 @@ fn presses_bring_every_model_near_fresh_training() {
             assert!(novel < 0.1 && (within - afresh[1]).abs() < 0.05, "{after:?} {afresh:?}");
             assert!(filled < 1.05 * afresh[2], "{after:?} {afresh:?}");
             assert_eq!(found.presses, count);
+            // The error after is of presses that the fit has not seen; of many, that is nearly the same.
+            let seen = error(&found.blob.prepare().with_baseline(&baseline), &presses);
+            assert!(count > 25 || found.error_after > 1.01 * seen, "{} {seen}", found.error_after);
             assert!(
                 found.error_before > 3.0 && (0.7..1.2).contains(&found.error_after),
                 "{found:?}"
@@ -200,13 +211,8 @@ fn zeros_of_inputs_that_have_drifted_change_and_nothing_else() {
         let zeros = differs[..18].windows(2);
         assert!(zeros.into_iter().all(|pair| pair[1] == pair[0] + 1), "one array, and the CRC");
         // Errors of the presses that have all readings, in training errors.
-        let seen = frames.subset(&(1..80).collect::<Vec<_>>());
-        let decoded = model.decode_table(&readings).values;
-        let of_lines = decoded[seen.outputs.names.len()..].iter().zip(&*seen.outputs.values);
-        let training_errors = training_errors(model.model());
-        let errors = of_lines.zip(training_errors.iter().cycle());
-        let squares = errors.map(|((a, b), error)| ((a - b) / error).powi(2));
-        let before = mean(&squares.collect::<Vec<_>>()).sqrt();
+        let complete: Vec<usize> = (1..80).collect();
+        let before = error(&model, &[&readings, &frames.outputs].map(|it| it.pick(&complete)));
         assert!((found.error_before / before - 1.0).abs() < 0.05, "{found:?} {before}");
         let again = recalibrate(&model, &readings, &frames.outputs).unwrap();
         assert_eq!(again.blob.bytes(), new, "the same presses, the same bytes");

@@ -4,6 +4,9 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
+use taxel_core::blob::Floats;
+use taxel_firmware::link::message::{EstimateReport, Report};
+
 use super::*;
 use crate::Error;
 
@@ -112,7 +115,8 @@ fn a_listener_keeps_the_newest_scans_and_counts_those_that_are_lost() {
     listener.set_baseline(vec![60.0]).unwrap();
     // One never came; then the sender starts anew.
     [7, 9, 10, 0, 1].into_iter().for_each(|number| sender.send(number).unwrap());
-    while listener.lost() < 1 + 3 {
+    let end = Instant::now() + WAIT;
+    while listener.lost() < 1 + 3 && Instant::now() < end {
         thread::sleep(Duration::from_millis(1));
     }
     let first = listener.next(WAIT).unwrap().unwrap();
@@ -136,4 +140,23 @@ fn a_source_that_cannot_be_opened_ends_its_listener() {
     let (listener, opened) = Listener::start(1, refuse).unwrap();
     assert_eq!(opened.recv().unwrap().unwrap_err().to_string(), "no such port");
     assert!(listener.next(Duration::from_secs(9)).is_err());
+}
+
+#[test]
+fn readings_of_another_scan_do_not_stand_beside_an_estimate() {
+    let mut assembler = Assembler::new(Sent { readings: true, estimates: true });
+    let readings_ohm = Floats::new(&[60.0, 61.0]);
+    let readings = Report::Readings { frame: 1, start_us: 0, readings_ohm };
+    assert!(assembler.take(&readings).is_none());
+    let estimate = EstimateReport {
+        frame: 2,
+        start_us: 10,
+        flags: 0,
+        row_status: &[0],
+        outputs: Floats::new(&[0.5]),
+        novelty: None,
+        deviation: Floats::new(&[]),
+    };
+    let scan = assembler.take(&Report::Estimate(estimate)).unwrap();
+    assert!(scan.number == 2 && scan.readings.is_empty(), "{scan:?}");
 }

@@ -262,3 +262,10 @@ fn a_damaged_file_is_refused_or_read_to_finite_numbers() {
     }
     assert!((1000..4000).contains(&read), "{read} files were read");
 }
+
+#[test]
+fn a_part_of_a_file_keeps_the_numbers_of_its_lines() {
+    let mut file = parse(Path::new("test.csv"), b"a\n1\n2\n3\n4\n", false).unwrap();
+    file.keep_lines(2..4);
+    assert_eq!([file.line_number(0), file.line_number(1)], [4, 5]);
+}
