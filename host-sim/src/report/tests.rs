@@ -237,3 +237,14 @@ fn rows_are_named_by_numbers_where_programs_read_them() {
     let rows = json["by_row"].as_array().unwrap().iter().map(|row| row["row_wire"].as_u64());
     assert_eq!(rows.collect::<Vec<_>>(), [Some(2), Some(3), Some(4)]);
 }
+
+#[test]
+fn arrows_point_to_the_right_for_x_and_up_for_y() {
+    let mut result = result();
+    result.distribution.frames[0].truth.fill(1.0);
+    let page = html(&result);
+    let before = page.split("\" class=\"truth arrow\"").next().unwrap();
+    let shaft = before.rsplit("d=\"M").next().unwrap().split([' ', 'L', 'M']);
+    let ends: Vec<f64> = shaft.take(4).map(|place| place.parse().unwrap()).collect();
+    assert!(ends[2] > ends[0] && ends[3] < ends[1], "{ends:?}");
+}
