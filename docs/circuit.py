@@ -1,7 +1,7 @@
 """The circuit of docs/board.md whose columns the board's own converters read, described once: python3 docs/circuit.py docs
 
 Writes circuit.net (KiCad's netlist), circuit-parts.csv (parts to order), circuit-nets.csv (what hangs on each net, which
-the emulated board reads) and wiring-onchip.svg into a folder.
+the emulated board reads) and wiring.svg into a folder.
 """
 
 import csv
@@ -214,7 +214,7 @@ def main(folder):
     write_table(folder / "circuit-parts.csv", ("references", "number", "value", "order_as", "for"), *bill())
     rows = [(net, *pin) for net, pins in nets.items() for pin in pins]
     write_table(folder / "circuit-nets.csv", ("net", "reference", "pin", "pin_name"), *rows)
-    wiring.draw(folder / "wiring-onchip.svg", own_converters)
+    wiring.draw(folder / "wiring.svg", own_converters)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,4 @@
-"""Draws the circuit of docs/board.md with converters around the board: python3 wiring.py wiring.svg"""
-
-import sys
+"""What circuit.py draws with: shapes, and the circuit around the readout."""
 
 parts = []
 
@@ -39,26 +37,6 @@ def capacitor(x, y, words):
     for plate in (y - 3, y + 3):
         line("wire", (x - 10, plate), (x + 10, plate))
     text(x - 14, y + 5, words, "end")
-
-
-def converters_around():
-    """A shift register drives the rows, three converters read the columns."""
-    box(0, 30, 130, 470, "NUCLEO-", "F446RE", "pin (CN10)")
-    box(270, 30, 120, 110, "74HC595", "control of rows")
-    for at, (pin, to) in enumerate([("PC6 (4)", "SER"), ("PC8 (2)", "SRCLK"), ("PC9 (1)", "RCLK")]):
-        y = 50 + 35 * at
-        line("row", (130, y), (270, y))
-        text(136, y - 5, pin, kind="small")
-        text(264, y - 5, to, "end", "small")
-    line("row", (390, 60), (480, 60))
-    text(435, 54, "Q_A … Q_H", "middle", "small")
-    text(435, 76, "to IN", "middle", "small")
-    box(440, 285, 170, 130, "3 × MCP3208", "columns 1–8,", "9–16, 17–18", "V_REF: 3.3 V")
-    pins = ["PB13 (30): CLK", "PB14 (28): D_OUT", "PB15 (26): D_IN", "PB12 (16): CS 1", "PB1 (24): CS 2", "PC4 (34): CS 3"]
-    for at, pin in enumerate(pins):
-        y = 300 + 20 * at
-        line("wire", (130, y), (440, y))
-        text(136, y - 4, pin, kind="small")
 
 
 def draw(path, readout):
@@ -135,7 +113,3 @@ def draw(path, readout):
     with open(path, "w") as file:
         file.write(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-2 0 924 530" role="img"><style>{style}</style>\n')
         file.write("\n".join(parts) + "\n</svg>\n")
-
-
-if __name__ == "__main__":
-    draw(sys.argv[1], converters_around)

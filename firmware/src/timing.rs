@@ -41,7 +41,9 @@ const ONCHIP_TRIGGER_CYCLES: u32 = 3 * ONCHIP_COLUMN_CYCLES + 6;
 /// 0.4 µs until the next trigger, and take 0.1.
 const ONCHIP_SAMPLED_CYCLES: u32 = ONCHIP_TRIGGER_CYCLES - 12;
 
-/// Number of columns that the NUCLEO-F446RE's own converters sample.
+/// Most rows that the NUCLEO-F446RE drives.
+pub const ONCHIP_ROWS: u16 = 16;
+/// Number of columns that its own converters sample.
 pub const ONCHIP_COLUMNS: u16 = 18;
 
 /// Most samples of a reading that the NUCLEO-F446RE has memory for at once.

@@ -33,14 +33,14 @@ def expect(condition, text):
 
 
 class Bench:
-    """A board that runs `image`, with a sensor of `shape`: rows, columns. `options` are those of `Board`.
+    """A board that runs `image`, with a sensor of `shape`: rows, columns; `ohm` is the range of its resistances. `options` are those of `Board`.
 
     The resistances at its wires are known: `ohm`.
     """
 
-    def __init__(self, image, taxel, log, shape=(8, 18), **options):
+    def __init__(self, image, taxel, log, shape=(8, 18), ohm=(44.0, 68.0), **options):
         draw, (rows, columns) = random.Random(7), shape
-        self.ohm = [[draw.uniform(44.0, 68.0) for _ in range(columns)] for _ in range(rows)]
+        self.ohm = [[draw.uniform(*ohm) for _ in range(columns)] for _ in range(rows)]
         self.board = Board(image, self.ohm, log=log, **options)
         self._taxel, self._log, self._number = taxel, log, 0
 
@@ -123,7 +123,7 @@ class Bench:
     def finish(self, resets=(), erased=()):
         """Ends the scenario: no rule may be broken, and the resets and the sectors that were erased must be these."""
         board = self.board
-        board.register.check_rest()
+        board.rows.check_rest()
         broken = ", ".join(f"{name} ({count}×)" for name, count in board.rules.counts.items())
         expect(not broken, f"broken rules: {broken}")
         expect(board.resets == list(resets), f"resets by {board.resets}, expected {list(resets)}")

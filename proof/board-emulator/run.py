@@ -18,12 +18,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--image", type=pathlib.Path, required=True, help="the board's image (ELF)")
     parser.add_argument("--wide-image", type=pathlib.Path, required=True,
-                        help="the same with room for 16 rows and 32 columns, for the scenario `wide`")
-    parser.add_argument("--onchip-image", type=pathlib.Path, required=True,
-                        help="the image that reads the sensor by the chip's own converters, for the scenarios `onchip`")
-    parser.add_argument("--onchip-scans", required=True,
+                        help="the same with room for 16 rows, for the scenario `wide`")
+    parser.add_argument("--scans", required=True,
                         help="its scans as computed, in us: mean and longest with one sample a reading, and with twelve")
-    parser.add_argument("--seconds", type=float, default=1.0, help="seconds for which `onchip-stream` counts estimates (1)")
+    parser.add_argument("--seconds", type=float, default=1.0, help="seconds for which `stream` counts estimates (1)")
     parser.add_argument("scenarios", nargs="*", metavar="scenario",
                         help=f"all, or some of: {', '.join(SCENARIOS)}; or serve")
     parser.add_argument("--taxel", type=pathlib.Path, required=True, help="the program taxel")

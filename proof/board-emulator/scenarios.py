@@ -31,19 +31,17 @@ ON_TRIAL = b"\x07\x02"
 #: Slowest and fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
 SLOWEST_LSI_HZ, FASTEST_LSI_HZ, SLOWEST_ERASE_S = 17_000, 47_000, 4.0
 #: Gain-bandwidth product of the slowest op-amps in Hz that settle while the board waits (docs/readout.md).
-SLOWEST_OP_AMP_HZ = 6e6
+SLOWEST_OP_AMP_HZ = 6.5e6
 #: By how much the internal oscillator may be off from -10 to 85 degrees, as a share (DS10693).
 LARGEST_HSI_ERROR = 0.04
 #: Supplies in V: a weak one, and ones that are too low for changing flash, and for running.
 WEAK_V, LOW_V, TOO_LOW_V = 3.0, 2.9, 2.6
+#: Time in s after which a scan that does not end is given up (firmware/src/app/sensor.rs).
+LONGEST_SCAN_S = 2.0
 #: Writes of settings between two restarts, and such writes behind which both pages have been erased (docs/link.md).
 WRITES, MANY_WRITES = 100, 290
 #: Bytes that a device keeps while it is busy (docs/link.md).
 ROOM = 1000
-#: Shortest time in s between two scans, longer than any between two edges at the rows' register within one.
-PAUSE_S = 2e-3
-#: Pin that selects a fourth converter.
-FOURTH_SELECT = "C", 5
 
 
 def session(make, files):
@@ -70,7 +68,6 @@ def session(make, files):
     bench.ask(RESTART, RESTARTING)
     bench.run_for(0.1)
     expect("slot 1, generation 1" in bench.taxel("identify"), "the model is not in force any more")
-    expect(bench.board.untouched(*FOURTH_SELECT), "the pin of a fourth converter is not as after a reset")
     bench.finish(resets=["program"], erased=[JOURNAL[1], SLOT_B])
 
 
@@ -81,13 +78,14 @@ def fill(bench, sector, content):
 
 
 def wide(make, files):
-    """An image for 16 rows and 32 columns: two row registers, four converters."""
-    bench = make(image=files.wide_image, shape=(16, 32))
+    """An image for 16 rows and 18 columns, with a decoder for the rows."""
+    # Twice the resistance, as op-amps are as slow as their column conducts.
+    bench = make(image=files.wide_image, shape=(16, 18), ohm=(88.0, 136.0))
     bench.run_for(0.1)
     said = bench.taxel("identify")
-    expect("16 rows, 32 columns" in said and ", 0 samples failed" in said, "it does not read all columns")
+    expect("16 rows, 18 columns" in said and ", 0 samples failed" in said, "it does not read all rows")
     bench.taxel("baseline", "-n", 3, "-o", files.directory / "baseline.csv")
-    check_baseline(bench, files.directory / "baseline.csv", 16 * 32)
+    check_baseline(bench, files.directory / "baseline.csv", 16 * 18)
     bench.finish(erased=[JOURNAL[1]])
 
 
@@ -126,29 +124,15 @@ def check_errors(bench, errors, readings):
     rms = math.sqrt(sum(error * error for error in errors) / len(errors))
     largest = max(map(abs, errors))
     bench.board.note(f"baseline: {len(errors)} readings, RMS error {100 * rms:.4f} %, largest {100 * largest:.4f} %")
-    expect(len(errors) == readings and rms <= 0.0003, f"the baseline is {100 * rms:.3f} % off (RMS)")
+    # A count is a larger share of a smaller current.
+    most = 0.0003 * max(map(max, bench.ohm)) / 68
+    expect(len(errors) == readings and rms <= most, f"the baseline is {100 * rms:.3f} % off (RMS)")
 
 
 def check_scan_time(bench, model):
-    """The mean time of scans, and of those with idle samples, against what `taxel inspect` computes for the model."""
+    """The times of scans against what `taxel inspect` computes for the model."""
     computed = json.loads(bench.program("inspect", model, "--json"))["scan"]
-    board, edges = bench.board, []
-    listeners = board.ports["C"].listeners
-    for pin, listener in [(pin, it) for pin, it in listeners.items() if getattr(it, "__self__", None) is board.register]:
-        listeners[pin] = lambda high, listener=listener: (edges.append(board.time.seconds()), listener(high))
-    bench.run_for(0.36)
-    scans, start = [], edges[0]
-    for last, edge in zip(edges, edges[1:]):
-        if edge - last > PAUSE_S:
-            scans.append((last - start) * 1e6)
-            start = edge
-    scans = scans[1:33]
-    expect(len(scans) == 32, f"there are {len(scans)} scans where 32 should be")
-    for name, found in (("mean_us", sum(scans) / len(scans)), ("longest_us", max(scans))):
-        off = computed[name] / found - 1
-        board.note(f"scan of {computed['rows']} x {computed['columns']}, {name}: {found:.0f}, computed {computed[name]} "
-                   f"({100 * off:+.1f} %)")
-        expect(abs(off) <= 0.03, f"a scan takes {found:.0f} us, computed {computed[name]} us")
+    check_scans(bench, 0.36, computed["mean_us"], computed["longest_us"])
 
 
 def slow_erase(make, files):
@@ -184,9 +168,9 @@ def patience(make, files):
 
 
 def silent_sensor(make, files):
-    """A sensor that is silent: the watchdog, at its fastest, resets the board."""
+    """Converters that no trigger reaches: the scan is given up, and the watchdog, at its fastest, resets the board."""
     bench = silent(make, FASTEST_LSI_HZ, 5.4)
-    bench.run_for(0.1)
+    bench.run_for(0.2)
     bench.ask(IDENTIFY, IDENTITY)
     bench.finish(resets=["watchdog"])
 
@@ -201,9 +185,7 @@ def silent_sensor_slow(make, files):
 def silent(make, lsi_hz, seconds):
     """A board whose sensor has been silent for so long, without a reset so far."""
     bench = make(lsi_hz=lsi_hz, sensor=False)
-    bench.run_for(0.03)
-    bench.scan_every(2.0)
-    bench.run_for(seconds)
+    bench.run_for(LONGEST_SCAN_S + seconds)
     expect(not bench.board.resets, "it is reset too early")
     return bench
 
@@ -258,7 +240,7 @@ def panic_restarts(make, files):
 
 def until_driven(bench):
     """Runs until a row is driven."""
-    bench.board.run_until(lambda: bench.board.register.outputs)
+    bench.board.run_until(lambda: bench.board.rows.outputs)
 
 
 def brown_out(make, files):
@@ -384,19 +366,20 @@ def dead_host(make, files):
     bench.finish(erased=[JOURNAL[1], SLOT_B])
 
 
-def onchip(make, files):
-    """The chip's own converters: times of scans with one and twelve samples, and readings, in both halves of a scan's wait."""
-    bench = onchip_bench(make, files)
-    computed = list(map(int, files.onchip_scans.split(",")))
+def scans(make, files):
+    """Times of scans with one and twelve samples, and readings; passes that are given up."""
+    bench = make()
+    bench.run_for(0.02)
+    computed = list(map(int, files.scans.split(",")))
     for samples, (mean_us, longest_us) in ((1, computed[:2]), (12, computed[2:4])):
         bench.scan_every(2e-3, samples=samples)
-        check_onchip_scans(bench, samples, mean_us, longest_us)
-        check_onchip_baseline(bench)
+        check_scans(bench, 0.08, mean_us, longest_us)
+        check_readings(bench)
     # More samples than fit into memory: several passes. And passes that are given up, since the configuration changes.
     for turn in range(8):
         bench.scan_every(3.6e-3 + 0.1e-3 * (turn % 2), samples=40)
         bench.run_for(9e-3)
-    check_onchip_baseline(bench)
+    check_readings(bench)
     expect(bench.board.passes.cuts > 0, "no pass was given up")
     statistics = ask_statistics(bench)
     expect(statistics["failed_samples"] == 0, f"samples failed: {statistics}")
@@ -404,21 +387,12 @@ def onchip(make, files):
     bench.finish()
 
 
-def check_onchip_baseline(bench):
+def check_readings(bench):
     """A baseline that is captured now, against the resistances at the wires."""
     answer, _ = bench.ask(CAPTURE + varint(3), BASELINE)
     _, floats = taken(answer[1:])
     ohms = struct.unpack(f"<{len(floats) // 4}f", floats)
     check_errors(bench, [ohm / expected - 1 for ohm, expected in zip(ohms, sum(bench.ohm, []))], 8 * 18)
-
-
-def onchip_bench(make, files, **options):
-    """A board that reads the sensor by its own converters, and has told so."""
-    bench = make(image=files.onchip_image, onchip=True, **options)
-    bench.run_for(0.02)
-    answer, _ = bench.ask(IDENTIFY, IDENTITY)
-    expect(b"nucleo-f446re-onchip" in answer, "it does not tell who it is")
-    return bench
 
 
 def ask_statistics(bench):
@@ -431,23 +405,24 @@ def ask_statistics(bench):
     return counters
 
 
-def check_onchip_scans(bench, samples, mean_us, longest_us):
+def check_scans(bench, seconds, mean_us, longest_us):
     """The mean time of a round of scans from the first row or idle line to the rows' rest, against what is computed."""
     passes, starts, ends = bench.board.passes, [], []
     passes.on_start, passes.on_end = starts.append, ends.append
-    bench.run_for(0.08)
+    bench.run_for(seconds)
     passes.on_start = passes.on_end = lambda cycle: None
     scans = [bench.board.time.ns(end - start) / 1e3 for start, end in zip(starts, ends)][:32]
     expect(len(scans) == 32, f"there are {len(scans)} scans where 32 should be")
     for name, found, computed in (("mean", sum(scans) / 32, mean_us), ("longest", max(scans), longest_us)):
         off = computed / found - 1
-        bench.board.note(f"scan with {samples} samples, {name}: {found:.1f} us, computed {computed} ({100 * off:+.1f} %)")
+        bench.board.note(f"scan, {name}: {found:.1f} us, computed {computed} ({100 * off:+.1f} %)")
         expect(abs(off) <= 0.03, f"a scan takes {found:.0f} us, computed {computed} us")
 
 
 def shorts(make, files):
     """Shorts of 0 to 20 ohm at ten cells: each is named, no other reading of its row is believed, and sound frames have none."""
-    bench = onchip_bench(make, files)
+    bench = make()
+    bench.run_for(0.02)
     for place in range(10):
         row, column = place % 8, 7 * place % 18
         sound = bench.ohm[row][column]
@@ -483,9 +458,10 @@ def health(bench):
     return found
 
 
-def onchip_stream(make, files):
-    """A thousand contacts a second by the chip's own converters, twelve samples a reading: none missed, and how old they are."""
-    bench, model = onchip_bench(make, files), files.directory / "contact.bin"
+def stream(make, files):
+    """A thousand contacts a second, twelve samples a reading: none missed, and how old they are."""
+    bench, model = make(), files.directory / "contact.bin"
+    bench.run_for(0.02)
     bench.program("train", "contact", "--no-refine", "--centres", 64, "--format", "fixed16", "-o", model)
     bench.taxel("upload", model)
     said = bench.taxel("check", "contact", "--model", model, "-n", files.frames)
@@ -561,5 +537,5 @@ SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
     for scenario in (session, sparse, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow,
                      no_clock, clock_stops, fault_restarts, panic_restarts, brown_out, sagging_supply, keep, burst, overrun,
-                     log_abandoned, restart, dead_host, onchip, shorts, onchip_stream)
+                     log_abandoned, restart, dead_host, scans, shorts, stream)
 }

@@ -68,7 +68,7 @@ def trade(
     **options: Any,
 ) -> Trade:
     """Trains and judges decoders of a scene or a data file, and chooses one within the bounds. Other options are those of
-    `taxel trade`, with underlines: `average=[1, 4]`, `readout="onchip"`."""
+    `taxel trade`, with underlines: `average=[1, 4]`, `readout="spi"`."""
     with folder() as work:
         out = work / "out"
         arguments: list[object] = ["trade", source(subject, work), "-o", out]

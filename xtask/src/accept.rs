@@ -18,7 +18,7 @@ use taxel_rig::device::{Device, stream, upload};
 use taxel_simulate::{Synthesis, World};
 
 use crate::cycles::{Model, train_all};
-use crate::images::NUCLEO_SPI;
+use crate::images::NUCLEO_IMAGE;
 use crate::process::{Outcome, cargo, first_line, root, run as run_command, target_dir};
 use crate::size::Size;
 use crate::toolchain::{Toolchain, elf};
@@ -92,7 +92,7 @@ pub fn run(options: &Options) -> Outcome {
     let mut device = board.open()?;
     let identity = device.identify().map_err(text)?;
     println!("{}, firmware {}", identity.board, identity.firmware);
-    let image = elf(NUCLEO_SPI);
+    let image = elf(NUCLEO_IMAGE);
     // Who flashed the board without a build has nothing to compare with.
     if image.exists() {
         check_image(&identity.memory, Size::new(&image)?.of_flash())?;
@@ -225,7 +225,7 @@ fn erase_and_scan(device: &mut Device) -> Outcome<(Beside<Vec<u32>>, Beside<u32>
     }
     let after = device.statistics().map_err(text)?;
     let erase_ms = after.frames_missed.wrapping_sub(missed_before) * (PERIOD_US / 1000);
-    let plan = ScanPlan::of_nucleo(8, 18, scanning.scan.oversampling);
+    let plan = ScanPlan::of_nucleo_onchip(8, 18, scanning.scan.oversampling);
     let (scan_us, predicted) = (after.longest_scan_us, plan.longest_us());
     println!(
         "erasing a slot took {erase_ms} ms; the longest scan {scan_us} µs, predicted {predicted}"

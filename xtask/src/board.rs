@@ -6,7 +6,7 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use crate::emulate::qemu::decoded;
-use crate::images::{NUCLEO, NUCLEO_SPI, build_image, build_wide};
+use crate::images::{NUCLEO, NUCLEO_IMAGE, build_image, build_wide};
 use crate::process::Outcome;
 use crate::toolchain::{Toolchain, elf};
 pub use emulator::Emulator;
@@ -17,7 +17,7 @@ pub struct Options {
     /// Frames that `check` decodes.
     #[arg(long, value_name = "N", default_value = "30")]
     frames: NonZeroU32,
-    /// Seconds for which the scenario `onchip-stream` counts estimates.
+    /// Seconds for which the scenario `stream` counts estimates.
     #[arg(long, value_name = "S", default_value = "1")]
     seconds: NonZeroU32,
     /// Blob to upload, of the scene `press`, instead of a small one.
@@ -59,7 +59,7 @@ pub fn run(options: &Options) -> Outcome {
         build_wide(&toolchain)?;
     }
     build_image(&toolchain, NUCLEO)?;
-    let image = elf(NUCLEO_SPI);
+    let image = elf(NUCLEO_IMAGE);
     emulator.run(&image, &options.names)?;
     for (scenario, text) in LOGGED.iter().filter(|(scenario, _)| run(scenario)) {
         let log = decoded(&emulator::log(scenario), &image)?;

@@ -26,7 +26,7 @@ const SCENARIOS: [&str; 9] = [
     "panic-restarts",
     "burst",
     "restart",
-    "onchip",
+    "scans",
     "shorts",
 ];
 

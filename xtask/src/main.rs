@@ -53,8 +53,8 @@ enum Command {
     Structure,
     /// Build and lint all code for a device (thumbv7em-none-eabihf), and prove by linking that it cannot panic.
     Firmware {
-        /// Build this image alone: the emulator's `qemu-app`, or the board's `nucleo-f446re` or `nucleo-f446re-onchip`.
-        #[arg(value_parser = [images::APPLICATION, images::NUCLEO_SPI, images::NUCLEO_ONCHIP])]
+        /// Build this image alone: the emulator's `qemu-app`, or the board's `nucleo-f446re`.
+        #[arg(value_parser = [images::APPLICATION, images::NUCLEO_IMAGE])]
         image: Option<String>,
     },
     /// Check taxel-core and firmware for other cores: thumbv6m, thumbv7m, thumbv8m.main-hf, riscv32imac; taxel-core for

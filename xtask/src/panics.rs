@@ -13,8 +13,8 @@ use crate::process::{Outcome, read};
 const LIST: &str = "firmware/README.md";
 const HEADING: &str = "## Panics that cannot be reached";
 
-/// Fails if `image` has a place of a panic that is not listed, or none at one that is, if it has `all` that are listed.
-pub fn check(image: &Path, all: bool) -> Outcome {
+/// Fails if `image` has a place of a panic that is not listed, or none at one that is.
+pub fn check(image: &Path) -> Outcome {
     let failed = |cause: String| format!("{}: {cause}", image.display());
     let bytes = fs::read(image).map_err(|cause| failed(cause.to_string()))?;
     let file = object::File::parse(&*bytes).map_err(|cause| failed(cause.to_string()))?;
@@ -22,9 +22,7 @@ pub fn check(image: &Path, all: bool) -> Outcome {
     let constants = section.data().map_err(|cause| failed(cause.to_string()))?;
     let page = read(LIST)?;
     let found = places(constants, section.address());
-    let mut listed = listed(&page);
-    listed.retain(|file| all || found.contains_key(file));
-    let faults = compare(&found, &listed);
+    let faults = compare(&found, &listed(&page));
     if !faults.is_empty() {
         return Err(format!("{}: {}", image.display(), faults.join("; ")));
     }

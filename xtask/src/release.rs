@@ -18,7 +18,7 @@ const STATIC: &str = "x86_64-unknown-linux-musl";
 const WHEEL: [&str; 3] = ["--zig", "--compatibility", "manylinux2014"];
 
 /// Images for a device.
-const IMAGES: [&str; 3] = [images::NUCLEO_SPI, images::NUCLEO_ONCHIP, images::APPLICATION];
+const IMAGES: [&str; 2] = [images::NUCLEO_IMAGE, images::APPLICATION];
 
 /// Runs what CI does not wait for, then, unless `checks` alone are wanted, builds everything into target/release-files and
 /// prints sizes.

@@ -22,16 +22,12 @@ use taxel_firmware::app::{App, Buffers};
 use taxel_firmware::capacity::Capacity;
 
 /// What the image has room for: the paper's sensor, unless `TAXEL_CAPACITY` says otherwise when it is built, such as
-/// `TAXEL_CAPACITY=16x32x18` for 16 rows, 32 columns and 18 outputs a row.
+/// `TAXEL_CAPACITY=16x18x18` for 16 rows, 18 columns and 18 outputs a row.
 #[cfg(target_os = "none")]
 pub const CAPACITY: Capacity = match option_env!("TAXEL_CAPACITY") {
     Some(text) => Capacity::parse(text),
     None => Capacity::PAPER,
 };
-
-/// Number of MCP3208 converters that sample all columns.
-#[cfg(target_os = "none")]
-pub const CONVERTERS: usize = CAPACITY.columns.div_ceil(8);
 
 /// The application with room for [`CAPACITY`].
 #[cfg(target_os = "none")]

@@ -1,6 +1,4 @@
-//! The program on the board: the application with the board's parts, whatever reads the sensor.
-
-use core::marker::PhantomData;
+//! The program on the board: the application with the board's parts.
 
 use board_common::region::take_weights;
 use board_common::{BoardApp, buffers, memory};
@@ -14,24 +12,24 @@ use taxel_firmware::platform::{Platform, Port};
 use taxel_firmware::readout::FrameSource;
 use taxel_firmware::store::Journal;
 
-use crate::board::{Board, Readout};
+use crate::board::Board;
 use crate::clock::Clock;
 use crate::flash::set_brown_out_level;
 use crate::oscillator::Oscillator;
+use crate::own_converters::OwnConverters;
 use crate::reset::restart;
 use crate::serial::Serial;
 use crate::slot::Slot;
 
-struct Nucleo<R> {
+struct Nucleo {
     serial: Serial,
     clock: Clock,
     watchdog: IndependentWatchdog,
     led: ErasedPin<Output>,
     journal: Journal<Slot>,
-    readout: PhantomData<R>,
 }
 
-impl<R> Port for Nucleo<R> {
+impl Port for Nucleo {
     fn now_us(&mut self) -> u32 {
         self.clock.now_us()
     }
@@ -45,10 +43,10 @@ impl<R> Port for Nucleo<R> {
     }
 }
 
-impl<R: Readout> Platform for Nucleo<R> {
+impl Platform for Nucleo {
     type Page = Slot;
 
-    const BOARD: &'static str = R::BOARD;
+    const BOARD: &'static str = "nucleo-f446re";
 
     /// Feeds the watchdog, and blinks the light about once a second.
     fn feed_watchdog(&mut self) {
@@ -87,12 +85,12 @@ impl<R: Readout> Platform for Nucleo<R> {
 }
 
 /// Runs the application with the frames that `source` makes of the readout.
-pub fn run<R: Readout, F: FrameSource>(source: impl FnOnce(R) -> F) -> ! {
-    let Some(board) = Board::<R>::take() else { restart() };
+pub fn run<F: FrameSource>(source: impl FnOnce(OwnConverters) -> F) -> ! {
+    let Some(board) = Board::take() else { restart() };
     info!(
         "taxel {=str} on a {=str}, started by: {}",
         env!("CARGO_PKG_VERSION"),
-        R::BOARD,
+        Nucleo::BOARD,
         board.reset_cause
     );
     if board.oscillator == Oscillator::Internal {
@@ -100,13 +98,12 @@ pub fn run<R: Readout, F: FrameSource>(source: impl FnOnce(R) -> F) -> ! {
             "no 8 MHz from the ST-LINK: running from the internal oscillator, 1 % off at 25 °C, up to 4 % elsewhere"
         );
     }
-    let nucleo = Nucleo::<R> {
+    let nucleo = Nucleo {
         serial: board.serial,
         clock: board.clock,
         watchdog: board.watchdog,
         led: board.led,
         journal: Journal::new(board.pages),
-        readout: PhantomData,
     };
     let Some(buffers) = buffers() else { restart() };
     let mut app =

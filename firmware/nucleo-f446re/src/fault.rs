@@ -1,4 +1,5 @@
-//! The end of a program that cannot go on: rows at rest, the cause kept in RAM, and a reset at once.
+//! The end of a program that cannot go on: the cause kept in RAM, and a reset at once, which makes inputs of the rows' pins:
+//! their resistors let all rows idle.
 
 use core::arch::naked_asm;
 use core::panic::{Location, PanicInfo};
@@ -8,8 +9,6 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::interrupt;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
-
-use crate::rest::rest_rows;
 
 /// What ended the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, defmt::Format)]
@@ -53,7 +52,6 @@ pub(crate) fn take() -> Option<Fault> {
 
 fn stop(cause: u32, place: u32) -> ! {
     interrupt::disable();
-    rest_rows();
     for (word, value) in NOTE.iter().zip([cause, place, cause ^ place ^ MARK]) {
         word.store(value, Ordering::Relaxed);
     }

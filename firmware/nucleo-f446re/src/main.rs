@@ -1,30 +1,21 @@
-//! The image for the board NUCLEO-F446RE with converters around it: the application, with the sensor at its pins.
+//! The image for the board NUCLEO-F446RE, which reads the sensor by the chip's own converters.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
 mod device {
-    use board_common::CAPACITY;
     use cortex_m_rt::entry;
-    use nucleo_f446re::{Converters, run};
+    use nucleo_f446re::{COLUMNS, LINES, restart, run};
     use taxel_firmware::circuit::ZeroPotential;
-    use taxel_firmware::readout::{Mcp3208s, Scanner, ShiftRegister595};
+    use taxel_firmware::readout::PassScanner;
 
     /// Constants of the circuit, until others are kept: `taxel link PORT constants FILE` sets your own.
-    const CIRCUIT: ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }> = ZeroPotential::TYPICAL;
-
-    type BoardScanner<D, S, T> = Scanner<D, S, T, { CAPACITY.rows }, { CAPACITY.columns }>;
+    const CIRCUIT: ZeroPotential<{ LINES - 1 }, COLUMNS> = ZeroPotential::TYPICAL;
 
     #[entry]
     fn main() -> ! {
-        run(|readout: Converters| {
-            let drive = ShiftRegister595::<_, { CAPACITY.rows }> {
-                data: readout.row_data,
-                clock: readout.row_clock,
-                latch: readout.row_latch,
-            };
-            let sampler = Mcp3208s { chips: readout.converters };
-            BoardScanner::new(drive, sampler, readout.delay, CIRCUIT)
-        })
+        let sums = cortex_m::singleton!(: [[u32; COLUMNS]; LINES] = [[0; COLUMNS]; LINES]);
+        let Some(sums) = sums else { restart() };
+        run(|readout| PassScanner::new(readout, CIRCUIT, sums))
     }
 }
 

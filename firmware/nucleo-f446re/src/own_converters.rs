@@ -11,30 +11,40 @@
 use core::cell::UnsafeCell;
 use core::sync::atomic::{Ordering, fence};
 
+use board_common::CAPACITY;
 use cortex_m::asm;
-use stm32f4xx_hal::gpio::PinState;
 use stm32f4xx_hal::pac::adc1::RegisterBlock;
 use stm32f4xx_hal::pac::dma2::ST;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, ADC2, ADC3, DMA2, GPIOB, RCC, TIM1, TIM8};
 use stm32f4xx_hal::rcc::Rcc;
 use taxel_core::RowWire;
 use taxel_firmware::readout::{Sequencer, SequencerFault, add_samples};
-use taxel_firmware::timing::{ONCHIP_COLUMNS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts};
-
-use crate::board::{OwnConverters, Readout, ReadoutParts};
+use taxel_firmware::timing::{
+    ONCHIP_COLUMNS, ONCHIP_ROWS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts,
+};
 
 /// Number of columns.
 pub const COLUMNS: usize = ONCHIP_COLUMNS as usize;
 
-/// Number of lines of a pass: eight rows, and one in which all idle.
-pub const LINES: usize = ROW_PINS.len() + 1;
+/// Number of lines of a pass: the rows, and one in which all idle.
+pub const LINES: usize = CAPACITY.rows + 1;
 
 /// Pins of port B that drive the rows, and the one that switches the multiplexers.
 const ROW_PINS: [u32; 8] = [5, 6, 7, 8, 9, 10, 12, 13];
 const SELECT: u32 = 1 << 14;
 
-/// Word for the port's register of changes that lets all rows idle, and chooses the first half of the columns.
-const REST: u32 = {
+/// Whether a 74HC4514 drives the rows, of which there are more than pins: the first four pins are a row's number, and the
+/// fifth lets all idle.
+pub const BY_DECODER: bool = CAPACITY.rows > ROW_PINS.len();
+const INHIBIT: u32 = 1 << ROW_PINS[4];
+
+const _: () = assert!(
+    CAPACITY.rows <= ONCHIP_ROWS as usize && CAPACITY.columns <= COLUMNS,
+    "the pins are for 16 rows and 18 columns"
+);
+
+/// Word for the port's register of changes that clears all pins, and so chooses the first half of the columns.
+const CLEAR: u32 = {
     let (mut pins, mut row) = (SELECT, 0);
     while row < ROW_PINS.len() {
         pins |= 1 << ROW_PINS[row];
@@ -42,6 +52,18 @@ const REST: u32 = {
     }
     pins << 16
 };
+
+/// The word that lets all rows idle.
+const REST: u32 = CLEAR | if BY_DECODER { INHIBIT } else { 0 };
+
+/// The word that drives a row: what is set wins over what is cleared. All rows idle for one that is not there.
+fn row_word(row: RowWire) -> u32 {
+    if BY_DECODER && row.0 < CAPACITY.rows {
+        return CLEAR | (row.0 as u32) << ROW_PINS[0];
+    }
+    let pin = ROW_PINS.get(row.0).filter(|_| !BY_DECODER);
+    pin.map_or(REST, |pin| CLEAR | 1 << pin)
+}
 
 /// Channels of each converter, in the order in which it converts them: PA0, PA1, PA4; PA6, PA7, PB0; PC0, PC1, PC2.
 const CHANNELS: [[u32; 3]; 3] = [[0, 1, 4], [6, 7, 8], [10, 11, 12]];
@@ -117,7 +139,7 @@ struct Memory {
 
 struct Place(UnsafeCell<Memory>);
 
-// SAFETY: only `OnChip` uses the place, of which there is one.
+// SAFETY: only `OwnConverters` uses the place, of which there is one.
 unsafe impl Sync for Place {}
 
 static MEMORY: Place = Place(UnsafeCell::new(Memory {
@@ -127,45 +149,34 @@ static MEMORY: Place = Place(UnsafeCell::new(Memory {
     numbers: [0; LINES * COLUMNS * ONCHIP_SAMPLES as usize],
 }));
 
-/// The converters, the timers and DMA.
-pub struct OnChip {
-    parts: OwnConverters,
+/// The converters, DMA, and the timers of the rows and of the triggers.
+pub struct OwnConverters {
+    converters: (ADC1, ADC2, ADC3, ADC_COMMON),
+    dma: DMA2,
+    timers: (TIM1, TIM8),
     clock_mhz: u32,
     /// Samples of a reading in the pass under way.
     samples: u16,
 }
 
-impl Readout for OnChip {
-    const BOARD: &'static str = "nucleo-f446re-onchip";
-
-    fn set_up(parts: ReadoutParts, rcc: &mut Rcc) -> Option<Self> {
-        let ReadoutParts { gpiob, own, .. } = parts;
-        let low = PinState::Low;
-        let _ = (
-            gpiob.pb5.into_push_pull_output_in_state(low),
-            gpiob.pb6.into_push_pull_output_in_state(low),
-            gpiob.pb7.into_push_pull_output_in_state(low),
-            gpiob.pb8.into_push_pull_output_in_state(low),
-            gpiob.pb9.into_push_pull_output_in_state(low),
-            gpiob.pb10.into_push_pull_output_in_state(low),
-            gpiob.pb12.into_push_pull_output_in_state(low),
-            gpiob.pb13.into_push_pull_output_in_state(low),
-            gpiob.pb14.into_push_pull_output_in_state(low),
-        );
-        let _ = (parts.pa0.into_analog(), parts.pa1.into_analog(), parts.pa4.into_analog());
-        let _ = (parts.pa6.into_analog(), parts.pa7.into_analog(), gpiob.pb0.into_analog());
-        let _ = (parts.pc0.into_analog(), parts.pc1.into_analog(), parts.pc2.into_analog());
+impl OwnConverters {
+    /// Starts the parts. All rows must idle.
+    pub(crate) fn start(
+        converters: (ADC1, ADC2, ADC3, ADC_COMMON),
+        dma: DMA2,
+        timers: (TIM1, TIM8),
+        rcc: &mut Rcc,
+    ) -> Self {
         rcc.ahb1enr().modify(|_, w| w.dma2en().set_bit());
         // SAFETY: the other peripherals' bits stay as they are.
         rcc.apb2enr().modify(|r, w| unsafe { w.bits(r.bits() | TIMERS | CONVERTERS) });
         asm::dsb(); // a write that follows at once may be lost (ES0298)
-        let mut this = Self { parts: own, clock_mhz: rcc.clocks.hclk().to_MHz(), samples: 1 };
+        let clock_mhz = rcc.clocks.hclk().to_MHz();
+        let mut this = Self { converters, dma, timers, clock_mhz, samples: 1 };
         this.stop();
-        Some(this)
+        this
     }
-}
 
-impl OnChip {
     /// Starts a stream of so many `items` between memory and a register, with these fields.
     fn start_stream(stream: &ST, memory: usize, register: usize, items: usize, fields: u32) {
         // SAFETY: the addresses are of `MEMORY` and of a register, and the items are as many as there is room for.
@@ -180,24 +191,11 @@ impl OnChip {
 
     /// Streams of the numbers, of the second half, of the end and of the rows.
     fn streams(&self) -> [&ST; 4] {
-        let dma = self.dma();
-        [dma.st(0), dma.st(2), dma.st(5), dma.st(6)]
-    }
-
-    fn dma(&self) -> &DMA2 {
-        &self.parts.4
-    }
-
-    fn converters(&self) -> (&ADC1, &ADC2, &ADC3, &ADC_COMMON) {
-        (&self.parts.0, &self.parts.1, &self.parts.2, &self.parts.3)
-    }
-
-    fn timers(&self) -> (&TIM1, &TIM8) {
-        (&self.parts.5, &self.parts.6)
+        [self.dma.st(0), self.dma.st(2), self.dma.st(5), self.dma.st(6)]
     }
 }
 
-impl Sequencer<COLUMNS> for OnChip {
+impl Sequencer<COLUMNS> for OwnConverters {
     const FULL_SCALE_COUNTS: u16 = 4095;
     const MOST_SAMPLES: u16 = ONCHIP_SAMPLES;
 
@@ -210,8 +208,7 @@ impl Sequencer<COLUMNS> for OnChip {
         let memory = unsafe { &mut *memory };
         (memory.select, memory.rest) = (SELECT, REST);
         for (word, row) in memory.rows.iter_mut().zip(rows) {
-            let pin = row.and_then(|row| ROW_PINS.get(row.0));
-            *word = REST | pin.map_or(0, |pin| 1 << pin); // what is set wins over what is cleared
+            *word = row.map_or(REST, row_word);
         }
         let numbers = lines * COLUMNS * usize::from(self.samples);
         let [rows, select, rest] = [
@@ -226,8 +223,8 @@ impl Sequencer<COLUMNS> for OnChip {
         let number = ADC_COMMON::PTR.addr() + 0x08;
         // SAFETY: writing ones clears these flags.
         unsafe {
-            self.dma().lifcr().write(|w| w.bits(LOW_FLAGS));
-            self.dma().hifcr().write(|w| w.bits(HIGH_FLAGS));
+            self.dma.lifcr().write(|w| w.bits(LOW_FLAGS));
+            self.dma.hifcr().write(|w| w.bits(HIGH_FLAGS));
         }
         let [of_numbers, of_switch, of_end, of_rows] = self.streams();
         Self::start_stream(of_numbers, to, number, numbers, HALF_WORDS | COUNT_UP);
@@ -235,7 +232,7 @@ impl Sequencer<COLUMNS> for OnChip {
         Self::start_stream(of_rows, rows, changes, lines, fields | COUNT_UP);
         Self::start_stream(of_switch, select, changes, lines, fields);
         Self::start_stream(of_end, rest, changes, 1, fields);
-        let (rows, triggers) = self.timers();
+        let (rows, triggers) = &self.timers;
         // SAFETY: all are counts or the fields that their constants tell.
         unsafe {
             triggers.rcr().write(|w| w.bits(2 * u32::from(self.samples) - 1));
@@ -254,8 +251,8 @@ impl Sequencer<COLUMNS> for OnChip {
     }
 
     fn poll(&mut self, sums: &mut [[u32; COLUMNS]]) -> Option<Result<(), SequencerFault>> {
-        let (low, high) = (self.dma().lisr().read().bits(), self.dma().hisr().read().bits());
-        let overrun = self.converters().3.csr().read().bits() & OVERRUN;
+        let (low, high) = (self.dma.lisr().read().bits(), self.dma.hisr().read().bits());
+        let overrun = self.converters.3.csr().read().bits() & OVERRUN;
         if low & LOW_ERRORS | high & HIGH_ERRORS | overrun != 0 {
             self.stop();
             return Some(Err(SequencerFault));
@@ -289,7 +286,7 @@ impl Sequencer<COLUMNS> for OnChip {
         // SAFETY: only the rows' pins and the multiplexers' change.
         unsafe { GPIOB::steal() }.bsrr().write(|w| unsafe { w.bits(REST) });
 
-        let (first, second, third, common) = self.converters();
+        let (first, second, third, common) = &self.converters;
         // SAFETY: the fields are those that their constants tell.
         common.ccr().write(|w| unsafe { w.bits(COMMON) });
         let blocks: [&RegisterBlock; 3] = [first, second, third];
@@ -307,7 +304,7 @@ impl Sequencer<COLUMNS> for OnChip {
             }
         }
         asm::delay(READY_US * self.clock_mhz);
-        let (rows, triggers) = self.timers();
+        let (rows, triggers) = &self.timers;
         // SAFETY: as above. Timer 1 has a count for its output before it has an output: that must not rise now.
         unsafe {
             rows.ccr1().write(|w| w.bits(u32::from(u16::MAX)));

@@ -14,25 +14,16 @@ use crate::moving::age_ms;
 /// Clock of the NUCLEO-F446RE in MHz.
 pub const BOARD_CLOCK_MHZ: f64 = 180.0;
 
-/// Readout of the NUCLEO-F446RE (docs/board.md): what samples columns.
+/// What samples columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Readout {
-    /// MCP3208 converters on a bus. The processor scans, and decodes the frame afterwards.
-    #[default]
+    /// MCP3208 converters on a bus of a board of your own. The processor scans, and decodes the frame afterwards.
     Spi,
-    /// The chip's own converters, which scan by themselves while the processor decodes the frame before.
+    /// The NUCLEO-F446RE's own converters (docs/board.md), which scan by themselves while the processor decodes the frame
+    /// before.
+    #[default]
     OnChip,
-}
-
-impl Readout {
-    /// Name of the board's image that scans so.
-    pub fn image(self) -> &'static str {
-        match self {
-            Self::Spi => "nucleo-f446re",
-            Self::OnChip => "nucleo-f446re-onchip",
-        }
-    }
 }
 
 /// Device whose times are given.
@@ -185,10 +176,9 @@ mod tests {
 
     #[test]
     fn a_frame_takes_its_scan_and_then_its_decoding() {
-        let board = Device::default();
+        let board = Device { readout: Readout::Spi, ..Device::default() };
         let cost = Cost { instructions: 1, cycles: 36_000 };
         let paper = Some(Wires { rows: 8, columns: 18 });
-        // docs/board.md: 5.6 ms with one sample a reading, 21 ms with four.
         let scans = [1, 4].map(|samples| board.scan_ms(paper, samples).unwrap());
         assert_eq!(scans, [5.573, 21.022]);
         let times = board.times(Some(5.5), &cost);
@@ -234,7 +224,8 @@ mod tests {
         assert!((three.correlated_level / 0.01 / expected - 1.0).abs() < 1e-3, "{three:?}");
         assert!(rest > 0.95 && (onchip.passes(17), onchip.passes(16)) == (2, 1));
         // On SPI all samples of a reading follow one another, 36 µs apart.
-        let spi = left(48, Device::default()).correlated_level / 0.01;
+        let board = Device { readout: Readout::Spi, ..Device::default() };
+        let spi = left(48, board).correlated_level / 0.01;
         assert!((0.7..0.8).contains(&spi), "{spi}");
         let given = Device { scan_ms: Some(1.0), ..onchip };
         assert_eq!((given.passes(48), onchip.averaged(noise, None, 4).correlated_level), (1, 0.01));

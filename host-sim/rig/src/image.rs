@@ -5,6 +5,7 @@ use taxel_core::health::MOST_COLUMNS;
 use taxel_core::scratch_floats;
 use taxel_data::columns;
 use taxel_firmware::capacity::{Capacity, MOST_OUTPUTS, MOST_ROWS};
+use taxel_firmware::timing::{ONCHIP_COLUMNS, ONCHIP_ROWS};
 
 /// RAM in bytes that an image has for its buffers, at most.
 const MOST_BUFFER_BYTES: usize = 52 * 1024;
@@ -88,10 +89,18 @@ fn wires(model: &Model<'_>, has: Capacity) -> Result<(usize, usize), String> {
 pub fn needed(model: &Model<'_>, has: Capacity) -> Option<String> {
     match capacity_for(model, has) {
         Ok(capacity) if capacity == has => None,
-        Ok(Capacity { rows, columns, outputs }) => Some(format!(
-            "it needs an image with room for {rows} × {columns} wires: TAXEL_CAPACITY={rows}x{columns}x{outputs} \
-             cargo nucleo builds the board's; put the same before `cargo xtask firmware qemu-app` for the emulator (docs/board.md)"
-        )),
+        Ok(Capacity { rows, columns, outputs }) => {
+            let room = format!("TAXEL_CAPACITY={rows}x{columns}x{outputs}");
+            let of_board = if rows <= ONCHIP_ROWS.into() && columns <= ONCHIP_COLUMNS.into() {
+                format!("{room} cargo nucleo builds the board's")
+            } else {
+                format!("the NUCLEO-F446RE scans {ONCHIP_ROWS} × {ONCHIP_COLUMNS} at most")
+            };
+            Some(format!(
+                "it needs an image with room for {rows} × {columns} wires: {of_board}; \
+                 {room} cargo xtask firmware qemu-app builds the emulator's (docs/board.md)"
+            ))
+        }
         Err(reason) => Some(reason),
     }
 }

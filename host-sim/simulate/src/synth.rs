@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 use taxel_data::{Dataset, LANES, Purpose, Stream, Table};
-use taxel_firmware::timing::ScanPlan;
+use taxel_firmware::link::message::Configuration;
 
 use crate::drift::Drift;
 use crate::motion::{self, Independent};
@@ -188,7 +188,7 @@ impl<'w> Synthesis<'w> {
     ///
     /// A baseline is what a user captures before the session: the mean of so many `averaged` frames of the untouched
     /// sensor. It has the session's drift, and what averaging [leaves](Noise::averaged) of the noise, with draws of its
-    /// own. Frames follow one another as scans do, or as the board scans.
+    /// own. Frames follow one another as scans do, or as a board scans until it is configured.
     pub fn baselines(&self, stream: Stream, frames: usize, averaged: usize) -> Table {
         self.baselines_from(stream, 0, frames, averaged)
     }
@@ -204,9 +204,8 @@ impl<'w> Synthesis<'w> {
     ) -> Table {
         let steps = self.steps();
         let mut at_rest = self.clone().untouched().timed(Timetable::still());
-        let (rows, columns) = (self.read_rows.len() as u16, self.world.sensor.column_wires as u16);
         let spacing_s = match steps {
-            1 => f64::from(ScanPlan::of_nucleo(rows, columns, 1).scan_us()) * 1e-6,
+            1 => f64::from(Configuration::DEFAULT.frame_period_us) * 1e-6,
             _ => self.timetable.since_last_s(1),
         };
         at_rest.noise = at_rest.noise.averaged(averaged, spacing_s);

@@ -126,8 +126,8 @@ fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
         let values = values.iter().map(|value| whole(*value)).collect();
         wanted.axes.insert(field.into(), Value::Array(values));
     }
-    if let ReadoutOption::Onchip = arguments.tried.readout {
-        wanted.device.insert("readout".into(), "onchip".into());
+    if let ReadoutOption::Spi = arguments.tried.readout {
+        wanted.device.insert("readout".into(), "spi".into());
     }
     wanted.set.extend(common.seed_in_scene()?.map(|seed| (SEED.into(), seed)));
     wanted

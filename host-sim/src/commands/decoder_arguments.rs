@@ -13,9 +13,9 @@ pub struct DecoderArguments {
     /// Numbers of samples averaged for each reading, to try: more lower the noise, and make the scan longer [default: 1].
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     pub average: Vec<usize>,
-    /// Readout of the board: converters on a bus, or the chip's own, which scan while the frame before is decoded
-    /// (docs/board.md).
-    #[arg(long, value_enum, default_value_t = ReadoutOption::Spi)]
+    /// Readout: the board's own converters, which scan while the frame before is decoded (docs/board.md), or converters on the
+    /// SPI of a board of your own.
+    #[arg(long, value_enum, default_value_t = ReadoutOption::Onchip)]
     pub readout: ReadoutOption,
     /// Choose among decoders that take at most so many ms, from the start of a scan to its estimate.
     #[arg(long, value_name = "MS")]

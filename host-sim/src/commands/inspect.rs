@@ -143,7 +143,7 @@ fn costs(result: &mut Sections, blob: &ModelBlob, model: &Model<'_>, design: &De
         result.line(
             "scan",
             format!(
-                "{rows} × {columns} wires, {mean_us} µs by converters around a NUCLEO-F446RE, {longest_us} µs at most"
+                "{rows} × {columns} wires, {mean_us} µs by the converters of a NUCLEO-F446RE, {longest_us} µs at most"
             ),
         );
         json!({ "rows": rows, "columns": columns, "mean_us": mean_us, "longest_us": longest_us })
@@ -191,7 +191,7 @@ fn scan(model: &Model<'_>) -> Option<(usize, usize, ScanPlan)> {
     let cells: Vec<_> = cells.collect::<std::result::Result<_, _>>().ok()?;
     let rows = cells.iter().map(|(row, _)| row).collect::<BTreeSet<_>>().len();
     let columns = cells.iter().map(|(_, column)| column).collect::<BTreeSet<_>>().len();
-    Some((rows, columns, ScanPlan::of_nucleo(rows as u16, columns as u16, 1)))
+    Some((rows, columns, ScanPlan::of_nucleo_onchip(rows as u16, columns as u16, 1)))
 }
 
 /// Width with the digits that f32 surely holds: the blob's number lies a little beside the one that was given.

@@ -46,7 +46,7 @@ mod files;
   taxel trade press --max-error 0.045
   taxel trade press --max-cycles 40000 --max-flash 40000
   taxel trade press --average 1,4,16 --max-latency-ms 25
-  taxel trade moving --readout onchip --average 1,4,12 --max-latency-ms 2
+  taxel trade moving --average 1,4,12 --max-latency-ms 2
   taxel trade press --plan > plan.toml
   taxel trade measured.csv --inputs 'ch*' --outputs 'f?_n' --fold-column place --scan-ms 2")]
 pub struct Arguments {

@@ -204,7 +204,8 @@ fn cost(point: &Point) -> String {
     let times = &point.times;
     let time = match times.scan_ms {
         Some(scan_ms) => format!(
-            "An estimate is finished {} ms after the start of its scan ({} ms to scan, {} ms to decode). There are at most {} \
+            "An estimate is finished {} ms after the start of its scan ({} ms to scan, {} ms to decode, the rest to \
+             turn samples into Ω and to wait for it). There are at most {} \
              frames a second. An estimate is {} ms old when it is used, on average",
             ms(times.frame_ms),
             ms(scan_ms),

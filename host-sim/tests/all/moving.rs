@@ -15,7 +15,7 @@ fn commands_tell_the_error_as_a_robot_meets_it_beside_the_age_of_an_estimate() {
     assert_eq!([0, 1, 2].map(|way| is_filtered(&ways[way])), [false, true, false]);
     assert_eq!((&ways[0]["decoder"], &ways[2]["decoder"]), (&"network".into(), &"linear".into()));
     assert!(rmse(&ways[0]) < rmse(&ways[2]), "{ways:?}");
-    assert!(ways[0]["age_ms"].as_f64().unwrap() > 1.0);
+    assert!(ways[0]["age_ms"].as_f64().unwrap() > 0.3);
     let shown = folder.read("out/small/figures/trajectory.csv");
     assert_eq!(shown.lines().count(), 1 + 3 * 486);
     let text = folder.succeed(&["run", "small.toml"]);

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use crate::common::{Folder, small_scene};
-use host_sim::device::Device;
+use host_sim::device::{Device, Readout};
 use host_sim::experiment::Experiment;
 use host_sim::subject::Subject;
 use host_sim::sweep;
@@ -36,7 +36,7 @@ impl Planned {
             centres: vec![16, 64],
             column_steps: vec![1],
             samples_averaged: vec![1, 16],
-            device: Device { clock_mhz: 100.0, ..Device::default() },
+            device: Device { clock_mhz: 100.0, readout: Readout::Spi, scan_ms: None },
             group: "dz_mm".into(),
             worst_case: false,
             most_bytes: 200_000,
@@ -368,7 +368,7 @@ fn measurements_are_traded_as_they_are() {
     // Readings that are named after wires: three rows, one of them idle.
     let page = folder.succeed(&[&["trade", "data.csv", "--max-flash", "40000"], &few[..]].concat());
     assert!(page.contains("80 measured test frames (the last fifth)"), "{page}");
-    assert!(page.contains("1.425 ms to scan") && page.contains("2 × 18 wires"), "{page}");
+    assert!(page.contains("0.058 ms to scan") && page.contains("2 × 18 wires"), "{page}");
     assert!(folder.path("out/data/chosen.bin").exists());
     // What to type for a point of the front keeps the bound that the front was made with.
     let html = folder.read("out/data/trade.html");

@@ -1,7 +1,5 @@
 """The whole board: the microcontroller, what hangs on its pins, and the loop that runs it."""
 
-import math
-
 from . import circuit, flash, gpio
 from .adc import BITS, Adc
 from .bus import Bus
@@ -9,14 +7,11 @@ from .core import Core
 from .cpu import FLASH, FLASH_BYTES, PERIPHERALS, SRAM, SRAM_BYTES, Cpu
 from .dma import Dma
 from .image import Image
-from .mcp3208 import Mcp3208
 from .rcc import CONVERTERS_RESET, HSI_HZ, TIMERS_RESET, Rcc
 from .row_pins import RowPins
 from .rtt import Rtt
 from .rules import Fault, Rules
 from .scan_timers import Passes
-from .shift_register import ShiftRegister
-from .spi import Spi
 from .timer import Timer
 from .time import Time
 from .usart import Usart
@@ -34,34 +29,27 @@ NOWHERE = 0x6000_0000
 DIP_S = 1e-3
 #: Flags of RCC_CSR after power-on, after a reset by the watchdog, by the program, and by a low supply.
 POWER_ON, BY_WATCHDOG, BY_PROGRAM, BROWN_OUT = 0x0E00_0000, 0x2400_0000, 0x1400_0000, 0x0600_0000
-#: Alternate functions that the pins need: SPI2 at PB13 to PB15, USART2 at PA2 and PA3.
-SPI_FUNCTION, USART_FUNCTION = 5, 7
-SCK, MISO, MOSI, TX, RX = 13, 14, 15, 2, 3
+#: Alternate function that the pins of USART2 need: PA2 and PA3.
+USART_FUNCTION, TX, RX = 7, 2, 3
 #: Longest time in s between two looks at the host's end of the line.
 GLANCE_S = 0.2e-3
 #: Longest time in cycles from one look to the next at whether an interrupt can be taken.
 LONGEST_PATIENCE = 2048
-#: Chip selects: port, pin. The fourth is for columns beyond the 24th; without them nothing hangs on its pin.
-SELECTS = (("B", 12), ("B", 1), ("C", 4), ("C", 5))
-FEWEST_CONVERTERS = 3
-#: Inputs of a converter, and outputs of a shift register.
-CHIP_WIRES = 8
 
 
 class Board:
-    """A board that runs the image at `path`, with the resistances `ohm[row][column]` at its wires, and with as many
-    shift registers and converters as these need.
+    """A board that runs the image at `path`, with the resistances `ohm[row][column]` at its wires. More than eight rows are
+    driven by a decoder.
 
     `hse`: the ST-LINK gives its 8 MHz. `hsi_error`: by how much, as a share, the internal oscillator is too fast.
     `lsi_hz`: the watchdog's own clock. `erase_s`: how long erasing a slot takes, whatever the data sheet says. `options`:
-    the option bytes. `sensor`: the converters are there. `settling_us`: the wait after each change of rows that the
-    device is configured to. `op_amp_hz`: the gain-bandwidth product of the op-amps. `onchip`: the chip's own converters
-    read the sensor, with multiplexers before them and the rows at pins.
+    the option bytes. `sensor`: the converters answer their triggers. `settling_us`: the wait after each change of rows that
+    the device is configured to. `op_amp_hz`: the gain-bandwidth product of the op-amps.
     """
 
     def __init__(self, path, ohm, *, hse=True, hsi_error=0.0, lsi_hz=32_000, erase_s=None,
                  options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=20.0,
-                 op_amp_hz=circuit.OP_AMP_HZ, onchip=False, log=print):
+                 op_amp_hz=circuit.OP_AMP_HZ, log=print):
         self.image = Image(path)
         self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
         self._hsi_error, self._supply_v, self._op_amp_hz = hsi_error, 3.3, op_amp_hz
@@ -70,10 +58,6 @@ class Board:
         self.rules = Rules(self.where, self.note)
         #: What its flash and option bytes hold, and what was done to them.
         self.store = flash.Store(self.image.segments, options)
-        self._onchip = onchip
-        rows = CHIP_WIRES * math.ceil(len(ohm) / CHIP_WIRES)
-        #: What drives the rows.
-        self.register = ShiftRegister(self.time, self.rules, rows, lambda: self.settling_us)
         #: Whether the next fault is the scenario's own.
         self._derailed = False
         #: Causes of the resets so far.
@@ -85,17 +69,11 @@ class Board:
         #: Called again and again while the board runs, with whether the program idles.
         self.glance = lambda idle: None
         self._reset_flags, self._pending_reset = POWER_ON, None
-        #: What the chip's own converters scan, and what lets it go on until now.
-        self.passes, self.advance = None, lambda: None
         self._start(bytes(SRAM_BYTES))
 
     def note(self, text):
         """Logs `text` with the time."""
         self._log(f"[{self.time.seconds():9.6f} s] {text}")
-
-    def untouched(self, port, pin):
-        """Whether a pin is as after a reset: an input."""
-        return self.ports[port].mode(pin) == gpio.INPUT
 
     def where(self):
         """The function that is executed."""
@@ -115,45 +93,32 @@ class Board:
             "B": gpio.Port({gpio.MODER: 0x280, gpio.OSPEEDR: 0xC0, gpio.PUPDR: 0x100}),
             "C": gpio.Port(),
         }
-        if self._onchip:
-            self.register = RowPins(time, rules, self.ports["B"], lambda: self.settling_us)
-        columns = len(self._ohm[0])
-        self.circuit = circuit.Circuit(time, rules, self.register, self._ohm, self._op_amp_hz)
-        self.converters = [
-            Mcp3208(time, rules, circuit.REFERENCE_V,
-                    lambda channel, cycle, first=CHIP_WIRES * chip: self.circuit.volts(first + channel, cycle))
-            for chip in range(max(FEWEST_CONVERTERS, math.ceil(columns / CHIP_WIRES)))
-        ]
+        #: What drives the rows.
+        self.rows = RowPins(time, rules, self.ports["B"], len(self._ohm), lambda: self.settling_us)
+        self.circuit = circuit.Circuit(time, rules, self.rows, self._ohm, self._op_amp_hz)
         self.rcc = Rcc(bus, time, rules, self._hse, self._hsi_error, self._reset_flags, self._clocks_changed,
                        self.supply_v)
         self.flash = flash.Flash(self.store, time, rules, self._stall, self.cpu.uc.mem_write, self._erase_s)
         self.rcc.flash_wait_states = self.flash.wait_states
         self.flash.wait_states_changed = self.rcc.check
         self.core = Core(time, rules, self._wait, self._ask_for_reset)
-        self.spi = Spi(time, rules, self._wait, lambda: self.rcc.clocks.pclk1, self._sck_slow, self._exchange)
         self.usart = Usart(time, rules, lambda: self.rcc.clocks.pclk1, lambda: self.rcc.clock_error(), self._baud)
         self.usart.on_send = self._before_sending
         self.timer = Timer(time, lambda: self.rcc.clocks.timer1, self._look, self._idle)
         self.watchdog = Watchdog(time, rules, self._lsi_hz)
         bus.attach(0x00000, self.timer, "TIM2")
         bus.attach(0x03000, self.watchdog, "IWDG", gated=False)
-        bus.attach(0x03800, self.spi, "SPI2")
         bus.attach(0x04400, self.usart, "USART2")
         bus.attach(0x07000, self.rcc.pwr, "PWR")
         for index, port in enumerate(self.ports.values()):
             bus.attach(0x20000 + 0x400 * index, port, f"GPIO{'ABC'[index]}")
         bus.attach(0x23800, self.rcc, "RCC", gated=False)
         bus.attach(0x23C00, self.flash, "FLASH", gated=False)
-        if self._onchip:
-            self._start_onchip(bus)
-        else:
-            for chip, (port, pin) in enumerate(SELECTS[:len(self.converters)]):
-                self.ports[port].listeners[pin] = lambda high, chip=chip: self._select(chip, high)
-            self.ports["C"].listeners.update({6: self.register.data, 8: self.register.clock, 9: self.register.latch})
+        self._start_converters(bus)
         self._idles, self._pins_checked, self._next_glance, self._patience = False, False, 0, 1
 
-    def _start_onchip(self, bus):
-        """Puts the chip's own converters on the bus, with the timers and the DMA that they work with."""
+    def _start_converters(self, bus):
+        """Puts the chip's converters on the bus, with the timers and the DMA that they work with."""
         time, rules = self.time, self.rules
         self._pins_at = None
 
@@ -168,8 +133,8 @@ class Board:
             bus.write_by_dma(address - PERIPHERALS, value)
 
         def counts(pin, cycle):
-            column = self.register.column(pin, cycle)
-            waited_us = self.time.ns(cycle - self.register.changed_at) / 1e3 * (1 + self.rcc.clock_error())
+            column = self.rows.column(pin, cycle)
+            waited_us = self.time.ns(cycle - self.rows.changed_at) / 1e3 * (1 + self.rcc.clock_error())
             if waited_us < self.settling_us:
                 rules.breach("wait-short", f"{waited_us:.2f} us of {self.settling_us:g}")
             volts = 0.0 if column is None else self.circuit.volts(column, cycle)
@@ -184,9 +149,10 @@ class Board:
 
         dma = Dma(self.cpu.uc, rules, advance, write, self._busy)
         adc = Adc(time, rules, self.rcc, self.ports, dma, advance, counts)
-        self.passes = Passes(time, rules, lambda: self.rcc.clocks.timer2, dma, adc, moment, self._busy)
+        #: What the converters scan, and what lets it go on until now.
+        self.passes = Passes(time, rules, lambda: self.rcc.clocks.timer2, dma, adc, moment, self._busy, self._sensor)
         self.advance = advance
-        self.ports["B"].changed = lambda: self.register.update(
+        self.ports["B"].changed = lambda: self.rows.update(
             time.now if self._pins_at is None else self._pins_at)
         self.rcc.on_reset = reset
         bus.attach(0x10000, self.passes.rows, "TIM1")
@@ -202,7 +168,7 @@ class Board:
         self.note(f"RESET by {cause}")
         self.resets.append(cause)
         self.take_log()
-        self.register.check_rest()
+        self.rows.check_rest()
         self._reset_flags, self._pending_reset = flags, None
         to_host = self.usart.to_host
         self._start(self.cpu.sram())
@@ -218,9 +184,9 @@ class Board:
         """The supply changes. Below the brown-out level the processor is held in reset, until it is back."""
         self._supply_v = volts
         if volts < self.flash.brown_out_v:
+            self._reset("brown-out", BROWN_OUT)
             self._stall(DIP_S)
             self._supply_v = 3.3
-            self._reset("brown-out", BROWN_OUT)
         self.rcc.check()
 
     def stop_hse(self):
@@ -288,7 +254,7 @@ class Board:
         if event is not None:
             cycle = min(cycle, event)
             self.time.wake_at(event)
-        event = self.passes.next_event() if self.passes else None
+        event = self.passes.next_event()
         if event is not None:
             cycle = min(cycle, event)
         self.time.now = max(self.time.now, int(cycle) + 1)
@@ -305,9 +271,7 @@ class Board:
         """The program looks at the time, as it does in its main loop."""
         self.flash.finish()
         self.advance()
-        self.register.check_rest()
-        if self.register.outputs is None:
-            self.rules.breach("rows-undefined")
+        self.rows.check_rest()
         if self.flash.stale:
             self.rules.breach("cache-stale")
         if not self.flash.caches_on():
@@ -387,9 +351,6 @@ class Board:
 
     # Pins
 
-    def _sck_slow(self):
-        return self.ports["B"].speed(SCK) == gpio.LOW_SPEED
-
     def _check_function(self, port, pins, function, name):
         for pin in pins:
             if self.ports[port].function(pin) != function:
@@ -400,34 +361,3 @@ class Board:
         if not self._pins_checked:
             self._pins_checked = True
             self._check_function("A", (TX, RX), USART_FUNCTION, "USART2")
-
-    def _select(self, chip, high):
-        self._busy()
-        self.flash.finish()
-        now, ends = self.time.now, self.spi.ends
-        if now < ends:
-            self.rules.breach("select-early", f"{self.time.ns(ends - now):.0f} ns before the end")
-        if not high:
-            # As the program reckons, whose clock may be off.
-            waited_us = self.time.ns(now - self.register.changed_at) / 1e3 * (1 + self.rcc.clock_error())
-            if waited_us < self.settling_us:
-                self.rules.breach("wait-short", f"{waited_us:.2f} us of {self.settling_us:g}")
-        self.converters[chip].select(not high)
-
-    def _exchange(self, byte, start, bit_cycles):
-        """Shifts a byte out to the converters; returns the byte that comes back."""
-        selected = [chip for chip in self.converters if chip.selected]
-        if len(selected) > 1:
-            self.rules.breach("two-converters")
-        self._check_function("B", (SCK, MISO, MOSI), SPI_FUNCTION, "SPI2")
-        pulled_up = self.ports["B"].pulled_up(MISO)
-        received = 0
-        for index in range(8):
-            data = byte >> 7 - index & 1
-            bit = None
-            for chip in selected if self._sensor else ():
-                bit = chip.rise(data, start + (index + 0.5) * bit_cycles)
-            if bit is None and not pulled_up:
-                self.rules.breach("line-floats")
-            received = received << 1 | (1 if bit is None else bit)
-        return received

@@ -15,8 +15,8 @@ class Circuit:
     gain-bandwidth product.
     """
 
-    def __init__(self, time, rules, register, ohm, op_amp_hz):
-        self._time, self._rules, self._register, self._ohm = time, rules, register, ohm
+    def __init__(self, time, rules, rows, ohm, op_amp_hz):
+        self._time, self._rules, self._rows, self._ohm = time, rules, rows, ohm
         #: Time in µs after which each column is within half a count: the op-amp is closed around 1 + R_f/R, with R all
         #: cells of the column in parallel.
         self.settled_us = [
@@ -27,18 +27,15 @@ class Circuit:
 
     def volts(self, column, cycle):
         """Output in V of a column's op-amp. Columns beyond the last are grounded."""
-        register = self._register
+        rows = self._rows
         if column >= len(self._ohm[0]):
             return 0.0
-        if register.outputs is None:
-            self._rules.breach("rows-undefined")
-            return BIAS_V
-        settled_us = self._time.ns(cycle - register.changed_at) / 1e3
+        settled_us = self._time.ns(cycle - rows.changed_at) / 1e3
         if settled_us < self.settled_us[column]:
             self._rules.breach("not-settled", f"{settled_us:.1f} us")
-        if not register.outputs:
+        if not rows.outputs:
             return BIAS_V
-        row = register.outputs.bit_length() - 1
+        row = rows.outputs.bit_length() - 1
         conductance = sum(1 / ohm for ohm in self._ohm[row])
         at_row_v = BIAS_V / (1 + ROW_SOURCE_OHM * conductance)
         return min(LARGEST_V, BIAS_V + FEEDBACK_OHM * at_row_v / self._ohm[row][column])

@@ -55,12 +55,12 @@ class ScanTimer(Registers):
 
 class Passes:
     """What the timers do to rows, multiplexers and converters, one event after the other. `moment(cycle)` says when what
-    follows happens; `busy` is called when a pass begins, and when its end is seen.
+    follows happens; `busy` is called when a pass begins, and when its end is seen. Unless it `triggers`, timer 8 is deaf.
     """
 
-    def __init__(self, time, rules, clock, dma, adc, moment, busy):
+    def __init__(self, time, rules, clock, dma, adc, moment, busy, triggers=True):
         self._time, self._rules, self._clock, self._dma, self._adc = time, rules, clock, dma, adc
-        self._moment, self._busy = moment, busy
+        self._moment, self._busy, self._triggers = moment, busy, triggers
         self.rows, self.triggers = ScanTimer(self.advance, self._start), ScanTimer(self.advance)
         #: Events to come, the last one first; the triggers to come: the first one's cycle, their number, their
         #: distance, and what the converters do at each; and the cycle at which the last column is sampled.
@@ -117,6 +117,8 @@ class Passes:
             self._convert_until(now)
 
     def _trigger(self, cycle):
+        if not self._triggers:
+            return
         if self._waiting:
             self._rules.breach("triggers-cut", f"{self._waiting[1]} are left")
         tick = self._time.hz / self._clock()

@@ -10,7 +10,7 @@ use taxel_firmware::timing::NUCLEO_BAUD;
 use taxel_rig::device::{Device, serial};
 
 use crate::board::{Emulator, Options};
-use crate::images::{NUCLEO, NUCLEO_SPI, PROFILE, build_image};
+use crate::images::{NUCLEO, NUCLEO_IMAGE, PROFILE, build_image};
 use crate::process::{Outcome, run};
 use crate::toolchain::{Toolchain, elf};
 
@@ -45,7 +45,7 @@ impl Board {
             let mut build = toolchain.build();
             build.args(PROFILE).args(NUCLEO);
             run(build.envs(baud.map(|baud| (BAUD_VARIABLE, baud.to_string()))))?;
-            flash(&elf(NUCLEO_SPI))?;
+            flash(&elf(NUCLEO_IMAGE))?;
         }
         let baud = baud.map_or_else(usual_baud, Ok)?;
         Ok(Self { port: port.into(), baud, emulator: None })
@@ -54,7 +54,7 @@ impl Board {
     /// The emulated board, running the image.
     pub fn emulated(toolchain: &Toolchain) -> Outcome<Self> {
         build_image(toolchain, NUCLEO)?;
-        let mut command = Emulator::prepare(&Options::plain())?.command(&elf(NUCLEO_SPI));
+        let mut command = Emulator::prepare(&Options::plain())?.command(&elf(NUCLEO_IMAGE));
         command.arg("serve").stdout(Stdio::piped());
         let mut emulator =
             command.spawn().map_err(|cause| format!("the emulated board: {cause}"))?;

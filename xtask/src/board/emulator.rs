@@ -8,7 +8,7 @@ use std::process::Command;
 use taxel_firmware::timing::ScanPlan;
 
 use super::Options;
-use crate::images::{NUCLEO_ONCHIP, NUCLEO_WIDE};
+use crate::images::NUCLEO_WIDE;
 use crate::process::{Outcome, cargo, first_line, root, run, target_dir};
 use crate::toolchain::elf;
 
@@ -52,7 +52,6 @@ impl Emulator {
             ("--model", model),
             ("--directory", folder),
             ("--wide-image", elf(NUCLEO_WIDE)),
-            ("--onchip-image", elf(NUCLEO_ONCHIP)),
         ];
         let mut arguments = vec![root().join(FOLDER).join("run.py").into_os_string()];
         for (name, value) in named {
@@ -65,7 +64,7 @@ impl Emulator {
             let plan = ScanPlan::of_nucleo_onchip(8, 18, samples);
             format!("{},{}", plan.scan_us(), plan.longest_us())
         });
-        arguments.extend(["--onchip-scans".into(), scans.join(",").into()]);
+        arguments.extend(["--scans".into(), scans.join(",").into()]);
         Ok(Self { python, arguments })
     }
 

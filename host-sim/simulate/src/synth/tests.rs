@@ -361,8 +361,8 @@ fn noise_with_a_memory_is_more_variance_on_still_frames_and_hardly_less_in_a_bas
     };
     let noisy = still.frames(Stream::Test, 400).inputs;
     assert!((squares(&noisy) / 0.005 - 1.0).abs() < 0.02, "{}", squares(&noisy));
-    // A hundred scans take 0.56 s.
-    let left = world.noise.averaged(100, 0.005_573).total_level();
+    // A hundred scans take 1 s.
+    let left = world.noise.averaged(100, 0.01).total_level();
     let baselines = still.baselines(Stream::Test, 400, 100);
     assert!((0.0036..0.0039).contains(&left), "{left}");
     assert!((squares(&baselines) / left - 1.0).abs() < 0.02, "{}", squares(&baselines));
