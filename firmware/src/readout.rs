@@ -69,7 +69,7 @@ pub struct ScanSettings {
 
 impl ScanSettings {
     /// Longest waiting time for a row in µs, so that no scan can hang.
-    pub const MOST_SETTLING_US: u32 = 10_000;
+    pub const MOST_SETTLING_US: u32 = 5_000;
     /// Largest number of samples averaged for a reading.
     pub const MOST_OVERSAMPLING: u16 = 256;
 
@@ -82,6 +82,10 @@ impl ScanSettings {
         }
     }
 }
+
+/// Longest time in µs for which a scan may go on by itself; then it has failed. No setting makes one as long, and a watchdog
+/// waits longer.
+pub const LONGEST_SCAN_US: u64 = 2_000_000;
 
 /// Number of scans between two in which columns are sampled idle.
 pub const SCANS_A_ROUND: u8 = 16;

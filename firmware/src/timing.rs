@@ -251,31 +251,6 @@ impl ScanPlan {
         let samples = u64::from(columns) * u64::from(self.oversampling.max(1));
         samples.saturating_mul(u64::from(self.sample_ns))
     }
-
-    /// Largest oversampling at which no scan takes longer than `period_us`; `None` if a single sample a reading
-    /// takes longer.
-    ///
-    /// ```
-    /// # use taxel_firmware::timing::ScanPlan;
-    /// # let plan = ScanPlan { rows: 8, columns: 18, board_columns: 18, settling_us: 20,
-    /// #     oversampling: 1, pass_samples: 256, sample_ns: 24_000, reading_ns: 0, row_ns: 0,
-    /// #     between_passes_ns: 0 };
-    /// assert_eq!(plan.most_oversampling(10_000), Some(2));
-    /// assert_eq!(plan.most_oversampling(1_000), None);
-    /// ```
-    pub fn most_oversampling(&self, period_us: u32) -> Option<u16> {
-        let fits = |oversampling| Self { oversampling, ..*self }.longest_us() <= period_us;
-        if !fits(1) {
-            return None;
-        }
-        // Bisection: `low` fits, and nothing above `high` fits.
-        let (mut low, mut high) = (1_u16, u16::MAX);
-        while low < high {
-            let middle = high - (high - low) / 2;
-            if fits(middle) { low = middle } else { high = middle - 1 }
-        }
-        Some(low)
-    }
 }
 
 fn in_us(ns: u64) -> u32 {
@@ -285,6 +260,7 @@ fn in_us(ns: u64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::readout::{LONGEST_SCAN_US, ScanSettings};
 
     const PLAN: ScanPlan = ScanPlan {
         rows: 8,
@@ -308,7 +284,6 @@ mod tests {
         assert_eq!(sampling.scan_us(), 5_115);
         assert_eq!((plan.scan_us(), plan.longest_us()), (5_573, 6_207));
         assert!(plan.longest_us() * 3 <= frame_period_us * 2);
-        assert_eq!(plan.most_oversampling(frame_period_us), Some(1));
     }
 
     #[test]
@@ -351,7 +326,15 @@ mod tests {
         }
         assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).longest_us(), 253);
         assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 12).longest_us(), 1019);
-        assert_eq!(ScanPlan::of_nucleo_onchip(8, 18, 1).most_oversampling(1000), Some(11));
+    }
+
+    #[test]
+    fn no_scan_that_can_be_configured_takes_as_long_as_one_that_is_given_up() {
+        let (settling_us, oversampling) =
+            (ScanSettings::MOST_SETTLING_US, ScanSettings::MOST_OVERSAMPLING);
+        let plan = ScanPlan::of_nucleo_onchip(ONCHIP_ROWS, ONCHIP_COLUMNS, oversampling);
+        let longest_us = ScanPlan { settling_us, ..plan }.longest_us();
+        assert!(u64::from(longest_us) < LONGEST_SCAN_US, "{longest_us}");
     }
 
     #[test]
@@ -366,9 +349,6 @@ mod tests {
         assert_eq!(part.longest_us(), 9 * row_ns / 1000 + (8 * 3 + 18 + 15) * 3 / 2 + 1);
         let four = ScanPlan { oversampling: 4, ..PLAN };
         assert_eq!(four.longest_us(), 9 * 12 + 4 * 9 * 18 * 3 / 2);
-        let most = PLAN.most_oversampling(10_000).unwrap();
-        assert!(ScanPlan { oversampling: most, ..PLAN }.longest_us() <= 10_000);
-        assert!(ScanPlan { oversampling: most + 1, ..PLAN }.longest_us() > 10_000);
     }
 
     #[test]
@@ -376,6 +356,5 @@ mod tests {
         let (rows, settling_us, oversampling) = (u16::MAX, u32::MAX, u16::MAX);
         let endless = ScanPlan { rows, settling_us, oversampling, pass_samples: 1, ..PLAN };
         assert_eq!((endless.scan_us(), endless.longest_us()), (u32::MAX, u32::MAX));
-        assert_eq!(endless.most_oversampling(u32::MAX - 1), None);
     }
 }

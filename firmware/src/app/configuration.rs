@@ -77,7 +77,7 @@ mod tests {
         for (bad, field) in [
             (Configuration { frame_period_us: 99, ..good }, ConfigurationField::FramePeriod),
             (Configuration { frame_period_us: u32::MAX, ..good }, ConfigurationField::FramePeriod),
-            (Configuration { scan: scan(10_001, 1), ..good }, ConfigurationField::Settling),
+            (Configuration { scan: scan(5_001, 1), ..good }, ConfigurationField::Settling),
             (Configuration { scan: scan(0, 0), ..good }, ConfigurationField::Oversampling),
             (Configuration { scan: scan(0, 257), ..good }, ConfigurationField::Oversampling),
             (Configuration { open_above_ohm: 5.0, ..good }, ConfigurationField::Limits),

@@ -13,11 +13,7 @@ use crate::link::message::{Configuration, HealthReport, Refusal, Report};
 use crate::link::packet::UNASKED;
 use crate::log::info;
 use crate::platform::Platform;
-use crate::readout::{Baseline, FrameSource, ScanReport, Selection};
-
-/// Longest time in µs for which a scan may go on by itself; then it has failed. With a watchdog's period it is long for
-/// every setting.
-const LONGEST_SCAN_US: u64 = 2_000_000;
+use crate::readout::{Baseline, FrameSource, LONGEST_SCAN_US, ScanReport, Selection};
 
 /// The sensor and the settings that belong to it.
 pub struct Sensor<'m, F, const ROWS: usize> {

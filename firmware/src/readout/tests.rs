@@ -370,7 +370,7 @@ fn settings_out_of_range_are_taken_for_the_nearest() {
     assert_eq!(scanner.scan(wild, WIRES, frame.as_flattened_mut()).failed_samples, 0);
     assert_eq!(record.transfers(), 3 * 3);
     let waits = record.take();
-    assert_eq!(waits.iter().filter(|it| **it == Event::WaitNs(10_000_000)).count(), 3);
+    assert_eq!(waits.iter().filter(|it| **it == Event::WaitNs(5_000_000)).count(), 3);
 }
 
 #[test]

@@ -70,7 +70,7 @@ pub enum KeepFault {
 pub enum ConfigurationField {
     /// The frame period: 0, or from 100 µs to 1000 s.
     FramePeriod,
-    /// The settling time: at most 10 ms.
+    /// The settling time: at most 5 ms.
     Settling,
     /// The oversampling: from 1 to 256.
     Oversampling,

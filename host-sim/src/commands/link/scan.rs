@@ -31,7 +31,7 @@ pub struct TimingArguments {
     #[serde(flatten)]
     pub period: ScanPeriodArgument,
     /// Wait after a row is driven.
-    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=10_000))]
+    #[arg(long, value_name = "US", value_parser = value_parser!(u32).range(..=5_000))]
     settling_us: Option<u32>,
     /// Samples averaged for a reading.
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=256))]
