@@ -210,8 +210,8 @@ mod tests {
         ] {
             let clock = clock(text, None).unwrap();
             assert_eq!((clock.unit, &clock.at[..]), ("s", &[0.0, 1.0, 2.0][..]), "{text}");
-            assert_eq!(clock.span(0.0, 2.0), "in 2.000 s");
-            assert_eq!(clock.span(0.0, 120.0), "in 2.0 minutes");
+            assert_eq!(clock.span(50.0, 52.0), "in 2.000 s");
+            assert_eq!(clock.span(30.0, 120.0), "in 1.5 minutes");
         }
     }
 
@@ -231,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_column_that_is_named_must_hold_times() {
-        assert_eq!(clock("n,a\n5,1\n7,2\n", Some("n")).unwrap().at, [5.0, 7.0]);
+        assert_eq!(clock("n,a\n5,1\n7,2\n7,3\n", Some("n")).unwrap().at, [5.0, 7.0, 7.0]);
         let refused = clock("n,a\n5,1\n4,2\n", Some("n")).unwrap_err().to_string();
         assert!(refused.contains("line 3") && refused.contains("4 is earlier than 5"), "{refused}");
         let refused = clock("n,a\n,1\n5,2\n", Some("n")).unwrap_err().to_string();
@@ -241,14 +241,21 @@ mod tests {
     #[test]
     fn neighbours_are_alike_in_a_log_and_not_in_shuffled_lines() {
         let table = |values: Vec<f64>| Table { names: vec!["f_n".into()], values: values.into() };
-        assert!(neighbours_alike(&table((0..200).map(|i| (f64::from(i) / 9.0).sin()).collect())));
-        assert!(neighbours_alike(&table((0..200).map(|i| (0.8 * f64::from(i)).sin()).collect())));
-        assert!(!neighbours_alike(&table((0..200).map(|i| f64::from(i * 37 % 101)).collect())));
+        let wave =
+            |step: f64, lines: i32| (0..lines).map(|i| (step * f64::from(i)).sin()).collect();
+        assert!(
+            neighbours_alike(&table(wave(0.1, 20))) && !neighbours_alike(&table(wave(0.1, 19)))
+        );
+        let waves: Vec<f64> = wave(0.8, 200);
+        let names = ["x", "y", "constant"].map(String::from).to_vec();
+        let values = waves.iter().flat_map(|value| [*value, *value, 7.0]).collect();
+        assert!(neighbours_alike(&Table { names, values }));
+        let shuffled = |i: i32| 1e3 + f64::from(i * 37 % 101) / 101.0;
+        assert!(!neighbours_alike(&table((0..200).map(shuffled).collect())));
         // Pauses without a value do not count.
         let gaps = |i: i32| if i % 3 == 0 { (f64::from(i) / 20.0).sin() } else { f64::NAN };
         assert!(neighbours_alike(&table((0..300).map(gaps).collect())));
-        // What never changes tells nothing, however its mean is rounded, and few lines tell little.
+        // What never changes tells nothing, however its mean is rounded.
         assert!(!neighbours_alike(&table(vec![0.1; 2400])));
-        assert!(!neighbours_alike(&table((0..9).map(f64::from).collect())));
     }
 }

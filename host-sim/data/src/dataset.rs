@@ -446,6 +446,20 @@ mod tests {
     }
 
     #[test]
+    fn frames_that_are_kept_are_those_of_a_subset_and_inputs_may_share_a_span() {
+        let names = |all: [&str; 2]| all.map(String::from).to_vec();
+        let mut set = Dataset::empty(names(["a", "b"]), names(["x_mm", "f_n"]), 1, 5);
+        set.inputs.values = vec![1.0, 50.0, 3.0, 20.0, 2.0, 40.0, 7.0, 30.0, 5.0, 60.0].into();
+        set.outputs.values = (0..10).map(f64::from).collect();
+        let mut kept = set.clone();
+        kept.keep(&[0, 2, 3]);
+        assert_eq!(kept, set.subset(&[0, 2, 3]));
+        assert_eq!(kept.input_ranges(), [[1.0, 7.0], [30.0, 50.0]]);
+        kept.common_span = true;
+        assert_eq!(kept.input_ranges(), [[-6.0, 14.0], [30.0, 50.0]]);
+    }
+
+    #[test]
     fn columns_that_lack_most_are_named_the_emptiest_first() {
         let (gap, header) = (f64::NAN, ["a", "b", "c", "d", "e"].map(String::from).to_vec());
         #[rustfmt::skip]

@@ -254,7 +254,7 @@ mod tests {
         // Three times 0.1 is more than 0.3.
         let table = Table { names: vec!["a".into()], values: vec![0.1; 3].into() };
         assert_eq!((table.means(), table.deviations()), (vec![0.1], vec![0.0]));
-        let rounded = Table { names: vec!["a".into()], values: vec![100.0, 100.0 + 1e-9].into() };
+        let rounded = Table { names: vec!["a".into()], values: vec![100.0, 100.0 + 1e-6].into() };
         assert_eq!(rounded.deviations(), [0.0]);
     }
 
@@ -270,8 +270,31 @@ mod tests {
             (part.names, part.values.into_vec()),
             (vec!["y".into(), "x".into()], vec![3.0, 1.0, 7.0, 5.0])
         );
+        assert_eq!(table.pick(&[2, 0]).values, [5.0, 6.0, 7.0, 1.0, 2.0, 3.0]);
+        assert_eq!((table.len(), table.is_empty()), (3, false));
+        let last = table.columns(1, 2);
+        assert_eq!(
+            (&last.names[..], &last.lines_with(&[0, 1])[..]),
+            (&table.names[1..], &[0, 2][..])
+        );
+        assert_eq!(last.pick(&[0, 2]).cycled(3).values, [2.0, 3.0, 6.0, 7.0, 2.0, 3.0]);
+        assert_eq!(table.medians(), [5.0, 4.0, 7.0]);
         let complete = Table { names: table.names, values: vec![0.0; 6].into() };
         assert_eq!(complete.missing_together(), [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn places_that_are_not_told_are_the_mean_where_a_line_is_decoded() {
+        let of = |names: [&str; 2], estimates: [f64; 4]| {
+            let names = names.map(String::from).to_vec();
+            let truth = Table { names, values: vec![1.0, 2.0, 3.0, 6.0].into() };
+            format!("{:?}", truth.with_places(&estimates[..]))
+        };
+        let nan = f64::NAN;
+        assert_eq!(of(["x_mm", "f_n"], [nan, 0.0, nan, nan]), "[2.0, 0.0, NaN, NaN]");
+        assert_eq!(of(["x_mm", "f_n"], [9.0, nan, 8.0, 7.0]), "[9.0, NaN, 8.0, 7.0]");
+        assert_eq!(of(["x_mm", "y_mm"], [nan, nan, 8.0, 7.0]), "[2.0, 4.0, 8.0, 7.0]");
+        assert_eq!(of(["g_n", "f_n"], [nan, 1.0, nan, nan]), "[NaN, 1.0, NaN, NaN]");
     }
 
     #[test]

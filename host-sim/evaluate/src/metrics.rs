@@ -381,28 +381,45 @@ mod tests {
         assert!((rmse_of(&errors, ALL).unwrap() - 0.35).abs() < 1e-12);
         assert_eq!(rmse_of(&errors, "x_mm"), Some(5.0));
         assert_eq!((rmse_of(&errors, "y_mm"), rmse_of(&[], ALL)), (None, None));
+        assert_eq!([ALL, "x_mm"].map(unit_of_rmse), ["σ", "mm"]);
+    }
+
+    #[test]
+    fn a_share_of_an_error_is_compared_as_surely_as_the_error() {
+        let of = |rmse: f64| {
+            let parts = (0..50).map(|block| rmse * f64::from(block / 5 % 3)).collect();
+            let blocks = [("f_n".to_owned(), parts)].into();
+            DecoderErrors { blocks, ..DecoderErrors::new("of", vec![Errors::of("f_n", rmse, 0.0)]) }
+        };
+        // Blocks are alike but for their size, so that half the error is half of it in each.
+        let above = |share| of(0.51).is_surely_above("f_n", share, &of(1.0));
+        assert_eq!([0.5, 0.52].map(above), [true, false]);
     }
 
     #[test]
     fn every_definition_by_hand() {
         let truth = Table {
             names: ["r1e1_dz_mm", "r1e1_dx_mm", "r1e2_dz_mm"].map(String::from).to_vec(),
-            values: vec![0.05, 1.0, 1.0, 1.0, -1.0, 0.5].into(),
+            values: vec![0.05, 1.0, 1.0, 2.0, -1.0, 0.5].into(),
         };
         // Errors of both signs: +0.5 and −0.25 of three.
-        let estimate = [0.55, 1.0, 1.0, 0.75, -1.0, f64::NAN];
+        let estimate = [0.55, 1.0, 1.0, 1.75, -1.0, f64::NAN];
         let squares: f64 = 0.25 + 0.0625;
-        let measure =
-            Measure { full_scale: vec![1.0; 3], thickness_mm: Some(5.0), limit: None, noise: None };
+        let measure = Measure {
+            full_scale: vec![4.0, 1.0, 2.0],
+            thickness_mm: Some(5.0),
+            limit: None,
+            noise: None,
+        };
         let [z, x] = &by_group(&truth, &estimate, &measure)[..] else { panic!("two groups") };
         assert_eq!((z.group.as_str(), z.count, z.unit.as_str()), ("dz_mm", 3, "mm"));
         let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
         close(Some(z.rmse), (squares / 3.0).sqrt());
-        close(z.relative_l2_percent, 100.0 * (squares / 2.0025).sqrt());
-        close(z.full_scale_percent, 75.0 / 3.0);
-        close(z.positional_percent, 100.0 * (0.5 / 4.95 + 0.25 / 4.0) / 3.0);
-        close(z.r_squared, 1.0 - squares / 0.45125); // means are 0.525 and 1
-        close(z.mean_relative_percent, 12.5); // the truth 0.05 is too small for one
+        close(z.relative_l2_percent, 100.0 * (squares / 5.0025).sqrt());
+        close(z.full_scale_percent, 75.0 / 4.0 / 3.0);
+        close(z.positional_percent, 100.0 * (0.5 / 4.95 + 0.25 / 3.0) / 3.0);
+        close(z.r_squared, 1.0 - squares / 1.90125); // means are 1.025 and 1
+        close(z.mean_relative_percent, 6.25); // the truth 0.05 is too small for one
         assert_eq!((x.rmse, x.positional_percent), (0.0, None));
     }
 

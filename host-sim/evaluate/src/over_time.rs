@@ -147,10 +147,11 @@ mod tests {
     #[test]
     fn errors_are_told_by_stretches_of_time_and_missing_values_do_not_count() {
         let log = log(Some("time_s"), 90);
-        let outputs = table("f_n", (0..90).map(|i| f64::from(i) / 9.0).collect());
-        let wrong = |(i, value): (usize, &f64)| value + if i < 30 { 1.0 } else { 2.0 };
+        let values = (0..180).map(|i| f64::from(i / 2) / 9.0).collect();
+        let outputs = Table { names: ["f_n", "g_n"].map(String::from).into(), values };
+        let wrong = |(i, value): (usize, &f64)| value + if i < 60 { 1.0 } else { 2.0 };
         let mut estimates: Vec<f64> = outputs.values.iter().enumerate().map(wrong).collect();
-        estimates[60..].fill(f64::NAN);
+        estimates[120..].fill(f64::NAN);
         let judged = Decoded { log: &log, outputs: &outputs, estimates: &estimates };
         let found = OverTime::new(None, &judged, None).unwrap();
         let told = |stretch: &Stretch| (stretch.from, stretch.to, stretch.rmse[0]);

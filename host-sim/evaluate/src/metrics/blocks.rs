@@ -67,6 +67,28 @@ pub fn standard_error(parts: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taxel_data::{Purpose, Random, Stream};
+
+    #[test]
+    fn parts_of_blocks_tell_the_standard_error_of_normal_errors() {
+        let mut random = Random::new(3, Stream::Test, Purpose::Noise, 0, 0);
+        let values: Vec<f64> = (0..2020).map(|at| f64::from(at % 7 * at)).collect();
+        let estimate = values.iter().map(|value| value + 0.5 * random.normal());
+        let estimate: Vec<f64> = estimate.collect();
+        let truth =
+            Table { names: ["a_mm", "b_n"].map(String::from).into(), values: values.into() };
+        let measure =
+            Measure { full_scale: vec![1.0; 2], thickness_mm: None, limit: None, noise: None };
+        let (_, blocks) = with_blocks(&truth, &estimate, &measure);
+        let [a, b] = ["a_mm", "b_n"].map(|group| &blocks[group]);
+        assert!(a.len() == 49 && a.iter().sum::<f64>().abs() < 1e-9, "{a:?}");
+        // σ/√2n of n values.
+        let error = standard_error(a.iter().copied());
+        assert!((error * 2020_f64.sqrt() / 0.5 - 1.0).abs() < 0.3, "{error}");
+        let deviations = truth.deviations();
+        let all = 0.5 * (a[7] / deviations[0] + b[7] / deviations[1]);
+        assert!((blocks[ALL][7] / all - 1.0).abs() < 1e-6, "{all}");
+    }
 
     #[test]
     fn a_standard_error_is_that_of_what_was_measured() {

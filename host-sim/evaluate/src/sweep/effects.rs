@@ -187,9 +187,10 @@ mod tests {
 
     #[test]
     fn chance_is_taken_off_the_share_of_drawn_levels() {
-        // Squares within and between are 4 of 8 each; those within have two degrees of freedom.
-        let of = |is_drawn| share(is_drawn, &[0.0, 2.0, 4.0, 2.0], &[vec![0, 1], vec![2, 3]]);
-        assert_eq!([true, false].map(|is_drawn| of(is_drawn).unwrap().0), [0.25, 0.5]);
+        // Squares within are 4 of 10 and those between 6; those within have four degrees of freedom.
+        let (values, groups) = ([0.0, 2.0, 1.0, 4.0, 2.0, 3.0], [vec![0, 1, 2], vec![3, 4, 5]]);
+        let of = |is_drawn| share(is_drawn, &values, &groups).unwrap().0;
+        assert_eq!([true, false].map(of), [0.5, 0.6]);
     }
 
     #[test]

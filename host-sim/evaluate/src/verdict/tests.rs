@@ -123,7 +123,7 @@ fn errors_that_chance_explains_are_no_reason_to_warn() {
         all.extend(decoders(&[("mean", &[("f_n", 1.3)])]));
         Verdict::new(&all, &no_limit())
     };
-    assert_eq!(names(&with_parts(0.01)), ["worse-than-baseline"]);
+    assert_eq!(names(&with_parts(0.02)), ["worse-than-baseline"]);
     let unsure = with_parts(0.1);
     assert_eq!(names(&unsure), [""; 0]);
     assert!(!unsure.sentence.contains("A simpler decoder"), "{}", unsure.sentence);
