@@ -324,13 +324,10 @@ mod tests {
         assert_eq!(quantity_of("contact_x_mm"), quantity_of("contact_y_mm"));
         assert_ne!(quantity_of("contact_x_mm"), quantity_of("contact_depth_mm"));
         assert_eq!(quantity_of("r4e2_dz_mm"), quantity_of("x_mm"));
-        for name in ["x_mm", "contact_y_mm", "pos_x", "Y (µm)"] {
-            assert!(is_place(name), "{name}");
-        }
-        for name in ["contact_depth_mm", "contact_shear_x_mm", "force_x", "x_n", "r1e2_x_mm", "max"]
-        {
-            assert!(!is_place(name), "{name}");
-        }
+        assert_eq!(["x_mm", "contact_y_mm", "pos_x", "Y (µm)"].map(is_place), [true; 4]);
+        let amounts =
+            ["contact_depth_mm", "contact_shear_x_mm", "force_x", "x_n", "r1e2_x_mm", "max"];
+        assert_eq!(amounts.map(is_place), [false; 6]);
     }
 
     #[test]

@@ -294,7 +294,6 @@ mod tests {
         assert_eq!(of(["x_mm", "f_n"], [nan, 0.0, nan, nan]), "[2.0, 0.0, NaN, NaN]");
         assert_eq!(of(["x_mm", "f_n"], [9.0, nan, 8.0, 7.0]), "[9.0, NaN, 8.0, 7.0]");
         assert_eq!(of(["x_mm", "y_mm"], [nan, nan, 8.0, 7.0]), "[2.0, 4.0, 8.0, 7.0]");
-        assert_eq!(of(["g_n", "f_n"], [nan, 1.0, nan, nan]), "[NaN, 1.0, NaN, NaN]");
     }
 
     #[test]

@@ -197,6 +197,7 @@ mod tests {
             [still, still + drift, still + left]
         };
         let readings = Table { names, values: (0..400).flat_map(line).collect() };
+        let all: Vec<usize> = (0..400).collect();
         let rest = Rest { readings: readings.clone(), lines: lines() };
         let found = RestOverTime::new(&rest, &clock, &Spread::of(&readings)).unwrap();
         assert_eq!((found.percent_of, found.most.as_str()), (PercentOf::Rest, "drifts"));
@@ -205,6 +206,12 @@ mod tests {
         assert!((6.3..6.4).contains(&drift.percent), "{}", drift.percent);
         assert_eq!((drift.from, drift.to), (20.0, 1558.0));
         assert_eq!(found.stretches[0].most_percent, 0.0);
+        // It is none where presses move the readings far more, or where few readings drift.
+        let spread = Spread { deviations: vec![400.0; 3], ..Spread::of(&readings) };
+        assert_eq!(RestOverTime::new(&rest, &clock, &spread).unwrap().drifts, []);
+        let of_four = Rest { readings: readings.part(&all, &[0, 1, 2, 0]), lines: lines() };
+        let spread = Spread::of(&of_four.readings);
+        assert_eq!(RestOverTime::new(&of_four, &clock, &spread).unwrap().drifts, []);
         // Where a baseline was subtracted, changes are told in per cent of the range.
         let means = readings.means().into_iter().cycle();
         let values = readings.values.iter().zip(means).map(|(value, mean)| value - mean).collect();
@@ -228,5 +235,7 @@ mod tests {
         let found = RestOverTime::new(&rest, &clock, &Spread::of(&readings)).unwrap();
         let [low, middle, high] = found.stretches.last().unwrap().percentiles_percent;
         assert!((low / middle - 0.2).abs() < 0.01 && (high / middle - 1.8).abs() < 0.01);
+        // The means of second halves of pauses are 330 lines apart.
+        assert!((middle - 412.5 / (1000.0 + 5.0 * 199.5 / 400.0)).abs() < 1e-9, "{middle}");
     }
 }

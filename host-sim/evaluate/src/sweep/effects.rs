@@ -200,10 +200,7 @@ mod tests {
             .collect();
         let fields = ["a".to_owned()];
         let all = Settings { fields: &fields, is_drawn: false, values: settings.iter().collect() };
-        let effects = all.effects(
-            "x",
-            &of(&["a".into(), "a".into()], &settings).iter().map(|_| Some(1.0)).collect::<Vec<_>>(),
-        );
+        let effects = all.effects("x", &[Some(1.0); 80]);
         assert!(effects.is_empty(), "nothing varies");
         let rising: Vec<Option<f64>> = settings.iter().map(|it| it["a"].as_f64()).collect();
         let effect = &all.effects("x", &rising)[0];

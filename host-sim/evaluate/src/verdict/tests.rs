@@ -84,6 +84,8 @@ fn a_verdict_tells_gains_and_losses_over_mean_and_linear() {
         ([0.25, 0.1], [1.0, 1.0], [0.25, 0.3], "", "0 to 67 % below the best linear decoder"),
         ([0.63, 0.3], [1.0, 1.0], [0.5, 0.5], worse, "26 % above to 40 % below the best linear"),
         ([0.63, 0.6], [1.0, 1.0], [0.5, 0.5], worse, "20 to 26 % above the best linear decoder"),
+        ([0.6, 0.3], [1.0, 1.0], [0.5, 0.25], worse, ", and 20 % above the best linear"),
+        ([0.25, 0.25], [1.0, 1.0], [0.5, 0.5], "", ": 75 % below always predicting"),
         ([0.0, 0.1], [0.0, 1.0], [0.0, 0.3], "", "f_n does not change in these frames"),
         ([missing, 0.1], [missing, 1.0], [missing, 0.3], "", "f_n has no frame to judge by"),
         ([0.95, 0.86], [1.0, 1.0], [1.0, 1.0], "", "of f_n and g_n: at best 14 % below"),
@@ -132,7 +134,7 @@ fn errors_that_chance_explains_are_no_reason_to_warn() {
 #[test]
 fn centres_are_as_many_as_frames_allow_without_a_warning() {
     for (frames, inputs, centres) in
-        [(640, 2, 60), (300, 12, 16), (50, 12, 4), (3, 2, 2), (9999, 18, 980)]
+        [(660, 2, 60), (300, 12, 16), (50, 12, 4), (3, 2, 2), (9999, 18, 980)]
     {
         assert_eq!(Warning::enough_frames_for(frames, inputs), centres, "{frames}");
         let few = Warning::few_frames(frames, centres, inputs);
