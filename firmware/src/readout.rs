@@ -14,6 +14,7 @@ use crate::circuit::{Constants, ConstantsFault};
 mod baseline;
 mod rows;
 mod columns;
+mod diagnosis;
 mod scanner;
 mod passes;
 #[cfg(test)]
@@ -21,6 +22,7 @@ mod tests;
 
 pub use baseline::Baseline;
 pub use columns::{Mcp3208s, SampleError};
+pub use diagnosis::{Diagnosis, PINS};
 pub use passes::{PassScanner, Sequencer, SequencerFault, add_samples};
 pub use rows::{DriveError, ShiftRegister595};
 pub use scanner::Scanner;
@@ -141,6 +143,11 @@ pub trait FrameSource {
 
     /// Gives up the scan that was started, if there is one: rows idle, and nothing of it gets into another frame.
     fn stop(&mut self) {}
+
+    /// Tests itself, which takes milliseconds, and gives up a scan under way. `None` if it cannot.
+    fn diagnose(&mut self) -> Option<Diagnosis> {
+        None
+    }
 
     /// The circuit's constants, if there are any that can be asked for.
     fn constants(&self) -> Option<Constants<'_>> {

@@ -9,6 +9,7 @@ use taxel_firmware::link::message::{
     UploadState, UploadStep,
 };
 use taxel_firmware::link::packet::{self, PROTOCOL_VERSION};
+use taxel_firmware::readout::Diagnosis;
 
 const START_US: u64 = 3_000_000;
 
@@ -107,7 +108,7 @@ fn identity() -> Report<'static> {
 }
 
 /// Messages about constants of the circuit and settings that are kept.
-fn about_settings() -> [(&'static str, Vec<u8>); 10] {
+fn about_settings() -> [(&'static str, Vec<u8>); 12] {
     let circuit = ZeroPotential::<1, 2>::TYPICAL;
     let constants = circuit.constants();
     let kept = Kept {
@@ -116,6 +117,15 @@ fn about_settings() -> [(&'static str, Vec<u8>); 10] {
         baseline: Some(KeptBaseline { rows: 8, columns: 18, frames: 20 }),
         writes_left: 99,
     };
+    let diagnosis = Diagnosis {
+        reference: 1501,
+        temperature: 959,
+        factory: [1501, 959, 1207],
+        items: [9, 9, 162, 1],
+        has_stopped: true,
+        pass_cycles: 300,
+        ..Diagnosis::default()
+    };
     [
         ("constants?", request_bytes(8, &Request::Constants)),
         ("set constants", request_bytes(8, &Request::SetConstants(constants))),
@@ -123,8 +133,10 @@ fn about_settings() -> [(&'static str, Vec<u8>); 10] {
         ("keep the baseline", request_bytes(9, &Request::Keep(Setting::Baseline))),
         ("forget the constants", request_bytes(9, &Request::Forget(Setting::Constants))),
         ("set the brown-out level", request_bytes(9, &Request::SetBrownOut)),
+        ("diagnose", request_bytes(10, &Request::Diagnose)),
         ("constants", report_bytes(8, &Report::Constants(constants))),
         ("kept", report_bytes(9, &Report::Kept(kept))),
+        ("diagnosis", report_bytes(10, &Report::Diagnosis(diagnosis))),
         ("refused: feedback", refused(9, Refusal::Constants(ConstantsFault::Feedback))),
         ("refused: nothing to keep", refused(9, Refusal::Keep(KeepFault::Nothing))),
     ]

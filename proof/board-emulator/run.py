@@ -10,6 +10,7 @@ import sys
 import time
 
 from bench import Bench, Failed
+from faults import FAULTS
 from machine.rules import Fault
 from scenarios import SCENARIOS, serve
 
@@ -24,6 +25,8 @@ def main():
     parser.add_argument("--seconds", type=float, default=1.0, help="seconds for which `stream` counts estimates (1)")
     parser.add_argument("scenarios", nargs="*", metavar="scenario",
                         help=f"all, or some of: {', '.join(SCENARIOS)}; or serve")
+    parser.add_argument("--bare", action="store_true", help="`serve` has nothing at its pins, unless a fault needs a circuit")
+    parser.add_argument("--fault", choices=FAULTS, help="a fault of `serve`")
     parser.add_argument("--taxel", type=pathlib.Path, required=True, help="the program taxel")
     parser.add_argument("--model", type=pathlib.Path, required=True, help="a model of the scene `press`")
     parser.add_argument("--directory", type=pathlib.Path, required=True, help="folder for logs and tables")

@@ -13,6 +13,7 @@ import signal
 import struct
 
 from bench import ERASE_PATIENCE_S, IDENTIFY, KEEP_CONFIGURATION, RESTART, begin, expect
+from faults import FAULTS, OF_CIRCUIT
 from machine.flash import FACTORY_OPTIONS, LEVEL_3_OPTIONS, PROGRAM_S, SECTORS
 from machine.line import Terminal, packets, taken, varint
 
@@ -521,7 +522,8 @@ class Stamped(bytearray):
 
 def serve(make, files):
     """A board for you: its serial port stays open until Ctrl-C."""
-    bench = make()
+    fault = FAULTS.get(files.fault, lambda board: None)
+    bench = make(bare=files.bare and fault not in OF_CIRCUIT, plant=fault)
     terminal = Terminal(bench.board)
     # Both depend on the settling time and the number of samples, which a user may configure.
     bench.board.rules.waived = {"row-left", "wait-short"}

@@ -14,6 +14,7 @@ mod reset;
 mod serial;
 mod slot;
 mod own_converters;
+mod self_test;
 mod board;
 mod device;
 

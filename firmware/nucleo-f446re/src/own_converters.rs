@@ -18,7 +18,7 @@ use stm32f4xx_hal::pac::dma2::ST;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, ADC2, ADC3, DMA2, GPIOB, RCC, TIM1, TIM8};
 use stm32f4xx_hal::rcc::Rcc;
 use taxel_core::RowWire;
-use taxel_firmware::readout::{Sequencer, SequencerFault, add_samples};
+use taxel_firmware::readout::{Diagnosis, Sequencer, SequencerFault, add_samples};
 use taxel_firmware::timing::{
     ONCHIP_COLUMNS, ONCHIP_ROWS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts,
 };
@@ -66,7 +66,7 @@ fn row_word(row: RowWire) -> u32 {
 }
 
 /// Channels of each converter, in the order in which it converts them: PA0, PA1, PA4; PA6, PA7, PB0; PC0, PC1, PC2.
-const CHANNELS: [[u32; 3]; 3] = [[0, 1, 4], [6, 7, 8], [10, 11, 12]];
+pub(crate) const CHANNELS: [[u32; 3]; 3] = [[0, 1, 4], [6, 7, 8], [10, 11, 12]];
 
 /// Field of a stream of DMA2 that chooses timer 1's requests; those of the converters are 0.
 const OF_TIMER_1: u32 = 6 << 25;
@@ -81,8 +81,8 @@ const HALF_WORDS: u32 = 1 << 11 | 1 << 13;
 const FIRST: u32 = 3 << 16;
 
 /// Flags of streams 0 to 3 and 4 to 7: complete are the numbers, and the end; an error of any stream.
-const NUMBERS_COMPLETE: u32 = 1 << 5;
-const END_COMPLETE: u32 = 1 << 11;
+pub(crate) const NUMBERS_COMPLETE: u32 = 1 << 5;
+pub(crate) const END_COMPLETE: u32 = 1 << 11;
 const LOW_ERRORS: u32 = 1 << 2 | 1 << 3 | 1 << 19;
 const HIGH_ERRORS: u32 = 1 << 9 | 1 << 19;
 const LOW_FLAGS: u32 = 0x3D | 0x3D << 16;
@@ -93,11 +93,11 @@ const HIGH_FLAGS: u32 = 0x3D << 6 | 0x3D << 16;
 const COMMON: u32 = 0b10110 | 1 << 13 | 1 << 14 | 1 << 16;
 
 /// A number that nobody took before the next one came, of any converter.
-const OVERRUN: u32 = 1 << 5 | 1 << 13 | 1 << 21;
+pub(crate) const OVERRUN: u32 = 1 << 5 | 1 << 13 | 1 << 21;
 
 /// Fields of the converters' control: several channels; on; trigger by a rising edge of timer 8's output.
 const SEVERAL: u32 = 1 << 8;
-const ON: u32 = 1 << 0;
+pub(crate) const ON: u32 = 1 << 0;
 const BY_TIMER_8: u32 = 14 << 24 | 1 << 28;
 
 /// Sampling for 15 cycles, for channels from 10 on and below.
@@ -106,7 +106,7 @@ const LOW_SAMPLED: u32 = 0o1_111_111_111;
 
 /// Fields of the timers: counting; only an overflow makes an update; the first one is the last; trigger output
 /// by channel 1, which is active from its count on; started by timer 1; load everything.
-const COUNTING: u32 = 1 << 0;
+pub(crate) const COUNTING: u32 = 1 << 0;
 const BY_OVERFLOW: u32 = 1 << 2;
 const ONCE: u32 = 1 << 3;
 const OUTPUT_1: u32 = 4 << 4;
@@ -151,10 +151,10 @@ static MEMORY: Place = Place(UnsafeCell::new(Memory {
 
 /// The converters, DMA, and the timers of the rows and of the triggers.
 pub struct OwnConverters {
-    converters: (ADC1, ADC2, ADC3, ADC_COMMON),
-    dma: DMA2,
-    timers: (TIM1, TIM8),
-    clock_mhz: u32,
+    pub(crate) converters: (ADC1, ADC2, ADC3, ADC_COMMON),
+    pub(crate) dma: DMA2,
+    pub(crate) timers: (TIM1, TIM8),
+    pub(crate) clock_mhz: u32,
     /// Samples of a reading in the pass under way.
     samples: u16,
 }
@@ -190,7 +190,7 @@ impl OwnConverters {
     }
 
     /// Streams of the numbers, of the second half, of the end and of the rows.
-    fn streams(&self) -> [&ST; 4] {
+    pub(crate) fn streams(&self) -> [&ST; 4] {
         [self.dma.st(0), self.dma.st(2), self.dma.st(5), self.dma.st(6)]
     }
 }
@@ -267,6 +267,10 @@ impl Sequencer<COLUMNS> for OwnConverters {
         let numbers = unsafe { &(*numbers).numbers };
         add_samples(numbers.get(..count).unwrap_or_default(), self.samples, sums);
         Some(Ok(()))
+    }
+
+    fn diagnose(&mut self) -> Option<Diagnosis> {
+        Some(self.test())
     }
 
     /// Sets everything up anew, which a pass that was cut needs: the converters deliver their numbers in turn.

@@ -94,6 +94,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 Ok(Some(Report::Restarting))
             }
             Request::SetBrownOut => Err(Refusal::Flash),
+            Request::Diagnose => {
+                sensor.diagnose().map(Report::Diagnosis).map(Some).ok_or(Refusal::Unknown)
+            }
             Request::Constants => {
                 let constants = sensor.source.constants().map(Report::Constants);
                 constants.map(Some).ok_or(Refusal::Constants(ConstantsFault::Fixed))

@@ -13,7 +13,7 @@ use crate::link::message::{Configuration, HealthReport, Refusal, Report};
 use crate::link::packet::UNASKED;
 use crate::log::info;
 use crate::platform::Platform;
-use crate::readout::{Baseline, FrameSource, LONGEST_SCAN_US, ScanReport, Selection};
+use crate::readout::{Baseline, Diagnosis, FrameSource, LONGEST_SCAN_US, ScanReport, Selection};
 
 /// The sensor and the settings that belong to it.
 pub struct Sensor<'m, F, const ROWS: usize> {
@@ -218,6 +218,12 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
             self.stop_scan();
         }
         Some(Ended { scan, end_us: Some(now_us), is_whole })
+    }
+
+    /// Lets the source test itself.
+    pub fn diagnose(&mut self) -> Option<Diagnosis> {
+        self.stop_scan();
+        self.source.diagnose()
     }
 
     /// Gives up the scan that goes on by itself: what it is of changes. It counts as no frame.

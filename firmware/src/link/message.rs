@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use taxel_core::blob::Floats;
 
 use crate::circuit::Constants;
-use crate::readout::ScanSettings;
+use crate::readout::{Diagnosis, ScanSettings};
 
 mod refusal;
 
@@ -77,6 +77,8 @@ pub enum Request<'a> {
     /// Let the chip reset while its supply is too low, for good, and restart. Answered by [`Report::Restarting`], or by
     /// [`Refusal::Flash`] if the supply is too low now, or the board cannot.
     SetBrownOut,
+    /// Let the readout test itself. Answered by [`Report::Diagnosis`], or by [`Refusal::Unknown`] if it cannot.
+    Diagnose,
 }
 
 /// Steps of uploading a model, in their order.
@@ -165,6 +167,8 @@ pub enum Report<'a> {
     Constants(#[serde(borrow)] Constants<'a>),
     /// The settings that are kept over restarts.
     Kept(Kept),
+    /// What the readout found when it tested itself.
+    Diagnosis(Diagnosis),
 }
 
 /// Identity of the device, and of the model in force.

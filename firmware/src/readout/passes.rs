@@ -3,7 +3,7 @@
 use taxel_core::{ColumnWires, RowWire};
 
 use super::scanner::count_failures;
-use super::{FrameSource, SCANS_A_ROUND, ScanReport, ScanSettings, Selection};
+use super::{Diagnosis, FrameSource, SCANS_A_ROUND, ScanReport, ScanSettings, Selection};
 use crate::circuit::{Constants, ConstantsFault, ScannedRow, ZeroPotential};
 
 /// Hardware that drives rows one after the other and samples all `COLUMNS` columns by itself: a *pass*.
@@ -24,6 +24,11 @@ pub trait Sequencer<const COLUMNS: usize> {
 
     /// Gives up the pass, if one goes on: all rows idle.
     fn stop(&mut self);
+
+    /// Tests itself, and gives up the pass, if one goes on. `None` if it cannot.
+    fn diagnose(&mut self) -> Option<Diagnosis> {
+        None
+    }
 }
 
 /// A pass of which samples were lost.
@@ -210,6 +215,11 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
     fn stop(&mut self) {
         self.sequencer.stop();
         (self.scans_left, self.has_ended) = (0, true);
+    }
+
+    fn diagnose(&mut self) -> Option<Diagnosis> {
+        self.stop();
+        self.sequencer.diagnose()
     }
 
     fn constants(&self) -> Option<Constants<'_>> {

@@ -249,6 +249,14 @@ impl Device {
         })
     }
 
+    /// Lets the device's readout test itself.
+    pub fn diagnose(&mut self) -> Result<taxel_firmware::readout::Diagnosis> {
+        self.ask_plainly(&Request::Diagnose, |report| match report {
+            Report::Diagnosis(diagnosis) => Some(*diagnosis),
+            _ => None,
+        })
+    }
+
     /// Gives the device a baseline in Ω, one number a reading of its model.
     pub fn set_baseline(&mut self, baseline_ohm: &[f32]) -> Result<()> {
         let request = Request::SetBaseline { readings_ohm: Floats::new(baseline_ohm) };

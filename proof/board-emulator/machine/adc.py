@@ -3,13 +3,19 @@
 import math
 
 from .bus import Registers
+from .cpu import FACTORY
 from .rules import Fault
 
-SR, CR1, CR2, SMPR1, SMPR2, SQR1, SQR3 = 0x00, 0x04, 0x08, 0x0C, 0x10, 0x2C, 0x34
+SR, CR1, CR2, SMPR1, SMPR2, SQR1, SQR3, DR = 0x00, 0x04, 0x08, 0x0C, 0x10, 0x2C, 0x34, 0x4C
 CONVERTER_BYTES, CSR, CCR, CDR = 0x100, 0x300, 0x304, 0x308
 SCAN, ADON = 1 << 8, 1 << 0
 RISING, TIMER_8 = 1 << 28, 14 << 24
 TRIPLE_SIMULTANEOUS, EACH_NUMBER, FOR_EVER = 0b10110, 1 << 14, 1 << 13
+SWSTART, EOC = 1 << 30, 1 << 1
+#: Bit of the common control that turns the sensors on; channels of ADC1 that they have; time in s that a temperature takes.
+TSVREFE, REFERENCE, TEMPERATURE, SENSOR_S = 1 << 23, 17, 18, 10e-6
+#: Temperatures in °C of the factory's numbers, and its supply in V.
+FACTORY_CELSIUS, FACTORY_V = (30, 110), 3.3
 OVERRUNS = 1 << 5 | 1 << 13 | 1 << 21
 #: Cycles to sample, by their field; to convert 12 bits; and that a trigger may take.
 SAMPLE_CYCLES = (3, 15, 28, 56, 84, 112, 144, 480)
@@ -31,14 +37,16 @@ ANALOGUE = 3
 
 
 class Adc(Registers):
-    """Three converters. `counts(pin, cycle)` tells what a pin's voltage makes of it, with the cycle at which sampling
+    """Three converters. `reference_v` is their reference in V. `counts(pin, cycle)` tells what a pin's voltage makes of it, with the cycle at which sampling
     begins. `advance` is called before an access.
     """
 
     def __init__(self, time, rules, rcc, ports, dma, advance, counts):
         super().__init__()
         self._time, self._rules, self._rcc, self._ports = time, rules, rcc, ports
-        self._dma, self._advance, self._counts = dma, advance, counts
+        self._dma, self._advance, self._counts, self.reference_v = dma, advance, counts, FACTORY_V
+        #: What a fault changes: pins by channel, converters that never answer, and the chip's temperature in °C.
+        self.pins, self.dead, self.celsius = list(PINS), set(), 25.0
 
     def reset(self):
         """The clock controller resets all three."""
@@ -46,6 +54,9 @@ class Adc(Registers):
 
     def read(self, offset):
         self._advance()
+        converter, register = divmod(offset, CONVERTER_BYTES)
+        if register == DR and converter < 3:
+            self.values[offset - DR] = self._of(converter, SR) & ~EOC
         return super().read(offset)
 
     def write(self, offset, value):
@@ -54,6 +65,32 @@ class Adc(Registers):
         if converter < 3 and not self._rcc.converter_clocked(converter):
             self._rules.breach("clock-gate", f"ADC{converter + 1}")
         super().write(offset, value)
+        if converter < 3 and offset % CONVERTER_BYTES == CR2 and value & SWSTART:
+            self._convert_alone(converter)
+
+    def _convert_alone(self, converter):
+        """One number of one converter, as the program asks for it: it is there at once, and its time has passed."""
+        common, channel = self.values.get(CCR, 0), self._of(converter, SQR3) & 31
+        if common & 31 or self._of(converter, CR1) or self._of(converter, SQR1) or not self._of(converter, CR2) & ADON:
+            raise Fault(f"ADC{converter + 1} has a mode that is not modelled: {common:#x}")
+        cycles = self.sample_cycles(channel)
+        if channel >= REFERENCE and cycles * self.cycle() < SENSOR_S * self._time.hz:
+            self._rules.breach("adc-sample", f"{cycles} cycles of a sensor")
+        if converter in self.dead:
+            return
+        self._time.now += int((cycles + CONVERT_CYCLES) * self.cycle())
+        self.values[CONVERTER_BYTES * converter + DR] = self._sensor(channel) if channel >= REFERENCE else \
+            self._counts(self.pins[channel], self._time.now)
+        self.values[CONVERTER_BYTES * converter + SR] = self._of(converter, SR) | EOC
+
+    def _sensor(self, channel):
+        """Counts of the reference or the temperature sensor."""
+        if not self.values.get(CCR, 0) & TSVREFE:
+            return 0
+        reference, cold, hot = FACTORY
+        low, high = FACTORY_CELSIUS
+        counts = reference if channel == REFERENCE else cold + (hot - cold) * (self.celsius - low) / (high - low)
+        return min((1 << BITS) - 1, round(counts * FACTORY_V / self.reference_v))
 
     def cycle(self):
         """Ticks of the processor's clock in a cycle of the converters'."""
@@ -104,7 +141,7 @@ class Adc(Registers):
                 self._rules.breach("adc-sample", f"{cycles} cycles of {needed:.1f}")
             turns.append((channels, at * tick, (at + cycles) * tick))
             at += cycles + CONVERT_CYCLES
-        for port, pin in (PINS[channel] for channels, _, _ in turns for channel in channels):
+        for port, pin in (self.pins[channel] for channels, _, _ in turns for channel in channels):
             if self._ports[port].mode(pin) != ANALOGUE:
                 self._rules.breach("adc-pin", f"P{port}{pin}")
         return turns, at * tick
@@ -114,7 +151,8 @@ class Adc(Registers):
         turns, busy = self.turns()
         if triggers > 1 and busy + SLACK_CYCLES * self.cycle() > step:
             self._rules.breach("adc-busy", f"{busy:.0f} of {step:.0f} cycles")
-        numbers = [self._counts(PINS[channel], first + begin) for channels, begin, _ in turns for channel in channels]
+        numbers = [0 if converter in self.dead else self._counts(self.pins[channel], first + begin)
+                   for channels, begin, _ in turns for converter, channel in enumerate(channels)]
         numbers *= triggers
         if self._dma.to_memory(STREAM, CHANNEL, DATA_ADDRESS, numbers) < len(numbers):
             self._rules.breach("adc-overrun")

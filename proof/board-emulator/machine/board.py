@@ -31,6 +31,8 @@ DIP_S = 1e-3
 POWER_ON, BY_WATCHDOG, BY_PROGRAM, BROWN_OUT = 0x0E00_0000, 0x2400_0000, 0x1400_0000, 0x0600_0000
 #: Alternate function that the pins of USART2 need: PA2 and PA3.
 USART_FUNCTION, TX, RX = 7, 2, 3
+#: Counts of a pin at which nothing is, by its pull, and with none.
+PULLED_UP, PULLED_DOWN, FLOATING = 4090, 3, 700
 #: Longest time in s between two looks at the host's end of the line.
 GLANCE_S = 0.2e-3
 #: Longest time in cycles from one look to the next at whether an interrupt can be taken.
@@ -44,15 +46,17 @@ class Board:
     `hse`: the ST-LINK gives its 8 MHz. `hsi_error`: by how much, as a share, the internal oscillator is too fast.
     `lsi_hz`: the watchdog's own clock. `erase_s`: how long erasing a slot takes, whatever the data sheet says. `options`:
     the option bytes. `sensor`: the converters answer their triggers. `settling_us`: the wait after each change of rows that
-    the device is configured to. `op_amp_hz`: the gain-bandwidth product of the op-amps.
+    the device is configured to. `op_amp_hz`: the gain-bandwidth product of the op-amps. `bare`: nothing is at the converters' pins. `plant(board)` plants
+    a fault after each reset.
     """
 
     def __init__(self, path, ohm, *, hse=True, hsi_error=0.0, lsi_hz=32_000, erase_s=None,
-                 options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=20.0,
+                 options=flash.LEVEL_3_OPTIONS, sensor=True, baud=921_600, settling_us=20.0, bare=False, plant=lambda board: None,
                  op_amp_hz=circuit.OP_AMP_HZ, log=print):
         self.image = Image(path)
         self._ohm, self._hse, self._lsi_hz, self._erase_s = ohm, hse, lsi_hz, erase_s
         self._hsi_error, self._supply_v, self._op_amp_hz = hsi_error, 3.3, op_amp_hz
+        self._bare, self._plant = bare, plant
         self._sensor, self._baud, self.settling_us, self._log = sensor, baud, settling_us, log
         self.time = Time()
         self.rules = Rules(self.where, self.note)
@@ -115,12 +119,15 @@ class Board:
         bus.attach(0x23800, self.rcc, "RCC", gated=False)
         bus.attach(0x23C00, self.flash, "FLASH", gated=False)
         self._start_converters(bus)
+        self._plant(self)
         self._idles, self._pins_checked, self._next_glance, self._patience = False, False, 0, 1
 
     def _start_converters(self, bus):
         """Puts the chip's converters on the bus, with the timers and the DMA that they work with."""
         time, rules = self.time, self.rules
         self._pins_at = None
+        #: Counts of pins that a fault holds.
+        self.held = {}
 
         def moment(cycle):
             self._pins_at = cycle
@@ -133,6 +140,11 @@ class Board:
             bus.write_by_dma(address - PERIPHERALS, value)
 
         def counts(pin, cycle):
+            port, number = pin
+            if pin in self.held:
+                return self.held[pin]
+            if self._bare:
+                return {gpio.PULL_UP: PULLED_UP, gpio.PULL_DOWN: PULLED_DOWN}.get(self.ports[port].pull(number), FLOATING)
             column = self.rows.column(pin, cycle)
             waited_us = self.time.ns(cycle - self.rows.changed_at) / 1e3 * (1 + self.rcc.clock_error())
             if waited_us < self.settling_us:
@@ -147,8 +159,8 @@ class Board:
             if bits & CONVERTERS_RESET:
                 adc.reset()
 
-        dma = Dma(self.cpu.uc, rules, advance, write, self._busy)
-        adc = Adc(time, rules, self.rcc, self.ports, dma, advance, counts)
+        dma = self.dma = Dma(self.cpu.uc, rules, advance, write, self._busy)
+        adc = self.adc = Adc(time, rules, self.rcc, self.ports, dma, advance, counts)
         #: What the converters scan, and what lets it go on until now.
         self.passes = Passes(time, rules, lambda: self.rcc.clocks.timer2, dma, adc, moment, self._busy, self._sensor)
         self.advance = advance

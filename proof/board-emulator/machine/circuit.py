@@ -17,6 +17,8 @@ class Circuit:
 
     def __init__(self, time, rules, rows, ohm, op_amp_hz):
         self._time, self._rules, self._rows, self._ohm = time, rules, rows, ohm
+        #: What a fault changes: the bias in V, and time constants in µs of columns whose op-amps are slow.
+        self.bias_v, self.slow_us = BIAS_V, {}
         #: Time in µs after which each column is within half a count: the op-amp is closed around 1 + R_f/R, with R all
         #: cells of the column in parallel.
         self.settled_us = [
@@ -34,8 +36,9 @@ class Circuit:
         if settled_us < self.settled_us[column]:
             self._rules.breach("not-settled", f"{settled_us:.1f} us")
         if not rows.outputs:
-            return BIAS_V
+            return self.bias_v
         row = rows.outputs.bit_length() - 1
         conductance = sum(1 / ohm for ohm in self._ohm[row])
-        at_row_v = BIAS_V / (1 + ROW_SOURCE_OHM * conductance)
-        return min(LARGEST_V, BIAS_V + FEEDBACK_OHM * at_row_v / self._ohm[row][column])
+        at_row_v = self.bias_v / (1 + ROW_SOURCE_OHM * conductance)
+        risen = 1 - math.exp(-settled_us / self.slow_us[column]) if column in self.slow_us else 1.0
+        return min(LARGEST_V, self.bias_v + risen * FEEDBACK_OHM * at_row_v / self._ohm[row][column])

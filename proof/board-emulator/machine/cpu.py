@@ -15,6 +15,8 @@ from .rules import Fault
 FLASH, FLASH_BYTES = 0x0800_0000, 512 << 10
 SRAM, SRAM_BYTES = 0x2000_0000, 128 << 10
 SYSTEM_MEMORY, FLASH_SIZE_KIB = 0x1FFF_7000, 0x1FFF_7A22
+#: Where the factory's counts at 3.3 V are, and what they are: the reference, and the temperature at 30 and 110 °C.
+FACTORY_COUNTS, FACTORY = 0x1FFF_7A2A, (1501, 959, 1207)
 PERIPHERALS, PERIPHERAL_BYTES = 0x4000_0000, 0x8_0000
 BIT_BAND = 0x4200_0000
 CORE, CORE_BYTES = 0xE000_0000, 0x10_0000
@@ -99,6 +101,7 @@ class Cpu:
         uc.mem_write(SRAM, sram)
         uc.mem_map(SYSTEM_MEMORY, 0x1000, unicorn.UC_PROT_READ)
         uc.mem_write(FLASH_SIZE_KIB, struct.pack("<H", FLASH_BYTES >> 10))
+        uc.mem_write(FACTORY_COUNTS, struct.pack("<3H", *FACTORY))
         uc.mmio_map(PERIPHERALS, PERIPHERAL_BYTES, devices.read_peripheral, None, devices.write_peripheral, None)
         uc.mmio_map(BIT_BAND, 32 * PERIPHERAL_BYTES, devices.read_bit, None, devices.write_bit, None)
         uc.mmio_map(CORE, CORE_BYTES, devices.read_core, None, devices.write_core, None)

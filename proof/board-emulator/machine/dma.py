@@ -23,6 +23,8 @@ class Dma(Registers):
     def __init__(self, uc, rules, advance, register, seen):
         super().__init__()
         self._uc, self._rules, self._advance, self._register, self._seen = uc, rules, advance, register, seen
+        #: Streams that move nothing: a fault.
+        self.stalled = set()
         #: Flags of each stream, items that are left, and the next place in memory.
         self.flags, self._left, self._place = [0] * STREAMS, [0] * STREAMS, [0] * STREAMS
 
@@ -71,7 +73,7 @@ class Dma(Registers):
 
     def _serves(self, stream, channel):
         control = self._stream(stream, CR)
-        return control & EN and control >> 25 & 7 == channel
+        return stream not in self.stalled and control & EN and control >> 25 & 7 == channel
 
     def _count(self, stream, items):
         self._left[stream] -= items

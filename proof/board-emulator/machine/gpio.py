@@ -3,8 +3,8 @@
 from .bus import Registers
 
 MODER, OSPEEDR, PUPDR, IDR, ODR, BSRR, AFRL = 0x00, 0x08, 0x0C, 0x10, 0x14, 0x18, 0x20
-INPUT, OUTPUT, ALTERNATE = 0, 1, 2
-LOW_SPEED, PULL_UP = 0, 1
+INPUT, OUTPUT, ALTERNATE, ANALOGUE = 0, 1, 2, 3
+LOW_SPEED, NO_PULL, PULL_UP, PULL_DOWN = 0, 0, 1, 2
 
 
 class Port(Registers):
@@ -31,9 +31,9 @@ class Port(Registers):
         """Speed of the output: 0 low to 3 very high."""
         return self._field(OSPEEDR, pin)
 
-    def pulled_up(self, pin):
-        """Whether a pull-up holds the pin."""
-        return self._field(PUPDR, pin) == PULL_UP
+    def pull(self, pin):
+        """The pull that holds the pin: none where it is analogue."""
+        return NO_PULL if self.mode(pin) == ANALOGUE else self._field(PUPDR, pin)
 
     def function(self, pin):
         """Number of the alternate function; `None` if the pin is not in that mode."""

@@ -60,7 +60,7 @@ class Passes:
 
     def __init__(self, time, rules, clock, dma, adc, moment, busy, triggers=True):
         self._time, self._rules, self._clock, self._dma, self._adc = time, rules, clock, dma, adc
-        self._moment, self._busy, self._triggers = moment, busy, triggers
+        self._moment, self._busy, self.triggers_converters = moment, busy, triggers
         self.rows, self.triggers = ScanTimer(self.advance, self._start), ScanTimer(self.advance)
         #: Events to come, the last one first; the triggers to come: the first one's cycle, their number, their
         #: distance, and what the converters do at each; and the cycle at which the last column is sampled.
@@ -117,7 +117,7 @@ class Passes:
             self._convert_until(now)
 
     def _trigger(self, cycle):
-        if not self._triggers:
+        if not self.triggers_converters:
             return
         if self._waiting:
             self._rules.breach("triggers-cut", f"{self._waiting[1]} are left")
