@@ -106,6 +106,7 @@ fn steps(this: &Path) -> [Vec<Step>; 3] {
             own("c", &["c", "--short"]),
             // The emulated board's time is virtual: it answers alike on a busy machine.
             own("board", &[&["board"], &SCENARIOS[..]].concat()),
+            own("accept", &["accept", "--emulated"]),
         ],
         vec![own("emulate", &["emulate"])],
     ]
@@ -126,7 +127,7 @@ fn steps_of_release(this: &Path) -> [Vec<Step>; 3] {
     [
         vec![own("publish", &["publish"]), own("python", &["python"]), cases, hostile, power_cuts],
         vec![own("c", &["c"]), own("board", &["board"])],
-        vec![own("accept", &["accept", "--emulated"])],
+        vec![own("faults", &["accept", "--emulated", "--fault", "all"])],
     ]
 }
 

@@ -28,7 +28,8 @@ const PORT: &str = "taxel link ";
 
 pub struct Board {
     port: String,
-    baud: u32,
+    /// Bits a second of its serial line.
+    pub baud: u32,
     emulator: Option<Child>,
 }
 
@@ -51,11 +52,14 @@ impl Board {
         Ok(Self { port: port.into(), baud, emulator: None })
     }
 
-    /// The emulated board, running the image.
-    pub fn emulated(toolchain: &Toolchain) -> Outcome<Self> {
-        build_image(toolchain, NUCLEO)?;
-        let mut command = Emulator::prepare(&Options::plain())?.command(&elf(NUCLEO_IMAGE));
-        command.arg("serve").stdout(Stdio::piped());
+    /// The emulated board, running the image that was built. Nothing is at its pins, unless the `fault` planted in it shows in
+    /// a circuit alone.
+    pub fn emulated(emulator: &Emulator, fault: Option<&str>) -> Outcome<Self> {
+        let mut command = emulator.command(&elf(NUCLEO_IMAGE));
+        if let Some(fault) = fault {
+            command.args(["--fault", fault]);
+        }
+        command.args(["--bare", "serve"]).stdout(Stdio::piped());
         let mut emulator =
             command.spawn().map_err(|cause| format!("the emulated board: {cause}"))?;
         let said = emulator.stdout.take().ok_or("the emulated board says nothing")?;
@@ -84,6 +88,12 @@ impl Drop for Board {
             let _ = emulator.wait();
         }
     }
+}
+
+/// Builds the image, and finds what the emulated board needs.
+pub fn prepare_emulator(toolchain: &Toolchain) -> Outcome<Emulator> {
+    build_image(toolchain, NUCLEO)?;
+    Emulator::prepare(&Options::plain())
 }
 
 /// Baud rate of an image that is built in this environment.

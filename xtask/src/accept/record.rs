@@ -3,8 +3,7 @@
 use serde::Serialize;
 use taxel_firmware::link::message::Memory;
 
-/// Largest difference of the emulated board's scan from its plan, as a share.
-const SCAN_OFF: f64 = 0.03;
+use super::stage::Stage;
 
 /// A measured number beside what is predicted.
 #[derive(Serialize)]
@@ -27,68 +26,41 @@ pub struct Decoding {
     pub stack_bytes: u32,
 }
 
+impl Decoding {
+    pub fn is_identical(&self) -> bool {
+        self.bit_identical.measured == self.bit_identical.predicted
+    }
+}
+
 /// What the file holds.
 #[derive(Serialize)]
-pub struct Record<'a> {
+pub struct Record {
     pub is_emulated: bool,
     /// Revision of the repository.
     pub revision: Option<String>,
     pub compiler: String,
-    pub board: &'a str,
+    pub board: String,
     /// Its version, as the board tells.
-    pub firmware: &'a str,
+    pub firmware: String,
     /// Number of the chip, as hexadecimal digits.
-    pub unique_id: &'a str,
+    pub unique_id: String,
     pub memory: Memory,
-    /// What the stack took at most.
-    pub stack_bytes: Beside<u32>,
+    /// What was checked, in order.
+    pub stages: Vec<Stage>,
     pub decoding: Vec<Decoding>,
-    pub scan_us: Beside<u32>,
-    pub erase_ms: Beside<Vec<u32>>,
-    pub keeps_its_model_over_a_restart: Beside<bool>,
 }
 
-impl Beside<u32> {
-    /// Whether the measured number is off by no more than this share.
-    fn is_within(&self, share: f64) -> bool {
-        f64::from(self.measured.abs_diff(self.predicted)) <= share * f64::from(self.predicted)
+impl Record {
+    /// Adds stages, and prints them.
+    pub fn add(&mut self, stages: impl IntoIterator<Item = Stage>) {
+        for stage in stages {
+            stage.tell();
+            self.stages.push(stage);
+        }
     }
-}
 
-impl Record<'_> {
-    /// Whether everything is right that must be. Cycles may differ, and on silicon times too.
-    pub fn is_as_predicted(&self) -> bool {
-        self.decoding.iter().all(|it| it.bit_identical.measured == it.bit_identical.predicted)
-            && (!self.is_emulated || self.scan_us.is_within(SCAN_OFF))
-            && self.keeps_its_model_over_a_restart.measured
-            && self.stack_bytes.measured <= self.stack_bytes.predicted
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_scan_of_the_emulated_board_must_be_as_planned_and_one_on_silicon_is_recorded() {
-        let is_right = |is_emulated, measured| {
-            let record = Record {
-                is_emulated,
-                revision: None,
-                compiler: String::new(),
-                board: "",
-                firmware: "",
-                unique_id: "",
-                memory: Memory::default(),
-                stack_bytes: Beside { measured: 1, predicted: 1 },
-                decoding: Vec::new(),
-                scan_us: Beside { measured, predicted: 1000 },
-                erase_ms: Beside { measured: Vec::new(), predicted: Vec::new() },
-                keeps_its_model_over_a_restart: Beside { measured: true, predicted: true },
-            };
-            record.is_as_predicted()
-        };
-        assert!(is_right(true, 970) && is_right(true, 1030) && is_right(false, 1100));
-        assert!(!is_right(true, 969) && !is_right(true, 1031));
+    /// Whether every stage so far is as allowed.
+    pub fn is_right(&self) -> bool {
+        self.stages.iter().all(Stage::is_right)
     }
 }
