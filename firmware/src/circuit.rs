@@ -153,7 +153,7 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
         readings: &mut [f32],
     ) {
         let volt_per_count = self.reference_v / counts_at_reference(full_scale_counts);
-        let saturated = self.saturated_v / volt_per_count;
+        let saturated = self.saturated_counts(full_scale_counts);
         let current = |n: f32, idle: f32, r: f32| (n - idle) * volt_per_count / r;
         let columns = || row.columns.pick(idle.iter().zip(&self.feedback_ohm));
         let currents = readings.iter().zip(columns()).map(|(n, (idle, r))| current(*n, *idle, *r));
@@ -178,12 +178,17 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
         full_scale_counts: u16,
         counts: &[f32],
     ) -> f32 {
-        let counts_per_volt = counts_at_reference(full_scale_counts) / self.reference_v;
-        if counts.iter().any(|n| *n >= self.saturated_v * counts_per_volt) {
+        let saturated = self.saturated_counts(full_scale_counts);
+        if counts.iter().any(|n| *n >= saturated) {
             return f32::NAN;
         }
         let parts = || counts.iter().zip(idle.iter().zip(&self.feedback_ohm));
         load(columns, || parts().map(|(n, (idle, r))| (n - idle, (n - idle) / r)))
+    }
+
+    /// Counts from which on an op-amp may be saturated.
+    fn saturated_counts(&self, full_scale_counts: u16) -> f32 {
+        self.saturated_v / (self.reference_v / counts_at_reference(full_scale_counts))
     }
 
     /// Corrects a whole `frame` (Ω, rows of `columns` readings) for leads in series with columns: each reading to

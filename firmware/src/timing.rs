@@ -6,9 +6,9 @@ use crate::capacity::Capacity;
 use crate::link::message::Configuration;
 use crate::readout::SCANS_A_ROUND;
 
-/// Clock of the converters' bus on the NUCLEO-F446RE in Hz: 45 MHz/64. An MCP3208 takes at most 1 MHz at 3.3 V, and the
-/// divider has powers of two.
-pub const NUCLEO_SPI_HZ: u32 = 703_125;
+/// Clock in Hz of a bus of MCP3208 converters on a processor like the NUCLEO-F446RE's: 45 MHz/64. They take at most 1 MHz at
+/// 3.3 V, and the divider has powers of two.
+const NUCLEO_SPI_HZ: u32 = 703_125;
 
 /// Clock of the NUCLEO-F446RE's processor in MHz, as long as the ST-LINK's is there.
 pub const NUCLEO_MHZ: u32 = 180;
@@ -19,9 +19,9 @@ pub const NUCLEO_BAUD: u32 = 921_600;
 /// Bytes that a sample of an MCP3208 takes on its bus.
 const MCP3208_BYTES: u32 = 3;
 
-/// Times in ns that the NUCLEO-F446RE's code takes: for a sample besides its clocks, above all the 500 ns for which the
+/// Times in ns that code takes on such a processor: for a sample besides its clocks, above all the 500 ns for which the
 /// chip select must be high; to turn a sample into a reading; and for a row, to shift it into the register and start.
-/// From the cycles of the emulated board, on which `cargo xtask board` holds whole scans to the plan.
+/// From the cycles of an emulated board with such a readout, whose scans were within 3 % of the plan.
 const NUCLEO_SAMPLE_NS: u32 = 1_350;
 const NUCLEO_READING_NS: u32 = 850;
 const NUCLEO_ROW_NS: u32 = 17_300;
@@ -38,7 +38,7 @@ const ONCHIP_COLUMN_CYCLES: u32 = ONCHIP_SAMPLE_CYCLES + 12;
 const ONCHIP_TRIGGER_CYCLES: u32 = 3 * ONCHIP_COLUMN_CYCLES + 6;
 
 /// Cycles from a trigger until the last of its columns is sampled for certain: then the multiplexers may switch. They have
-/// 0.4 µs until the next trigger, and take 0.1.
+/// 0.5 µs until the next trigger, and take 0.1.
 const ONCHIP_SAMPLED_CYCLES: u32 = ONCHIP_TRIGGER_CYCLES - 12;
 
 /// Most rows that the NUCLEO-F446RE drives.
@@ -146,12 +146,13 @@ pub struct ScanPlan {
 }
 
 impl ScanPlan {
-    /// Plan of the NUCLEO-F446RE's image for so many wires: its converters' bus, and its first configuration's wait.
+    /// Plan of a [`Scanner`](crate::readout::Scanner) with a 74HC595 and MCP3208 converters, for so many wires: a processor like the
+    /// NUCLEO-F446RE's, and the first configuration's wait.
     ///
     /// ```
-    /// assert_eq!(taxel_firmware::timing::ScanPlan::of_nucleo(8, 18, 1).scan_us(), 5_573);
+    /// assert_eq!(taxel_firmware::timing::ScanPlan::of_spi(8, 18, 1).scan_us(), 5_573);
     /// ```
-    pub fn of_nucleo(rows: u16, columns: u16, oversampling: u16) -> Self {
+    pub fn of_spi(rows: u16, columns: u16, oversampling: u16) -> Self {
         Self {
             rows,
             columns,
@@ -278,7 +279,7 @@ mod tests {
     #[test]
     fn the_boards_scan_leaves_a_third_of_the_period() {
         let Configuration { frame_period_us, scan, .. } = Configuration::DEFAULT;
-        let plan = ScanPlan::of_nucleo(8, 18, scan.oversampling);
+        let plan = ScanPlan::of_spi(8, 18, scan.oversampling);
         // docs/board.md has these.
         let sampling = ScanPlan { sample_ns: 34_134, reading_ns: 0, row_ns: 0, ..plan };
         assert_eq!(sampling.scan_us(), 5_115);

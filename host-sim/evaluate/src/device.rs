@@ -110,7 +110,7 @@ impl Device {
         let short = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
         let of_board = |Wires { rows, columns }| {
             let plan = match self.readout {
-                Readout::Spi => ScanPlan::of_nucleo,
+                Readout::Spi => ScanPlan::of_spi,
                 Readout::OnChip => ScanPlan::of_nucleo_onchip,
             };
             f64::from(plan(short(rows), short(columns), short(samples)).scan_us()) / 1000.0

@@ -4,19 +4,17 @@ from .bus import Registers
 
 MODER, OSPEEDR, PUPDR, IDR, ODR, BSRR, AFRL = 0x00, 0x08, 0x0C, 0x10, 0x14, 0x18, 0x20
 INPUT, OUTPUT, ALTERNATE, ANALOGUE = 0, 1, 2, 3
-LOW_SPEED, NO_PULL, PULL_UP, PULL_DOWN = 0, 0, 1, 2
+NO_PULL, PULL_UP, PULL_DOWN = 0, 1, 2
 
 
 class Port(Registers):
-    """Sixteen pins. Whoever wants to know of a pin's level enters a function in `listeners`."""
+    """Sixteen pins."""
 
     def __init__(self, after_reset=None):
         super().__init__()
         self.values.update(after_reset or {})
-        self.listeners = {}
         #: Functions by pin that tell whether something outside holds it high; without one it reads its output.
         self.inputs = {}
-        self._levels = {}
         #: Called after a change of outputs or modes.
         self.changed = lambda: None
 
@@ -26,10 +24,6 @@ class Port(Registers):
     def mode(self, pin):
         """Mode: 0 input, 1 output, 2 alternate function, 3 analogue."""
         return self._field(MODER, pin)
-
-    def speed(self, pin):
-        """Speed of the output: 0 low to 3 very high."""
-        return self._field(OSPEEDR, pin)
 
     def pull(self, pin):
         """The pull that holds the pin: none where it is analogue."""
@@ -58,10 +52,4 @@ class Port(Registers):
             offset, value = ODR, self.values.get(ODR, 0) & ~(value >> 16) | value & 0xFFFF
         super().write(offset, value)
         if offset in (ODR, MODER):
-            for pin, listener in self.listeners.items():
-                level = self.high(pin) if self.mode(pin) == OUTPUT else None
-                if level != self._levels.get(pin):
-                    self._levels[pin] = level
-                    if level is not None:
-                        listener(level)
             self.changed()
