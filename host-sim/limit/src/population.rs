@@ -85,13 +85,16 @@ pub fn sample<T: Target>(
     let masses = kept.iter().map(|it| log_sum(it.log_weights())).chain(thin.iter().map(log_mass));
     let least = masses.fold(f64::NEG_INFINITY, f64::max) + NEGLIGIBLE_MASS;
     thin.retain(|it| log_mass(it) >= least);
+    if thin.is_empty() {
+        return kept;
+    }
     for round in 1..=effort.solved {
         for (kind, maps) in &thin {
             kept[*kind].append(&maps.draw(&targets[*kind], random, memory));
         }
         let found = effective(&weights(&kept));
         let is_hopeless = 4 * round >= effort.solved && 10.0 * found < effort.wanted;
-        if thin.is_empty() || found >= effort.wanted || is_hopeless {
+        if found >= effort.wanted || is_hopeless {
             break;
         }
     }
