@@ -368,4 +368,33 @@ mod tests {
             assert_eq!(unmatched(&header, nothing), Some(nothing));
         }
     }
+
+    #[test]
+    fn a_wrong_name_is_answered_by_the_one_that_is_most_like_it() {
+        let header = ["t", "Force_z (N)", "force", "x_mm", "y_mm"].map(String::from);
+        let meant = |wanted: &str| {
+            let known = known_names(&header, wanted);
+            let (names, meant) = known.split_once("; did you mean ").unwrap_or((&known, ""));
+            assert_eq!(names, "t, Force_z (N), force, x_mm, y_mm", "{wanted}");
+            meant.replace(['"', '?'], "")
+        };
+        // The same but for case, unit and signs goes before a part of it; one letter is a part of anything.
+        for (wanted, found) in [
+            ("FORCE", "force"),
+            ("forcez", "Force_z (N)"),
+            ("my_force_mN", "force"),
+            ("Force_z_mN", "Force_z (N)"),
+            ("orc", "Force_z (N)"),
+            ("Y", "y_mm"),
+            ("tx", ""),
+            ("gap", ""),
+            ("*", ""),
+        ] {
+            assert_eq!(meant(wanted), found, "{wanted}");
+        }
+        let names =
+            |count: usize| -> Vec<String> { (1..=count).map(|i| format!("c{i}")).collect() };
+        assert_eq!(some_names(&names(8)), names(8).join(", "));
+        assert_eq!(some_names(&names(9)), "c1, c2, c3, c4, c5, …, c7, c8, c9 (9 columns)");
+    }
 }

@@ -169,5 +169,18 @@ mod tests {
         let rate = Bounds::from([("frames_per_s".to_owned(), Bound::Least { least: 1.0 })]);
         let unknown = nearest(&rate, results.iter()).unwrap();
         assert!(unknown.1.contains("no frames_per_s") && !are_within(&rate, &results[0]));
+        // The least is a bound from below, which it meets itself.
+        let cycles = |least| Bounds::from([("cycles".to_owned(), Bound::Least { least })]);
+        assert_eq!(nearest(&cycles(36_000.0), results.iter()), None);
+        let least = nearest(&cycles(40_000.0), results.iter());
+        assert_eq!(least, Some((0, "cycles = 36000".into())));
+        assert!(are_within(&bounds(6.0, 36_000.0), &results[0]));
+        // Misses are compared as factors: twice the time is more than one and a half times the cycles; without a
+        // factor, as differences.
+        let results = [of(16.0, 1000.0), of(8.0, 1500.0)];
+        assert_eq!(nearest(&bounds(8.0, 1000.0), results.iter()).unwrap().0, 1);
+        let missed = |least: f64, value| Bound::Least { least }.missed_by(value);
+        assert_eq!([missed(4.0, 2.0), missed(4.0, 8.0)], [2.0_f64.ln(), 0.0]);
+        assert_eq!([missed(4.0, 0.0), missed(4.0, -1.0), missed(-1.0, -3.0)], [4.0, 5.0, 2.0]);
     }
 }

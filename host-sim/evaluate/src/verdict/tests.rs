@@ -3,6 +3,7 @@ use taxel_simulate::noise::{Noise, NoiseKind};
 
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::Format;
+use taxel_data::Table;
 
 use super::*;
 
@@ -67,6 +68,22 @@ fn every_warning_is_raised_and_left_out() {
         Warning::outliers(&outliers(0)),
     ];
     assert_eq!(left_out, [const { None }; 5]);
+    // Two of 10 000 readings are too many, one is not; zero is one, and what is missing is not.
+    let readings = |bad: [f64; 3]| {
+        let mut values = vec![100.0; 10_000];
+        values[..3].copy_from_slice(&bad);
+        Warning::not_positive(&Table { names: vec!["a".into()], values: values.into() })
+    };
+    let text = readings([0.0, -3.0, 5.0]).unwrap().text;
+    assert!(text.starts_with("noise makes 0.02 % of the readings"), "{text}");
+    assert_eq!(readings([-3.0, 5.0, f64::NAN]), None);
+    // A reading model needs 300 frames if it tells deviations.
+    let blob = include_bytes!("../../../../testdata/array-fixed16-confidence.bin");
+    let blob = ModelBlob::of_bytes(blob).unwrap();
+    let of = |frames, model| Warning::few_frames_for_confidence(frames, model).map(|it| it.name);
+    let assesses = blob.parse().reading_model();
+    assert_eq!(of(299, assesses), Some("few-frames-for-confidence"));
+    assert_eq!([of(300, assesses), of(299, None)], [None; 2]);
 }
 
 #[test]
