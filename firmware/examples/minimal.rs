@@ -8,7 +8,7 @@ use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiDevice};
 use taxel_core::{ColumnWires, RowWire};
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::readout::{
-    FrameSource, Mcp3208s, ScanSettings, Scanner, Selection, ShiftRegister595,
+    Mcp3208s, ScanSettings, Scanner, Selection, ShiftRegister595, WaitingSource,
 };
 
 /// What `taxel export row4.bin --rust row4.rs` writes.

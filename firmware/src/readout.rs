@@ -100,6 +100,14 @@ pub struct ScanReport {
     pub failed_samples: u16,
 }
 
+impl ScanReport {
+    /// Makes every reading of `frame` a failed one.
+    pub(crate) fn of_failed(frame: &mut [f32]) -> Self {
+        frame.fill(f32::NAN);
+        Self { failed_samples: u16::try_from(frame.len()).unwrap_or(u16::MAX) }
+    }
+}
+
 /// Wires that a scan reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Selection<'a> {
@@ -109,11 +117,8 @@ pub struct Selection<'a> {
     pub columns: ColumnWires,
 }
 
-/// Source of frames: a scanned sensor, or a substitute for one.
-///
-/// One that only waits implements [`scan`](Self::scan). One whose hardware scans by itself implements the other four
-/// too: the application takes and decodes a frame while the next one is scanned.
-pub trait FrameSource {
+/// A source that waits while it scans.
+pub trait WaitingSource {
     /// Scans `wires` into `frame`, and waits for the end: one reading in Ω for each row and column, row after row.
     /// Readings that could not be taken become NaN.
     fn scan(
@@ -122,27 +127,36 @@ pub trait FrameSource {
         wires: Selection<'_>,
         frame: &mut [f32],
     ) -> ScanReport;
+}
 
-    /// Starts a scan that goes on by itself. Returns whether it does: a source does so always, or never as by default.
-    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) -> bool {
-        let _ = (settings, wires);
-        false
-    }
+/// A source whose hardware scans by itself: the application takes and decodes a frame while the next one is scanned.
+pub trait RunningSource {
+    /// Starts a scan of `wires`.
+    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>);
 
     /// Whether the scan that was started has ended. Then the next one may be started before the frame is taken.
-    fn poll(&mut self) -> bool {
-        false
-    }
+    fn poll(&mut self) -> bool;
 
-    /// Fills `frame` as [`scan`](Self::scan) does with the scan that ended last, for its settings and wires. It is taken once,
-    /// and before the source is looked at again.
-    fn take(&mut self, frame: &mut [f32]) -> ScanReport {
-        let _ = frame;
-        ScanReport::default()
-    }
+    /// Fills `frame` as [`WaitingSource::scan`] does with the scan that ended last. It is taken once, and before the source
+    /// is looked at again.
+    fn take(&mut self, frame: &mut [f32]) -> ScanReport;
 
     /// Gives up the scan that was started, if there is one: rows idle, and nothing of it gets into another frame.
-    fn stop(&mut self) {}
+    fn stop(&mut self);
+}
+
+/// How a source scans.
+pub enum Scanning<'s> {
+    /// It waits for the end of each scan.
+    Waits(&'s mut dyn WaitingSource),
+    /// It scans by itself.
+    Runs(&'s mut dyn RunningSource),
+}
+
+/// Source of frames: a scanned sensor, or a substitute for one.
+pub trait FrameSource {
+    /// How it scans: always in the same way.
+    fn scanning(&mut self) -> Scanning<'_>;
 
     /// Tests itself, which takes milliseconds, and gives up a scan under way. `None` if it cannot.
     fn diagnose(&mut self) -> Option<Diagnosis> {

@@ -169,9 +169,12 @@ def patience(make, files):
 
 
 def silent_sensor(make, files):
-    """Converters that no trigger reaches: the scan is given up, and the watchdog, at its fastest, resets the board."""
+    """Converters that no trigger reaches: the scan is given up, the host is told which part stalls, and the watchdog, at its
+    fastest, resets the board."""
     bench = silent(make, FASTEST_LSI_HZ, 5.4)
     bench.run_for(0.2)
+    said = bench.taxel("record", "-n", 1, "-o", files.directory / "silent.csv", status=1)
+    expect("part of its readout that stalls: numbers" in said, "the host is not told what stalls")
     bench.ask(IDENTIFY, IDENTITY)
     bench.finish(resets=["watchdog"])
 

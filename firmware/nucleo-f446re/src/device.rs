@@ -8,7 +8,7 @@ use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use taxel_firmware::link::message::{Configuration, Memory};
-use taxel_firmware::platform::{Platform, Port};
+use taxel_firmware::platform::{Line, Platform, Storage, Watchdog};
 use taxel_firmware::readout::FrameSource;
 use taxel_firmware::store::Journal;
 
@@ -29,11 +29,17 @@ struct Nucleo {
     journal: Journal<Slot>,
 }
 
-impl Port for Nucleo {
+impl taxel_firmware::platform::Clock for Nucleo {
     fn now_us(&mut self) -> u32 {
         self.clock.now_us()
     }
 
+    fn cycles(&self) -> u32 {
+        self.clock.cycles()
+    }
+}
+
+impl Line for Nucleo {
     fn receive(&mut self) -> Option<u8> {
         self.serial.try_read()
     }
@@ -43,28 +49,28 @@ impl Port for Nucleo {
     }
 }
 
-impl Platform for Nucleo {
+impl Storage for Nucleo {
     type Page = Slot;
 
-    const BOARD: &'static str = "nucleo-f446re";
+    fn journal(&mut self) -> &mut Journal<Slot> {
+        &mut self.journal
+    }
+}
 
+impl Watchdog for Nucleo {
     /// Feeds the watchdog, and blinks the light about once a second.
     fn feed_watchdog(&mut self) {
         self.watchdog.feed();
         let on = self.clock.now_us() >> 19 & 1 == 0;
         self.led.set_state(on.into());
     }
+}
+
+impl Platform for Nucleo {
+    const BOARD: &'static str = "nucleo-f446re";
 
     fn memory(&self) -> Memory {
         memory::taken()
-    }
-
-    fn cycles(&self) -> u32 {
-        self.clock.cycles()
-    }
-
-    fn journal(&mut self) -> &mut Journal<Slot> {
-        &mut self.journal
     }
 
     fn set_brown_out(&mut self) -> bool {

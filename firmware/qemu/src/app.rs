@@ -16,8 +16,10 @@ use qemu_image::{exit, memory};
 use taxel_core::{Decoder, decoder_ram_bytes};
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{Configuration, Memory};
-use taxel_firmware::platform::{Platform, Port};
-use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use taxel_firmware::platform::{self, Line, Platform, Storage};
+use taxel_firmware::readout::{
+    FrameSource, ScanReport, ScanSettings, Scanning, Selection, WaitingSource,
+};
 use taxel_firmware::store::Journal;
 
 /// The RAM figure of `taxel inspect` must be at least the compiler's.
@@ -29,10 +31,16 @@ const WATCHDOG_MS: u32 = 20_000;
 /// A circuit with constants to set and no sensor behind it: every reading is missing.
 struct NoSensor(ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }>);
 
-impl FrameSource for NoSensor {
+impl WaitingSource for NoSensor {
     fn scan(&mut self, _: ScanSettings, _: Selection<'_>, frame: &mut [f32]) -> ScanReport {
         frame.fill(f32::NAN);
         ScanReport { failed_samples: frame.len() as u16 }
+    }
+}
+
+impl FrameSource for NoSensor {
+    fn scanning(&mut self) -> Scanning<'_> {
+        Scanning::Waits(self)
     }
 
     fn constants(&self) -> Option<Constants<'_>> {
@@ -52,11 +60,13 @@ struct Board {
     journal: Journal<Slot>,
 }
 
-impl Port for Board {
+impl platform::Clock for Board {
     fn now_us(&mut self) -> u32 {
         self.clock.now_us() as u32
     }
+}
 
+impl Line for Board {
     fn receive(&mut self) -> Option<u8> {
         self.mailbox.try_read()
     }
@@ -66,26 +76,30 @@ impl Port for Board {
     }
 }
 
-impl Platform for Board {
+impl Storage for Board {
     type Page = Slot;
 
-    const BOARD: &'static str = "qemu mps2-an386";
+    fn journal(&mut self) -> &mut Journal<Slot> {
+        &mut self.journal
+    }
+}
 
+impl platform::Watchdog for Board {
     /// Feeds the watchdog at most once a millisecond, because feeding costs QEMU system calls.
     fn feed_watchdog(&mut self) {
-        let now_us = self.now_us();
+        let now_us = self.clock.now_us() as u32;
         if now_us.wrapping_sub(self.fed_us) >= 1000 {
             self.fed_us = now_us;
             self.watchdog.feed();
         }
     }
+}
+
+impl Platform for Board {
+    const BOARD: &'static str = "qemu mps2-an386";
 
     fn memory(&self) -> Memory {
         memory::taken()
-    }
-
-    fn journal(&mut self) -> &mut Journal<Slot> {
-        &mut self.journal
     }
 }
 

@@ -3,7 +3,7 @@
 use super::frame_clock::LongClock;
 use crate::link::message::{KeepFault, Refusal, Report, Statistics};
 use crate::link::{cobs, packet};
-use crate::platform::{Platform, Port};
+use crate::platform::{Clock, Line, Watchdog};
 use crate::store::KeepError;
 
 /// Longest time in µs without progress of a report; then it is given up.
@@ -29,7 +29,7 @@ pub struct Link<'m, P> {
     left_us: u32,
 }
 
-impl<P: Platform> Link<'_, P> {
+impl<P: Watchdog> Link<'_, P> {
     /// Counts a write of `kept`, if there was one, and converts its outcome.
     pub fn count_write(&mut self, kept: Result<bool, KeepError>) -> Result<(), Refusal> {
         if kept != Ok(false) {
@@ -49,7 +49,7 @@ impl<P: Platform> Link<'_, P> {
     }
 }
 
-impl<'m, P: Port> Link<'m, P> {
+impl<'m, P: Line + Clock> Link<'m, P> {
     pub fn new(mut platform: P, buffer: &'m mut [u8]) -> Self {
         let time = LongClock::starting_at(platform.now_us());
         let (statistics, writes_left) = (Statistics::default(), MOST_WRITES);
@@ -94,7 +94,7 @@ impl<'m, P: Port> Link<'m, P> {
     }
 }
 
-fn send_in_time<P: Port>(platform: &mut P, byte: u8, start_us: u32, left_us: u32) -> bool {
+fn send_in_time<P: Line + Clock>(platform: &mut P, byte: u8, start_us: u32, left_us: u32) -> bool {
     if platform.send(byte) {
         return true;
     }

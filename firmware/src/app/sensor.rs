@@ -13,7 +13,9 @@ use crate::link::message::{Configuration, HealthReport, Refusal, Report};
 use crate::link::packet::UNASKED;
 use crate::log::info;
 use crate::platform::Platform;
-use crate::readout::{Baseline, Diagnosis, FrameSource, LONGEST_SCAN_US, ScanReport, Selection};
+use crate::readout::{
+    Baseline, Diagnosis, FrameSource, LONGEST_SCAN_US, ScanReport, Scanning, Selection,
+};
 
 /// The sensor and the settings that belong to it.
 pub struct Sensor<'m, F, const ROWS: usize> {
@@ -52,9 +54,9 @@ pub struct Scan {
 /// A scan whose frame is still to be read.
 struct Ended {
     scan: Scan,
-    /// Time in µs at which it was seen to have ended; `None` if the source must be waited for.
+    /// Time in µs at which it was seen to have ended; `None` if the source is still to be waited for.
     end_us: Option<u64>,
-    /// Whether the source has a frame of it.
+    /// Whether it was not given up.
     is_whole: bool,
 }
 
@@ -173,22 +175,21 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
             let missed_frames = &mut link.statistics.frames_missed;
             *missed_frames = missed_frames.saturating_add(missed);
             let scan = Scan { start_us: link.now_us(), missed };
-            if self.source.start(self.configuration.scan, self.wiring.selection()) {
-                self.under_way = Some(scan);
-            } else {
-                ended = Some(Ended { scan, end_us: None, is_whole: true });
+            match self.source.scanning() {
+                Scanning::Runs(source) => {
+                    source.start(self.configuration.scan, self.wiring.selection());
+                    self.under_way = Some(scan);
+                }
+                Scanning::Waits(_) => ended = Some(Ended { scan, end_us: None, is_whole: true }),
             }
         }
         let Ended { scan, end_us, is_whole } = ended?;
         let settings = self.configuration.scan;
         let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
-        let read = |wires: Selection<'_>, frame: &mut [f32]| match end_us {
-            None => self.source.scan(settings, wires, frame),
-            Some(_) if is_whole => self.source.take(frame),
-            Some(_) => {
-                frame.fill(f32::NAN);
-                ScanReport { failed_samples: frame.len() as u16 }
-            }
+        let read = |wires: Selection<'_>, frame: &mut [f32]| match self.source.scanning() {
+            Scanning::Waits(source) => source.scan(settings, wires, frame),
+            Scanning::Runs(source) if is_whole => source.take(frame),
+            Scanning::Runs(_) => ScanReport::of_failed(frame),
         };
         let report = self.wiring.fill(frame, scratch, read);
         let end_us = end_us.unwrap_or_else(|| link.now_us());
@@ -204,18 +205,20 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         Some((frame, scan))
     }
 
-    /// Ends the scan that goes on by itself, if there is one and it has ended. One that takes too long is given up.
+    /// Ends the scan that goes on by itself, if there is one and it has ended. One that takes too long is given up, and the
+    /// source tells what it finds of itself.
     fn poll<P: Platform>(&mut self, link: &mut Link<'_, P>) -> Option<Ended> {
         let scan = self.under_way?;
-        let is_whole = self.source.poll();
+        let Scanning::Runs(source) = self.source.scanning() else { return None };
+        let is_whole = source.poll();
         let now_us = link.now_us();
         if !is_whole && now_us.wrapping_sub(scan.start_us) < LONGEST_SCAN_US {
             return None;
         }
         if is_whole {
             self.under_way = None;
-        } else {
-            self.stop_scan();
+        } else if let Some(diagnosis) = self.diagnose() {
+            link.send(UNASKED, &Report::Diagnosis(diagnosis));
         }
         Some(Ended { scan, end_us: Some(now_us), is_whole })
     }
@@ -228,8 +231,10 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
 
     /// Gives up the scan that goes on by itself: what it is of changes. It counts as no frame.
     fn stop_scan(&mut self) {
-        if self.under_way.take().is_some() {
-            self.source.stop();
+        if self.under_way.take().is_some()
+            && let Scanning::Runs(source) = self.source.scanning()
+        {
+            source.stop();
         }
     }
 

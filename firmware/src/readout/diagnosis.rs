@@ -36,4 +36,13 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// In place of counts: the converter did not answer.
     pub const NO_ANSWER: u16 = u16::MAX;
+
+    /// Parts of a pass that move items, in the order in which one needs the other.
+    pub const PARTS: [&'static str; 4] = ["rows", "switches", "numbers", "end"];
+
+    /// The first part of a pass that has not moved all its items.
+    pub fn stalled_part(&self) -> Option<&'static str> {
+        let place = self.items_left.iter().position(|left| *left != 0);
+        place.and_then(|place| Self::PARTS.get(place)).copied()
+    }
 }

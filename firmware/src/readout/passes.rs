@@ -3,7 +3,10 @@
 use taxel_core::{ColumnWires, RowWire};
 
 use super::scanner::count_failures;
-use super::{Diagnosis, FrameSource, SCANS_A_ROUND, ScanReport, ScanSettings, Selection};
+use super::{
+    Diagnosis, FrameSource, RunningSource, SCANS_A_ROUND, ScanReport, ScanSettings, Scanning,
+    Selection,
+};
 use crate::circuit::{Constants, ConstantsFault, ScannedRow, ZeroPotential};
 
 /// Hardware that drives rows one after the other and samples all `COLUMNS` columns by itself: a *pass*.
@@ -34,9 +37,6 @@ pub trait Sequencer<const COLUMNS: usize> {
 /// A pass of which samples were lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SequencerFault;
-
-/// Looks at a pass until it has failed: 2 s or more, at ten cycles a look.
-const MOST_LOOKS: u32 = 40_000_000;
 
 /// Scanner of a sensor by a [`Sequencer`] and the circuit's constants. `LINES` is one more than `ROWS`, the largest number
 /// of rows.
@@ -147,21 +147,29 @@ impl<'m, Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COL
 impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS: usize> FrameSource
     for PassScanner<'_, Q, ROWS, LINES, COLUMNS>
 {
-    fn scan(
-        &mut self,
-        settings: ScanSettings,
-        wires: Selection<'_>,
-        frame: &mut [f32],
-    ) -> ScanReport {
-        self.start(settings, wires);
-        if (0..MOST_LOOKS).any(|_| self.poll()) {
-            return self.take(frame);
-        }
-        self.stop();
-        failed(frame)
+    fn scanning(&mut self) -> Scanning<'_> {
+        Scanning::Runs(self)
     }
 
-    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) -> bool {
+    fn diagnose(&mut self) -> Option<Diagnosis> {
+        self.stop();
+        self.sequencer.diagnose()
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        Some(self.circuit.constants())
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        self.scans_left = 0;
+        self.circuit.set_constants(constants)
+    }
+}
+
+impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS: usize>
+    RunningSource for PassScanner<'_, Q, ROWS, LINES, COLUMNS>
+{
+    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) {
         let settings = settings.clamped();
         let plan = &mut self.started;
         if plan.settings != settings {
@@ -179,7 +187,6 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
         self.scans_left = if begins_round { SCANS_A_ROUND } else { self.scans_left } - 1;
         self.samples_left = settings.oversampling;
         self.start_pass();
-        true
     }
 
     fn poll(&mut self) -> bool {
@@ -203,7 +210,7 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
 
     fn take(&mut self, frame: &mut [f32]) -> ScanReport {
         if self.ended.has_failed {
-            return failed(frame);
+            return ScanReport::of_failed(frame);
         }
         frame.fill(f32::NAN); // rows and columns that are not wired
         let taken = self.convert(frame);
@@ -215,20 +222,6 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
     fn stop(&mut self) {
         self.sequencer.stop();
         (self.scans_left, self.has_ended) = (0, true);
-    }
-
-    fn diagnose(&mut self) -> Option<Diagnosis> {
-        self.stop();
-        self.sequencer.diagnose()
-    }
-
-    fn constants(&self) -> Option<Constants<'_>> {
-        Some(self.circuit.constants())
-    }
-
-    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
-        self.scans_left = 0;
-        self.circuit.set_constants(constants)
     }
 }
 
@@ -257,14 +250,6 @@ pub fn add_samples(delivered: &[u16], samples: u16, sums: &mut [[u32; 2 * AT_ONC
             }
         }
     }
-}
-
-/// Makes every reading of the frame a failed one.
-fn failed(frame: &mut [f32]) -> ScanReport {
-    let mut report = ScanReport::default();
-    frame.fill(f32::NAN);
-    count_failures(&mut report, frame.len());
-    report
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use embedded_hal::delay::DelayNs;
 use taxel_core::{ColumnWire, ColumnWires, RowWire};
 
 use super::{
-    ColumnSampler, FrameSource, RowDrive, SCANS_A_ROUND, ScanReport, ScanSettings, Selection,
+    ColumnSampler, FrameSource, RowDrive, SCANS_A_ROUND, ScanReport, ScanSettings, Scanning,
+    Selection, WaitingSource,
 };
 use crate::circuit::{Constants, ConstantsFault, ScannedRow, ZeroPotential};
 
@@ -170,6 +171,23 @@ pub(super) fn count_failures(report: &mut ScanReport, failures: usize) {
 impl<D: RowDrive, S: ColumnSampler, T: DelayNs, const ROWS: usize, const COLUMNS: usize> FrameSource
     for Scanner<D, S, T, ROWS, COLUMNS>
 {
+    fn scanning(&mut self) -> Scanning<'_> {
+        Scanning::Waits(self)
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        Some(self.circuit.constants())
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        self.restart();
+        self.circuit.set_constants(constants)
+    }
+}
+
+impl<D: RowDrive, S: ColumnSampler, T: DelayNs, const ROWS: usize, const COLUMNS: usize>
+    WaitingSource for Scanner<D, S, T, ROWS, COLUMNS>
+{
     fn scan(
         &mut self,
         settings: ScanSettings,
@@ -198,14 +216,5 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, const ROWS: usize, const COLUMNS
         self.next_row += usize::from(begins_round);
         self.scans_left = if report.failed_samples == 0 { self.scans_left - 1 } else { 0 };
         report
-    }
-
-    fn constants(&self) -> Option<Constants<'_>> {
-        Some(self.circuit.constants())
-    }
-
-    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
-        self.restart();
-        self.circuit.set_constants(constants)
     }
 }

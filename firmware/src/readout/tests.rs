@@ -306,7 +306,7 @@ fn a_failed_transaction_costs_one_reading_and_an_idle_one_its_column_until_the_n
 fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
     let (record, mut scanner) = scanner();
     let mut frame = [f32::NAN; 6];
-    let mut samples = |scanner: &mut dyn FrameSource, settings, wires: Selection<'_>| {
+    let mut samples = |scanner: &mut TestScanner, settings, wires: Selection<'_>| {
         let before = record.transfers();
         let frame = &mut frame[..wires.rows.len() * wires.columns.count()];
         scanner.scan(settings, wires, frame);

@@ -122,7 +122,7 @@ fn a_scan_of_other_wires_is_given_up_when_a_model_comes_into_force() {
 }
 
 #[test]
-fn a_scan_that_never_ends_is_a_silent_sensor() {
+fn a_scan_that_never_ends_is_a_silent_sensor_which_tells_what_it_finds() {
     let (mut session, board) = started_alone(1000, 1_000_000_000);
     run_until_started(&mut session, &board, 1);
     board.pins.borrow_mut().look_us = 1000;
@@ -135,6 +135,9 @@ fn a_scan_that_never_ends_is_a_silent_sensor() {
     assert_eq!(board.pins.borrow().feeds, fed, "the watchdog is fed");
     assert!(board.pins.borrow().started > 2, "it is not tried again");
     let frames = readings(&board);
+    let all = reports(&board.pins.borrow().to_host);
+    let told = all.iter().filter(|(number, text)| *number == 0 && text.contains("Diagnosis"));
+    assert_eq!(told.count(), frames.len(), "one for each scan");
     let s = statistics(&mut session, &board);
     assert_eq!(s.failed_samples, s.frames_scanned * (ROWS * COLS) as u32);
     assert!(!frames.is_empty() && frames.iter().all(|(.., first_ohm)| first_ohm.is_nan()));

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use taxel_firmware::link::message::Memory;
-use taxel_firmware::platform::{Platform, Port};
+use taxel_firmware::platform::{Clock, Line, Platform, Storage, Watchdog};
 use taxel_firmware::store::Journal;
 
 use super::flash::Flash;
@@ -58,13 +58,22 @@ impl Board {
     }
 }
 
-impl Port for Board {
+impl Clock for Board {
     fn now_us(&mut self) -> u32 {
         let mut pins = self.pins.borrow_mut();
         pins.now_us = pins.now_us.wrapping_add(1 + pins.look_us);
         pins.now_us
     }
 
+    /// Each look takes a thousand cycles.
+    fn cycles(&self) -> u32 {
+        let mut pins = self.pins.borrow_mut();
+        pins.cycles = pins.cycles.wrapping_add(1000);
+        pins.cycles
+    }
+}
+
+impl Line for Board {
     fn receive(&mut self) -> Option<u8> {
         self.pins.borrow_mut().to_device.pop_front()
     }
@@ -85,28 +94,25 @@ impl Port for Board {
     }
 }
 
-impl Platform for Board {
-    type Page = Flash;
-
-    const BOARD: &'static str = "test";
-
+impl Watchdog for Board {
     fn feed_watchdog(&mut self) {
         let mut pins = self.pins.borrow_mut();
         pins.feeds = pins.feeds.wrapping_add(1);
     }
+}
 
-    fn memory(&self) -> Memory {
-        Memory { stack_reserved: 1024, ..Memory::default() }
-    }
-
-    /// Each look takes a thousand cycles.
-    fn cycles(&self) -> u32 {
-        let mut pins = self.pins.borrow_mut();
-        pins.cycles = pins.cycles.wrapping_add(1000);
-        pins.cycles
-    }
+impl Storage for Board {
+    type Page = Flash;
 
     fn journal(&mut self) -> &mut Journal<Flash> {
         &mut self.journal
+    }
+}
+
+impl Platform for Board {
+    const BOARD: &'static str = "test";
+
+    fn memory(&self) -> Memory {
+        Memory { stack_reserved: 1024, ..Memory::default() }
     }
 }

@@ -1,7 +1,10 @@
 //! The sensor and its circuit.
 
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
-use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use taxel_firmware::readout::{
+    Diagnosis, FrameSource, RunningSource, ScanReport, ScanSettings, Scanning, Selection,
+    WaitingSource,
+};
 
 use super::board::Board;
 use super::shape::{COLS, ROWS};
@@ -41,6 +44,28 @@ fn report(frame: &[f32]) -> ScanReport {
 }
 
 impl FrameSource for Source {
+    fn scanning(&mut self) -> Scanning<'_> {
+        let alone = self.board.pins.borrow().scans_alone;
+        if alone { Scanning::Runs(self) } else { Scanning::Waits(self) }
+    }
+
+    fn diagnose(&mut self) -> Option<Diagnosis> {
+        assert!(self.under_way.is_none(), "a test within a scan");
+        let items_left = [0, 0, 5, 1];
+        Some(Diagnosis { items_left, ..Diagnosis::default() })
+    }
+
+    fn constants(&self) -> Option<Constants<'_>> {
+        Some(self.circuit.constants())
+    }
+
+    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
+        assert!(self.under_way.is_none(), "constants change within a scan");
+        self.circuit.set_constants(constants)
+    }
+}
+
+impl WaitingSource for Source {
     fn scan(
         &mut self,
         settings: ScanSettings,
@@ -52,15 +77,14 @@ impl FrameSource for Source {
         pins.now_us = pins.now_us.wrapping_add(SCAN_US + pins.scan_us);
         report(frame)
     }
+}
 
-    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) -> bool {
+impl RunningSource for Source {
+    fn start(&mut self, settings: ScanSettings, wires: Selection<'_>) {
         let (readings, mut pins) = (self.read(settings, wires), self.board.pins.borrow_mut());
-        if pins.scans_alone {
-            pins.started += 1;
-            let end_us = pins.now_us.wrapping_add(SCAN_US + pins.scan_us);
-            assert!(self.under_way.replace((readings, end_us)).is_none(), "two scans at once");
-        }
-        pins.scans_alone
+        pins.started += 1;
+        let end_us = pins.now_us.wrapping_add(SCAN_US + pins.scan_us);
+        assert!(self.under_way.replace((readings, end_us)).is_none(), "two scans at once");
     }
 
     fn poll(&mut self) -> bool {
@@ -79,14 +103,5 @@ impl FrameSource for Source {
     fn stop(&mut self) {
         assert!(self.under_way.take().is_some(), "there is no scan to give up");
         self.board.pins.borrow_mut().stopped += 1;
-    }
-
-    fn constants(&self) -> Option<Constants<'_>> {
-        Some(self.circuit.constants())
-    }
-
-    fn set_constants(&mut self, constants: Constants<'_>) -> Result<(), ConstantsFault> {
-        assert!(self.under_way.is_none(), "constants change within a scan");
-        self.circuit.set_constants(constants)
     }
 }

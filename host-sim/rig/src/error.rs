@@ -80,6 +80,15 @@ pub enum Error {
         /// What came instead.
         heard: Heard,
     },
+    /// Scan that never ended.
+    #[error(
+        "the device gave up a scan that did not end; part of its readout that stalls: {stalled}; `cargo xtask accept` tests \
+         it (docs/board.md)"
+    )]
+    GivenUp {
+        /// The part, as the device found it in a test of itself.
+        stalled: &'static str,
+    },
     /// Answer that does not belong to the request.
     #[error("the device answers {request} with {answer}")]
     Unexpected { request: String, answer: String },

@@ -5,7 +5,7 @@ use taxel_core::health::Limits;
 use taxel_data::Table;
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::Configuration;
-use taxel_firmware::readout::{FrameSource, Selection};
+use taxel_firmware::readout::{Selection, WaitingSource};
 use taxel_learn::faults::diagnose;
 use taxel_simulate::World;
 

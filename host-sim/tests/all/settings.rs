@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{Configuration, Setting};
-use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use taxel_firmware::readout::{
+    FrameSource, ScanReport, ScanSettings, Scanning, Selection, WaitingSource,
+};
 use taxel_rig::device::Device;
 use taxel_rig::emulator::{self, Emulator};
 
@@ -53,10 +55,16 @@ fn the_image_keeps_settings_over_restarts() {
 #[derive(Clone)]
 struct AtRest(ZeroPotential<8, 18>);
 
-impl FrameSource for AtRest {
+impl WaitingSource for AtRest {
     fn scan(&mut self, _: ScanSettings, _: Selection<'_>, frame: &mut [f32]) -> ScanReport {
         frame.fill(55.0);
         ScanReport::default()
+    }
+}
+
+impl FrameSource for AtRest {
+    fn scanning(&mut self) -> Scanning<'_> {
+        Scanning::Waits(self)
     }
 
     fn constants(&self) -> Option<Constants<'_>> {

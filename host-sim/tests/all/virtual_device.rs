@@ -6,8 +6,10 @@ use taxel_data::{Purpose, Random, Stream};
 use taxel_firmware::app::{App, Buffers};
 use taxel_firmware::capacity::Capacity;
 use taxel_firmware::link::message::{Configuration, Memory};
-use taxel_firmware::platform::{Platform, Port};
-use taxel_firmware::readout::{FrameSource, ScanReport, ScanSettings, Selection};
+use taxel_firmware::platform::{self, Clock, Platform, Storage, Watchdog};
+use taxel_firmware::readout::{
+    FrameSource, ScanReport, ScanSettings, Scanning, Selection, WaitingSource,
+};
 use taxel_firmware::store::Journal;
 
 /// Line to the device that spoils bytes, in either direction: one in so many, or none.
@@ -59,11 +61,25 @@ impl<W: Read + Write, N> Board<'_, W, N> {
     }
 }
 
-impl<W: Read + Write, N: FnMut()> Port for Board<'_, W, N> {
+impl<W, N> Clock for Board<'_, W, N> {
     fn now_us(&mut self) -> u32 {
         self.start.elapsed().as_micros() as u32
     }
+}
 
+impl<W, N> Watchdog for Board<'_, W, N> {
+    fn feed_watchdog(&mut self) {}
+}
+
+impl<W, N> Storage for Board<'_, W, N> {
+    type Page = Flash;
+
+    fn journal(&mut self) -> &mut Journal<Flash> {
+        self.journal
+    }
+}
+
+impl<W: Read + Write, N: FnMut()> platform::Line for Board<'_, W, N> {
     fn receive(&mut self) -> Option<u8> {
         if self.taken == self.received.len() {
             self.flush();
@@ -109,18 +125,10 @@ impl<W: Read + Write, N: FnMut()> Port for Board<'_, W, N> {
 }
 
 impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
-    type Page = Flash;
-
     const BOARD: &'static str = "virtual";
-
-    fn feed_watchdog(&mut self) {}
 
     fn memory(&self) -> Memory {
         Memory { text: 20_000, bss: 3000, stack_high_water: 1000, ..Memory::default() }
-    }
-
-    fn journal(&mut self) -> &mut Journal<Flash> {
-        self.journal
     }
 }
 
@@ -136,6 +144,12 @@ pub struct Source {
 }
 
 impl FrameSource for Source {
+    fn scanning(&mut self) -> Scanning<'_> {
+        Scanning::Waits(self)
+    }
+}
+
+impl WaitingSource for Source {
     fn scan(&mut self, _: ScanSettings, wires: Selection<'_>, frame: &mut [f32]) -> ScanReport {
         let shown = &self.frames[self.next % self.frames.len()];
         let readings = wires.rows.iter().flat_map(|row| wires.columns.pick(shown[row.0]));

@@ -6,7 +6,7 @@ use taxel_firmware::link::message::{Configuration, Report};
 
 use super::{Scan, ScanEstimate, Source};
 use crate::device::{Device, DeviceIdentity};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// What a device sends of each scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,25 +30,31 @@ impl Assembler {
     }
 
     /// The scan that is whole with this `report`.
-    pub fn take(&mut self, report: &Report<'_>) -> Option<Scan> {
-        match report {
+    ///
+    /// # Errors
+    /// [`Error::GivenUp`] if the device says that a scan did not end.
+    pub fn take(&mut self, report: &Report<'_>) -> Result<Option<Scan>> {
+        let scan = match report {
+            Report::Diagnosis(found) => {
+                return Err(Error::GivenUp { stalled: found.stalled_part().unwrap_or("none") });
+            }
             Report::Readings { frame, start_us, readings_ohm } if self.sent.readings => {
                 let readings = readings_ohm.iter().collect();
                 if self.sent.estimates {
                     self.readings = Some((*frame, readings));
-                    return None;
+                    return Ok(None);
                 }
-                Some(Scan {
+                Scan {
                     number: *frame,
                     start_us: *start_us,
                     heard: Instant::now(),
                     readings,
                     estimate: None,
-                })
+                }
             }
             Report::Estimate(estimate) if self.sent.estimates => {
                 let of_scan = self.readings.take().filter(|(frame, _)| *frame == estimate.frame);
-                Some(Scan {
+                Scan {
                     number: estimate.frame,
                     start_us: estimate.start_us,
                     heard: Instant::now(),
@@ -60,10 +66,11 @@ impl Assembler {
                         deviations: estimate.deviation.iter().collect(),
                         novelty: estimate.novelty,
                     }),
-                })
+                }
             }
-            _ => None,
-        }
+            _ => return Ok(None),
+        };
+        Ok(Some(scan))
     }
 }
 
@@ -100,13 +107,14 @@ impl DeviceScans {
 impl Source for DeviceScans {
     fn hear(&mut self, deadline: Instant, take: &mut dyn FnMut(Scan)) -> Result<()> {
         let Self { device, assembler } = self;
-        device.hear(deadline, |_, report| {
-            if let Some(scan) = assembler.take(report) {
-                take(scan);
+        let failure = device.hear(deadline, |_, report| match assembler.take(report) {
+            Ok(scan) => {
+                scan.into_iter().for_each(&mut *take);
+                None
             }
-            None::<()>
+            Err(failure) => Some(failure),
         })?;
-        Ok(())
+        failure.map_or(Ok(()), Err)
     }
 
     fn set_baseline(&mut self, readings: &[f32]) -> Result<()> {

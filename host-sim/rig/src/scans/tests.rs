@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use taxel_core::blob::Floats;
 use taxel_firmware::link::message::{EstimateReport, Report};
+use taxel_firmware::readout::Diagnosis;
 
 use super::*;
 use crate::Error;
@@ -147,7 +148,7 @@ fn readings_of_another_scan_do_not_stand_beside_an_estimate() {
     let mut assembler = Assembler::new(Sent { readings: true, estimates: true });
     let readings_ohm = Floats::new(&[60.0, 61.0]);
     let readings = Report::Readings { frame: 1, start_us: 0, readings_ohm };
-    assert!(assembler.take(&readings).is_none());
+    assert!(assembler.take(&readings).unwrap().is_none());
     let estimate = EstimateReport {
         frame: 2,
         start_us: 10,
@@ -157,6 +158,10 @@ fn readings_of_another_scan_do_not_stand_beside_an_estimate() {
         novelty: None,
         deviation: Floats::new(&[]),
     };
-    let scan = assembler.take(&Report::Estimate(estimate)).unwrap();
+    let scan = assembler.take(&Report::Estimate(estimate)).unwrap().unwrap();
     assert!(scan.number == 2 && scan.readings.is_empty(), "{scan:?}");
+    // A device that gave up a scan says which part of its readout was the first to stall.
+    let diagnosis = Diagnosis { items_left: [0, 0, 5, 1], ..Diagnosis::default() };
+    let given_up = assembler.take(&Report::Diagnosis(diagnosis)).unwrap_err().to_string();
+    assert!(given_up.contains("stalls: numbers;"), "{given_up}");
 }

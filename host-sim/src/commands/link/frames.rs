@@ -36,8 +36,9 @@ pub fn hear_scans(
     let mut scans: Vec<Scan> = Vec::new();
     let mut assembler = Assembler::new(wanted.sent());
     while scans.len() < count {
-        let next = device.hear(Instant::now() + patience, |_, report| assembler.take(report))?;
-        let Some(scan) = next else {
+        let next = device
+            .hear(Instant::now() + patience, |_, report| assembler.take(report).transpose())?;
+        let Some(scan) = next.transpose()? else {
             let why = match scans.len() {
                 0 => "does it scan? `identify` counts its frames",
                 _ => "does the line carry them? Give a longer --period-us",
