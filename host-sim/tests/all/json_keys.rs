@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::common::{Folder, small_scene, small_scene_with_table1, tiny_scene};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
-const COMMANDS: [&str; 39] = [
+const COMMANDS: [&str; 66] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --reading-model full -o m.bin",
@@ -52,6 +52,36 @@ const COMMANDS: [&str; 39] = [
     "synth spans_drift.toml -n 20 -o spans.csv",
     "sweep all.toml",
     "sweep folds.toml",
+    // Arrays that are not square, wires that are not read, contacts of several shapes, and every kind of noise at once.
+    "synth odd.toml -n 300 -o odd.csv",
+    "synth odd.toml -n 30 --untouched -o rest.csv",
+    "train odd.toml -o odd.bin",
+    "inspect odd.bin",
+    "eval odd.bin odd.csv --baseline rest.csv --without r2c4_ohm,r5c1* --html odd.html",
+    "decode odd.bin odd.csv --baseline rest.csv --limits 20,400 --confidence -o odd-e.csv",
+    "run odd.toml -o odd",
+    "limit still.toml -n 3 -o still",
+    "run slow.toml -o slow",
+    "trade slow.toml --centres 4 --average 4 --max-error 5 -o slow",
+    "synth slow.toml -n 60 --frame-rate 100 --scan-ms 6 -o slow.csv",
+    "run alone.toml --reading-model full --relative-inputs -o alone",
+    "limit alone.toml -n 4 --row 3 --noise 0.01,0.02 -o alone",
+    "trade alone.toml --centres 4,8 --average 1,2 --column-step 1,2 --group all --all -o alone",
+    "compare alone.toml wider.toml --centres 4,6 --average 1,4 --readout onchip --group dx_mm --max-latency-ms 2 -o both",
+    "train flat.toml --format fixed16 --each-row --reading-model fill -o flat.bin",
+    "limit flat.toml -n 3 --model flat.bin -o flat",
+    "export flat.bin --rust flat.rs",
+    "sweep scenes.toml",
+    // A mat's log in another dialect, with gaps, lines that are cut, values far from all others, and folds.
+    "run gaps.csv --inputs ch* --outputs x_mm,y_mm,fz_n --missing 4095 --grid 3x5 --time time_ms --centres 6 --no-refine --reading-model full -o gaps",
+    "run gaps.csv --inputs ch*,!ch4 --outputs fz_n --relative-inputs --rest fz_n --time time_ms --centres 6 --solver rls --penalty 1e-5 -o rls",
+    "train gaps.csv --inputs ch* --outputs *_mm,fz_n --missing 4095 --grid 3x5 --fold-column place --select --centres 3,6 --spread 0.5,1 --no-refine --reading-model full -o g.bin",
+    "decode g.bin gaps.csv --missing 4095 --without r2c2_ch7,r3c2* --keep place,time_ms --confidence --filter-ms 60 --lead-ms 10 -o g.csv",
+    "eval g.bin gaps.csv --missing 4095 --without r2c2_ch7,r3c2* --last-share 0.3 --time time_ms --html g.html",
+    "trade gaps.csv --inputs ch* --outputs fz_n,x_mm --keep-outliers --fold-column place --centres 3,6 --spread 1 --no-refine --grid 3x5 --all -o gaps",
+    // A recording, and what is read from it.
+    "decode g.bin gaps.csv --missing 4095 --without r3c2* --confidence --no-fill --first-share 0.3 -o g.mcap",
+    "decode g.bin g.mcap -o h.csv",
 ];
 
 /// Axes of all kinds, with prices, bounds and draws.
@@ -65,6 +95,49 @@ const ALL: &str = "name = \"all\"\nscene = \"tiny.toml\"\nlimit_frames = 4\nrepe
 /// Folds of measurements, with results that repeat over them.
 const FOLDS: &str = "name = \"folds\"\n[data]\nfile = \"log.csv\"\ninputs = \"ch*\"\noutputs = \"f*\"\nfold_blocks = 3\n\
                      [set]\ntraining.refine = false\n[axes]\ndata.fold = [0, 1, 2]\ntraining.centres = [3, 5]\n";
+
+/// Two scenes, with seeds and a bound.
+const SCENES: &str = "name = \"scenes\"\nscene = [\"alone.toml\", \"wider.toml\"]\nlimit_frames = 3\nrepeats = 3\n\
+                      objectives = [\"rmse_dz_mm\", \"frame_ms\"]\n\
+                      [axes]\ntraining.format = [\"f32\", \"fixed16\"]\ntraining.centres = [3, 5]\n[bounds]\ncycles = 3000\n";
+
+/// Presses on a mat of 3 × 5 cells, with semicolons and decimal commas. Some readings and outputs are missing or far off, and
+/// two lines are cut.
+fn gaps() -> String {
+    let line = |i: usize| {
+        let (t, press) = (i as f64, (i % 90) as f64);
+        let press =
+            if press < 60.0 { (press * std::f64::consts::PI / 60.0).sin().max(0.0) } else { 0.0 };
+        let place = i / 90;
+        let x = 3.0 * (place * 7 % 5) as f64 + (0.2 * t).sin();
+        let y = 2.0 * (place * 3 % 4) as f64 + 0.5 * (0.3 * t).cos();
+        let force = 4.0 * press * (1.0 + 0.1 * place as f64);
+        let mut cells: Vec<String> = (0..15)
+            .map(|cell| {
+                let [row, column] = [cell / 5, cell % 5].map(|it| it as f64);
+                let d = ((3.0 * column - x) / 3.5).powi(2) + ((4.0 * row - y) / 4.0).powi(2);
+                let rough = ((i * 7919 + cell / 5 * 31 + cell % 5 * 17) % 101) as f64 / 40.0;
+                format!("{:.3}", 500.0 + 0.05 * t - 60.0 * force * (-d).exp() + rough)
+            })
+            .collect();
+        match i {
+            333 | 700 => cells[5] = "99999".into(),
+            _ if i % 53 == 7 => cells[i % 15].clear(),
+            _ if i % 61 == 5 => cells[i / 61 % 15] = "nan".into(),
+            _ if i % 97 == 11 => cells[3] = "4095".into(),
+            _ => {}
+        }
+        let touched = |value: f64| if press > 0.0 { format!("{value:.3}") } else { String::new() };
+        let force = if i % 101 == 50 { String::new() } else { format!("{force:.3}") };
+        let cut = if [120, 450].contains(&i) { "cut;" } else { "" };
+        let line = [format!("{cut}{:.1}", 20.0 * t), touched(x), touched(y), force].join(";");
+        format!("{line};{};{}\n", place % 5, cells.join(";")).replace('.', ",")
+    };
+    let channels: Vec<String> = (1..=15).map(|channel| format!("ch{channel}")).collect();
+    let channels = channels.join(";");
+    let heads = format!("# A mat.\ntime_ms;x_mm;y_mm;fz_n;place;{channels}\n");
+    heads + &(0..900).map(line).collect::<String>()
+}
 
 /// Presses of different strengths on four channels that drift apart, with rest between them.
 pub fn log() -> String {
@@ -111,7 +184,22 @@ fn prepared() -> Folder {
     let drifts = format!("{}\n[drift]\ngain = 0.2\n", tiny.replace("\"relative\"", "\"span\""));
     folder.write("spans_drift.toml", drifts);
     folder.write("tiny.toml", tiny);
+    let odd = include_str!("scenes/odd.toml");
+    let still = odd.replace("[drift]\ngain = 0.05", "").replace("relative_inputs = true", "");
+    let alone = include_str!("scenes/alone.toml");
+    let flat = alone.replace("\"deformation\"\naxes", "\"force\"\naxes");
+    let wider = alone.replace("15.0, 9.0, 4.0", "18.0, 12.0, 5.0").replace("[1, 3]", "[1, 2]");
+    for (name, scene) in
+        [("odd", odd), ("still", &still), ("slow", include_str!("scenes/slow.toml"))]
+    {
+        folder.write(&format!("{name}.toml"), scene);
+    }
+    for (name, scene) in [("alone", alone), ("flat", &flat), ("wider", &wider)] {
+        folder.write(&format!("{name}.toml"), scene);
+    }
     folder.write("all.toml", ALL);
+    folder.write("scenes.toml", SCENES);
+    folder.write("gaps.csv", gaps());
     folder.write("folds.toml", FOLDS);
     folder.write("log.csv", log());
     folder
@@ -188,7 +276,7 @@ fn digest(content: &[u8]) -> u64 {
     })
 }
 
-/// All files below a folder, but for points of sweeps, whose names tell the build.
+/// All files below a folder, but for points of sweeps, whose names tell the build, and recordings, which tell when they were made.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut all = vec![];
     for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
@@ -198,7 +286,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
                     .into_iter()
                     .filter(|it| !it.components().any(|part| part.as_os_str() == "points")),
             );
-        } else {
+        } else if entry.extension().is_none_or(|end| end != "mcap") {
             all.push(entry);
         }
     }
@@ -288,7 +376,13 @@ fn results_stay_as_they_are() {
         let arguments: Vec<&str> = command.split(' ').collect();
         let result = folder.json(&arguments);
         assert_eq!(result["command"], arguments[0]);
-        let text = folder.succeed(&arguments);
+        let output = folder.run(&arguments);
+        assert!(output.status.success(), "{command}");
+        let [mut text, said] =
+            [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap());
+        let is_note =
+            |line: &&str| ["note: ", "warning: ", "  "].iter().any(|it| line.starts_with(it));
+        text.extend(said.lines().filter(is_note).map(|line| format!("{line}\n")));
         let mut values = Values::new();
         add_values(&result, "", &mut values);
         keys.extend(["\n", command, "\n"]);

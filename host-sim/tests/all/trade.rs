@@ -7,7 +7,8 @@ use host_sim::device::{Device, Readout};
 use host_sim::experiment::Experiment;
 use host_sim::subject::Subject;
 use host_sim::sweep;
-use host_sim::sweep::bounds::{Bound, Bounds};
+use host_sim::sweep::bounds::Bound::{self, Least, Most};
+use host_sim::sweep::bounds::Bounds;
 use host_sim::sweep::plan::Base;
 use host_sim::trade::{self, Asked, Trade};
 use taxel_data::Stream;
@@ -56,7 +57,7 @@ impl Planned {
 }
 
 fn at_most(result: &str, most: f64) -> Bounds {
-    [(result.to_owned(), Bound::Most(most))].into()
+    [(result.to_owned(), Most(most))].into()
 }
 
 /// The plan's trade, which several tests look at.
@@ -191,7 +192,6 @@ fn choice_and_knee_are_those_worked_out_by_hand() {
         trade.choose(&bounds).unwrap();
         trade.chosen.unwrap()
     };
-    use Bound::{Least, Most};
     assert_eq!(chosen(&[("rmse_dz_mm", Most(0.11))]), 3);
     assert_eq!(chosen(&[("rmse_dz_mm", Most(0.109))]), 2);
     assert_eq!(chosen(&[("rmse_dz_mm", Most(0.11)), ("blob_bytes", Most(400.0))]), 1);

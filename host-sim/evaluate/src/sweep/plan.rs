@@ -440,6 +440,13 @@ fn axes(bases: &[Base], wanted: &Wanted) -> Checked<Vec<Lines>> {
     let single = |field: &str, values: Vec<Value>| {
         (vec![field.to_owned()], values.into_iter().map(|value| vec![value]).collect())
     };
+    // What stands there would name points, and change none.
+    let drawn = wanted.draw.as_ref().map(|draw| &draw.axes);
+    for table in [&wanted.set, &wanted.axes].into_iter().chain(drawn) {
+        require(!table.contains_key(SCENE), SCENE, "a field", || {
+            "give scenes at the top of the plan, before its sections: scene = [\"a.toml\", \"b.toml\"]".into()
+        })?;
+    }
     let mut axes = Vec::new();
     if bases.len() > 1 {
         let labels = bases.iter().map(|base| Value::from(base.label.as_str())).collect();
