@@ -11,7 +11,7 @@ use crate::link::receive::Receiver;
 use crate::log::{info, warning};
 use crate::platform::Platform;
 use crate::readout::FrameSource;
-use crate::store::{ConfirmedModels, Slot, Upload};
+use crate::store::Slot;
 
 // From the ground up: a module imports only what is declared before it.
 mod buffers;
@@ -24,9 +24,7 @@ mod wiring;
 mod sensor;
 mod saved_settings;
 mod work;
-mod trial;
 mod models;
-mod undo;
 mod session;
 mod answer;
 
@@ -36,7 +34,6 @@ use models::Models;
 use sensor::Sensor;
 pub use session::Session;
 pub use session_end::SessionEnd;
-use trial::Trial;
 use wiring::Wiring;
 use work::Work;
 
@@ -80,12 +77,6 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
         if journal.recover().is_err() {
             warning!("the journal in flash failed");
         }
-        let models = Models {
-            capacity,
-            confirmed: ConfirmedModels::NONE,
-            upload: Upload::new(),
-            trial: Trial::default(),
-        };
         let now_us = platform.now_us();
         let mut link = Link::new(platform, message);
         let memories = [frame.as_flattened_mut(), baseline.as_flattened_mut()];
@@ -102,7 +93,7 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             filter: State::new(tracks.as_flattened_mut()),
             deviations: deviations.as_flattened_mut(),
         };
-        let core = Core { sensor, models, link, work };
+        let core = Core { sensor, models: Models::new(capacity), link, work };
         Self { receiver: Receiver::new(received), core }
     }
 

@@ -8,11 +8,9 @@ use taxel_core::blob::Model;
 
 mod journal;
 mod confirmed;
-mod upload;
 
 pub use confirmed::ConfirmedModels;
 pub use journal::{Journal, KeepError, Kind, PAGE_BYTES};
-pub use upload::Upload;
 
 /// Error of a flash that could not be erased or written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use crate::mock::*;
 use taxel_firmware::app::SessionEnd;
 use taxel_firmware::link::message::{ModelFault, Refusal, UploadState, UploadStep};
-use taxel_firmware::store::{ERASES_AT_ONCE, Upload};
+use taxel_firmware::store::ERASES_AT_ONCE;
 
 const CHUNK: usize = 60;
 
@@ -108,47 +108,57 @@ fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_mo
 }
 
 #[test]
-fn erases_are_limited_in_rate_and_prepared_for() {
+fn erases_are_limited_in_rate() {
     const INTERVAL_US: u64 = 600_000_000;
-    let [mut slot, _] = Flash::slots();
-    slot.erase_interval_s = 600;
-    let mut upload = Upload::new();
-    let mut prepared = 0;
-    let mut begin_and_chunk = |now_us: u64| {
-        let prepare = || {
-            prepared += 1;
-            Ok(())
-        };
-        upload.begin(&mut slot, 100, now_us, prepare)?;
-        upload.chunk(&mut slot, 0, &[1; 8])
+    let mut bench = Bench::new(quiet(), &blob(1, 3));
+    bench.slots[1].erase_interval_s = 600;
+    let (mut session, board) = bench.session();
+    let new = blob(2, 4);
+    let steps = upload_steps(&new, CHUNK);
+    let pass = |us: u64| {
+        let mut pins = board.pins.borrow_mut();
+        pins.now_us = pins.now_us.wrapping_add(us as u32);
     };
-    let start_us = 5_000_000;
+    let mut begin_and_chunk = |later_us: u64| {
+        pass(later_us);
+        upload(&mut session, &board, &steps[..2]).0
+    };
+    // All looks at the clock so far take less than a millisecond.
+    let is_refused = |outcome: Answer, wait_us: u64| match outcome {
+        Err(Refusal::TooSoon { wait_us: found }) => found.abs_diff(wait_us) < 1000,
+        _ => false,
+    };
     for _ in 0..ERASES_AT_ONCE {
-        begin_and_chunk(start_us).unwrap();
+        begin_and_chunk(0).unwrap();
     }
-    let wait = |wait_us| Err(Refusal::TooSoon { wait_us });
-    assert_eq!(begin_and_chunk(start_us), wait(INTERVAL_US));
-    assert_eq!(begin_and_chunk(start_us + INTERVAL_US - 1), wait(1));
-    assert_eq!(begin_and_chunk(start_us + INTERVAL_US), Ok(()));
-    assert_eq!(begin_and_chunk(start_us + INTERVAL_US), wait(INTERVAL_US));
+    assert!(is_refused(begin_and_chunk(0), INTERVAL_US));
+    assert!(is_refused(begin_and_chunk(INTERVAL_US - 10_000), 10_000));
+    begin_and_chunk(10_000).unwrap();
+    assert!(is_refused(begin_and_chunk(0), INTERVAL_US));
     // After a long rest there are as many again, and no more.
-    let late_us = 1000 * INTERVAL_US;
-    for _ in 0..ERASES_AT_ONCE {
-        begin_and_chunk(late_us).unwrap();
+    for _ in 0..200 {
+        pass(INTERVAL_US);
+        session.step(); // the clock is looked at before it wraps around
     }
-    assert_eq!(begin_and_chunk(late_us), wait(INTERVAL_US));
-    let erases = 2 * ERASES_AT_ONCE + 1;
-    assert_eq!((slot.erases, prepared), (erases as usize, erases));
+    for _ in 0..ERASES_AT_ONCE {
+        upload(&mut session, &board, &steps[..2]).0.unwrap();
+    }
+    assert!(is_refused(upload(&mut session, &board, &steps[..2]).0, INTERVAL_US));
 }
 
 #[test]
 fn a_blob_may_fill_the_slot() {
-    let [mut slot, _] = Flash::slots();
-    let slot_bytes = Flash::SLOT_BYTES;
-    let mut begin = |length| Upload::new().begin(&mut slot, length, 0, || Ok(()));
-    let too_large = Refusal::TooLarge { slot_bytes: slot_bytes as u32 };
-    assert_eq!(begin(slot_bytes + 1), Err(too_large));
-    assert_eq!(begin(slot_bytes), Ok(()));
+    let (mut session, board) = started(quiet(), &[]);
+    let slot_bytes = Flash::SLOT_BYTES as u32;
+    let mut head = blob(1, 3)[..16].to_vec();
+    for (length, expected) in [
+        (slot_bytes + 1, Err(Refusal::TooLarge { slot_bytes })),
+        (slot_bytes, Ok(UploadState::Receiving { received: 0 })),
+    ] {
+        head[5..9].copy_from_slice(&length.to_le_bytes());
+        let begin = UploadStep::Begin { head: &head };
+        assert_eq!(upload(&mut session, &board, &[begin]).0, expected);
+    }
 }
 
 #[test]

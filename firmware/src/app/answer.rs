@@ -80,7 +80,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             }),
             Request::Upload(step) => models
                 .upload_step(step, model, spare, link, &mut end)
-                .map(|()| Some(Report::Upload(models.upload.state()))),
+                .map(|state| Some(Report::Upload(state))),
             Request::Undo { crc_32 } => models
                 .undo(crc_32, model, spare, link, &mut end)
                 .map(|crc_32| Some(Report::Upload(UploadState::Confirmed { crc_32 }))),

@@ -35,7 +35,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
         let Core { models, link, .. } = &mut app.core;
         models.confirmed = ConfirmedModels::read(link.platform().journal(), slots);
         let (capacity, confirmed) = (models.capacity, models.confirmed);
-        let candidates = candidates(slots, &confirmed, models.trial.slot());
+        let candidates = candidates(slots, &confirmed, models.slot_on_trial());
         let best = candidates.into_iter().flatten().next();
         // Only the copy is checked, so the best model is looked at once.
         let bytes = best.and_then(|best| slots.get(best.slot)).map_or(&[][..], S::bytes);
