@@ -1,9 +1,11 @@
 //! The host's side: reports to it, and what is counted for it.
 
+use serde::Serialize;
+
 use super::frame_clock::LongClock;
-use crate::link::message::{KeepFault, Refusal, Report, Statistics};
+use crate::link::message::{KeepFault, Refusal, Report, Setting, Statistics};
 use crate::link::{cobs, packet};
-use crate::platform::{Clock, Line, Watchdog};
+use crate::platform::{Clock, Line, Storage, Watchdog};
 use crate::store::KeepError;
 
 /// Longest time in µs without progress of a report; then it is given up.
@@ -41,6 +43,17 @@ impl<P: Watchdog> Link<'_, P> {
             Err(KeepError::TooLarge) => Err(Refusal::Keep(KeepFault::TooLarge)),
             Err(KeepError::Failed) => Err(Refusal::Flash),
         }
+    }
+
+    /// Keeps the postcard fields of `content` for `setting`.
+    pub fn keep<T: Serialize>(&mut self, setting: Setting, content: &T) -> Result<(), Refusal>
+    where
+        P: Storage,
+    {
+        let bytes = postcard::to_slice(content, self.buffer);
+        let bytes = bytes.map_err(|_| Refusal::Keep(KeepFault::TooLarge))?;
+        let written = self.platform.journal().keep(setting.into(), &[bytes]);
+        self.count_write(written)
     }
 
     /// Checks that the host may have something kept.
