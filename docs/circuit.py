@@ -18,7 +18,8 @@ SELECT_PIN = "PB14"
 COLUMN_PINS = "PA0 PA1 PA4 PA6 PA7 PB0 PC0 PC1 PC2".split()
 ROWS, COLUMNS = 8, 18
 
-#: Pins of ST's morpho connectors (UM1724, NUCLEO-F446RE), two a line: odd and even.
+#: Pins of ST's morpho connectors (UM1724, NUCLEO-F446RE), two a line: odd and even. They agree with
+#: KiCad's NUCLEO64-F411RE, and with Zephyr's boards/st/nucleo_f446re/st_morpho_connector.dtsi.
 CN7 = """
 PC10 PC11  PC12 PD2   VDD E5V    BOOT0 GND  NC1 NC2   NC3 IOREF  PA13 RESET  PA14 +3V3  PA15 +5V  GND GND
 PB7 GND    PC13 VIN   PC14 NC4   PC15 PA0   PH0 PA1   PH1 PA4    VBAT PB0    PC2 PC1    PC3 PC0
@@ -56,6 +57,7 @@ def socket(pins):
 
 
 #: By the chips' data sheets: TI SCDS238 (DGS), Microchip DS21685 (PDIP-14), TI SCHS122 (74HC4053; X, Y, Z are its A, B, C).
+#: They agree with KiCad 6: TS3A24159DGSR, MCP6004 (whose pins are those of the MCP6024) and CD4053B.
 SWITCH = Kind("TS3A24159", "TS3A24159DGSR", "Package_SO:VSSOP-10_3x3mm_P0.5mm",
               "V+ NO1 COM1 IN1 NC1 GND NC2 IN2 COM2 NO2".split())
 OP_AMP = Kind("MCP6024", "MCP6024-I/P", "Package_DIP:DIP-14_W7.62mm",
