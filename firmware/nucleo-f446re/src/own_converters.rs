@@ -6,6 +6,9 @@
 //! - Timer 8 triggers the converters twice as often as there are samples of a reading, then stops until the next row.
 //! - At each trigger the converters sample three columns each, all three at once; DMA takes the nine numbers to memory.
 //!
+//! A number and a row's word may meet in DMA2, which then writes the word twice (ES0298): it is the same one. Prefetch
+//! is on, although it adds noise to the converters (AN4073).
+//!
 //! `docs/board.md` has the pins.
 
 use core::cell::UnsafeCell;
