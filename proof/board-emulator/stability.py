@@ -1,22 +1,27 @@
 """Computes whether the op-amps of docs/board.md are stable, and how fast they settle: python3 stability.py (numpy)
 
+For R_f = 10 kΩ beside 47 pF, and cells of 1 kΩ: python3 stability.py 10e3 47e-12 1e3
+
 Small signals: an op-amp is an integrator of 10 MHz behind an output resistance, whose 65° of phase margin as a follower
 with 60 pF (data sheet of the MCP6024) tell a second pole. From 150 Ω on the output alone takes more than that: such a
 part would miss its data sheet, and is the worst case here.
 """
 
 import functools
+import sys
 
 import numpy as np
 
-ROWS, COLUMNS, BIAS_V, FEEDBACK_OHM, SWITCH_OHM, CELL_OHM = 8, 18, 0.2, 560.0, 0.26, 55.0
+ROWS, COLUMNS, BIAS_V, SWITCH_OHM = 8, 18, 0.2, 0.26
+#: Feedback resistor, what docs/circuit.py has across it, and a cell of the sensor.
+FEEDBACK_OHM, FEEDBACK_F, CELL_OHM = map(float, sys.argv[1:4] or (560, 220e-12, 55))
 GAIN_HZ, SHEET_DEGREES, SHEET_F = 10e6, 65.0, 60e-12
+CELL = f"{CELL_OHM:g} Ω"
 #: Output resistances in Ω, and capacitances in F of an op-amp's input, of its load (a 74HC4053 and wires), and of the
 #: wire of a row or column.
 OUTPUT_OHM, INPUT_F, LOAD_F, WIRE_F = (50, 100, 200, 300), 6.5e-12, 30e-12, (100e-12, 300e-12)
-#: What docs/circuit.py has across the feedback resistor, and at the divider of V_b, whose resistance in Ω is that of
-#: 15.5 kΩ and 1 kΩ in parallel.
-FEEDBACK_F, BIAS_F, BIAS_OHM = 220e-12, 1e-6, 939.0
+#: What docs/circuit.py has at the divider of V_b, whose resistance in Ω is that of 15.5 kΩ and 1 kΩ in parallel.
+BIAS_F, BIAS_OHM = 1e-6, 939.0
 HZ = np.logspace(4, 8, 8000)
 
 
@@ -96,7 +101,7 @@ def main():
     print("Phase margin of a column's op-amp, with 100 and 300 pF of wire, by its output resistance\n")
     print(f"| feedback | column | {ends} |")
     for feedback_f in (0.0, 100e-12, FEEDBACK_F, 1e-9):
-        for name, ohm in (("open", 1e9), ("55 Ω", CELL_OHM), ("8 × 55 Ω", CELL_OHM / ROWS)):
+        for name, ohm in (("open", 1e9), (CELL, CELL_OHM), (f"8 × {CELL}", CELL_OHM / ROWS)):
             cells = (" ".join(f"{column(out, wire, feedback_f, ohm):5.0f}°" for wire in WIRE_F) for out in OUTPUT_OHM)
             print(f"| {feedback_f * 1e12:5.0f} pF | {name:8} | {' | '.join(cells)} |")
     print(f"\nWith {FEEDBACK_F * 1e12:.0f} pF, 20 µs after a change: error of the current from idle, and from row to row; "
@@ -106,9 +111,9 @@ def main():
         for name, before in (("idle", None), ("row", 0)):
             cells = (f"{settling_percent(out, followers, before):+11.4f} %" for out in OUTPUT_OHM)
             print(f"| {followers} | from {name} | {' | '.join(cells)} |")
-        for name, ohm in (("55 Ω", CELL_OHM), ("no sensor", 1e9)):
+        for name, ohm in ((CELL, CELL_OHM), ("no sensor", 1e9)):
             print(f"| {followers} | {name} | {' | '.join(f'{damping(out, followers, ohm):13.2f}' for out in OUTPUT_OHM)} |")
-    print("\nA pulse of 16 pC at the divider of V_b (5 pF to an edge of 3.3 V), after 20 µs in counts at 55 Ω\n")
+    print(f"\nA pulse of 16 pC at the divider of V_b (5 pF to an edge of 3.3 V), after 20 µs in counts at {CELL}\n")
     for farad in (20e-12, 2.2e-9, 10e-9, 100e-9, BIAS_F):
         volts = 16e-12 / farad * np.exp(-20e-6 / (BIAS_OHM * farad))
         print(f"| {farad * 1e9:6.2f} nF | {volts * (1 + FEEDBACK_OHM / CELL_OHM) / 3.3 * 4096:.3f} |")

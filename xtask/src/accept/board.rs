@@ -112,8 +112,7 @@ fn flash(image: &Path) -> Outcome {
         }
         run(&mut command).map_err(|cause| {
             format!(
-                "{cause}; flashing takes probe-rs (`cargo install probe-rs-tools --locked`), or flash the image yourself \
-                 and say --flashed"
+                "{cause}; flashing takes probe-rs (docs/board.md), or flash the image yourself and say --flashed"
             )
         })?;
     }
