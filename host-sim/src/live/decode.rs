@@ -99,3 +99,55 @@ impl<'b> FrameByFrame<'b> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use taxel_data::Stream;
+    use taxel_recording::Frame;
+    use taxel_simulate::Synthesis;
+
+    use super::super::simulation::small_model;
+    use super::*;
+    use crate::experiment::Experiment;
+
+    #[test]
+    fn a_frame_is_decoded_and_flagged_as_a_data_file_is() {
+        let text = Experiment::text("contact").unwrap();
+        let text = text.replace("frames = 20000", "frames = 2000\nrelative_inputs = true");
+        let scene = Experiment::parse("contact", &text).unwrap();
+        let blob = small_model(&scene).unwrap();
+        let table = Synthesis::new(&scene.world).frames(Stream::Test, 3).inputs;
+        let baseline =
+            Synthesis::new(&scene.world).untouched().ideal().frames(Stream::Test, 1).inputs;
+        let model = blob.prepare().with_baseline(&baseline.values);
+        let floats = |line: &[f64]| line.iter().map(|it| *it as f32).collect::<Vec<f32>>();
+        let mut decoder = FrameByFrame::new(&blob).unwrap();
+        let decode = |readings: Vec<f32>, decoder: &mut FrameByFrame<'_>| {
+            let mut moment = Moment::new(Frame { readings, ..Frame::default() });
+            decoder.decode(&mut moment).unwrap();
+            moment
+        };
+        let readings = floats(table.line(1));
+        assert!(decoder.note().unwrap().contains("zero it"));
+        let blind = decode(readings.clone(), &mut decoder);
+        assert!(blind.frame.outputs.unwrap().iter().all(|it| it.is_nan()));
+        decoder.set_baseline(&floats(baseline.line(0)));
+        assert_eq!(decoder.note(), None);
+        let same = |a: Vec<f32>, b: &[f64]| a.iter().map(|it| f64::from(*it)).eq(b.iter().copied());
+        let seen = decode(readings.clone(), &mut decoder);
+        assert!(same(seen.frame.outputs.unwrap(), model.decode_table(&table).line(1)));
+        let (deviations, novelty) = model.assess(&table.values).unwrap();
+        let outputs = deviations.len() / 3;
+        assert!(same(seen.frame.deviations.unwrap(), &deviations[outputs..2 * outputs]));
+        assert_eq!(seen.novelty.map(f64::from), Some(novelty[1]));
+        assert_eq!((seen.flags, novelty[1] > 0.0), (0, false));
+        // A reading beyond its limits is filled, and told; what nobody has seen is novel and clamped.
+        let mut faulty = readings.clone();
+        faulty[20] = 2000.0;
+        let filled = decode(faulty, &mut decoder);
+        assert!(filled.has(EstimateReport::FAULTY_READING) && filled.frame.readings[20] == 2000.0);
+        assert!(filled.frame.outputs.unwrap().iter().all(|it| it.is_finite()));
+        let far = decode(readings.iter().map(|it| 0.3 * it).collect(), &mut decoder);
+        assert_eq!(far.flags, EstimateReport::NOVEL | EstimateReport::CLAMPED);
+    }
+}

@@ -443,4 +443,36 @@ mod tests {
         feed.act(Action::Speed { factor: 1.0 }).unwrap();
         play(&mut feed, 101, 50);
     }
+
+    #[test]
+    fn lines_of_a_data_file_come_at_their_times_and_those_sought_too() {
+        let text = "time_s,r1c1_ohm,r1c2_ohm,load_g\n5,1,2,9\n5.5,3,4,9\n6.5,5,6,9\n8,7,8,9\n";
+        let path = Path::new("log.csv");
+        let file =
+            || DataFile::parse(path, text.as_bytes(), &taxel_data::data_file::Reading::default());
+        let file = || file().unwrap();
+        let clock = Clock::of(&file(), None).unwrap();
+        let mut feed = ReplayFeed::of_data(file(), None, &clock, None).unwrap();
+        assert_eq!((feed.about.duration_s, feed.layout.columns), (Some(3.0), 2));
+        let next = |feed: &mut ReplayFeed<'_>| {
+            feed.steps = 1;
+            let Next::Frame(moment) = feed.next(Duration::ZERO).unwrap() else { panic!() };
+            let Frame { number, time_us, readings, .. } = moment.frame;
+            (number, time_us, readings)
+        };
+        assert_eq!(next(&mut feed), (0, 0, vec![1.0, 2.0]));
+        assert_eq!(next(&mut feed), (1, 500_000, vec![3.0, 4.0]));
+        for (to_s, number) in [(1.5, 2), (1.51, 3), (0.2, 1), (99.0, 3)] {
+            feed.act(Action::Seek { to_s }).unwrap();
+            assert_eq!(next(&mut feed).0, number, "{to_s}");
+        }
+        // Before what was given, a step lasts as long as the last one.
+        feed.act(Action::Seek { to_s: 0.5 }).unwrap();
+        assert_eq!([next(&mut feed).0, next(&mut feed).0], [1, 2]);
+        feed.given.clear();
+        feed.act(Action::Step { frames: -1 }).unwrap();
+        assert_eq!(next(&mut feed).0, 1);
+        assert_eq!(times_s(&clock, Some(10.0)), [0.0, 0.1, 0.2, 0.3]);
+        assert_eq!(times_s(&clock, None), [0.0, 0.5, 1.5, 3.0]);
+    }
 }

@@ -118,3 +118,38 @@ fn advice(kind: Kind) -> &'static str {
         Health::Sound => "",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Health::{Missing, Open, Shorted, Sound};
+
+    #[test]
+    fn a_broken_row_is_no_column_for_page_and_recording() {
+        let names = ["r1c1_ohm", "r1c2_ohm", "r1c3_ohm", "r2c1_ohm", "r2c2_ohm", "r2c3_ohm"];
+        let layout = sheet::layout("", sheet::columns(names, []), vec![], None);
+        let judged = |broken: &[usize], ohm: f32| {
+            let mut wires = Wires::new(&layout.readings);
+            for frame in 0..20_u8 {
+                let mut readings = vec![100.0 + f32::from(frame % 3); 6];
+                broken.iter().for_each(|place| readings[*place] = ohm);
+                wires.push(&readings);
+            }
+            wires.judge(None);
+            let page = wires.for_page();
+            let words: Vec<&str> = page.iter().map(|it| it.wire.as_str()).collect();
+            (words.join(";"), wires.for_recording(&layout))
+        };
+        let [rows, columns] = [vec![Sound; 2], vec![Sound; 3]];
+        assert_eq!(
+            judged(&[1, 4], 1e6),
+            ("column 2".into(), [rows.clone(), vec![Sound, Open, Sound]])
+        );
+        assert_eq!(
+            judged(&[3, 4, 5], 0.1),
+            ("row 2".into(), [vec![Sound, Shorted], columns.clone()])
+        );
+        assert_eq!(judged(&[2, 5], f32::NAN).1, [rows.clone(), vec![Sound, Sound, Missing]]);
+        assert_eq!(judged(&[], 0.0), (String::new(), [rows, columns]));
+    }
+}

@@ -275,6 +275,8 @@ pub mod serial_port {
             (found["frames_per_s"].as_f64().unwrap() / frames_per_s - 1.0).abs() < 1e-3,
             "{json}"
         );
+        let counted = ["frames", "frames_lost", "values_missing", "frames_novel"];
+        assert_eq!(counted.map(|key| found[key].as_u64()), [8, 0, 0, 0].map(Some), "{json}");
         folder.succeed(&[&record[..], &["--readings"]].concat());
         let decode = ["decode", "model.bin", "log.csv", "-o", "estimate.csv"];
         folder.succeed(&[&decode[..], &["--filter-ms", "30", "--lead-ms", "4"]].concat());
@@ -348,6 +350,35 @@ pub mod serial_port {
         let found: f64 = line.split(',').next().unwrap().parse().unwrap();
         assert!((found / mean - 1.0).abs() < 1e-5, "{found} instead of {mean}");
 
+        // What is told of the device, which does nothing meanwhile.
+        let page = folder.succeed(&["link", &port, "identify"]);
+        let told = folder.json(&["link", &port, "identify"]);
+        let of = |key: &str| told["statistics"][key].as_u64().unwrap();
+        assert!(of("frames_scanned") > 0 && of("frames_scanned") != of("frames_decoded"), "{told}");
+        for line in [
+            format!(
+                "frames: {} scanned, {} decoded, {} missed, {} samples failed\n",
+                of("frames_scanned"),
+                of("frames_decoded"),
+                of("frames_missed"),
+                of("failed_samples")
+            ),
+            format!(
+                "longest: scan {} µs, decoding {} µs\n",
+                of("longest_scan_us"),
+                of("longest_decode_us")
+            ),
+            "shape: 8 × 18 readings to 8 × 18 outputs\n".into(),
+            "flash: 25460 bytes without the model: vector table 400, code 20000, constants 5000, \
+             start values 60\n"
+                .into(),
+            "RAM: 4760 bytes: variables 3760, stack 1000 at its deepest (of 4096 reserved)\n"
+                .into(),
+        ] {
+            let page = page.replace("\n  ", " ");
+            assert!(page.contains(&line), "{line} {page}");
+        }
+
         // Another model on the device is replaced by the one that it is checked with.
         let check = ["link", &port, "check", "press", "--model", "old.bin", "-n", "50"];
         let page = folder.succeed(&check);
@@ -384,5 +415,19 @@ pub mod serial_port {
             assert!(message.contains("not a single reading"), "{message}");
         }
         assert!(folder.names().is_empty());
+        // One of 144 readings is missing in two of five frames, and with it the 18 outputs of its row.
+        folder.write("model.bin", model.bytes());
+        let mut frames = super::frames();
+        frames[1..3].iter_mut().for_each(|frame| frame[5][7] = f32::NAN);
+        let (port, near) = port_with(&model, frames);
+        drop(near);
+        for (of, missing) in [(&["model.bin"][..], 4 * 18), (&[], 4)] {
+            let record = [&["link", &port, "record"], of, &["-n", "10", "-o", "x.csv"]].concat();
+            let found = folder.json(&record);
+            assert_eq!(found["values_missing"], missing, "{found}");
+            let text = folder.read("x.csv");
+            let empty = text.lines().flat_map(|line| line.split(',')).filter(|it| it.is_empty());
+            assert_eq!(empty.count(), missing);
+        }
     }
 }

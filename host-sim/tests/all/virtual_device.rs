@@ -128,7 +128,9 @@ impl<W: Read + Write, N: FnMut()> Platform for Board<'_, W, N> {
     const BOARD: &'static str = "virtual";
 
     fn memory(&self) -> Memory {
-        Memory { text: 20_000, bss: 3000, stack_high_water: 1000, ..Memory::default() }
+        let [vector_table, text, rodata, data] = [400, 20_000, 5000, 60];
+        let [bss, uninit, stack_reserved, stack_high_water] = [3000, 700, 4096, 1000];
+        Memory { vector_table, text, rodata, data, bss, uninit, stack_reserved, stack_high_water }
     }
 }
 
