@@ -26,6 +26,7 @@ def main():
     parser.add_argument("scenarios", nargs="*", metavar="scenario",
                         help=f"all, or some of: {', '.join(SCENARIOS)}; or serve")
     parser.add_argument("--bare", action="store_true", help="`serve` has nothing at its pins, unless a fault needs a circuit")
+    parser.add_argument("--ohm", type=float, help="all resistances of `serve` (others from 44 to 68 ohm)")
     parser.add_argument("--fault", choices=FAULTS, help="a fault of `serve`")
     parser.add_argument("--taxel", type=pathlib.Path, required=True, help="the program taxel")
     parser.add_argument("--model", type=pathlib.Path, required=True, help="a model of the scene `press`")

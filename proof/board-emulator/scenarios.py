@@ -526,7 +526,8 @@ class Stamped(bytearray):
 def serve(make, files):
     """A board for you: its serial port stays open until Ctrl-C."""
     fault = FAULTS.get(files.fault, lambda board: None)
-    bench = make(bare=files.bare and fault not in OF_CIRCUIT, plant=fault)
+    options = {"ohm": (files.ohm, files.ohm)} if files.ohm else {}
+    bench = make(bare=files.bare and fault not in OF_CIRCUIT, plant=fault, **options)
     terminal = Terminal(bench.board)
     # Both depend on the settling time and the number of samples, which a user may configure.
     bench.board.rules.waived = {"row-left", "wait-short"}

@@ -4,6 +4,7 @@ mod board;
 mod stage;
 mod readout;
 mod line;
+mod cells;
 mod record;
 mod faults;
 
@@ -29,6 +30,7 @@ use crate::process::{Outcome, cargo, first_line, root, run as run_command, targe
 use crate::size::Size;
 use crate::toolchain::{Toolchain, elf};
 use board::{Board, prepare_emulator};
+use cells::Cells;
 use readout::Pin;
 use record::{Beside, Decoding, Record};
 use stage::Stage;
@@ -73,6 +75,9 @@ const TRAIN_CONFIDENCE: [&str; 12] = [
     "--output",
 ];
 
+/// Resistances of the emulated sensor in Ω.
+const EMULATED_OHM: f32 = 60.0;
+
 /// Most bytes that the stack may take, of the 8192 that the image has for it.
 const STACK_BYTES: u32 = 7168;
 
@@ -95,6 +100,9 @@ pub struct Options {
     /// second may leave read protection on, which a mass erase removes.
     #[arg(long)]
     set_brown_out: bool,
+    /// What is between the wires: `sensor`, untouched, or the Ω of a resistor in every cell, such as 100.
+    #[arg(long, value_name = "sensor|OHM")]
+    cells: Option<Cells>,
     /// Speed of the serial line in bits a second: the image is built for it [default: TAXEL_BAUD of the environment, or 921600]
     #[arg(long, value_name = "N", conflicts_with = "emulated", value_parser = clap::value_parser!(u32).range(1..))]
     baud: Option<u32>,
@@ -115,7 +123,11 @@ pub fn run(options: &Options) -> Outcome {
     let mut board = if let Some(port) = &options.port {
         Board::real(port, options.baud, options.flashed, &toolchain)?
     } else {
-        Board::emulated(&prepare_emulator(&toolchain)?, options.fault.as_deref())?
+        let ohm = options.cells.map(|cells| match cells {
+            Cells::Resistors(ohm) => ohm,
+            Cells::Sensor => EMULATED_OHM,
+        });
+        Board::emulated(&prepare_emulator(&toolchain)?, options.fault.as_deref(), ohm)?
     };
     let record = accept(&mut board, options, &toolchain)?;
     let path = options
@@ -175,6 +187,11 @@ fn accept(board: &mut Board, options: &Options, toolchain: &Toolchain) -> Outcom
     if readout::pins(&found).contains(&Pin::Biased) {
         println!("readings after the usual wait are compared with others after a long one");
         record.add([line::settling(&mut device)?]);
+    }
+    match options.cells {
+        Some(Cells::Resistors(ohm)) => record.add([cells::resistors(&mut device, ohm)?]),
+        Some(Cells::Sensor) => record.add(cells::sensor(&mut device)?),
+        None => {}
     }
     if !record.is_right() {
         println!("line or circuit are not right: nothing else is tried");

@@ -53,13 +53,17 @@ impl Board {
     }
 
     /// The emulated board, running the image that was built. Nothing is at its pins, unless the `fault` planted in it shows in
-    /// a circuit alone.
-    pub fn emulated(emulator: &Emulator, fault: Option<&str>) -> Outcome<Self> {
+    /// a circuit alone, or resistors of so many `ohm` are between its wires.
+    pub fn emulated(emulator: &Emulator, fault: Option<&str>, ohm: Option<f32>) -> Outcome<Self> {
         let mut command = emulator.command(&elf(NUCLEO_IMAGE));
         if let Some(fault) = fault {
             command.args(["--fault", fault]);
         }
-        command.args(["--bare", "serve"]).stdout(Stdio::piped());
+        match ohm {
+            Some(ohm) => command.args(["--ohm", &ohm.to_string()]),
+            None => command.arg("--bare"),
+        };
+        command.arg("serve").stdout(Stdio::piped());
         let mut emulator =
             command.spawn().map_err(|cause| format!("the emulated board: {cause}"))?;
         let said = emulator.stdout.take().ok_or("the emulated board says nothing")?;

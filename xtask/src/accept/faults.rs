@@ -30,7 +30,7 @@ pub fn each_is_named(options: &Options) -> Outcome {
     let mut missed = Vec::new();
     for (fault, words) in FAULTS {
         println!("-- {fault}");
-        let mut board = Board::emulated(&emulator, Some(fault))?;
+        let mut board = Board::emulated(&emulator, Some(fault), None)?;
         let record = accept(&mut board, options, &toolchain)?;
         let cause = record.stages.iter().find_map(|stage| stage.probable_cause.as_deref());
         if !cause.is_some_and(|cause| cause.contains(words)) {

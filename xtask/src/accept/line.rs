@@ -109,7 +109,8 @@ pub fn settling(device: &mut Device) -> Outcome<Stage> {
     ))
 }
 
-fn baseline(device: &mut Device, settling_us: u32) -> Outcome<Vec<f32>> {
+/// Readings in Ω, each a mean of some scans with this wait.
+pub fn baseline(device: &mut Device, settling_us: u32) -> Outcome<Vec<f32>> {
     let mut configuration = device.configuration().map_err(text)?;
     configuration.scan.settling_us = settling_us;
     device.configure(configuration).map_err(text)?;
