@@ -55,12 +55,17 @@ def test_the_snippet_of_two_logs_finds_the_lag_and_joins_them(tmp_path, monkeypa
 
 def test_each_press_is_asked_for_and_recorded_with_its_truth(tmp_path):
     taxel = tmp_path / "taxel"
-    taxel.write_text("#!/bin/sh\nprintf 'r1c1_ohm,r1c2_ohm,r1c3_ohm\\n50,60,\\n51,61,\\n'\n")
+    taxel.write_text("""#!/bin/sh
+for file; do :; done
+printf 'r1c1_ohm,r1c2_ohm,r1c3_ohm\\n50,60,\\n51,,\\n' > "$file"
+""")
     taxel.chmod(0o755)
     (tmp_path / "presses.csv").write_text("x_mm,force_n\n8,2\n,0\n")
     command = [sys.executable, DOCS / "presses.py", "presses.csv", "PORT", "log.csv", "1x2"]
     environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
-    subprocess.run(command, cwd=tmp_path, env=environment, input="\n\n", text=True, check=True)
+    streams = {"input": "\n\n", "stdout": subprocess.PIPE, "text": True}
+    said = subprocess.run(command, cwd=tmp_path, env=environment, check=True, **streams).stdout
+    assert said.count("open or shorted: r1c2_ohm\n") == 2
     first, *lines = (tmp_path / "log.csv").read_text().split()
     assert first == "r1c1_ohm,r1c2_ohm,x_mm,force_n"
-    assert sorted(lines) == ["50,60,,0", "50,60,8,2", "51,61,,0", "51,61,8,2"]
+    assert sorted(lines) == ["50,60,,0", "50,60,8,2", "51,,,0", "51,,8,2"]
