@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::common::{Folder, small_scene, small_scene_with_table1, tiny_scene};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
-const COMMANDS: [&str; 66] = [
+const COMMANDS: [&str; 88] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --reading-model full -o m.bin",
@@ -82,6 +82,29 @@ const COMMANDS: [&str; 66] = [
     // A recording, and what is read from it.
     "decode g.bin gaps.csv --missing 4095 --without r3c2* --confidence --no-fill --first-share 0.3 -o g.mcap",
     "decode g.bin g.mcap -o h.csv",
+    "synth slow.toml -n 40 -o slow.mcap",
+    "train slow.toml -o slow.bin",
+    "eval slow.bin slow.mcap",
+    "decode slow.bin slow.mcap --filter-ms 20 -o slow-e.csv",
+    // Options and files that meet.
+    "synth odd.toml -n 60 --seed 9 -o more.csv",
+    "run odd.csv --inputs r* --outputs contact_* --test more.csv --relative-inputs --baseline rest.csv --centres 6 --no-refine -o tested",
+    "export odd.bin --c oddlib",
+    "inspect flat.bin",
+    "inspect g.bin",
+    "synth flat.toml -n 60 -o flat.csv",
+    "eval flat.bin flat.csv --without r1c2_ohm --html flat.html",
+    "synth alone.toml -n 30 -o alone.csv",
+    "forward alone.toml alone.csv -o forward.csv",
+    "train flat.toml --paper -o paper.bin",
+    "table1 book.toml --group dx_mm",
+    "run book.toml -o book",
+    "compare alone.toml wider.toml --limit-only -o limits",
+    "run gaps.csv --inputs ch* --outputs *_mm,fz_n --fold-column place --keep-outliers --features 6 --features-kind plain --format f32 --spread 1 --centres 6 --no-refine -o folded",
+    "run units.tsv --inputs ch1..ch4 --outputs F* --first-share 0.8 --folds 4 --keep-outliers --relative-inputs --centres 4 --no-refine --reading-model full -o units",
+    "train gaps.csv --inputs ch* --outputs fz_n,x_mm --relative-inputs --rest fz_n --first-share 0.6 --solver rls --centres 6 --grid none -o relative.bin",
+    "eval relative.bin gaps.csv --last-share 0.4 --time time_ms --html relative.html",
+    "decode relative.bin gaps.csv --keep place --no-fill --last-share 0.4 --filter-ms 60 --period-ms 20 -o relative.csv",
 ];
 
 /// Axes of all kinds, with prices, bounds and draws.
@@ -200,6 +223,12 @@ fn prepared() -> Folder {
     folder.write("all.toml", ALL);
     folder.write("scenes.toml", SCENES);
     folder.write("gaps.csv", gaps());
+    let book = "\n[table1]\nspreads = [0.5, 1.0]\nnoise_levels = [0.01, 0.03]\nframes = 300\ntest_frames = 40\n\
+                centres = 6\nstandard_frames = 30\ntextbook_covariance = 1e6\n";
+    folder.write("book.toml", alone.to_owned() + book);
+    let units = "time\tch1\tch2\tch3\tch4\tFx\tFz\ns\tkOhm\tkOhm\tkOhm\tkOhm\tmN\tmN\n";
+    let lines = log().lines().skip(1).take(600).collect::<Vec<_>>().join("\n");
+    folder.write("units.tsv", units.to_owned() + &lines.replace(',', "\t"));
     folder.write("folds.toml", FOLDS);
     folder.write("log.csv", log());
     folder
