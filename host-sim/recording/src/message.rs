@@ -318,10 +318,48 @@ mod tests {
         };
         let bytes = wrench(0, Some([1000.0, 0.0, f32::NAN]), 5.0, [0.0, 0.0, 2.0]);
         assert_eq!(values(bytes), [0.0, 0.0, 2.0, 0.0, -2.0, 0.0]);
+        // y·Fz − z·Fy, z·Fx − x·Fz and x·Fy − y·Fx at 2, 4 and 0.5 m.
+        let bytes = wrench(0, Some([2000.0, 4000.0, 500.0]), 1000.0, [1.0, 3.0, 8.0]);
+        assert_eq!(values(bytes)[3..], [32.0 - 1.5, 0.5 - 16.0, 6.0 - 4.0]);
         // A contact is where the sheet is, pressed in from the electrodes at rest.
         assert_eq!(values(point(0, [0.0, 0.0, 0.5], 5.0)), [0.0, 0.0, 0.0045]);
         let unknown = point(0, [0.0, 0.0, f32::NAN], 5.0);
         assert!(read_point(&unknown, 5.0).is_some_and(|[.., depth]| depth.is_nan()));
         assert_eq!(values(unknown), [0.0, 0.0, 0.005]);
+    }
+
+    #[test]
+    fn points_are_where_electrodes_are_pressed_to_and_pictures_have_rows() {
+        let column = |name: &str| crate::Column { name: name.into(), unit: "mm".into() };
+        let outputs = [Some(1), None, Some(0)];
+        let place_mm = [1000.0, 2000.0, 500.0];
+        let layout = Layout {
+            title: String::new(),
+            rows: 1,
+            columns: 2,
+            readings: ["a", "b"].map(column).into(),
+            outputs: ["dz_mm", "dx_mm"].map(column).into(),
+            electrodes: vec![crate::Electrode { name: "e".into(), place_mm, outputs }],
+        };
+        let bytes = points(3_000_000_007, &layout, &[250.0, -500.0], Some(&[125.0, 62.5]));
+        let data = |of: &[f64], floats: &[f32]| -> Vec<u8> {
+            let floats = floats.iter().flat_map(|it| it.to_le_bytes());
+            floats.chain(of.iter().flat_map(|it| it.to_le_bytes())).collect()
+        };
+        // A press moves an electrode down, and what is decoded and its deviations follow along x and z.
+        let point = data(&[-0.5, 0.25, 0.0625, 0.125], &[1.5, 2.0, 0.25, 0.0]);
+        assert!(bytes.windows(point.len()).any(|found| found == point), "{bytes:?}");
+        assert_eq!(bytes.last(), Some(&1), "nothing is missing");
+        assert_eq!(points(0, &layout, &[f32::NAN, 0.0], None).last(), Some(&0));
+        let mut picture = Bytes::message(&bytes).unwrap();
+        assert_eq!([picture.u32(), picture.u32()], [Some(3), Some(7)], "s and ns");
+        let bytes = image(0, &layout, &[1.0, 2.0]);
+        let mut picture = Bytes::message(&bytes).unwrap();
+        skip_header(&mut picture).unwrap();
+        assert_eq!([picture.u32(), picture.u32()], [Some(1), Some(2)], "height and width");
+        assert_eq!(
+            (picture.text(), picture.u8(), picture.u32()),
+            (Some("32FC1"), Some(0), Some(8))
+        );
     }
 }

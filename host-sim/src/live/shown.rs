@@ -81,3 +81,42 @@ pub fn frame(moment: &Moment) -> page::Frame {
         force_n: frame.force_n.map(|force| force[2]),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use taxel_rig::scans::{Scan, ScanEstimate};
+
+    use super::*;
+
+    #[test]
+    fn a_scan_is_shown_with_what_the_device_said_of_it() {
+        let estimate = ScanEstimate {
+            outputs: vec![0.5, 0.25],
+            row_status: vec![0, 2],
+            flags: EstimateReport::NOVEL | EstimateReport::FAULTY_READING,
+            deviations: vec![0.1, 0.2],
+            novelty: Some(3.0),
+        };
+        let (number, start_us, heard) = (7, 9000, Instant::now());
+        let scan = Scan { number, start_us, heard, readings: vec![], estimate: Some(estimate) };
+        let mut moment = Moment::of_scan(scan.clone(), 3);
+        (moment.frame.force_n, moment.frame.contact_mm) =
+            (Some([1.0, 2.0, 4.0]), Some([5.0, 6.0, 0.5]));
+        let shown = frame(&moment);
+        assert!(shown.readings.len() == 3 && shown.readings.iter().all(|it| it.is_nan()));
+        assert_eq!((shown.number, shown.time_us, shown.outputs), (7, 9000, vec![0.5, 0.25]));
+        assert_eq!(shown.row_status, Some(vec![None, Some(Flag::Missing)]));
+        assert_eq!(shown.flags, [Flag::Novel, Flag::Missing]);
+        assert_eq!((shown.novelty, shown.force_n), (Some(3.0), Some(4.0)));
+        assert_eq!(shown.deviations, Some(vec![0.1, 0.2]));
+        let contact = page::Contact { x_mm: 5.0, y_mm: 6.0, depth_mm: 0.5 };
+        assert_eq!(shown.contact, Some(contact));
+        // Without a model there are no outputs, whatever came.
+        let flags = EstimateReport::NO_MODEL;
+        let estimate = Some(ScanEstimate { flags, ..ScanEstimate::default() });
+        let shown = frame(&Moment::of_scan(Scan { estimate, ..scan }, 3));
+        assert!(shown.outputs.is_empty() && shown.flags.is_empty() && shown.row_status.is_none());
+    }
+}
