@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::common::{Folder, small_scene, small_scene_with_table1, tiny_scene};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
-const COMMANDS: [&str; 88] = [
+const COMMANDS: [&str; 90] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --reading-model full -o m.bin",
@@ -62,7 +62,7 @@ const COMMANDS: [&str; 88] = [
     "run odd.toml -o odd",
     "limit still.toml -n 3 -o still",
     "run slow.toml -o slow",
-    "trade slow.toml --centres 4 --average 4 --max-error 5 -o slow",
+    "trade slow.toml --centres 4 --average 20 --readout onchip --clock-mhz 90 --max-error 5 -o slow",
     "synth slow.toml -n 60 --frame-rate 100 --scan-ms 6 -o slow.csv",
     "run alone.toml --reading-model full --relative-inputs -o alone",
     "limit alone.toml -n 4 --row 3 --noise 0.01,0.02 -o alone",
@@ -102,6 +102,8 @@ const COMMANDS: [&str; 88] = [
     "compare alone.toml wider.toml --limit-only -o limits",
     "run gaps.csv --inputs ch* --outputs *_mm,fz_n --fold-column place --keep-outliers --features 6 --features-kind plain --format f32 --spread 1 --centres 6 --no-refine -o folded",
     "run units.tsv --inputs ch1..ch4 --outputs F* --first-share 0.8 --folds 4 --keep-outliers --relative-inputs --centres 4 --no-refine --reading-model full -o units",
+    "train units.tsv --inputs ch1..ch4 --outputs F* --first-share 0.7 --centres 4 --no-refine --reading-model full -o u.bin",
+    "eval u.bin units.tsv --last-share 0.3 --without ch2 --html u.html",
     "train gaps.csv --inputs ch* --outputs fz_n,x_mm --relative-inputs --rest fz_n --first-share 0.6 --solver rls --centres 6 --grid none -o relative.bin",
     "eval relative.bin gaps.csv --last-share 0.4 --time time_ms --html relative.html",
     "decode relative.bin gaps.csv --keep place --no-fill --last-share 0.4 --filter-ms 60 --period-ms 20 -o relative.csv",
