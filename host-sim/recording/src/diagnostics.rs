@@ -88,3 +88,30 @@ pub fn read_diagnostics(bytes: &[u8], found: &mut Option<Status>) -> Option<()> 
     }
     Some(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Health::{Open, Shorted, Sound};
+
+    #[test]
+    fn faults_are_a_warning_with_their_wires_in_words() {
+        let said = |status: &Status| {
+            let bytes = diagnostics(0, "a sensor", status);
+            let mut read = Bytes::message(&bytes).unwrap();
+            skip_header(&mut read).unwrap();
+            let (count, level, _) = (read.u32(), read.u8(), read.text());
+            assert_eq!(count, Some(1));
+            (level.unwrap(), read.text().unwrap().to_owned())
+        };
+        let sound = Status { row_wires: vec![Sound; 2], lost_frames: 3, ..Status::default() };
+        assert_eq!(said(&sound), (0, "no fault".into()));
+        let column_wires = vec![Shorted, Sound];
+        let faulty = Status { row_wires: vec![Sound, Open], column_wires, ..sound.clone() };
+        assert_eq!(said(&faulty), (1, "row-wire 2 open, column-wire 1 shorted".into()));
+        let novel = Status { is_novel: true, ..sound.clone() };
+        assert_eq!(said(&novel), (1, "unlike what the model was trained on".into()));
+        let clamped = Status { is_clamped: true, ..sound };
+        assert_eq!(said(&clamped), (1, "outside the model's range".into()));
+    }
+}

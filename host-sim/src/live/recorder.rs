@@ -107,3 +107,57 @@ impl Recorder {
         Ok(format!("{}, {seconds:.1} s", path.display()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use taxel_firmware::link::message::EstimateReport;
+    use taxel_recording::{Reader, Status};
+
+    use super::super::feed::{Feed, Next};
+    use super::super::{replay::ReplayFeed, sheet};
+    use super::*;
+
+    #[test]
+    fn a_recording_is_replayed_with_its_baseline_its_truth_and_what_was_said_of_its_frames() {
+        let columns = |names: &[&str]| sheet::columns(names.iter().copied(), []);
+        let layout = sheet::layout("", columns(&["a", "b"]), columns(&["x_mm", "load_n"]), None);
+        let folder = std::env::temp_dir().join(format!("taxel-recorder-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("it.mcap");
+        let beside = Beside { baseline: Some(vec![7.5, 0.1]), ..Beside::default() };
+        let mut recorder = Recorder::start(&path, &layout, beside).unwrap();
+        let status = |is_novel| Status { is_novel, is_clamped: !is_novel, ..Status::default() };
+        for number in 0..3_u8 {
+            let at = f32::from(number);
+            let frame = Frame {
+                time_us: 250_000 * u64::from(number),
+                number: number.into(),
+                readings: vec![at, 10.0 + at],
+                outputs: Some(vec![0.5 * at, 2.0]),
+                truth: Some(vec![at, 4.0]),
+                status: Some(status(number == 1)),
+                ..Frame::default()
+            };
+            recorder.write(&frame).unwrap();
+        }
+        assert_eq!(recorder.for_page().file, path.display().to_string());
+        recorder.finish().unwrap();
+        let reader = Reader::open(&path).unwrap();
+        let mut feed = ReplayFeed::of_recording(reader, &path, None).unwrap();
+        assert_eq!(feed.baseline(), Some(vec![7.5, 0.1]));
+        assert_eq!(feed.about().duration_s, Some(0.5));
+        let flags = [EstimateReport::CLAMPED, EstimateReport::NOVEL, EstimateReport::CLAMPED];
+        for (number, flags) in (0..3_u8).zip(flags) {
+            let Next::Frame(moment) = feed.next(Duration::from_secs(9)).unwrap() else { panic!() };
+            let at = f32::from(number);
+            assert_eq!((moment.flags, moment.frame.readings), (flags, vec![at, 10.0 + at]));
+            assert_eq!(moment.frame.outputs, Some(vec![0.5 * at, 2.0]));
+            assert_eq!(moment.frame.truth, Some(vec![at, 4.0]));
+            assert_eq!(feed.position().map(|it| it.1), Some(1.0));
+        }
+        assert!(matches!(feed.next(Duration::ZERO).unwrap(), Next::Ended));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}

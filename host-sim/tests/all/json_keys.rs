@@ -81,7 +81,7 @@ const COMMANDS: [&str; 90] = [
     "trade gaps.csv --inputs ch* --outputs fz_n,x_mm --keep-outliers --fold-column place --centres 3,6 --spread 1 --no-refine --grid 3x5 --all -o gaps",
     // A recording, and what is read from it.
     "decode g.bin gaps.csv --missing 4095 --without r3c2* --confidence --no-fill --first-share 0.3 -o g.mcap",
-    "decode g.bin g.mcap -o h.csv",
+    "decode g.bin g.mcap --filter-ms 60 --confidence -o h.csv",
     "synth slow.toml -n 40 -o slow.mcap",
     "train slow.toml -o slow.bin",
     "eval slow.bin slow.mcap",

@@ -251,6 +251,10 @@ fn a_data_file_of_any_columns_is_decoded_by_its_model_and_a_line_of_numbers_too(
     let frame = page.events().any("frame");
     let [decoded, truth] = ["outputs", "truth"].map(|of| numbers(&frame[of])[0]);
     assert!((decoded - truth).abs() < 0.1, "{decoded} N, {truth} N");
+    let near_20 = |status: &Value, rate: &str| {
+        status[rate].as_f64().is_some_and(|rate| (17.0..23.0).contains(&rate))
+    };
+    page.events().next("status", |it| near_20(it, "scan_rate") && near_20(it, "decode_rate"));
     page.end();
 
     let (name, near, mut far) = terminal();
