@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::common::{Folder, small_scene, small_scene_with_table1, tiny_scene};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
-const COMMANDS: [&str; 90] = [
+const COMMANDS: [&str; 95] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --reading-model full -o m.bin",
@@ -94,6 +94,11 @@ const COMMANDS: [&str; 90] = [
     "inspect g.bin",
     "synth flat.toml -n 60 -o flat.csv",
     "eval flat.bin flat.csv --without r1c2_ohm --html flat.html",
+    "export flat.bin --c flatlib",
+    "export g.bin --c glib",
+    "export g.bin --rust g.rs",
+    "synth slow.toml -n 20 --still --noise 0.2 -o still.csv",
+    "run flat.csv --inputs r*_ohm --outputs r*_n --each-row --format fixed16 --no-refine --centres 5 --last-share 0.8 -o rows",
     "synth alone.toml -n 30 -o alone.csv",
     "forward alone.toml alone.csv -o forward.csv",
     "train flat.toml --paper -o paper.bin",
@@ -123,8 +128,8 @@ const FOLDS: &str = "name = \"folds\"\n[data]\nfile = \"log.csv\"\ninputs = \"ch
 
 /// Two scenes, with seeds and a bound.
 const SCENES: &str = "name = \"scenes\"\nscene = [\"alone.toml\", \"wider.toml\"]\nlimit_frames = 3\nrepeats = 3\n\
-                      objectives = [\"rmse_dz_mm\", \"frame_ms\"]\n\
-                      [axes]\ntraining.format = [\"f32\", \"fixed16\"]\ntraining.centres = [3, 5]\n[bounds]\ncycles = 3000\n";
+                      objectives = [\"rmse_dz_mm\", \"cost_eur\"]\n\
+                      [axes]\ntraining.format = [\"f32\", \"fixed16\"]\ndevice.column_step = [1, 2]\n[bounds]\ncycles = 3000\n[prices]\nfixed_eur = 0.5\nrow_eur = 0.25\ncolumn_eur = 0.125\ncm2_eur = 2.0\n";
 
 /// Presses on a mat of 3 × 5 cells, with semicolons and decimal commas. Some readings and outputs are missing or far off, and
 /// two lines are cut.

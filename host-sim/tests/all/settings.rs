@@ -91,7 +91,10 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
     folder.write("constants.toml", "drive_v = 0.21\nseries_ohm = 0.05\n");
     let page = link(&["constants", "constants.toml"]);
     assert!(page.contains("drive: 0.21000 V of 3.3000 V") && page.contains("0.050"), "{page}");
-    let configure = ["configure", "--period-us", "20000", "--send", "both"];
+    let configure = ["configure", "--period-us", "20000", "--send", "both", "--settling-us", "55"];
+    let more =
+        ["--oversampling", "4", "--filter-ms", "30", "--lead-ms", "4", "--report-every", "3"];
+    let configure = [&configure[..], &more].concat();
     let page = link(&[&configure[..], &["--contact-threshold", "0.05"]].concat());
     assert!(page.contains("configuration: kept"), "{page}");
     link(&["baseline", "-n", "5", "--period-us", "1000", "-o", "rest.csv"]);
@@ -101,9 +104,10 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
         .unwrap();
     let page = link(&["settings"]);
     for said in [
-        "a scan every 20000 µs",
-        "readings yes, estimates yes",
-        "contact from 0.05",
+        "a scan every 20000 µs, 55 µs settling, 4 samples a reading",
+        "outputs with a time constant of 30 ms, a lead of 4 ms",
+        "readings yes, estimates yes (one of 3), of confidence nothing",
+        "shorted below 5 Ω, open above 1000 Ω, contact from 0.05",
         "constants: kept",
         "drive: 0.21000 V of 3.3000 V",
         "kept: mean of 5 frames of 8 × 18 readings",
