@@ -14,5 +14,4 @@ mod link_format;
 mod power_cuts;
 mod settings;
 mod trial;
-mod undo;
 mod upload;

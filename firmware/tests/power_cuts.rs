@@ -183,9 +183,9 @@ impl Case {
     fn fulfil(&mut self, wish: &Wish) -> bool {
         match wish {
             Wish::Model(seed) => self.device.install(&blob(*seed, 2)).is_ok(),
-            Wish::Undo => self.device.session(|session, board| {
-                model_crc(session, board).is_some_and(|left| undo(session, board, left).0.is_ok())
-            }),
+            Wish::Undo => self
+                .device
+                .session(|host| host.model_crc().is_some_and(|left| host.undo(left).0.is_ok())),
             Wish::Setting(setting, bytes) => self.device.keep(SETTINGS[*setting].0, bytes).is_ok(),
         }
     }
@@ -221,7 +221,7 @@ impl Case {
         let mut operation = 0;
         loop {
             self.device.restore(&before);
-            self.device.cut(operation).session(|_, _| ());
+            self.device.cut(operation).session(|_| ());
             if !self.device.is_cut() {
                 break;
             }

@@ -1,21 +1,16 @@
 //! Settings are kept over restarts, and what does not fit the device is not believed.
 
-use crate::app::requests::decode;
 use crate::mock::*;
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{
-    Configuration, EstimateReport, KeepFault, Kept, KeptBaseline, Refusal, Report, Request, Setting,
+    Configuration, KeepFault, Kept, KeptBaseline, Refusal, Report, Request, Setting,
 };
 use taxel_firmware::store::Kind;
 
 const NOTHING: Refusal = Refusal::Keep(KeepFault::Nothing);
 
-fn ask_kept(session: &mut Running<'_, '_>, board: &Board, request: &Request<'_>) -> Kept {
-    answer!(session, board, request, Report::Kept(kept) => kept)
-}
-
-fn refusal(session: &mut Running<'_, '_>, board: &Board, request: &Request<'_>) -> Refusal {
-    answer!(session, board, request, Report::Refused(refusal) => refusal)
+fn ask_kept(host: &mut Host<'_, '_>, request: &Request<'_>) -> Kept {
+    answer!(host, request, Report::Kept(kept) => kept)
 }
 
 /// Circuit with constants that are all different.
@@ -32,9 +27,9 @@ fn circuit() -> ZeroPotential<ROWS, COLS> {
 }
 
 /// Checks that the constants in force are those of `circuit`.
-fn expect(session: &mut Running<'_, '_>, board: &Board, circuit: &ZeroPotential<ROWS, COLS>) {
+fn expect(host: &mut Host<'_, '_>, circuit: &ZeroPotential<ROWS, COLS>) {
     let expected = circuit.constants();
-    answer!(session, board, &Request::Constants, Report::Constants(it) => assert_eq!(it, expected));
+    answer!(host, &Request::Constants, Report::Constants(it) => assert_eq!(it, expected));
 }
 
 #[test]
@@ -43,68 +38,65 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
     let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
     let none =
         |writes_left| Kept { configuration: None, constants: false, baseline: None, writes_left };
-    device.session(|session, board| {
-        assert_eq!(ask_kept(session, board, &Request::Kept), none(100));
-        tell(session, board, &Request::SetConstants(circuit().constants()));
-        expect(session, board, &circuit());
-        send(session, board, 1, &Request::Configure(scanning));
-        send(session, board, 2, &Request::CaptureBaseline { frames: 3 });
-        let in_capture_us = board.pins.borrow().now_us + 1500;
-        run_until(session, board, in_capture_us);
-        assert_eq!(refusal(session, board, &Request::Keep(Setting::Baseline)), NOTHING);
-        turn(session, 10_000);
+    device.session(|host| {
+        assert_eq!(ask_kept(host, &Request::Kept), none(100));
+        host.tell(&Request::SetConstants(circuit().constants()));
+        expect(host, &circuit());
+        host.send(1, &Request::Configure(scanning));
+        host.send(2, &Request::CaptureBaseline { frames: 3 });
+        host.run_for(1500);
+        assert_eq!(host.refusal(&Request::Keep(Setting::Baseline)), NOTHING);
+        host.turn(10_000);
         for setting in Setting::ALL {
-            ask_kept(session, board, &Request::Keep(setting));
+            ask_kept(host, &Request::Keep(setting));
         }
         let baseline = Some(KeptBaseline { rows: 2, columns: 3, frames: 3 });
         let all =
             Kept { configuration: Some(scanning), constants: true, baseline, writes_left: 97 };
-        assert_eq!(ask_kept(session, board, &Request::Kept), all);
+        assert_eq!(ask_kept(host, &Request::Kept), all);
         // What is kept already is not written again.
         for setting in Setting::ALL {
-            assert_eq!(ask_kept(session, board, &Request::Keep(setting)), all);
+            assert_eq!(ask_kept(host, &Request::Keep(setting)), all);
         }
     });
-    device.session(|session, board| {
-        let found =
-            answer!(session, board, &Request::Configuration, Report::Configuration(it) => it);
+    device.session(|host| {
+        let found = answer!(host, &Request::Configuration, Report::Configuration(it) => it);
         assert_eq!(found, scanning);
-        expect(session, board, &circuit());
+        expect(host, &circuit());
         // The baseline is in force: a frame that differs from it is a contact. With other constants it means nothing, and
         // with the former ones it does again.
-        for (circuit, ohm, contact) in [
-            (circuit(), 65.0, 0),
-            (circuit(), 40.0, EstimateReport::CONTACT),
-            (ZeroPotential::TYPICAL, 40.0, 0),
-            (circuit(), 40.0, EstimateReport::CONTACT),
+        for (circuit, ohm, is_contact) in [
+            (circuit(), 65.0, false),
+            (circuit(), 40.0, true),
+            (ZeroPotential::TYPICAL, 40.0, false),
+            (circuit(), 40.0, true),
         ] {
-            tell(session, board, &Request::SetConstants(circuit.constants()));
+            host.tell(&Request::SetConstants(circuit.constants()));
             let mut frame = frame_at_rest();
             frame[1][2] = ohm;
-            let (flags, ..) = decode(session, board, &frame);
-            assert_eq!(flags & EstimateReport::CONTACT, contact);
+            assert_eq!(host.is_contact(frame.as_flattened()), is_contact);
         }
         for setting in Setting::ALL {
-            ask_kept(session, board, &Request::Forget(setting));
+            ask_kept(host, &Request::Forget(setting));
         }
-        assert_eq!(ask_kept(session, board, &Request::Kept), none(97));
+        assert_eq!(ask_kept(host, &Request::Kept), none(97));
     });
-    device.session(|session, board| {
-        expect(session, board, &ZeroPotential::TYPICAL);
-        assert_eq!(refusal(session, board, &Request::Keep(Setting::Baseline)), NOTHING);
+    device.session(|host| {
+        expect(host, &ZeroPotential::TYPICAL);
+        assert_eq!(host.refusal(&Request::Keep(Setting::Baseline)), NOTHING);
     });
 }
 
 #[test]
 fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
     let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
-    device.session(|session, board| {
+    device.session(|host| {
         for setting in [Setting::Configuration, Setting::Constants] {
-            tell(session, board, &Request::Keep(setting));
+            host.tell(&Request::Keep(setting));
         }
     });
     let kept_now = |device: &mut Device| {
-        let kept = device.session(|session, board| ask_kept(session, board, &Request::Kept));
+        let kept = device.session(|host| ask_kept(host, &Request::Kept));
         (kept.configuration, kept.constants)
     };
     assert_eq!(kept_now(&mut device), (Some(quiet()), true));
@@ -121,13 +113,13 @@ fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
 
 #[test]
 fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
-    let (mut session, board) = started(quiet(), &[]);
+    let mut host = started(quiet(), &[]);
     let good = circuit();
-    tell(&mut session, &board, &Request::SetConstants(good.constants()));
+    host.tell(&Request::SetConstants(good.constants()));
     let mut check = |constants: Constants<'_>, fault: ConstantsFault| {
-        let found = refusal(&mut session, &board, &Request::SetConstants(constants));
+        let found = host.refusal(&Request::SetConstants(constants));
         assert_eq!(found, Refusal::Constants(fault));
-        expect(&mut session, &board, &good);
+        expect(&mut host, &good);
     };
     let series_ohm = [0.0, 0.0, -0.1];
     let bad: [(ZeroPotential<ROWS, COLS>, ConstantsFault); 6] = [
@@ -147,17 +139,15 @@ fn what_is_out_of_range_is_refused_and_what_was_in_force_stays() {
 fn writes_are_limited_between_restarts() {
     let mut device = Device::new(Flash::slots());
     for _ in 0..2 {
-        device.session(|session, board| {
+        device.session(|host| {
             let keep = Request::Keep(Setting::Configuration);
             for left in (0..100).rev() {
                 let contact_threshold = 0.001 + f32::from(left) * 1e-5;
-                let configuration = Configuration { contact_threshold, ..quiet() };
-                tell(session, board, &Request::Configure(configuration));
-                assert_eq!(ask_kept(session, board, &keep).writes_left, left);
+                host.configure(Configuration { contact_threshold, ..quiet() });
+                assert_eq!(ask_kept(host, &keep).writes_left, left);
             }
-            tell(session, board, &Request::Configure(quiet()));
-            let refused = refusal(session, board, &keep);
-            assert_eq!(refused, Refusal::Keep(KeepFault::TooOften));
+            host.configure(quiet());
+            assert_eq!(host.refusal(&keep), Refusal::Keep(KeepFault::TooOften));
         });
     }
 }

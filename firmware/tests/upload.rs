@@ -1,30 +1,8 @@
 //! Uploading a model: sound models come into force, and nothing else ever does.
 
 use crate::mock::*;
-use taxel_firmware::app::SessionEnd;
 use taxel_firmware::link::message::{ModelFault, Refusal, UploadState, UploadStep};
 use taxel_firmware::store::ERASES_AT_ONCE;
-
-const CHUNK: usize = 60;
-
-/// A trial of whatever was uploaded.
-const TRY: UploadStep<'_> = UploadStep::Try { trial_ms: 60_000 };
-
-/// Carries out an upload as far as it goes; returns the last answer, and whether the session ended.
-fn upload(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    steps: &[UploadStep<'_>],
-) -> (Answer, Option<SessionEnd>) {
-    let mut last = (Ok(UploadState::Idle), None);
-    for step in steps {
-        last = upload_step(session, board, *step);
-        if last.0.is_err() {
-            break;
-        }
-    }
-    last
-}
 
 #[test]
 fn a_good_model_comes_into_force_and_stays_and_a_repeated_confirmation_does_no_harm() {
@@ -43,17 +21,16 @@ fn a_good_model_comes_into_force_and_stays_and_a_repeated_confirmation_does_no_h
 
 #[test]
 fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor_is_silent() {
-    let (mut session, board) = started(every(1000), &[]);
-    *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
-    turn(&mut session, 2000);
-    let feeds = || board.pins.borrow().feeds;
-    let fed = feeds();
+    let mut host = started(every(1000), &[]);
+    *host.frame() = [[f32::NAN; COLS]; ROWS];
+    host.turn(2000);
+    let fed = host.pins().feeds;
     let good = blob(4, 3);
     let mut too_long = good.to_vec();
     too_long[5..9].copy_from_slice(&(1_u32 << 20).to_le_bytes());
     for (blob, more) in [(&too_long[..], 0), (&good[..], 3)] {
-        let (outcome, _) = upload(&mut session, &board, &[begin(blob)]);
-        assert_eq!((outcome.is_ok(), feeds() - fed), (more == 3, more));
+        assert_eq!(host.upload(&[begin(blob)]).0.is_ok(), more == 3);
+        assert_eq!(host.pins().feeds - fed, more);
     }
 }
 
@@ -74,7 +51,7 @@ fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_i
 
 #[test]
 fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_more() {
-    let (mut session, board) = started(quiet(), &blob(1, 3));
+    let mut host = started(quiet(), &blob(1, 3));
     let good = blob(2, 4);
     // Another number of rows, of inputs, another version, and heads that are cut.
     for (length, place, byte, fault) in [
@@ -90,65 +67,60 @@ fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_mo
         if fault == ModelFault::Length {
             head[6..9].fill(0); // no more than this head
         }
-        let (outcome, _) = upload(&mut session, &board, &[UploadStep::Begin { head: &head }]);
+        let (outcome, _) = host.upload(&[UploadStep::Begin { head: &head }]);
         assert_eq!(outcome, Err(Refusal::BadModel(fault)), "{head:?}");
     }
-    assert_eq!(statistics(&mut session, &board).slot_erases, 0);
+    assert_eq!(host.statistics().slot_erases, 0);
     for _ in 0..1000 {
-        upload(&mut session, &board, &[begin(&good)]).0.unwrap();
+        host.upload(&[begin(&good)]).0.unwrap();
     }
-    assert_eq!(statistics(&mut session, &board).slot_erases, 1);
+    assert_eq!(host.statistics().slot_erases, 1);
     // An empty slot takes the model, after an abort as well; one with a chunk must be erased.
-    let steps = upload_steps(&good, CHUNK);
-    upload(&mut session, &board, &[UploadStep::Abort, steps[0], steps[1], steps[0]]).0.unwrap();
-    assert_eq!(statistics(&mut session, &board).slot_erases, 2);
-    let (outcome, end) = upload(&mut session, &board, &steps);
+    let steps = trial_steps(&good);
+    host.upload(&[UploadStep::Abort, steps[0], steps[1], steps[0]]).0.unwrap();
+    assert_eq!(host.statistics().slot_erases, 2);
+    let (outcome, end) = host.upload(&steps);
     assert!(outcome.is_ok() && end.is_some(), "{outcome:?}");
-    assert_eq!(statistics(&mut session, &board).slot_erases, 2);
+    assert_eq!(host.statistics().slot_erases, 2);
 }
 
 #[test]
 fn erases_are_limited_in_rate() {
-    const INTERVAL_US: u64 = 600_000_000;
+    const INTERVAL_US: u32 = 600_000_000;
     let mut bench = Bench::new(quiet(), &blob(1, 3));
     bench.slots[1].erase_interval_s = 600;
-    let (mut session, board) = bench.session();
+    let mut host = bench.session();
     let new = blob(2, 4);
-    let steps = upload_steps(&new, CHUNK);
-    let pass = |us: u64| {
-        let mut pins = board.pins.borrow_mut();
-        pins.now_us = pins.now_us.wrapping_add(us as u32);
-    };
-    let mut begin_and_chunk = |later_us: u64| {
-        pass(later_us);
-        upload(&mut session, &board, &steps[..2]).0
-    };
+    let steps = &trial_steps(&new)[..2];
     // All looks at the clock so far take less than a millisecond.
-    let is_refused = |outcome: Answer, wait_us: u64| match outcome {
-        Err(Refusal::TooSoon { wait_us: found }) => found.abs_diff(wait_us) < 1000,
-        _ => false,
+    let expect_refused = |host: &mut Host<'_, '_>, wait_us: u32| match host.upload(steps).0 {
+        Err(Refusal::TooSoon { wait_us: found }) => {
+            assert!(found.abs_diff(wait_us.into()) < 1000, "{found} instead of {wait_us}");
+        }
+        other => panic!("{other:?}"),
     };
     for _ in 0..ERASES_AT_ONCE {
-        begin_and_chunk(0).unwrap();
+        host.upload(steps).0.unwrap();
     }
-    assert!(is_refused(begin_and_chunk(0), INTERVAL_US));
-    assert!(is_refused(begin_and_chunk(INTERVAL_US - 10_000), 10_000));
-    begin_and_chunk(10_000).unwrap();
-    assert!(is_refused(begin_and_chunk(0), INTERVAL_US));
-    // After a long rest there are as many again, and no more.
+    expect_refused(&mut host, INTERVAL_US);
+    host.pass(INTERVAL_US - 10_000);
+    expect_refused(&mut host, 10_000);
+    host.pass(10_000);
+    host.upload(steps).0.unwrap();
+    expect_refused(&mut host, INTERVAL_US);
+    // After a long rest there are as many again, and no more. The clock is looked at before it wraps around.
     for _ in 0..200 {
-        pass(INTERVAL_US);
-        session.step(); // the clock is looked at before it wraps around
+        host.pass(INTERVAL_US);
     }
     for _ in 0..ERASES_AT_ONCE {
-        upload(&mut session, &board, &steps[..2]).0.unwrap();
+        host.upload(steps).0.unwrap();
     }
-    assert!(is_refused(upload(&mut session, &board, &steps[..2]).0, INTERVAL_US));
+    expect_refused(&mut host, INTERVAL_US);
 }
 
 #[test]
 fn a_blob_may_fill_the_slot() {
-    let (mut session, board) = started(quiet(), &[]);
+    let mut host = started(quiet(), &[]);
     let slot_bytes = Flash::SLOT_BYTES as u32;
     let mut head = blob(1, 3)[..16].to_vec();
     for (length, expected) in [
@@ -156,15 +128,14 @@ fn a_blob_may_fill_the_slot() {
         (slot_bytes, Ok(UploadState::Receiving { received: 0 })),
     ] {
         head[5..9].copy_from_slice(&length.to_le_bytes());
-        let begin = UploadStep::Begin { head: &head };
-        assert_eq!(upload(&mut session, &board, &[begin]).0, expected);
+        assert_eq!(host.upload(&[UploadStep::Begin { head: &head }]).0, expected);
     }
 }
 
 #[test]
 fn each_fault_of_a_model_is_named() {
     let old = blob(1, 3);
-    let (mut session, board) = started(quiet(), &old);
+    let mut host = started(quiet(), &old);
     let mut corrupt = old.clone();
     corrupt[40] ^= 1;
     let truncated = &old[..old.len() - 4];
@@ -176,25 +147,25 @@ fn each_fault_of_a_model_is_named() {
         (&[&old[..], &[0; 4]].concat(), received(whole_chunks)),
         (&corrupt, Refusal::BadModel(ModelFault::Corrupt)),
     ] {
-        let (outcome, _) = upload(&mut session, &board, &upload_steps(blob, CHUNK));
+        let (outcome, _) = host.upload(&trial_steps(blob));
         assert_eq!(outcome, Err(refusal));
     }
     // A blob that says another length than its upload did.
     let mut longer = old.clone();
     longer[5] += 4;
-    let mut steps = upload_steps(&longer, CHUNK);
+    let mut steps = trial_steps(&longer);
     steps[0] = begin(&old);
-    let (outcome, _) = upload(&mut session, &board, &steps);
+    let (outcome, _) = host.upload(&steps);
     assert_eq!(outcome, Err(Refusal::BadModel(ModelFault::Length)));
-    assert_eq!(model_crc(&mut session, &board), Some(crc_of(&old)));
+    assert_eq!(host.model_crc(), Some(crc_of(&old)));
 }
 
 #[test]
 fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     let (old, new) = (blob(1, 3), blob(2, 4));
-    let steps = upload_steps(&new, CHUNK);
-    let (mut session, board) = started(quiet(), &old);
-    let mut one = |step: &UploadStep<'_>| upload(&mut session, &board, &[*step]).0;
+    let steps = trial_steps(&new);
+    let mut host = started(quiet(), &old);
+    let mut one = |step: &UploadStep<'_>| host.upload(&[*step]).0;
 
     assert_eq!(one(&steps[1]), Err(Refusal::NoUpload));
     assert_eq!(one(&TRY), Err(Refusal::NoUpload));

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use embedded_hal::delay::DelayNs;
-use embedded_hal::digital::{self, OutputPin};
+use embedded_hal::digital::{self, ErrorKind, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
 
 use taxel_core::ColumnWires;
@@ -39,10 +39,6 @@ impl Record {
         Pin { record: self.clone(), name }
     }
 
-    fn pins<const N: usize>(&self, names: [&'static str; N]) -> [Pin; N] {
-        names.map(|name| self.pin(name))
-    }
-
     fn chips<const N: usize>(&self) -> [Spi; N] {
         core::array::from_fn(|chip| Spi { record: self.clone(), chip })
     }
@@ -51,14 +47,28 @@ impl Record {
         std::mem::take(&mut self.0.borrow_mut().events)
     }
 
+    fn count(&self, counts: impl Fn(&Event) -> bool) -> usize {
+        self.0.borrow().events.iter().filter(|event| counts(event)).count()
+    }
+
     fn transfers(&self) -> usize {
-        let state = self.0.borrow();
-        state.events.iter().filter(|event| matches!(event, Event::Transfer(..))).count()
+        self.count(|event| matches!(event, Event::Transfer(..)))
     }
 
     fn pin_changes(&self) -> usize {
-        let state = self.0.borrow();
-        state.events.iter().filter(|event| matches!(event, Event::Pin(..))).count()
+        self.count(|event| matches!(event, Event::Pin(..)))
+    }
+
+    fn answer(&self, counts: &[u16]) {
+        self.0.borrow_mut().answers = counts.iter().map(|counts| answer(*counts)).collect();
+    }
+
+    fn fail_transfer(&self, number: Option<usize>) {
+        self.0.borrow_mut().failing_transfer = number;
+    }
+
+    fn fail_pin_change(&self, number: usize) {
+        self.0.borrow_mut().failing_pin_change = Some(number);
     }
 
     /// Levels of the pins after all events.
@@ -72,21 +82,6 @@ impl Record {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Broken;
-
-impl digital::Error for Broken {
-    fn kind(&self) -> digital::ErrorKind {
-        digital::ErrorKind::Other
-    }
-}
-
-impl spi::Error for Broken {
-    fn kind(&self) -> spi::ErrorKind {
-        spi::ErrorKind::Other
-    }
-}
-
 #[derive(Debug)]
 struct Pin {
     record: Record,
@@ -94,23 +89,23 @@ struct Pin {
 }
 
 impl Pin {
-    fn set(&self, high: bool) -> Result<(), Broken> {
+    fn set(&self, high: bool) -> Result<(), ErrorKind> {
         let fails = self.record.0.borrow().failing_pin_change == Some(self.record.pin_changes());
         self.record.0.borrow_mut().events.push(Event::Pin(self.name, high));
-        if fails { Err(Broken) } else { Ok(()) }
+        if fails { Err(ErrorKind::Other) } else { Ok(()) }
     }
 }
 
 impl digital::ErrorType for Pin {
-    type Error = Broken;
+    type Error = ErrorKind;
 }
 
 impl OutputPin for Pin {
-    fn set_low(&mut self) -> Result<(), Broken> {
+    fn set_low(&mut self) -> Result<(), ErrorKind> {
         self.set(false)
     }
 
-    fn set_high(&mut self) -> Result<(), Broken> {
+    fn set_high(&mut self) -> Result<(), ErrorKind> {
         self.set(true)
     }
 }
@@ -122,18 +117,18 @@ struct Spi {
 }
 
 impl spi::ErrorType for Spi {
-    type Error = Broken;
+    type Error = spi::ErrorKind;
 }
 
 impl SpiDevice for Spi {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Broken> {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::ErrorKind> {
         let [Operation::TransferInPlace(bytes)] = operations else { panic!("one exchange") };
         let transfers = self.record.transfers();
         let mut state = self.record.0.borrow_mut();
         state.events.push(Event::Transfer(self.chip, bytes.to_vec()));
         let last = state.answers.len() - 1;
         bytes.copy_from_slice(&state.answers[transfers.min(last)]);
-        if state.failing_transfer == Some(transfers) { Err(Broken) } else { Ok(()) }
+        if state.failing_transfer == Some(transfers) { Err(spi::ErrorKind::Other) } else { Ok(()) }
     }
 }
 
@@ -143,8 +138,8 @@ impl DelayNs for Record {
     }
 }
 
-const LOW: bool = false;
-const HIGH: bool = true;
+/// Levels of a scanner's row pins while it does not scan.
+const ROWS_LOW: [(&str, bool); 2] = [("r0", false), ("r1", false)];
 
 #[test]
 fn mcp3208_is_asked_in_the_datasheets_bytes() {
@@ -207,14 +202,14 @@ fn shift_register_shows_one_row_and_whole_bytes() {
 struct RowPins([Pin; 2]);
 
 impl RowDrive for RowPins {
-    type Error = Broken;
+    type Error = ErrorKind;
 
-    fn drive(&mut self, row: RowWire) -> Result<(), Broken> {
+    fn drive(&mut self, row: RowWire) -> Result<(), ErrorKind> {
         self.release()?;
-        self.0.get_mut(row.0).ok_or(Broken)?.set_high()
+        self.0.get_mut(row.0).ok_or(ErrorKind::Other)?.set_high()
     }
 
-    fn release(&mut self) -> Result<(), Broken> {
+    fn release(&mut self) -> Result<(), ErrorKind> {
         let [first, second] = &mut self.0;
         let outcome = first.set_low();
         outcome.and(second.set_low())
@@ -226,8 +221,8 @@ type TestScanner = Scanner<RowPins, Mcp3208s<Spi, 1>, Record, 2, 3>;
 /// A scanner of 2 × 3 wires over one converter chip and row pins, and the record of what it does.
 fn scanner() -> (Record, TestScanner) {
     let record = Record::default();
-    record.0.borrow_mut().answers = vec![answer(2000)];
-    let drive = RowPins(record.pins(["r0", "r1"]));
+    record.answer(&[2000]);
+    let drive = RowPins(["r0", "r1"].map(|name| record.pin(name)));
     let sampler = Mcp3208s { chips: record.chips() };
     let scanner = Scanner::new(drive, sampler, record.clone(), ZeroPotential::TYPICAL);
     (record, scanner)
@@ -255,28 +250,30 @@ const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 }
 
 #[test]
 fn a_scan_does_what_it_must_and_no_more() {
-    let (record, mut scanner) = scanner();
-    assert_eq!(scan(&mut scanner).1, 0);
-    // Each row, and the idle samples, take one wait and one sample a column.
-    assert_eq!(record.transfers(), 3 * 3 * 4);
-    // A release changes two pins, a drive three.
-    assert_eq!(record.pin_changes(), 2 + 2 * 3 + 2);
-    assert_eq!(record.levels(), HashMap::from([("r0", LOW), ("r1", LOW)]));
-    let events = record.take();
-    let waits = events.iter().filter(|event| **event == Event::WaitNs(46_000)).count();
-    assert_eq!(waits, 3);
-    // Each row settles before it is sampled.
-    let high = events.iter().position(|event| *event == Event::Pin("r1", HIGH)).unwrap();
-    assert_eq!(events[high + 1], Event::WaitNs(46_000));
-    assert_eq!(events[high + 2], Event::Transfer(0, vec![0x06, 0x00, 0]));
+    let wild = ScanSettings { settling_us: u32::MAX, oversampling: 0 };
+    // Settings out of range are taken for the nearest.
+    for (settings, samples, wait_ns) in [(SETTINGS, 4, 46_000), (wild, 1, 5_000_000)] {
+        let (record, mut scanner) = scanner();
+        let mut frame = [f32::NAN; 6];
+        assert_eq!(scanner.scan(settings, WIRES, &mut frame).failed_samples, 0);
+        // Each row, and the idle samples, take one wait and so many samples a column.
+        assert_eq!(record.count(|event| *event == Event::WaitNs(wait_ns)), 3);
+        assert_eq!(record.transfers(), 3 * 3 * samples);
+        // A release changes two pins, a drive three.
+        assert_eq!(record.pin_changes(), 2 + 2 * 3 + 2);
+        assert_eq!(record.levels(), ROWS_LOW.into());
+        // Each row settles before it is sampled.
+        let events = record.take();
+        let high = events.iter().position(|event| *event == Event::Pin("r1", true)).unwrap();
+        let then = [Event::WaitNs(wait_ns), Event::Transfer(0, vec![0x06, 0x00, 0])];
+        assert!(events[high + 1..].starts_with(&then), "{events:?}");
+    }
 }
 
 #[test]
 fn readings_are_those_of_the_mean_counts() {
     let (record, mut scanner) = scanner();
-    let idle = [250; 12];
-    let counts = idle.iter().chain(&[2600, 2601, 2603, 2604, 2000]);
-    record.0.borrow_mut().answers = counts.copied().map(answer).collect();
+    record.answer(&[&[250; 12][..], &[2600, 2601, 2603, 2604, 2000]].concat());
     let (frame, _) = scan(&mut scanner);
     let mut expected = [2602.0, 2000.0, 2000.0];
     let row = ScannedRow { row: RowWire(0), columns: WIRES.columns, load: 1.0 };
@@ -289,15 +286,14 @@ fn a_failed_transaction_costs_one_reading_and_an_idle_one_its_column_until_the_n
     // The third sample of the second row's second column, and an idle one of the second column.
     for (failing, first_row) in [(2 * 3 * 4 + 4 + 2, [false; 3]), (4, [false, true, false])] {
         let (record, mut scanner) = scanner();
-        record.0.borrow_mut().failing_transfer = Some(failing);
+        record.fail_transfer(Some(failing));
         let (frame, failed) = scan(&mut scanner);
         assert_eq!((are_missing(frame), failed), ([first_row, [false, true, false]], 1));
         // The next scan takes another; where rows are not released for it, the one before does not stand in.
-        record.0.borrow_mut().failing_transfer = None;
+        record.fail_transfer(None);
         assert_eq!(are_missing(scan(&mut scanner).0), [[false; 3]; 2]);
         scanner.restart();
-        let next = record.pin_changes();
-        record.0.borrow_mut().failing_pin_change = Some(next);
+        record.fail_pin_change(record.pin_changes());
         assert_eq!(are_missing(scan(&mut scanner).0), [[true; 3]; 2]);
     }
 }
@@ -325,7 +321,7 @@ fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
     let constants = ZeroPotential::<2, 3>::TYPICAL;
     scanner.set_constants(constants.constants()).unwrap();
     assert_eq!([once, once].map(|settings| samples(&mut scanner, settings, WIRES)), [9, 6]);
-    record.0.borrow_mut().failing_transfer = Some(record.transfers() + 4);
+    record.fail_transfer(Some(record.transfers() + 4));
     assert_eq!([once, once, once].map(|it| samples(&mut scanner, it, WIRES)), [6, 9, 6]);
     let second = Selection { rows: &[RowWire(1)], ..WIRES };
     assert_eq!(samples(&mut scanner, once, second), 3);
@@ -346,7 +342,7 @@ fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
 fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing() {
     for failing in 0..10 {
         let (record, mut scanner) = scanner();
-        record.0.borrow_mut().failing_pin_change = Some(failing);
+        record.fail_pin_change(failing);
         let (frame, failed) = scan(&mut scanner);
         let rows_missing = frame.map(|row| row.iter().all(|r| r.is_nan()));
         // Without a first release there are no idle samples. Changes 2 to 4 drive row 0; if the releasing half fails, the
@@ -358,19 +354,8 @@ fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing(
             _ => ([false, false], 1),
         };
         assert_eq!((rows_missing, failed), expected, "change {failing}");
-        assert_eq!(record.levels(), HashMap::from([("r0", LOW), ("r1", LOW)]));
+        assert_eq!(record.levels(), ROWS_LOW.into());
     }
-}
-
-#[test]
-fn settings_out_of_range_are_taken_for_the_nearest() {
-    let (record, mut scanner) = scanner();
-    let mut frame = [[f32::NAN; 3]; 2];
-    let wild = ScanSettings { settling_us: u32::MAX, oversampling: 0 };
-    assert_eq!(scanner.scan(wild, WIRES, frame.as_flattened_mut()).failed_samples, 0);
-    assert_eq!(record.transfers(), 3 * 3);
-    let waits = record.take();
-    assert_eq!(waits.iter().filter(|it| **it == Event::WaitNs(5_000_000)).count(), 3);
 }
 
 #[test]
@@ -379,17 +364,15 @@ fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its
     let once = ScanSettings { oversampling: 1, ..SETTINGS };
     let wires = Selection { rows: &[RowWire(1)], columns: ColumnWires(0b110) };
     // Idle in all columns, the asked ones first; then the second row's.
-    record.0.borrow_mut().answers = [251, 252, 250, 2001, 2002, 2000].map(answer).to_vec();
+    record.answer(&[251, 252, 250, 2001, 2002, 2000]);
     let mut frame = [7.0; 3];
     assert_eq!(scanner.scan(once, wires, &mut frame[..2]).failed_samples, 0);
-    let driven = |row| record.0.borrow().events.contains(&Event::Pin(row, HIGH));
+    let driven = |row| record.0.borrow().events.contains(&Event::Pin(row, true));
     assert_eq!([driven("r0"), driven("r1")], [false, true]);
-    let asked: Vec<u8> = (record.take().iter())
-        .filter_map(
-            |event| if let Event::Transfer(_, bytes) = event { Some(bytes[1] >> 6) } else { None },
-        )
-        .collect();
-    assert_eq!(asked, [1, 2, 0, 1, 2, 0]);
+    let mut events = record.take();
+    events.retain(|event| matches!(event, Event::Transfer(..)));
+    let asked = [1, 2, 0, 1, 2, 0].map(|column| Event::Transfer(0, vec![0x06, column << 6, 0]));
+    assert_eq!(events, asked);
     let circuit = ZeroPotential::<2, 3>::TYPICAL;
     let (idle, counts) = ([250.0, 251.0, 252.0], [2000.0, 2001.0, 2002.0]);
     let load = circuit.load(wires.columns, &idle, 4095, &counts);
@@ -403,11 +386,7 @@ fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its
 fn wires_that_a_scanner_does_not_have_are_missing() {
     let (_, mut scanner) = scanner();
     let mut frame = [7.0; 4];
-    let report = scanner.scan(
-        SETTINGS,
-        Selection { rows: &[RowWire(0)], columns: ColumnWires::first(4) },
-        &mut frame,
-    );
+    let wires = Selection { rows: &[RowWire(0)], columns: ColumnWires::first(4) };
+    assert_eq!(scanner.scan(SETTINGS, wires, &mut frame).failed_samples, 4);
     assert!(frame.iter().all(|ohm| ohm.is_nan()));
-    assert_eq!(report.failed_samples, 4);
 }

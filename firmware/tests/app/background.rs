@@ -3,32 +3,30 @@
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
-use taxel_core::blob::{Columns, Metadata, ModelShape};
-
 use super::requests::decode;
 use crate::mock::*;
 
-/// A session with a model on a board whose sensor scans by itself for `scan_us` and 10 µs.
-fn started_alone(period_us: u32, scan_us: u32) -> (TestSession<'static>, Board) {
+/// A host of a device with a model, whose sensor scans by itself for `scan_us` and 10 µs.
+fn started_alone(period_us: u32, scan_us: u32) -> Host<'static, 'static> {
     let configuration = Configuration { send_readings: true, ..every(period_us) };
-    let (session, board) = started(configuration, &blob(3, 4));
-    let mut pins = board.pins.borrow_mut();
-    (pins.scans_alone, pins.scan_us) = (true, scan_us);
-    drop(pins);
-    (session, board)
+    let host = started(configuration, &blob(3, 4));
+    host.pins_mut().scans_alone = true;
+    host.pins_mut().scan_us = scan_us;
+    host
 }
 
-/// Runs turns of the loop until so many scans were started.
-fn run_until_started(session: &mut TestSession<'_>, board: &Board, started: u32) {
-    while board.pins.borrow().started < started {
-        assert_eq!(session.step(), None);
+/// Runs turns of the loop until so many more scans were started.
+fn run_until_started(host: &mut Host<'_, '_>, more: u32) {
+    let started = host.pins().started + more;
+    while host.pins().started < started {
+        assert_eq!(host.step(), None);
     }
 }
 
 /// Number of each frame whose readings were reported, when its scan began, and its first reading.
-fn readings(board: &Board) -> Vec<(u32, u64, f32)> {
+fn readings(host: &Host<'_, '_>) -> Vec<(u32, u64, f32)> {
     let mut found = Vec::new();
-    find_report(&board.pins.borrow().to_host, |_, report| {
+    host.find(|_, report| {
         if let Report::Readings { frame, start_us, readings_ohm } = report {
             found.push((frame, start_us, readings_ohm.iter().next().unwrap()));
         }
@@ -40,14 +38,13 @@ fn readings(board: &Board) -> Vec<(u32, u64, f32)> {
 #[test]
 fn the_next_frame_is_scanned_while_one_is_decoded_and_none_is_missed() {
     for alone in [true, false] {
-        let (mut session, board) = started_alone(1000, 790);
+        let mut host = started_alone(1000, 790);
+        host.pins_mut().scans_alone = alone;
         // Reports take longer than the scan leaves of a period.
-        let mut pins = board.pins.borrow_mut();
-        (pins.scans_alone, pins.gap_us) = (alone, 7);
-        drop(pins);
-        run_until(&mut session, &board, 40_000);
-        let frames = readings(&board);
-        let s = statistics(&mut session, &board);
+        host.pins_mut().gap_us = 7;
+        host.run_until(40_000);
+        let frames = readings(&host);
+        let s = host.statistics();
         assert_eq!((s.frames_decoded, s.lost_reports), (s.frames_scanned, 0));
         if !alone {
             assert!(s.frames_missed > 3, "{s:?}");
@@ -64,92 +61,83 @@ fn the_next_frame_is_scanned_while_one_is_decoded_and_none_is_missed() {
 
 #[test]
 fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
-    let (mut session, board) = started_alone(1000, 500);
-    let mut constants = ZeroPotential::<ROWS, COLS>::TYPICAL;
-    constants.drive_v = 0.21;
+    let mut host = started_alone(1000, 500);
+    let circuit = ZeroPotential::<ROWS, COLS> { drive_v: 0.21, ..ZeroPotential::TYPICAL };
     let slower = Configuration { frame_period_us: 2000, send_readings: true, ..quiet() };
     let changes = [
         Request::Configure(slower),
-        Request::SetConstants(constants.constants()),
+        Request::SetConstants(circuit.constants()),
         Request::CaptureBaseline { frames: 1 },
     ];
     for (index, change) in changes.iter().enumerate() {
-        let started = board.pins.borrow().started;
-        run_until_started(&mut session, &board, started + 1);
+        run_until_started(&mut host, 1);
         // What the scan has read so far belongs to no frame any more.
-        board.frame.borrow_mut()[0][0] = 70.0 + index as f32;
-        board.pins.borrow_mut().to_host.clear();
-        let (stopped, changed_us) = (board.pins.borrow().stopped, board.pins.borrow().now_us);
-        send(&mut session, &board, 9, change);
-        assert_eq!(board.pins.borrow().stopped, stopped + 1, "{change:?}");
-        while readings(&board).is_empty() {
-            session.step();
+        host.frame()[0][0] = 70.0 + index as f32;
+        host.pins_mut().to_host.clear();
+        let (stopped, changed_us) = (host.pins().stopped, host.pins().now_us);
+        host.send(9, change);
+        assert_eq!(host.pins().stopped, stopped + 1, "{change:?}");
+        while readings(&host).is_empty() {
+            host.step();
         }
-        let (_, start_us, first_ohm) = readings(&board)[0];
+        let (_, start_us, first_ohm) = readings(&host)[0];
         assert!(start_us > u64::from(changed_us), "{change:?}");
         assert_eq!(first_ohm.to_bits(), (70.0 + index as f32).to_bits(), "{change:?}");
     }
     // The baseline is of the one frame that began behind the request: 72 Ω as bytes.
-    let all = reports(&board.pins.borrow().to_host);
-    assert!(
-        all.iter().any(|(number, text)| *number == 9 && text.contains("[0, 0, 144, 66")),
-        "{all:?}"
-    );
+    let answers = host.answers(9);
+    assert!(answers.iter().any(|text| text.contains("[0, 0, 144, 66")), "{answers:?}");
     // Nothing is given up where nothing changes.
-    let (started, stopped) = (board.pins.borrow().started, board.pins.borrow().stopped);
-    run_until_started(&mut session, &board, started + 1);
-    tell(&mut session, &board, &Request::Configure(slower));
-    assert_eq!(board.pins.borrow().stopped, stopped);
-    assert_eq!(statistics(&mut session, &board).frames_missed, 0);
+    let stopped = host.pins().stopped;
+    run_until_started(&mut host, 1);
+    host.configure(slower);
+    assert_eq!(host.pins().stopped, stopped);
+    assert_eq!(host.statistics().frames_missed, 0);
 }
 
 #[test]
 fn a_scan_of_other_wires_is_given_up_when_a_model_comes_into_force() {
     let mut bench = Bench::new(every(1000), &[]);
-    let (mut session, board) = bench.session();
-    board.pins.borrow_mut().scans_alone = true;
-    board.pins.borrow_mut().scan_us = 500;
-    run_until_started(&mut session, &board, 1);
-    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
-    let metadata =
-        Metadata { input_names: Columns("r2c1_ohm\nr2c3_ohm"), ..Metadata::unnamed(shape) };
-    bench.slots = Flash::slots_with(&blob_of_a_row(shape, metadata));
-    let (mut session, board) = bench.session();
-    assert_eq!(board.pins.borrow().stopped, 1);
-    run_until_started(&mut session, &board, 3);
+    let mut host = bench.session();
+    host.pins_mut().scans_alone = true;
+    host.pins_mut().scan_us = 500;
+    run_until_started(&mut host, 1);
+    bench.slots = Flash::slots_with(&blob_of_names("r2c1_ohm\nr2c3_ohm", 1));
+    let mut host = bench.session();
+    assert_eq!(host.pins().stopped, 1);
+    run_until_started(&mut host, 2);
     // It has as many readings as the model: the mock panics for another number.
-    assert!(statistics(&mut session, &board).frames_decoded >= 1);
+    assert!(host.statistics().frames_decoded >= 1);
 }
 
 #[test]
 fn a_scan_that_never_ends_is_a_silent_sensor_which_tells_what_it_finds() {
-    let (mut session, board) = started_alone(1000, 1_000_000_000);
-    run_until_started(&mut session, &board, 1);
-    board.pins.borrow_mut().look_us = 1000;
-    while board.pins.borrow().stopped == 0 {
-        assert_eq!(session.step(), None); // and the host is served
-        assert!(board.pins.borrow().now_us < 2_100_000, "the scan has no end");
+    let mut host = started_alone(1000, 1_000_000_000);
+    run_until_started(&mut host, 1);
+    host.pins_mut().look_us = 1000;
+    while host.pins().stopped == 0 {
+        assert_eq!(host.step(), None); // and the host is served
+        assert!(host.pins().now_us < 2_100_000, "the scan has no end");
     }
-    let (fed, now_us) = (board.pins.borrow().feeds, board.pins.borrow().now_us);
-    run_until(&mut session, &board, now_us + 6_000_000);
-    assert_eq!(board.pins.borrow().feeds, fed, "the watchdog is fed");
-    assert!(board.pins.borrow().started > 2, "it is not tried again");
-    let frames = readings(&board);
-    let all = reports(&board.pins.borrow().to_host);
-    let told = all.iter().filter(|(number, text)| *number == 0 && text.contains("Diagnosis"));
-    assert_eq!(told.count(), frames.len(), "one for each scan");
-    let s = statistics(&mut session, &board);
+    let fed = host.pins().feeds;
+    host.run_for(6_000_000);
+    assert_eq!(host.pins().feeds, fed, "the watchdog is fed");
+    assert!(host.pins().started > 2, "it is not tried again");
+    let frames = readings(&host);
+    let told = host.answers(0).iter().filter(|text| text.contains("Diagnosis")).count();
+    assert_eq!(told, frames.len(), "one for each scan");
+    let s = host.statistics();
     assert_eq!(s.failed_samples, s.frames_scanned * (ROWS * COLS) as u32);
     assert!(!frames.is_empty() && frames.iter().all(|(.., first_ohm)| first_ohm.is_nan()));
 }
 
 #[test]
 fn what_a_host_wants_decoded_disturbs_no_scan() {
-    let (mut session, board) = started_alone(1000, 500);
-    run_until_started(&mut session, &board, 1);
-    decode(&mut session, &board, &[[33.0; COLS]; ROWS]);
-    assert!(readings(&board).is_empty());
-    run_until_started(&mut session, &board, 2);
-    assert_eq!(readings(&board)[0].2.to_bits(), frame_at_rest()[0][0].to_bits());
-    assert_eq!(board.pins.borrow().stopped, 0);
+    let mut host = started_alone(1000, 500);
+    run_until_started(&mut host, 1);
+    decode(&mut host, &[[33.0; COLS]; ROWS]);
+    assert!(readings(&host).is_empty());
+    run_until_started(&mut host, 1);
+    assert_eq!(readings(&host)[0].2.to_bits(), frame_at_rest()[0][0].to_bits());
+    assert_eq!(host.pins().stopped, 0);
 }

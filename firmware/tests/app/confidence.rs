@@ -1,11 +1,8 @@
 //! Novelty and deviations: when they are computed, and what is sent of them.
 
-use taxel_core::blob::Floats;
 use taxel_core::relative::reciprocal;
 use taxel_core::{Decoder, Frame};
-use taxel_firmware::link::message::{
-    ConfidenceSent, Configuration, EstimateReport, Report, Request,
-};
+use taxel_firmware::link::message::{ConfidenceSent, Configuration, EstimateReport, Report};
 
 use super::requests::bits;
 use crate::mock::*;
@@ -35,39 +32,12 @@ fn expected(blob: &[u8], frame: &TestFrame, baseline_ohm: f32) -> Sent {
     let frame = Frame { readings_ohm: frame.as_flattened(), reciprocals: &reciprocals };
     let (mut scratch, mut deviation) = (vec![0.0; decoder.scratch_floats()], [0.0; ROWS * OUTPUTS]);
     let novelty = decoder.assess_into(frame, &mut scratch, &mut deviation).unwrap().unwrap();
-    Sent {
-        is_novel: novelty > 0.0,
-        novelty: Some(novelty.to_bits()),
-        deviations: bits(deviation.into_iter()),
-    }
+    Sent { is_novel: novelty > 0.0, novelty: Some(novelty.to_bits()), deviations: bits(deviation) }
 }
 
 /// Lets the device decode `frame`.
-fn decode(session: &mut TestSession<'_>, board: &Board, frame: &TestFrame) -> (Sent, u8) {
-    let readings_ohm = Floats::new(frame.as_flattened());
-    let request = Request::Decode { frame: 5, start_us: 0, readings_ohm };
-    answer!(session, board, &request, Report::Estimate(it) => (sent(&it), it.flags))
-}
-
-/// What the device sends of its next scans, which it then ends.
-fn scanned(session: &mut TestSession<'_>, board: &Board, confidence: ConfidenceSent) -> Vec<Sent> {
-    let scanning = Configuration { frame_period_us: 1000, confidence, ..quiet() };
-    tell(session, board, &Request::Configure(scanning));
-    board.pins.borrow_mut().to_host.clear();
-    let until_us = board.pins.borrow().now_us + 2500;
-    run_until(session, board, until_us);
-    let mut found = Vec::new();
-    find_report(&std::mem::take(&mut board.pins.borrow_mut().to_host), |_, report| {
-        match report {
-            Report::Estimate(estimate) => found.push(sent(&estimate)),
-            Report::Health(_) => {}
-            other => panic!("{other:?}"),
-        }
-        None::<()>
-    });
-    tell(session, board, &Request::Configure(quiet()));
-    assert!(found.len() >= 2, "{found:?}");
-    found
+fn decode(host: &mut Host<'_, '_>, frame: &TestFrame) -> (Sent, u8) {
+    host.estimate(0, frame.as_flattened(), |it| (sent(&it), it.flags))
 }
 
 /// A frame that is like those of training, but for one reading.
@@ -81,25 +51,24 @@ fn with_last(ohm: f32) -> TestFrame {
 fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
     for (is_relative, baseline_ohm) in [(false, f32::NAN), (true, 62.0)] {
         let blob = blob_with_readings(is_relative);
-        let (mut session, board) = started(quiet(), &blob);
-        let (found, flags) = decode(&mut session, &board, &frame_at_rest());
+        let mut host = started(quiet(), &blob);
+        let (found, flags) = decode(&mut host, &frame_at_rest());
         let is_unknown = found.novelty.is_some_and(|novelty| f32::from_bits(novelty).is_nan());
         let unknown = if is_relative { EstimateReport::NO_BASELINE } else { 0 };
         assert_eq!((flags, is_unknown), (unknown, is_relative));
-        let readings_ohm = Floats::new(&[62.0; ROWS * COLS]);
-        tell(&mut session, &board, &Request::SetBaseline { readings_ohm });
+        host.set_baseline(&[62.0; ROWS * COLS]);
         // However little a frame is novel, it is flagged.
         let hardly = (65..900).map(|ohm| ohm as f32).find(|ohm| {
             let sent = expected(&blob, &with_last(*ohm), baseline_ohm);
             sent.novelty.is_some_and(|novelty| (1e-6..1.0).contains(&f32::from_bits(novelty)))
         });
         for (ohm, novel) in [(65.0, false), (64.0, false), (hardly.unwrap(), true), (900.0, true)] {
-            let (found, flags) = decode(&mut session, &board, &with_last(ohm));
+            let (found, flags) = decode(&mut host, &with_last(ohm));
             assert_eq!(found, expected(&blob, &with_last(ohm), baseline_ohm), "{ohm}");
             assert_ne!(flags & EstimateReport::CONTACT, 0, "{ohm}: a flag of its own is lost");
             assert_eq!((found.is_novel, found.deviations.len()), (novel, ROWS * OUTPUTS), "{ohm}");
         }
-        let s = statistics(&mut session, &board);
+        let s = host.statistics();
         assert_eq!((s.frames_novel, s.longest_confidence_us > 0), (2, true));
     }
 }
@@ -116,38 +85,47 @@ fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
         (&with, ConfidenceSent::Novelty, novelty),
         (&with, ConfidenceSent::Deviations, all()),
     ] {
-        let (mut session, board) = started(quiet(), blob);
-        *board.frame.borrow_mut() = frame;
-        let frames = scanned(&mut session, &board, confidence);
-        assert!(frames.iter().all(|sent| *sent == expected), "{confidence:?}: {frames:?}");
-        let s = statistics(&mut session, &board);
+        let scanning = Configuration { confidence, ..every(1000) };
+        let mut host = started(scanning, blob);
+        *host.frame() = frame;
+        host.run_until(2500);
+        let mut frames = Vec::new();
+        host.find(|_, report| {
+            match report {
+                Report::Estimate(estimate) => frames.push(sent(&estimate)),
+                Report::Health(_) => {}
+                other => panic!("{other:?}"),
+            }
+            None::<()>
+        });
+        assert_eq!(frames, [expected.clone(), expected.clone()], "{confidence:?}");
+        let s = host.statistics();
         assert_eq!(s.frames_novel, if expected.is_novel { s.frames_decoded } else { 0 });
         assert_eq!(s.longest_confidence_us > 0, expected.is_novel);
     }
-    let (mut session, board) = started(quiet(), &without);
-    assert_eq!(decode(&mut session, &board, &frame).0, NOTHING);
+    let mut host = started(quiet(), &without);
+    assert_eq!(decode(&mut host, &frame).0, NOTHING);
 }
 
 #[test]
 fn a_faulty_reading_is_filled_before_a_frame_is_assessed_and_two_leave_it_unknown() {
     for (is_relative, baseline_ohm) in [(false, f32::NAN), (true, 62.0)] {
         let blob = blob_with_readings(is_relative);
-        let (mut session, board) = started(quiet(), &blob);
-        let readings_ohm = Floats::new(&[62.0; ROWS * COLS]);
-        tell(&mut session, &board, &Request::SetBaseline { readings_ohm });
+        let mut host = started(quiet(), &blob);
+        host.set_baseline(&[62.0; ROWS * COLS]);
         let mut filled = with_last(f32::NAN);
         let decoder = Decoder::<ROWS>::load(&blob).unwrap();
         let reciprocals = [reciprocal(baseline_ohm); ROWS * COLS];
         let mut scratch = vec![0.0; decoder.scratch_floats()];
         assert_eq!(decoder.fill(filled.as_flattened_mut(), &reciprocals, &mut scratch), 1);
         for bad in [f32::NAN, 0.0, f32::INFINITY, 2000.0, -60.0] {
-            let (found, flags) = decode(&mut session, &board, &with_last(bad));
+            let (found, flags) = decode(&mut host, &with_last(bad));
             assert_ne!(flags & EstimateReport::FAULTY_READING, 0, "{bad}");
             assert_eq!(found, expected(&blob, &filled, baseline_ohm), "{bad}");
             assert!(found.novelty.is_some_and(|it| f32::from_bits(it) < 0.0), "{found:?}");
             let mut frame = with_last(bad);
             frame[0][0] = bad;
-            let (found, flags) = decode(&mut session, &board, &frame);
+            let (found, flags) = decode(&mut host, &frame);
             assert_ne!(flags & EstimateReport::FAULTY_READING, 0, "{bad}");
             assert!(found.novelty.is_some_and(|it| f32::from_bits(it).is_nan()), "{found:?}");
             assert!(found.deviations.iter().all(|it| f32::from_bits(*it).is_nan()), "{found:?}");

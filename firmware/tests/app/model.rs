@@ -3,11 +3,9 @@
 use taxel_core::Decoder;
 use taxel_core::blob::{Columns, Floats, Metadata, ModelShape};
 use taxel_core::checksum::CRC_32;
-use taxel_firmware::link::message::{
-    Configuration, EstimateReport, ModelFault, Refusal, Report, Request, Setting,
-};
+use taxel_firmware::link::message::{Configuration, ModelFault, Refusal, Report, Request, Setting};
 
-use super::requests::{bits, decode, expected};
+use super::requests::{decode, expected};
 use crate::mock::*;
 
 #[test]
@@ -15,8 +13,8 @@ fn the_identity_tells_what_the_model_was_trained_on() {
     let shape = ModelShape { rows: 1, inputs: 3, outputs: 2 };
     let plain = Metadata::unnamed(shape);
     let read = |metadata: Metadata<'static>| {
-        let (mut session, board) = started(quiet(), &blob_of_a_row(shape, metadata));
-        answer!(&mut session, &board, &Request::Identify, Report::Identity(identity) => {
+        let mut host = started(quiet(), &blob_of_a_row(shape, metadata));
+        answer!(host, &Request::Identify, Report::Identity(identity) => {
             (identity.model_name.to_owned(), identity.model.unwrap())
         })
     };
@@ -28,20 +26,10 @@ fn the_identity_tells_what_the_model_was_trained_on() {
     assert_eq!(other.inputs_crc_32, model.inputs_crc_32);
     assert_eq!(other.outputs_crc_32, crc("y\nyN\nN"));
     // A long name is cut between letters.
-    let long = "äöüßäöüßäöüßäöüßäöüßäöüß";
-    let (name, _) = read(Metadata { name: long, ..plain });
-    assert_eq!(name, &long[..40]);
-    let (name, _) =
-        read(Metadata { name: "xäöüßäöüßäöüßäöüßäöüßäöüß", ..plain });
-    assert_eq!(name.len(), 39);
-}
-
-/// Reports on the first scan with the model in `blob`: readings, and then the estimate.
-fn reports_on_a_scan(blob: &[u8]) -> Vec<(u16, String)> {
-    let scanning = Configuration { frame_period_us: 1000, send_readings: true, ..quiet() };
-    let (mut session, board) = started(scanning, blob);
-    run_until(&mut session, &board, 1500);
-    reports(&board.pins.borrow().to_host)
+    for (name, length) in [("äöüßäöüßäöüßäöüßäöüßäöüß", 40), ("xäöüßäöüßäöüßäöüßäöüßäöüß", 39)]
+    {
+        assert_eq!(read(Metadata { name, ..plain }).0, &name[..length]);
+    }
 }
 
 #[test]
@@ -55,64 +43,54 @@ fn the_model_says_which_cells_are_scanned_in_which_order_and_what_is_decoded() {
         (2, "r2c1_ohm\nr2c2_ohm", second[..2].to_vec()),
         (1, "r1c3_ohm\nr2c1_ohm\nr1c2_ohm", vec![first[2], second[0], first[1]]),
     ] {
-        let shape = ModelShape { rows: 1, inputs: readings.len(), outputs };
-        let metadata = Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) };
-        let blob = blob_of_a_row(shape, metadata);
-        let decoder = Decoder::<1>::load(&blob).unwrap();
-        let outputs = decoder.decode(&readings[..]).unwrap().outputs;
-        let all = reports_on_a_scan(&blob);
-        let found = |debug: String| all.iter().any(|(_, text)| text.contains(&debug));
-        assert!(found(format!("readings_ohm: {:?}", Floats::new(&readings))), "{names}: {all:?}");
+        let blob = blob_of_names(names, outputs);
+        let outputs = Decoder::<1>::load(&blob).unwrap().decode(&readings[..]).unwrap().outputs;
+        let mut host = started(Configuration { send_readings: true, ..every(1000) }, &blob);
+        host.run_until(1500);
+        let [scanned, decoded] = &host.answers(0)[..] else { panic!("one scan") };
+        assert!(scanned.ends_with(&format!("{:?} }}", Floats::new(&readings))), "{scanned}");
         let row = format!("row_status: [0], outputs: {:?}", Floats::new(&outputs));
-        assert!(found(row), "{names}: {all:?}");
+        assert!(decoded.contains(&row), "{names}: {decoded}");
     }
 }
 
 #[test]
 fn a_model_that_does_not_fit_the_board_is_refused_and_not_put_in_force() {
     let old = blob(1, 3);
-    let check = |blob: &[u8], fault: ModelFault| {
-        let (mut session, board) = started(quiet(), blob);
-        assert_eq!(model_crc(&mut session, &board), None, "{fault:?}");
-        let mut device = Device::new(Flash::slots_with(&old));
-        assert_eq!(device.install(blob), Err(Refusal::BadModel(fault)));
-        assert_eq!(device.restart(), Some(crc_of(&old)));
-    };
-    for (inputs, outputs, names, fault) in [
-        (2, 1, "r3c1_ohm\nr3c2_ohm", ModelFault::Wires),
-        (2, 1, "r1c1_ohm\nrest", ModelFault::Wires),
-        (7, 1, "", ModelFault::Shape),
-        (3, 5, "", ModelFault::Shape),
-    ] {
+    let unnamed = |inputs, outputs| {
         let shape = ModelShape { rows: 1, inputs, outputs };
-        let unnamed = Metadata::unnamed(shape);
-        let input_names = if names.is_empty() { unnamed.input_names } else { Columns(names) };
-        check(&blob_of_a_row(shape, Metadata { input_names, ..unnamed }), fault);
-    }
+        blob_of_a_row(shape, Metadata::unnamed(shape))
+    };
     // Working space has room for 14 numbers: two for each feature.
-    check(&blob_of_features(8), ModelFault::Shape);
     let few = blob_of_features(7);
-    assert_eq!(Device::new(Flash::slots()).install(&few), Ok(confirmed(&few)));
+    for (blob, fault) in [
+        (blob_of_names("r3c1_ohm\nr3c2_ohm", 1), Some(ModelFault::Wires)),
+        (blob_of_names("r1c1_ohm\nrest", 1), Some(ModelFault::Wires)),
+        (unnamed(7, 1), Some(ModelFault::Shape)),
+        (unnamed(3, 5), Some(ModelFault::Shape)),
+        (blob_of_features(8), Some(ModelFault::Shape)),
+        (few, None),
+    ] {
+        let in_force = started(quiet(), &blob).model_crc();
+        assert_eq!(in_force, fault.is_none().then(|| crc_of(&blob)), "{fault:?}");
+        let mut device = Device::new(Flash::slots_with(&old));
+        let expected = fault.map_or(Ok(confirmed(&blob)), |it| Err(Refusal::BadModel(it)));
+        assert_eq!(device.install(&blob), expected);
+        assert_eq!(device.restart(), Some(in_force.unwrap_or(crc_of(&old))));
+    }
 }
 
 #[test]
 fn a_kept_baseline_is_that_of_its_wires_in_their_order() {
-    let shape = ModelShape { rows: 1, inputs: 2, outputs: 1 };
-    let [first, second] = ["r1c1_ohm\nr1c2_ohm", "r1c2_ohm\nr1c1_ohm"].map(|names| {
-        blob_of_a_row(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
-    });
+    let [first, second] =
+        ["r1c1_ohm\nr1c2_ohm", "r1c2_ohm\nr1c1_ohm"].map(|names| blob_of_names(names, 1));
     let mut bench = Bench::new(quiet(), &first);
-    let (mut session, board) = bench.session();
-    let baseline = Request::SetBaseline { readings_ohm: Floats::new(&[60.0, 50.0]) };
-    tell(&mut session, &board, &baseline);
-    tell(&mut session, &board, &Request::Keep(Setting::Baseline));
-    for (next, contact) in [(&second, 0), (&first, EstimateReport::CONTACT)] {
+    let mut host = bench.session();
+    host.set_baseline(&[60.0, 50.0]);
+    host.tell(&Request::Keep(Setting::Baseline));
+    for (next, is_contact) in [(&second, false), (&first, true)] {
         bench.install(next).unwrap();
-        let (mut session, board) = bench.session();
-        let request =
-            Request::Decode { frame: 1, start_us: 0, readings_ohm: Floats::new(&[30.0; 2]) };
-        let flags = answer!(&mut session, &board, &request, Report::Estimate(it) => it.flags);
-        assert_eq!(flags & EstimateReport::CONTACT, contact);
+        assert_eq!(bench.session().is_contact(&[30.0; 2]), is_contact);
     }
 }
 
@@ -123,11 +101,10 @@ fn a_model_is_decoded_from_ram_where_it_fits() {
     for (room, in_ram) in [(words, true), (words - 1, false)] {
         let mut bench = Bench::new(quiet(), &blob);
         bench.weights = vec![0; room];
-        let (mut session, board) = bench.session();
-        assert_eq!(model(&mut session, &board).unwrap().in_ram, in_ram);
+        let mut host = bench.session();
+        assert_eq!(host.model().unwrap().in_ram, in_ram);
         let frame = frame_at_rest();
-        let (_, _, found) = decode(&mut session, &board, &frame);
-        assert_eq!(found, bits(expected(&blob, &frame).into_iter().flatten()));
+        assert_eq!(decode(&mut host, &frame).2, expected(&blob, &frame));
         assert_eq!(bytemuck::cast_slice::<u32, u8>(&bench.weights).starts_with(&blob), in_ram);
     }
 }

@@ -7,10 +7,9 @@ use crate::mock::*;
 
 #[test]
 fn frames_are_scanned_on_time_numbered_and_reported() {
-    let configuration = Configuration { send_readings: true, ..every(1000) };
-    let (mut session, board) = started(configuration, &blob(3, 4));
-    run_until(&mut session, &board, 5500);
-    let reports = reports(&board.pins.borrow().to_host);
+    let mut host = started(Configuration { send_readings: true, ..every(1000) }, &blob(3, 4));
+    host.run_until(5500);
+    let reports = host.reports();
     assert_eq!(reports.len(), 10, "{reports:?}"); // readings and estimate, five times
     for (i, (number, text)) in reports.iter().enumerate() {
         assert_eq!(*number, 0);
@@ -18,7 +17,7 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
         let start = format!("{kind}frame: {}, start_us: {}", i / 2 + 1, i / 2 + 1);
         assert!(text.starts_with(&start), "{text} instead of {start}");
     }
-    let s = statistics(&mut session, &board);
+    let s = host.statistics();
     assert_eq!((s.frames_scanned, s.frames_decoded, s.frames_missed), (5, 5, 0));
     assert!(s.longest_scan_us >= 10 && s.longest_scan_us < 20);
     assert_eq!((s.shortest_decode_cycles, s.longest_decode_cycles), (1000, 1000));
@@ -26,53 +25,53 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
 
 #[test]
 fn a_scan_longer_than_the_period_is_an_overrun() {
-    let configuration = every(100);
-    let (mut session, board) = started(configuration, &blob(3, 4));
-    board.pins.borrow_mut().scan_us = 250;
-    run_until(&mut session, &board, 2000);
-    let all = reports(&board.pins.borrow().to_host);
+    let mut host = started(every(100), &blob(3, 4));
+    host.pins_mut().scan_us = 250;
+    host.run_until(2000);
+    let all = host.reports();
     let flagged =
         |flag: u8| all.iter().filter(|(_, t)| t.contains(&format!("flags: {flag},"))).count();
     assert_eq!(flagged(0), 1, "{all:?}"); // the first was on time
     assert_eq!(flagged(EstimateReport::OVERRUN), all.len() - 1);
-    let s = statistics(&mut session, &board);
+    let s = host.statistics();
     assert!(s.frames_missed >= s.frames_scanned - 1, "{s:?}");
 }
 
 #[test]
 fn the_watchdog_is_fed_by_good_loops_only() {
-    let (mut session, board) = started(every(100), &blob(3, 4));
+    let mut host = started(every(100), &blob(3, 4));
+    let board = host.board.clone();
     let feeds = || board.pins.borrow().feeds;
-    let await_scan = |session: &mut TestSession<'_>| {
-        let scanned = statistics(session, &board).frames_scanned;
-        while statistics(session, &board).frames_scanned == scanned {
-            session.step();
+    let await_scan = |host: &mut Host<'_, '_>| {
+        let scanned = host.statistics().frames_scanned;
+        while host.statistics().frames_scanned == scanned {
+            host.step();
         }
     };
     for _ in 0..50 {
         let before = feeds();
-        session.step();
+        host.step();
         assert_eq!(feeds(), before + 1);
     }
     // With a converter that gives nothing, no loop is good from the next scan on, whether it scans or not.
-    *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
-    await_scan(&mut session);
-    let (fed, bad) = (feeds(), statistics(&mut session, &board).bad_loops);
-    turn(&mut session, 2000);
+    *host.frame() = [[f32::NAN; COLS]; ROWS];
+    await_scan(&mut host);
+    let (fed, bad) = (feeds(), host.statistics().bad_loops);
+    host.turn(2000);
     assert_eq!(feeds(), fed);
-    assert!(statistics(&mut session, &board).bad_loops >= bad + 2000);
+    assert!(host.statistics().bad_loops >= bad + 2000);
     // One reading is enough.
-    board.frame.borrow_mut()[1][1] = 60.0;
-    await_scan(&mut session);
+    host.frame()[1][1] = 60.0;
+    await_scan(&mut host);
     let fed = feeds();
-    turn(&mut session, 2000);
+    host.turn(2000);
     assert_eq!(feeds(), fed + 2000);
     // Without scans, a silent sensor must not restart the device.
-    *board.frame.borrow_mut() = [[f32::NAN; COLS]; ROWS];
-    turn(&mut session, 2000);
-    tell(&mut session, &board, &Request::Configure(quiet()));
+    *host.frame() = [[f32::NAN; COLS]; ROWS];
+    host.turn(2000);
+    host.configure(quiet());
     let fed = feeds();
-    session.step();
+    host.step();
     assert_eq!(feeds(), fed + 1);
 }
 
@@ -80,19 +79,17 @@ fn the_watchdog_is_fed_by_good_loops_only() {
 /// `scan_us`.
 fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
     let scanning = Configuration { send_readings: true, ..every(10_000) };
-    let (mut session, board) = started(scanning, &blob(3, 4));
-    let mut pins = board.pins.borrow_mut();
-    (pins.scan_us, pins.gap_us) = (scan_us, gap_us);
-    drop(pins);
+    let mut host = started(scanning, &blob(3, 4));
+    host.pins_mut().scan_us = scan_us;
+    host.pins_mut().gap_us = gap_us;
     // A faulty reading, so that all kinds of reports are sent.
-    board.frame.borrow_mut()[0][0] = f32::NAN;
+    host.frame()[0][0] = f32::NAN;
     let mut longest_us = 0;
     for _ in 0..30 {
-        let request = request_bytes(5, &Request::Identify);
-        board.pins.borrow_mut().to_device.extend(request);
-        let start_us = board.pins.borrow().now_us;
-        session.step();
-        longest_us = longest_us.max(board.pins.borrow().now_us - start_us);
+        host.pins_mut().to_device.extend(request_bytes(5, &Request::Identify));
+        let start_us = host.pins().now_us;
+        host.step();
+        longest_us = longest_us.max(host.pins().now_us - start_us);
     }
     longest_us
 }
@@ -111,24 +108,23 @@ fn however_slowly_bytes_are_taken_the_watchdog_is_fed() {
 
 #[test]
 fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
-    let (mut session, board) = started(every(1000), &blob(3, 4));
-    board.pins.borrow_mut().room = Some(10);
-    run_until(&mut session, &board, 500_000);
+    let mut host = started(every(1000), &blob(3, 4));
+    host.pins_mut().room = Some(10);
+    host.run_until(500_000);
     // The report that was cut is a broken frame, which does not damage the next report.
-    board.pins.borrow_mut().room = None;
-    send(&mut session, &board, 7, &Request::Statistics);
-    let bytes = std::mem::take(&mut board.pins.borrow_mut().to_host);
-    assert_eq!(find_report(&bytes, |number, _| Some(number)), Some(7));
-    let s = statistics(&mut session, &board);
+    host.pins_mut().room = None;
+    host.send(7, &Request::Statistics);
+    assert_eq!(host.find(|number, _| Some(number)), Some(7));
+    let s = host.statistics();
     assert!(s.lost_reports >= 5 && s.frames_missed > 0, "{s:?}");
 }
 
 #[test]
 fn a_restart_is_answered_and_ends_the_session() {
-    let (mut session, board) = started(quiet(), &blob(3, 4));
-    let (answer, end) = ask(&mut session, &board, &Request::Restart, |r| r == Report::Restarting);
+    let mut host = started(quiet(), &blob(3, 4));
+    let (answer, end) = host.ask(&Request::Restart, |r| r == Report::Restarting);
     assert_eq!((answer, end), (true, Some(SessionEnd::Restart)));
     // A board without a brown-out level goes on.
-    let refused = |report: Report<'_>| report == Report::Refused(Refusal::Flash);
-    assert_eq!(ask(&mut session, &board, &Request::SetBrownOut, refused), (true, None));
+    assert_eq!(host.refusal(&Request::SetBrownOut), Refusal::Flash);
+    assert_eq!(host.step(), None);
 }

@@ -1,12 +1,12 @@
 //! An application on its board.
 
 use taxel_firmware::app::{App, Buffers, Session};
-use taxel_firmware::link::message::{Configuration, UploadState, UploadStep};
+use taxel_firmware::link::message::{Configuration, UploadStep};
 use taxel_firmware::store::Journal;
 
 use super::board::Board;
 use super::flash::Flash;
-use super::host::{Answer, Running, TestSession, confirmed_steps, upload_step};
+use super::host::{Answer, Host, trial_steps};
 use super::shape::{COLS, MESSAGE_BYTES, OUTPUTS, ROWS};
 use super::source::Source;
 
@@ -35,8 +35,8 @@ pub struct Bench<'m> {
     pub weights: Vec<u32>,
 }
 
-/// A session on a new board with `blob` in its first slot, and the board. Neither is ever freed.
-pub fn started(configuration: Configuration, blob: &[u8]) -> (TestSession<'static>, Board) {
+/// A host of a new board with `blob` in its first slot, which is never freed.
+pub fn started(configuration: Configuration, blob: &[u8]) -> Host<'static, 'static> {
     Box::leak(Box::new(Bench::new(configuration, blob))).session()
 }
 
@@ -64,30 +64,27 @@ impl<'m> Bench<'m> {
         Self { app, board, slots, weights: Vec::new() }
     }
 
-    /// The next session, and the board.
-    pub fn session(&mut self) -> (Running<'_, 'm>, Board) {
+    /// The host of the next session.
+    pub fn session(&mut self) -> Host<'_, 'm> {
         let session = Session::start(&mut self.app, &mut self.slots, &mut self.weights);
-        (session, self.board.clone())
+        Host { session, board: self.board.clone() }
     }
 
     /// Carries out steps of an upload in one session after the other, until the device refuses one; returns the last
     /// answer.
     pub fn upload(&mut self, steps: &[UploadStep<'_>]) -> Answer {
         let mut steps = steps.iter();
-        let mut last = Ok(UploadState::Idle);
         loop {
-            let (mut session, board) = self.session();
-            let mut end = None;
-            while end.is_none() {
-                let Some(step) = steps.next().filter(|_| last.is_ok()) else { return last };
-                (last, end) = upload_step(&mut session, &board, *step);
+            let (last, _) = self.session().upload(steps.by_ref());
+            if last.is_err() || steps.len() == 0 {
+                return last;
             }
         }
     }
 
     /// Uploads `blob`, and confirms it.
     pub fn install(&mut self, blob: &[u8]) -> Answer {
-        self.upload(&confirmed_steps(blob))
+        self.upload(&[&trial_steps(blob)[..], &[UploadStep::Confirm]].concat())
     }
 
     /// Its board's journal, for the next start.

@@ -8,8 +8,8 @@ use taxel_firmware::store::{Journal, KeepError, Kind};
 
 use super::bench::{Bench, Memory, quiet};
 use super::board::Board;
-use super::flash::{Cells, Flash, Supply};
-use super::host::{Answer, Running, model, model_crc, undo};
+use super::flash::{Flash, Supply};
+use super::host::{Answer, Host};
 use super::models::crc_of;
 
 /// The answer to a confirmation of `blob`.
@@ -31,7 +31,7 @@ pub struct Device {
 }
 
 /// What a device's flash holds.
-pub struct Snapshot([Cells; 4]);
+pub type Snapshot = ([Flash; 2], Journal<Flash>);
 
 impl Device {
     /// A device with these slots.
@@ -47,16 +47,13 @@ impl Device {
     }
 
     /// What its flash holds.
-    pub fn snapshot(&mut self) -> Snapshot {
-        let [one, other] = self.journal.pages();
-        let [first, second] = &self.slots;
-        Snapshot([first, second, one, other].map(Flash::cells))
+    pub fn snapshot(&self) -> Snapshot {
+        (self.slots.clone(), self.journal.clone())
     }
 
     /// Puts back what its flash held.
-    pub fn restore(&mut self, Snapshot(cells): &Snapshot) {
-        let flashes = self.slots.iter_mut().chain(self.journal.pages());
-        flashes.zip(cells).for_each(|(flash, cells)| flash.restore(cells));
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        (self.slots, self.journal) = snapshot.clone();
     }
 
     /// Switches the power on, and lets weak bits settle.
@@ -84,11 +81,8 @@ impl Device {
     }
 
     /// Starts it, and does `work` in its session.
-    pub fn session<T>(&mut self, work: impl FnOnce(&mut Running<'_, '_>, &Board) -> T) -> T {
-        self.start(|bench| {
-            let (mut session, board) = bench.session();
-            work(&mut session, &board)
-        })
+    pub fn session<T>(&mut self, work: impl FnOnce(&mut Host<'_, '_>) -> T) -> T {
+        self.start(|bench| work(&mut bench.session()))
     }
 
     /// Whether the power was cut since the last start.
@@ -98,12 +92,12 @@ impl Device {
 
     /// CRC-32 of the model that is in force after a restart.
     pub fn restart(&mut self) -> Option<u32> {
-        self.session(model_crc)
+        self.model().map(|model| model.crc_32)
     }
 
     /// The model in force.
     pub fn model(&mut self) -> Option<ModelIdentity> {
-        self.session(model)
+        self.start(|bench| bench.session().model())
     }
 
     /// Carries out these steps of an upload, until one is refused; returns the last answer.
@@ -114,11 +108,6 @@ impl Device {
     /// Uploads `blob`, and confirms it.
     pub fn install(&mut self, blob: &[u8]) -> Answer {
         self.start(|bench| bench.install(blob))
-    }
-
-    /// Leaves the model with the CRC-32 `left` for the one before it.
-    pub fn undo(&mut self, left: u32) -> Answer {
-        self.session(|session, board| undo(session, board, left).0)
     }
 
     /// Keeps `bytes` in the journal, past the application.

@@ -72,20 +72,14 @@ impl Supply {
     }
 }
 
-/// What the cells of a flash hold.
-#[derive(Clone)]
-pub struct Cells {
-    words: Vec<u32>,
-    /// Bits that read as 0 or 1, anew after each start.
-    weak: Vec<u32>,
-    has_weak: bool,
-}
-
 /// Flash that is erased as a whole: a model slot, or a page of the journal. A clone is another chip with the same
 /// content, on the same power.
 #[derive(Clone)]
 pub struct Flash {
-    cells: Cells,
+    words: Vec<u32>,
+    /// Bits that read as 0 or 1, anew after each start.
+    weak: Vec<u32>,
+    has_weak: bool,
     supply: Rc<RefCell<Supply>>,
     /// Mean time in s between erases that it endures; 0 for ever.
     pub erase_interval_s: u32,
@@ -101,10 +95,15 @@ impl Flash {
 
     /// Erased flash of so many `bytes`.
     pub fn erased(bytes: usize, supply: &Rc<RefCell<Supply>>) -> Self {
-        let words = bytes / 4;
-        let cells = Cells { words: vec![u32::MAX; words], weak: vec![0; words], has_weak: false };
-        let supply = supply.clone();
-        Self { cells, supply, erase_interval_s: 0, erases: 0, words_written: 0 }
+        Self {
+            words: vec![u32::MAX; bytes / 4],
+            weak: vec![0; bytes / 4],
+            has_weak: false,
+            supply: supply.clone(),
+            erase_interval_s: 0,
+            erases: 0,
+            words_written: 0,
+        }
     }
 
     /// A pair of erased flashes of so many `bytes`, with one power supply.
@@ -142,33 +141,23 @@ impl Flash {
         self.supply.clone()
     }
 
-    /// What it holds, to be put back by [`Flash::restore`].
-    pub fn cells(&self) -> Cells {
-        self.cells.clone()
-    }
-
-    /// Puts back what it held.
-    pub fn restore(&mut self, cells: &Cells) {
-        self.cells.clone_from(cells);
-    }
-
     /// Puts `bytes` at `offset`, as a programmer does: without regard to what was there.
     pub fn flash(&mut self, offset: usize, bytes: &[u8]) {
-        let all: &mut [u8] = bytemuck::cast_slice_mut(&mut self.cells.words);
+        let all: &mut [u8] = bytemuck::cast_slice_mut(&mut self.words);
         all[offset..offset + bytes.len()].copy_from_slice(bytes);
     }
 
     /// Flips `bits` of word `place`, as an old cell does.
     pub fn decay(&mut self, place: usize, bits: u32) {
-        self.cells.words[place] ^= bits;
+        self.words[place] ^= bits;
     }
 
     /// Lets weak bits settle, as they do at a start: each by itself, or those of a word alike, the old one or the new.
     pub fn settle(&mut self) {
-        if self.cells.has_weak {
+        if self.has_weak {
             let mut supply = self.supply.borrow_mut();
             let are_alike = supply.below(2) == 0;
-            for (word, weak) in self.cells.words.iter_mut().zip(&self.cells.weak) {
+            for (word, weak) in self.words.iter_mut().zip(&self.weak) {
                 let any = supply.random.next_u32();
                 let bits = match any % 4 {
                     0 if are_alike => 0,
@@ -184,8 +173,8 @@ impl Flash {
     fn tear(&mut self, supply: &mut Supply) {
         let halvings = [1, 5, 9, 14][supply.below(4) as usize];
         let (is_early, has_weak) = (supply.below(2) == 0, supply.below(2) == 0);
-        self.cells.has_weak |= has_weak;
-        for (word, weak) in self.cells.words.iter_mut().zip(&mut self.cells.weak) {
+        self.has_weak |= has_weak;
+        for (word, weak) in self.words.iter_mut().zip(&mut self.weak) {
             let some = supply.sparse(halvings);
             if has_weak {
                 *weak = (*weak | !*word) & some;
@@ -203,7 +192,7 @@ impl Slot for Flash {
     }
 
     fn bytes(&self) -> &[u8] {
-        bytemuck::cast_slice(&self.cells.words)
+        bytemuck::cast_slice(&self.words)
     }
 
     fn erase(&mut self) -> Result<(), FlashError> {
@@ -219,9 +208,9 @@ impl Slot for Flash {
             }
             Course::Whole => {}
         }
-        self.cells.words.fill(u32::MAX);
-        self.cells.weak.fill(0);
-        self.cells.has_weak = false;
+        self.words.fill(u32::MAX);
+        self.weak.fill(0);
+        self.has_weak = false;
         Ok(())
     }
 
@@ -231,8 +220,7 @@ impl Slot for Flash {
             self.words_written += 1;
             let wanted = u32::from_le_bytes(*bytes);
             let mut supply = self.supply.borrow_mut();
-            let Cells { words, weak, has_weak } = &mut self.cells;
-            let (word, weak) = (&mut words[place], &mut weak[place]);
+            let (word, weak) = (&mut self.words[place], &mut self.weak[place]);
             assert!(*word == u32::MAX || wanted == 0, "word {place} is not erased");
             match supply.operate() {
                 Course::Nowhere => return Err(FlashError),
@@ -243,7 +231,7 @@ impl Slot for Flash {
                     let some = [u32::MAX, supply.random.next_u32(), one];
                     *weak |= change & some[supply.below(3) as usize];
                     *word = wanted;
-                    *has_weak = true;
+                    self.has_weak = true;
                     return Err(FlashError);
                 }
                 Course::Torn => {

@@ -1,26 +1,32 @@
 //! The host's side of the link.
 
-use taxel_core::blob::Model;
+use std::cell::{Ref, RefMut};
+
+use taxel_core::blob::{Floats, Model};
 use taxel_firmware::app::{Session, SessionEnd};
 use taxel_firmware::link::message::{
-    ModelIdentity, Refusal, Report, Request, Statistics, UploadState, UploadStep,
+    Configuration, EstimateReport, ModelIdentity, Refusal, Report, Request, Statistics,
+    UploadState, UploadStep,
 };
 use taxel_firmware::link::receive::{Received, Receiver};
 use taxel_firmware::link::{cobs, packet};
 
-use super::board::Board;
+use super::board::{Board, Pins};
 use super::flash::Flash;
-use super::shape::ROWS;
+use super::shape::{ROWS, TestFrame};
 use super::source::Source;
 
-/// A session of an application in memory of any lifetime.
+/// A session of an application.
 pub type Running<'a, 'm> = Session<'a, 'm, Board, Source, Flash, ROWS>;
-
-/// A session of an application whose memory is never freed.
-pub type TestSession<'a> = Running<'a, 'static>;
 
 /// Number of the requests of [`ask`].
 const ASKED: u16 = 77;
+
+/// Length in bytes of the chunks of an upload.
+pub const CHUNK: usize = 60;
+
+/// A trial of whatever was uploaded.
+pub const TRY: UploadStep<'_> = UploadStep::Try { trial_ms: 60_000 };
 
 /// Answer to a step of an upload, or to an undo.
 pub type Answer = Result<UploadState, Refusal>;
@@ -40,163 +46,213 @@ pub fn framed(packet: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Passes each report in a device's bytes to `read`, with its number; returns what it first makes of one. What is no whole
-/// report is passed over.
-pub fn find_report<T>(
-    bytes: &[u8],
-    mut read: impl FnMut(u16, Report<'_>) -> Option<T>,
-) -> Option<T> {
-    let mut receiver = Receiver::new([0; 1024]);
-    bytes.iter().find_map(|byte| {
-        let Some(Received::Frame(bytes)) = receiver.push(*byte) else { return None };
-        let packet = packet::decode::<Report<'_>>(bytes).ok()?;
-        read(packet.number, packet.body)
-    })
-}
-
-/// Reports that the host finds in a device's bytes: the number and debug text of each.
-pub fn reports(bytes: &[u8]) -> Vec<(u16, String)> {
-    let mut receiver = Receiver::new([0; 1024]);
-    let mut reports = Vec::new();
-    for byte in bytes {
-        match receiver.push(*byte) {
-            Some(Received::Frame(bytes)) => {
-                let packet = packet::decode::<Report<'_>>(bytes).expect("a whole report");
-                reports.push((packet.number, format!("{:?}", packet.body)));
-            }
-            Some(other) => panic!("the device sent {other:?}"),
-            None => {}
-        }
-    }
-    reports
-}
-
-/// Runs turns of the loop until the device has read all bytes sent to it, or the session ends.
-pub fn settle(session: &mut Running<'_, '_>, board: &Board) -> Option<SessionEnd> {
-    while !board.pins.borrow().to_device.is_empty() {
-        if let Some(end) = session.step() {
-            return Some(end);
-        }
-    }
-    None
-}
-
-/// Sends `request` and passes the answer to `read`. All that the device has sent before is forgotten.
-pub fn ask<T>(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    request: &Request<'_>,
-    read: impl FnOnce(Report<'_>) -> T,
-) -> (T, Option<SessionEnd>) {
-    board.pins.borrow_mut().to_host.clear();
-    board.pins.borrow_mut().to_device.extend(request_bytes(ASKED, request));
-    let end = settle(session, board);
-    let answer = std::mem::take(&mut board.pins.borrow_mut().to_host);
-    let mut read = Some(read);
-    let found = find_report(&answer, |number, report| {
-        if number == ASKED { read.take().map(|read| read(report)) } else { None }
-    });
-    let found = found.unwrap_or_else(|| panic!("no answer in {:?}", reports(&answer)));
-    (found, end)
-}
-
 /// What the device answers to a request, which is as in the pattern.
 macro_rules! answer {
-    ($session:expr, $board:expr, $request:expr, $report:pat => $value:expr) => {
-        crate::mock::ask($session, $board, $request, |report| match report {
-            $report => $value,
-            other => panic!("{other:?}"),
-        })
-        .0
+    ($host:expr, $request:expr, $report:pat => $value:expr) => {
+        $host
+            .ask($request, |report| match report {
+                $report => $value,
+                other => panic!("{other:?}"),
+            })
+            .0
     };
 }
 pub(crate) use answer;
 
-/// Sends `request`, whatever the answer.
-pub fn tell(session: &mut Running<'_, '_>, board: &Board, request: &Request<'_>) {
-    ask(session, board, request, |_| ());
+/// A host of a device in a session, and what the device is connected to.
+pub struct Host<'a, 'm> {
+    pub session: Running<'a, 'm>,
+    pub board: Board,
 }
 
-/// Sends `request` with this number, and lets the device read it.
-pub fn send(session: &mut Running<'_, '_>, board: &Board, number: u16, request: &Request<'_>) {
-    board.pins.borrow_mut().to_device.extend(request_bytes(number, request));
-    settle(session, board);
-}
-
-/// Runs so many turns of the loop.
-pub fn turn(session: &mut Running<'_, '_>, times: u32) {
-    for _ in 0..times {
-        session.step();
+impl Host<'_, '_> {
+    /// State of the board.
+    pub fn pins(&self) -> Ref<'_, Pins> {
+        self.board.pins.borrow()
     }
-}
 
-/// Runs turns of the loop until this time.
-pub fn run_until(session: &mut Running<'_, '_>, board: &Board, end_us: u32) {
-    while board.pins.borrow().now_us < end_us {
-        assert_eq!(session.step(), None);
+    /// The same, to be changed.
+    pub fn pins_mut(&self) -> RefMut<'_, Pins> {
+        self.board.pins.borrow_mut()
     }
-}
 
-/// The device's counters.
-pub fn statistics(session: &mut Running<'_, '_>, board: &Board) -> Statistics {
-    answer!(session, board, &Request::Statistics, Report::Statistics(it) => it)
-}
+    /// The frame that the sensor shows, in Ω.
+    pub fn frame(&self) -> RefMut<'_, TestFrame> {
+        self.board.frame.borrow_mut()
+    }
 
-/// The model in force.
-pub fn model(session: &mut Running<'_, '_>, board: &Board) -> Option<ModelIdentity> {
-    answer!(session, board, &Request::Identify, Report::Identity(identity) => identity.model)
-}
+    /// Runs a turn of the loop.
+    pub fn step(&mut self) -> Option<SessionEnd> {
+        self.session.step()
+    }
 
-/// The CRC-32 of the model in force.
-pub fn model_crc(session: &mut Running<'_, '_>, board: &Board) -> Option<u32> {
-    model(session, board).map(|model| model.crc_32)
-}
+    /// Runs so many turns of the loop.
+    pub fn turn(&mut self, times: u32) {
+        for _ in 0..times {
+            self.step();
+        }
+    }
 
-/// The first step of an upload of `blob`.
-pub fn begin(blob: &[u8]) -> UploadStep<'_> {
-    UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
-}
+    /// Runs turns of the loop until this time.
+    pub fn run_until(&mut self, end_us: u32) {
+        while self.pins().now_us < end_us {
+            assert_eq!(self.step(), None);
+        }
+    }
 
-/// The steps of an upload of `blob` in chunks of `chunk` bytes, until it is on trial.
-pub fn upload_steps(blob: &[u8], chunk: usize) -> Vec<UploadStep<'_>> {
-    let mut steps = vec![begin(blob)];
-    steps.extend(
-        blob.chunks(chunk)
-            .enumerate()
-            .map(|(i, bytes)| UploadStep::Chunk { offset: (i * chunk) as u32, bytes }),
-    );
-    steps.push(UploadStep::Try { trial_ms: 60_000 });
-    steps
-}
+    /// Runs turns of the loop for so many µs.
+    pub fn run_for(&mut self, us: u32) {
+        let now_us = self.pins().now_us;
+        self.run_until(now_us + us);
+    }
 
-/// The same in chunks of 100 bytes.
-pub fn trial_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
-    upload_steps(blob, 100)
-}
+    /// Lets so many µs pass, and runs a turn of the loop.
+    pub fn pass(&mut self, us: u32) -> Option<SessionEnd> {
+        let now_us = self.pins().now_us;
+        self.pins_mut().now_us = now_us.wrapping_add(us);
+        self.step()
+    }
 
-/// The same, and its confirmation.
-pub fn confirmed_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
-    let mut steps = trial_steps(blob);
-    steps.push(UploadStep::Confirm);
-    steps
-}
+    /// Runs turns of the loop until the device has read all bytes sent to it, or the session ends.
+    fn settle(&mut self) -> Option<SessionEnd> {
+        while !self.pins().to_device.is_empty() {
+            if let Some(end) = self.step() {
+                return Some(end);
+            }
+        }
+        None
+    }
 
-/// Carries out one step of an upload.
-pub fn upload_step(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    step: UploadStep<'_>,
-) -> (Answer, Option<SessionEnd>) {
-    ask(session, board, &Request::Upload(step), upload_answer)
-}
+    /// Passes each report that the device has sent to `read`, with its number; returns what it first makes of one. What is
+    /// no whole report is passed over.
+    pub fn find<T>(&self, mut read: impl FnMut(u16, Report<'_>) -> Option<T>) -> Option<T> {
+        let mut receiver = Receiver::new([0; 1024]);
+        self.pins().to_host.iter().find_map(|byte| {
+            let Some(Received::Frame(bytes)) = receiver.push(*byte) else { return None };
+            let packet = packet::decode::<Report<'_>>(bytes).ok()?;
+            read(packet.number, packet.body)
+        })
+    }
 
-/// Leaves the model with the CRC-32 `left` for the one before it.
-pub fn undo(
-    session: &mut Running<'_, '_>,
-    board: &Board,
-    left: u32,
-) -> (Answer, Option<SessionEnd>) {
-    ask(session, board, &Request::Undo { crc_32: left }, upload_answer)
+    /// Reports that the device has sent, all of them whole: the number and debug text of each.
+    pub fn reports(&self) -> Vec<(u16, String)> {
+        let mut reports = Vec::new();
+        self.find(|number, report| {
+            reports.push((number, format!("{report:?}")));
+            None::<()>
+        });
+        let frames = self.pins().to_host.split(|byte| *byte == cobs::END).count() - 1;
+        assert_eq!(reports.len(), frames, "{reports:?}");
+        reports
+    }
+
+    /// Debug texts of the reports with this number.
+    pub fn answers(&self, number: u16) -> Vec<String> {
+        let reports = self.reports().into_iter();
+        reports.filter(|(found, _)| *found == number).map(|(_, text)| text).collect()
+    }
+
+    /// Sends `request` and passes the answer to `read`. All that the device has sent before is forgotten, and so is the answer.
+    pub fn ask<T>(
+        &mut self,
+        request: &Request<'_>,
+        read: impl FnOnce(Report<'_>) -> T,
+    ) -> (T, Option<SessionEnd>) {
+        self.pins_mut().to_host.clear();
+        self.pins_mut().to_device.extend(request_bytes(ASKED, request));
+        let end = self.settle();
+        let mut read = Some(read);
+        let found =
+            self.find(
+                |number, report| {
+                    if number == ASKED { read.take().map(|read| read(report)) } else { None }
+                },
+            );
+        let found = found.unwrap_or_else(|| panic!("no answer in {:?}", self.reports()));
+        self.pins_mut().to_host.clear();
+        (found, end)
+    }
+
+    /// Sends `request`, whatever the answer.
+    pub fn tell(&mut self, request: &Request<'_>) {
+        self.ask(request, |_| ());
+    }
+
+    /// Brings a configuration into force.
+    pub fn configure(&mut self, configuration: Configuration) {
+        self.tell(&Request::Configure(configuration));
+    }
+
+    /// Sends `request` with this number, and lets the device read it.
+    pub fn send(&mut self, number: u16, request: &Request<'_>) {
+        self.pins_mut().to_device.extend(request_bytes(number, request));
+        self.settle();
+    }
+
+    /// What the device refuses `request` for.
+    pub fn refusal(&mut self, request: &Request<'_>) -> Refusal {
+        answer!(self, request, Report::Refused(refusal) => refusal)
+    }
+
+    /// What `read` makes of the answer to readings of a frame that began at `start_us`.
+    pub fn estimate<T>(
+        &mut self,
+        start_us: u64,
+        readings_ohm: &[f32],
+        read: impl FnOnce(EstimateReport<'_>) -> T,
+    ) -> T {
+        let readings_ohm = Floats::new(readings_ohm);
+        let request = Request::Decode { frame: 5, start_us, readings_ohm };
+        answer!(self, &request, Report::Estimate(it) => {
+            assert_eq!((it.frame, it.start_us), (5, start_us));
+            read(it)
+        })
+    }
+
+    /// Whether these readings are a contact.
+    pub fn is_contact(&mut self, readings_ohm: &[f32]) -> bool {
+        self.estimate(0, readings_ohm, |it| it.flags & EstimateReport::CONTACT != 0)
+    }
+
+    /// Brings a baseline into force.
+    pub fn set_baseline(&mut self, readings_ohm: &[f32]) {
+        self.tell(&Request::SetBaseline { readings_ohm: Floats::new(readings_ohm) });
+    }
+
+    /// The device's counters.
+    pub fn statistics(&mut self) -> Statistics {
+        answer!(self, &Request::Statistics, Report::Statistics(it) => it)
+    }
+
+    /// The model in force.
+    pub fn model(&mut self) -> Option<ModelIdentity> {
+        answer!(self, &Request::Identify, Report::Identity(identity) => identity.model)
+    }
+
+    /// The CRC-32 of the model in force.
+    pub fn model_crc(&mut self) -> Option<u32> {
+        self.model().map(|model| model.crc_32)
+    }
+
+    /// Carries out steps of an upload until one is refused or ends the session; returns the last answer, and the end.
+    pub fn upload<'s>(
+        &mut self,
+        steps: impl IntoIterator<Item = &'s UploadStep<'s>>,
+    ) -> (Answer, Option<SessionEnd>) {
+        let mut last = (Ok(UploadState::Idle), None);
+        for step in steps {
+            last = self.ask(&Request::Upload(*step), upload_answer);
+            if last.0.is_err() || last.1.is_some() {
+                break;
+            }
+        }
+        last
+    }
+
+    /// Leaves the model with the CRC-32 `left` for the one before it.
+    pub fn undo(&mut self, left: u32) -> (Answer, Option<SessionEnd>) {
+        self.ask(&Request::Undo { crc_32: left }, upload_answer)
+    }
 }
 
 fn upload_answer(report: Report<'_>) -> Answer {
@@ -205,4 +261,16 @@ fn upload_answer(report: Report<'_>) -> Answer {
         Report::Refused(refusal) => Err(refusal),
         other => panic!("{other:?}"),
     }
+}
+
+/// The first step of an upload of `blob`.
+pub fn begin(blob: &[u8]) -> UploadStep<'_> {
+    UploadStep::Begin { head: &blob[..Model::HEAD_BYTES] }
+}
+
+/// The steps of an upload of `blob`, until it is on trial.
+pub fn trial_steps(blob: &[u8]) -> Vec<UploadStep<'_>> {
+    let chunks = blob.chunks(CHUNK).enumerate();
+    let chunks = chunks.map(|(i, bytes)| UploadStep::Chunk { offset: (i * CHUNK) as u32, bytes });
+    [begin(blob)].into_iter().chain(chunks).chain([TRY]).collect()
 }

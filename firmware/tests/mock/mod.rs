@@ -15,15 +15,10 @@ mod bench;
 mod device;
 
 pub use bench::{Bench, every, quiet, started};
-pub use board::Board;
 pub use device::{Device, confirmed};
 pub use flash::{Flash, Supply};
 pub(crate) use host::answer;
-pub use host::{
-    Answer, Running, TestSession, ask, begin, find_report, framed, model, model_crc, reports,
-    request_bytes, run_until, send, statistics, tell, trial_steps, turn, undo, upload_step,
-    upload_steps,
-};
-pub use models::{blob, blob_of_features, blob_with_readings, crc_of};
-pub use row_model::blob_of_a_row;
+pub use host::{CHUNK, Host, TRY, begin, framed, request_bytes, trial_steps};
+pub use models::{blob, blob_of_features, blob_with, blob_with_readings, crc_of};
+pub use row_model::{blob_of_a_row, blob_of_names};
 pub use shape::{COLS, OUTPUTS, ROWS, TestFrame, frame_at_rest};

@@ -1,9 +1,9 @@
 //! Small models for this sensor.
 
 use taxel_core::AlignedBytes;
-use taxel_core::blob::{Front, Metadata, Model, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::blob::{Front, Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::projection::Projection;
-use taxel_core::rbf::{Network, Shape};
+use taxel_core::rbf::Shape;
 use taxel_core::reading_model::{ReadingModel, Sizes};
 
 use super::row_model::with_network;
@@ -11,12 +11,32 @@ use super::shape::{COLS, OUTPUTS, ROWS};
 
 /// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
-    let shape = Shape { inputs: COLS, centres, outputs: OUTPUTS };
-    with_network(shape, seed, |network| blob_with(network, None, false))
+    blob_of(seed, centres, false, None)
 }
 
-/// The blob of [`blob`] with a reading model, for readings relative to the baseline if `relative_inputs`. Its one component
-/// is of frames near 62 Ω, or near the baseline.
+/// The blob of `blob(3, 4)` for readings relative to the baseline if `relative_inputs`, with a reading model of this block.
+pub fn blob_with(relative_inputs: bool, reading_model: Option<(Sizes, &[f32])>) -> AlignedBytes {
+    let made = reading_model.map(|(sizes, block)| ReadingModel::new(sizes, block).unwrap());
+    blob_of(3, 4, relative_inputs, made)
+}
+
+fn blob_of(
+    seed: usize,
+    centres: usize,
+    relative_inputs: bool,
+    reading_model: Option<ReadingModel<'_>>,
+) -> AlignedBytes {
+    let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+    let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
+    with_network(Shape { inputs: COLS, centres, outputs: OUTPUTS }, seed, |network| {
+        let networks = [network];
+        let parts =
+            ModelParts { reading_model, ..ModelParts::new(&networks, &[0; ROWS], metadata) };
+        encode_to_vec(&parts).unwrap()
+    })
+}
+
+/// [`blob_with`] a reading model whose one component is of frames near 62 Ω, or near the baseline.
 pub fn blob_with_readings(relative_inputs: bool) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
@@ -32,23 +52,7 @@ pub fn blob_with_readings(relative_inputs: bool) -> AlignedBytes {
     ]
     .concat();
     let sizes = Sizes { readings, factors: 1, components: 1, outputs };
-    let reading_model = ReadingModel::new(sizes, &block).ok();
-    let blob = blob(3, 4);
-    let model = Model::decode(&blob).unwrap();
-    blob_with(model.networks().next().unwrap(), reading_model, relative_inputs)
-}
-
-fn blob_with(
-    network: Network<'_>,
-    reading_model: Option<ReadingModel<'_>>,
-    relative_inputs: bool,
-) -> AlignedBytes {
-    let shape = network.shape();
-    let shape = ModelShape { rows: ROWS, inputs: shape.inputs, outputs: shape.outputs };
-    let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
-    let networks = [network];
-    let parts = ModelParts { reading_model, ..ModelParts::new(&networks, &[0; ROWS], metadata) };
-    encode_to_vec(&parts).unwrap()
+    blob_with(relative_inputs, Some((sizes, &block)))
 }
 
 /// A blob of one network for both rows, behind a projection to so many `features`.

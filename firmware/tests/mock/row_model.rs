@@ -1,7 +1,7 @@
 //! A small model of one row.
 
 use taxel_core::AlignedBytes;
-use taxel_core::blob::{Metadata, ModelParts, ModelShape, encode_to_vec};
+use taxel_core::blob::{Columns, Metadata, ModelParts, ModelShape, encode_to_vec};
 use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
 
@@ -11,6 +11,12 @@ pub fn blob_of_a_row(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes 
     with_network(Shape { inputs, centres: 1, outputs }, 0, |network| {
         encode_to_vec(&ModelParts::new(&[network], &[0], metadata)).unwrap()
     })
+}
+
+/// The same whose readings have these names, one on each line.
+pub fn blob_of_names(names: &'static str, outputs: usize) -> AlignedBytes {
+    let shape = ModelShape { rows: 1, inputs: names.lines().count(), outputs };
+    blob_of_a_row(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
 }
 
 /// What `make` makes of a network of this shape, with an affine tail and numbers that depend on `seed`.

@@ -19,14 +19,12 @@ use taxel_firmware::link::{cobs, packet};
 #[expect(dead_code, unused_imports, reason = "the firmware's tests use all of it")]
 mod mock;
 
-use mock::{Board, Device, Flash, Running, blob, model_crc, request_bytes, upload_steps};
+use mock::{Device, Flash, Host, blob, request_bytes, trial_steps};
 
 /// Most starts of the device in one run.
 const MOST_STARTS: usize = 12;
 /// Most turns of the loop for the bytes of one step: far more than are needed.
 const MOST_TURNS: usize = 20_000;
-/// Length in bytes of the chunks of an upload.
-const CHUNK: usize = 60;
 /// Number of the requests of an upload.
 const NUMBER: u16 = 9;
 
@@ -39,7 +37,7 @@ fuzz_target!(|bytes: &[u8]| {
         // The journal has a power of its own, which is cut alike.
         let supply = device.journal.pages()[0].supply();
         supply.borrow_mut().on(device.cut_after);
-        let end = device.session(|session, board| Life { session, board }.run(&mut steps, &models));
+        let end = device.session(|host| Life { host }.run(&mut steps, &models));
         let ControlFlow::Continue(cut_after) = end else { return };
         device.cut_after = cut_after;
     }
@@ -77,8 +75,7 @@ macro_rules! same_again {
 
 /// A device from a start to the next.
 struct Life<'d, 'b, 'm> {
-    session: &'d mut Running<'b, 'm>,
-    board: &'d Board,
+    host: &'d mut Host<'b, 'm>,
 }
 
 impl Life<'_, '_, '_> {
@@ -135,52 +132,47 @@ impl Life<'_, '_, '_> {
                 let mut choices = bytes.iter().map(|byte| usize::from(*byte));
                 let model = &models[choices.next().unwrap_or(0) % models.len()];
                 let (from, count) = (choices.next().unwrap_or(0), choices.next().unwrap_or(255));
-                let steps = upload_steps(model, CHUNK).into_iter().skip(from).take(count);
+                let steps = trial_steps(model).into_iter().skip(from).take(count);
                 steps.map(Request::Upload).find_map(|it| self.send(request_bytes(NUMBER, &it)))
             }
-            7 => {
-                let mut pins = self.board.pins.borrow_mut();
-                pins.now_us = pins.now_us.wrapping_add(number_of(bytes));
-                drop(pins);
-                self.session.step()
-            }
+            7 => self.host.pass(number_of(bytes)),
             8 => {
                 // A host that takes a few bytes more, and then reads on.
-                self.board.pins.borrow_mut().room = Some(number_of(bytes) as usize % 512);
+                self.host.pins_mut().room = Some(number_of(bytes) as usize % 512);
                 let end = self.send(request_bytes(NUMBER, &Request::Statistics));
-                self.board.pins.borrow_mut().room = None;
+                self.host.pins_mut().room = None;
                 end
             }
             _ => {
-                let mut frame = self.board.frame.borrow_mut();
+                let mut frame = self.host.frame();
                 let readings = frame.as_flattened_mut().iter_mut();
                 readings
                     .zip(bytes.as_chunks().0)
                     .for_each(|(ohm, it)| *ohm = f32::from_le_bytes(*it));
                 drop(frame);
-                self.session.step()
+                self.host.step()
             }
         }
     }
 
     /// Sends bytes, and runs until the device has read them.
     fn send(&mut self, bytes: Vec<u8>) -> Option<SessionEnd> {
-        self.board.pins.borrow_mut().to_device.extend(bytes);
+        self.host.pins_mut().to_device.extend(bytes);
         let mut turns = 0;
-        while !self.board.pins.borrow().to_device.is_empty() {
-            if let Some(end) = self.session.step() {
+        while !self.host.pins().to_device.is_empty() {
+            if let Some(end) = self.host.step() {
                 return Some(end);
             }
             turns += 1;
             assert!(turns < MOST_TURNS, "the device reads no more");
         }
-        self.board.pins.borrow_mut().to_host.clear();
+        self.host.pins_mut().to_host.clear();
         None
     }
 
     /// Checks that the device answers, and has a model in force.
     fn answers(&mut self) {
-        assert!(model_crc(self.session, self.board).is_some(), "no model in force");
+        assert!(self.host.model_crc().is_some(), "no model in force");
     }
 }
 
