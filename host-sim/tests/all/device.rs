@@ -416,6 +416,53 @@ pub mod serial_port {
     }
 
     #[test]
+    fn what_a_device_is_unsure_of_is_recorded_as_the_host_computes_it() {
+        let folder = Folder::new("recorded_confidence");
+        let train = ["train", "contact", "-n", "1500", "--no-refine", "--centres", "6"];
+        folder.succeed(&[&train[..], &["--reading-model", "full", "-o", "c.bin"]].concat());
+        // Of five frames, two are like none of training.
+        let mut frames = super::frames();
+        frames[1..3].iter_mut().flatten().flatten().for_each(|ohm| *ohm *= 1.3);
+        let blob = ModelBlob::of_bytes(&std::fs::read(folder.path("c.bin")).unwrap()).unwrap();
+        let (port, near) = port_with(&blob, frames);
+        drop(near);
+        let record = ["link", &port, "record", "c.bin", "-n", "10", "-o", "log.csv"];
+        folder.succeed(&[&record[..], &["--readings"]].concat());
+        folder.succeed(&["decode", "c.bin", "log.csv", "--confidence", "-o", "host.csv"]);
+        let host = folder.read("host.csv");
+        let numbers = |line: &str| -> Vec<f32> {
+            line.split(',').map(|it| it.parse().unwrap_or(f32::NAN)).collect()
+        };
+        let known: Vec<Vec<f32>> = host.lines().skip(1).map(numbers).collect();
+        let outputs = 4;
+        for (what, columns) in [("deviations", 2 * outputs + 1), ("novelty", outputs + 1)] {
+            let found = folder.json(&[&record[..], &["--confidence", what]].concat());
+            assert_eq!(
+                (found["frames_novel"].as_u64(), found["frames"].as_u64()),
+                (Some(4), Some(10))
+            );
+            let text = folder.read("log.csv");
+            let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+            let all = host.lines().next().unwrap().split(',');
+            let named = |name: &&str| *name != "status" && names.contains(name);
+            assert_eq!(
+                (names.len(), all.filter(named).collect::<Vec<_>>()),
+                (columns, names.clone())
+            );
+            for line in text.lines().skip(1).map(numbers) {
+                // The host's columns that the device sends, outputs, deviations and novelty.
+                let same = |host: &Vec<f32>| {
+                    let deviations = &host[outputs..2 * outputs];
+                    let deviations = if what == "novelty" { &[] } else { deviations };
+                    let host = host[..outputs].iter().chain(deviations).chain([&host[2 * outputs]]);
+                    host.zip(&line).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
+                };
+                assert!(known.iter().any(same), "{line:?} {known:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_sensor_that_says_nothing_is_no_recording() {
         let folder = Folder::new("silent");
         let model = model(3);
