@@ -5,26 +5,6 @@ use serde_json::Value;
 use crate::common::{Folder, small_scene, tiny_scene};
 
 #[test]
-fn the_limit_falls_with_noise_and_with_more_rows() {
-    let folder = Folder::new("limit");
-    folder.write("scene.toml", small_scene());
-    let result = folder.json(&["limit", "scene.toml", "-n", "20", "--noise", "0.01,0.1"]);
-    let limits = result["limits"].as_array().unwrap();
-    // At each level both rows together, and each by itself.
-    assert_eq!((limits.len(), result["directions"].as_array().unwrap().len()), (6, 6));
-    let z = |line: usize| limits[line]["limit_dz_mm"].as_f64().unwrap();
-    for first in [0, 3] {
-        let apart = (0.5 * (z(first + 1).powi(2) + z(first + 2).powi(2))).sqrt();
-        assert!(z(first) < apart, "two rows tell more than one: {limits:?}");
-        let samples = |name: &str| limits[first][name].as_f64().unwrap();
-        let [least, median] = ["effective_samples", "effective_samples_median"].map(samples);
-        assert!(least > 30.0 && least < median, "{least} {median}");
-        assert_eq!(limits[first]["row_wires"], serde_json::json!([4, 5]));
-    }
-    assert!(z(0) < z(3), "less noise, less error");
-}
-
-#[test]
 fn models_are_judged_on_the_frames_of_the_limit() {
     let folder = Folder::new("limit-models");
     folder.write("scene.toml", small_scene());

@@ -21,7 +21,6 @@ mod manners;
 mod mat;
 mod log;
 mod measured;
-mod moving;
 mod options;
 #[cfg(unix)]
 mod output;

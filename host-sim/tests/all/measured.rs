@@ -97,64 +97,14 @@ fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing()
 }
 
 #[test]
-fn run_judges_a_csv_file_by_its_last_fifth_or_fold_or_another_file() {
+fn run_needs_frames_to_judge_by() {
     let folder = Folder::new("measured-run");
-    let all = lines(500);
-    write(&folder, "all.csv", &all);
-    write(&folder, "test.csv", &all[..80]);
-    write(&folder, "short.csv", &all[..4]);
-    let run = |file: &'static str, more: &[&'static str]| {
-        let usual =
-            ["run", file, "--inputs", "a,b", "--outputs", "y", "--no-refine", "--centres", "8"];
-        [&usual[..], more].concat()
-    };
-    let result = folder.json(&run("all.csv", &[]));
-    assert_eq!(
-        (&result["model"]["training_frames"], &result["model"]["test_frames"]),
-        (&400.into(), &100.into())
-    );
-    assert_eq!(result["data"]["test_choice"], "the last fifth");
-    let rmse = |decoder: usize| result["decoders"][decoder]["errors"][0]["rmse"].as_f64().unwrap();
-    assert!(rmse(0) < 0.5 * rmse(1) && rmse(1) < rmse(2), "{result}");
-    let page = folder.read("out/all/report.html");
-    assert!(page.contains("Data “all”") && page.contains("the last fifth"), "{page}");
-
-    let told = folder.json(&run("all.csv", &["--test", "test.csv"]));
-    assert_eq!(
-        (&told["model"]["training_frames"], &told["model"]["test_frames"]),
-        (&500.into(), &80.into())
-    );
-    let words = folder.succeed(&run("all.csv", &[]));
-    assert!(
-        words.contains("The model decodes y to ") && words.contains("Next: open out"),
-        "{words}"
-    );
-    let none = folder.fail(&run("short.csv", &[]), 2);
+    write(&folder, "all.csv", &lines(100));
+    write(&folder, "short.csv", &lines(4));
+    let usual = ["--inputs", "a,b", "--outputs", "y", "--no-refine", "--centres", "8"];
+    let fail = |words: &[&str]| folder.fail(&[words, &usual].concat(), 2);
+    let none = fail(&["run", "short.csv"]);
     assert!(none.contains("no frame to judge by"), "{none}");
-    let other = folder.fail(&run("all.csv", &["--test", "m.bin"]), 2);
+    let other = fail(&["run", "all.csv", "--test", "m.bin"]);
     assert!(other.contains("m.bin"), "{other}");
-}
-
-#[test]
-fn lines_left_out_are_counted_by_reason() {
-    let folder = Folder::new("measured-left-out");
-    let mut text = String::from("a,b,y,z\n");
-    for (i, [a, b, y]) in lines(100).into_iter().enumerate() {
-        let b = if i % 10 == 0 { String::new() } else { b.to_string() };
-        let z = if i % 20 == 1 { String::new() } else { y.to_string() };
-        let _ = writeln!(text, "{a},{b},{y},{z}");
-    }
-    text += "7,8\n7,8,9,10,11\n7,8,nine,10\n";
-    folder.write("gaps.csv", text);
-    let (printed, notes) = train(&folder, "gaps.csv", &["--json"]);
-    let note = "note: 10 of 100 lines of gaps.csv have a missing value and are skipped: 10 lack a reading (most often \
-                missing: b 10)";
-    assert!(notes.contains(note), "{notes}");
-    let cut = "note: 3 of 103 lines of gaps.csv are cut or garbled and are skipped (--strict refuses them); the first: \
-               line 102 has 2 fields; the header names 4\n";
-    assert!(notes.contains(cut), "{notes}");
-    let left_out = &json(&printed)["lines_left_out"];
-    assert_eq!(left_out["unreadable"]["lines"], 3);
-    assert_eq!(left_out["without_reading"], 10);
-    assert_eq!(left_out["missing_most"], serde_json::json!([["b", 10]]));
 }
