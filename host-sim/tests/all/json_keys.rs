@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::common::{Folder, small_scene, small_scene_with_table1, tiny_scene};
 
 /// Commands of a study from its scene to its plans, one after the other in one folder.
-const COMMANDS: [&str; 95] = [
+const COMMANDS: [&str; 99] = [
     "synth scene.toml -n 200 -o data.csv",
     "forward scene.toml data.csv -o ideal.csv",
     "train scene.toml --reading-model full -o m.bin",
@@ -62,7 +62,7 @@ const COMMANDS: [&str; 95] = [
     "run odd.toml -o odd",
     "limit still.toml -n 3 -o still",
     "run slow.toml -o slow",
-    "trade slow.toml --centres 4 --average 20 --readout onchip --clock-mhz 90 --max-error 5 -o slow",
+    "trade slow.toml --centres 4 --average 20 --readout onchip --clock-mhz 90 --group all --max-error 5 -o slow",
     "synth slow.toml -n 60 --frame-rate 100 --scan-ms 6 -o slow.csv",
     "run alone.toml --reading-model full --relative-inputs -o alone",
     "limit alone.toml -n 4 --row 3 --noise 0.01,0.02 -o alone",
@@ -94,6 +94,10 @@ const COMMANDS: [&str; 95] = [
     "inspect g.bin",
     "synth flat.toml -n 60 -o flat.csv",
     "eval flat.bin flat.csv --without r1c2_ohm --html flat.html",
+    "decode flat.bin flat.csv --without r1c2_ohm --no-fill -o flat-e.csv",
+    "decode l.bin log.csv --limits 45,100 --filter-ms 40 -o limits.csv",
+    "run glide.toml --relative-inputs -o glide",
+    "run slow.toml --noise 0.1 --paper -o paper",
     "export flat.bin --c flatlib",
     "export g.bin --c glib",
     "export g.bin --rust g.rs",
@@ -215,13 +219,16 @@ fn prepared() -> Folder {
     folder.write("spans_drift.toml", drifts);
     folder.write("tiny.toml", tiny);
     let odd = include_str!("scenes/odd.toml");
+    let slow = include_str!("scenes/slow.toml");
+    let glide = slow.replace("seed = 5", "seed = 5\nothers = []");
+    let of_contact = "contact = [\"centre\"]";
+    let glide = glide.replace("quantity = \"force\"\naxes = [\"x\", \"z\"]", of_contact);
+    folder.write("glide.toml", glide);
     let still = odd.replace("[drift]\ngain = 0.05", "").replace("relative_inputs = true", "");
     let alone = include_str!("scenes/alone.toml");
     let flat = alone.replace("\"deformation\"\naxes", "\"force\"\naxes");
     let wider = alone.replace("15.0, 9.0, 4.0", "18.0, 12.0, 5.0").replace("[1, 3]", "[1, 2]");
-    for (name, scene) in
-        [("odd", odd), ("still", &still), ("slow", include_str!("scenes/slow.toml"))]
-    {
+    for (name, scene) in [("odd", odd), ("still", &still), ("slow", slow)] {
         folder.write(&format!("{name}.toml"), scene);
     }
     for (name, scene) in [("alone", alone), ("flat", &flat), ("wider", &wider)] {
