@@ -288,6 +288,31 @@ fn a_data_file_of_any_columns_is_decoded_by_its_model_and_a_line_of_numbers_too(
 }
 
 #[test]
+fn frames_of_another_firmware_are_shown_in_the_shape_that_is_given() {
+    let folder = Folder::new("view_flexitac");
+    let (name, near, mut far) = terminal();
+    drop(near);
+    std::thread::spawn(move || {
+        for _ in 0..2000 {
+            std::thread::sleep(Duration::from_millis(5));
+            let _ = far.write_all(&[0xAA, 0x55, 1, 2, 3, 4, 5, 250]);
+        }
+    });
+    let page = Page::of(&folder, &[&name, "--protocol", "flexitac", "--shape", "2x3"]);
+    let mut events = page.events();
+    let layout = events.any("layout");
+    assert_eq!([&layout["rows"], &layout["columns"]], [2, 3]);
+    assert_eq!(
+        (names(&layout, "readings")[3].as_str(), &layout["readings"][3]["unit"]),
+        ("r2c1_reading", &"counts".into())
+    );
+    assert_eq!(numbers(&events.any("frame")["readings"]), [1.0, 2.0, 3.0, 4.0, 5.0, 250.0]);
+    assert_eq!(numbers(&events.any("baseline")), [1.0, 2.0, 3.0, 4.0, 5.0, 250.0]);
+    events.next("status", |it| it["rest"] == "first steady frames");
+    page.end();
+}
+
+#[test]
 fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wrong() {
     let folder = Folder::new("view_reconnects");
     let port = folder.path("port");
