@@ -118,6 +118,18 @@ const COMMANDS: [&str; 99] = [
     "decode relative.bin gaps.csv --keep place --no-fill --last-share 0.4 --filter-ms 60 --period-ms 20 -o relative.csv",
 ];
 
+/// Commands that are refused, whose reasons have figures.
+const REFUSED: [&str; 8] = [
+    "trade alone.toml --centres 4 --frame-rate 20000 --max-latency-ms 0.9",
+    "trade alone.toml --centres 4 --column-step 1,2 --average 2 --max-latency-ms 0.05",
+    "trade alone.toml --centres 4 --max-error 0.09 --max-cycles 2000",
+    "trade alone.toml --centres 4 --max-cycles 20 --max-flash 90",
+    "trade gaps.csv --inputs ch* --outputs fz_n --scan-ms 2 --frame-rate 900 --centres 3 --no-refine",
+    "run gaps.csv --inputs ch* --outputs fz_n --last-share 0.6 --strict",
+    "run gaps.csv --inputs ch* --outputs fz_n --last-share 0.8 --time place",
+    "train gaps.csv --inputs ch* --outputs x_mm,fz_n --fold-column place --centres 900 -o x.bin",
+];
+
 /// Axes of all kinds, with prices, bounds and draws.
 const ALL: &str = "name = \"all\"\nscene = \"tiny.toml\"\nlimit_frames = 4\nrepeats = 2\nalso = [\"baselines\", \"other_contacts\"]\n\
                    objectives = [\"rmse_dz_mm\", \"frame_ms\", \"cost_eur\"]\n\
@@ -433,6 +445,11 @@ fn results_stay_as_they_are() {
             format!("    {key}  {}", few(values)).trim_end().to_owned() + "\n"
         }));
         printed.extend(["\n", command, "\n", &without_build(&text), &add_files(&result)]);
+    }
+    for command in REFUSED {
+        let said = folder.fail(&command.split(' ').collect::<Vec<_>>(), 2);
+        let why = said.lines().find(|line| line.starts_with("error: "));
+        printed.extend(["\n", command, "\n", why.unwrap(), "\n"]);
     }
     hold("json-keys.txt", &keys);
     hold("printed.txt", &printed);
