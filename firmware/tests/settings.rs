@@ -72,9 +72,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
             (circuit(), 40.0, true),
         ] {
             host.tell(&Request::SetConstants(circuit.constants()));
-            let mut frame = frame_at_rest();
-            frame[1][2] = ohm;
-            assert_eq!(host.is_contact(frame.as_flattened()), is_contact);
+            assert_eq!(host.is_contact(frame_with(1, 2, ohm).as_flattened()), is_contact);
         }
         for setting in Setting::ALL {
             ask_kept(host, &Request::Forget(setting));

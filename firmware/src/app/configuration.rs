@@ -66,35 +66,38 @@ impl Configuration {
 
 #[cfg(test)]
 mod tests {
+    use super::ConfigurationField as Field;
     use super::*;
 
     #[test]
     fn each_field_is_checked() {
-        let good = Configuration::DEFAULT;
-        assert_eq!(good.check(), Ok(()));
-        assert_eq!(Configuration { frame_period_us: 0, ..good }.check(), Ok(()));
-        let scan = |settling_us, oversampling| ScanSettings { settling_us, oversampling };
-        for (bad, field) in [
-            (Configuration { frame_period_us: 99, ..good }, ConfigurationField::FramePeriod),
-            (Configuration { frame_period_us: u32::MAX, ..good }, ConfigurationField::FramePeriod),
-            (Configuration { scan: scan(5_001, 1), ..good }, ConfigurationField::Settling),
-            (Configuration { scan: scan(0, 0), ..good }, ConfigurationField::Oversampling),
-            (Configuration { scan: scan(0, 257), ..good }, ConfigurationField::Oversampling),
-            (Configuration { open_above_ohm: 5.0, ..good }, ConfigurationField::Limits),
-            (Configuration { open_above_ohm: f32::NAN, ..good }, ConfigurationField::Limits),
-            (Configuration { shorted_below_ohm: f32::NAN, ..good }, ConfigurationField::Limits),
-            (
-                Configuration { contact_threshold: 0.0, ..good },
-                ConfigurationField::ContactThreshold,
-            ),
-            (
-                Configuration { filter_time_constant_us: 1_000_001, ..good },
-                ConfigurationField::FilterTimeConstant,
-            ),
-            (Configuration { filter_lead_us: 1_000_001, ..good }, ConfigurationField::FilterLead),
-            (Configuration { report_every: 0, ..good }, ConfigurationField::ReportEvery),
-        ] {
-            assert_eq!(bad.check(), Err(field), "{bad:?}");
+        let cases: [(fn(&mut Configuration), Result<(), Field>); 21] = [
+            (|_| (), Ok(())),
+            (|it| it.frame_period_us = 0, Ok(())),
+            (|it| it.frame_period_us = 99, Err(Field::FramePeriod)),
+            (|it| it.frame_period_us = 100, Ok(())),
+            (|it| it.frame_period_us = 1_000_000_001, Err(Field::FramePeriod)),
+            (|it| it.scan.settling_us = 5_000, Ok(())),
+            (|it| it.scan.settling_us = 5_001, Err(Field::Settling)),
+            (|it| it.scan.oversampling = 0, Err(Field::Oversampling)),
+            (|it| it.scan.oversampling = 256, Ok(())),
+            (|it| it.scan.oversampling = 257, Err(Field::Oversampling)),
+            (|it| it.open_above_ohm = it.shorted_below_ohm, Err(Field::Limits)),
+            (|it| it.open_above_ohm = f32::INFINITY, Ok(())),
+            (|it| it.open_above_ohm = f32::NAN, Err(Field::Limits)),
+            (|it| it.shorted_below_ohm = f32::NAN, Err(Field::Limits)),
+            (|it| it.contact_threshold = 0.0, Err(Field::ContactThreshold)),
+            (|it| it.contact_threshold = f32::INFINITY, Err(Field::ContactThreshold)),
+            (|it| it.filter_time_constant_us = 1_000_000, Ok(())),
+            (|it| it.filter_time_constant_us = 1_000_001, Err(Field::FilterTimeConstant)),
+            (|it| it.filter_lead_us = 1_000_000, Ok(())),
+            (|it| it.filter_lead_us = 1_000_001, Err(Field::FilterLead)),
+            (|it| it.report_every = 0, Err(Field::ReportEvery)),
+        ];
+        for (change, expected) in cases {
+            let mut configuration = Configuration::DEFAULT;
+            change(&mut configuration);
+            assert_eq!(configuration.check(), expected, "{configuration:?}");
         }
     }
 }

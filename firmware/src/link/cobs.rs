@@ -128,14 +128,11 @@ pub(super) mod tests {
     #[test]
     fn known_frames() {
         // Examples of the paper, and the usual corner cases at the longest run.
+        let longest: Vec<u8> = (1..=254).collect();
         assert_eq!(frame_of(&[]), [1, 0]);
         assert_eq!(frame_of(&[0]), [1, 1, 0]);
         assert_eq!(frame_of(&[1, 2, 0, 3]), [3, 1, 2, 2, 3, 0]);
-        let longest: Vec<u8> = (1..=254).collect();
-        let mut frame = vec![255];
-        frame.extend(&longest);
-        frame.push(0);
-        assert_eq!(frame_of(&longest), frame);
+        assert_eq!(frame_of(&longest), [&[255][..], &longest, &[0]].concat());
     }
 
     #[test]

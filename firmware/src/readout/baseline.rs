@@ -87,75 +87,58 @@ fn usable(ohm: f32) -> bool {
 mod tests {
     use super::*;
 
-    /// A baseline of frames of three readings.
-    fn baseline(memory: &mut [f32; 3]) -> Baseline<'_> {
-        let mut baseline = Baseline::new(memory);
+    /// A baseline of these frames.
+    fn of(frames: &[[f32; 3]]) -> Baseline<'static> {
+        let mut baseline = Baseline::new(Box::leak(Box::new([0.0; 4])));
         baseline.restart(3);
+        frames.iter().for_each(|frame| baseline.add(frame));
         baseline
     }
 
     #[test]
     fn the_mean_of_many_frames_is_theirs_to_the_last_digits() {
-        let mut memory = [0.0; 3];
-        let mut baseline = baseline(&mut memory);
-        baseline.add(&[60.0, 50.0, 40.0]);
-        baseline.add(&[62.0, 50.0, 41.0]);
+        let mut baseline = of(&[[60.0, 50.0, 40.0], [62.0, 50.0, 41.0]]);
         assert_eq!(baseline.mean(), [61.0, 50.0, 40.5]);
         baseline.restart(3);
-        let reading = |i: u16, k: f32| 55.0 + k + f32::from(i % 7) * 0.1;
-        for i in 0..7000 {
-            baseline.add(&[reading(i, 0.0), reading(i, 1.0), reading(i, 2.0)]);
+        for i in 0..7000_u16 {
+            baseline.add(&[55.0, 56.0, 57.0].map(|ohm| ohm + f32::from(i % 7) * 0.1));
         }
-        for (k, mean) in baseline.mean().iter().enumerate() {
-            let expected = 55.3 + k as f32;
+        for (mean, expected) in baseline.mean().iter().zip([55.3, 56.3, 57.3]) {
             assert!((mean / expected - 1.0).abs() < 1e-5, "{mean} instead of {expected}");
         }
     }
 
     #[test]
-    fn what_was_missing_once_stays_missing() {
+    fn what_is_not_known_is_compared_with_nothing() {
         for bad in [f32::NAN, f32::INFINITY, 0.0] {
             for place in 0..3 {
-                let mut memory = [0.0; 3];
-                let mut baseline = baseline(&mut memory);
-                for i in 0..3 {
-                    let first = if i == place { bad } else { 60.0 };
-                    baseline.add(&[first, 50.0, 40.0]);
-                }
+                let mut frames = [[60.0, 50.0, 40.0]; 3];
+                frames[place][0] = bad;
+                let baseline = of(&frames);
                 assert!(baseline.mean()[0].is_nan());
                 assert_eq!(baseline.mean()[1..], [50.0, 40.0]);
                 let deviation = baseline.largest_relative_deviation(&[1.0, 50.0, 30.0]);
                 assert_eq!(deviation, Some(0.25));
             }
         }
-    }
-
-    #[test]
-    fn nothing_known_is_no_deviation_at_all() {
-        let mut memory = [0.0; 3];
-        let mut baseline = baseline(&mut memory);
-        assert_eq!(baseline.largest_relative_deviation(&[60.0; 3]), None);
-        baseline.add(&[60.0; 3]);
-        assert_eq!(baseline.largest_relative_deviation(&[f32::NAN; 3]), None);
-        assert_eq!(baseline.largest_relative_deviation(&[60.0; 3]), Some(0.0));
-    }
-
-    #[test]
-    fn a_counter_at_its_end_changes_nothing_more() {
-        let mut memory = [60.0; 3];
-        let mut baseline = Baseline { memory: &mut memory, readings: 3, frames: u16::MAX };
-        baseline.add(&[1.0; 3]);
-        assert_eq!((baseline.mean(), baseline.frames()), (&[60.0; 3][..], u16::MAX));
+        let known = of(&[[60.0; 3]]);
+        assert_eq!(known.largest_relative_deviation(&[60.0; 3]), Some(0.0));
+        assert_eq!(known.largest_relative_deviation(&[f32::NAN; 3]), None);
+        assert_eq!(of(&[]).largest_relative_deviation(&[60.0; 3]), None);
     }
 
     #[test]
     fn a_kept_reading_that_means_nothing_is_missing() {
-        let mut memory = [0.0; 3];
-        let mut baseline = baseline(&mut memory);
+        let mut baseline = Baseline::new(Box::leak(Box::new([0.0; 4])));
         baseline.restore(Floats::new(&[60.0, 0.0, -1.0]), 7);
-        assert_eq!(
-            baseline.mean().iter().map(|ohm| ohm.is_nan()).collect::<Vec<_>>(),
-            [false, true, true]
-        );
+        let is_missing: Vec<_> = baseline.mean().iter().map(|ohm| ohm.is_nan()).collect();
+        assert_eq!((is_missing, baseline.frames()), (vec![false, true, true], 7));
+    }
+
+    #[test]
+    fn a_counter_at_its_end_changes_nothing_more() {
+        let mut baseline = Baseline { frames: u16::MAX, ..of(&[[60.0; 3]]) };
+        baseline.add(&[1.0; 3]);
+        assert_eq!((baseline.mean(), baseline.frames()), (&[60.0; 3][..], u16::MAX));
     }
 }

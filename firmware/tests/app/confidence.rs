@@ -42,9 +42,7 @@ fn decode(host: &mut Host<'_, '_>, frame: &TestFrame) -> (Sent, u8) {
 
 /// A frame that is like those of training, but for one reading.
 fn with_last(ohm: f32) -> TestFrame {
-    let mut frame = frame_at_rest();
-    frame[1][2] = ohm;
-    frame
+    frame_with(1, 2, ohm)
 }
 
 #[test]

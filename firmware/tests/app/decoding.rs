@@ -12,11 +12,9 @@ use crate::mock::*;
 fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
     let blob = blob(3, 4);
     let mut host = started(quiet(), &blob);
-    let mut frame = frame_at_rest();
-    let good = expected(&blob, &frame);
+    let good = expected(&blob, &frame_at_rest());
     for bad in [f32::NAN, 0.0, f32::INFINITY, 1.0, 2000.0, -60.0] {
-        frame[0][2] = bad;
-        let (flags, status, found) = decode(&mut host, &frame);
+        let (flags, status, found) = decode(&mut host, &frame_with(0, 2, bad));
         assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[1, 0][..]), "{bad}");
         assert!(found[..OUTPUTS].iter().all(|value| f32::from_bits(*value).is_nan()));
         assert_eq!(found[OUTPUTS..], good[OUTPUTS..]);
@@ -30,10 +28,8 @@ fn a_model_with_a_reading_model_decodes_rows_with_a_faulty_reading_and_tells_of_
     let sizes = Sizes { readings: 6, factors: 1, components: 0, outputs: ROWS * OUTPUTS };
     let filling = blob_with(false, Some((sizes, &block)));
     let mut host = started(quiet(), &filling);
-    let mut frame = frame_at_rest();
-    frame[0][2] = 2000.0;
-    let mut filled = frame;
-    filled[0][2] = f32::NAN;
+    let mut frame = frame_with(0, 2, 2000.0);
+    let mut filled = frame_with(0, 2, f32::NAN);
     let decoder = Decoder::<ROWS>::load(&filling).unwrap();
     assert_eq!(decoder.fill(filled.as_flattened_mut(), &[], &mut [0.0; 9]), 1);
     assert!((filled[0][2] - 62.0).abs() < 0.01, "{filled:?}");
@@ -61,13 +57,11 @@ fn without_a_model_or_with_a_frame_of_another_length_the_answer_says_so() {
 #[test]
 fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
     let mut host = started(quiet(), &blob(3, 4));
-    let mut frame = frame_at_rest();
     // The training range is 50 to 70 Ω, and an eighth of it more on either side is not clamped.
     for (reading, clamped) in
         [(47.6, false), (72.4, false), (47.4, true), (72.6, true), (900.0, true)]
     {
-        frame[1][2] = reading;
-        let (flags, ..) = decode(&mut host, &frame);
+        let (flags, ..) = decode(&mut host, &frame_with(1, 2, reading));
         assert_eq!(flags & EstimateReport::CLAMPED != 0, clamped, "{reading}");
     }
     assert_eq!(host.statistics().frames_clamped, 3);
