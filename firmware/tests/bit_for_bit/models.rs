@@ -43,7 +43,7 @@ fn hand_made() -> AlignedBytes {
     let mut words = || float32_words(&mut numbers, shape, true, 12);
     let (even, odd) = (words(), words());
     let networks = [&even, &odd].map(|words| network(Format::F32, shape, true, words));
-    encoded("hand-made", &[], &networks, &[0, 1, 0, 1, 0, 1, 0, 1])
+    encoded("hand-made", &[], &networks, &[0, 1, 0, 1, 0, 1, 0, 1], None)
 }
 
 fn row_shape(centres: usize) -> Shape {
@@ -61,7 +61,7 @@ fn of_format(format: Format) -> AlignedBytes {
         let (centres, affine) = kinds[index];
         network(format, row_shape(centres), affine, &words[index])
     });
-    encoded(format.name(), &[], &networks, &[0, 1, 0, 1, 0, 1, 0, 2])
+    encoded(format.name(), &[], &networks, &[0, 1, 0, 1, 0, 1, 0, 2], None)
 }
 
 /// A model of one network for all rows behind a projection, whose features vary about as much as single readings.
@@ -75,7 +75,7 @@ fn of_array(format: Format, centres: usize, affine: bool) -> AlignedBytes {
     let words = words_of(format, &mut numbers, shape, affine);
     let network = network(format, shape, affine, &words);
     let front = Front { outputs: shape.outputs, touch: None, projection };
-    encoded(format.name(), &[front], &[network], &[0; ARRAY_ROWS])
+    encoded(format.name(), &[front], &[network], &[0; ARRAY_ROWS], None)
 }
 
 /// The block of a projection with these `parts`, whose features are 60 where all inputs are the `middle`.
@@ -99,18 +99,16 @@ fn of_touch() -> AlignedBytes {
     let parts = draw(&mut numbers, (readings + 1) * COLS, 0.0, 10.0);
     let block = projection_block(0.0, &parts);
     let shape = row_shape(17);
-    let words = [Format::Fixed16, Format::F32].map(|it| words_of(it, &mut numbers, shape, true));
-    let networks = [
-        network(Format::Fixed16, shape, true, &words[0]),
-        network(Format::F32, shape, true, &words[1]),
-    ];
+    let formats = [Format::Fixed16, Format::F32];
+    let words = formats.map(|format| words_of(format, &mut numbers, shape, true));
+    let networks = [0, 1].map(|it| network(formats[it], shape, true, &words[it]));
     let kinds = [(Kind::Place, &of_places), (Kind::Amount, &of_amounts)];
     let fronts = kinds.map(|(kind, touch)| Front {
         outputs: OUTPUTS,
         touch: Touch::new(kind, touch).ok(),
         projection: Projection::new(readings + 1, COLS, &block).ok(),
     });
-    encoded("touch", &fronts, &networks, &[0; ARRAY_ROWS])
+    encoded("touch", &fronts, &networks, &[0; ARRAY_ROWS], None)
 }
 
 fn words_of(format: Format, numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
@@ -143,18 +141,12 @@ fn float32_words(numbers: &mut Numbers, shape: Shape, affine: bool, widths: usiz
     parameters.words().collect()
 }
 
-/// Middles of the training range in Ω, and numbers of units in 1 Ω.
-fn scaling(numbers: &mut Numbers) -> [Vec<f32>; 2] {
-    let midpoint = draw(numbers, COLS, 60.0, 1.0);
-    let mut per_unit = draw(numbers, COLS, UNITS / 7.5, UNITS / 75.0);
-    // A channel that never changed.
-    per_unit[COLS - 1] = 0.0;
-    [midpoint, per_unit]
-}
-
 fn fixed16_words(numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> {
     let Shape { centres, outputs, .. } = shape;
-    let [midpoint, per_unit] = scaling(numbers);
+    // Middles of the training range in Ω, and numbers of units in 1 Ω. One channel never changed.
+    let midpoint = draw(numbers, COLS, 60.0, 1.0);
+    let mut per_unit = draw(numbers, COLS, UNITS / 7.5, UNITS / 75.0);
+    per_unit[COLS - 1] = 0.0;
     let step = f64::from(HALF_RANGE) / f64::from(UNITS) * f64::from(UNITS_PER_STEP);
     let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
     let decay = (DECAY_PER_SPAN_SQUARED * step * step * 2_f64.powi(bits.cast_signed())) as u32;
@@ -169,13 +161,13 @@ fn fixed16_words(numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> 
                 centre.iter().map(|c| (-2.0 * per_step * f64::from(*c) / step) as i32).collect();
             let square: u64 = a.iter().map(|a| u64::from(a.unsigned_abs()).pow(2)).sum();
             words.push(((square << 32) / u64::from(decay)) as u32 + EXPONENT_MARGIN + 1);
-            words.extend(a.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
+            words.extend(pairs(&a));
         }
         // The scale leaves room for sums of at most 33 centres, the tail and the bias.
         for _ in 0..outputs {
             let mut weights = whole(numbers, here, 1200.0);
             weights.resize(CENTRES_AT_ONCE, 0);
-            words.extend(weights.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
+            words.extend(pairs(&weights));
         }
     }
     let tail = whole(numbers, if affine { COLS * outputs } else { 0 }, 600.0);
@@ -185,7 +177,7 @@ fn fixed16_words(numbers: &mut Numbers, shape: Shape, affine: bool) -> Vec<u32> 
         decay,
         bias: &whole(numbers, outputs, 1e8),
         output_scale: &draw(numbers, outputs, 2e-8, 1e-8),
-        affine: &tail.as_chunks::<2>().0.iter().map(|[l, h]| pair(*l, *h)).collect::<Vec<_>>(),
+        affine: &pairs(&tail).collect::<Vec<_>>(),
         centres: &words,
     };
     parameters.words().collect()
@@ -195,8 +187,10 @@ fn whole(numbers: &mut Numbers, count: usize, reach: f32) -> Vec<i32> {
     draw(numbers, count, 0.0, reach).iter().map(|value| *value as i32).collect()
 }
 
-fn pair(low: i32, high: i32) -> u32 {
-    (low as u32 & 0xFFFF) | (high as u32) << 16
+/// Numbers of 16 bits, two in each word.
+fn pairs(numbers: &[i32]) -> impl Iterator<Item = u32> {
+    let pairs = numbers.as_chunks::<2>().0.iter();
+    pairs.map(|[low, high]| (*low as u32 & 0xFFFF) | (*high as u32) << 16)
 }
 
 /// A small model of the small sensor, with a reading model.
@@ -208,19 +202,10 @@ fn of_readings() -> AlignedBytes {
     let mut block = vec![0.0; ARRAY_READINGS.block_floats()];
     write_reading_model(ARRAY_READINGS, &mut block, &mut numbers);
     let reading_model = ReadingModel::new(ARRAY_READINGS, &block).unwrap();
-    encoded_with("reading model", &[], &[network], &[0; ARRAY_ROWS], Some(reading_model))
+    encoded("reading model", &[], &[network], &[0; ARRAY_ROWS], Some(reading_model))
 }
 
 fn encoded(
-    name: &str,
-    fronts: &[Front<'_>],
-    networks: &[Network<'_>],
-    row_network: &[u8],
-) -> AlignedBytes {
-    encoded_with(name, fronts, networks, row_network, None)
-}
-
-fn encoded_with(
     name: &str,
     fronts: &[Front<'_>],
     networks: &[Network<'_>],
