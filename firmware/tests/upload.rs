@@ -53,24 +53,28 @@ fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_i
 fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_more() {
     let mut host = started(quiet(), &blob(1, 3));
     let good = blob(2, 4);
-    // Another number of rows, of inputs, another version, and heads that are cut.
-    for (length, place, byte, fault) in [
-        (16, 9, 3, ModelFault::Shape),
-        (16, 10, 4, ModelFault::Shape),
-        (16, 4, 9, ModelFault::NotABlob),
-        (16, 5, 16, ModelFault::Length),
-        (11, 0, b'T', ModelFault::NotABlob),
-        (1, 0, b'T', ModelFault::NotABlob),
+    let slot_bytes = Flash::SLOT_BYTES as u32;
+    // Another number of rows, of inputs, another version, no more than this head, too much, and heads that are cut.
+    let refused = Refusal::BadModel;
+    for (length, place, bytes, refusal) in [
+        (16, 9, &[3][..], refused(ModelFault::Shape)),
+        (16, 10, &[4], refused(ModelFault::Shape)),
+        (16, 4, &[9], refused(ModelFault::NotABlob)),
+        (16, 5, &[16, 0, 0, 0], refused(ModelFault::Length)),
+        (16, 5, &(slot_bytes + 1).to_le_bytes(), Refusal::TooLarge { slot_bytes }),
+        (11, 0, b"T", refused(ModelFault::NotABlob)),
+        (1, 0, b"T", refused(ModelFault::NotABlob)),
     ] {
         let mut head = good[..length].to_vec();
-        head[place] = byte;
-        if fault == ModelFault::Length {
-            head[6..9].fill(0); // no more than this head
-        }
+        head[place..][..bytes.len()].copy_from_slice(bytes);
         let (outcome, _) = host.upload(&[UploadStep::Begin { head: &head }]);
-        assert_eq!(outcome, Err(Refusal::BadModel(fault)), "{head:?}");
+        assert_eq!(outcome, Err(refusal), "{head:?}");
     }
     assert_eq!(host.statistics().slot_erases, 0);
+    // A blob may fill the slot.
+    let mut head = good[..16].to_vec();
+    head[5..9].copy_from_slice(&slot_bytes.to_le_bytes());
+    host.upload(&[UploadStep::Begin { head: &head }]).0.unwrap();
     for _ in 0..1000 {
         host.upload(&[begin(&good)]).0.unwrap();
     }
@@ -119,20 +123,6 @@ fn erases_are_limited_in_rate() {
 }
 
 #[test]
-fn a_blob_may_fill_the_slot() {
-    let mut host = started(quiet(), &[]);
-    let slot_bytes = Flash::SLOT_BYTES as u32;
-    let mut head = blob(1, 3)[..16].to_vec();
-    for (length, expected) in [
-        (slot_bytes + 1, Err(Refusal::TooLarge { slot_bytes })),
-        (slot_bytes, Ok(UploadState::Receiving { received: 0 })),
-    ] {
-        head[5..9].copy_from_slice(&length.to_le_bytes());
-        assert_eq!(host.upload(&[UploadStep::Begin { head: &head }]).0, expected);
-    }
-}
-
-#[test]
 fn each_fault_of_a_model_is_named() {
     let old = blob(1, 3);
     let mut host = started(quiet(), &old);
@@ -147,16 +137,14 @@ fn each_fault_of_a_model_is_named() {
         (&[&old[..], &[0; 4]].concat(), received(whole_chunks)),
         (&corrupt, Refusal::BadModel(ModelFault::Corrupt)),
     ] {
-        let (outcome, _) = host.upload(&trial_steps(blob));
-        assert_eq!(outcome, Err(refusal));
+        assert_eq!(host.upload(&trial_steps(blob)).0, Err(refusal));
     }
     // A blob that says another length than its upload did.
     let mut longer = old.clone();
     longer[5] += 4;
     let mut steps = trial_steps(&longer);
     steps[0] = begin(&old);
-    let (outcome, _) = host.upload(&steps);
-    assert_eq!(outcome, Err(Refusal::BadModel(ModelFault::Length)));
+    assert_eq!(host.upload(&steps).0, Err(Refusal::BadModel(ModelFault::Length)));
     assert_eq!(host.model_crc(), Some(crc_of(&old)));
 }
 
@@ -165,31 +153,27 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
     let (old, new) = (blob(1, 3), blob(2, 4));
     let steps = trial_steps(&new);
     let mut host = started(quiet(), &old);
-    let mut one = |step: &UploadStep<'_>| host.upload(&[*step]).0;
-
-    assert_eq!(one(&steps[1]), Err(Refusal::NoUpload));
-    assert_eq!(one(&TRY), Err(Refusal::NoUpload));
-    assert_eq!(one(&UploadStep::Confirm), Err(Refusal::NoUpload));
-    assert_eq!(one(&steps[0]), Ok(UploadState::Receiving { received: 0 }));
-    assert_eq!(one(&steps[2]), Err(Refusal::OutOfPlace { received: 0 }));
-    let received = CHUNK as u32;
-    for _ in 0..2 {
-        assert_eq!(one(&steps[1]), Ok(UploadState::Receiving { received })); // doubled
+    let receiving = |received| Ok(UploadState::Receiving { received });
+    let out_of_place = |received| Err(Refusal::OutOfPlace { received });
+    let chunk = |bytes| UploadStep::Chunk { offset: 60, bytes };
+    for (step, expected) in [
+        (steps[1], Err(Refusal::NoUpload)),
+        (TRY, Err(Refusal::NoUpload)),
+        (UploadStep::Confirm, Err(Refusal::NoUpload)),
+        (steps[0], receiving(0)),
+        (steps[2], out_of_place(0)),
+        (steps[1], receiving(60)),
+        (steps[1], receiving(60)), // doubled
+        (TRY, out_of_place(60)),
+        (UploadStep::Confirm, Err(Refusal::NoUpload)),
+        (chunk(&[1; 236]), Err(Refusal::Unknown)), // too long
+        (chunk(&[1; 3]), out_of_place(60)),        // no whole words
+        (chunk(&[1; 100]), receiving(160)),
+        (steps[0], receiving(0)), // begin anew
+    ] {
+        assert_eq!(host.upload(&[step]).0, expected, "{step:?}");
     }
-    assert_eq!(one(&TRY), Err(Refusal::OutOfPlace { received }));
-    assert_eq!(one(&UploadStep::Confirm), Err(Refusal::NoUpload));
-    let too_long = UploadStep::Chunk { offset: received, bytes: &[1; 236] };
-    assert_eq!(one(&too_long), Err(Refusal::Unknown));
-    for bytes in [&[1; 3][..], &[1; 100]] {
-        let chunk = UploadStep::Chunk { offset: received, bytes };
-        let beyond = received as usize + bytes.len() > new.len() || bytes.len() == 3;
-        assert_eq!(one(&chunk).is_err(), beyond);
-        assert!(one(&steps[0]).is_ok()); // begin anew
-        one(&steps[1]).unwrap();
-    }
-    for step in &steps[2..] {
-        one(step).unwrap();
-    }
-    let on_trial = UploadState::OnTrial { crc_32: crc_of(&new) };
-    assert_eq!(one(&TRY), Ok(on_trial)); // the answer was lost
+    let on_trial = Ok(UploadState::OnTrial { crc_32: crc_of(&new) });
+    assert_eq!(host.upload(&steps[1..]).0, on_trial);
+    assert_eq!(host.upload(&[TRY]).0, on_trial, "the answer was lost");
 }
